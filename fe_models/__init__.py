@@ -1,0 +1,1 @@
+"""Structures: geometry and meshes, elasticity, reduction to the interfaces, structural friction."""

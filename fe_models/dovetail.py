@@ -1,0 +1,103 @@
+"""Supports and loads of a dovetail joint, condensed onto its two flanks."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.constraints import Constraints
+from fe_models.elasticity import ElasticBody
+from fe_models.geometry.dovetail import Dovetail
+from fe_models.mesh import StructureMesh
+from fe_models.reduction import ConstrainedBody, interface_frames
+from fe_models.structure import Structure
+from sa_solver.types import Array, Material
+
+
+@dataclass(frozen=True)
+class Mission:
+    """One mission: the speed rises linearly to its peak and falls back to zero.
+
+    ``rotation_speed`` [rad/s] is reached at increment ``peak_at`` of ``increments``;
+    ``airfoil_mass`` [t] pulls with its centre at ``airfoil_radius`` [mm]; ``aerodynamic_moment``
+    [N mm] about the slot, at peak, presses on the intrados (X > 0). Both follow the square of the
+    speed.
+    """
+
+    increments: int
+    peak_at: int
+    rotation_speed: float
+    airfoil_mass: float
+    airfoil_radius: float
+    aerodynamic_moment: float
+
+    def speeds(self) -> Array:
+        """Rotation speed at the end of each increment, ``(increments,)`` [rad/s]."""
+        up = np.arange(1, self.peak_at + 1) / self.peak_at
+        down = np.arange(self.increments - self.peak_at - 1, -1, -1)
+        return self.rotation_speed * np.append(up, down / (self.increments - self.peak_at))
+
+    def amplitudes(self) -> Array:
+        """Amplitudes of the load cases, ``(increments, 2)``: Ω² [1/s²] and the moment [N mm]."""
+        squares = self.speeds() ** 2
+        peak = self.rotation_speed**2
+        return np.stack([squares, self.aerodynamic_moment * squares / peak], axis=1)
+
+
+def dovetail_structure(
+    dovetail: Dovetail,
+    mesh: StructureMesh,
+    disk: Material,
+    blade: Material,
+    mission: Mission,
+    order: int,
+) -> Structure:
+    """The two supported, loaded bodies of a dovetail; ``order`` is that of the tetrahedra."""
+    elastic_1 = ElasticBody(mesh.body_1, disk, order)
+    elastic_2 = ElasticBody(mesh.body_2, blade, order)
+    frames = interface_frames(mesh.interfaces)
+    nodes_1 = np.concatenate([i.nodes_1 for i in mesh.interfaces])
+    nodes_2 = np.concatenate([i.nodes_2 for i in mesh.interfaces])
+
+    held = Constraints(len(elastic_1.nodes))
+    held.hold(elastic_1.boundary_nodes("inner"))
+    held.slide(*elastic_1.boundary_normals("sides"))
+    centrifugal = elastic_1.centrifugal_load()
+    loads_1 = np.stack([centrifugal, np.zeros_like(centrifugal)], axis=1)
+
+    guided = Constraints(len(elastic_2.nodes))
+    root, weights = elastic_2.boundary_weights("root_bottom")
+    guided.zero_mean(root, weights, dovetail.slot_direction)
+    loads_2 = _blade_loads(elastic_2, dovetail, mission)
+
+    for constraints, elastic in ((held, elastic_1), (guided, elastic_2)):
+        for interface in mesh.interfaces:
+            constraints.average(*elastic.midsides(interface.name))
+
+    return Structure(
+        mesh=mesh,
+        body_1=ConstrainedBody(elastic_1, held, nodes_1, frames, loads_1),
+        body_2=ConstrainedBody(elastic_2, guided, nodes_2, frames, loads_2),
+        support_direction=dovetail.slot_direction,
+        support_point=weights @ elastic_2.nodes[root] / weights.sum(),
+    )
+
+
+def _blade_loads(blade: ElasticBody, dovetail: Dovetail, mission: Mission) -> Array:
+    """Load cases ``(3 n, 2)``: rotation at 1 rad/s with the airfoil's pull, and a unit moment."""
+    top = "shank_top"
+    axis = dovetail.load_axis
+    area = blade.boundary_integral(top, lambda x: np.ones_like(x[0]))
+    lever = blade.boundary_integral(top, lambda x: _lever(x, dovetail) ** 2)
+    pull = mission.airfoil_mass * mission.airfoil_radius / area
+    rotation = blade.traction_load(top, lambda x: np.full_like(x[0], pull), axis)
+    # A moment about the slot, as a radial traction that is linear across the shank.
+    moment = blade.traction_load(top, lambda x: _lever(x, dovetail) / lever, axis)
+    return np.stack([rotation + blade.centrifugal_load(), moment], axis=1)
+
+
+def _lever(points: Array, dovetail: Dovetail) -> Array:
+    """Distance from the plane through slot and load axis, of points ``(3, ...)``."""
+    across = np.cross(dovetail.slot_direction, dovetail.load_axis)
+    return np.einsum("a,a...->...", across, points)

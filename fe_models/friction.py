@@ -1,0 +1,103 @@
+"""Incremental Coulomb friction between two condensed bodies: stick, slip, separation per node.
+
+At each increment find the relative displacements w and the contact forces f = H w + f0 on body 2
+that obey, node by node, unilateral contact with the gap g + w_z and Coulomb's law for the slip
+since the previous increment. Solved by splitting: the only parameter is chosen from the extreme
+eigenvalues of H, and there is no penalty.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sl
+
+from fe_models.reduction import JointStiffness
+from sa_solver.contact_law import coulomb, unilateral
+from sa_solver.splitting import Splitting, douglas_rachford
+from sa_solver.types import Array
+
+# Out-of-balance forces left, relative to the forces of the load at hand.
+TOLERANCE = 1e-8
+# An unloaded increment is measured against this share of the largest load of the path.
+LOAD_FLOOR = 1e-3
+# The default joint needs 30 to 50 iterations per increment; hard ones a few hundred.
+MAX_ITERATIONS = 5000
+
+
+@dataclass(frozen=True)
+class FrictionState:
+    """State at the end of one increment, components in the interface frames.
+
+    ``force`` ``(3, n)`` on body 2 [N]; ``displacement`` ``(3, n)`` of body 2 relative to body 1 and
+    ``slip`` ``(2, n)`` its tangential part since the previous increment [mm].
+    """
+
+    force: Array
+    displacement: Array
+    slip: Array
+    residual: float
+    iterations: int
+    converged: bool
+
+
+class FrictionalJoint:
+    """A joint with friction coefficient µ, factorised once for any gaps and loads."""
+
+    def __init__(self, joint: JointStiffness, friction: float) -> None:
+        self._loads = joint.loads
+        self._friction = friction
+        self._rho = float(np.sqrt(joint.smallest * joint.largest))
+        shifted = joint.stiffness.copy()
+        shifted[np.diag_indices_from(shifted)] += self._rho
+        factor = sl.cholesky(shifted, lower=True, overwrite_a=True, check_finite=False)
+        inverse, _ = sl.lapack.dpotri(factor, lower=1, overwrite_c=1)
+        self._inverse = np.tril(inverse) + np.tril(inverse, -1).T
+
+    def march(self, amplitudes: Array, gap: Array) -> Iterator[FrictionState]:
+        """States along a load path ``(increments, cases)`` that starts unloaded and unslipped.
+
+        ``gap`` ``(n,)`` is the distance of the unloaded faces [mm].
+        """
+        loads = amplitudes @ self._loads.T
+        floor = LOAD_FLOOR * np.linalg.norm(loads, axis=1).max()
+        displacement = np.zeros((3, len(gap)))
+        start = np.zeros(3 * len(gap))
+        for load in loads:
+            scale = max(float(np.linalg.norm(load)), floor)
+            split = self._solve(load, gap, displacement, start, scale)
+            state = self._state(split, gap, displacement)
+            start, displacement = split.state, state.displacement
+            yield state
+
+    def _solve(
+        self, load: Array, gap: Array, previous: Array, start: Array, scale: float
+    ) -> Splitting:
+        rho, inverse = self._rho, self._inverse
+        offset = inverse @ load
+
+        def elastic(state: Array) -> Array:
+            return rho * (inverse @ state) - offset
+
+        def law(trial: Array) -> Array:
+            nodal = trial.reshape(-1, 3).T
+            return (nodal + self._force(nodal, gap, previous) / rho).T.ravel()
+
+        return douglas_rachford(elastic, law, start, scale / rho, TOLERANCE, MAX_ITERATIONS)
+
+    def _force(self, trial: Array, gap: Array, previous: Array) -> Array:
+        """Force that brings a trial displacement ``(3, n)`` back to the law, at stiffness ρ."""
+        pressure = unilateral(-self._rho * (gap + trial[2]))
+        shear = coulomb(self._rho * (previous[:2] - trial[:2]), self._friction * pressure)
+        return np.concatenate([shear, pressure[None]])
+
+    def _state(self, split: Splitting, gap: Array, previous: Array) -> FrictionState:
+        trial = (2.0 * split.elastic - split.state).reshape(-1, 3).T
+        force = self._force(trial, gap, previous)
+        displacement = split.law.reshape(-1, 3).T
+        slip = displacement[:2] - previous[:2]
+        return FrictionState(
+            force, displacement, slip, split.residual, split.iterations, split.converged
+        )

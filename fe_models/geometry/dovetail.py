@@ -1,0 +1,338 @@
+"""Blade root and disk sector of a dovetail joint, meshed with gmsh's OpenCASCADE kernel.
+
+Global axes: Z is radial (the load axis), Y the rotor axis, X completes them; the origin is on the
+rotor axis, in the middle of the slot. The section lies in planes Y = const and is extruded along
+the slot, which ``skew`` turns away from Y. It is mirrored about its middle, mesh included, so that
+a symmetric load gives a symmetric answer to rounding.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fe_models.gmsh_session import gmsh_model
+from fe_models.mesh import Body, MeshError, StructureMesh, matched_interface, named_mesh
+from sa_solver.types import Array, Frame
+
+# How fast the mesh size grows with the distance from the flanks.
+SIZE_GROWTH = 0.25
+# Slope at which the faces part beyond their rounded edges, where fillets and corners begin.
+PARTING_SLOPE = 1.0
+# gmsh's numbers for first-order elements.
+GMSH_TRIANGLE, GMSH_TETRAHEDRON = 2, 4
+
+Curve = tuple[str, list[tuple[float, float]]]
+
+
+@dataclass(frozen=True)
+class Dovetail:
+    """Parameters of the joint; lengths in mm, angles in radians.
+
+    ``flank_angle`` lies between flank and load axis. ``flank_length`` is the flat, ``edge_width``
+    the rounded part beyond it at either side (radius ``edge_radius``), ``end_width`` the rounded
+    part at the two slot ends (radius ``end_radius``), inside ``slot_length``. ``rim_radius`` is the
+    radius of the top of the flanks; ``lug_height`` the disk above it, ``disk_height`` below it;
+    ``root_depth`` the blade below the flanks, ``slot_clearance`` the play under the root.
+    """
+
+    flank_angle: float
+    flank_length: float
+    edge_radius: float
+    edge_width: float
+    end_radius: float
+    end_width: float
+    neck_width: float
+    neck_fillet: float
+    root_depth: float
+    shank_height: float
+    slot_length: float
+    slot_fillet: float
+    slot_clearance: float
+    lug_height: float
+    disk_height: float
+    rim_radius: float
+    blades: int
+    skew: float = 0.0
+
+    @property
+    def flank_width(self) -> float:
+        """Flat and both rounded edges, along the flank [mm]."""
+        return self.flank_length + 2.0 * self.edge_width
+
+    @property
+    def slot_direction(self) -> Array:
+        """Unit vector along the slot."""
+        return np.array([np.sin(self.skew), np.cos(self.skew), 0.0])
+
+    @property
+    def load_axis(self) -> Array:
+        """Unit vector of the blade's pull."""
+        return np.array([0.0, 0.0, 1.0])
+
+    def flank_ends(self) -> tuple[Array, Array]:
+        """Top and bottom of the flank in the right half of the section, ``(X, Z)``."""
+        sine, cosine = np.sin(self.flank_angle), np.cos(self.flank_angle)
+        tangent = self.neck_fillet * np.tan(0.5 * self.flank_angle)
+        top = np.array([0.5 * self.neck_width + tangent * sine, self.rim_radius])
+        return top, top + self.flank_width * np.array([sine, -cosine])
+
+    def flank_frame(self, side: int) -> Frame:
+        """Frame of the flank at X > 0 (``side`` 1) or X < 0 (``side`` -1)."""
+        top, bottom = self.flank_ends()
+        middle = 0.5 * (top + bottom)
+        uphill = self._uphill(side)
+        normal = np.cross(uphill, self.slot_direction)
+        normal *= -np.sign(normal[2]) / np.linalg.norm(normal)
+        along = self.slot_direction
+        x = np.cross(along, normal)
+        if x @ self.load_axis < 0.0:
+            along, x = -along, -x
+        return Frame(np.array([side * middle[0], 0.0, middle[1]]), np.array([x, along, normal]))
+
+    def _uphill(self, side: int) -> Array:
+        """Unit vector up the flank, within the section."""
+        return np.array([-side * np.sin(self.flank_angle), 0.0, np.cos(self.flank_angle)])
+
+    def flank_size(self, side: int = 1) -> tuple[float, float]:
+        """Extent of the flank along x and y of its frame [mm]; it is a parallelogram if skewed."""
+        frame = self.flank_frame(side)
+        edges = np.array(
+            [self.flank_width * self._uphill(side), self.slot_length * self.slot_direction]
+        )
+        extent = np.abs(frame.components(edges)[:, :2]).sum(axis=0)
+        return float(extent[0]), float(extent[1])
+
+    def flank_gap(self, x: Array, y: Array, side: int) -> Array:
+        """Distance of the unloaded, unworn faces at ``x``, ``y`` of the flank's frame [mm].
+
+        Zero on the flat, circular arcs on the rounded edges and ends, a slope beyond them.
+        """
+        frame = self.flank_frame(side)
+        up = frame.components(self._uphill(side))
+        # Oblique coordinates: along the section and along the slot.
+        across, along = x / up[0], y - x * up[1] / up[0]
+        return _rounding(
+            np.abs(across) * abs(up[0]), 0.5 * self.flank_width * abs(up[0]), self.edge_width,
+            self.edge_radius,
+        ) + _rounding(
+            np.abs(along) * abs(up[0]), 0.5 * self.slot_length * abs(up[0]), self.end_width,
+            self.end_radius,
+        )  # fmt: skip
+
+    def check(self) -> None:
+        """Raise :class:`MeshError` if the section cannot be drawn."""
+        top, bottom = self.flank_ends()
+        slot = bottom[1] - self.root_depth - self.slot_clearance
+        wall = bottom[0] + self.slot_fillet * (1.0 - np.cos(self.flank_angle))
+        tangent = np.tan(np.pi / self.blades)
+        if self.slot_fillet * np.sin(self.flank_angle) + self.slot_fillet > bottom[1] - slot:
+            raise MeshError(
+                f"slot_fillet {self.slot_fillet:g} mm is too large for root_depth + slot_clearance"
+                f" = {bottom[1] - slot:g} mm: make the fillet smaller or the root deeper"
+            )
+        if slot <= self.rim_radius - self.disk_height:
+            raise MeshError(
+                f"the slot is deeper ({self.rim_radius - slot:.4g} mm) than disk_height "
+                f"{self.disk_height:g} mm: increase disk_height"
+            )
+        if wall >= slot * tangent or top[0] >= (self.rim_radius + self.lug_height) * tangent:
+            raise MeshError(
+                f"the slot is wider ({2 * wall:.4g} mm) than the sector at its bottom "
+                f"({2 * slot * tangent:.4g} mm): fewer blades, a larger rim_radius or a narrower root"
+            )
+        if self.neck_fillet * np.tan(0.5 * self.flank_angle) * np.cos(
+            self.flank_angle
+        ) + self.neck_fillet * np.sin(self.flank_angle) >= self.shank_height:
+            raise MeshError("neck_fillet is taller than the shank: increase shank_height")
+
+    def mesh(self, flank_nodes: tuple[int, int], size: float) -> StructureMesh:
+        """Mesh both bodies: ``flank_nodes`` across and along each flank, ``size`` [mm] far away.
+
+        The disk is body 1, the blade body 2. Boundaries: ``intrados`` (X > 0) and ``extrados`` on
+        both; ``inner``, ``sides`` of the disk; ``root_bottom``, ``shank_top`` of the blade.
+        """
+        self.check()
+        disk = _mesh_body("disk", self.disk_section(), self, flank_nodes, size)
+        blade = _mesh_body("blade", self.blade_section(), self, flank_nodes, size)
+        interfaces = []
+        for name, side in (("intrados", 1), ("extrados", -1)):
+            face = matched_interface(name, disk, blade, name, self.flank_frame(side))
+            gap = self.flank_gap(*face.coordinates.T, side)
+            interfaces.append(matched_interface(name, disk, blade, name, face.frame, gap))
+        return StructureMesh(disk, blade, tuple(interfaces))
+
+    def blade_section(self) -> list[Curve]:
+        """Named curves round the right half of the blade; arcs are (start, centre, end)."""
+        top, bottom = self.flank_ends()
+        neck = 0.5 * self.neck_width
+        tangent = self.neck_fillet * np.tan(0.5 * self.flank_angle)
+        arc_z = top[1] + tangent * (np.cos(self.flank_angle) + 1.0)
+        low, high = bottom[1] - self.root_depth, top[1] + self.shank_height
+        return _chain(
+            [
+                ("root_bottom", (0.0, low)),
+                ("", (bottom[0], low)),
+                ("flank", tuple(bottom)),
+                ("", tuple(top), (neck + self.neck_fillet, arc_z)),
+                ("", (neck, arc_z)),
+                ("shank_top", (neck, high)),
+                ("middle", (0.0, high)),
+            ]
+        )
+
+    def disk_section(self) -> list[Curve]:
+        """Named curves round the right half of the disk sector; arcs are (start, centre, end)."""
+        top, bottom = self.flank_ends()
+        radius = self.slot_fillet
+        sine, cosine = np.sin(self.flank_angle), np.cos(self.flank_angle)
+        wall = bottom[0] + radius * (1.0 - cosine)
+        slot = bottom[1] - self.root_depth - self.slot_clearance
+        inner, outer = self.rim_radius - self.disk_height, self.rim_radius + self.lug_height
+        tangent = np.tan(np.pi / self.blades)
+        return _chain(
+            [
+                ("inner", (0.0, inner)),
+                ("sides", (inner * tangent, inner)),
+                ("", (outer * tangent, outer)),
+                ("", (top[0], outer)),
+                ("flank", tuple(top)),
+                ("", tuple(bottom), (wall - radius, bottom[1] - radius * sine)),
+                ("", (wall, bottom[1] - radius * sine)),
+                ("", (wall, slot + radius), (wall - radius, slot + radius)),
+                ("", (wall - radius, slot)),
+                ("middle", (0.0, slot)),
+            ]
+        )
+
+
+def _rounding(distance: Array, half: float, width: float, radius: float) -> Array:
+    """Drop of a circular arc that begins ``width`` before ``half``, and of the slope beyond it."""
+    into = np.clip(distance - (half - width), 0.0, width)
+    beyond = np.maximum(distance - half, 0.0)
+    return into**2 / (radius + np.sqrt(radius**2 - into**2)) + PARTING_SLOPE * beyond
+
+
+def _chain(corners: list[Any]) -> list[Curve]:
+    """Curves between consecutive corners; a third entry is the centre of the arc that follows."""
+    following = corners[1:] + corners[:1]
+    return [
+        (corner[0], [corner[1], *corner[2:], after[1]])
+        for corner, after in zip(corners, following, strict=True)
+    ]
+
+
+def _mesh_body(
+    name: str, section: list[Curve], dovetail: Dovetail, flank_nodes: tuple[int, int], size: float
+) -> Body:
+    """Mesh one body in a gmsh model of its own.
+
+    Two bodies in one model would share the nodes of their flanks: gmsh finds the nodes of an
+    extruded mesh by their place.
+    """
+    slot = dovetail.slot_length * dovetail.slot_direction
+    with gmsh_model(name) as gmsh:
+        model = gmsh.model
+        surfaces, named = _draw_halves(model.occ, section, -0.5 * slot)
+        model.occ.synchronize()
+        for curve in named["flank"]:
+            model.mesh.setTransfiniteCurve(curve, flank_nodes[0])
+        _set_sizes(gmsh, named["flank"], dovetail.flank_width / (flank_nodes[0] - 1), size)
+        _mirror_mesh(model, surfaces, -0.5 * slot[0])
+        halves = [(2, surface) for surface in surfaces]
+        extruded = model.occ.extrude(halves, *slot, numElements=[flank_nodes[1] - 1])
+        model.occ.synchronize()
+        _name_groups(model, name, [tag for dim, tag in extruded if dim == 3], named, surfaces)
+        model.mesh.generate(3)
+        return _read_body(gmsh, name)
+
+
+def _draw_halves(
+    occ: Any, section: list[Curve], start: Array
+) -> tuple[list[int], dict[str, list[int]]]:
+    """Draw the right and the left half of a section; return their surfaces and named curves."""
+    points: dict[tuple[float, float], int] = {}
+    named: dict[str, list[int]] = {}
+    surfaces = []
+
+    def point(x: float, z: float) -> int:
+        if (x, z) not in points:
+            points[x, z] = occ.addPoint(start[0] + x, start[1], z)
+        return points[x, z]
+
+    for side in (1.0, -1.0):
+        loop = []
+        for name, corners in section:
+            if name == "middle" and "middle" in named:
+                loop += named["middle"]
+                continue
+            tags = [point(side * x, z) for x, z in corners]
+            curve = occ.addLine(*tags) if len(tags) == 2 else occ.addCircleArc(*tags)
+            named.setdefault(name, []).append(curve)
+            loop.append(curve)
+        surfaces.append(occ.addPlaneSurface([occ.addCurveLoop(loop)]))
+    return surfaces, named
+
+
+def _set_sizes(gmsh: Any, flanks: list[int], fine: float, coarse: float) -> None:
+    """Mesh size: ``fine`` on the flanks, growing with the distance from them up to ``coarse``."""
+    field = gmsh.model.mesh.field
+    distance = field.add("Distance")
+    field.setNumbers(distance, "CurvesList", flanks)
+    field.setNumber(distance, "Sampling", 200)
+    growing = field.add("MathEval")
+    field.setString(growing, "F", f"{fine!r} + {SIZE_GROWTH!r} * F{distance}")
+    field.setAsBackgroundMesh(growing)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", coarse)
+    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+    gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
+
+
+def _mirror_mesh(model: Any, surfaces: list[int], middle: float) -> None:
+    """Make the mesh of the left half the mirror image of the right half's, about X = middle."""
+    mirror = np.diag([-1.0, 1.0, 1.0, 1.0])
+    mirror[0, 3] = 2.0 * middle
+    model.mesh.setPeriodic(2, [surfaces[1]], [surfaces[0]], mirror.ravel().tolist())
+
+
+def _name_groups(
+    model: Any, body: str, volumes: list[int], named: dict[str, list[int]], sections: list[int]
+) -> None:
+    """Name the body and the faces that its named section curves have swept."""
+    model.addPhysicalGroup(3, volumes, name=body)
+    right, left = named["flank"]
+    groups = {"intrados": [right], "extrados": [left]}
+    groups |= {name: curves for name, curves in named.items() if name not in ("", "middle", "flank")}
+    for name, curves in groups.items():
+        beside = np.concatenate([model.getAdjacencies(1, curve)[0] for curve in curves])
+        swept = np.setdiff1d(beside, sections)
+        model.addPhysicalGroup(2, swept.tolist(), name=f"{body}_{name}")
+
+
+def _read_body(gmsh: Any, name: str) -> Body:
+    """The body of that name with its named boundaries, its vertices numbered from zero."""
+    model = gmsh.model
+    names = {model.getPhysicalName(dim, tag): (dim, tag) for dim, tag in model.getPhysicalGroups()}
+
+    def elements(group: str, element_type: int, corners: int) -> NDArray[np.int64]:
+        dim, tag = names[group]
+        nodes = [
+            model.mesh.getElementsByType(element_type, entity)[1]
+            for entity in model.getEntitiesForPhysicalGroup(dim, tag)
+        ]
+        return np.concatenate(nodes).reshape(-1, corners).astype(np.int64)
+
+    tets = elements(name, GMSH_TETRAHEDRON, 4)
+    boundaries = {
+        group.removeprefix(f"{name}_"): elements(group, GMSH_TRIANGLE, 3)
+        for group in names
+        if group.startswith(f"{name}_")
+    }
+    used = np.unique(tets)
+    tags, points, _ = model.mesh.getNodes()
+    points = points.reshape(-1, 3)[np.argsort(tags)[np.searchsorted(np.sort(tags), used)]]
+    numbered = {group: np.searchsorted(used, nodes) for group, nodes in boundaries.items()}
+    return Body(name, named_mesh(points, np.searchsorted(used, tets), numbered))

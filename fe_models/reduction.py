@@ -1,0 +1,152 @@
+"""Static condensation of two bodies onto the interfaces between them.
+
+Each body is condensed onto its interface nodes, S u = r + f, with f the contact forces on it. Two
+bodies that meet node to node then form one joint: with w = u_2 - u_1 the relative displacement and
+f the contact forces on body 2,
+
+    f = H w + f0,   H = S_2 - S_2 (S_1 + S_2)⁻¹ S_2,   f0 = S_2 (S_1 + S_2)⁻¹ (r_1 + r_2) - r_2.
+
+H is symmetric; the rigid motions of a body that is held by contact alone are its null space.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sl
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from fe_models.constraints import Constraints
+from fe_models.elasticity import ElasticBody
+from fe_models.linear_solver import factorise, schur_complement
+from fe_models.mesh import Interface
+from sa_solver.types import Array
+
+# Eigenvalues below this share of the largest are rigid motions; elastic ones start near 1e-3.
+RIGID_LIMIT = 1e-10
+
+
+@dataclass(frozen=True)
+class JointStiffness:
+    """The joint ``f = H w + Σ_c amplitude_c loads_c`` in the interface frames.
+
+    ``stiffness`` ``(3 n, 3 n)`` [N/mm] and ``loads`` ``(3 n, cases)`` [N], numbered ``3 node +
+    component`` over all interfaces; ``rigid_modes`` counts H's null space; ``smallest`` and
+    ``largest`` are its extreme elastic eigenvalues.
+    """
+
+    stiffness: Array
+    loads: Array
+    rigid_modes: int
+    smallest: float
+    largest: float
+
+
+class ConstrainedBody:
+    """A supported body whose interface displacements are in the interface frames.
+
+    ``nodes`` ``(n,)`` are its interface vertices and ``frames`` ``(n, 3, 3)`` the axes at each;
+    ``loads`` ``(3 all, cases)`` its load cases.
+    """
+
+    def __init__(
+        self,
+        elastic: ElasticBody,
+        constraints: Constraints,
+        nodes: NDArray[np.int64],
+        frames: Array,
+        loads: Array,
+    ) -> None:
+        self.elastic = elastic
+        self._loads = loads
+        rotation = _rotation(len(elastic.nodes), nodes, frames)
+        transformation = constraints.transformation()
+        self._interface = _free_columns(transformation, nodes)
+        # Constraints first, then local axes at the interface nodes, which no constraint touches.
+        self._transformation = (rotation @ transformation).tocsr()
+
+    def condense(self) -> tuple[Array, Array]:
+        """Stiffness ``(3 n, 3 n)`` and loads ``(3 n, cases)`` on the interface displacements."""
+        stiffness, loads = self._reduced()
+        inner = self._inner(stiffness)
+        condensed = schur_complement(stiffness, self._interface)
+        if not loads.any():
+            return condensed, loads[self._interface]
+        solve = factorise(stiffness[inner][:, inner].tocsr())
+        coupling = stiffness[self._interface][:, inner]
+        return condensed, loads[self._interface] - coupling @ solve(loads[inner])
+
+    def recover(self, interface_displacement: Array, amplitudes: Array) -> Array:
+        """All displacements ``(3 all,)`` for given interface displacements ``(3 n, )``."""
+        stiffness, loads = self._reduced()
+        inner = self._inner(stiffness)
+        rhs = loads[inner] @ amplitudes
+        rhs -= stiffness[inner][:, self._interface] @ interface_displacement
+        displacement = np.empty(stiffness.shape[0])
+        displacement[self._interface] = interface_displacement
+        displacement[inner] = factorise(stiffness[inner][:, inner].tocsr())(rhs)
+        return self._transformation @ displacement
+
+    def respond(self, interface_forces: Array, amplitudes: Array) -> tuple[Array, Array]:
+        """All displacements and the interface's, of a held body under interface forces."""
+        stiffness, loads = self._reduced()
+        rhs = loads @ amplitudes
+        rhs[self._interface] += interface_forces
+        displacement = factorise(stiffness)(rhs)
+        return self._transformation @ displacement, displacement[self._interface]
+
+    def load_resultants(self, amplitudes: Array, about: Array) -> Array:
+        """Force and moment ``(2, 3)`` of the applied loads about a point."""
+        forces = (self._loads @ amplitudes).reshape(-1, 3)
+        arms = self.elastic.nodes - about
+        return np.array([forces.sum(axis=0), np.cross(arms, forces).sum(axis=0)])
+
+    def _reduced(self) -> tuple[sp.csr_matrix, Array]:
+        t = self._transformation
+        return (t.T @ self.elastic.stiffness @ t).tocsr(), t.T @ self._loads
+
+    def _inner(self, stiffness: sp.csr_matrix) -> NDArray[np.int64]:
+        return np.setdiff1d(np.arange(stiffness.shape[0]), self._interface)
+
+
+def join(
+    condensed_1: tuple[Array, Array], condensed_2: tuple[Array, Array]
+) -> JointStiffness:
+    """Join two condensed bodies; body 1 must be held, body 2 may float."""
+    (stiffness_1, loads_1), (stiffness_2, loads_2) = condensed_1, condensed_2
+    factors = sl.cho_factor(stiffness_1 + stiffness_2, lower=True, overwrite_a=True)
+    shared = sl.cho_solve(factors, stiffness_2)
+    stiffness = stiffness_2 - stiffness_2 @ shared
+    stiffness = 0.5 * (stiffness + stiffness.T)
+    eigenvalues = sl.eigvalsh(stiffness)
+    elastic = eigenvalues[eigenvalues > RIGID_LIMIT * eigenvalues[-1]]
+    return JointStiffness(
+        stiffness=stiffness,
+        loads=shared.T @ (loads_1 + loads_2) - loads_2,
+        rigid_modes=len(eigenvalues) - len(elastic),
+        smallest=float(elastic[0]),
+        largest=float(elastic[-1]),
+    )
+
+
+def interface_frames(interfaces: tuple[Interface, ...]) -> Array:
+    """Axes at every interface node, ``(n, 3, 3)``, interface after interface."""
+    return np.concatenate([np.tile(i.frame.axes, (len(i), 1, 1)) for i in interfaces])
+
+
+def _rotation(nodes: int, turned: NDArray[np.int64], frames: Array) -> sp.csr_matrix:
+    """Global displacements from ones that are in ``frames`` at the turned nodes."""
+    blocks = np.tile(np.eye(3), (nodes, 1, 1))
+    blocks[turned] = frames.transpose(0, 2, 1)
+    shape = (3 * nodes, 3 * nodes)
+    return sp.bsr_matrix((blocks, np.arange(nodes), np.arange(nodes + 1)), shape=shape).tocsr()
+
+
+def _free_columns(transformation: sp.csr_matrix, nodes: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Columns of T that are the displacements of the given nodes."""
+    rows = transformation[(3 * nodes[:, None] + np.arange(3)).ravel()]
+    if not np.all(np.diff(rows.indptr) == 1):
+        raise ValueError("a displacement of an interface node is constrained")
+    return rows.indices.astype(np.int64)

@@ -1,0 +1,149 @@
+"""Two supported bodies with their interfaces: condensation, contact history, equilibrium, stress."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.friction import FrictionalJoint, FrictionState
+from fe_models.mesh import Interface, StructureMesh
+from fe_models.reduction import ConstrainedBody, JointStiffness, join
+from sa_solver.types import Array, LoadHistory, resultants
+
+# A flank slides as a whole when nodes that stick carry less than this share of its load.
+STICKING_SHARE = 1e-2
+# A node slips when its shear reaches this share of Coulomb's limit.
+LIMIT_SHARE = 1.0 - 1e-6
+
+
+@dataclass(frozen=True)
+class InterfaceHistory:
+    """What one interface does over the increments of a cycle, in its frame.
+
+    ``loads`` are the resultants; ``force`` ``(t, 3, n)`` on body 2 [N], ``displacement`` ``(t, 3,
+    n)`` relative [mm], ``slip`` ``(t, 2, n)`` of each increment [mm], zero where a node sticks.
+    """
+
+    interface: Interface
+    loads: LoadHistory
+    force: Array
+    displacement: Array
+    slip: Array
+
+    @property
+    def pressure(self) -> Array:
+        """Nodal pressure ``(t, n)`` [MPa]."""
+        return self.force[:, 2] / self.interface.nodal_areas
+
+
+@dataclass(frozen=True)
+class CycleSolution:
+    """The closed cycle of a structure, with what the solver says of itself.
+
+    ``closure`` is the change of the contact forces at the end of the last increment before the
+    peak between the last two cycles, relative; ``equilibrium`` ``(t, 2)`` the relative error of
+    forces and moments.
+    """
+
+    histories: tuple[InterfaceHistory, ...]
+    iterations: int
+    residual: float
+    converged: bool
+    closure: float
+    equilibrium: Array
+
+
+@dataclass(frozen=True)
+class Structure:
+    """Body 1 is held, body 2 is held by contact and by one support along ``support_direction``.
+
+    The support acts at ``support_point`` on the mean displacement of a boundary.
+    """
+
+    mesh: StructureMesh
+    body_1: ConstrainedBody
+    body_2: ConstrainedBody
+    support_direction: Array
+    support_point: Array
+
+    def condense(self) -> JointStiffness:
+        """Stiffness and loads of the joint on its interface displacements."""
+        return join(self.body_1.condense(), self.body_2.condense())
+
+    def gap(self) -> Array:
+        """Gaps of all interfaces one after the other, unworn ``(n,)`` [mm]."""
+        return np.concatenate([i.gap for i in self.mesh.interfaces])
+
+    def solve_cycle(
+        self, joint: FrictionalJoint, amplitudes: Array, gap: Array, friction: float, cycles: int = 2
+    ) -> CycleSolution:
+        """March through the load path ``cycles`` times and keep the last."""
+        states = list(joint.march(np.tile(amplitudes, (cycles, 1)), gap))
+        count = len(amplitudes)
+        last, before = states[-count:], states[-2 * count : -count]
+        change = [np.abs(a.force - b.force).max() for a, b in zip(last, before, strict=False)]
+        largest = max(np.abs(s.force).max() for s in last)
+        return CycleSolution(
+            histories=tuple(self._histories(last, friction)),
+            iterations=sum(s.iterations for s in states),
+            residual=max(s.residual for s in states),
+            converged=all(s.converged for s in states),
+            closure=max(change, default=0.0) / largest,
+            equilibrium=np.array(
+                [self.equilibrium_error(s, a) for s, a in zip(last, amplitudes, strict=True)]
+            ),
+        )
+
+    def _histories(self, states: list[FrictionState], friction: float) -> list[InterfaceHistory]:
+        force = np.stack([s.force for s in states])
+        displacement = np.stack([s.displacement for s in states])
+        slip = np.stack([s.slip for s in states])
+        histories, start = [], 0
+        for interface in self.mesh.interfaces:
+            own = slice(start, start + len(interface))
+            parts = force[..., own], displacement[..., own], slip[..., own]
+            loads = load_history(interface, parts[0], parts[2], friction)
+            histories.append(InterfaceHistory(interface, loads, *parts))
+            start += len(interface)
+        return histories
+
+    def equilibrium_error(self, state: FrictionState, amplitudes: Array) -> tuple[float, float]:
+        """Relative error of forces and of moments on body 2, support included.
+
+        Moments are taken about the support and measured against applied force x joint size where
+        no moment is applied.
+        """
+        contact = np.zeros((2, 3))
+        start = 0
+        points = []
+        for interface in self.mesh.interfaces:
+            own = slice(start, start + len(interface))
+            forces = interface.frame.to_global(state.force[:, own].T)
+            at = self.mesh.body_2.mesh.p[:, interface.nodes_2].T - self.support_point
+            contact += forces.sum(axis=0), np.cross(at, forces).sum(axis=0)
+            points.append(at)
+            start += len(interface)
+        applied = self.body_2.load_resultants(amplitudes, self.support_point)
+        balance = contact + applied
+        balance[0] -= (balance[0] @ self.support_direction) * self.support_direction
+        force = np.linalg.norm(applied[0])
+        if force == 0.0:
+            return 0.0, 0.0
+        size = np.linalg.norm(np.ptp(np.concatenate(points), axis=0))
+        moment = max(float(np.linalg.norm(applied[1])), force * size)
+        return float(np.linalg.norm(balance[0]) / force), float(
+            np.linalg.norm(balance[1]) / moment
+        )
+
+
+def load_history(interface: Interface, force: Array, slip: Array, friction: float) -> LoadHistory:
+    """Resultants and dissipated energies of nodal ``force`` ``(t, 3, n)`` and ``slip`` ``(t, 2, n)``."""
+    x, y = interface.coordinates.T
+    columns = np.array([resultants(f, x, y) for f in force]).T
+    energy = -np.einsum("tan,tan->at", force[:, :2], slip)
+    shear = np.hypot(force[:, 0], force[:, 1])
+    sticks = shear < LIMIT_SHARE * friction * force[:, 2]
+    load = columns[0]
+    sliding = np.sum(force[:, 2] * sticks, axis=1) < STICKING_SHARE * load
+    return LoadHistory(*columns, *energy, sliding=sliding)

@@ -1,0 +1,1 @@
+"""Contact mechanics on elastic half-spaces, and the shared types, frames and signs."""

@@ -1,0 +1,140 @@
+"""Douglas-Rachford splitting with Anderson acceleration, for contact problems of any kind.
+
+A contact problem asks for tractions that satisfy an elastic relation (linear, global) and a contact
+law (nonlinear, cell by cell). The splitting needs only the two resolvents: it repeats
+
+    t1 = elastic_step(s)            the elastic relation near s, resultants met exactly
+    t2 = local_law(2 t1 - s)        the contact law near the reflected point
+    s  = s + 1.6 (t2 - t1)
+
+until ``t1 = t2``, which then satisfies both.
+
+Sources: Lions & Mercier 1979, SIAM J. Numer. Anal. 16, 964, doi:10.1137/0716071; Walker & Ni 2011,
+SIAM J. Numer. Anal. 49, 1715, doi:10.1137/10078356X.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg
+
+from sa_solver.types import Array
+
+OVER_RELAXATION = 1.6
+"""Step along ``t2 - t1``. Any value in (0, 2) converges; 1.5 to 1.7 took the fewest iterations."""
+
+ANDERSON_DEPTH = 10
+"""Differences remembered. Fewer than 5 lose the acceleration, more than 10 gain nothing."""
+
+RESTART_GROWTH = 2.0
+"""The memory is dropped when the residual grows by this factor in one iteration: the contact set
+has changed and the old differences mislead."""
+
+GRAM_CUTOFF = 1e-13
+"""Eigenvalues of the scaled Gram matrix below this are rounding, since it squares the differences:
+their directions are left out of the least-squares problem."""
+
+Step = Callable[[Array], Array]
+
+
+@dataclass(frozen=True)
+class SplittingResult:
+    """Outcome of a splitting; arrays have the shape of the start.
+
+    ``solution`` obeys the local law exactly and ``elastic`` the elastic relation exactly; they
+    differ by ``residual`` times the larger of their norms. ``state`` is the start of a next solve.
+    """
+
+    state: Array
+    solution: Array
+    elastic: Array
+    residual: float
+    iterations: int
+    converged: bool
+
+
+def douglas_rachford(
+    elastic_step: Step,
+    local_law: Step,
+    start: Array,
+    *,
+    tolerance: float = 1e-8,
+    max_iterations: int = 1000,
+    relaxation: float = OVER_RELAXATION,
+    depth: int = ANDERSON_DEPTH,
+) -> SplittingResult:
+    """Iterate the two steps from ``start`` until ``|t2 - t1| <= tolerance max(|t1|, |t2|)``.
+
+    ``elastic_step`` and ``local_law`` map an array of any shape to one of the same shape and must
+    not modify it. ``depth = 0`` turns the acceleration off. A result that has not
+    converged after ``max_iterations`` says so.
+    """
+    state = np.array(start, dtype=np.float64)
+    memory = AndersonMemory(state.size, depth)
+    elastic = solution = state
+    residual, iteration = np.inf, 0
+    for iteration in range(1, max_iterations + 1):
+        elastic = elastic_step(state)
+        solution = local_law(2.0 * elastic - state)
+        step = solution - elastic
+        scale = max(np.linalg.norm(solution), np.linalg.norm(elastic), np.finfo(float).tiny)
+        residual = float(np.linalg.norm(step) / scale)
+        if residual <= tolerance or not np.isfinite(residual):
+            break
+        state = memory.next_state(state.ravel(), relaxation * step.ravel()).reshape(state.shape)
+    return SplittingResult(state, solution, elastic, residual, iteration, residual <= tolerance)
+
+
+class AndersonMemory:
+    """Anderson acceleration (type II) of a fixed-point iteration ``s ← s + f(s)``.
+
+    Holds the last ``depth`` differences of images and of residuals, and the Gram matrix of the
+    latter, of which each iteration renews one row and column.
+    """
+
+    def __init__(self, size: int, depth: int) -> None:
+        """Memory for vectors of ``size`` values."""
+        self._images = np.empty((depth, size))
+        self._residuals = np.empty((depth, size))
+        self._gram = np.zeros((depth, depth))
+        self._depth = depth
+        self._last_image = self._last_residual = np.empty(0)
+        self._last_norm = 0.0
+        self._seen = 0
+
+    def next_state(self, state: Array, residual: Array) -> Array:
+        """The next state from this ``state`` and its ``residual`` f(s), both ``(size,)``."""
+        image = state + residual
+        norm = float(np.linalg.norm(residual))
+        if self._depth == 0:
+            return image
+        if self._seen > 0 and norm > RESTART_GROWTH * self._last_norm:
+            self._seen = 0
+        accelerated = self._accelerate(image, residual) if self._seen > 0 else image
+        self._last_image, self._last_residual, self._last_norm = image, residual, norm
+        self._seen += 1
+        return accelerated
+
+    def _accelerate(self, image: Array, residual: Array) -> Array:
+        """Combine the remembered images so that the combined residual is least."""
+        slot = (self._seen - 1) % self._depth
+        used = min(self._seen, self._depth)
+        np.subtract(residual, self._last_residual, out=self._residuals[slot])
+        np.subtract(image, self._last_image, out=self._images[slot])
+        products = self._residuals[:used] @ np.stack([self._residuals[slot], residual], axis=1)
+        self._gram[slot, :used] = self._gram[:used, slot] = products[:, 0]
+        weights = _solve_gram(self._gram[:used, :used], products[:, 1])
+        return image - weights @ self._images[:used]
+
+
+def _solve_gram(gram: Array, right: Array) -> Array:
+    """Least-squares weights from a Gram matrix that may be singular to rounding."""
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+    values, vectors = scipy.linalg.eigh(gram * np.outer(scale, scale), check_finite=False)
+    kept = values > GRAM_CUTOFF * values[-1]
+    basis = vectors[:, kept]
+    weights: Array = scale * (basis @ ((basis.T @ (scale * right)) / values[kept]))
+    return weights

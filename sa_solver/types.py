@@ -1,0 +1,155 @@
+"""Types, frames and signs shared by every package.
+
+Base units: mm, N, s, MPa, tonne (1 N mm = 1 mJ).
+
+Signs
+-----
+Body 1 is the disk (or the lower, fixed body), body 2 the blade (or the upper, moving one).
+An interface frame has its origin at the centre of the nominal contact face, ``z`` along the
+outward normal of body 1 into body 2, ``x`` along the face in the direction in which body 2 would
+slide under the load, and ``y = z × x``.
+
+Tractions and resultants are those that body 1 exerts on body 2: pressure ``p >= 0``, shear
+``q = (qx, qy)`` and, with the cell area ``S``,
+
+    P = Σ p S          Qx, Qy = Σ q S
+    Mx = Σ p y S       My = -Σ p x S       Mz = Σ (qy x - qx y) S
+
+Rigid motions ``(δx, δy, δz, φx, φy, φz)`` are those of body 1 relative to body 2 far from the
+contact, conjugate to the resultants, so that the gap is ``g = h + u_z - δz - φx y + φy x``. Slip is
+the motion of body 2's surface relative to body 1's; friction opposes it, and the energy of an
+increment is ``Ed = -Σ q·Δs S >= 0``.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Material:
+    """Isotropic linear elastic material.
+
+    ``young`` and ``yield_stress`` in MPa, ``density`` in t/mm³.
+    """
+
+    young: float
+    poisson: float
+    density: float = 0.0
+    yield_stress: float = np.inf
+
+    @property
+    def shear_modulus(self) -> float:
+        """G = E / 2(1+ν) [MPa]."""
+        return self.young / (2.0 * (1.0 + self.poisson))
+
+    @property
+    def lame(self) -> float:
+        """First Lamé constant λ [MPa]."""
+        return self.young * self.poisson / ((1.0 + self.poisson) * (1.0 - 2.0 * self.poisson))
+
+
+def contact_modulus(body_1: Material, body_2: Material) -> float:
+    """E* [MPa], 1/E* = Σ (1-ν²)/E (Johnson 1985, eq. 4.20)."""
+    compliance = sum((1.0 - m.poisson**2) / m.young for m in (body_1, body_2))
+    return 1.0 / compliance
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Uniform grid of rectangular cells, centred on the frame's origin.
+
+    ``shape`` is ``(nx, ny)``, ``pitch`` is ``(dx, dy)`` in mm. Fields on it are ``(nx, ny)`` arrays.
+    """
+
+    shape: tuple[int, int]
+    pitch: tuple[float, float]
+
+    @classmethod
+    def covering(cls, size: tuple[float, float], shape: tuple[int, int]) -> Grid:
+        """The grid of ``shape`` cells that exactly covers a rectangle of ``size`` (mm, mm)."""
+        return cls(shape, (size[0] / shape[0], size[1] / shape[1]))
+
+    @property
+    def cell_area(self) -> float:
+        """S [mm²]."""
+        return self.pitch[0] * self.pitch[1]
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Extent of the grid along x and y [mm]."""
+        return self.shape[0] * self.pitch[0], self.shape[1] * self.pitch[1]
+
+    @cached_property
+    def x(self) -> Array:
+        """Cell centres along x, shape ``(nx, 1)`` [mm]."""
+        return ((np.arange(self.shape[0]) + 0.5) * self.pitch[0] - 0.5 * self.size[0])[:, None]
+
+    @cached_property
+    def y(self) -> Array:
+        """Cell centres along y, shape ``(1, ny)`` [mm]."""
+        return ((np.arange(self.shape[1]) + 0.5) * self.pitch[1] - 0.5 * self.size[1])[None, :]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Interface frame: ``origin`` (3,) in mm and ``axes`` (3, 3), whose rows are x, y and z."""
+
+    origin: Array
+    axes: Array
+
+    def coordinates(self, points: Array) -> Array:
+        """Local coordinates of global ``points`` ``(..., 3)``."""
+        return self.components(points - self.origin)
+
+    def components(self, vectors: Array) -> Array:
+        """Local components of global ``vectors`` ``(..., 3)``."""
+        return vectors @ self.axes.T
+
+    def to_global(self, components: Array) -> Array:
+        """Global vectors of local ``components`` ``(..., 3)``."""
+        return components @ self.axes
+
+
+def resultants(forces: Array, x: Array, y: Array) -> Array:
+    """``(P, Qx, Qy, Mx, My, Mz)`` of point forces on body 2, in the interface frame.
+
+    ``forces`` has shape ``(3, ...)`` ordered x, y, z [N] (the z component is the pressure force,
+    positive); ``x`` and ``y`` broadcast against ``forces[0]`` [mm]. Returns shape ``(6,)``, N and N mm.
+    """
+    fx, fy, fz = forces
+    moments = np.sum(fz * y), -np.sum(fz * x), np.sum(fy * x - fx * y)
+    return np.array([np.sum(fz), np.sum(fx), np.sum(fy), *moments])
+
+
+@dataclass(frozen=True)
+class LoadHistory:
+    """Resultants of one interface over the increments of one closed cycle, each ``(n,)``.
+
+    ``P, Qx, Qy`` in N, ``Mx, My, Mz`` in N mm; ``Edx, Edy`` [N mm] is the energy dissipated in the
+    increment that ends at this state, by direction; ``sliding`` marks gross slip.
+    """
+
+    P: Array
+    Qx: Array
+    Qy: Array
+    Mx: Array
+    My: Array
+    Mz: Array
+    Edx: Array
+    Edy: Array
+    sliding: NDArray[np.bool_]
+
+    def __post_init__(self) -> None:
+        lengths = {len(getattr(self, f.name)) for f in fields(self)}
+        if len(lengths) != 1:
+            raise ValueError(f"columns of a load history differ in length: {sorted(lengths)}")
+
+    def __len__(self) -> int:
+        return len(self.P)

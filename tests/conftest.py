@@ -1,0 +1,24 @@
+"""Shared by all tests: one thread per process, and the cases of the repository."""
+
+import os
+from pathlib import Path
+
+# Before numpy is imported: its threads would fight with the other test processes.
+for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ.setdefault(name, "1")
+
+import pytest
+
+CASES = Path(__file__).parent.parent / "cases"
+
+
+@pytest.fixture(scope="session")
+def dovetail_path() -> Path:
+    """The default case."""
+    return CASES / "dovetail.yaml"
+
+
+@pytest.fixture(scope="session")
+def dovetail_text(dovetail_path: Path) -> str:
+    """Its text."""
+    return dovetail_path.read_text(encoding="utf-8")

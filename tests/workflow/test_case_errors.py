@@ -1,0 +1,198 @@
+"""A wrong case ends in exit code 2 and a line: file, line, key, what is wrong, what is allowed."""
+
+import re
+
+import pytest
+from click.testing import CliRunner
+
+from workflow.cli import cli
+
+# Name, text to replace in the default case, its replacement, key in the message, words in it.
+WRONG = [
+    ("unknown unit", "8 mm ", "8 mmm ", "structure.flank_length", "unknown unit 'mmm'"),
+    ("case of a unit", "blade: {young: 115 GPa", "blade: {young: 115 gpa", "materials.blade.young",
+     "did you mean 'GPa'"),
+    ("wrong dimension", "20 mm", "20 N", "structure.neck_width", "cannot be converted to mm"),
+    ("ratio as an angle", "45 deg", "45 %", "structure.flank_angle", "cannot be converted to rad"),
+    ("frequency as a speed", "6000 rpm", "100 Hz", "load_path.rotation_speed", "rad/s"),
+    ("angle as a ratio", "drift: 2 %", "drift: 2 deg", "coupling.drift", "a ratio"),
+    ("number in quotes", "20 mm", "'20'", "structure.neck_width", "without a unit"),
+    ("decimal comma", "8 mm ", "8,5 mm ", "structure.flank_length", "write a point"),
+    ("prose for a number", "8 mm ", "rather long ", "structure.flank_length", "not a number"),
+    ("list for a number", "8 mm ", "[8, 9] ", "structure.flank_length", "not a number"),
+    ("bool for a number", "coefficient: 0.4", "coefficient: true", "friction.coefficient", "true"),
+    ("nothing for a number", "20 mm", "", "structure.neck_width", "nothing: not a number"),
+    ("negative radius", "30 mm ", "-30 mm ", "structure.edge_radius", "above 0 mm"),
+    ("not a number", "coefficient: 0.4", "coefficient: .nan", "friction.coefficient", "finite"),
+    ("infinite", "rim_radius: 250 mm", "rim_radius: .inf", "structure.rim_radius", "finite"),
+    ("infinite by its exponent", "20 mm", "1e999 mm", "structure.neck_width", "finite"),
+    ("flank beyond 90 degrees", "45 deg", "95 deg", "structure.flank_angle", "10 deg to 80 deg"),
+    ("bare angle", "45 deg", "45", "structure.flank_angle", "a bare number is in rad"),
+    ("bare modulus in Pa", "blade: {young: 115 GPa", "blade: {young: 115e9",
+     "materials.blade.young", "2000 GPa"),
+    ("bare density in kg/m^3", "disk: {young: 115 GPa, poisson: 0.29, density: 4430 kg/m^3",
+     "disk: {young: 115 GPa, poisson: 0.29, density: 4430", "materials.disk.density", "t/mm^3"),
+    ("bare wear coefficient", "blade: {coefficient: 1e4 um^3/J}", "blade: {coefficient: 1e4}",
+     "wear.blade.coefficient", "um^3/J"),
+    ("incompressible", "blade: {young: 115 GPa, poisson: 0.29",
+     "blade: {young: 115 GPa, poisson: 0.5",
+     "materials.blade.poisson", "below 0.5"),
+    ("friction over 2", "coefficient: 0.4", "coefficient: 40", "friction.coefficient", "2"),
+    ("no increments", "increments: 22", "increments: 0", "load_path.increments", "from 2"),
+    ("half an increment", "increments: 22", "increments: 22.5", "load_path.increments", "whole"),
+    ("bool for a whole number", "peak_at: 8", "peak_at: yes", "load_path.peak_at", "whole"),
+    ("peak after the cycle", "peak_at: 8", "peak_at: 22", "load_path.peak_at", "increments, 22"),
+    ("grid of one cell", "[128, 256]", "[1, 256]", "contact.grid.0", "from 8 to 4096"),
+    ("grid of one number", "[128, 256]", "[128]", "contact.grid", "too short"),
+    ("grid of three numbers", "[128, 256]", "[128, 256, 64]", "contact.grid", "a list of 2"),
+    ("grid that is no list", "[128, 256]", "128 x 256", "contact.grid", "not a list"),
+    ("third-order elements", "order: 1 ", "order: 3 ", "mesh.order", "1 or 2"),
+    ("loose tolerance", "tolerance: 1e-8", "tolerance: 0.1", "contact.tolerance", "0.001"),
+    ("two blades", "blades: 24", "blades: 2", "structure.blades", "from 3"),
+    ("skewed too far", "skew: 0 deg", "skew: 40 deg", "structure.skew", "-30 deg to 30 deg"),
+    ("rounding past its arc", "30 mm ", "0.9 mm ", "structure.edge_width", "edge_radius, 0.9 mm"),
+    ("edges wider than the flat", "1 mm ", "4 mm ", "structure.edge_width",
+     "half the flank_length"),
+    ("ends longer than the slot", "end_width: 3 mm", "end_width: 30 mm", "structure.end_width",
+     "half the slot_length"),
+    ("disk too shallow", "disk_height: 60 mm", "disk_height: 9 mm", "structure.disk_height",
+     "10.07 mm"),
+    ("disk beyond the axis", "disk_height: 60 mm", "disk_height: 250 mm", "structure.disk_height",
+     "rim_radius"),
+    ("blades too close", "blades: 24", "blades: 60", "structure.blades", "fewer blades"),
+    ("airfoil in the disk", "400 mm", "200 mm", "load_path.airfoil_radius", "250 mm"),
+    ("unknown key", "neck_fillet", "neck_filet", "structure.neck_filet", "'neck_fillet'"),
+    ("unknown section", "output:", "plots:", "plots", "allowed: title"),
+    ("unknown key of a law", "law: energy", "law: energy\n  hardnes: 1", "wear.hardnes", "allowed"),
+    ("missing entry", "  peak_at: 8\n", "", "load_path.peak_at", "missing"),
+    ("missing section", "friction: {coefficient: 0.4}", "", "friction", "missing"),
+    ("missing kind", "  kind: dovetail\n", "", "structure.kind", "such as dovetail"),
+    ("missing law", "  law: energy\n", "", "wear.law", "energy_amplitude"),
+    ("unknown law", "law: energy", "law: wishful", "wear.law", "energy, energy_amplitude, archard"),
+    ("law that is a section", "law: energy", "law: {a: 1}", "wear.law", "archard"),
+    ("unknown structure", "kind: dovetail", "kind: firtree", "structure.kind", "'dovetail'"),
+    ("unknown analysis", "analysis: wear", "analysis: magic", "analysis", "'wear'"),
+    ("law without its amplitude", "law: energy", "law: energy_amplitude",
+     "wear.reference_amplitude", "75 um"),
+    ("two step sizes", "cycles: 5000}", "cycles: 5000, depth: 1 um}", "wear.step.depth",
+     "exactly one"),
+    ("no step size", ", cycles: 5000}", "}", "wear.step", "exactly one"),
+    ("text for a section", "friction: {coefficient: 0.4}", "friction: 0.4", "friction", "section"),
+    ("nothing for a section", "friction: {coefficient: 0.4}", "friction:", "friction", "nothing"),
+    ("yes for a switch", "figures: true", "figures: yes", "output.figures", "true or false"),
+    ("number for a title", "title: Ti-6Al-4V dovetail, one mission per cycle", "title: 7", "title",
+     "quotes"),
+    ("date for a title", "title: Ti-6Al-4V dovetail, one mission per cycle", "title: 2020-01-01",
+     "title", "quotes"),
+    ("unknown assumed path", "- load_path", "- load_paths", "assumed.2", "no such entry"),
+    ("expectation without source", "assumed:", "expect: [{quantity: a.b, value: 1, tolerance: 1 %}]"
+     "\nassumed:", "expect.0.source", "missing"),
+    ("duplicate key", "peak_at: 8", "peak_at: 8\n  peak_at: 9", "'peak_at'", "given twice"),
+]  # fmt: skip
+
+# Name, whole text of the file, line of the error, words in the message.
+UNREADABLE = [
+    ("empty", b"", 1, "empty"),
+    ("only a comment", b"# nothing\n", 1, "empty"),
+    ("a list", b"- title\n- analysis\n", 1, "a list of 2"),
+    ("a text", b"title\n", 1, "'title'"),
+    ("a tab", b"title: a\nstructure:\n\tkind: dovetail\n", 3, "a tab; allowed: spaces"),
+    ("broken YAML", b"title: a\nfriction: {coefficient: 0.4\nwear: 3\n", 3, "not YAML"),
+    ("two documents", b"title: a\n---\ntitle: b\n", 2, "not YAML"),
+    ("not UTF-8", b"title: a\nanalysis: \xff\xfe\n", 2, "UTF-8"),
+    ("zero byte", b"title: a\nanalysis: \x00\n", 2, "unprintable"),
+    ("number as a key", b"title: a\n3: b\n", 2, "not a key"),
+    ("odd tag", b"title: !!python/name:os.system a\n", 1, "TaggedScalar"),
+    ("binary", b"title: !!binary aGk=\n", 1, "a bytes"),
+    ("alias bomb", b"a: &a [1,1,1,1,1,1,1,1]\n" + b"".join(
+        b"%c: &%c [%s]\n" % (n + 1, n + 1, b",".join([b"*%c" % n] * 8)) for n in range(97, 105)
+    ), 1, "too long"),
+    ("nesting", b"title: " + b"[" * 50 + b"]" * 50, 1, "nested too deeply"),
+    ("deep nesting", b"title: " + b"[" * 1000 + b"]" * 1000, 1, "nested too deeply"),
+    ("endless number", b"title: " + b"9" * 5000, 1, "not YAML"),
+    ("huge file", b"#" * 1_000_001, None, "over 1000000 bytes"),
+]  # fmt: skip
+
+
+def refusal(arguments):
+    """The only line on stderr of a command that must end with exit code 2."""
+    result = CliRunner().invoke(cli, arguments)
+    assert result.exit_code == 2, (result.stdout, result.stderr, result.exception)
+    assert isinstance(result.exception, SystemExit)
+    assert result.stdout == ""
+    assert "Traceback" not in result.stderr
+    (line,) = result.stderr.splitlines()
+    assert len(line) < 400
+    return line
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "key", "words"), [row[1:] for row in WRONG], ids=[row[0] for row in WRONG]
+)
+def test_wrong_entry_is_told_in_one_line(tmp_path, dovetail_text, old, new, key, words):
+    assert dovetail_text.count(old) >= 1
+    path = tmp_path / "wrong.yaml"
+    path.write_text(dovetail_text.replace(old, new, 1), encoding="utf-8")
+    line = refusal(["check", str(path)])
+    place = re.match(rf"fretscale: {re.escape(str(path))}:(\d+): {re.escape(key)}: ", line)
+    assert place, line
+    assert words in line
+    # The line in the file is that of the key, or of the section in which it is missing.
+    last = key.strip("'").split(".")[-1]
+    text = path.read_text().splitlines()[int(place[1]) - 1]
+    missing = "missing" in line or "exactly one" in line or last.isdigit()
+    assert last in text or missing, (line, text)
+
+
+@pytest.mark.parametrize(
+    ("raw", "number", "words"), [row[1:] for row in UNREADABLE], ids=[row[0] for row in UNREADABLE]
+)
+def test_unreadable_file_is_told_in_one_line(tmp_path, raw, number, words):
+    path = tmp_path / "wrong.yaml"
+    path.write_bytes(raw)
+    line = refusal(["check", str(path)])
+    place = f"{path}:{number}: " if number else f"{path}: "
+    assert line.startswith(f"fretscale: {place}"), line
+    assert words in line
+
+
+def test_missing_file_and_directory(tmp_path):
+    assert "no such file" in refusal(["check", str(tmp_path / "none.yaml")])
+    assert "a directory" in refusal(["check", str(tmp_path)])
+
+
+def test_every_error_has_its_line(tmp_path, dovetail_text):
+    path = tmp_path / "wrong.yaml"
+    text = dovetail_text.replace("45 deg", "4 deg").replace("blades: 24", "blades: 1")
+    path.write_text(text.replace("peak_at: 8", "peak: 8"), encoding="utf-8")
+    result = CliRunner().invoke(cli, ["check", str(path)])
+    keys = [line.split(": ")[2] for line in result.stderr.splitlines()]
+    assert keys == ["structure.flank_angle", "structure.blades", "load_path.peak"]
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("friction.coefficient=3", "out of range"),
+        ("friction.coefficient", "not key=value"),
+        ("=3", "not key=value"),
+        ("friction..coefficient=3", "not key=value"),
+        ("friction.coeficient=0.3", "did you mean 'coefficient'?"),
+        ("friction.coefficient.static=0.3", "no such entry"),
+        ("contact.grid.7=64", "no such entry"),
+        ("contact.grid.1=2", "from 8 to 4096"),
+        ("structure.edge_width=[1", "not YAML"),
+        ("structure.edge_width=\t1", "a tab"),
+        ("structure.edge_width=31 mm", "edge_radius"),
+        ("structure.rim_radius=500 mm", "airfoil"),
+        ("load_path.increments=5", "increments, 5"),
+        ("wear.step.depth=1 um", "exactly one"),
+        ("wear.stop.depht=1 um", "did you mean 'depth'?"),
+        ("output=", "not a section"),
+    ],
+)
+def test_wrong_override_is_named(dovetail_path, override, words):
+    line = refusal(["check", str(dovetail_path), "--set", override])
+    shown = override.replace("\t", "\\t")
+    assert line.startswith(f"fretscale: --set {shown}: "), line
+    assert words in line

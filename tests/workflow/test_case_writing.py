@@ -1,0 +1,72 @@
+"""What is written reads back the same; the template is the default case."""
+
+import json
+
+import pytest
+from ruamel.yaml import YAML
+
+from workflow.case import KINDS, Case, dump_case, load_case, parse_case, template
+from workflow.case.schema import sections_of
+
+AWKWARD = ["yes", "null", "1e5", "12:30", "a: b", "# no", "- x", "ü µ", "'", '"', "\\n", "{", "~"]
+
+
+@pytest.mark.parametrize(
+    "overrides",
+    [
+        [],
+        ["materials.blade.yield_stress=", "wear.stop={depth: 0.1 mm}", "assumed=[]"],
+        ["wear.step={kind: explicit, volume: 1e-7 mm^3}", "structure.skew=-29.999 deg"],
+        ["expect=[{quantity: a.b-1.0, value: -1.23456789e-7, tolerance: 0.1 %, source: a}]"],
+        *([f"title={json.dumps(title)}"] for title in AWKWARD),
+    ],
+)
+def test_dump_reads_back_equal(dovetail_path, overrides):
+    case = load_case(dovetail_path, overrides)
+    text = dump_case(case)
+    assert parse_case(text, "dump") == case
+    assert dump_case(parse_case(text, "dump")) == text
+
+
+def test_dump_has_every_default(dovetail_path, dovetail_text):
+    start = dovetail_text.index("mesh:")
+    short = dovetail_text[:start] + dovetail_text[dovetail_text.index("wear:") :]
+    written = YAML(typ="safe").load(dump_case(parse_case(short, "short")))
+    assert written["mesh"] == {"flank_nodes": [20, 34], "size": 5.0, "order": 1}
+    assert written["contact"] == {"grid": [128, 256], "method": "normal", "tolerance": 1e-8}
+    assert parse_case(short, "short") == load_case(dovetail_path)
+
+
+def test_numbers_are_numbers_in_every_yaml(dovetail_path):
+    """YAML 1.1, which most other readers speak, takes ``1e-08`` for a text."""
+    text = dump_case(load_case(dovetail_path))
+    yaml = YAML(typ="safe", pure=True)
+    yaml.version = (1, 1)
+    assert isinstance(yaml.load(text)["wear"]["blade"]["coefficient"], float)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_template_is_the_default_case(kind, dovetail_path):
+    written, default = parse_case(template(kind), kind), load_case(dovetail_path)
+    assert written.model_copy(update={"assumed": default.assumed}) == default
+
+
+def test_template_has_every_entry():
+    lines = [line.lstrip("# -").split(":")[0] for line in template("dovetail").splitlines()]
+
+    def names(model):
+        for name, field in model.model_fields.items():
+            yield name
+            for section in list(sections_of(field.annotation))[:1]:
+                yield from names(section)
+
+    assert set(names(Case)) <= set(lines)
+
+
+def test_template_works_without_its_comment_signs(dovetail_path):
+    """Entries left in as comments are right as well."""
+    text = template("dovetail").replace("# stop", "stop").replace("# expect", "expect")
+    text = text.replace("  #   ", "    ").replace("\n#   ", "\n  ")
+    case = parse_case(text, "template")
+    assert case.wear.stop.depth == 0.5
+    assert case.expect[0].tolerance == 0.01

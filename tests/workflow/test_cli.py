@@ -1,0 +1,158 @@
+"""The command: what it prints, how fast it answers, and how each ending leaves it."""
+
+import json
+import subprocess
+import sys
+import types
+
+import pytest
+from click.testing import CliRunner
+
+from workflow import errors, system_check
+from workflow.case import load_case
+from workflow.cli import cli
+
+# Only these outside the standard library may be imported to print the help.
+LIGHT = {"click", "workflow"}
+
+
+def invoke(*arguments):
+    return CliRunner().invoke(cli, [str(argument) for argument in arguments])
+
+
+@pytest.mark.parametrize("arguments", [["--help"], ["run", "--help"], ["--version"]])
+def test_help_imports_nothing_heavy(arguments):
+    code = f"""
+import sys
+before = set(sys.modules)
+from workflow.cli import cli
+try:
+    cli({arguments})
+except SystemExit as end:
+    assert end.code == 0
+print("\\nIMPORTED", *({{name.partition(".")[0] for name in set(sys.modules) - before}}))
+"""
+    command = [sys.executable, "-c", code]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    imported = set(done.stdout.split("IMPORTED")[1].split())
+    assert imported - sys.stdlib_module_names <= LIGHT
+
+
+def test_case_without_units_needs_no_pint(dovetail_path, tmp_path):
+    """Importing pint takes longer than everything else that reads a case."""
+    from workflow.case import dump_case
+
+    path = tmp_path / "bare.yaml"
+    path.write_text(dump_case(load_case(dovetail_path)), encoding="utf-8")
+    code = f"""
+import sys
+from workflow.case import load_case
+load_case({str(path)!r})
+assert "pint" not in sys.modules
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_check_says_what_would_run(dovetail_path):
+    result = invoke("check", dovetail_path)
+    assert result.exit_code == 0
+    first, *rows = result.stdout.splitlines()
+    assert first == f"OK {dovetail_path}: Ti-6Al-4V dovetail, one mission per cycle"
+    assert "128 x 256 cells" in result.stdout
+    assert "22 increments" in result.stdout
+    assert "20 jumps" in result.stdout
+    assert len(rows) < 8
+
+
+def test_new_writes_a_case_that_checks(tmp_path):
+    path = tmp_path / "mine.yaml"
+    assert invoke("new", "dovetail", path).exit_code == 0
+    assert invoke("check", path).exit_code == 0
+    assert invoke("new", "dovetail").stdout == path.read_text(encoding="utf-8")
+    again = invoke("new", "dovetail", path)
+    assert (again.exit_code, again.stderr.count("\n")) == (2, 1)
+    assert "exists" in again.stderr
+
+
+def test_schema_is_json_with_descriptions():
+    schema = json.loads(invoke("schema").stdout)
+    assert schema["additionalProperties"] is False
+    for name, section in {**schema["$defs"], "Case": schema}.items():
+        for key, entry in section["properties"].items():
+            assert entry.get("description"), f"{name}.{key}"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["frobnicate"], "frobnicate"),
+        (["run"], "CASE"),
+        (["run", "case.yaml"], "--out"),
+        (["check", "a", "--fast"], "--fast"),
+        (["new", "firtree"], "dovetail"),
+        (["new", "dovetail", "/no/such/folder/case.yaml"], "/no/such/folder/case.yaml"),
+        (["resume", "/no/such/folder"], "/no/such/folder"),
+        (["run", "none.yaml", "--out", "out"], "none.yaml"),
+    ],
+)
+def test_wrong_usage_is_one_line(arguments, words):
+    result = invoke(*arguments)
+    assert result.exit_code == 2
+    (line,) = result.stderr.splitlines()
+    assert line.startswith("fretscale: ")
+    assert words in line
+
+
+LIBRARY_MISSING = "libGLU.so.1: cannot open shared object file: No such file or directory"
+
+
+@pytest.mark.parametrize(
+    ("ending", "code", "words"),
+    [
+        (None, 0, ""),
+        (errors.ExpectationMissed("depth 3 instead of 2"), 1, "depth 3 instead of 2"),
+        (errors.UserError("out: exists"), 2, "out: exists"),
+        (errors.MethodFailed("residual 1e-2 after 500; try more"), 3, "residual 1e-2"),
+        (errors.OutOfMemory("needs 90 GB, there are 8"), 4, "90 GB"),
+        (MemoryError(), 4, "out of memory"),
+        (KeyboardInterrupt(), 130, "interrupted"),
+        (PermissionError(13, "Permission denied", "/out"), 2, "/out: Permission denied"),
+        (OSError(LIBRARY_MISSING), 3, "libGLU"),
+        (ImportError(LIBRARY_MISSING), 3, "libGLU"),
+    ],
+    ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else None,
+)
+def test_endings_have_their_exit_code(monkeypatch, dovetail_path, tmp_path, ending, code, words):
+    def run_case(case, out, force):
+        assert case == load_case(dovetail_path, ["friction.coefficient=0.3"])
+        assert (out, force) == (tmp_path, True)
+        if ending is not None:
+            raise ending
+
+    stand_in = types.ModuleType("workflow.run")
+    stand_in.run_case = run_case
+    monkeypatch.setitem(sys.modules, "workflow.run", stand_in)
+    monkeypatch.setattr(system_check, "missing_packages", list)
+    result = invoke(
+        *("run", dovetail_path, "--out", tmp_path, "--force"), "--set", "friction.coefficient=0.3"
+    )
+    assert result.exit_code == code
+    lines = result.stderr.split("\n")
+    assert len([line for line in lines if line]) == (ending is not None)
+    assert words in result.stderr
+    assert "Traceback" not in result.stderr
+
+
+def test_missing_library_names_its_packages(monkeypatch):
+    monkeypatch.setattr(system_check, "DEBIAN_PACKAGES", {"libno.so.7": "libno7", "libc.so.6": "c"})
+    line = system_check.remedy(OSError(LIBRARY_MISSING))
+    assert line.endswith("apt-get install libno7")
+    assert system_check.remedy(OSError("disk full")) is None
+
+
+def test_verify_reports_by_exit_code(monkeypatch, dovetail_path):
+    for passed in (True, False):
+        stand_in = types.ModuleType("workflow.verify")
+        stand_in.verify_cases = lambda paths, passed=passed: passed
+        monkeypatch.setitem(sys.modules, "workflow.verify", stand_in)
+        assert invoke("verify", dovetail_path).exit_code == (0 if passed else 1)

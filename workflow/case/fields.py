@@ -1,0 +1,197 @@
+"""Kinds of entry in a case: quantity, whole number, text. Each knows what it takes.
+
+They are written as annotations, ``Annotated[float, Quantity("mm", above=0)]``, so that the type
+seen by the rest of the program is the plain ``float``, in base units.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from workflow.case import units
+
+LONGEST_SHOWN = 60  # of a wrong value in a message, which must stay one readable line
+
+
+def shown(value: object) -> str:
+    """``value`` as it goes into a one-line message."""
+    if isinstance(value, dict):
+        return "a section"
+    if isinstance(value, list | tuple):
+        return f"a list of {len(value)}"
+    if value is None:
+        return "nothing"
+    if isinstance(value, bool):
+        return str(value).lower()
+    # Python refuses to print whole numbers of thousands of digits.
+    text = "a huge number" if isinstance(value, int) and abs(value) > 1e300 else repr(value)
+    return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "..."
+
+
+class Entry:
+    """An annotation that validates one value; ``allowed`` is the sentence about what it takes."""
+
+    @property
+    def allowed(self) -> str:
+        raise NotImplementedError
+
+    def parse(self, value: object) -> Any:
+        raise NotImplementedError
+
+    def json_schema(self) -> dict[str, Any]:
+        raise NotImplementedError
+
+    def refusal(self, value: object, wrong: str) -> PydanticCustomError:
+        """The error: the value, what is wrong with it, what is allowed."""
+        message = f"{shown(value)}: {wrong}; allowed: {self.allowed}"
+        return PydanticCustomError("entry", "{message}", {"message": message})
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_plain_validator_function(self.parse)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return self.json_schema()
+
+
+@dataclass(frozen=True)
+class Quantity(Entry):
+    """A number in the base unit ``unit``, or a text with any unit of that dimension.
+
+    ``unit`` is ``"1"`` for a ratio and ``None`` for any dimension. The limits are in the base unit;
+    ``range_text`` says them in everyday units where those differ.
+    """
+
+    unit: str | None
+    above: float = -math.inf
+    at_least: float = -math.inf
+    below: float = math.inf
+    at_most: float = math.inf
+    range_text: str = ""
+
+    @property
+    def allowed(self) -> str:
+        text = self.range_text or self._range()
+        if self.unit is None:
+            return text
+        if self.unit == "1":
+            return f"{text}, as a bare number or in %"
+        if self.range_text:
+            return f"{text} (a bare number is in {self.unit})"
+        return text
+
+    def _range(self) -> str:
+        unit = "" if self.unit in (None, "1") else f" {self.unit}"
+        lower = f"above {self.above:g}{unit}" if self.above > -math.inf else ""
+        lower = f"at least {self.at_least:g}{unit}" if self.at_least > -math.inf else lower
+        upper = f"below {self.below:g}{unit}" if self.below < math.inf else ""
+        upper = f"at most {self.at_most:g}{unit}" if self.at_most < math.inf else upper
+        return " and ".join(part for part in (lower, upper) if part) or f"any number{unit}"
+
+    def contains(self, number: float) -> bool:
+        """Whether ``number``, in the base unit, is within the limits."""
+        return self.above < number < self.below and self.at_least <= number <= self.at_most
+
+    def parse(self, value: object) -> float:
+        number = self._number(value)
+        if not math.isfinite(number):
+            raise self.refusal(value, "not a finite number")
+        if not self.contains(number):
+            raise self.refusal(value, "out of range")
+        return number
+
+    def _number(self, value: object) -> float:
+        if isinstance(value, str):
+            try:
+                return units.to_base(value, self.unit)
+            except units.UnitError as error:
+                raise self.refusal(value, str(error)) from error
+            except ArithmeticError as error:
+                raise self.refusal(value, "out of range") from error
+        if isinstance(value, bool) or not isinstance(value, int | float):
+            raise self.refusal(value, "not a number")
+        try:
+            return float(value)
+        except OverflowError as error:
+            raise self.refusal(value, "out of range") from error
+
+    def json_schema(self) -> dict[str, Any]:
+        limits = {
+            "exclusiveMinimum": self.above,
+            "minimum": self.at_least,
+            "exclusiveMaximum": self.below,
+            "maximum": self.at_most,
+        }
+        finite = {name: limit for name, limit in limits.items() if math.isfinite(limit)}
+        number = {"type": "number", **finite}
+        return {"anyOf": [number, {"type": "string", "pattern": units.QUANTITY_PATTERN}]}
+
+
+@dataclass(frozen=True)
+class Whole(Entry):
+    """A whole number from ``at_least`` to ``at_most``."""
+
+    at_least: int
+    at_most: int
+
+    @property
+    def allowed(self) -> str:
+        return f"a whole number from {self.at_least} to {self.at_most}"
+
+    def parse(self, value: object) -> int:
+        if isinstance(value, bool) or not isinstance(value, int):
+            raise self.refusal(value, "not a whole number")
+        if not self.at_least <= value <= self.at_most:
+            raise self.refusal(value, "out of range")
+        return int(value)
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"type": "integer", "minimum": self.at_least, "maximum": self.at_most}
+
+
+@dataclass(frozen=True)
+class Text(Entry):
+    """One line of printable text."""
+
+    @property
+    def allowed(self) -> str:
+        return "one line of text"
+
+    def parse(self, value: object) -> str:
+        if not isinstance(value, str):
+            raise self.refusal(value, "not text, put it in quotes if it is meant to be")
+        if not value.strip():
+            raise self.refusal(value, "empty")
+        if not value.isprintable():
+            raise self.refusal(value, "has line breaks or unprintable characters")
+        return value
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"type": "string", "minLength": 1}
+
+
+@dataclass(frozen=True)
+class Path(Entry):
+    """Keys joined by dots, such as ``wear.blade.coefficient``; list entries by their number."""
+
+    @property
+    def allowed(self) -> str:
+        return "keys joined by dots, such as wear.blade.coefficient"
+
+    def parse(self, value: object) -> str:
+        if not isinstance(value, str):
+            raise self.refusal(value, "not a dotted path")
+        if not all(key.replace("-", "_").replace("_", "a").isalnum() for key in value.split(".")):
+            raise self.refusal(value, "not a dotted path")
+        return value
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"type": "string", "pattern": r"^[\w-]+(\.[\w-]+)*$"}

@@ -1,0 +1,430 @@
+"""What a case may say: one frozen model per section, every quantity in base units.
+
+Each field carries its description, with the base unit in brackets, and an example as one would
+write it. JSON schema, template and error messages are made from these; nothing is said twice.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import cos, pi, radians, sin, tan
+from typing import Annotated, Any, Literal, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
+from pydantic.fields import FieldInfo
+from pydantic_core import PydanticCustomError
+
+from sa_solver.types import Material as ElasticMaterial
+from workflow.case.fields import Entry, Path, Quantity, Text, Whole
+
+# Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual machine.
+Length = Annotated[float, Quantity("mm", above=0.0, at_most=1e4)]
+RoundingRadius = Annotated[float, Quantity("mm", above=0.0, at_most=1e6)]  # nearly flat is fine
+Stress = Annotated[
+    float, Quantity("MPa", above=0.0, at_most=2e6, range_text="above 0 and at most 2000 GPa")
+]
+Density = Annotated[
+    float,
+    Quantity("t/mm^3", above=0.0, at_most=2.5e-8, range_text="above 0 and at most 25000 kg/m^3"),
+]
+Mass = Annotated[float, Quantity("t", at_least=0.0, at_most=1.0, range_text="0 to 1000 kg")]
+Poisson = Annotated[float, Quantity("1", above=0.0, below=0.5)]
+FlankAngle = Annotated[
+    float,
+    Quantity("rad", at_least=radians(10), at_most=radians(80), range_text="10 deg to 80 deg"),
+]
+Skew = Annotated[
+    float,
+    Quantity("rad", at_least=radians(-30), at_most=radians(30), range_text="-30 deg to 30 deg"),
+]
+RotationSpeed = Annotated[
+    float,
+    Quantity(
+        "rad/s", above=0.0, at_most=1e5 * pi / 30, range_text="above 0 and at most 100000 rpm"
+    ),
+]
+Moment = Annotated[
+    float, Quantity("N*mm", at_least=-1e9, at_most=1e9, range_text="-1e6 N*m to 1e6 N*m")
+]
+Volume = Annotated[float, Quantity("mm^3", above=0.0, at_most=1e9)]
+Cycles = Annotated[float, Quantity("1", at_least=1.0, at_most=1e12)]
+# Metals wear 1e2 to 1e6 um^3 per joule; a forgotten unit gives 1e16.
+VolumePerEnergy = Annotated[
+    float, Quantity("1/MPa", at_least=0.0, at_most=1e-3, range_text="0 to 1e9 um^3/J")
+]
+Ratio = Annotated[float, Quantity("1", above=0.0, at_most=1.0)]
+GridCells = Annotated[int, Whole(8, 4096)]
+FlankNodes = Annotated[int, Whole(3, 2000)]
+Title = Annotated[str, Text()]
+DottedPath = Annotated[str, Path()]
+
+
+def entry(description: str, example: object = None, **settings: Any) -> Any:
+    """A field with its description and, for a leaf, an example as one would write it."""
+    examples = None if example is None else [example]
+    return Field(description=description, examples=examples, **settings)
+
+
+def disagreement(message: str, *keys: str) -> PydanticCustomError:
+    """Entries that are fine one by one but not together; the first key is the one to look at."""
+    return PydanticCustomError("disagreement", "{message}", {"message": message, "keys": keys})
+
+
+class Section(BaseModel):
+    """A section of a case: frozen, every key known, every number finite."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+class Dovetail(Section):
+    """Blade root in a disk sector, in contact along two flanks (dovetail attachment)."""
+
+    kind: Literal["dovetail"] = entry("what the structure is", "dovetail")
+    flank_angle: FlankAngle = entry("between the flank and the radial axis [rad]", "45 deg")
+    flank_length: Length = entry("flat part of the flank, across the slot [mm]", "8 mm")
+    edge_radius: RoundingRadius = entry(
+        "rounding of the two flank edges along the slot [mm]", "30 mm"
+    )
+    edge_width: Length = entry("width of each rounded edge, beyond the flat [mm]", "1 mm")
+    end_radius: RoundingRadius = entry("rounding of the flank at the slot ends [mm]", "150 mm")
+    end_width: Length = entry("width of each rounded end, inside the slot length [mm]", "3 mm")
+    neck_width: Length = entry("blade, between the tops of the flanks [mm]", "20 mm")
+    neck_fillet: Length = entry("blade, radius between neck and flank [mm]", "3 mm")
+    slot_length: Length = entry("of the slot, along its direction [mm]", "60 mm")
+    slot_fillet: Length = entry("disk, radius at the bottom of the slot [mm]", "3 mm")
+    shank_height: Length = entry("blade, from the top of the flanks outwards [mm]", "30 mm")
+    blades: Annotated[int, Whole(3, 1000)] = entry("the sector spans 360°/blades", 24)
+    rim_radius: Length = entry("rotor axis to the top of the flanks [mm]", "250 mm")
+    disk_height: Length = entry("radial height of the sector below the rim [mm]", "60 mm")
+    skew: Skew = entry("slot direction against the rotor axis [rad]", "0 deg", default=0.0)
+
+    @property
+    def face_width(self) -> float:
+        """Flat and both rounded edges of a flank, across the slot [mm]."""
+        return self.flank_length + 2.0 * self.edge_width
+
+    @property
+    def face_depth(self) -> float:
+        """Radial extent of the flank below the rim [mm]."""
+        return self.face_width * cos(self.flank_angle)
+
+    @property
+    def root_width(self) -> float:
+        """Width of the blade root at the bottom of the flanks [mm]."""
+        return self.neck_width + 2.0 * self.face_width * sin(self.flank_angle)
+
+    @model_validator(mode="after")
+    def _roundings_fit(self) -> Dovetail:
+        for name in ("edge", "end"):
+            width, radius = getattr(self, f"{name}_width"), getattr(self, f"{name}_radius")
+            if width >= radius:
+                raise disagreement(
+                    f"{width:g} mm: the rounding ends beyond its own arc; "
+                    f"allowed: below {name}_radius, {radius:g} mm",
+                    f"{name}_width",
+                    f"{name}_radius",
+                )
+        _require_below(self, "edge_width", self.flank_length / 2, "half the flank_length")
+        _require_below(self, "end_width", self.slot_length / 2, "half the slot_length")
+        return self
+
+    @model_validator(mode="after")
+    def _root_fits_sector(self) -> Dovetail:
+        _require_below(self, "disk_height", self.rim_radius, "the rim_radius")
+        depth = self.face_depth + self.slot_fillet
+        if depth >= self.disk_height:
+            raise disagreement(
+                f"{self.disk_height:g} mm: too shallow for flanks and slot_fillet, which reach "
+                f"{depth:.4g} mm below the rim; allowed: above {depth:.4g} mm",
+                *("disk_height", "flank_length", "edge_width", "flank_angle", "slot_fillet"),
+            )
+        sector = 2.0 * (self.rim_radius - self.face_depth) * tan(pi / self.blades)
+        if self.root_width >= sector:
+            raise disagreement(
+                f"{self.blades} blades: the sector is {sector:.4g} mm wide at the bottom of the "
+                f"flanks, the blade root {self.root_width:.4g} mm; allowed: fewer blades or a "
+                "narrower root",
+                *("blades", "neck_width", "flank_length", "edge_width", "flank_angle"),
+                "rim_radius",
+            )
+        return self
+
+
+def _require_below(section: Section, key: str, limit: float, name: str) -> None:
+    """Raise unless the length ``key`` is below ``limit`` [mm], called ``name`` in the message."""
+    length = getattr(section, key)
+    if length >= limit:
+        other = name.rsplit(" ", 1)[-1]
+        raise disagreement(
+            f"{length:g} mm: too large; allowed: below {name}, {limit:g} mm", key, other
+        )
+
+
+class Material(Section):
+    """Isotropic linear elastic material."""
+
+    young: Stress = entry("Young's modulus [MPa]", "115 GPa")
+    poisson: Poisson = entry("Poisson's ratio [1]", 0.29)
+    density: Density = entry("mass per volume [t/mm^3]", "4430 kg/m^3")
+    yield_stress: Stress | None = entry(
+        "pressures above it are warned of; without it none [MPa]", "900 MPa", default=None
+    )
+
+    def elastic(self) -> ElasticMaterial:
+        """The same material as the solvers take it; no yield stress is an infinite one."""
+        given = {k: v for k, v in self.model_dump().items() if v is not None}
+        return ElasticMaterial(**given)
+
+
+class Materials(Section):
+    """The two bodies in contact."""
+
+    blade: Material = entry("the upper, moving body")
+    disk: Material = entry("the lower, fixed body")
+
+
+class Friction(Section):
+    """Coulomb friction."""
+
+    coefficient: Annotated[float, Quantity("1", at_least=0.0, at_most=2.0)] = entry(
+        "shear over pressure when slipping [1]", 0.4
+    )
+
+
+class LoadPath(Section):
+    """One mission: the speed rises linearly to its peak and falls back to zero.
+
+    Centrifugal force and aerodynamic moment follow the square of the speed.
+    """
+
+    increments: Annotated[int, Whole(2, 10_000)] = entry("of one cycle", 22)
+    peak_at: Annotated[int, Whole(1, 10_000)] = entry("increment at which the speed peaks", 8)
+    rotation_speed: RotationSpeed = entry("at the peak [rad/s]", "6000 rpm")
+    airfoil_mass: Mass = entry("of the blade outside the model [t]", "0.8 kg")
+    airfoil_radius: Length = entry(
+        "of the airfoil's centre of mass, from the rotor axis [mm]", "400 mm"
+    )
+    aerodynamic_moment: Moment = entry(
+        "at peak speed, about the slot; presses on the intrados [N*mm]", "150 N*m", default=0.0
+    )
+
+    @model_validator(mode="after")
+    def _peak_inside_cycle(self) -> LoadPath:
+        if self.peak_at >= self.increments:
+            raise disagreement(
+                f"{self.peak_at}: the peak comes after the cycle; "
+                f"allowed: below increments, {self.increments}",
+                *("peak_at", "increments"),
+            )
+        return self
+
+
+class Mesh(Section):
+    """Tetrahedra of the structure."""
+
+    flank_nodes: tuple[FlankNodes, FlankNodes] = entry(
+        "nodes across the flank, along the slot", [20, 34], default=(20, 34)
+    )
+    size: Length = entry("of the elements away from the flanks [mm]", "5 mm", default=5.0)
+    order: Literal[1, 2] = entry("of the tetrahedra, 1 or 2", 1, default=1)
+
+
+class Contact(Section):
+    """Half-space solution on a grid over each contact face."""
+
+    grid: tuple[GridCells, GridCells] = entry(
+        "cells across the flank, along the slot", [128, 256], default=(128, 256)
+    )
+    method: Literal["normal"] = entry(
+        "normal: half-space pressure, slips from the structure", "normal", default="normal"
+    )
+    tolerance: Annotated[float, Quantity("1", at_least=1e-12, at_most=1e-3)] = entry(
+        "relative, on equilibrium and complementarity [1]", 1e-8, default=1e-8
+    )
+
+
+class Step(Section):
+    """Size of a wear step: exactly one of cycles, depth and volume."""
+
+    kind: Literal["explicit", "implicit"] = entry("explicit or implicit", "implicit")
+    cycles: Cycles | None = entry("jumped in a step [1]", 5000, default=None)
+    depth: Length | None = entry("largest depth worn in a step [mm]", "1 um", default=None)
+    volume: Volume | None = entry("worn in a step [mm^3]", "0.01 mm^3", default=None)
+
+    @model_validator(mode="after")
+    def _one_size(self) -> Step:
+        sizes = [key for key in ("cycles", "depth", "volume") if getattr(self, key) is not None]
+        if len(sizes) != 1:
+            given = " and ".join(sizes) or "no size"
+            message = f"{given} given; allowed: exactly one of cycles, depth, volume"
+            raise disagreement(message, *sizes[1:])
+        return self
+
+
+class Stop(Section):
+    """Ends the run before its cycles are over, at the first of these that is reached."""
+
+    depth: Length | None = entry("largest depth of either body [mm]", "0.5 mm", default=None)
+    volume: Volume | None = entry("worn from both bodies [mm^3]", "10 mm^3", default=None)
+
+
+class _Wear(Section):
+    """What every wear law needs."""
+
+    law: str  # named first in every wear section; each law narrows it to its own name
+    cycles: Cycles = entry("of the whole run [1]", 1e5)
+    step: Step = entry("how far one wear step jumps")
+    stop: Stop = entry("ends the run early", default=Stop())
+
+
+class EnergyBody(Section):
+    """Wear of one body by dissipated energy."""
+
+    coefficient: VolumePerEnergy = entry("volume per dissipated energy [1/MPa]", "1e4 um^3/J")
+
+
+class EnergyWear(_Wear):
+    """Depth = coefficient x dissipated energy per area."""
+
+    law: Literal["energy"] = entry("energy, energy_amplitude or archard", "energy")
+    blade: EnergyBody = entry("the upper, moving body")
+    disk: EnergyBody = entry("the lower, fixed body")
+
+
+class EnergyAmplitudeWear(_Wear):
+    """Energy law whose coefficient grows with the slip amplitude over a reference amplitude."""
+
+    law: Literal["energy_amplitude"] = entry(
+        "energy, energy_amplitude or archard", "energy_amplitude"
+    )
+    reference_amplitude: Length = entry("at which the coefficients hold [mm]", "75 um")
+    blade: EnergyBody = entry("the upper, moving body")
+    disk: EnergyBody = entry("the lower, fixed body")
+
+
+class ArchardBody(Section):
+    """Wear of one body by pressure times slip over hardness."""
+
+    coefficient: Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)] = entry(
+        "Archard's wear coefficient K [1]", 1e-4
+    )
+    hardness: Annotated[
+        float, Quantity("MPa", above=0.0, at_most=1e5, range_text="above 0 and at most 100 GPa")
+    ] = entry("of the worn body [MPa]", "3.5 GPa")
+
+
+class ArchardWear(_Wear):
+    """Depth = coefficient / hardness x pressure x slip."""
+
+    law: Literal["archard"] = entry("energy, energy_amplitude or archard", "archard")
+    blade: ArchardBody = entry("the upper, moving body")
+    disk: ArchardBody = entry("the lower, fixed body")
+
+
+Wear = Annotated[EnergyWear | EnergyAmplitudeWear | ArchardWear, Field(discriminator="law")]
+
+
+class Coupling(Section):
+    """How often the worn surfaces go back to the structure."""
+
+    resultants: Literal["constant", "drift"] = entry(
+        "constant: of the unworn structure; drift: computed again when wear changes them",
+        "drift",
+        default="drift",
+    )
+    drift: Ratio = entry(
+        "change that asks for new resultants, when they may drift [1]", "2 %", default=0.02
+    )
+
+
+class Output(Section):
+    """What is written beside summary and results."""
+
+    paraview: StrictBool = entry("files for ParaView", True, default=True)
+    figures: StrictBool = entry("charts", True, default=True)
+
+
+class Expectation(Section):
+    """A value the run must reproduce, checked by ``fretscale verify``."""
+
+    quantity: DottedPath = entry("path into summary.json", "intrados.depth")
+    value: Annotated[float, Quantity(None)] = entry("in base units or with any unit", "12 um")
+    tolerance: Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)] = entry(
+        "relative to the value [1]", "1 %"
+    )
+    source: Title = entry("where the value comes from", "closed form")
+
+
+class Case(Section):
+    """One scene: a structure, its load, its contacts and how they wear."""
+
+    title: Title = entry("one line", "Ti-6Al-4V dovetail, one mission per cycle")
+    analysis: Literal["wear"] = entry("what is computed", "wear")
+    structure: Dovetail = entry("lengths in the section across the slot unless named otherwise")
+    materials: Materials = entry("the two bodies in contact")
+    friction: Friction = entry("Coulomb's law on every contact face")
+    load_path: LoadPath = entry("one cycle")
+    mesh: Mesh = entry("tetrahedra of the structure", default=Mesh())
+    contact: Contact = entry("half-space grid over each contact face", default=Contact())
+    wear: Wear = entry("law, length of the run and step")
+    coupling: Coupling = entry("worn surfaces back to the structure", default=Coupling())
+    output: Output = entry("files beside summary and results", default=Output())
+    assumed: tuple[DottedPath, ...] = entry(
+        "inputs that are ours because the source does not print them",
+        ["structure", "friction.coefficient"],
+        default=(),
+    )
+    expect: tuple[Expectation, ...] = entry("values the run must reproduce", default=())
+
+    @model_validator(mode="after")
+    def _airfoil_outside_disk(self) -> Case:
+        radius, rim = self.load_path.airfoil_radius, self.structure.rim_radius
+        if radius <= rim:
+            raise disagreement(
+                f"{radius:g} mm: the airfoil is inside the disk; "
+                f"allowed: above structure.rim_radius, {rim:g} mm",
+                *("load_path.airfoil_radius", "structure.rim_radius"),
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _assumed_exist(self) -> Case:
+        for index, path in enumerate(self.assumed):
+            if not _has(self, path):
+                raise disagreement(
+                    f"'{path}': no such entry in a case of this kind; "
+                    "allowed: dotted paths such as structure or wear.blade.coefficient",
+                    f"assumed.{index}",
+                )
+        return self
+
+
+def _has(node: object, path: str) -> bool:
+    """Whether ``path`` leads from ``node`` to an entry."""
+    for key in path.split("."):
+        if isinstance(node, BaseModel) and key in type(node).model_fields:
+            node = getattr(node, key)
+        elif isinstance(node, tuple) and key.isdecimal() and int(key) < len(node):
+            node = node[int(key)]
+        else:
+            return False
+    return True
+
+
+def sections_of(annotation: object) -> Iterator[type[Section]]:
+    """The section models an annotation admits: none for a leaf, several for a union of kinds."""
+    if isinstance(annotation, type) and issubclass(annotation, Section):
+        yield annotation
+    for argument in get_args(annotation):
+        yield from sections_of(argument)
+
+
+def entry_of(field: FieldInfo) -> Entry | None:
+    """The quantity, whole number or text of a leaf field; ``None`` for sections and choices."""
+    parts = [*field.metadata, field.annotation]
+    while parts:
+        part = parts.pop(0)
+        if isinstance(part, Entry):
+            return part
+        parts += [*getattr(part, "__metadata__", ()), *get_args(part)]
+    return None

@@ -1,0 +1,218 @@
+"""The text of a case as plain data, and the place where each entry was written."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from pathlib import Path
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.comments import CommentedMap, CommentedSeq
+from ruamel.yaml.constructor import DuplicateKeyError
+from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.reader import ReaderError
+
+from workflow.case.fields import shown
+from workflow.errors import CaseError
+
+KeyPath = tuple[str | int, ...]
+
+LARGEST_FILE = 1_000_000  # bytes; cases have a few thousand
+MOST_ENTRIES = 10_000  # after expanding YAML aliases, which can grow without bound
+DEEPEST = 20  # levels; a case has four
+LONGEST_REASON = 100  # of what the YAML parser has to say
+
+
+class Source:
+    """Plain data of a case, with a file line or an override for each entry.
+
+    ``overrides`` are texts such as ``"wear.cycles=1e4"``, applied in order. Raises ``CaseError``.
+    """
+
+    def __init__(self, name: str, text: str, overrides: Iterable[str] = ()) -> None:
+        self.name = name
+        self._overrides: dict[KeyPath, str] = {}
+        reading = _Reading(name)
+        data = reading.plain(parse_yaml(text, name), (), 1)
+        if data is None:
+            raise CaseError(f"{name}:1: empty; allowed: a case (see `fretscale new`)")
+        if not isinstance(data, dict):
+            raise CaseError(f"{name}:1: {shown(data)}: not a case; allowed: key: value")
+        self.data: dict[str, Any] = data
+        self._lines = reading.lines
+        for override in overrides:
+            self._set(override)
+
+    def where(self, path: KeyPath) -> tuple[int, str]:
+        """Line of ``path`` or of what contains it, and the text that names the place.
+
+        For an entry that an override has set the line is 0.
+        """
+        for length in range(len(path), -1, -1):
+            part = path[:length]
+            if part in self._overrides:
+                return 0, f"--set {self._overrides[part]}"
+            if part in self._lines:
+                return self._lines[part], f"{self.name}:{self._lines[part]}"
+        return 1, f"{self.name}:1"
+
+    def is_override(self, path: KeyPath) -> bool:
+        """Whether ``path``, or a section around it, was set by an override."""
+        return self.where(path)[0] == 0
+
+    def at(self, path: Iterable[str | int]) -> Any:
+        """The data at ``path``; ``None`` if there is none."""
+        node: Any = self.data
+        for key in path:
+            node = child(node, key)
+        return node
+
+    def _set(self, override: str) -> None:
+        """Put ``key=value`` into the data, making sections on the way."""
+        written = shown(override)[1:-1]
+        label = f"--set {written}"
+        keys, equals, text = override.partition("=")
+        path = split_path(keys.strip())
+        if not equals or "" in path:
+            raise CaseError(f"{label}: not key=value; allowed: such as wear.cycles=1e4")
+        value = _Reading(label).plain(parse_yaml(text, label), (), 1)
+        node: Any = self.data
+        for key in path[:-1]:
+            if isinstance(node, dict) and node.get(str(key)) is None:
+                node[str(key)] = {}
+            node = child(node, key)
+        if isinstance(node, dict):
+            node[str(path[-1])] = value
+        elif child(node, path[-1]) is not None:
+            node[path[-1]] = value
+        else:
+            raise CaseError(f"{label}: no such entry; allowed: keys joined by dots")
+        # What the file or an earlier override said there and below is gone.
+        self._lines = {p: line for p, line in self._lines.items() if p[: len(path)] != path}
+        self._overrides = {p: o for p, o in self._overrides.items() if p[: len(path)] != path}
+        self._overrides[path] = written
+
+
+class _Reading:
+    """One pass over ruamel's nodes, which know their lines, to plain Python objects."""
+
+    def __init__(self, name: str) -> None:
+        self.name = name
+        self.lines: dict[KeyPath, int] = {}
+
+    def plain(self, node: Any, path: KeyPath, line: int) -> Any:
+        """``node`` as dictionaries, lists and scalars; its lines are noted in ``lines``."""
+        self.lines[path] = line
+        if len(path) > DEEPEST or len(self.lines) > MOST_ENTRIES:
+            raise CaseError(f"{self._place(line)}: nested too deeply or too long for a case")
+        if isinstance(node, CommentedMap):
+            return dict(self._item(key, node, path, line) for key in node)
+        if isinstance(node, CommentedSeq):
+            items = enumerate(node)
+            return [self.plain(v, (*path, i), _line_of(node, i, line)) for i, v in items]
+        for kind in (bool, int, float, str):
+            if isinstance(node, kind):
+                return kind(node)
+        if node is None:
+            return None
+        raise CaseError(
+            f"{self._place(line)}: {dotted(path)}: a {type(node).__name__}; "
+            "allowed: number, text (in quotes if it looks like a date), true, false, list, section"
+        )
+
+    def _item(self, key: Any, node: CommentedMap, path: KeyPath, line: int) -> tuple[str, Any]:
+        below = _line_of(node, key, line)
+        if not isinstance(key, str):
+            raise CaseError(f"{self._place(below)}: {shown(key)}: not a key; allowed: words")
+        name = str(key)
+        return name, self.plain(node[key], (*path, name), below)
+
+    def _place(self, line: int) -> str:
+        return _place(self.name, line)
+
+
+def read_text(path: Path) -> str:
+    """The text of a case file; raises ``CaseError``."""
+    try:
+        with path.open("rb") as file:
+            raw = file.read(LARGEST_FILE + 1)
+    except FileNotFoundError:
+        raise CaseError(f"{path}: no such file; allowed: a case file in YAML") from None
+    except IsADirectoryError:
+        raise CaseError(f"{path}: a directory; allowed: a case file in YAML") from None
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        reason = getattr(error, "strerror", None) or error
+        raise CaseError(f"{path}: cannot be read ({reason}); allowed: a case file") from None
+    if len(raw) > LARGEST_FILE:
+        raise CaseError(f"{path}: over {LARGEST_FILE} bytes; allowed: a case file in YAML")
+    try:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        line = raw.count(b"\n", 0, error.start) + 1
+        raise CaseError(f"{path}:{line}: not UTF-8; allowed: text in UTF-8") from None
+
+
+def parse_yaml(text: str, name: str) -> Any:
+    """``text`` as ruamel's nodes; YAML 1.2, where ``1e5`` is a number and ``yes`` a word."""
+    try:
+        return YAML(typ="rt", pure=True).load(text)
+    except DuplicateKeyError as error:
+        key = shown(str(error.problem).partition('"')[2].partition('"')[0])
+        raise CaseError(f"{_marked(error, name)}: {key}: given twice; allowed: once") from None
+    except MarkedYAMLError as error:
+        raise CaseError(f"{_marked(error, name)}: {_problem(error, text)}") from None
+    except ReaderError as error:
+        line = text.count("\n", 0, error.position) + 1
+        raise CaseError(f"{_place(name, line)}: unprintable character; allowed: text") from None
+    except RecursionError:
+        raise CaseError(f"{_place(name, 1)}: nested too deeply for a case") from None
+    except (YAMLError, ValueError, TypeError, LookupError, AttributeError) as error:
+        # Odd tags and monstrous numbers end up here: ruamel has no one kind for them.
+        raise CaseError(f"{_place(name, 1)}: not YAML: {_one_line(error)}") from None
+
+
+def _marked(error: MarkedYAMLError, name: str) -> str:
+    mark = error.problem_mark or error.context_mark
+    return _place(name, mark.line + 1) if mark else name
+
+
+def _place(name: str, line: int) -> str:
+    """File and line; an override has no lines."""
+    return name if name.startswith("--set ") else f"{name}:{line}"
+
+
+def _problem(error: MarkedYAMLError, text: str) -> str:
+    mark = error.problem_mark or error.context_mark
+    lines = text.splitlines()
+    if mark is not None and mark.line < len(lines) and "\t" in lines[mark.line]:
+        return "a tab; allowed: spaces"
+    return f"not YAML: {_one_line(error.problem or error.context)}"
+
+
+def _one_line(reason: object) -> str:
+    return " ".join(str(reason).split())[:LONGEST_REASON]
+
+
+def _line_of(node: CommentedMap | CommentedSeq, key: Any, otherwise: int) -> int:
+    """Line of an entry, counted from 1; one merged in from elsewhere has none of its own."""
+    position = (node.lc.data or {}).get(key)
+    return position[0] + 1 if position else otherwise
+
+
+def child(node: Any, key: str | int) -> Any:
+    """The entry ``key`` of a section or list; ``None`` if there is none."""
+    if isinstance(node, dict):
+        return node.get(str(key))
+    if isinstance(node, list) and isinstance(key, int) and key < len(node):
+        return node[key]
+    return None
+
+
+def split_path(text: str) -> KeyPath:
+    """The keys of a dotted path; numbers are places in a list."""
+    return tuple(int(key) if key.isdecimal() else key for key in text.split("."))
+
+
+def dotted(path: Iterable[str | int]) -> str:
+    """A path as it is written, keys joined by dots."""
+    return ".".join(str(key) for key in path)

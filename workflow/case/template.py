@@ -1,0 +1,44 @@
+"""The case that ``fretscale new`` writes: the examples of the schema, each with its description."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from pydantic.fields import FieldInfo
+
+from workflow.case.schema import Case, Section, sections_of
+from workflow.case.writing import Row, render
+
+KINDS = ("dovetail",)
+
+HEADER = """\
+# A number without a unit is in the base unit, given in brackets. `fretscale check` tells what is
+# wrong with a case, `fretscale run` runs it. Entries behind a # are optional.
+"""
+# Optional entries the template fills in: a material that can yield, and the one size a step needs.
+FILLED_IN = ("yield_stress", "cycles")
+
+
+def template(kind: str) -> str:
+    """A commented case of ``kind``, ready to run, with every entry there is."""
+    if kind not in KINDS:
+        raise ValueError(f"{kind}: no such template; allowed: {', '.join(KINDS)}")
+    return HEADER + render(_rows(Case))
+
+
+def _rows(model: type[Section]) -> list[Row]:
+    return [_row(name, field) for name, field in model.model_fields.items()]
+
+
+def _row(name: str, field: FieldInfo) -> Row:
+    """The entry as one would write it; of several kinds the first."""
+    sections = list(sections_of(field.annotation))
+    value: Any = _rows(sections[0]) if sections else (field.examples or [None])[0]
+    off = not field.is_required() and field.default in (None, ()) and name not in FILLED_IN
+    if sections and all(row.off for row in value):
+        # A section of nothing but optional entries is optional as a whole.
+        value, off = [replace(row, off=False) for row in value], True
+    if sections and field.default == ():
+        value = [value]
+    return Row(name, value, field.description or "", off)

@@ -1,0 +1,106 @@
+"""Texts such as ``115 GPa`` to numbers in the base units mm, N, s, MPa, tonne, rad.
+
+The only place that knows other units. Conversion is in decimal arithmetic, so that ``115 GPa`` is
+exactly 115000.0. Angles count as a dimension of their own: ``45 %`` is no angle, ``100 Hz`` is no
+rotation speed.
+"""
+
+from __future__ import annotations
+
+import difflib
+import re
+from decimal import Decimal
+from functools import cache
+from typing import TYPE_CHECKING, NamedTuple
+
+if TYPE_CHECKING:
+    from pint import UnitRegistry
+
+QUANTITY_PATTERN = r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*$"
+LONGEST_UNIT = 40  # no unit is longer; keeps pint from chewing on prose
+
+# Offered when a unit is not known; pint knows many more.
+COMMON_UNITS = (
+    *("mm", "um", "m", "N", "kN", "MPa", "GPa", "Pa", "kg", "g", "t", "s", "h", "J", "mJ"),
+    *("deg", "rad", "rpm", "rad/s", "%", "kg/m^3", "N*m", "um^3/J", "mm^3/J"),
+)
+
+
+class UnitError(ValueError):
+    """A text that is not a quantity, or not one of the wanted dimension."""
+
+
+class _Unit(NamedTuple):
+    factor: Decimal  # size in root units
+    powers: dict[str, Decimal]  # of the root units meter, gram, second, radian, ...
+
+
+def to_base(text: str, unit: str | None) -> float:
+    """The number that ``text`` is in the base unit ``unit``.
+
+    ``unit`` ``None`` takes any dimension, ``"1"`` a ratio such as ``2 %``. Raises ``UnitError``.
+    """
+    number, written = split(text)
+    known = _parse(written)
+    if unit is None:
+        return float(number * known.factor / _base_factor(known.powers))
+    wanted = _parse(unit)
+    if known.powers != wanted.powers:
+        target = "a ratio" if unit == "1" else unit
+        raise UnitError(f"unit '{written}' cannot be converted to {target}")
+    return float(number * known.factor / wanted.factor)
+
+
+def split(text: str) -> tuple[Decimal, str]:
+    """Number and unit of ``text``; raises ``UnitError`` if one of them is missing."""
+    match = re.match(QUANTITY_PATTERN, text)
+    if match is None:
+        raise UnitError("not a number with a unit")
+    number, unit = match.groups()
+    if unit is None:
+        raise UnitError("text without a unit")
+    if re.match(r",\d", unit):
+        raise UnitError("decimal comma; write a point")
+    return Decimal(number), unit
+
+
+def _base_factor(powers: dict[str, Decimal]) -> Decimal:
+    """Size in root units of the base unit of a dimension: mm and tonne instead of m and g."""
+    base = {"meter": Decimal("1e-3"), "gram": Decimal("1e6")}
+    factor = Decimal(1)
+    for root, power in powers.items():
+        factor *= base.get(root, Decimal(1)) ** power
+    return factor
+
+
+@cache
+def _parse(unit: str) -> _Unit:
+    """Factor and dimension of ``unit``, or ``UnitError``."""
+    if len(unit) > LONGEST_UNIT:
+        raise UnitError("not a number with a unit")
+    if unit == "1":
+        return _Unit(Decimal(1), {})
+    registry = _registry()
+    try:
+        parsed = registry.parse_units(unit)
+        # Temperature scales and decibels have no factor; multiplying them is an error in pint.
+        _ = registry.Quantity(Decimal(1), parsed) * registry.Quantity(Decimal(1), "meter")
+        factor, root = registry.get_root_units(parsed)
+    except Exception as error:  # pint lets a dozen kinds through, from its tokenizer to decimal's
+        raise UnitError(_unknown(unit)) from error
+    powers = {name: Decimal(str(power)) for name, power in root._units.items()}
+    return _Unit(Decimal(str(factor)), powers)
+
+
+def _unknown(unit: str) -> str:
+    near = difflib.get_close_matches(unit.lower(), [u.lower() for u in COMMON_UNITS], n=1)
+    hint = [u for u in COMMON_UNITS if near and u.lower() == near[0]]
+    return f"unknown unit '{unit}'" + (f", did you mean '{hint[0]}'?" if hint else "")
+
+
+@cache
+def _registry() -> UnitRegistry:
+    """Pint's registry. Importing and building it takes 0.6 s, so only when a unit is met."""
+    import pint
+
+    return pint.UnitRegistry(non_int_type=Decimal)

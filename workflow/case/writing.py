@@ -1,0 +1,110 @@
+"""A ``Case`` as YAML: every entry with its description, which names its base unit."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import BaseModel
+
+from workflow.case.schema import Case
+
+HEADER = """\
+# The case as run, every default written out. Base units: mm, N, s, MPa, tonne (t), rad.
+# Optional entries that are not set are left out.
+"""
+# Texts that need no quotes in YAML: words and quantities, no number, switch, date or null.
+PLAIN_TEXT = re.compile(
+    r"(?!(?:true|false|yes|no|on|off|y|n|null)$)[A-Za-z][\w./-]*", re.ASCII | re.I
+)
+QUANTITY_TEXT = re.compile(r"-?[\d.]+(?:e-?\d+)? [A-Za-z%][\w/^*%-]*", re.ASCII)
+INDENT = "  "
+
+
+@dataclass(frozen=True)
+class Row:
+    """One entry to write; ``off`` leaves it in as a comment."""
+
+    key: str
+    value: Any  # scalar, list of scalars, rows of a section, or a list of such rows
+    comment: str = ""
+    off: bool = False
+
+
+def dump_case(case: Case) -> str:
+    """``case`` in base units; ``parse_case`` of the result is equal to ``case``."""
+    return HEADER + render(rows_of(case))
+
+
+def rows_of(section: BaseModel) -> list[Row]:
+    """The entries of ``section`` that are set."""
+    values = ((name, getattr(section, name)) for name in type(section).model_fields)
+    return [
+        Row(name, _value(value), type(section).model_fields[name].description or "")
+        for name, value in values
+        if value is not None
+    ]
+
+
+def _value(value: Any) -> Any:
+    if isinstance(value, BaseModel):
+        return rows_of(value) or {}
+    if isinstance(value, tuple):
+        return [_value(item) for item in value]
+    return value
+
+
+def render(rows: list[Row]) -> str:
+    """``rows`` as YAML text, a blank line before each section."""
+    blocks = ["\n".join(_lines([row])) for row in rows]
+    spaced = [f"\n{b}" if _is_section(r.value) else b for r, b in zip(rows, blocks, strict=True)]
+    return "\n".join(spaced) + "\n"
+
+
+def _lines(rows: list[Row]) -> Iterator[str]:
+    for row in rows:
+        for line in _entry_lines(row):
+            yield f"# {line}" if row.off else line
+
+
+def _entry_lines(row: Row) -> Iterator[str]:
+    if not _is_section(row.value):
+        yield _commented(f"{row.key}: {scalar(row.value)}", row.comment)
+        return
+    yield _commented(f"{row.key}:", row.comment)
+    if isinstance(row.value[0], Row):
+        yield from (INDENT + line for line in _lines(row.value))
+        return
+    for item in row.value:
+        first, *rest = _lines(item)
+        yield f"{INDENT}- {first}"
+        yield from (2 * INDENT + line for line in rest)
+
+
+def _is_section(value: Any) -> bool:
+    """Whether ``value`` is rows, or a list of sections given as rows."""
+    return isinstance(value, list) and bool(value) and isinstance(value[0], Row | list)
+
+
+def _commented(text: str, comment: str) -> str:
+    return f"{text}  # {comment}" if comment else text
+
+
+def scalar(value: Any) -> str:
+    """A number, switch, text or list of them in YAML 1.1 and 1.2 alike."""
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(scalar, value))}]"
+    if isinstance(value, float):
+        return _float(value)
+    if isinstance(value, str) and (PLAIN_TEXT.fullmatch(value) or QUANTITY_TEXT.fullmatch(value)):
+        return value
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _float(value: float) -> str:
+    """The shortest text that reads back as ``value``; YAML 1.1 wants a point in ``1.0e-08``."""
+    mantissa, exponent, power = repr(value).partition("e")
+    return mantissa + ("" if "." in mantissa else ".0") * bool(exponent) + exponent + power

@@ -1,0 +1,180 @@
+"""The command ``fretscale``.
+
+Everything heavy is imported inside the commands, so that ``--help`` answers at once; whatever ends
+a command early ends it in one line and an exit code (``workflow.errors``).
+"""
+
+from __future__ import annotations
+
+import sys
+from math import ceil
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NoReturn
+
+import click
+
+from workflow import errors
+
+if TYPE_CHECKING:
+    from workflow.case import Case
+
+
+class _OneLineGroup(click.Group):
+    """A group of commands whose failures are one line on stderr and an exit code."""
+
+    def main(self, *args: Any, **settings: Any) -> NoReturn:
+        settings["standalone_mode"] = False
+        try:
+            code = super().main(*args, **settings)
+        except (errors.FretscaleError, OSError, ImportError, MemoryError) as error:
+            code = _report(error)
+        except click.Abort:
+            click.echo("fretscale: interrupted; a run continues with `resume DIR`", err=True)
+            code = errors.INTERRUPTED
+        except click.exceptions.NoArgsIsHelpError as error:
+            error.show()
+            code = errors.UserError.exit_code
+        except click.ClickException as error:
+            click.echo(f"fretscale: {_usage(error)}", err=True)
+            code = errors.UserError.exit_code
+        sys.exit(code if isinstance(code, int) else errors.DONE)
+
+
+def _report(error: Exception) -> int:
+    """Say what ended the command, one line for each thing wrong, and give the exit code."""
+    message, code = _ending(error)
+    for line in message.splitlines():
+        click.echo(f"fretscale: {line}", err=True)
+    return code
+
+
+def _ending(error: Exception) -> tuple[str, int]:
+    """Message and exit code of ``error``."""
+    if isinstance(error, errors.FretscaleError):
+        return str(error), error.exit_code
+    if isinstance(error, MemoryError):
+        return f"out of memory: {error}".rstrip(": "), errors.OutOfMemory.exit_code
+    from workflow.system_check import remedy
+
+    if missing := remedy(error):
+        return missing, errors.MethodFailed.exit_code
+    if isinstance(error, OSError) and error.filename is not None:
+        return f"{error.filename}: {error.strerror}", errors.UserError.exit_code
+    raise error
+
+
+def _usage(error: click.ClickException) -> str:
+    """A usage error in one line."""
+    context = getattr(error, "ctx", None)
+    hint = f"; see `{context.command_path} --help`" if context else ""
+    return " ".join(error.format_message().split()).rstrip(".") + hint
+
+
+@click.group(cls=_OneLineGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(package_name="fretscale")
+def cli() -> None:
+    """Fretting wear across scales: a structure, its contacts, and how they wear.
+
+    Exit codes: 0 done, 1 an expectation missed, 2 bad case or usage, 3 a method failed,
+    4 not enough memory, 130 interrupted.
+    """
+
+
+@cli.command()
+@click.argument("case")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
+@click.option("--force", is_flag=True, help="Overwrite a folder that holds another run.")
+def run(case: str, out: Path, overrides: tuple[str, ...], force: bool) -> None:
+    """Run CASE and write its results."""
+    from workflow.case import load_case
+
+    loaded = load_case(case, overrides)
+    from workflow.run import run_case
+
+    run_case(loaded, out, force)
+
+
+@cli.command()
+@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+def resume(folder: Path) -> None:
+    """Continue an interrupted run from its output FOLDER."""
+    from workflow.run import resume_run
+
+    resume_run(folder)
+
+
+@cli.command()
+@click.argument("cases", nargs=-1, required=True, type=click.Path(path_type=Path))
+def verify(cases: tuple[Path, ...]) -> int:
+    """Run CASES and compare with what they expect."""
+    from workflow.verify import verify_cases
+
+    return errors.DONE if verify_cases(cases) else errors.ExpectationMissed.exit_code
+
+
+@cli.command()
+@click.argument("case")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
+def check(case: str, overrides: tuple[str, ...]) -> None:
+    """Read CASE and say what it would run."""
+    from workflow.case import load_case
+
+    loaded = load_case(case, overrides)
+    click.echo(f"OK {case}: {loaded.title}")
+    for name, text in _outline(loaded):
+        click.echo(f"  {name:<10} {text}")
+
+
+@cli.command()
+@click.argument("kind")
+@click.argument("file", required=False, type=click.Path(path_type=Path))
+def new(kind: str, file: Path | None) -> None:
+    """Write a commented case of KIND (dovetail) to FILE, or print it."""
+    from workflow.case import KINDS, template
+
+    if kind not in KINDS:
+        raise errors.UserError(f"{kind}: no such kind of case; allowed: {', '.join(KINDS)}")
+    if file is None:
+        click.echo(template(kind), nl=False)
+        return
+    try:
+        with file.open("x", encoding="utf-8") as stream:
+            stream.write(template(kind))
+    except FileExistsError:
+        raise errors.UserError(f"{file}: exists; give another name or remove it") from None
+
+
+@cli.command()
+def schema() -> None:
+    """Print the JSON schema of a case, for editors."""
+    import json
+
+    from workflow.case import Case
+
+    click.echo(json.dumps(Case.model_json_schema(), indent=2, allow_nan=False, ensure_ascii=False))
+
+
+def _outline(case: Case) -> list[tuple[str, str]]:
+    """What would run, in a few rows."""
+    path, mesh, grid, wear = case.load_path, case.mesh, case.contact.grid, case.wear
+    nodes = mesh.flank_nodes
+    return [
+        ("structure", f"{case.structure.kind}, {nodes[0]} x {nodes[1]} nodes on a flank"),
+        ("load path", f"{path.increments} increments, peak at {path.peak_at}"),
+        ("contact", f"{grid[0]} x {grid[1]} cells, {case.contact.method}"),
+        ("wear", f"{wear.law}, {wear.cycles:g} cycles, {wear.step.kind} steps of {_step(case)}"),
+    ]
+
+
+def _step(case: Case) -> str:
+    """Size of a wear step, with the number of jumps where it is known beforehand."""
+    step = case.wear.step
+    if step.cycles is not None:
+        return f"{step.cycles:g} cycles: {ceil(case.wear.cycles / step.cycles)} jumps"
+    return f"{step.depth:g} mm" if step.depth is not None else f"{step.volume:g} mm^3"
+
+
+def main() -> None:
+    """Entry point of the command."""
+    cli(prog_name="fretscale")

@@ -1,0 +1,44 @@
+"""What can end a command early, and the exit code each ending has.
+
+Imports nothing, so that the command line answers at once. Each message is written for the person
+who started the command: one line, what is wrong and what to do about it.
+"""
+
+from __future__ import annotations
+
+DONE = 0
+INTERRUPTED = 130
+
+
+class FretscaleError(Exception):
+    """An ending the user should read as one line, without a traceback."""
+
+    exit_code = 3
+
+
+class ExpectationMissed(FretscaleError):
+    """A computed quantity is outside the tolerance its case states."""
+
+    exit_code = 1
+
+
+class UserError(FretscaleError):
+    """A bad case, argument or file: nothing was computed."""
+
+    exit_code = 2
+
+
+class CaseError(UserError, ValueError):
+    """A case file that cannot be run; one line ``file:line: key: ...`` for each thing wrong."""
+
+
+class MethodFailed(FretscaleError):
+    """A numerical method did not converge; the message carries its residual and a remedy."""
+
+    exit_code = 3
+
+
+class OutOfMemory(FretscaleError):
+    """The case needs more memory than there is."""
+
+    exit_code = 4
