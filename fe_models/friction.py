@@ -15,8 +15,8 @@ import numpy as np
 import scipy.linalg as sl
 
 from fe_models.reduction import JointStiffness
-from sa_solver.contact_law import coulomb, unilateral
-from sa_solver.splitting import Splitting, douglas_rachford
+from sa_solver.contact_law import coulomb
+from sa_solver.splitting import SplittingResult, douglas_rachford
 from sa_solver.types import Array
 
 # Out-of-balance forces left, relative to the forces of the load at hand.
@@ -74,7 +74,7 @@ class FrictionalJoint:
 
     def _solve(
         self, load: Array, gap: Array, previous: Array, start: Array, scale: float
-    ) -> Splitting:
+    ) -> SplittingResult:
         rho, inverse = self._rho, self._inverse
         offset = inverse @ load
 
@@ -85,18 +85,25 @@ class FrictionalJoint:
             nodal = trial.reshape(-1, 3).T
             return (nodal + self._force(nodal, gap, previous) / rho).T.ravel()
 
-        return douglas_rachford(elastic, law, start, scale / rho, TOLERANCE, MAX_ITERATIONS)
+        return douglas_rachford(
+            elastic,
+            law,
+            start,
+            scale=scale / rho,
+            tolerance=TOLERANCE,
+            max_iterations=MAX_ITERATIONS,
+        )
 
     def _force(self, trial: Array, gap: Array, previous: Array) -> Array:
         """Force that brings a trial displacement ``(3, n)`` back to the law, at stiffness ρ."""
-        pressure = unilateral(-self._rho * (gap + trial[2]))
-        shear = coulomb(self._rho * (previous[:2] - trial[:2]), self._friction * pressure)
-        return np.concatenate([shear, pressure[None]])
+        stick = self._rho * (previous - trial)
+        stick[2] = -self._rho * (gap + trial[2])
+        return coulomb(stick, self._friction)
 
-    def _state(self, split: Splitting, gap: Array, previous: Array) -> FrictionState:
+    def _state(self, split: SplittingResult, gap: Array, previous: Array) -> FrictionState:
         trial = (2.0 * split.elastic - split.state).reshape(-1, 3).T
         force = self._force(trial, gap, previous)
-        displacement = split.law.reshape(-1, 3).T
+        displacement = split.solution.reshape(-1, 3).T
         slip = displacement[:2] - previous[:2]
         return FrictionState(
             force, displacement, slip, split.residual, split.iterations, split.converged

@@ -154,7 +154,7 @@ class HalfSpaceResolvent:
 
     def __init__(self, convolution: HalfSpaceConvolution, shift: float) -> None:
         """Plan; ``shift`` is ρ > 0 [mm/MPa]."""
-        self.padded = padded_shape(convolution.grid)
+        self.padded, self.shift = padded_shape(convolution.grid), shift
         self._convolution = convolution
         self._transform = plan_transform(self.padded, self.padded, convolution.threads)
         self._symbol = 1.0 / (np.maximum(convolution.symbol, 0.0) + shift)

@@ -37,6 +37,9 @@ GRAM_CUTOFF = 1e-13
 """Eigenvalues of the scaled Gram matrix below this are rounding, since it squares the differences:
 their directions are left out of the least-squares problem."""
 
+TINY = np.finfo(float).tiny
+"""Keeps divisions by a vanishing size finite."""
+
 Step = Callable[[Array], Array]
 
 
@@ -45,7 +48,7 @@ class SplittingResult:
     """Outcome of a splitting; arrays have the shape of the start.
 
     ``solution`` obeys the local law exactly and ``elastic`` the elastic relation exactly; they
-    differ by ``residual`` times the larger of their norms. ``state`` is the start of a next solve.
+    differ by ``residual`` times the scale. ``state`` is the start of a next solve.
     """
 
     state: Array
@@ -61,13 +64,15 @@ def douglas_rachford(
     local_law: Step,
     start: Array,
     *,
+    scale: float | None = None,
     tolerance: float = 1e-8,
     max_iterations: int = 1000,
     relaxation: float = OVER_RELAXATION,
     depth: int = ANDERSON_DEPTH,
 ) -> SplittingResult:
-    """Iterate the two steps from ``start`` until ``|t2 - t1| <= tolerance max(|t1|, |t2|)``.
+    """Iterate the two steps from ``start`` until ``|t2 - t1| <= tolerance scale``.
 
+    ``scale`` is the size to measure the residual against, max(|t1|, |t2|) unless it is given.
     ``elastic_step`` and ``local_law`` map an array of any shape to one of the same shape and must
     not modify it. ``depth = 0`` turns the acceleration off. A result that has not
     converged after ``max_iterations`` says so.
@@ -80,8 +85,8 @@ def douglas_rachford(
         elastic = elastic_step(state)
         solution = local_law(2.0 * elastic - state)
         step = solution - elastic
-        scale = max(np.linalg.norm(solution), np.linalg.norm(elastic), np.finfo(float).tiny)
-        residual = float(np.linalg.norm(step) / scale)
+        size = scale or max(np.linalg.norm(solution), np.linalg.norm(elastic), TINY)
+        residual = float(np.linalg.norm(step) / size)
         if residual <= tolerance or not np.isfinite(residual):
             break
         state = memory.next_state(state.ravel(), relaxation * step.ravel()).reshape(state.shape)
@@ -132,7 +137,7 @@ class AndersonMemory:
 
 def _solve_gram(gram: Array, right: Array) -> Array:
     """Least-squares weights from a Gram matrix that may be singular to rounding."""
-    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
+    scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), TINY))
     values, vectors = scipy.linalg.eigh(gram * np.outer(scale, scale), check_finite=False)
     kept = values > GRAM_CUTOFF * values[-1]
     basis = vectors[:, kept]

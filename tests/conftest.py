@@ -3,11 +3,11 @@
 import os
 from pathlib import Path
 
+import pytest
+
 # Before numpy is imported: its threads would fight with the other test processes.
 for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
     os.environ.setdefault(name, "1")
-
-import pytest
 
 CASES = Path(__file__).parent.parent / "cases"
 
