@@ -61,11 +61,10 @@ class ConstrainedBody:
     ) -> None:
         self.elastic = elastic
         self._loads = loads
-        rotation = _rotation(len(elastic.nodes), nodes, frames)
         transformation = constraints.transformation()
         self._interface = _free_columns(transformation, nodes)
-        # Constraints first, then local axes at the interface nodes, which no constraint touches.
-        self._transformation = (rotation @ transformation).tocsr()
+        rotation = _rotation(transformation.shape[1], self._interface, frames)
+        self._transformation = (transformation @ rotation).tocsr()
 
     def condense(self) -> tuple[Array, Array]:
         """Stiffness ``(3 n, 3 n)`` and loads ``(3 n, cases)`` on the interface displacements."""
@@ -111,9 +110,7 @@ class ConstrainedBody:
         return np.setdiff1d(np.arange(stiffness.shape[0]), self._interface)
 
 
-def join(
-    condensed_1: tuple[Array, Array], condensed_2: tuple[Array, Array]
-) -> JointStiffness:
+def join(condensed_1: tuple[Array, Array], condensed_2: tuple[Array, Array]) -> JointStiffness:
     """Join two condensed bodies; body 1 must be held, body 2 may float."""
     (stiffness_1, loads_1), (stiffness_2, loads_2) = condensed_1, condensed_2
     factors = sl.cho_factor(stiffness_1 + stiffness_2, lower=True, overwrite_a=True)
@@ -136,12 +133,15 @@ def interface_frames(interfaces: tuple[Interface, ...]) -> Array:
     return np.concatenate([np.tile(i.frame.axes, (len(i), 1, 1)) for i in interfaces])
 
 
-def _rotation(nodes: int, turned: NDArray[np.int64], frames: Array) -> sp.csr_matrix:
-    """Global displacements from ones that are in ``frames`` at the turned nodes."""
-    blocks = np.tile(np.eye(3), (nodes, 1, 1))
-    blocks[turned] = frames.transpose(0, 2, 1)
-    shape = (3 * nodes, 3 * nodes)
-    return sp.bsr_matrix((blocks, np.arange(nodes), np.arange(nodes + 1)), shape=shape).tocsr()
+def _rotation(size: int, interface: NDArray[np.int64], frames: Array) -> sp.csr_matrix:
+    """Free displacements from ones that are in ``frames`` ``(n, 3, 3)`` at the interface nodes."""
+    others = np.setdiff1d(np.arange(size), interface)
+    nodal = interface.reshape(-1, 3)
+    rows = np.broadcast_to(nodal[:, :, None], frames.shape).ravel()
+    columns = np.broadcast_to(nodal[:, None, :], frames.shape).ravel()
+    values = np.append(frames.transpose(0, 2, 1).ravel(), np.ones(len(others)))
+    places = np.append(rows, others), np.append(columns, others)
+    return sp.csr_matrix((values, places), shape=(size, size))
 
 
 def _free_columns(transformation: sp.csr_matrix, nodes: NDArray[np.int64]) -> NDArray[np.int64]:

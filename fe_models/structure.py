@@ -76,7 +76,12 @@ class Structure:
         return np.concatenate([i.gap for i in self.mesh.interfaces])
 
     def solve_cycle(
-        self, joint: FrictionalJoint, amplitudes: Array, gap: Array, friction: float, cycles: int = 2
+        self,
+        joint: FrictionalJoint,
+        amplitudes: Array,
+        gap: Array,
+        friction: float,
+        cycles: int = 2,
     ) -> CycleSolution:
         """March through the load path ``cycles`` times and keep the last."""
         states = list(joint.march(np.tile(amplitudes, (cycles, 1)), gap))
@@ -108,6 +113,15 @@ class Structure:
             start += len(interface)
         return histories
 
+    def interface_resultants(self, state: FrictionState) -> Array:
+        """``(P, Qx, Qy, Mx, My, Mz)`` of every interface, ``(interfaces, 6)``."""
+        rows, start = [], 0
+        for interface in self.mesh.interfaces:
+            own = slice(start, start + len(interface))
+            rows.append(resultants(state.force[:, own], *interface.coordinates.T))
+            start += len(interface)
+        return np.array(rows)
+
     def equilibrium_error(self, state: FrictionState, amplitudes: Array) -> tuple[float, float]:
         """Relative error of forces and of moments on body 2, support included.
 
@@ -132,9 +146,7 @@ class Structure:
             return 0.0, 0.0
         size = np.linalg.norm(np.ptp(np.concatenate(points), axis=0))
         moment = max(float(np.linalg.norm(applied[1])), force * size)
-        return float(np.linalg.norm(balance[0]) / force), float(
-            np.linalg.norm(balance[1]) / moment
-        )
+        return float(np.linalg.norm(balance[0]) / force), float(np.linalg.norm(balance[1]) / moment)
 
 
 def load_history(interface: Interface, force: Array, slip: Array, friction: float) -> LoadHistory:

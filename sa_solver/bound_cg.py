@@ -27,12 +27,14 @@ Mask = NDArray[np.bool_]
 
 SETTLED = 0.4
 """The contact set is revised once the preconditioned residual on it has fallen by this factor.
-Between 0.3 and 0.5 the count is least: earlier, every revision costs a convolution; later, the
-solve on a wrong set is wasted."""
+From 0.3 up smooth contacts take the same count; at 0.1 a third more, spent on wrong sets."""
+
+ROUNDING = 1e-12
+"""Cells whose pressure reaches zero within this relative distance reach it together."""
 
 STALE = 0.01
 """Flat-punch pressures are recomputed once this fraction of the set has changed; until then those
-at hand, cut to the set, do as well."""
+at hand, cut to the set, do as well: 0 and 0.05 take the same count within one."""
 
 
 @dataclass(frozen=True)
@@ -87,22 +89,24 @@ class _Search:
         self._contact = pressure > 0.0
         self._compute_punches()
         self._find_gap()
-        self.feasible = Iterate(pressure, displacement, self._rigid)
+        self._keep()
 
     def converged(self, tolerance: float) -> bool:
         """Penetration and complementarity within ``tolerance`` and no cell pulling."""
         if self._pressure.min() < 0.0:
             return False
-        self.feasible = Iterate(self._pressure, self._displacement, self._rigid)
+        self._keep()
         measures = contact_residuals(self._pressure, self._displacement, self._gap)
         return max(measures) <= tolerance
 
+    def _keep(self) -> None:
+        self.feasible = Iterate(self._pressure, self._displacement, self._rigid)
+
     def advance(self) -> bool:
-        """Search one direction; False where none is left or the load has lost its support."""
+        """Search one direction; False where none is left."""
         residual, gradient, energy = self._gradient()
         if energy <= self._settled and self._needs_revision():
-            if not self._revise():
-                return False
+            self._revise()
             residual, gradient, energy = self._gradient()
             self._settled = SETTLED**2 * energy
         elif self._settled == np.inf:
@@ -117,7 +121,7 @@ class _Search:
 
     def _search(self, residual: Array, gradient: Array, energy: float) -> bool:
         """Minimise along the conjugate direction (Polak-Ribière, never negative)."""
-        conjugacy = np.vdot(gradient, residual - self._residual) / self._energy
+        conjugacy = float(np.vdot(gradient, residual - self._residual)) / self._energy
         direction = self._without_resultants(max(0.0, conjugacy) * self._direction - gradient)
         image = self._problem.displacement(direction)
         curvature = np.vdot(direction, image)
@@ -133,24 +137,32 @@ class _Search:
     def _needs_revision(self) -> bool:
         return bool(self._pressure.min() < 0.0 or np.any(self._gap[~self._contact] < 0.0))
 
-    def _revise(self) -> bool:
+    def _revise(self) -> None:
         """Cells that pull leave the set, cells that interpenetrate join it."""
         joining = ~self._contact & (self._gap < 0.0)
         if self._pressure.min() < 0.0:
-            pressure = self._problem.modes.balance(
-                unilateral(self._pressure), self._problem.target
-            )
-            if pressure is None:
-                return False
-            self._pressure = pressure
-            self._displacement = self._problem.displacement(pressure)
-            self._take((pressure > 0.0) | joining)
+            self._truncate()
+            self._take((self._pressure > 0.0) | joining)
             joining = self._gap < 0.0
+            self._keep()
         self._take(self._contact | joining)
         if np.count_nonzero(self._contact ^ self._punch_set) > STALE * self._contact.sum():
             self._compute_punches()
             self._find_gap()
-        return True
+
+    def _truncate(self) -> None:
+        """Cut off all cells that pull or, if the rest cannot carry the load, the first to do so."""
+        balanced = self._problem.modes.balance(unilateral(self._pressure), self._problem.target)
+        if balanced is not None:
+            self._pressure, self._displacement = balanced, self._problem.displacement(balanced)
+            return
+        last = self.feasible
+        change = self._pressure - last.pressure
+        falling = self._pressure < 0.0
+        step = np.min(last.pressure[falling] / -change[falling])
+        first = falling & (last.pressure <= -step * change * (1.0 + ROUNDING))
+        self._pressure = np.where(first, 0.0, last.pressure + step * change)
+        self._displacement = last.displacement + step * (self._displacement - last.displacement)
 
     def _take(self, contact: Mask) -> None:
         """Make ``contact`` the trial set, with the punch pressures at hand cut to it."""

@@ -7,11 +7,14 @@ import numpy as np
 from sa_solver.types import Array
 
 
-def normal_influence(x: Array, y: Array, pitch: tuple[float, float], contact_modulus: float) -> Array:
-    """Normal displacement at ``(x, y)`` from the centre of a rectangle under unit pressure [mm/MPa].
+def normal_influence(
+    x: Array, y: Array, pitch: tuple[float, float], contact_modulus: float
+) -> Array:
+    """Normal displacement at ``(x, y)`` from the centre of a uniformly pressed rectangle.
 
     ``x`` and ``y`` broadcast against each other [mm], ``pitch`` is ``(dx, dy)`` [mm] and
     ``contact_modulus`` is E* [MPa], so that the displacement is that of both bodies together.
+    Returns the displacement per unit pressure [mm/MPa].
 
     Source: Love 1929, Phil. Trans. R. Soc. A 228, 377, doi:10.1098/rsta.1929.0009, as in Johnson
     1985, *Contact Mechanics*, eq. 3.25, with (1-ν²)/E → 1/E*.

@@ -42,7 +42,8 @@ class RigidModes:
 
     def resultants(self, sums: Array) -> Array:
         """``(P, Mx, My)`` [N, N mm] of ``sums`` of pressure times shape, ``(3,)`` [MPa]."""
-        return sums * self.lengths * self.grid.cell_area
+        physical: Array = sums * self.lengths * self.grid.cell_area
+        return physical
 
     def motion(self, coefficients: Array) -> Array:
         """Rigid displacement field ``(nx, ny)`` of scaled ``coefficients`` ``(3,)`` [mm]."""
@@ -70,7 +71,8 @@ class RigidModes:
                 balanced.ravel()[pressed] = values
                 return balanced
             hessian = (shapes * values) @ shapes.T
-            exponent = (np.linalg.pinv(hessian, rcond=RANK_CUTOFF, hermitian=True) @ missing) @ shapes
+            step = np.linalg.pinv(hessian, rcond=RANK_CUTOFF, hermitian=True) @ missing
+            exponent = step @ shapes
             largest = np.abs(exponent).max()
             values = values * np.exp(exponent * min(1.0, LARGEST_EXPONENT_STEP / largest))
         return None

@@ -24,10 +24,12 @@ import scipy.linalg
 from sa_solver.types import Array
 
 OVER_RELAXATION = 1.6
-"""Step along ``t2 - t1``. Any value in (0, 2) converges; 1.5 to 1.7 took the fewest iterations."""
+"""Step along ``t2 - t1``, in (0, 2). Once accelerated it hardly matters: 1.0 to 1.9 took 35 to 52
+iterations on flats and spheres, without an order."""
 
 ANDERSON_DEPTH = 10
-"""Differences remembered. Fewer than 5 lose the acceleration, more than 10 gain nothing."""
+"""Differences remembered. On flats and spheres 0, 3, 5, 10 and 20 took about 285, 70, 60, 43 and 39
+iterations, and each difference costs memory and time."""
 
 RESTART_GROWTH = 2.0
 """The memory is dropped when the residual grows by this factor in one iteration: the contact set
@@ -80,8 +82,9 @@ def douglas_rachford(
     state = np.array(start, dtype=np.float64)
     memory = AndersonMemory(state.size, depth)
     elastic = solution = state
-    residual, iteration = np.inf, 0
-    for iteration in range(1, max_iterations + 1):
+    residual, iterations = np.inf, 0
+    while iterations < max_iterations:
+        iterations += 1
         elastic = elastic_step(state)
         solution = local_law(2.0 * elastic - state)
         step = solution - elastic
@@ -90,7 +93,7 @@ def douglas_rachford(
         if residual <= tolerance or not np.isfinite(residual):
             break
         state = memory.next_state(state.ravel(), relaxation * step.ravel()).reshape(state.shape)
-    return SplittingResult(state, solution, elastic, residual, iteration, residual <= tolerance)
+    return SplittingResult(state, solution, elastic, residual, iterations, residual <= tolerance)
 
 
 class AndersonMemory:

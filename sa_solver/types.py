@@ -110,11 +110,13 @@ class Frame:
 
     def components(self, vectors: Array) -> Array:
         """Local components of global ``vectors`` ``(..., 3)``."""
-        return vectors @ self.axes.T
+        components: Array = vectors @ self.axes.T
+        return components
 
     def to_global(self, components: Array) -> Array:
         """Global vectors of local ``components`` ``(..., 3)``."""
-        return components @ self.axes
+        vectors: Array = components @ self.axes
+        return vectors
 
 
 def resultants(forces: Array, x: Array, y: Array) -> Array:

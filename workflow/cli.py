@@ -106,11 +106,18 @@ def resume(folder: Path) -> None:
 
 @cli.command()
 @click.argument("cases", nargs=-1, required=True, type=click.Path(path_type=Path))
-def verify(cases: tuple[Path, ...]) -> int:
+@click.option(
+    "--out",
+    default=Path("out/verify"),
+    show_default=True,
+    type=click.Path(path_type=Path),
+    help="Folder for the runs, one inside it for each case.",
+)
+def verify(cases: tuple[Path, ...], out: Path) -> int:
     """Run CASES and compare with what they expect."""
     from workflow.verify import verify_cases
 
-    return errors.DONE if verify_cases(cases) else errors.ExpectationMissed.exit_code
+    return errors.DONE if verify_cases(cases, out) else errors.ExpectationMissed.exit_code
 
 
 @cli.command()

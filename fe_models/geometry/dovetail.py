@@ -144,9 +144,11 @@ class Dovetail:
                 f"the slot is wider ({2 * wall:.4g} mm) than the sector at its bottom "
                 f"({2 * slot * tangent:.4g} mm): fewer blades, a larger rim_radius or a narrower root"
             )
-        if self.neck_fillet * np.tan(0.5 * self.flank_angle) * np.cos(
-            self.flank_angle
-        ) + self.neck_fillet * np.sin(self.flank_angle) >= self.shank_height:
+        if (
+            self.neck_fillet * np.tan(0.5 * self.flank_angle) * np.cos(self.flank_angle)
+            + self.neck_fillet * np.sin(self.flank_angle)
+            >= self.shank_height
+        ):
             raise MeshError("neck_fillet is taller than the shank: increase shank_height")
 
     def mesh(self, flank_nodes: tuple[int, int], size: float) -> StructureMesh:
@@ -305,7 +307,9 @@ def _name_groups(
     model.addPhysicalGroup(3, volumes, name=body)
     right, left = named["flank"]
     groups = {"intrados": [right], "extrados": [left]}
-    groups |= {name: curves for name, curves in named.items() if name not in ("", "middle", "flank")}
+    groups |= {
+        name: curves for name, curves in named.items() if name not in ("", "middle", "flank")
+    }
     for name, curves in groups.items():
         beside = np.concatenate([model.getAdjacencies(1, curve)[0] for curve in curves])
         swept = np.setdiff1d(beside, sections)

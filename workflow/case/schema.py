@@ -92,7 +92,10 @@ class Dovetail(Section):
     neck_fillet: Length = entry("blade, radius between neck and flank [mm]", "3 mm")
     slot_length: Length = entry("of the slot, along its direction [mm]", "60 mm")
     slot_fillet: Length = entry("disk, radius at the bottom of the slot [mm]", "3 mm")
+    root_depth: Length = entry("blade, below the flanks [mm]", "6 mm")
     shank_height: Length = entry("blade, from the top of the flanks outwards [mm]", "30 mm")
+    slot_clearance: Length = entry("play under the blade root [mm]", "1 mm")
+    lug_height: Length = entry("disk, above the top of the flanks [mm]", "6 mm")
     blades: Annotated[int, Whole(3, 1000)] = entry("the sector spans 360°/blades", 24)
     rim_radius: Length = entry("rotor axis to the top of the flanks [mm]", "250 mm")
     disk_height: Length = entry("radial height of the sector below the rim [mm]", "60 mm")
@@ -205,7 +208,7 @@ class LoadPath(Section):
         "of the airfoil's centre of mass, from the rotor axis [mm]", "400 mm"
     )
     aerodynamic_moment: Moment = entry(
-        "at peak speed, about the slot; presses on the intrados [N*mm]", "150 N*m", default=0.0
+        "at peak speed, about the slot; presses on the intrados [N*mm]", "30 N*m", default=0.0
     )
 
     @model_validator(mode="after")

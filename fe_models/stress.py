@@ -1,0 +1,41 @@
+"""Displacements and stresses of both bodies at one state of the joint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.elasticity import maximum_principal, von_mises
+from fe_models.structure import Structure
+from sa_solver.types import Array
+
+
+@dataclass(frozen=True)
+class StressField:
+    """At the vertices of one body: displacement ``(n, 3)`` [mm], stresses ``(n,)`` [MPa]."""
+
+    displacement: Array
+    von_mises: Array
+    maximum_principal: Array
+
+
+def stress_state(
+    structure: Structure, force: Array, relative: Array, amplitudes: Array
+) -> tuple[StressField, StressField]:
+    """Stress fields of body 1 and body 2.
+
+    ``force`` ``(3, n)`` on body 2 and ``relative`` displacement ``(3, n)`` over all interfaces, in
+    their frames; ``amplitudes`` of the load cases. Body 1 carries the forces, body 2 follows it at
+    the relative displacements.
+    """
+    forces, gaps = force.T.ravel(), relative.T.ravel()
+    displacement_1, interface_1 = structure.body_1.respond(-forces, amplitudes)
+    displacement_2 = structure.body_2.recover(interface_1 + gaps, amplitudes)
+    pairs = ((structure.body_1, displacement_1), (structure.body_2, displacement_2))
+    fields = []
+    for body, displacement in pairs:
+        stress = body.elastic.at_vertices(body.elastic.stress(displacement))
+        vertices = displacement.reshape(-1, 3)[: body.elastic.body.mesh.nvertices]
+        fields.append(StressField(np.array(vertices), von_mises(stress), maximum_principal(stress)))
+    return fields[0], fields[1]

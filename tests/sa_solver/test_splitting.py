@@ -1,0 +1,102 @@
+"""Contact laws, and the splitting against independent solvers of small dense problems."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from sa_solver.contact_law import coulomb, project_on_disk, unilateral
+from sa_solver.splitting import douglas_rachford
+
+
+def test_unilateral_pressure():
+    assert np.array_equal(unilateral(np.array([-1.0, 0.0, 2.0])), [0.0, 0.0, 2.0])
+
+
+def test_shear_is_scaled_back_along_its_direction():
+    shear = np.array([[3.0, 0.3, 0.0, 1.0], [4.0, 0.4, 0.0, 0.0]])
+    out = project_on_disk(shear, np.array([1.0, 1.0, 0.0, -1.0]))
+    np.testing.assert_allclose(out, [[0.6, 0.3, 0.0, 0.0], [0.8, 0.4, 0.0, 0.0]], rtol=1e-15)
+
+
+def test_projection_is_the_nearest_point():
+    """Of many points of the disk none is nearer."""
+    rng = np.random.default_rng(0)
+    shear, limit = 3.0 * rng.standard_normal((2, 50)), rng.random(50)
+    nearest = np.linalg.norm(shear - project_on_disk(shear, limit), axis=0)
+    for angle in np.linspace(0.0, 2.0 * np.pi, 100):
+        other = limit * np.array([[np.cos(angle)], [np.sin(angle)]])
+        assert np.all(np.linalg.norm(shear - other, axis=0) >= nearest - 1e-12)
+
+
+def test_coulomb_separates_where_pressure_pulls():
+    out = coulomb(np.array([[2.0, 2.0], [0.0, 0.0], [1.0, -1.0]]), 0.5)
+    np.testing.assert_allclose(out, [[0.5, 0.0], [0.0, 0.0], [1.0, 0.0]])
+
+
+def linear_complementarity(size, seed):
+    """A random positive definite LCP: w = A z + q, z >= 0, w >= 0, z w = 0."""
+    rng = np.random.default_rng(seed)
+    factor = rng.standard_normal((size, size))
+    return factor @ factor.T + 0.1 * np.eye(size), rng.standard_normal(size)
+
+
+def enumerated(matrix, vector):
+    """The unique solution, by trying every set of positive unknowns."""
+    size = len(vector)
+    for positive in itertools.product([False, True], repeat=size):
+        mask = np.array(positive)
+        z = np.zeros(size)
+        z[mask] = np.linalg.solve(matrix[np.ix_(mask, mask)], -vector[mask])
+        if z.min() >= 0.0 and (matrix @ z + vector)[~mask].min(initial=0.0) >= 0.0:
+            return z
+    raise AssertionError("no solution")
+
+
+@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("depth", [0, 10])
+def test_small_complementarity_problem(seed, depth):
+    matrix, vector = linear_complementarity(8, seed)
+    shift = np.sqrt(np.linalg.eigvalsh(matrix)[[0, -1]].prod())
+    inverse = np.linalg.inv(matrix + shift * np.eye(8))
+    result = douglas_rachford(
+        lambda s: inverse @ (shift * s - vector),
+        unilateral,
+        np.zeros(8),
+        tolerance=1e-11,
+        depth=depth,
+        max_iterations=20000,
+    )
+    assert result.converged
+    np.testing.assert_allclose(result.solution, enumerated(matrix, vector), atol=1e-8)
+    np.testing.assert_allclose(result.solution, result.elastic, atol=1e-8)
+
+
+def test_acceleration_pays_and_a_warm_start_ends_at_once():
+    matrix, vector = linear_complementarity(60, 7)
+    shift = np.sqrt(np.linalg.eigvalsh(matrix)[[0, -1]].prod())
+    inverse = np.linalg.inv(matrix + shift * np.eye(60))
+
+    def solve(start, depth):
+        return douglas_rachford(
+            lambda s: (inverse @ (shift * s.ravel() - vector)).reshape(s.shape),
+            unilateral,
+            start,
+            depth=depth,
+            max_iterations=5000,
+        )
+
+    plain, accelerated = (solve(np.zeros((6, 10)), depth) for depth in (0, 10))
+    assert accelerated.iterations < 0.5 * plain.iterations
+    assert solve(accelerated.state, 10).iterations == 1
+
+
+def test_failure_is_said():
+    matrix, vector = linear_complementarity(8, 0)
+    inverse = np.linalg.inv(matrix + np.eye(8))
+    result = douglas_rachford(
+        lambda s: inverse @ (s - vector), unilateral, np.zeros(8), max_iterations=3
+    )
+    assert not result.converged
+    assert result.residual > 1e-8
+    assert result.iterations == 3

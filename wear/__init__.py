@@ -1,0 +1,1 @@
+"""Wear laws, surfaces, cycle stepping and kinetics."""

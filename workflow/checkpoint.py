@@ -1,0 +1,123 @@
+"""The state of a wear run between two jumps, and its copy on disk."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+
+import numpy as np
+
+from sa_solver.normal import NormalStart
+from sa_solver.types import Array, LoadHistory
+from wear.surfaces import Surfaces
+from workflow.contact_stage import InterfaceState
+from workflow.store import read_arrays, write_arrays
+
+# Columns of the kinetics of one interface.
+KINETICS = ("depth_1", "depth_2", "volume_1", "volume_2", "energy")
+
+
+@dataclass(frozen=True)
+class RunState:
+    """Everything a wear run needs to go on.
+
+    ``cycles`` ``(j,)`` are those at the end of every jump so far, the unworn state included;
+    ``kinetics`` ``(j, interfaces, 5)`` has the columns ``KINETICS``; ``solved_depths`` are the nodal
+    depths of the last structural solution and ``solved_resultants`` ``(interfaces, 6)`` its probe;
+    ``drift`` ``(j,)`` is the drift found after each jump and ``solutions`` counts the structural
+    solutions.
+    """
+
+    interfaces: tuple[InterfaceState, ...]
+    cycles: Array
+    kinetics: Array
+    drift: Array
+    solved_resultants: Array
+    solutions: int
+
+    @property
+    def jump(self) -> int:
+        """Number of jumps done."""
+        return len(self.cycles) - 1
+
+    def record(self, cycles: float, cell_areas: list[float], drift: float) -> RunState:
+        """The state with a row of kinetics added."""
+        row = [
+            kinetics_row(state, area)
+            for state, area in zip(self.interfaces, cell_areas, strict=True)
+        ]
+        return replace(
+            self,
+            cycles=np.append(self.cycles, cycles),
+            kinetics=np.concatenate([self.kinetics, np.array([row])]),
+            drift=np.append(self.drift, drift),
+        )
+
+
+def kinetics_row(state: InterfaceState, cell_area: float) -> list[float]:
+    """Values of ``KINETICS`` for one interface."""
+    depths = state.surfaces.depth_1, state.surfaces.depth_2
+    return [
+        *(float(depth.max()) for depth in depths),
+        *(float(depth.sum()) * cell_area for depth in depths),
+        state.energy,
+    ]
+
+
+def save(path: Path, state: RunState) -> None:
+    """Write the state; the old file stays until the new one is whole."""
+    arrays: dict[str, object] = {
+        name: getattr(state, name) for name in ("cycles", "kinetics", "drift", "solved_resultants")
+    }
+    for number, own in enumerate(state.interfaces):
+        group = f"interface_{number}"
+        for part in fields(Surfaces):
+            arrays[f"{group}/surfaces/{part.name}"] = getattr(own.surfaces, part.name)
+        for column in fields(LoadHistory):
+            arrays[f"{group}/loads/{column.name}"] = getattr(own.loads, column.name)
+        arrays[f"{group}/slip"] = own.slip
+        arrays[f"{group}/scalars"] = np.array([own.energy, own.depth_rate, own.volume_rate])
+        for increment, start in own.starts.items():
+            arrays[f"{group}/starts/{increment}/pressure"] = start.pressure
+            arrays[f"{group}/starts/{increment}/displacement"] = start.displacement
+    attributes = {"solutions": state.solutions, "interfaces": len(state.interfaces)}
+    write_arrays(path, arrays, attributes)
+
+
+def load(path: Path) -> RunState:
+    """Read a state; raises OSError if there is none."""
+    arrays, attributes = read_arrays(path)
+    return RunState(
+        interfaces=tuple(
+            _load_interface(arrays, f"interface_{number}")
+            for number in range(int(attributes["interfaces"]))
+        ),
+        cycles=arrays["cycles"],
+        kinetics=arrays["kinetics"],
+        drift=arrays["drift"],
+        solved_resultants=arrays["solved_resultants"],
+        solutions=int(attributes["solutions"]),
+    )
+
+
+def _load_interface(arrays: dict[str, Array], group: str) -> InterfaceState:
+    prefix = f"{group}/starts/"
+    increments = sorted(
+        {int(n[len(prefix) :].split("/")[0]) for n in arrays if n.startswith(prefix)}
+    )
+    starts = {
+        t: NormalStart(arrays[f"{prefix}{t}/pressure"], arrays[f"{prefix}{t}/displacement"])
+        for t in increments
+    }
+    energy, depth_rate, volume_rate = (float(v) for v in arrays[f"{group}/scalars"])
+    surfaces = {part.name: arrays[f"{group}/surfaces/{part.name}"] for part in fields(Surfaces)}
+    loads = {column.name: arrays[f"{group}/loads/{column.name}"] for column in fields(LoadHistory)}
+    return InterfaceState(
+        Surfaces(**surfaces),
+        LoadHistory(**loads),
+        arrays[f"{group}/slip"],
+        energy,
+        depth_rate,
+        volume_rate,
+        starts,
+    )

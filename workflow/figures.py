@@ -1,0 +1,566 @@
+"""Figures of a run: resultants, peak pressure, worn profiles, kinetics and the structure's stress.
+
+Each figure reads ``results.h5`` and nothing else; numbers in the titles come from the data. A
+figure whose data a run does not have is left out. Images are 1200 pixels wide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import h5py
+import numpy as np
+
+from sa_solver.types import Array, Grid
+from workflow.store import replacing
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+WIDTH_INCHES, DOTS_PER_INCH = 12.0, 100
+FONT_SIZE = 13
+STYLE: dict[Any, Any] = {
+    "font.size": FONT_SIZE,
+    "axes.titlesize": 13,
+    "axes.titlelocation": "left",
+    "axes.grid": True,
+    "grid.alpha": 0.3,
+    "legend.fontsize": 11,
+    "legend.framealpha": 0.85,
+    "figure.titlesize": 15,
+    "lines.linewidth": 1.8,
+}
+# Okabe and Ito's colours: told apart by everyone.
+BLUE, ORANGE, GREEN, PURPLE, BLACK = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222"
+BODIES = {1: ("disk", BLUE, "o"), 2: ("blade", ORANGE, "s")}
+PRESSURE_COLOURS, CYCLE_COLOURS = "viridis", "viridis"
+
+# Edge peaks are a few cells: a scale that reached them would leave the rest in one colour.
+MAP_PERCENTILE = 99.5
+# Nodes this close to the nearest row count as on the line, as a share of the face: less than half
+# the rows of a mesh of 34 nodes, enough for rows that are not quite straight.
+ROW_SHARE = 0.01
+# More profiles than this overlap.
+MAX_PROFILES = 6
+# How far the kinetics are extended, in computed numbers of cycles.
+EXTRAPOLATION = 2.0
+# Around the flanks, how far the section shows the bodies: as a share of the flanks' distance.
+SECTION_MARGIN = 0.75
+
+
+class _Section(NamedTuple):
+    """One body's stress in the plane across the slot.
+
+    ``points (n, 2)`` to the right and up [mm], ``triangles (m, 3)``, ``stress (n,)`` [MPa], and
+    ``outline (k, 2, 2)``, the segments of the body's border.
+    """
+
+    points: Array
+    triangles: np.ndarray
+    stress: Array
+    outline: Array
+
+
+def write_figures(results: Path, folder: Path) -> list[Path]:
+    """Draw the figures of ``results`` (a ``results.h5``) as PNG files; returns their paths."""
+    import matplotlib
+
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    with h5py.File(results) as file, matplotlib.rc_context(STYLE):
+        for name, (draw, needed) in FIGURES.items():
+            if all(group in file for group in needed):
+                path = folder / f"{name}.png"
+                _save(draw(file), path)
+                written.append(path)
+    return written
+
+
+def _save(figure: Figure, path: Path) -> None:
+    """Write ``figure``; it appears under its name only when it is complete."""
+    with replacing(path) as partial:
+        figure.savefig(partial, format="png", dpi=DOTS_PER_INCH)
+
+
+def _figure(title: str, height: float) -> Figure:
+    """An empty figure with a title, ``height`` in inches."""
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(WIDTH_INCHES, height), layout="constrained")
+    figure.suptitle(title, fontweight="bold")
+    return figure
+
+
+# --- resultants ---------------------------------------------------------------------------------
+
+
+def resultants(file: h5py.File) -> Figure:
+    """P, Qx within the Coulomb limits, and energy per increment, one column per interface."""
+    interfaces = list(file["structure"])
+    figure = _figure(f"Resultants over one cycle: {_who_slides(file)}", 9.0)
+    axes = figure.subplots(3, len(interfaces), sharex=True, sharey="row", squeeze=False)
+    for column, interface in zip(axes.T, interfaces, strict=True):
+        history = {k: v[()] for k, v in file["structure"][interface]["load_history"].items()}
+        increments = np.arange(1.0, len(history["P"]) + 1.0)
+        _draw_normal_force(column[0], increments, history, interface)
+        _draw_tangential_force(column[1], increments, history, float(file.attrs["friction"]))
+        half_space = file.get(f"contact/{interface}/energy_half_space")
+        _draw_energy(column[2], increments, history["Edx"] + history["Edy"], half_space)
+        column[2].set_xlabel("increment")
+    for axis, label in zip(
+        axes[:, 0], ("P [kN]", "Qx [kN]", "energy per increment [N mm]"), strict=True
+    ):
+        axis.set_ylabel(label)
+    axes[0, 0].set_ylim(bottom=0.0)
+    return figure
+
+
+def _who_slides(file: h5py.File) -> str:
+    """What the flanks do, for the title."""
+    sliding = [group["load_history/sliding"][()] for group in file["structure"].values()]
+    count, total = sum(int(s.sum()) for s in sliding), sum(len(s) for s in sliding)
+    if count == 0:
+        return "no flank slides as a whole"
+    return f"flanks slide as a whole in {count / total:.0%} of the increments"
+
+
+def _draw_normal_force(
+    axis: Axes, increments: Array, history: dict[str, Array], interface: str
+) -> None:
+    force = history["P"] / 1e3
+    axis.plot(increments, force, "o-", color=BLUE, markersize=4)
+    peak = int(np.argmax(force))
+    axis.set_title(f"{interface}: P peaks at {force[peak]:.3g} kN, increment {peak + 1}")
+
+
+def _draw_tangential_force(
+    axis: Axes, increments: Array, history: dict[str, Array], friction: float
+) -> None:
+    limit, force = friction * history["P"] / 1e3, history["Qx"] / 1e3
+    label = f"|Qx| < µP, µ = {friction:g}"
+    axis.fill_between(increments, -limit, limit, color="#BBBBBB", alpha=0.5, lw=0, label=label)
+    axis.plot(increments, force, "-", color=GREEN)
+    sliding = history["sliding"].astype(bool)
+    for mask, style, name in (
+        (~sliding, "o", "at least partly stuck"),
+        (sliding, "D", "slides as a whole"),
+    ):
+        fill = "white" if style == "o" else GREEN
+        axis.plot(increments[mask], force[mask], style, color=GREEN, mfc=fill, ms=6, label=name)
+    axis.set_title(f"slides as a whole in increments {_ranges(increments[sliding])}")
+    axis.legend(loc="best")
+
+
+def _ranges(numbers: Iterable[Any]) -> str:
+    """``1-3, 7`` of ``1, 2, 3, 7``; ``none`` of nothing."""
+    runs: list[list[int]] = []
+    for number in map(int, numbers):
+        if runs and number == runs[-1][-1] + 1:
+            runs[-1].append(number)
+        else:
+            runs.append([number])
+    texts = (f"{run[0]}–{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs)
+    return ", ".join(texts) or "none"
+
+
+def _draw_energy(
+    axis: Axes, increments: Array, structure: Array, half_space: h5py.Dataset | None
+) -> None:
+    total = f"{structure.sum():.4g} N mm"
+    axis.bar(increments, structure, width=0.8, color="#9DC3DE", label=f"finite elements: {total}")
+    title = f"{total} by finite elements"
+    if half_space is not None:
+        fine = half_space[()]
+        name = f"half-space: {fine.sum():.4g} N mm"
+        axis.plot(increments, fine, "D", color=ORANGE, markersize=5, label=name)
+        title = f"half-space {_change(structure.sum(), fine.sum())} against FE"
+    axis.set_title(f"energy over the cycle: {title}")
+    axis.legend(loc="best")
+
+
+def _change(before: float, after: float) -> str:
+    """Relative change, for a title."""
+    return f"{after / before - 1.0:+.1%}" if before else "(no reference)"
+
+
+# --- pressure -----------------------------------------------------------------------------------
+
+
+def pressure_maps(file: h5py.File) -> Figure:
+    """Peak-load pressure of every flank, unworn above worn, on one colour scale."""
+    states = [(name, jump) for name in file["contact"] for jump in _ends(file, name)]
+    fields = [file["contact"][name][jump]["pressure"][()] for name, jump in states]
+    top = _map_top(fields)
+    figure = _figure(f"Largest pressure at peak load: {_peak_change(file)}", 2.0 * len(states) + 1)
+    axes = figure.subplots(len(states), 1, sharex=True, squeeze=False)[:, 0]
+    for axis, (name, jump), field in zip(axes, states, fields, strict=True):
+        image = _draw_map(axis, field, _grid(file, name), top)
+        cycles = _cycles(file, name, jump)
+        axis.set_title(f"{name}, {cycles}: largest {field.max():.0f} MPa, {_open(field)}")
+    axes[-1].set_xlabel("y, along the slot [mm]")
+    figure.supylabel("x, across the flank [mm]", fontsize=FONT_SIZE)
+    label = f"pressure [MPa]; white: open; arrow: highest {100 - MAP_PERCENTILE:g}% of the cells"
+    figure.colorbar(image, ax=axes, label=label, extend="max", shrink=0.8, pad=0.01)
+    return figure
+
+
+def _draw_map(axis: Axes, field: Array, grid: Grid, top: float) -> Any:
+    """One field with y to the right, to scale."""
+    half = 0.5 * grid.size[1], 0.5 * grid.size[0]
+    axis.grid(visible=False)
+    return axis.imshow(
+        np.ma.masked_less_equal(field, 0.0),
+        origin="lower",
+        extent=(-half[0], half[0], -half[1], half[1]),
+        cmap=PRESSURE_COLOURS,
+        vmin=0.0,
+        vmax=top,
+        interpolation="nearest",
+    )
+
+
+def _map_top(fields: list[Array]) -> float:
+    """Top of the colour scale [MPa]."""
+    closed = np.concatenate([field[field > 0.0] for field in fields])
+    return float(np.percentile(closed, MAP_PERCENTILE)) if closed.size else 1.0
+
+
+def _open(field: Array) -> str:
+    """The share of the flank's grid that is open."""
+    return f"{np.mean(field <= 0.0):.0%} of the grid open"
+
+
+def _peak_change(file: h5py.File) -> str:
+    """Largest pressure of each flank, unworn and worn."""
+    texts = []
+    for name in file["contact"]:
+        peaks = [file["contact"][name][jump]["pressure"][()].max() for jump in _ends(file, name)]
+        texts.append(f"{name} " + " → ".join(f"{peak:.0f}" for peak in peaks) + " MPa")
+    return ", ".join(texts)
+
+
+def pressure_profiles(file: h5py.File) -> Figure:
+    """Peak-load pressure across and along the middle of each flank, with the coarse answers."""
+    interfaces = list(file["contact"])
+    figure = _figure(_edge_peak(file), 9.0)
+    axes = figure.subplots(2, len(interfaces), sharey="row", sharex="row", squeeze=False)
+    for column, interface in zip(axes.T, interfaces, strict=True):
+        for direction, axis in enumerate(column):
+            _draw_profile(axis, file, interface, direction)
+        column[0].set_title(f"{interface}, across the flank at y = 0")
+        column[1].set_title(f"{interface}, along the slot at x = 0")
+    axes[0, 0].legend(loc="upper center")
+    for axis in axes[:, 0]:
+        axis.set_ylabel("pressure [MPa]")
+        axis.set_ylim(bottom=0.0)  # rows share it: only once all is drawn
+    return figure
+
+
+def _draw_profile(axis: Axes, file: h5py.File, interface: str, direction: int) -> None:
+    """Pressure along x (``direction`` 0) or y (1) through the middle."""
+    contact, grid = file["contact"][interface], _grid(file, interface)
+    for jump, colour in zip(_ends(file, interface), (BLUE, ORANGE), strict=False):
+        label = f"half-space {grid.shape[0]} x {grid.shape[1]}, {_cycles(file, interface, jump)}"
+        profile = _middle(contact[jump]["pressure"][()], direction)
+        axis.plot(_centres(grid, direction), profile, color=colour, label=label)
+    if "coarse" in contact:
+        coarse = _grid_of(contact["coarse"])
+        profile = _middle(contact["coarse"]["pressure"][()], direction)
+        label = f"half-space {coarse.shape[0]} x {coarse.shape[1]}, unworn"
+        axis.plot(_centres(coarse, direction), profile, "o", color=BLACK, mfc="none", label=label)
+    if f"structure/{interface}/pressure" in file:
+        place, pressure = _nodes_on_middle(file, interface, direction)
+        axis.plot(place, pressure, "x", color=PURPLE, mew=2, label="finite elements, unworn")
+    axis.set_xlabel(("x [mm]", "y [mm]")[direction])
+
+
+def _middle(field: Array, direction: int) -> Array:
+    """Values along x (0) or y (1) next to the other axis' middle."""
+    return np.take(field, field.shape[1 - direction] // 2, axis=1 - direction)
+
+
+def _centres(grid: Grid, direction: int) -> Array:
+    """Cell centres along x (0) or y (1)."""
+    return (grid.x, grid.y)[direction].ravel()
+
+
+def _nodes_on_middle(file: h5py.File, interface: str, direction: int) -> tuple[Array, Array]:
+    """Places and pressures at peak load of the FE nodes nearest to the middle line."""
+    group = file["structure"][interface]
+    coordinates, pressure = group["coordinates"][()], group["pressure"][_peak(file)]
+    distance = np.abs(coordinates[:, 1 - direction])
+    near = distance <= distance.min() + ROW_SHARE * np.ptp(coordinates[:, 1 - direction])
+    return coordinates[near, direction], pressure[near]
+
+
+def _edge_peak(file: h5py.File) -> str:
+    """Largest pressure at y = 0 of the flank where it is largest, by every method."""
+    unworn = {name: file["contact"][name][_ends(file, name)[0]] for name in file["contact"]}
+    peaks = {name: _middle(group["pressure"][()], 0).max() for name, group in unworn.items()}
+    name = max(peaks, key=lambda name: peaks[name])
+    text = f"Edge peak on the {name}: {peaks[name]:.0f} MPa"
+    if coarse := file["contact"][name].get("coarse"):
+        shape = _grid_of(coarse).shape
+        peak = _middle(coarse["pressure"][()], 0).max()
+        text += f"; {shape[0]} x {shape[1]} cells see {peak:.0f} MPa"
+    if f"structure/{name}/pressure" in file:
+        text += f", finite elements {_nodes_on_middle(file, name, 0)[1].max():.0f} MPa"
+    return text
+
+
+# --- wear ---------------------------------------------------------------------------------------
+
+
+def worn_profiles(file: h5py.File) -> Figure:
+    """Both surfaces and the depth worn off, across the middle of each flank, as cycles go by."""
+    interfaces = list(file["surfaces"])
+    figure = _figure(f"Where the flanks wear, at y = 0: {_deepest(file)}", 9.0)
+    axes = figure.subplots(2, len(interfaces), sharex=True, sharey="row", squeeze=False)
+    for column, interface in zip(axes.T, interfaces, strict=True):
+        _draw_wear(column, file, interface)
+        column[0].set_title(f"{interface}: blade (above) and disk (below) in the flank's frame")
+        column[1].set_title(f"{interface}: depth worn off both bodies")
+        column[1].set_xlabel("x, across the flank [mm]")
+    axes[1, 0].invert_yaxis()
+    axes[0, 0].legend(loc="upper center")
+    axes[0, 0].set_ylabel("height [µm]")
+    axes[1, 0].set_ylabel("wear depth [µm]")
+    return figure
+
+
+def _draw_wear(axes: Iterable[Axes], file: h5py.File, interface: str) -> None:
+    """Heights above, depths below, one colour per number of cycles."""
+    from matplotlib import colormaps
+
+    heights, depths = axes
+    surfaces, x = file["surfaces"][interface], _centres(_grid(file, interface), 0)
+    unworn = [_middle(surfaces[_jumps(file, interface)[0]][f"body_{b}"][()], 0) for b in BODIES]
+    chosen = _spread(_jumps(file, interface), MAX_PROFILES)
+    for number, jump in enumerate(chosen):
+        colour = colormaps[CYCLE_COLOURS](0.9 * number / max(len(chosen) - 1, 1))
+        worn = [_middle(surfaces[jump][f"body_{body}"][()], 0) for body in BODIES]
+        for height, label in zip(worn, (_cycles(file, interface, jump), None), strict=True):
+            heights.plot(x, 1e3 * height, color=colour, label=label)
+        depth = sum(np.abs(w - u) for w, u in zip(worn, unworn, strict=True))
+        depths.plot(x, 1e3 * depth, color=colour)
+
+
+def _spread(items: list[str], count: int) -> list[str]:
+    """At most ``count`` of the items, evenly spread, first and last among them."""
+    places = np.linspace(0, len(items) - 1, min(count, len(items)))
+    return [items[round(place)] for place in places]
+
+
+def _deepest(file: h5py.File) -> str:
+    """Depth of both bodies together, at the deepest cell of each flank."""
+    texts = []
+    for name, surfaces in file["surfaces"].items():
+        first, last = (surfaces[jump] for jump in (_jumps(file, name)[0], _jumps(file, name)[-1]))
+        both = sum(np.abs(last[f"body_{b}"][()] - first[f"body_{b}"][()]) for b in BODIES)
+        texts.append(f"{name} {1e3 * np.max(both):.3g} µm")
+    return ", ".join(texts) + " at the deepest cell"
+
+
+def kinetics(file: h5py.File) -> Figure:
+    """Largest depth and volume over the cycles, with the linear regime and its extrapolation."""
+    interfaces = [name for name in file["kinetics"] if name != "cycles"]
+    cycles = file["kinetics/cycles"][()]
+    title = f"Wear over {cycles[-1]:,.0f} cycles, extrapolated to {EXTRAPOLATION * cycles[-1]:,.0f}"
+    figure = _figure(title, 9.0)
+    axes = figure.subplots(2, len(interfaces), sharex=True, sharey="row", squeeze=False)
+    for column, interface in zip(axes.T, interfaces, strict=True):
+        group = file["kinetics"][interface]
+        _draw_kinetics(column[0], cycles, group, "depth", 1e3)
+        _draw_kinetics(column[1], cycles, group, "volume", 1.0)
+        column[0].set_title(f"{interface}: largest depth, {_regime(group, cycles)}")
+        rate = 1e6 * float(group.attrs["volume_rate"])
+        column[1].set_title(f"{interface}: volume, {rate:.3g} mm³ per million cycles at the end")
+        column[1].set_xlabel("cycles")
+        column[1].xaxis.set_major_formatter("{x:,.0f}")
+        column[1].locator_params(axis="x", nbins=5)
+    axes[0, 0].set_ylabel("largest depth [µm]")
+    axes[1, 0].set_ylabel("volume [mm³]")
+    # Not every interface need have a linear regime: the legend takes each name where it is found.
+    named = {
+        name: h for a in axes[0] for h, name in zip(*a.get_legend_handles_labels(), strict=True)
+    }
+    figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=len(named))
+    return figure
+
+
+def _draw_kinetics(
+    axis: Axes, cycles: Array, group: h5py.Group, quantity: str, scale: float
+) -> None:
+    """Both bodies and their sum; dashed beyond the computed cycles."""
+    worn = {body: scale * group[f"{quantity}_{body}"][()] for body in BODIES}
+    for body, (name, colour, marker) in BODIES.items():
+        # Bodies of one material wear alike: the second must not hide the first.
+        size = 9 if body == 1 else 5
+        fill = "none" if body == 1 else colour
+        axis.plot(cycles, worn[body], marker, color=colour, mfc=fill, ms=size, label=name)
+    total = np.sum(list(worn.values()), axis=0)
+    axis.plot(cycles, total, "-", color=BLACK, label="both")
+    beyond = cycles[-1] * np.array([1.0, EXTRAPOLATION])
+    rate = scale * float(group.attrs[f"{quantity}_rate"])
+    line = total[-1] + rate * (beyond - cycles[-1])
+    axis.plot(beyond, line, "--", color=BLACK, label="both, extrapolated (not computed)")
+    linear_from = float(group.attrs["linear_from"])
+    if np.isfinite(linear_from):
+        axis.axvspan(linear_from, cycles[-1], color=GREEN, alpha=0.15, lw=0, label="linear regime")
+
+
+def _regime(group: h5py.Group, cycles: Array) -> str:
+    """From when wear is linear, for a title."""
+    linear_from = float(group.attrs["linear_from"])
+    if not np.isfinite(linear_from):
+        return f"not yet linear at {cycles[-1]:,.0f}"
+    return f"linear from {linear_from:,.0f} cycles"
+
+
+# --- structure ----------------------------------------------------------------------------------
+
+
+def structure_stress(file: h5py.File) -> Figure:
+    """Von Mises stress in the middle of the slot, around the flanks, unworn beside worn."""
+    states = [s for s in ("unworn", "worn") if all(s in body for body in file["bodies"].values())]
+    sections = {state: _sections(file, state) for state in states}
+    inside = {state: _largest_near_flanks(file, sections[state]) for state in states}
+    texts = (f"{peak:.0f} MPa {state}" for state, peak in inside.items())
+    figure = _figure(f"Stress in mid-slot at peak load: largest {', '.join(texts)}", 6.0)
+    axes = figure.subplots(1, len(states), sharex=True, sharey=True, squeeze=False)[0]
+    top = max(inside.values())
+    for axis, state in zip(axes, states, strict=True):
+        for section in sections[state]:
+            filled = _draw_section(axis, section, top)
+        _zoom(axis, file)
+        axis.set_title(f"{state}: largest {inside[state]:.0f} MPa in view")
+        axis.set_xlabel(f"{'XYZ'[_plane(file)[1]]} [mm]")
+    axes[0].set_ylabel(f"{'XYZ'[_plane(file)[2]]} [mm]")
+    figure.colorbar(filled, ax=axes, label="von Mises stress [MPa]", pad=0.01)
+    return figure
+
+
+def _plane(file: h5py.File) -> tuple[int, int, int]:
+    """Global axes nearest to the slot's direction (the plane's normal), to right and to top."""
+    slot = np.abs(next(iter(file["grid"].values())).attrs["axes"][1])
+    normal = int(np.argmax(slot))
+    right, top = (axis for axis in range(3) if axis != normal)
+    return normal, right, top
+
+
+def _sections(file: h5py.File, state: str) -> list[_Section]:
+    """Cuts of the bodies through the middle of the slot."""
+    import pyvista
+
+    _, right, top = _plane(file)
+    flank = next(iter(file["grid"].values())).attrs
+    sections = []
+    for body in file["bodies"].values():
+        cells = {pyvista.CellType.TETRA: body[state]["tets"][()]}
+        mesh = pyvista.UnstructuredGrid(cells, body[state]["points"][()])
+        mesh.point_data["stress"] = body[state]["von_mises"][()]
+        cut = mesh.slice(normal=flank["axes"][1], origin=flank["origin"]).triangulate()
+        if cut.n_points:
+            border = cut.extract_feature_edges(
+                feature_edges=False, non_manifold_edges=False, manifold_edges=False
+            )
+            sections.append(
+                _Section(
+                    points=cut.points[:, [right, top]],
+                    triangles=cut.regular_faces,
+                    stress=cut["stress"],
+                    outline=border.points[border.lines.reshape(-1, 3)[:, 1:]][..., [right, top]],
+                )
+            )
+    return sections
+
+
+def _draw_section(axis: Axes, section: _Section, top: float) -> Any:
+    from matplotlib.collections import LineCollection
+    from matplotlib.tri import Triangulation
+
+    axis.set_aspect("equal")
+    axis.grid(visible=False)
+    axis.add_collection(LineCollection(list(section.outline), colors=BLACK, linewidths=0.8))
+    return axis.tripcolor(
+        Triangulation(section.points[:, 0], section.points[:, 1], section.triangles),
+        section.stress,
+        shading="gouraud",
+        cmap="magma_r",
+        vmin=0.0,
+        vmax=top,
+    )
+
+
+def _window(file: h5py.File) -> tuple[Array, Array]:
+    """Lower left and upper right corner of the view, ``(2,)`` each [mm]."""
+    _, right, top = _plane(file)
+    origins = np.array([group.attrs["origin"][[right, top]] for group in file["grid"].values()])
+    low, high = origins.min(axis=0), origins.max(axis=0)
+    margin = SECTION_MARGIN * np.max(high - low)
+    return low - margin, high + margin
+
+
+def _largest_near_flanks(file: h5py.File, sections: list[_Section]) -> float:
+    """Largest stress in view [MPa]."""
+    low, high = _window(file)
+    largest = 0.0
+    for section in sections:
+        inside = np.all((section.points >= low) & (section.points <= high), axis=1)
+        largest = max(largest, np.max(section.stress[inside], initial=0.0))
+    return largest
+
+
+def _zoom(axis: Axes, file: h5py.File) -> None:
+    """Show the surroundings of the flanks; arrows would hide what happens on them."""
+    low, high = _window(file)
+    axis.set_xlim(low[0], high[0])
+    axis.set_ylim(low[1], high[1])
+
+
+# --- reading ------------------------------------------------------------------------------------
+
+
+def _jumps(file: h5py.File, interface: str) -> list[str]:
+    """Names of the jumps that have both surfaces and a contact solution, ascending."""
+    return sorted(set(file["surfaces"][interface]) & set(file["contact"][interface]))
+
+
+def _ends(file: h5py.File, interface: str) -> list[str]:
+    """First and last jump; one where nothing wore."""
+    jumps = _jumps(file, interface)
+    return jumps[:1] + jumps[1:][-1:]
+
+
+def _cycles(file: h5py.File, interface: str, jump: str) -> str:
+    """How worn a jump is, in words."""
+    cycles = float(file["contact"][interface][jump].attrs["cycles"])
+    return f"{cycles:,.0f} cycles" if cycles else "unworn"
+
+
+def _peak(file: h5py.File) -> int:
+    return int(file.attrs["peak_increment"])
+
+
+def _grid(file: h5py.File, interface: str) -> Grid:
+    return _grid_of(file["grid"][interface])
+
+
+def _grid_of(group: h5py.Group) -> Grid:
+    (nx, ny), (dx, dy) = group.attrs["shape"], group.attrs["pitch"]
+    return Grid((int(nx), int(ny)), (float(dx), float(dy)))
+
+
+CONTACT = ("grid", "contact", "surfaces")
+# What each figure is called, and the groups it needs.
+FIGURES: dict[str, tuple[Callable[[h5py.File], Figure], tuple[str, ...]]] = {
+    "resultants": (resultants, ("structure",)),
+    "pressure_maps": (pressure_maps, CONTACT),
+    "pressure_profiles": (pressure_profiles, CONTACT),
+    "worn_profiles": (worn_profiles, CONTACT),
+    "kinetics": (kinetics, ("kinetics",)),
+    "structure_stress": (structure_stress, ("bodies", "grid")),
+}

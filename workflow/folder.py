@@ -1,0 +1,72 @@
+"""A run's output folder: whose it is, and what may be overwritten."""
+
+from __future__ import annotations
+
+import shutil
+from pathlib import Path
+
+from workflow.case import Case, dump_case, load_case
+from workflow.errors import UserError
+from workflow.store import replacing
+
+FILES = ("case.yaml", "summary.json", "results.h5", "checkpoint.h5", "run.log")
+FOLDERS = ("jumps", "paraview", "figures")
+
+
+class OutputFolder:
+    """Paths of a run's files."""
+
+    def __init__(self, root: Path) -> None:
+        self.root = root
+        self.case = root / "case.yaml"
+        self.summary = root / "summary.json"
+        self.results = root / "results.h5"
+        self.checkpoint = root / "checkpoint.h5"
+        self.log = root / "run.log"
+        self.jumps = root / "jumps"
+        self.paraview = root / "paraview"
+        self.figures = root / "figures"
+
+    def jump(self, number: int) -> Path:
+        """File of one jump's fields."""
+        return self.jumps / f"{number:05d}.h5"
+
+    def claim(self, case: Case, force: bool) -> None:
+        """Make the folder this run's own, removing what an earlier run left.
+
+        Raises :class:`UserError` if it holds anything of another case, or an unfinished run, and
+        ``force`` is not given.
+        """
+        if self.root.exists() and not self.root.is_dir():
+            raise UserError(f"{self.root}: is a file; give a folder to --out")
+        if self.root.is_dir() and any(self.root.iterdir()) and not force:
+            self._refuse_foreign(case)
+        self.root.mkdir(parents=True, exist_ok=True)
+        for name in FILES:
+            (self.root / name).unlink(missing_ok=True)
+        for name in FOLDERS:
+            shutil.rmtree(self.root / name, ignore_errors=True)
+        self.jumps.mkdir()
+        with replacing(self.case) as partial:
+            partial.write_text(dump_case(case), encoding="utf-8")
+
+    def _refuse_foreign(self, case: Case) -> None:
+        if not self.case.exists():
+            raise UserError(
+                f"{self.root}: not empty and no run of fretscale; give another folder, or --force"
+            )
+        if self.case.read_text(encoding="utf-8") != dump_case(case):
+            raise UserError(
+                f"{self.root}: holds the results of another case; give another folder, or --force"
+            )
+        if not self.summary.exists() and self.checkpoint.exists():
+            raise UserError(
+                f"{self.root}: holds an unfinished run of this case; continue it with "
+                f"`fretscale resume {self.root}`, or start again with --force"
+            )
+
+    def load_case(self) -> Case:
+        """The case this folder was claimed for."""
+        if not self.case.exists():
+            raise UserError(f"{self.root}: no run of fretscale here (case.yaml is missing)")
+        return load_case(self.case)

@@ -1,0 +1,49 @@
+"""Memory a case needs, estimated before anything large is allocated."""
+
+from __future__ import annotations
+
+import os
+
+from workflow.case import Case
+from workflow.errors import OutOfMemory
+
+# Dense interface matrices alive at once while the joint is condensed.
+DENSE_MATRICES = 6
+# Fields per cell and increment: slips, depths per pressure, pressures, starts.
+FIELDS = 12
+# Sparse factors, meshes, plots and the interpreter with its libraries.
+REST = 1.2e9
+BYTES = 8
+
+
+def required_bytes(case: Case) -> float:
+    """Upper estimate of the memory a run takes."""
+    nodes = case.mesh.flank_nodes[0] * case.mesh.flank_nodes[1]
+    unknowns = 3 * 2 * nodes
+    cells = case.contact.grid[0] * case.contact.grid[1]
+    contact = 2 * cells * case.load_path.increments * FIELDS
+    return BYTES * (DENSE_MATRICES * unknowns**2 + contact) + REST
+
+
+def check_memory(case: Case) -> None:
+    """Raise :class:`OutOfMemory` if the machine has less than the case needs."""
+    required, available = required_bytes(case), _available_bytes()
+    if available is not None and required > available:
+        raise OutOfMemory(
+            f"this case needs about {required / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB are "
+            "free: lower mesh.flank_nodes or contact.grid"
+        )
+
+
+def _available_bytes() -> float | None:
+    """Free memory, reclaimable caches included; None where the system does not tell."""
+    try:
+        with open("/proc/meminfo", encoding="ascii") as file:
+            lines = dict(line.split(":") for line in file)
+        return 1024.0 * float(lines["MemAvailable"].split()[0])
+    except (OSError, KeyError):
+        pass
+    try:
+        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
+    except (ValueError, AttributeError):
+        return None

@@ -1,0 +1,271 @@
+"""What a finished run leaves: results, summary, ParaView files, figures, the worn mesh."""
+
+from __future__ import annotations
+
+import json
+import platform
+import shutil
+from dataclasses import dataclass
+from importlib.metadata import version
+from typing import Any
+
+import h5py
+import numpy as np
+
+from fe_models.mesh import StructureMesh, write_msh
+from fe_models.remesh import worn_mesh, worn_volume
+from fe_models.stress import StressField
+from fe_models.structure import CycleSolution
+from sa_solver.types import Array
+from wear.kinetics import LinearRegime, linear_regime
+from wear.stepping import CycleResult
+from workflow.case import Case, dump_case
+from workflow.checkpoint import KINETICS, RunState
+from workflow.contact_stage import ContactStage
+from workflow.folder import OutputFolder
+from workflow.reporter import Reporter
+from workflow.store import ResultsWriter, read_arrays, replacing
+from workflow.structure_stage import StructureStage
+
+PACKAGES = ("fretscale", "numpy", "scipy", "scikit-fem", "gmsh", "pyfftw", "h5py")
+RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
+BODIES = ("disk", "blade")
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Everything a wear run found.
+
+    ``unworn`` and ``worn`` are the structure's cycles with the first and the last gaps, ``first``
+    the contact of the unworn cycle and ``depths`` the nodal depths (body 1, body 2) at the end, by
+    interface.
+    """
+
+    case: Case
+    structure: StructureStage
+    stages: list[ContactStage]
+    state: RunState
+    unworn: CycleSolution
+    worn: CycleSolution
+    first: list[CycleResult]
+    depths: list[tuple[Array, Array]]
+
+
+Stress = tuple[StressField, StressField]
+
+
+def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> None:
+    """Write all files of a finished run; the summary comes last and marks it as finished."""
+    structure = outcome.structure
+    with reporter.stage("re-meshing"):
+        mesh = worn_mesh(structure.mesh, outcome.depths)
+        with replacing(folder.root / "worn.msh") as partial:
+            path = partial.with_suffix(".msh")
+            write_msh(path, mesh)
+            path.replace(partial)
+    with reporter.stage("stress"):
+        stresses = {
+            "unworn": structure.stress(outcome.unworn),
+            "worn": structure.worn_stress(mesh, outcome.worn),
+        }
+    with reporter.stage("results"):
+        _write_results(outcome, mesh, stresses, folder)
+    if outcome.case.output.paraview:
+        from workflow.paraview import write_paraview
+
+        with reporter.stage("paraview"):
+            write_paraview(folder.results, folder.paraview)
+    if outcome.case.output.figures:
+        from workflow.figures import write_figures
+
+        with reporter.stage("figures"):
+            write_figures(folder.results, folder.figures)
+    summary = _summary(outcome, mesh, stresses, reporter)
+    with replacing(folder.summary) as partial:
+        partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    shutil.rmtree(folder.jumps)
+    _say(summary, reporter)
+
+
+def _regimes(outcome: Outcome) -> dict[str, dict[str, LinearRegime | None]]:
+    """Linear regimes of depth and volume, both bodies together, by interface."""
+    cycles = outcome.state.cycles
+    columns = {"depth": slice(0, 2), "volume": slice(2, 4)}
+    return {
+        stage.name: {
+            name: linear_regime(cycles, outcome.state.kinetics[:, number, pick].sum(axis=1))
+            for name, pick in columns.items()
+        }
+        for number, stage in enumerate(outcome.stages)
+    }
+
+
+def _write_results(
+    outcome: Outcome, mesh: StructureMesh, stresses: dict[str, Stress], folder: OutputFolder
+) -> None:
+    structure, peak = outcome.structure, outcome.structure.peak
+    with replacing(folder.results) as partial, h5py.File(partial, "w") as file:
+        writer = ResultsWriter(file)
+        file.attrs.update(
+            {
+                "title": outcome.case.title,
+                "friction": outcome.case.friction.coefficient,
+                "peak_increment": peak,
+            }
+        )
+        file.create_group("case").attrs.update({"text": dump_case(outcome.case)} | _versions())
+        for group, solution in (("structure", outcome.unworn), ("structure_worn", outcome.worn)):
+            for history in solution.histories:
+                writer.put_structure(f"{group}/{history.interface.name}", history)
+        for stage, result, history in zip(
+            outcome.stages, outcome.first, outcome.unworn.histories, strict=True
+        ):
+            writer.put_grid(stage.name, stage.grid, stage.interface.frame)
+            coarse = f"contact/{stage.name}/coarse"
+            writer.put(coarse, pressure=stage.coarse_pressure(history.loads, peak))
+            grid = stage.coarse_grid
+            file[coarse].attrs.update({"shape": grid.shape, "pitch": grid.pitch})
+            writer.put(f"contact/{stage.name}", energy_half_space=result.energy)
+        _write_jumps(writer, outcome, folder)
+        _write_kinetics(writer, outcome)
+        for moment, shape in (("unworn", structure.mesh), ("worn", mesh)):
+            for name, body, field in zip(
+                BODIES, (shape.body_1, shape.body_2), stresses[moment], strict=True
+            ):
+                writer.put_body(f"bodies/{name}/{moment}", body.mesh.p.T, body.mesh.t.T, field)
+
+
+def _write_jumps(writer: ResultsWriter, outcome: Outcome, folder: OutputFolder) -> None:
+    for jump in range(outcome.state.jump + 1):
+        arrays, attributes = read_arrays(folder.jump(jump))
+        for stage in outcome.stages:
+            for kind in ("surfaces", "contact"):
+                prefix = f"{kind}/{stage.name}/"
+                fields = {
+                    n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)
+                }
+                writer.put(f"{prefix}{jump:05d}", **fields)
+                writer.file[f"{prefix}{jump:05d}"].attrs["cycles"] = attributes["cycles"]
+
+
+def _write_kinetics(writer: ResultsWriter, outcome: Outcome) -> None:
+    state, regimes = outcome.state, _regimes(outcome)
+    writer.put("kinetics", cycles=state.cycles)
+    for number, stage in enumerate(outcome.stages):
+        group = f"kinetics/{stage.name}"
+        columns = dict(zip(KINETICS, state.kinetics[:, number].T, strict=True))
+        writer.put(group, **columns)
+        depth, volume = regimes[stage.name]["depth"], regimes[stage.name]["volume"]
+        writer.file[group].attrs.update(
+            {
+                "linear_from": max(depth.start, volume.start) if depth and volume else np.nan,
+                "depth_rate": depth.rate if depth else np.nan,
+                "volume_rate": volume.rate if volume else np.nan,
+            }
+        )
+
+
+def _summary(
+    outcome: Outcome, mesh: StructureMesh, stresses: dict[str, Stress], reporter: Reporter
+) -> dict[str, Any]:
+    state, structure = outcome.state, outcome.structure
+    return {
+        "title": outcome.case.title,
+        "assumed": list(outcome.case.assumed),
+        "cycles": float(state.cycles[-1]),
+        "jumps": state.jump,
+        "structure": {
+            "from_cache": structure.from_cache,
+            "nodes": {b.name: b.mesh.nvertices for b in (mesh.body_1, mesh.body_2)},
+            "rigid_modes": structure.rigid_modes,
+            "solutions": state.solutions,
+            "iterations": outcome.unworn.iterations,
+            "residual": outcome.unworn.residual,
+            "equilibrium_error": float(outcome.unworn.equilibrium.max()),
+            "closure": outcome.unworn.closure,
+            "drift": [float(value) for value in state.drift],
+            "peak_stress": {
+                moment: {
+                    name: {
+                        "von_mises": float(field.von_mises.max()),
+                        "maximum_principal": float(field.maximum_principal.max()),
+                    }
+                    for name, field in zip(BODIES, stresses[moment], strict=True)
+                }
+                for moment in stresses
+            },
+        },
+        **{
+            stage.name: _interface_summary(outcome, number, mesh)
+            for number, stage in enumerate(outcome.stages)
+        },
+        "kinetics": {
+            "cycles": state.cycles.tolist(),
+            **{
+                stage.name: dict(zip(KINETICS, state.kinetics[:, number].T.tolist(), strict=True))
+                for number, stage in enumerate(outcome.stages)
+            },
+        },
+        "warnings": reporter.warnings,
+        "seconds": {name: round(value, 2) for name, value in reporter.seconds.items()},
+        "versions": _versions(),
+    }
+
+
+def _interface_summary(outcome: Outcome, number: int, mesh: StructureMesh) -> dict[str, Any]:
+    stage, structure = outcome.stages[number], outcome.structure
+    own, first = outcome.state.interfaces[number], outcome.first[number]
+    peak = structure.peak
+    unworn, worn = (s.histories[number].loads for s in (outcome.unworn, outcome.worn))
+    bodies = (
+        (structure.mesh.body_1, mesh.body_1),
+        (structure.mesh.body_2, mesh.body_2),
+    )
+    last = dict(zip(KINETICS, outcome.state.kinetics[-1, number].tolist(), strict=True))
+    loaded = [s for s in first.states.values()]
+    return {
+        **last,
+        "mesh_volume_1": worn_volume(*bodies[0], stage.interface, 1),
+        "mesh_volume_2": worn_volume(*bodies[1], stage.interface, 2),
+        "peak_load": {
+            "unworn": {name: float(getattr(unworn, name)[peak]) for name in RESULTANTS},
+            "worn": {name: float(getattr(worn, name)[peak]) for name in RESULTANTS},
+        },
+        "slip_per_cycle": float(
+            np.hypot(*np.moveaxis(outcome.unworn.histories[number].slip, 1, 0)).sum(axis=0).max()
+        ),
+        "peak_pressure": {
+            "unworn": float(first.states[peak].pressure.max()) if peak in first.states else 0.0,
+            "worn": float(stage.peak_fields(own, peak)[0]["pressure"].max()),
+        },
+        "energy_per_cycle": {
+            "half_space": float(first.energy.sum()),
+            "structure": float((unworn.Edx + unworn.Edy).sum()),
+        },
+        "contact_residual": max((s.residuals.largest for s in loaded), default=0.0),
+        "convolutions": first.convolutions,
+        "linear_regime": {
+            name: None if regime is None else vars(regime)
+            for name, regime in _regimes(outcome)[stage.name].items()
+        },
+    }
+
+
+def _versions() -> dict[str, str]:
+    return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
+
+
+def _say(summary: dict[str, Any], reporter: Reporter) -> None:
+    """The end of the run in a few lines."""
+    reporter.say(f"{summary['cycles']:.6g} cycles in {summary['jumps']} jumps")
+    for name in (
+        key for key, value in summary.items() if isinstance(value, dict) and "depth_1" in value
+    ):
+        own = summary[name]
+        peaks = own["peak_pressure"]
+        reporter.say(
+            f"  {name}: worn {own['depth_1'] * 1e3:.3g} um (disk) and {own['depth_2'] * 1e3:.3g} um "
+            f"(blade), {own['volume_1']:.3g} and {own['volume_2']:.3g} mm^3; peak pressure "
+            f"{peaks['unworn']:.0f} -> {peaks['worn']:.0f} MPa"
+        )
+    reporter.say(f"  seconds: {', '.join(f'{k} {v:.1f}' for k, v in summary['seconds'].items())}")

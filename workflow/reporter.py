@@ -1,0 +1,78 @@
+"""What a run says while it works: stages and jumps on the terminal, everything in ``run.log``."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+
+
+class Reporter:
+    """Times stages, logs lines and collects warnings."""
+
+    def __init__(self, log: Path, append: bool = False) -> None:
+        self._log = log.open("a" if append else "w", encoding="utf-8")
+        self._console = Console(stderr=True, highlight=False)
+        self.seconds: dict[str, float] = {}
+        self.warnings: list[str] = []
+
+    def close(self) -> None:
+        self._log.close()
+
+    def say(self, line: str) -> None:
+        """A line on the terminal and in the log."""
+        self._console.print(line, markup=False)
+        self.log(line)
+
+    def log(self, line: str) -> None:
+        """A line in the log only."""
+        self._log.write(f"{time.strftime('%H:%M:%S')} {line}\n")
+        self._log.flush()
+
+    def warn(self, line: str) -> None:
+        """A warning: said once, and kept for the summary."""
+        if line not in self.warnings:
+            self.warnings.append(line)
+            self.say(f"warning: {line}")
+
+    @contextmanager
+    def stage(self, name: str) -> Iterator[None]:
+        """Time a stage; seconds of the same name add up."""
+        begin = time.perf_counter()
+        try:
+            yield
+        finally:
+            spent = time.perf_counter() - begin
+            self.seconds[name] = self.seconds.get(name, 0.0) + spent
+            self.log(f"{name}: {spent:.2f} s")
+
+    @contextmanager
+    def jumps(self, total: float, done: float) -> Iterator[JumpProgress]:
+        """A bar over the cycles of a run."""
+        columns = (
+            TextColumn("wear"),
+            BarColumn(),
+            TextColumn("{task.fields[text]}"),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+        )
+        with Progress(*columns, console=self._console, transient=True) as progress:
+            yield JumpProgress(progress, total, done)
+
+
+class JumpProgress:
+    """The bar of a wear run."""
+
+    def __init__(self, progress: Progress, total: float, done: float) -> None:
+        self._progress = progress
+        self._task = progress.add_task("wear", total=total, completed=done, text="")
+
+    def update(self, cycles: float, jump: int) -> None:
+        """Show the cycles reached and the number of the jump."""
+        text = f"jump {jump}, {cycles:.4g} cycles"
+        self._progress.update(self._task, completed=cycles, text=text)

@@ -1,0 +1,281 @@
+"""The main road: structure, contact, wear, back to the structure, output."""
+
+from __future__ import annotations
+
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from fe_models.mesh import MeshError
+from fe_models.structure import CycleSolution
+from sa_solver.normal import NormalContactError
+from sa_solver.types import Array
+from wear.stepping import ContactFailure, CycleResult
+from workflow import checkpoint
+from workflow.case import Case
+from workflow.checkpoint import KINETICS, RunState
+from workflow.contact_stage import ContactStage, InterfaceState
+from workflow.errors import MethodFailed, UserError
+from workflow.folder import OutputFolder
+from workflow.memory import check_memory
+from workflow.output import Outcome, write_output
+from workflow.reporter import Reporter
+from workflow.store import write_arrays
+from workflow.structure_stage import SIDES, StructureStage
+from workflow.warnings import warn_of_contact, warn_of_structure
+
+
+def run_case(case: Case, out: Path, force: bool) -> None:
+    """Run a case from the start into a folder."""
+    check_memory(case)
+    folder = OutputFolder(out)
+    folder.claim(case, force)
+    _run(case, folder, resume=False)
+
+
+def resume_run(out: Path) -> None:
+    """Continue the run in a folder from its last whole jump."""
+    folder = OutputFolder(out)
+    case = folder.load_case()
+    check_memory(case)
+    _run(case, folder, resume=True)
+
+
+def _run(case: Case, folder: OutputFolder, resume: bool) -> None:
+    reporter = Reporter(folder.log, append=resume)
+    try:
+        WearRun(case, folder, reporter).execute(resume)
+    except (ContactFailure, NormalContactError) as error:
+        remedy = f"; the state is kept, see `fretscale resume {folder.root}`"
+        raise MethodFailed(f"{error}{remedy if folder.checkpoint.exists() else ''}") from error
+    except MeshError as error:
+        raise UserError(f"{folder.case}: structure: {error}") from error
+    finally:
+        reporter.close()
+
+
+class WearRun:
+    """One run of a wear case."""
+
+    def __init__(self, case: Case, folder: OutputFolder, reporter: Reporter) -> None:
+        self._case = case
+        self._folder = folder
+        self._reporter = reporter
+        self._structure = StructureStage(case)
+
+    def execute(self, resume: bool) -> None:
+        """Run to the end and write everything."""
+        self._reporter.say(f"{'resume' if resume else 'run'}: {self._case.title}")
+        with self._reporter.stage("mesh"):
+            mesh = self._structure.mesh
+        with self._reporter.stage("condensation"):
+            _ = self._structure.joint
+        with self._reporter.stage("structural friction"):
+            unworn = self._structure.cycle([np.zeros(len(i)) for i in mesh.interfaces])
+        warn_of_structure(self._case, self._structure, unworn, self._reporter)
+        with self._reporter.stage("contact set-up"):
+            stages = self._contact_stages()
+        with ThreadPoolExecutor(len(stages)) as pool:
+            loop = WearLoop(self._case, self._folder, self._reporter, self._structure, stages, pool)
+            if resume and self._folder.checkpoint.exists():
+                state = checkpoint.load(self._folder.checkpoint)
+                first = loop.unworn_cycles(unworn)
+            else:
+                state, first = loop.begin(unworn)
+            warn_of_contact(self._case, self._structure, stages, state, first, self._reporter)
+            state = loop.advance(state)
+        depths = [
+            stage.nodal_depths(own) for stage, own in zip(stages, state.interfaces, strict=True)
+        ]
+        with self._reporter.stage("structural friction"):
+            worn = self._structure.cycle([one + two for one, two in depths])
+        write_output(
+            Outcome(self._case, self._structure, stages, state, unworn, worn, first, depths),
+            self._folder,
+            self._reporter,
+        )
+
+    def _contact_stages(self) -> list[ContactStage]:
+        stages = []
+        for interface in self._structure.interfaces:
+            side = SIDES[interface.name]
+            dovetail = self._structure.dovetail
+            stage = ContactStage(
+                self._case,
+                interface,
+                dovetail.flank_size(side),
+                lambda grid, side=side: dovetail.flank_gap(grid.x, grid.y, side),
+            )
+            stages.append(stage)
+        return stages
+
+
+class WearLoop:
+    """Jumps of all interfaces side by side, with a checkpoint after each."""
+
+    def __init__(
+        self,
+        case: Case,
+        folder: OutputFolder,
+        reporter: Reporter,
+        structure: StructureStage,
+        stages: list[ContactStage],
+        pool: ThreadPoolExecutor,
+    ) -> None:
+        self._case = case
+        self._folder = folder
+        self._reporter = reporter
+        self._structure = structure
+        self._stages = stages
+        self._pool = pool
+
+    def begin(self, unworn: CycleSolution) -> tuple[RunState, list[CycleResult]]:
+        """State before the first jump, and the contact of the first cycle."""
+        with self._reporter.stage("contact, first cycle"):
+            begun = list(self._pool.map(ContactStage.begin, self._stages, unworn.histories))
+        count = len(self._stages)
+        state = RunState(
+            interfaces=tuple(own for own, _ in begun),
+            cycles=np.empty(0),
+            kinetics=np.empty((0, count, len(KINETICS))),
+            drift=np.empty(0),
+            solved_resultants=self._probe(tuple(own for own, _ in begun)),
+            solutions=1,
+        ).record(0.0, self._areas, 0.0)
+        self._keep(state)
+        return state, [result for _, result in begun]
+
+    def unworn_cycles(self, unworn: CycleSolution) -> list[CycleResult]:
+        """Contact of the first cycle alone, for a run that goes on from a checkpoint."""
+        with self._reporter.stage("contact, first cycle"):
+            begun = self._pool.map(ContactStage.begin, self._stages, unworn.histories)
+            return [result for _, result in begun]
+
+    def advance(self, state: RunState) -> RunState:
+        """Jump until the cycles are over or a stop is reached."""
+        total = self._case.wear.cycles
+        with self._reporter.jumps(total, float(state.cycles[-1])) as progress:
+            while not self._ended(state):
+                state = self._jump(state)
+                progress.update(float(state.cycles[-1]), state.jump)
+        return state
+
+    def _jump(self, state: RunState) -> RunState:
+        cycles = self._jump_cycles(state)
+        with self._reporter.stage("wear"):
+            jumped = self._pool.map(
+                lambda stage, own: stage.jump(own, cycles), self._stages, state.interfaces
+            )
+            interfaces, results = zip(*jumped, strict=True)
+        state = replace(state, interfaces=interfaces)
+        state, drift = self._follow_drift(state)
+        state = state.record(float(state.cycles[-1]) + cycles, self._areas, drift)
+        convolutions = sum(result.convolutions for result in results)
+        self._reporter.log(
+            f"jump {state.jump}: {state.cycles[-1]:.6g} cycles, depths "
+            f"{np.array2string(state.kinetics[-1, :, :2] * 1e3, precision=3)} um, "
+            f"{convolutions} convolutions, drift {drift:.2%}"
+        )
+        self._keep(state)
+        return state
+
+    def _jump_cycles(self, state: RunState) -> float:
+        """Cycles of the next jump, by the case's measure at the present rates."""
+        step = self._case.wear.step
+        if step.cycles is not None:
+            cycles = step.cycles
+        elif step.depth is not None:
+            cycles = _quotient(step.depth, max(own.depth_rate for own in state.interfaces))
+        else:
+            assert step.volume is not None
+            cycles = _quotient(step.volume, sum(own.volume_rate for own in state.interfaces))
+        if step.kind == "explicit":
+            self._warn_of_instability(state, cycles)
+        return min(cycles, self._case.wear.cycles - float(state.cycles[-1]))
+
+    def _warn_of_instability(self, state: RunState, cycles: float) -> None:
+        pairs = zip(self._stages, state.interfaces, strict=True)
+        stable = min(stage.stable_cycles(own) for stage, own in pairs)
+        if cycles > stable:
+            self._reporter.warn(
+                f"explicit wear steps above {stable:.3g} cycles amplify the grid's roughness "
+                "(wear.step): use implicit steps or smaller ones"
+            )
+
+    def _ended(self, state: RunState) -> bool:
+        wear = self._case.wear
+        depth = state.kinetics[-1, :, :2].max()
+        volume = state.kinetics[-1, :, 2:4].sum()
+        return bool(
+            state.cycles[-1] >= wear.cycles
+            or (wear.stop.depth is not None and depth >= wear.stop.depth)
+            or (wear.stop.volume is not None and volume >= wear.stop.volume)
+        )
+
+    def _follow_drift(self, state: RunState) -> tuple[RunState, float]:
+        """Solve the structure again where its resultants have drifted too far."""
+        if self._case.coupling.resultants == "constant":
+            return state, 0.0
+        with self._reporter.stage("drift probe"):
+            probe = self._probe(state.interfaces)
+        drift = max(
+            _drift(now, then, stage.grid.size)
+            for now, then, stage in zip(probe, state.solved_resultants, self._stages, strict=True)
+        )
+        if drift <= self._case.coupling.drift:
+            return state, drift
+        with self._reporter.stage("structural friction"):
+            solution = self._structure.cycle(self._total_depths(state.interfaces))
+        self._reporter.log(f"drift {drift:.2%}: resultants computed again")
+        reloaded = map(ContactStage.reload, self._stages, state.interfaces, solution.histories)
+        return replace(
+            state,
+            interfaces=tuple(reloaded),
+            solved_resultants=probe,
+            solutions=state.solutions + 1,
+        ), drift
+
+    def _probe(self, interfaces: tuple[InterfaceState, ...]) -> Array:
+        return self._structure.peak_resultants(self._total_depths(interfaces))
+
+    def _total_depths(self, interfaces: tuple[InterfaceState, ...]) -> list[Array]:
+        pairs = zip(self._stages, interfaces, strict=True)
+        return [np.sum(stage.nodal_depths(own), axis=0) for stage, own in pairs]
+
+    @property
+    def _areas(self) -> list[float]:
+        return [stage.grid.cell_area for stage in self._stages]
+
+    def _keep(self, state: RunState) -> None:
+        """Write the fields of this jump, then the state that the next one starts from."""
+        with self._reporter.stage("checkpoints"):
+            peak = self._structure.peak
+            recorded = self._pool.map(
+                lambda stage, own: stage.peak_fields(own, peak), self._stages, state.interfaces
+            )
+            arrays = {}
+            for stage, own, (fields, _) in zip(
+                self._stages, state.interfaces, recorded, strict=True
+            ):
+                body_1, body_2 = own.surfaces.heights
+                arrays |= {f"surfaces/{stage.name}/body_1": body_1}
+                arrays |= {f"surfaces/{stage.name}/body_2": body_2}
+                arrays |= {f"contact/{stage.name}/{name}": field for name, field in fields.items()}
+            attributes = {"cycles": float(state.cycles[-1])}
+            write_arrays(self._folder.jump(state.jump), arrays, attributes)
+            checkpoint.save(self._folder.checkpoint, state)
+
+
+def _drift(now: Array, then: Array, size: tuple[float, float]) -> float:
+    """Change of resultants relative to P, and to P times half the face for moments."""
+    load = then[0]
+    half_x, half_y = 0.5 * size[0], 0.5 * size[1]
+    scales = load * np.array([1.0, 1.0, 1.0, half_y, half_x, max(half_x, half_y)])
+    return float(np.max(np.abs(now - then) / scales))
+
+
+def _quotient(limit: float, rate: float) -> float:
+    """Cycles to a limit; all that remain where nothing wears."""
+    return limit / rate if rate > 0.0 else np.inf

@@ -1,0 +1,126 @@
+"""HDF5 files that are never half written, and the layout of ``results.h5``.
+
+A file is written beside its place and renamed: whoever is killed in the middle leaves the old one.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from fe_models.structure import InterfaceHistory
+from sa_solver.types import Array, Frame, Grid
+
+# Unit and description of every dataset, by its own name.
+DATASETS = {
+    "P": ("N", "normal force on body 2"),
+    "Qx": ("N", "tangential force on body 2 along x"),
+    "Qy": ("N", "tangential force on body 2 along y"),
+    "Mx": ("N mm", "moment of the pressure about x"),
+    "My": ("N mm", "moment of the pressure about y"),
+    "Mz": ("N mm", "moment of the shear about z"),
+    "Edx": ("N mm", "energy dissipated in the increment by slip along x"),
+    "Edy": ("N mm", "energy dissipated in the increment by slip along y"),
+    "sliding": ("1", "whether the whole face slides"),
+    "coordinates": ("mm", "nodes in the interface frame"),
+    "facets": ("1", "corner nodes of the triangles"),
+    "gap": ("mm", "distance of the unloaded faces"),
+    "pressure": ("MPa", "contact pressure"),
+    "shear": ("MPa", "shear on body 2, x and y; µp where the structure slips, else 0 on the grid"),
+    "slip": ("mm", "slip of body 2 over body 1 in the increment, x and y"),
+    "energy_half_space": ("N mm", "energy dissipated in each increment, half-space pressure"),
+    "body_1": ("mm", "height of body 1 in the interface frame"),
+    "body_2": ("mm", "height of body 2 in the interface frame"),
+    "cycles": ("1", "cycles"),
+    "depth_1": ("mm", "largest worn depth of body 1"),
+    "depth_2": ("mm", "largest worn depth of body 2"),
+    "volume_1": ("mm^3", "worn volume of body 1"),
+    "volume_2": ("mm^3", "worn volume of body 2"),
+    "energy": ("N mm", "energy dissipated so far"),
+    "points": ("mm", "vertices"),
+    "tets": ("1", "corner vertices of the tetrahedra"),
+    "displacement": ("mm", "displacement at peak load"),
+    "von_mises": ("MPa", "von Mises stress at peak load"),
+    "maximum_principal": ("MPa", "largest principal stress at peak load"),
+}
+
+
+@contextmanager
+def replacing(path: Path) -> Iterator[Path]:
+    """A path to write to; it takes the place of ``path`` once the writing has ended well."""
+    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        yield partial
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def write_arrays(
+    path: Path, arrays: Mapping[str, Any], attributes: Mapping[str, Any] | None = None
+) -> None:
+    """Write named arrays (names may hold slashes) and attributes of the root."""
+    with replacing(path) as partial, h5py.File(partial, "w") as file:
+        for name, values in arrays.items():
+            file.create_dataset(name, data=values)
+        file.attrs.update(attributes or {})
+
+
+def read_arrays(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
+    """All arrays of a file by their full name, and the attributes of its root."""
+    arrays: dict[str, Any] = {}
+
+    def collect(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset):
+            arrays[name] = item[()]
+
+    with h5py.File(path, "r") as file:
+        file.visititems(collect)
+        return arrays, dict(file.attrs)
+
+
+class ResultsWriter:
+    """Fills an open ``results.h5``; every dataset gets its unit and description."""
+
+    def __init__(self, file: h5py.File) -> None:
+        self.file = file
+
+    def put(self, group: str, **datasets: Any) -> None:
+        """Write datasets into a group."""
+        for name, values in datasets.items():
+            values = np.asarray(values)
+            large = {"compression": "gzip", "compression_opts": 1} if values.size > 4096 else {}
+            dataset = self.file.create_dataset(f"{group}/{name}", data=values, **large)
+            dataset.attrs["unit"], dataset.attrs["description"] = DATASETS[name]
+
+    def put_grid(self, name: str, grid: Grid, frame: Frame) -> None:
+        """Grid of an interface and its place in space."""
+        group = self.file.create_group(f"grid/{name}")
+        group.attrs.update(
+            {"shape": grid.shape, "pitch": grid.pitch, "origin": frame.origin, "axes": frame.axes}
+        )
+
+    def put_structure(self, group: str, history: InterfaceHistory) -> None:
+        """What the structure gives for one interface over a cycle."""
+        face = history.interface
+        loads = history.loads
+        self.put(f"{group}/load_history", **vars(loads))
+        self.put(
+            group,
+            coordinates=face.coordinates,
+            facets=face.facets,
+            gap=face.gap,
+            pressure=history.pressure,
+            shear=history.force[:, :2] / face.nodal_areas,
+            slip=history.slip,
+        )
+
+    def put_body(self, group: str, points: Array, tets: Any, field: Any) -> None:
+        """Mesh and stress of one body."""
+        self.put(group, points=points, tets=tets, **vars(field))

@@ -1,0 +1,140 @@
+"""The structural stage of a dovetail case: mesh, condensed joint, cycles, stress, worn mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import cached_property
+
+import numpy as np
+
+from fe_models.dovetail import Mission, dovetail_structure
+from fe_models.friction import FrictionalJoint, FrictionState
+from fe_models.geometry.dovetail import Dovetail
+from fe_models.mesh import Interface, StructureMesh
+from fe_models.reduction import JointStiffness
+from fe_models.stress import StressField, stress_state
+from fe_models.structure import CycleSolution, Structure
+from sa_solver.types import Array
+from workflow.cache import content_key, load_joint, save_joint
+from workflow.case import Case
+from workflow.errors import MethodFailed
+
+SIDES = {"intrados": 1, "extrados": -1}
+
+
+class StructureStage:
+    """Everything the run asks of the structure. Worn depths are nodal, ``(n,)`` per interface."""
+
+    def __init__(self, case: Case) -> None:
+        self._case = case
+        parameters = case.structure.model_dump(exclude={"kind"})
+        self.dovetail = Dovetail(**parameters)
+        self.mission = Mission(**case.load_path.model_dump())
+        self._mesh_settings = tuple(case.mesh.flank_nodes), case.mesh.size
+        self.from_cache = False
+
+    @cached_property
+    def mesh(self) -> StructureMesh:
+        """The unworn mesh."""
+        return self.dovetail.mesh(*self._mesh_settings)
+
+    @property
+    def interfaces(self) -> tuple[Interface, ...]:
+        return self.mesh.interfaces
+
+    @property
+    def peak(self) -> int:
+        """Index of the increment of peak load."""
+        return self.mission.peak_at - 1
+
+    @cached_property
+    def joint(self) -> FrictionalJoint:
+        """The condensed joint, from the cache when it is there."""
+        key = content_key(
+            self.dovetail,
+            self._mesh_settings,
+            self._case.materials,
+            self.mission.airfoil_mass,
+            self.mission.airfoil_radius,
+            self._case.mesh.order,
+        )
+        stiffness = load_joint(key)
+        self.from_cache = stiffness is not None
+        if stiffness is None:
+            stiffness = self.structure.condense()
+            save_joint(key, stiffness)
+        self.rigid_modes = stiffness.rigid_modes
+        return FrictionalJoint(stiffness, self._case.friction.coefficient)
+
+    @cached_property
+    def structure(self) -> Structure:
+        """Both bodies with supports and loads, unworn."""
+        return self._structure(self.mesh)
+
+    def self_locking(self) -> bool:
+        """Whether friction alone can hold the blade in the slot."""
+        return self._case.friction.coefficient > np.tan(self.dovetail.flank_angle)
+
+    def cycle(self, depths: list[Array]) -> CycleSolution:
+        """The closed mission cycle with the gaps widened by the worn depth of both bodies."""
+        solution = self.structure.solve_cycle(
+            self.joint,
+            self.mission.amplitudes(),
+            self._gap(depths),
+            self._case.friction.coefficient,
+        )
+        if not solution.converged:
+            raise MethodFailed(
+                f"structural friction did not converge: residual {solution.residual:.1e} after "
+                f"{solution.iterations} iterations; refine load_path.increments or lower "
+                "friction.coefficient"
+            )
+        return solution
+
+    def peak_resultants(self, depths: list[Array]) -> Array:
+        """Resultants ``(interfaces, 6)`` at peak load reached in a single increment.
+
+        Cheap, and moved by wear as those of the full cycle are: the probe for drift.
+        """
+        amplitudes = self.mission.amplitudes()[self.peak : self.peak + 1]
+        (state,) = self.joint.march(amplitudes, self._gap(depths))
+        return self.structure.interface_resultants(state)
+
+    def stress(self, solution: CycleSolution) -> tuple[StressField, StressField]:
+        """Stress of disk and blade at peak load on the unworn mesh."""
+        return self._stress(self.structure, solution)
+
+    def worn_stress(
+        self, mesh: StructureMesh, solution: CycleSolution
+    ) -> tuple[StressField, StressField]:
+        """Stress of disk and blade at peak load on the worn mesh."""
+        return self._stress(self._structure(mesh), solution)
+
+    def _stress(
+        self, structure: Structure, solution: CycleSolution
+    ) -> tuple[StressField, StressField]:
+        force, relative = (
+            np.concatenate([pick(history)[self.peak] for history in solution.histories], axis=-1)
+            for pick in _FORCE_AND_DISPLACEMENT
+        )
+        return stress_state(structure, force, relative, self.mission.amplitudes()[self.peak])
+
+    def _structure(self, mesh: StructureMesh) -> Structure:
+        return dovetail_structure(
+            self.dovetail,
+            mesh,
+            self._case.materials.disk.elastic(),
+            self._case.materials.blade.elastic(),
+            self.mission,
+            self._case.mesh.order,
+        )
+
+    def _gap(self, depths: list[Array]) -> Array:
+        return self.structure.gap() + np.concatenate(depths)
+
+
+_FORCE_AND_DISPLACEMENT: tuple[Callable, Callable] = (
+    lambda history: history.force,
+    lambda history: history.displacement,
+)

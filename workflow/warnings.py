@@ -1,0 +1,90 @@
+"""Things a user should know about a run that went well all the same."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from fe_models.structure import CycleSolution
+from sa_solver.reference.flat_rounded import FlatRounded
+from wear.stepping import CycleResult
+from workflow.case import Case
+from workflow.checkpoint import RunState
+from workflow.contact_stage import ContactStage
+from workflow.reporter import Reporter
+from workflow.structure_stage import StructureStage
+
+# The second cycle should repeat the first's forces; a larger change means a cycle not closed.
+OPEN_CYCLE = 0.02
+# Share of the closed form's edge peak that the grid may miss.
+PEAK_ERROR = 0.05
+
+
+def warn_of_structure(
+    case: Case, structure: StructureStage, unworn: CycleSolution, reporter: Reporter
+) -> None:
+    """Self-locking joints, cycles that do not close, faces that lose their contact."""
+    if structure.self_locking():
+        reporter.warn(
+            f"friction.coefficient {case.friction.coefficient:g} exceeds the tangent of the flank "
+            f"angle, {np.tan(case.structure.flank_angle):.3g}: the joint locks itself and the "
+            "blade does not come back when the load falls"
+        )
+    if unworn.closure > OPEN_CYCLE:
+        reporter.warn(
+            f"the second mission differs from the first by {unworn.closure:.1%} of the largest "
+            "contact force: the cycle that feeds the wear is not closed"
+        )
+    for history in unworn.histories:
+        if history.loads.P[structure.peak] <= 0.0:
+            reporter.warn(f"{history.interface.name} is open at peak load: it does not wear")
+
+
+def warn_of_contact(
+    case: Case,
+    structure: StructureStage,
+    stages: list[ContactStage],
+    state: RunState,
+    first: list[CycleResult],
+    reporter: Reporter,
+) -> None:
+    """Pressures above yield, contacts at the border, edge peaks the grid cannot show."""
+    yield_stress = min(
+        m.elastic().yield_stress for m in (case.materials.blade, case.materials.disk)
+    )
+    for stage, own, result in zip(stages, state.interfaces, first, strict=True):
+        highest = max((float(s.pressure.max()) for s in result.states.values()), default=0.0)
+        if highest > yield_stress:
+            reporter.warn(
+                f"{stage.name}: the pressure reaches {highest:.0f} MPa, above the yield stress of "
+                f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there"
+            )
+        if any(s.touches_border for s in result.states.values()):
+            reporter.warn(
+                f"{stage.name}: the contact touches the border of its grid: widen "
+                "structure.edge_width or structure.end_width"
+            )
+        load = float(own.loads.P[structure.peak])
+        for edge, error in edge_peak_errors(case, stage, load).items():
+            if abs(error) > PEAK_ERROR:
+                reporter.warn(
+                    f"{stage.name}: the grid misses {abs(error):.0%} of the pressure peak at the "
+                    f"{edge}: refine contact.grid or increase structure.{edge}_radius"
+                )
+
+
+def edge_peak_errors(case: Case, stage: ContactStage, load: float) -> dict[str, float]:
+    """What the grid makes of the closed form's edge peaks, relative, under a centred ``load``.
+
+    The plane strain profile across the flank stands for both: the peak at the slot ends is set by
+    the same short side.
+    """
+    if load <= 0.0:
+        return {}
+    dovetail = case.structure
+    half_width = 0.5 * dovetail.flank_length
+    per_length = load / (dovetail.slot_length - 2.0 * dovetail.end_width)
+    radii = {"edge": dovetail.edge_radius, "end": dovetail.end_radius}
+    return {
+        edge: FlatRounded(half_width, radius, per_length, stage.modulus).peak_error(pitch)
+        for (edge, radius), pitch in zip(radii.items(), stage.grid.pitch, strict=True)
+    }
