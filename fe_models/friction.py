@@ -8,7 +8,7 @@ eigenvalues of H, and there is no penalty.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -32,12 +32,14 @@ class FrictionState:
     """State at the end of one increment, components in the interface frames.
 
     ``force`` ``(3, n)`` on body 2 [N]; ``displacement`` ``(3, n)`` of body 2 relative to body 1 and
-    ``slip`` ``(2, n)`` its tangential part since the previous increment [mm].
+    ``slip`` ``(2, n)`` its tangential part since the previous increment [mm]. ``state`` ``(3 n,)`` is
+    the splitting's, to start from again.
     """
 
     force: Array
     displacement: Array
     slip: Array
+    state: Array
     residual: float
     iterations: int
     converged: bool
@@ -56,21 +58,30 @@ class FrictionalJoint:
         inverse, _ = sl.lapack.dpotri(factor, lower=1, overwrite_c=1)
         self._inverse = np.tril(inverse) + np.tril(inverse, -1).T
 
-    def march(self, amplitudes: Array, gap: Array) -> Iterator[FrictionState]:
+    def march(
+        self, amplitudes: Array, gap: Array, cycles: int = 1, guess: Sequence[Array] = ()
+    ) -> Iterator[FrictionState]:
         """States along a load path ``(increments, cases)`` that starts unloaded and unslipped.
 
-        ``gap`` ``(n,)`` is the distance of the unloaded faces [mm].
+        ``gap`` ``(n,)`` is the distance of the unloaded faces [mm]; the path is repeated ``cycles``
+        times. ``guess`` are the ``state`` of every increment of a similar path: it saves
+        iterations and changes nothing else.
         """
         loads = amplitudes @ self._loads.T
         floor = LOAD_FLOOR * np.linalg.norm(loads, axis=1).max()
         displacement = np.zeros((3, len(gap)))
-        start = np.zeros(3 * len(gap))
-        for load in loads:
-            scale = max(float(np.linalg.norm(load)), floor)
-            split = self._solve(load, gap, displacement, start, scale)
-            state = self._state(split, gap, displacement)
-            start, displacement = split.state, state.displacement
-            yield state
+        earlier = list(guess)
+        for _ in range(cycles):
+            found: list[Array] = []
+            for load in loads:
+                scale = max(float(np.linalg.norm(load)), floor)
+                start = _predicted(found, earlier, len(load))
+                split = self._solve(load, gap, displacement, start, scale)
+                state = self._state(split, gap, displacement)
+                found.append(state.state)
+                displacement = state.displacement
+                yield state
+            earlier = found
 
     def _solve(
         self, load: Array, gap: Array, previous: Array, start: Array, scale: float
@@ -106,5 +117,19 @@ class FrictionalJoint:
         displacement = split.solution.reshape(-1, 3).T
         slip = displacement[:2] - previous[:2]
         return FrictionState(
-            force, displacement, slip, split.residual, split.iterations, split.converged
+            force,
+            displacement,
+            slip,
+            split.state,
+            split.residual,
+            split.iterations,
+            split.converged,
         )
+
+
+def _predicted(found: list[Array], earlier: list[Array], size: int) -> Array:
+    """Start of the next increment: it changes by as much as it did in the earlier cycle."""
+    increment = len(found)
+    if increment < len(earlier):
+        return earlier[increment] + (found[-1] - earlier[increment - 1] if found else 0.0)
+    return found[-1] if found else np.zeros(size)

@@ -18,11 +18,14 @@ from sa_solver.types import Array
 
 # A backward-stable factorisation leaves about 1e-13; anything above this is a wrong answer.
 RESIDUAL_LIMIT = 1e-9
-# SuperLU condenses this many interface unknowns at once: enough to amortise, little memory.
-SUPERLU_COLUMNS = 256
+# Interface unknowns condensed at once without PARDISO: enough to amortise, little memory.
+COLUMNS_AT_ONCE = 256
 
 PARDISO_SPD = 2
 PARDISO_ANALYSE_FACTORISE = 12
+
+
+Indices = NDArray[np.int64]
 
 
 class SolverError(RuntimeError):
@@ -40,15 +43,17 @@ def factorise(matrix: sp.csr_matrix) -> Factorisation:
     return _Checked(matrix, _pardiso(matrix) or _superlu(matrix))
 
 
-def schur_complement(matrix: sp.csr_matrix, kept: NDArray[np.int64]) -> Array:
+def schur_complement(
+    matrix: sp.csr_matrix, kept: Indices, inner: Indices, solve_inner: Factorisation
+) -> Array:
     """Condense a symmetric matrix onto the unknowns ``kept``: K_cc - K_ci K_ii⁻¹ K_ic, dense.
 
-    Rows and columns follow the order of ``kept``. K_ii must be positive definite, K need not be.
+    Rows and columns follow the order of ``kept``; ``inner`` are all others and ``solve_inner`` the
+    factorised K_ii, which must be positive definite, as K need not be.
     """
-    inner = np.setdiff1d(np.arange(matrix.shape[0]), kept)
     condensed = _pardiso_schur(matrix, kept)
-    if condensed is None or not _is_schur(matrix, kept, inner, condensed):
-        condensed = _superlu_schur(matrix, kept, inner)
+    if condensed is None or not _is_schur(matrix, kept, inner, solve_inner, condensed):
+        condensed = _schur_by_columns(matrix, kept, inner, solve_inner)
     return condensed
 
 
@@ -104,7 +109,7 @@ def _pardiso(matrix: sp.csr_matrix) -> Any | None:
     return lambda rhs: solver.solve(upper, np.asfortranarray(rhs)).reshape(rhs.shape)
 
 
-def _pardiso_schur(matrix: sp.csr_matrix, kept: NDArray[np.int64]) -> Array | None:
+def _pardiso_schur(matrix: sp.csr_matrix, kept: Indices) -> Array | None:
     """PARDISO's own Schur complement (iparm 36); None where PARDISO is not installed or fails."""
     pypardiso = _load_pardiso()
     if pypardiso is None:
@@ -145,23 +150,21 @@ def _pardiso_schur(matrix: sp.csr_matrix, kept: NDArray[np.int64]) -> Array | No
 
 
 def _is_schur(
-    matrix: sp.csr_matrix, kept: NDArray[np.int64], inner: NDArray[np.int64], condensed: Array
+    matrix: sp.csr_matrix, kept: Indices, inner: Indices, solve: Factorisation, condensed: Array
 ) -> bool:
     """Whether S v equals the interface forces of the full system, for one random v."""
     v = np.random.default_rng(0).standard_normal(len(kept))
-    solve = factorise(matrix[inner][:, inner].tocsr())
     exact = matrix[kept][:, kept] @ v
     exact -= matrix[kept][:, inner] @ solve(matrix[inner][:, kept] @ v)
     return bool(np.abs(condensed @ v - exact).max() < RESIDUAL_LIMIT * np.abs(exact).max())
 
 
-def _superlu_schur(
-    matrix: sp.csr_matrix, kept: NDArray[np.int64], inner: NDArray[np.int64]
+def _schur_by_columns(
+    matrix: sp.csr_matrix, kept: Indices, inner: Indices, solve: Factorisation
 ) -> Array:
-    solve = _superlu(matrix[inner][:, inner])
     coupling = matrix[inner][:, kept].tocsc()
     condensed = matrix[kept][:, kept].toarray()
-    for start in range(0, len(kept), SUPERLU_COLUMNS):
-        block = slice(start, start + SUPERLU_COLUMNS)
+    for start in range(0, len(kept), COLUMNS_AT_ONCE):
+        block = slice(start, start + COLUMNS_AT_ONCE)
         condensed[:, block] -= coupling.T @ solve(coupling[:, block].toarray())
     return 0.5 * (condensed + condensed.T)

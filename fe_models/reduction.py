@@ -17,6 +17,7 @@ import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
 from numpy.typing import NDArray
+from scipy.sparse.linalg import LinearOperator, eigsh
 
 from fe_models.constraints import Constraints
 from fe_models.elasticity import ElasticBody
@@ -25,7 +26,9 @@ from fe_models.mesh import Interface
 from sa_solver.types import Array
 
 # Eigenvalues below this share of the largest are rigid motions; elastic ones start near 1e-3.
-RIGID_LIMIT = 1e-10
+RIGID_LIMIT = 1e-7
+# Share of the largest eigenvalue that makes the singular joint invertible for the Lanczos search.
+SPECTRUM_SHIFT = 1e-5
 
 
 @dataclass(frozen=True)
@@ -70,10 +73,8 @@ class ConstrainedBody:
         """Stiffness ``(3 n, 3 n)`` and loads ``(3 n, cases)`` on the interface displacements."""
         stiffness, loads = self._reduced()
         inner = self._inner(stiffness)
-        condensed = schur_complement(stiffness, self._interface)
-        if not loads.any():
-            return condensed, loads[self._interface]
         solve = factorise(stiffness[inner][:, inner].tocsr())
+        condensed = schur_complement(stiffness, self._interface, inner, solve)
         coupling = stiffness[self._interface][:, inner]
         return condensed, loads[self._interface] - coupling @ solve(loads[inner])
 
@@ -113,19 +114,30 @@ class ConstrainedBody:
 def join(condensed_1: tuple[Array, Array], condensed_2: tuple[Array, Array]) -> JointStiffness:
     """Join two condensed bodies; body 1 must be held, body 2 may float."""
     (stiffness_1, loads_1), (stiffness_2, loads_2) = condensed_1, condensed_2
-    factors = sl.cho_factor(stiffness_1 + stiffness_2, lower=True, overwrite_a=True)
-    shared = sl.cho_solve(factors, stiffness_2)
-    stiffness = stiffness_2 - stiffness_2 @ shared
-    stiffness = 0.5 * (stiffness + stiffness.T)
-    eigenvalues = sl.eigvalsh(stiffness)
-    elastic = eigenvalues[eigenvalues > RIGID_LIMIT * eigenvalues[-1]]
-    return JointStiffness(
-        stiffness=stiffness,
-        loads=shared.T @ (loads_1 + loads_2) - loads_2,
-        rigid_modes=len(eigenvalues) - len(elastic),
-        smallest=float(elastic[0]),
-        largest=float(elastic[-1]),
+    factor = sl.cholesky(stiffness_1 + stiffness_2, lower=True, overwrite_a=True)
+    # S_2 (S_1 + S_2)⁻¹ S_2 = XᵀX with X = L⁻¹ S_2: half the work of solving with both factors.
+    half = sl.solve_triangular(factor, stiffness_2, lower=True)
+    stiffness = stiffness_2 - half.T @ half
+    loads = half.T @ sl.solve_triangular(factor, loads_1 + loads_2, lower=True) - loads_2
+    rigid_modes, smallest, largest = _spectrum(stiffness)
+    return JointStiffness(stiffness, loads, rigid_modes, smallest, largest)
+
+
+def _spectrum(stiffness: Array) -> tuple[int, float, float]:
+    """Number of zero eigenvalues, smallest other one and largest one, by Lanczos iterations."""
+    start = np.random.default_rng(0).standard_normal(len(stiffness))
+    (largest,) = eigsh(stiffness, 1, v0=start, return_eigenvectors=False)
+    shift = SPECTRUM_SHIFT * largest
+    shifted = stiffness.copy()
+    shifted[np.diag_indices_from(shifted)] += shift
+    factors = sl.cho_factor(shifted, lower=True, overwrite_a=True)
+    inverse = LinearOperator(
+        stiffness.shape, matvec=lambda v: sl.cho_solve(factors, v), dtype=np.float64
     )
+    # A free body has six rigid motions: the seventh eigenvalue is elastic.
+    lowest = 1.0 / eigsh(inverse, 7, v0=start, return_eigenvectors=False) - shift
+    elastic = lowest[lowest > RIGID_LIMIT * largest]
+    return len(lowest) - len(elastic), float(elastic.min()), float(largest)
 
 
 def interface_frames(interfaces: tuple[Interface, ...]) -> Array:

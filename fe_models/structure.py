@@ -1,7 +1,8 @@
-"""Two supported bodies with their interfaces: condensation, contact history, equilibrium, stress."""
+"""Two supported bodies with their interfaces: condensation, contact history, equilibrium."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +14,8 @@ from sa_solver.types import Array, LoadHistory, resultants
 
 # A flank slides as a whole when nodes that stick carry less than this share of its load.
 STICKING_SHARE = 1e-2
+# Below this share of the cycle's largest P the resultants are the friction solver's remainder.
+UNLOADED_SHARE = 1e-6
 # A node slips when its shear reaches this share of Coulomb's limit.
 LIMIT_SHARE = 1.0 - 1e-6
 
@@ -41,12 +44,13 @@ class InterfaceHistory:
 class CycleSolution:
     """The closed cycle of a structure, with what the solver says of itself.
 
-    ``closure`` is the change of the contact forces at the end of the last increment before the
-    peak between the last two cycles, relative; ``equilibrium`` ``(t, 2)`` the relative error of
+    ``states`` are the splitting's, by increment. ``closure`` is the largest difference of contact
+    forces between the first and the second cycle, relative to the largest force; ``equilibrium`` ``(t, 2)`` the relative error of
     forces and moments.
     """
 
     histories: tuple[InterfaceHistory, ...]
+    states: tuple[Array, ...]
     iterations: int
     residual: float
     converged: bool
@@ -81,20 +85,23 @@ class Structure:
         amplitudes: Array,
         gap: Array,
         friction: float,
-        cycles: int = 2,
+        guess: Sequence[Array] = (),
     ) -> CycleSolution:
-        """March through the load path ``cycles`` times and keep the last."""
-        states = list(joint.march(np.tile(amplitudes, (cycles, 1)), gap))
-        count = len(amplitudes)
-        last, before = states[-count:], states[-2 * count : -count]
-        change = [np.abs(a.force - b.force).max() for a, b in zip(last, before, strict=False)]
-        largest = max(np.abs(s.force).max() for s in last)
+        """March through the load path twice and keep the second, closed cycle.
+
+        ``guess`` are the ``states`` of a similar cycle, to save iterations.
+        """
+        states = list(joint.march(amplitudes, gap, cycles=2, guess=guess))
+        first, last = states[: len(amplitudes)], states[len(amplitudes) :]
+        change = [float(np.abs(a.force - b.force).max()) for a, b in zip(first, last, strict=True)]
+        largest = max(float(np.abs(s.force).max()) for s in last)
         return CycleSolution(
             histories=tuple(self._histories(last, friction)),
+            states=tuple(s.state for s in last),
             iterations=sum(s.iterations for s in states),
             residual=max(s.residual for s in states),
             converged=all(s.converged for s in states),
-            closure=max(change, default=0.0) / largest,
+            closure=max(change) / largest,
             equilibrium=np.array(
                 [self.equilibrium_error(s, a) for s, a in zip(last, amplitudes, strict=True)]
             ),
@@ -150,12 +157,13 @@ class Structure:
 
 
 def load_history(interface: Interface, force: Array, slip: Array, friction: float) -> LoadHistory:
-    """Resultants and dissipated energies of nodal ``force`` ``(t, 3, n)`` and ``slip`` ``(t, 2, n)``."""
+    """Resultants and energies of nodal ``force`` ``(t, 3, n)`` and ``slip`` ``(t, 2, n)``."""
     x, y = interface.coordinates.T
     columns = np.array([resultants(f, x, y) for f in force]).T
     energy = -np.einsum("tan,tan->at", force[:, :2], slip)
     shear = np.hypot(force[:, 0], force[:, 1])
     sticks = shear < LIMIT_SHARE * friction * force[:, 2]
     load = columns[0]
+    columns[:, load < UNLOADED_SHARE * load.max()] = 0.0
     sliding = np.sum(force[:, 2] * sticks, axis=1) < STICKING_SHARE * load
-    return LoadHistory(*columns, *energy, sliding=sliding)
+    return LoadHistory(*columns, *energy, sliding)

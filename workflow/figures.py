@@ -37,6 +37,8 @@ STYLE: dict[Any, Any] = {
 BLUE, ORANGE, GREEN, PURPLE, BLACK = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222"
 BODIES = {1: ("disk", BLUE, "o"), 2: ("blade", ORANGE, "s")}
 PRESSURE_COLOURS, CYCLE_COLOURS = "viridis", "viridis"
+STRESS_COLOURS, CHANGE_COLOURS = "magma_r", "RdBu_r"
+CHANGE = "worn less unworn"
 
 # Edge peaks are a few cells: a scale that reached them would leave the rest in one colour.
 MAP_PERCENTILE = 99.5
@@ -45,10 +47,12 @@ MAP_PERCENTILE = 99.5
 ROW_SHARE = 0.01
 # More profiles than this overlap.
 MAX_PROFILES = 6
+# The rounding is many times deeper than young wear: heights are shown up to so many depths.
+HEIGHT_IN_DEPTHS = 2.0
 # How far the kinetics are extended, in computed numbers of cycles.
 EXTRAPOLATION = 2.0
 # Around the flanks, how far the section shows the bodies: as a share of the flanks' distance.
-SECTION_MARGIN = 0.75
+SECTION_MARGIN = 0.4
 
 
 class _Section(NamedTuple):
@@ -151,7 +155,7 @@ def _draw_tangential_force(
         fill = "white" if style == "o" else GREEN
         axis.plot(increments[mask], force[mask], style, color=GREEN, mfc=fill, ms=6, label=name)
     axis.set_title(f"slides as a whole in increments {_ranges(increments[sliding])}")
-    axis.legend(loc="best")
+    axis.legend(loc="lower right")
 
 
 def _ranges(numbers: Iterable[Any]) -> str:
@@ -211,6 +215,7 @@ def _draw_map(axis: Axes, field: Array, grid: Grid, top: float) -> Any:
     """One field with y to the right, to scale."""
     half = 0.5 * grid.size[1], 0.5 * grid.size[0]
     axis.grid(visible=False)
+    axis.locator_params(axis="y", nbins=3)
     return axis.imshow(
         np.ma.masked_less_equal(field, 0.0),
         origin="lower",
@@ -317,35 +322,46 @@ def _edge_peak(file: h5py.File) -> str:
 def worn_profiles(file: h5py.File) -> Figure:
     """Both surfaces and the depth worn off, across the middle of each flank, as cycles go by."""
     interfaces = list(file["surfaces"])
-    figure = _figure(f"Where the flanks wear, at y = 0: {_deepest(file)}", 9.0)
+    figure = _figure("", 9.0)
     axes = figure.subplots(2, len(interfaces), sharex=True, sharey="row", squeeze=False)
+    deepest = []
     for column, interface in zip(axes.T, interfaces, strict=True):
-        _draw_wear(column, file, interface)
+        deepest.append(_draw_wear(column, file, interface))
         column[0].set_title(f"{interface}: blade (above) and disk (below) in the flank's frame")
         column[1].set_title(f"{interface}: depth worn off both bodies")
         column[1].set_xlabel("x, across the flank [mm]")
+    texts = (f"{name} {depth:.3g} µm" for name, depth in zip(interfaces, deepest, strict=True))
+    figure.suptitle(f"Depth worn off at y = 0, at most: {', '.join(texts)}", fontweight="bold")
+    low, high = axes[0, 0].get_ylim()
+    axes[0, 0].set_ylim(low, min(high, HEIGHT_IN_DEPTHS * max(deepest)) if any(deepest) else high)
     axes[1, 0].invert_yaxis()
-    axes[0, 0].legend(loc="upper center")
+    axes[0, 0].legend(loc="upper center", ncols=2)
     axes[0, 0].set_ylabel("height [µm]")
     axes[1, 0].set_ylabel("wear depth [µm]")
     return figure
 
 
-def _draw_wear(axes: Iterable[Axes], file: h5py.File, interface: str) -> None:
-    """Heights above, depths below, one colour per number of cycles."""
+def _draw_wear(axes: Iterable[Axes], file: h5py.File, interface: str) -> float:
+    """Heights above, depths below, one colour per number of cycles; returns the last depth [µm]."""
     from matplotlib import colormaps
 
     heights, depths = axes
     surfaces, x = file["surfaces"][interface], _centres(_grid(file, interface), 0)
-    unworn = [_middle(surfaces[_jumps(file, interface)[0]][f"body_{b}"][()], 0) for b in BODIES]
+    unworn = _middle_heights(surfaces[_jumps(file, interface)[0]])
     chosen = _spread(_jumps(file, interface), MAX_PROFILES)
     for number, jump in enumerate(chosen):
         colour = colormaps[CYCLE_COLOURS](0.9 * number / max(len(chosen) - 1, 1))
-        worn = [_middle(surfaces[jump][f"body_{body}"][()], 0) for body in BODIES]
+        worn = _middle_heights(surfaces[jump])
         for height, label in zip(worn, (_cycles(file, interface, jump), None), strict=True):
-            heights.plot(x, 1e3 * height, color=colour, label=label)
-        depth = sum(np.abs(w - u) for w, u in zip(worn, unworn, strict=True))
-        depths.plot(x, 1e3 * depth, color=colour)
+            heights.plot(x, height, color=colour, label=label)
+        depth = np.abs(worn - unworn).sum(axis=0)
+        depths.plot(x, depth, color=colour)
+    return float(depth.max())
+
+
+def _middle_heights(surfaces: h5py.Group) -> Array:
+    """Heights of both bodies along x at y = 0, ``(2, nx)`` [µm]."""
+    return 1e3 * np.stack([_middle(surfaces[f"body_{body}"][()], 0) for body in BODIES])
 
 
 def _spread(items: list[str], count: int) -> list[str]:
@@ -354,21 +370,12 @@ def _spread(items: list[str], count: int) -> list[str]:
     return [items[round(place)] for place in places]
 
 
-def _deepest(file: h5py.File) -> str:
-    """Depth of both bodies together, at the deepest cell of each flank."""
-    texts = []
-    for name, surfaces in file["surfaces"].items():
-        first, last = (surfaces[jump] for jump in (_jumps(file, name)[0], _jumps(file, name)[-1]))
-        both = sum(np.abs(last[f"body_{b}"][()] - first[f"body_{b}"][()]) for b in BODIES)
-        texts.append(f"{name} {1e3 * np.max(both):.3g} µm")
-    return ", ".join(texts) + " at the deepest cell"
-
-
 def kinetics(file: h5py.File) -> Figure:
     """Largest depth and volume over the cycles, with the linear regime and its extrapolation."""
     interfaces = [name for name in file["kinetics"] if name != "cycles"]
     cycles = file["kinetics/cycles"][()]
-    title = f"Wear over {cycles[-1]:,.0f} cycles, extrapolated to {EXTRAPOLATION * cycles[-1]:,.0f}"
+    totals = (f"{name} {_worn_volume(file, name):.3g} mm³" for name in interfaces)
+    title = f"Worn off in {cycles[-1]:,.0f} cycles: {', '.join(totals)}"
     figure = _figure(title, 9.0)
     axes = figure.subplots(2, len(interfaces), sharex=True, sharey="row", squeeze=False)
     for column, interface in zip(axes.T, interfaces, strict=True):
@@ -376,17 +383,17 @@ def kinetics(file: h5py.File) -> Figure:
         _draw_kinetics(column[0], cycles, group, "depth", 1e3)
         _draw_kinetics(column[1], cycles, group, "volume", 1.0)
         column[0].set_title(f"{interface}: largest depth, {_regime(group, cycles)}")
-        rate = 1e6 * float(group.attrs["volume_rate"])
-        column[1].set_title(f"{interface}: volume, {rate:.3g} mm³ per million cycles at the end")
+        column[1].set_title(f"{interface}: volume, {_rate(group)}")
         column[1].set_xlabel("cycles")
         column[1].xaxis.set_major_formatter("{x:,.0f}")
         column[1].locator_params(axis="x", nbins=5)
     axes[0, 0].set_ylabel("largest depth [µm]")
     axes[1, 0].set_ylabel("volume [mm³]")
-    # Not every interface need have a linear regime: the legend takes each name where it is found.
-    named = {
-        name: h for a in axes[0] for h, name in zip(*a.get_legend_handles_labels(), strict=True)
-    }
+    # Not every panel has a linear regime: the legend takes each name where it is found.
+    named: dict[str, Any] = {}
+    for axis in axes.flat:
+        handles, names = axis.get_legend_handles_labels()
+        named |= dict(zip(names, handles, strict=True))
     figure.legend(named.values(), named.keys(), loc="outside lower center", ncols=len(named))
     return figure
 
@@ -403,44 +410,73 @@ def _draw_kinetics(
         axis.plot(cycles, worn[body], marker, color=colour, mfc=fill, ms=size, label=name)
     total = np.sum(list(worn.values()), axis=0)
     axis.plot(cycles, total, "-", color=BLACK, label="both")
-    beyond = cycles[-1] * np.array([1.0, EXTRAPOLATION])
     rate = scale * float(group.attrs[f"{quantity}_rate"])
-    line = total[-1] + rate * (beyond - cycles[-1])
-    axis.plot(beyond, line, "--", color=BLACK, label="both, extrapolated (not computed)")
+    if np.isfinite(rate):
+        beyond = cycles[-1] * np.array([1.0, EXTRAPOLATION])
+        line = total[-1] + rate * (beyond - cycles[-1])
+        axis.plot(beyond, line, "--", color=BLACK, label="both, extrapolated (not computed)")
     linear_from = float(group.attrs["linear_from"])
     if np.isfinite(linear_from):
         axis.axvspan(linear_from, cycles[-1], color=GREEN, alpha=0.15, lw=0, label="linear regime")
 
 
+def _worn_volume(file: h5py.File, interface: str) -> float:
+    """Volume worn off both bodies in the end [mm³]."""
+    group = file["kinetics"][interface]
+    return float(sum(group[f"volume_{body}"][-1] for body in BODIES))
+
+
+def _rate(group: h5py.Group) -> str:
+    """Volume rate of the linear regime, for a title."""
+    rate = float(group.attrs["volume_rate"])
+    if not np.isfinite(rate):
+        return "no linear regime, no extrapolation"
+    return f"{1e6 * rate:.3g} mm³ per million cycles at the end"
+
+
 def _regime(group: h5py.Group, cycles: Array) -> str:
     """From when wear is linear, for a title."""
     linear_from = float(group.attrs["linear_from"])
-    if not np.isfinite(linear_from):
-        return f"not yet linear at {cycles[-1]:,.0f}"
-    return f"linear from {linear_from:,.0f} cycles"
+    if np.isfinite(linear_from):
+        return f"linear from {linear_from:,.0f} cycles"
+    if np.isfinite(float(group.attrs["depth_rate"])):
+        return "linear at the end"
+    return f"not yet linear at {cycles[-1]:,.0f}"
 
 
 # --- structure ----------------------------------------------------------------------------------
 
 
 def structure_stress(file: h5py.File) -> Figure:
-    """Von Mises stress in the middle of the slot, around the flanks, unworn beside worn."""
-    states = [s for s in ("unworn", "worn") if all(s in body for body in file["bodies"].values())]
-    sections = {state: _sections(file, state) for state in states}
-    inside = {state: _largest_near_flanks(file, sections[state]) for state in states}
-    texts = (f"{peak:.0f} MPa {state}" for state, peak in inside.items())
-    figure = _figure(f"Stress in mid-slot at peak load: largest {', '.join(texts)}", 6.0)
-    axes = figure.subplots(1, len(states), sharex=True, sharey=True, squeeze=False)[0]
-    top = max(inside.values())
-    for axis, state in zip(axes, states, strict=True):
-        for section in sections[state]:
-            filled = _draw_section(axis, section, top)
+    """Von Mises stress in mid-slot around the flanks: unworn, worn and what wear changed."""
+    panels = {state: _sections(file, state) for state in _states(file)}
+    ranges = {state: _range_in_view(file, sections) for state, sections in panels.items()}
+    top = max(ranges[state][1] for state in panels if state != CHANGE)
+    texts = (f"{ranges[state][1]:.0f} MPa {state}" for state in panels if state != CHANGE)
+    title = f"Von Mises stress in mid-slot at peak load: at most {', '.join(texts)}"
+    figure = _figure(title, 1.0 + 4.2 * len(panels))
+    axes = figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    for axis, (state, sections) in zip(axes, panels.items(), strict=True):
+        low, high = ranges[state]
+        scale = max(-low, high) if state == CHANGE else top
+        colours = _draw_sections(axis, sections, scale, signed=state == CHANGE)
         _zoom(axis, file)
-        axis.set_title(f"{state}: largest {inside[state]:.0f} MPa in view")
-        axis.set_xlabel(f"{'XYZ'[_plane(file)[1]]} [mm]")
-    axes[0].set_ylabel(f"{'XYZ'[_plane(file)[2]]} [mm]")
-    figure.colorbar(filled, ax=axes, label="von Mises stress [MPa]", pad=0.01)
+        axis.set_title(f"{state}: {low:+.0f} to {high:+.0f} MPa" if state == CHANGE else state)
+        axis.set_ylabel(f"{'XYZ'[_plane(file)[2]]} [mm]")
+        figure.colorbar(colours, ax=axis, label="[MPa]", pad=0.01)
+    axes[-1].set_xlabel(f"{'XYZ'[_plane(file)[1]]} [mm]")
     return figure
+
+
+def _states(file: h5py.File) -> list[str]:
+    """What there is to show; a change needs both states on one mesh."""
+    bodies = list(file["bodies"].values())
+    states = [state for state in ("unworn", "worn") if all(state in body for body in bodies)]
+    if len(states) == 2 and all(
+        np.array_equal(body["unworn/tets"], body["worn/tets"]) for body in bodies
+    ):
+        states.append(CHANGE)
+    return states
 
 
 def _plane(file: h5py.File) -> tuple[int, int, int]:
@@ -453,46 +489,54 @@ def _plane(file: h5py.File) -> tuple[int, int, int]:
 
 def _sections(file: h5py.File, state: str) -> list[_Section]:
     """Cuts of the bodies through the middle of the slot."""
+    cuts = []
+    for body in file["bodies"].values():
+        if state == CHANGE:
+            change = body["worn/von_mises"][()] - body["unworn/von_mises"][()]
+            cuts.append(_cut(file, body["unworn"], change))
+        else:
+            cuts.append(_cut(file, body[state], body[state]["von_mises"][()]))
+    return cuts
+
+
+def _cut(file: h5py.File, body: h5py.Group, stress: Array) -> _Section:
+    """One body and a nodal stress cut by the plane across the slot."""
     import pyvista
 
-    _, right, top = _plane(file)
+    shown = list(_plane(file)[1:])
     flank = next(iter(file["grid"].values())).attrs
-    sections = []
-    for body in file["bodies"].values():
-        cells = {pyvista.CellType.TETRA: body[state]["tets"][()]}
-        mesh = pyvista.UnstructuredGrid(cells, body[state]["points"][()])
-        mesh.point_data["stress"] = body[state]["von_mises"][()]
-        cut = mesh.slice(normal=flank["axes"][1], origin=flank["origin"]).triangulate()
-        if cut.n_points:
-            border = cut.extract_feature_edges(
-                feature_edges=False, non_manifold_edges=False, manifold_edges=False
-            )
-            sections.append(
-                _Section(
-                    points=cut.points[:, [right, top]],
-                    triangles=cut.regular_faces,
-                    stress=cut["stress"],
-                    outline=border.points[border.lines.reshape(-1, 3)[:, 1:]][..., [right, top]],
-                )
-            )
-    return sections
+    mesh = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: body["tets"][()]}, body["points"][()])
+    mesh.point_data["stress"] = stress
+    cut = mesh.slice(normal=flank["axes"][1], origin=flank["origin"]).triangulate()
+    border = cut.extract_feature_edges(
+        feature_edges=False, non_manifold_edges=False, manifold_edges=False
+    )
+    return _Section(
+        points=cut.points[:, shown],
+        triangles=cut.regular_faces,
+        stress=cut["stress"],
+        outline=border.points[border.lines.reshape(-1, 3)[:, 1:]][..., shown],
+    )
 
 
-def _draw_section(axis: Axes, section: _Section, top: float) -> Any:
+def _draw_sections(axis: Axes, sections: list[_Section], top: float, signed: bool) -> Any:
+    """Colours and outlines of the bodies; returns the colours."""
     from matplotlib.collections import LineCollection
     from matplotlib.tri import Triangulation
 
     axis.set_aspect("equal")
     axis.grid(visible=False)
-    axis.add_collection(LineCollection(list(section.outline), colors=BLACK, linewidths=0.8))
-    return axis.tripcolor(
-        Triangulation(section.points[:, 0], section.points[:, 1], section.triangles),
-        section.stress,
-        shading="gouraud",
-        cmap="magma_r",
-        vmin=0.0,
-        vmax=top,
-    )
+    for section in sections:
+        axis.add_collection(LineCollection(list(section.outline), colors=BLACK, linewidths=0.8))
+        colours = axis.tripcolor(
+            Triangulation(section.points[:, 0], section.points[:, 1], section.triangles),
+            section.stress,
+            shading="gouraud",
+            cmap=CHANGE_COLOURS if signed else STRESS_COLOURS,
+            vmin=-top if signed else 0.0,
+            vmax=top,
+        )
+    return colours
 
 
 def _window(file: h5py.File) -> tuple[Array, Array]:
@@ -504,18 +548,16 @@ def _window(file: h5py.File) -> tuple[Array, Array]:
     return low - margin, high + margin
 
 
-def _largest_near_flanks(file: h5py.File, sections: list[_Section]) -> float:
-    """Largest stress in view [MPa]."""
+def _range_in_view(file: h5py.File, sections: list[_Section]) -> tuple[float, float]:
+    """Smallest and largest stress in view [MPa]."""
     low, high = _window(file)
-    largest = 0.0
-    for section in sections:
-        inside = np.all((section.points >= low) & (section.points <= high), axis=1)
-        largest = max(largest, np.max(section.stress[inside], initial=0.0))
-    return largest
+    seen = [s.stress[np.all((s.points >= low) & (s.points <= high), axis=1)] for s in sections]
+    every = np.concatenate(seen)
+    return float(every.min()), float(every.max())
 
 
 def _zoom(axis: Axes, file: h5py.File) -> None:
-    """Show the surroundings of the flanks; arrows would hide what happens on them."""
+    """Show the surroundings of the flanks, where wear makes the difference."""
     low, high = _window(file)
     axis.set_xlim(low[0], high[0])
     axis.set_ylim(low[1], high[1])

@@ -18,10 +18,9 @@ from fe_models.stress import StressField
 from fe_models.structure import CycleSolution
 from sa_solver.types import Array
 from wear.kinetics import LinearRegime, linear_regime
-from wear.stepping import CycleResult
 from workflow.case import Case, dump_case
 from workflow.checkpoint import KINETICS, RunState
-from workflow.contact_stage import ContactStage
+from workflow.contact_stage import ContactStage, FirstContact
 from workflow.folder import OutputFolder
 from workflow.reporter import Reporter
 from workflow.store import ResultsWriter, read_arrays, replacing
@@ -47,7 +46,7 @@ class Outcome:
     state: RunState
     unworn: CycleSolution
     worn: CycleSolution
-    first: list[CycleResult]
+    first: list[FirstContact]
     depths: list[tuple[Array, Array]]
 
 
@@ -80,11 +79,11 @@ def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> 
 
         with reporter.stage("figures"):
             write_figures(folder.results, folder.figures)
-    summary = _summary(outcome, mesh, stresses, reporter)
+    summary = _summary(outcome, mesh, stresses, _peak_pressures(outcome, folder), reporter)
     with replacing(folder.summary) as partial:
         partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     shutil.rmtree(folder.jumps)
-    _say(summary, reporter)
+    _say(outcome, summary, reporter)
 
 
 def _regimes(outcome: Outcome) -> dict[str, dict[str, LinearRegime | None]]:
@@ -165,8 +164,25 @@ def _write_kinetics(writer: ResultsWriter, outcome: Outcome) -> None:
         )
 
 
+def _peak_pressures(outcome: Outcome, folder: OutputFolder) -> dict[str, dict[str, float]]:
+    """Largest pressure at peak load before the first and after the last jump, by interface."""
+    jumps = {"unworn": 0, "worn": outcome.state.jump}
+    with h5py.File(folder.results, "r") as file:
+        return {
+            stage.name: {
+                moment: float(file[f"contact/{stage.name}/{jump:05d}/pressure"][()].max())
+                for moment, jump in jumps.items()
+            }
+            for stage in outcome.stages
+        }
+
+
 def _summary(
-    outcome: Outcome, mesh: StructureMesh, stresses: dict[str, Stress], reporter: Reporter
+    outcome: Outcome,
+    mesh: StructureMesh,
+    stresses: dict[str, Stress],
+    pressures: dict[str, dict[str, float]],
+    reporter: Reporter,
 ) -> dict[str, Any]:
     state, structure = outcome.state, outcome.structure
     return {
@@ -176,7 +192,7 @@ def _summary(
         "jumps": state.jump,
         "structure": {
             "from_cache": structure.from_cache,
-            "nodes": {b.name: b.mesh.nvertices for b in (mesh.body_1, mesh.body_2)},
+            "nodes": {b.name: int(b.mesh.nvertices) for b in (mesh.body_1, mesh.body_2)},
             "rigid_modes": structure.rigid_modes,
             "solutions": state.solutions,
             "iterations": outcome.unworn.iterations,
@@ -197,6 +213,7 @@ def _summary(
         },
         **{
             stage.name: _interface_summary(outcome, number, mesh)
+            | {"peak_pressure": pressures[stage.name]}
             for number, stage in enumerate(outcome.stages)
         },
         "kinetics": {
@@ -222,7 +239,6 @@ def _interface_summary(outcome: Outcome, number: int, mesh: StructureMesh) -> di
         (structure.mesh.body_2, mesh.body_2),
     )
     last = dict(zip(KINETICS, outcome.state.kinetics[-1, number].tolist(), strict=True))
-    loaded = [s for s in first.states.values()]
     return {
         **last,
         "mesh_volume_1": worn_volume(*bodies[0], stage.interface, 1),
@@ -234,15 +250,11 @@ def _interface_summary(outcome: Outcome, number: int, mesh: StructureMesh) -> di
         "slip_per_cycle": float(
             np.hypot(*np.moveaxis(outcome.unworn.histories[number].slip, 1, 0)).sum(axis=0).max()
         ),
-        "peak_pressure": {
-            "unworn": float(first.states[peak].pressure.max()) if peak in first.states else 0.0,
-            "worn": float(stage.peak_fields(own, peak)[0]["pressure"].max()),
-        },
         "energy_per_cycle": {
             "half_space": float(first.energy.sum()),
             "structure": float((unworn.Edx + unworn.Edy).sum()),
         },
-        "contact_residual": max((s.residuals.largest for s in loaded), default=0.0),
+        "contact_residual": first.largest_residual,
         "convolutions": first.convolutions,
         "linear_regime": {
             name: None if regime is None else vars(regime)
@@ -255,17 +267,16 @@ def _versions() -> dict[str, str]:
     return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
 
 
-def _say(summary: dict[str, Any], reporter: Reporter) -> None:
+def _say(outcome: Outcome, summary: dict[str, Any], reporter: Reporter) -> None:
     """The end of the run in a few lines."""
     reporter.say(f"{summary['cycles']:.6g} cycles in {summary['jumps']} jumps")
-    for name in (
-        key for key, value in summary.items() if isinstance(value, dict) and "depth_1" in value
-    ):
-        own = summary[name]
+    for stage in outcome.stages:
+        own = summary[stage.name]
         peaks = own["peak_pressure"]
         reporter.say(
-            f"  {name}: worn {own['depth_1'] * 1e3:.3g} um (disk) and {own['depth_2'] * 1e3:.3g} um "
-            f"(blade), {own['volume_1']:.3g} and {own['volume_2']:.3g} mm^3; peak pressure "
-            f"{peaks['unworn']:.0f} -> {peaks['worn']:.0f} MPa"
+            f"  {stage.name}: worn {own['depth_1'] * 1e3:.3g} um (disk), "
+            f"{own['depth_2'] * 1e3:.3g} um (blade); {own['volume_1']:.3g}, "
+            f"{own['volume_2']:.3g} mm^3; peak pressure {peaks['unworn']:.0f} -> "
+            f"{peaks['worn']:.0f} MPa"
         )
     reporter.say(f"  seconds: {', '.join(f'{k} {v:.1f}' for k, v in summary['seconds'].items())}")

@@ -32,8 +32,6 @@ if TYPE_CHECKING:
 # Names of body 1 and body 2 (sa_solver.types), for files that a user opens one by one.
 BODY_NAMES = {1: "disk", 2: "blade"}
 UNWORN = "00000"
-# Sides may differ from the FE face by rounding only; a cell's centre is half a pitch inside.
-FACE_TOLERANCE = 1e-9
 
 Fields = dict[str, tuple[Array, str]]
 Step = tuple[float, str, Path]
@@ -160,7 +158,7 @@ def _flank_window(file: h5py.File, interface: str, grid: Grid) -> tuple[slice, s
     face = file.get(f"structure/{interface}/coordinates")
     if face is None:
         return slice(None), slice(None)
-    low, high = np.min(face, axis=0) - FACE_TOLERANCE, np.max(face, axis=0) + FACE_TOLERANCE
+    low, high = np.min(face, axis=0), np.max(face, axis=0)
     inside_x = np.flatnonzero((grid.x.ravel() >= low[0]) & (grid.x.ravel() <= high[0]))
     inside_y = np.flatnonzero((grid.y.ravel() >= low[1]) & (grid.y.ravel() <= high[1]))
     return slice(inside_x[0], inside_x[-1] + 1), slice(inside_y[0], inside_y[-1] + 1)
@@ -179,7 +177,9 @@ def _triangles(nx: int, ny: int) -> np.ndarray:
 
 def _write_structure(file: h5py.File, folder: Path) -> list[Path]:
     """All bodies at peak load, unworn and (where there is one) worn."""
-    times = {"unworn": 0.0, "worn": float(file["kinetics/cycles"][-1])}
+    times = {"unworn": 0.0}
+    if "kinetics" in file:
+        times["worn"] = float(file["kinetics/cycles"][-1])
     steps: list[Step] = []
     for state, time in times.items():
         for body, states in file["bodies"].items():

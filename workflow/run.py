@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
-from fe_models.mesh import MeshError
+from fe_models.mesh import Interface, MeshError
 from fe_models.structure import CycleSolution
 from sa_solver.normal import NormalContactError
 from sa_solver.types import Array
-from wear.stepping import ContactFailure, CycleResult
+from wear.stepping import ContactFailure
 from workflow import checkpoint
 from workflow.case import Case
 from workflow.checkpoint import KINETICS, RunState
-from workflow.contact_stage import ContactStage, InterfaceState
+from workflow.contact_stage import ContactStage, FirstContact, InterfaceState, StageSettings
 from workflow.errors import MethodFailed, UserError
 from workflow.folder import OutputFolder
 from workflow.memory import check_memory
@@ -25,6 +25,7 @@ from workflow.reporter import Reporter
 from workflow.store import write_arrays
 from workflow.structure_stage import SIDES, StructureStage
 from workflow.warnings import warn_of_contact, warn_of_structure
+from workflow.workers import Workers, contact_workers
 
 
 def run_case(case: Case, out: Path, force: bool) -> None:
@@ -70,46 +71,43 @@ class WearRun:
         self._reporter.say(f"{'resume' if resume else 'run'}: {self._case.title}")
         with self._reporter.stage("mesh"):
             mesh = self._structure.mesh
-        with self._reporter.stage("condensation"):
-            _ = self._structure.joint
-        with self._reporter.stage("structural friction"):
-            unworn = self._structure.cycle([np.zeros(len(i)) for i in mesh.interfaces])
-        warn_of_structure(self._case, self._structure, unworn, self._reporter)
-        with self._reporter.stage("contact set-up"):
-            stages = self._contact_stages()
-        with ThreadPoolExecutor(len(stages)) as pool:
-            loop = WearLoop(self._case, self._folder, self._reporter, self._structure, stages, pool)
+        settings = [self._stage_settings(interface) for interface in mesh.interfaces]
+        with contact_workers(settings) as workers:
+            with self._reporter.stage("condensation"):
+                self._structure.prepare()
+            unworn = self._solve_structure([np.zeros(len(i)) for i in mesh.interfaces])
+            warn_of_structure(self._case, self._structure, unworn, self._reporter)
+            with self._reporter.stage("contact set-up"):
+                stages = [ContactStage(own) for own in settings]
+            loop = WearLoop(
+                self._case, self._folder, self._reporter, self._structure, stages, workers
+            )
+            state, first = loop.begin(unworn)
+            warn_of_contact(self._case, self._structure, stages, state, first, self._reporter)
             if resume and self._folder.checkpoint.exists():
                 state = checkpoint.load(self._folder.checkpoint)
-                first = loop.unworn_cycles(unworn)
             else:
-                state, first = loop.begin(unworn)
-            warn_of_contact(self._case, self._structure, stages, state, first, self._reporter)
-            state = loop.advance(state)
-        depths = [
-            stage.nodal_depths(own) for stage, own in zip(stages, state.interfaces, strict=True)
-        ]
-        with self._reporter.stage("structural friction"):
-            worn = self._structure.cycle([one + two for one, two in depths])
+                loop.keep(state)
+            state = loop.advance(state, unworn)
+        pairs = zip(stages, state.interfaces, strict=True)
+        depths = [stage.nodal_depths(own) for stage, own in pairs]
+        worn = self._solve_structure([one + two for one, two in depths], unworn)
         write_output(
             Outcome(self._case, self._structure, stages, state, unworn, worn, first, depths),
             self._folder,
             self._reporter,
         )
 
-    def _contact_stages(self) -> list[ContactStage]:
-        stages = []
-        for interface in self._structure.interfaces:
-            side = SIDES[interface.name]
-            dovetail = self._structure.dovetail
-            stage = ContactStage(
-                self._case,
-                interface,
-                dovetail.flank_size(side),
-                lambda grid, side=side: dovetail.flank_gap(grid.x, grid.y, side),
-            )
-            stages.append(stage)
-        return stages
+    def _solve_structure(
+        self, depths: list[Array], guess: CycleSolution | None = None
+    ) -> CycleSolution:
+        with self._reporter.stage("structural friction"):
+            return self._structure.cycle(depths, guess)
+
+    def _stage_settings(self, interface: Interface) -> StageSettings:
+        dovetail, side = self._structure.dovetail, SIDES[interface.name]
+        gap = partial(dovetail.flank_gap, side=side)
+        return StageSettings(self._case, interface, dovetail.flank_size(side), gap)
 
 
 class WearLoop:
@@ -122,63 +120,54 @@ class WearLoop:
         reporter: Reporter,
         structure: StructureStage,
         stages: list[ContactStage],
-        pool: ThreadPoolExecutor,
+        workers: Workers,
     ) -> None:
         self._case = case
         self._folder = folder
         self._reporter = reporter
         self._structure = structure
         self._stages = stages
-        self._pool = pool
+        self._workers = workers
 
-    def begin(self, unworn: CycleSolution) -> tuple[RunState, list[CycleResult]]:
+    def begin(self, unworn: CycleSolution) -> tuple[RunState, list[FirstContact]]:
         """State before the first jump, and the contact of the first cycle."""
         with self._reporter.stage("contact, first cycle"):
-            begun = list(self._pool.map(ContactStage.begin, self._stages, unworn.histories))
+            begun = self._workers.call("begin", unworn.histories)
+        interfaces = tuple(own for own, _ in begun)
         count = len(self._stages)
         state = RunState(
-            interfaces=tuple(own for own, _ in begun),
+            interfaces=interfaces,
             cycles=np.empty(0),
             kinetics=np.empty((0, count, len(KINETICS))),
             drift=np.empty(0),
-            solved_resultants=self._probe(tuple(own for own, _ in begun)),
+            solved_resultants=self._probe(interfaces),
             solutions=1,
-        ).record(0.0, self._areas, 0.0)
-        self._keep(state)
-        return state, [result for _, result in begun]
+        )
+        return state.record(0.0, self._areas, 0.0), [first for _, first in begun]
 
-    def unworn_cycles(self, unworn: CycleSolution) -> list[CycleResult]:
-        """Contact of the first cycle alone, for a run that goes on from a checkpoint."""
-        with self._reporter.stage("contact, first cycle"):
-            begun = self._pool.map(ContactStage.begin, self._stages, unworn.histories)
-            return [result for _, result in begun]
-
-    def advance(self, state: RunState) -> RunState:
+    def advance(self, state: RunState, unworn: CycleSolution) -> RunState:
         """Jump until the cycles are over or a stop is reached."""
         total = self._case.wear.cycles
         with self._reporter.jumps(total, float(state.cycles[-1])) as progress:
             while not self._ended(state):
-                state = self._jump(state)
+                state = self._jump(state, unworn)
                 progress.update(float(state.cycles[-1]), state.jump)
         return state
 
-    def _jump(self, state: RunState) -> RunState:
+    def _jump(self, state: RunState, unworn: CycleSolution) -> RunState:
         cycles = self._jump_cycles(state)
         with self._reporter.stage("wear"):
-            jumped = self._pool.map(
-                lambda stage, own: stage.jump(own, cycles), self._stages, state.interfaces
-            )
-            interfaces, results = zip(*jumped, strict=True)
-        state = replace(state, interfaces=interfaces)
-        state, drift = self._follow_drift(state)
+            jumped = self._workers.call("jump", state.interfaces, [cycles] * len(self._stages))
+        state = replace(state, interfaces=tuple(own for own, _ in jumped))
+        state, drift = self._follow_drift(state, unworn)
         state = state.record(float(state.cycles[-1]) + cycles, self._areas, drift)
-        convolutions = sum(result.convolutions for result in results)
+        convolutions = sum(spent for _, spent in jumped)
         self._reporter.log(
             f"jump {state.jump}: {state.cycles[-1]:.6g} cycles, depths "
             f"{np.array2string(state.kinetics[-1, :, :2] * 1e3, precision=3)} um, "
             f"{convolutions} convolutions, drift {drift:.2%}"
         )
-        self._keep(state)
+        self.keep(state)
         return state
 
     def _jump_cycles(self, state: RunState) -> float:
@@ -214,7 +203,7 @@ class WearLoop:
             or (wear.stop.volume is not None and volume >= wear.stop.volume)
         )
 
-    def _follow_drift(self, state: RunState) -> tuple[RunState, float]:
+    def _follow_drift(self, state: RunState, unworn: CycleSolution) -> tuple[RunState, float]:
         """Solve the structure again where its resultants have drifted too far."""
         if self._case.coupling.resultants == "constant":
             return state, 0.0
@@ -227,7 +216,7 @@ class WearLoop:
         if drift <= self._case.coupling.drift:
             return state, drift
         with self._reporter.stage("structural friction"):
-            solution = self._structure.cycle(self._total_depths(state.interfaces))
+            solution = self._structure.cycle(self._total_depths(state.interfaces), unworn)
         self._reporter.log(f"drift {drift:.2%}: resultants computed again")
         reloaded = map(ContactStage.reload, self._stages, state.interfaces, solution.histories)
         return replace(
@@ -248,20 +237,16 @@ class WearLoop:
     def _areas(self) -> list[float]:
         return [stage.grid.cell_area for stage in self._stages]
 
-    def _keep(self, state: RunState) -> None:
+    def keep(self, state: RunState) -> None:
         """Write the fields of this jump, then the state that the next one starts from."""
         with self._reporter.stage("checkpoints"):
-            peak = self._structure.peak
-            recorded = self._pool.map(
-                lambda stage, own: stage.peak_fields(own, peak), self._stages, state.interfaces
-            )
-            arrays = {}
-            for stage, own, (fields, _) in zip(
-                self._stages, state.interfaces, recorded, strict=True
-            ):
+            peaks = [self._structure.peak] * len(self._stages)
+            recorded = self._workers.call("peak_fields", state.interfaces, peaks)
+            arrays: dict[str, Array] = {}
+            for stage, own, fields in zip(self._stages, state.interfaces, recorded, strict=True):
                 body_1, body_2 = own.surfaces.heights
-                arrays |= {f"surfaces/{stage.name}/body_1": body_1}
-                arrays |= {f"surfaces/{stage.name}/body_2": body_2}
+                arrays[f"surfaces/{stage.name}/body_1"] = body_1
+                arrays[f"surfaces/{stage.name}/body_2"] = body_2
                 arrays |= {f"contact/{stage.name}/{name}": field for name, field in fields.items()}
             attributes = {"cycles": float(state.cycles[-1])}
             write_arrays(self._folder.jump(state.jump), arrays, attributes)

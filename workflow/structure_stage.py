@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from fe_models.dovetail import Mission, dovetail_structure
-from fe_models.friction import FrictionalJoint, FrictionState
+from fe_models.friction import FrictionalJoint
 from fe_models.geometry.dovetail import Dovetail
 from fe_models.mesh import Interface, StructureMesh
-from fe_models.reduction import JointStiffness
 from fe_models.stress import StressField, stress_state
 from fe_models.structure import CycleSolution, Structure
 from sa_solver.types import Array
@@ -31,13 +29,12 @@ class StructureStage:
         parameters = case.structure.model_dump(exclude={"kind"})
         self.dovetail = Dovetail(**parameters)
         self.mission = Mission(**case.load_path.model_dump())
-        self._mesh_settings = tuple(case.mesh.flank_nodes), case.mesh.size
         self.from_cache = False
 
     @cached_property
     def mesh(self) -> StructureMesh:
         """The unworn mesh."""
-        return self.dovetail.mesh(*self._mesh_settings)
+        return self.dovetail.mesh(self._case.mesh.flank_nodes, self._case.mesh.size)
 
     @property
     def interfaces(self) -> tuple[Interface, ...]:
@@ -53,11 +50,10 @@ class StructureStage:
         """The condensed joint, from the cache when it is there."""
         key = content_key(
             self.dovetail,
-            self._mesh_settings,
+            self._case.mesh,
             self._case.materials,
             self.mission.airfoil_mass,
             self.mission.airfoil_radius,
-            self._case.mesh.order,
         )
         stiffness = load_joint(key)
         self.from_cache = stiffness is not None
@@ -76,13 +72,21 @@ class StructureStage:
         """Whether friction alone can hold the blade in the slot."""
         return self._case.friction.coefficient > np.tan(self.dovetail.flank_angle)
 
-    def cycle(self, depths: list[Array]) -> CycleSolution:
-        """The closed mission cycle with the gaps widened by the worn depth of both bodies."""
+    def prepare(self) -> None:
+        """Do the costly part now: condense the structure, or find it in the cache."""
+        _ = self.joint
+
+    def cycle(self, depths: list[Array], guess: CycleSolution | None = None) -> CycleSolution:
+        """The closed mission cycle with the gaps widened by the worn depth of both bodies.
+
+        ``guess`` is a similar cycle, to save iterations.
+        """
         solution = self.structure.solve_cycle(
             self.joint,
             self.mission.amplitudes(),
             self._gap(depths),
             self._case.friction.coefficient,
+            guess=() if guess is None else guess.states,
         )
         if not solution.converged:
             raise MethodFailed(

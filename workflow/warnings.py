@@ -6,10 +6,9 @@ import numpy as np
 
 from fe_models.structure import CycleSolution
 from sa_solver.reference.flat_rounded import FlatRounded
-from wear.stepping import CycleResult
 from workflow.case import Case
 from workflow.checkpoint import RunState
-from workflow.contact_stage import ContactStage
+from workflow.contact_stage import ContactStage, FirstContact
 from workflow.reporter import Reporter
 from workflow.structure_stage import StructureStage
 
@@ -44,7 +43,7 @@ def warn_of_contact(
     structure: StructureStage,
     stages: list[ContactStage],
     state: RunState,
-    first: list[CycleResult],
+    first: list[FirstContact],
     reporter: Reporter,
 ) -> None:
     """Pressures above yield, contacts at the border, edge peaks the grid cannot show."""
@@ -52,13 +51,13 @@ def warn_of_contact(
         m.elastic().yield_stress for m in (case.materials.blade, case.materials.disk)
     )
     for stage, own, result in zip(stages, state.interfaces, first, strict=True):
-        highest = max((float(s.pressure.max()) for s in result.states.values()), default=0.0)
+        highest = result.highest_pressure
         if highest > yield_stress:
             reporter.warn(
                 f"{stage.name}: the pressure reaches {highest:.0f} MPa, above the yield stress of "
                 f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there"
             )
-        if any(s.touches_border for s in result.states.values()):
+        if result.touches_border:
             reporter.warn(
                 f"{stage.name}: the contact touches the border of its grid: widen "
                 "structure.edge_width or structure.end_width"

@@ -107,7 +107,9 @@ def put_kinetics(file: h5py.File, name: str, grid: Grid) -> None:
     for quantity in ("depth", "volume"):
         both = group[f"{quantity}_1"][()] + group[f"{quantity}_2"][()]
         group.attrs[f"{quantity}_rate"] = (both[-1] - both[-2]) / (JUMPS[-1] - JUMPS[-2])
-    group.attrs["linear_from"] = 4e4 if name == "intrados" else np.nan
+    group.attrs["linear_from"] = 4e4
+    if name == "extrados":  # its depth has not become linear
+        group.attrs["depth_rate"] = group.attrs["linear_from"] = np.nan
 
 
 def put_bodies(file: h5py.File) -> None:

@@ -1,0 +1,202 @@
+"""Figures: all there, legible in size, not blank, and true to the data where they show numbers."""
+
+import runpy
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from workflow import figures
+from workflow.figures import write_figures
+
+NAMES = {
+    "resultants",
+    "pressure_maps",
+    "pressure_profiles",
+    "worn_profiles",
+    "kinetics",
+    "structure_stress",
+}
+# The one maker of synthetic results; test modules cannot import one another.
+SYNTHETIC = runpy.run_path(str(Path(__file__).with_name("test_paraview.py")))
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path: Path = SYNTHETIC["fabricate"](tmp_path_factory.mktemp("run") / "results.h5")
+    return path
+
+
+@pytest.fixture(scope="module")
+def written(results: Path) -> list[Path]:
+    return write_figures(results, results.parent / "figures")
+
+
+@pytest.fixture
+def changed(results: Path, tmp_path: Path) -> Path:
+    """A copy to take things out of."""
+    copy = tmp_path / "results.h5"
+    copy.write_bytes(results.read_bytes())
+    return copy
+
+
+def title(figure: Any) -> str:
+    return str(figure.get_suptitle())
+
+
+def test_every_figure_is_written(written: list[Path]) -> None:
+    assert {path.stem for path in written} == NAMES
+    assert sorted(written) == sorted(written[0].parent.iterdir())
+
+
+def test_figures_are_wide_and_not_blank(written: list[Path]) -> None:
+    from matplotlib.image import imread
+
+    for path in written:
+        assert path.read_bytes().startswith(b"\x89PNG")
+        image = imread(path)
+        assert 1000 <= image.shape[1] <= 1400, path
+        inked = np.any(image[..., :3] < 0.95, axis=-1)
+        assert inked.mean() > 0.02, path
+        # Something in every fifth of the image: no panel is missing or squeezed aside.
+        assert all(part.any() for part in np.array_split(inked, 5, axis=0)), path
+        assert all(part.any() for part in np.array_split(inked, 5, axis=1)), path
+
+
+def test_titles_fit_the_width(results: Path) -> None:
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    with h5py.File(results) as file, rc_context(figures.STYLE):
+        for draw, _ in figures.FIGURES.values():
+            figure = draw(file)
+            FigureCanvasAgg(figure).draw()
+            titles = [axis._left_title for axis in figure.axes] + [figure._suptitle]
+            for text in titles:
+                box = text.get_window_extent()
+                assert box.x0 >= 0, text.get_text()
+                assert box.x1 <= figure.bbox.x1, text.get_text()
+
+
+def test_resultants_stay_inside_the_axes_and_the_coulomb_limits(results: Path) -> None:
+    with h5py.File(results) as file:
+        figure = figures.resultants(file)
+        peak = max(group["load_history/P"][()].max() for group in file["structure"].values())
+        assert figure.axes[0].get_ylim()[1] >= peak / 1e3
+        assert "64%" in title(figure)  # 14 of 22 increments on either flank
+
+
+def test_pressure_maps_share_one_scale_and_name_the_peaks(results: Path) -> None:
+    with h5py.File(results) as file:
+        figure = figures.pressure_maps(file)
+        for name, contact in file["contact"].items():
+            first, last = contact["00000/pressure"][()].max(), contact["00006/pressure"][()].max()
+            assert f"{name} {first:.0f} → {last:.0f} MPa" in title(figure)
+    images = [image for axis in figure.axes for image in axis.images]
+    assert len(images) == 4
+    assert len({image.get_clim() for image in images}) == 1
+
+
+def test_pressure_map_puts_x_up_and_y_right(changed: Path) -> None:
+    with h5py.File(changed, "a") as file:
+        pressure = file["contact/extrados/00000/pressure"]
+        pressure[...] = 0.0
+        pressure[-1, 0] = 100.0  # largest x, smallest y
+        image = figures.pressure_maps(file).axes[0].images[0]
+    (row,), (column,) = np.nonzero(image.get_array().filled(0.0))
+    assert image.origin == "lower"
+    assert (row, column) == (image.get_array().shape[0] - 1, 0)
+
+
+def test_profiles_show_all_three_methods(results: Path) -> None:
+    with h5py.File(results) as file:
+        figure = figures.pressure_profiles(file)
+        lines = {line.get_label(): line for line in figure.axes[0].lines}
+        contact = file["contact/extrados"]
+        middle = contact["00000/pressure"][()][:, 20]
+        np.testing.assert_array_equal(lines["half-space 24 x 40, unworn"].get_ydata(), middle)
+        assert len(lines["half-space 20 x 34, unworn"].get_xdata()) == 20
+        # Two rows of 20 nodes lie next to y = 0.
+        assert len(lines["finite elements, unworn"].get_xdata()) == 40
+        peak = file["contact/intrados/00000/pressure"][()][:, 20].max()
+        assert f"intrados: {peak:.0f} MPa" in title(figure)
+
+
+def test_kinetics_mark_what_is_extrapolated(results: Path) -> None:
+    with h5py.File(results) as file:
+        figure = figures.kinetics(file)
+        rate = file["kinetics/intrados"].attrs["depth_rate"]
+    linear = figure.axes[1]
+    assert "linear from 40,000 cycles" in linear.get_title()
+    dashed = next(line for line in linear.lines if line.get_linestyle() == "--")
+    np.testing.assert_allclose(dashed.get_xdata(), [1e5, 2e5])
+    assert np.ptp(dashed.get_ydata()) == pytest.approx(1e3 * rate * 1e5)
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
+    assert "both, extrapolated (not computed)" in names
+    assert "linear regime" in names
+
+
+def test_kinetics_without_a_linear_regime_extrapolate_nothing(results: Path) -> None:
+    with h5py.File(results) as file:
+        axis = figures.kinetics(file).axes[0]
+    assert "not yet linear at 100,000" in axis.get_title()
+    assert all(line.get_linestyle() != "--" for line in axis.lines)
+
+
+def test_stress_section_cuts_every_body_in_mid_slot(changed: Path) -> None:
+    with h5py.File(changed, "a") as file:
+        for body in file["bodies"].values():
+            # Linear, so that the cut has it exactly; the part along the slot must vanish.
+            body["unworn/von_mises"][...] = body["unworn/points"][()] @ [2.0, 100.0, 3.0]
+        sections = figures._sections(file, "unworn")
+    assert sum(triangle_areas(section) for section in sections) == pytest.approx(2 * 50.0 * 60.0)
+    for section in sections:
+        np.testing.assert_allclose(section.stress, section.points @ [2.0, 3.0], rtol=1e-4)
+
+
+def test_change_of_stress_is_shown_where_the_meshes_agree(changed: Path) -> None:
+    with h5py.File(changed, "a") as file:
+        figure = figures.structure_stress(file)
+        panels = [axis.get_title() for axis in figure.axes if axis.get_title()]
+        assert panels[:2] == ["unworn", "worn"]
+        assert panels[2].startswith(figures.CHANGE)
+        # The synthetic stress falls by a tenth everywhere.
+        for before, change in zip(
+            figures._sections(file, "unworn"), figures._sections(file, figures.CHANGE), strict=True
+        ):
+            np.testing.assert_allclose(change.stress, -0.1 * before.stress, rtol=1e-4)
+        file["bodies/disk/worn/tets"][0] = file["bodies/disk/worn/tets"][1]
+        assert figures._states(file) == ["unworn", "worn"]
+
+
+def triangle_areas(section: Any) -> float:
+    a, b, c = np.moveaxis(section.points[section.triangles], 1, 0)
+    return float(0.5 * np.abs(np.linalg.det(np.stack([b - a, c - a], axis=-1))).sum())
+
+
+def test_ranges_of_increments() -> None:
+    assert figures._ranges([1, 2, 3, 7]) == "1–3, 7"
+    assert figures._ranges([]) == "none"
+
+
+def test_figures_without_data_are_left_out(changed: Path, tmp_path: Path) -> None:
+    with h5py.File(changed, "a") as file:
+        for group in ("structure", "structure_worn", "bodies"):
+            del file[group]
+        del file["contact/intrados/coarse"]
+    names = {path.stem for path in write_figures(changed, tmp_path / "figures")}
+    assert names == NAMES - {"resultants", "structure_stress"}
+
+
+def test_run_without_wear_can_be_drawn(changed: Path, tmp_path: Path) -> None:
+    with h5py.File(changed, "a") as file:
+        for name in file["grid"]:
+            for jump in list(file["surfaces"][name])[1:]:
+                del file["surfaces"][name][jump], file["contact"][name][jump]
+        for body in file["bodies"].values():
+            del body["worn"]
+        del file["kinetics"]
+    names = {path.stem for path in write_figures(changed, tmp_path / "figures")}
+    assert names == NAMES - {"kinetics"}
