@@ -59,29 +59,31 @@ class FrictionalJoint:
         self._inverse = np.tril(inverse) + np.tril(inverse, -1).T
 
     def march(
-        self, amplitudes: Array, gap: Array, cycles: int = 1, guess: Sequence[Array] = ()
+        self,
+        amplitudes: Array,
+        gap: Array,
+        previous: Array | None = None,
+        guess: Sequence[Array] = (),
     ) -> Iterator[FrictionState]:
-        """States along a load path ``(increments, cases)`` that starts unloaded and unslipped.
+        """States along a load path ``(increments, cases)``.
 
-        ``gap`` ``(n,)`` is the distance of the unloaded faces [mm]; the path is repeated ``cycles``
-        times. ``guess`` are the ``state`` of every increment of a similar path: it saves
-        iterations and changes nothing else.
+        ``gap`` ``(n,)`` is the distance of the unloaded faces [mm]; ``previous`` the displacement
+        ``(3, n)`` that the path starts from, unslipped unless it is given. ``guess`` are the
+        ``state`` of every increment of a similar path: they save iterations and change nothing
+        else.
         """
         loads = amplitudes @ self._loads.T
         floor = LOAD_FLOOR * np.linalg.norm(loads, axis=1).max()
-        displacement = np.zeros((3, len(gap)))
-        earlier = list(guess)
-        for _ in range(cycles):
-            found: list[Array] = []
-            for load in loads:
-                scale = max(float(np.linalg.norm(load)), floor)
-                start = _predicted(found, earlier, len(load))
-                split = self._solve(load, gap, displacement, start, scale)
-                state = self._state(split, gap, displacement)
-                found.append(state.state)
-                displacement = state.displacement
-                yield state
-            earlier = found
+        displacement = np.zeros((3, len(gap))) if previous is None else previous
+        found: list[Array] = []
+        for load in loads:
+            scale = max(float(np.linalg.norm(load)), floor)
+            start = _predicted(found, guess, len(load))
+            split = self._solve(load, gap, displacement, start, scale)
+            state = self._state(split, gap, displacement)
+            found.append(state.state)
+            displacement = state.displacement
+            yield state
 
     def _solve(
         self, load: Array, gap: Array, previous: Array, start: Array, scale: float
@@ -127,9 +129,9 @@ class FrictionalJoint:
         )
 
 
-def _predicted(found: list[Array], earlier: list[Array], size: int) -> Array:
-    """Start of the next increment: it changes by as much as it did in the earlier cycle."""
+def _predicted(found: list[Array], guess: Sequence[Array], size: int) -> Array:
+    """Start of the next increment: it changes by as much as it does in the guess."""
     increment = len(found)
-    if increment < len(earlier):
-        return earlier[increment] + (found[-1] - earlier[increment - 1] if found else 0.0)
+    if increment < len(guess):
+        return guess[increment] + (found[-1] - guess[increment - 1] if found else 0.0)
     return found[-1] if found else np.zeros(size)

@@ -7,6 +7,7 @@ every solution's residual is checked and a bad one is solved again with SuperLU.
 from __future__ import annotations
 
 import ctypes
+import os
 from typing import Any, Protocol
 
 import numpy as np
@@ -62,6 +63,8 @@ def _load_pardiso() -> Any | None:
         import pypardiso
     except ImportError:
         return None
+    # Every solver object would search the whole environment for the library again.
+    os.environ.setdefault("PYPARDISO_MKL_RT", pypardiso.ps.libmkl._name)
     return pypardiso
 
 
@@ -96,17 +99,29 @@ def _superlu(matrix: sp.csr_matrix) -> Any:
     return factors.solve
 
 
-def _pardiso(matrix: sp.csr_matrix) -> Any | None:
+class _Pardiso:
+    """A factorisation of PARDISO's; its memory is given back with the object."""
+
+    def __init__(self, pypardiso: Any, upper: sp.csr_matrix) -> None:
+        self._upper = upper
+        self._solver = pypardiso.PyPardisoSolver(mtype=PARDISO_SPD)
+        self._solver.factorize(upper)
+
+    def __call__(self, rhs: Array) -> Array:
+        return self._solver.solve(self._upper, np.asfortranarray(rhs)).reshape(rhs.shape)
+
+    def __del__(self) -> None:
+        self._solver.free_memory(everything=True)
+
+
+def _pardiso(matrix: sp.csr_matrix) -> _Pardiso | None:
     pypardiso = _load_pardiso()
     if pypardiso is None:
         return None
-    upper = sp.triu(matrix, format="csr")
-    solver = pypardiso.PyPardisoSolver(mtype=PARDISO_SPD)
     try:
-        solver.factorize(upper)
+        return _Pardiso(pypardiso, sp.triu(matrix, format="csr"))
     except pypardiso.pardiso_wrapper.PyPardisoError:
         return None
-    return lambda rhs: solver.solve(upper, np.asfortranarray(rhs)).reshape(rhs.shape)
 
 
 def _pardiso_schur(matrix: sp.csr_matrix, kept: Indices) -> Array | None:

@@ -44,13 +44,15 @@ class InterfaceHistory:
 class CycleSolution:
     """The closed cycle of a structure, with what the solver says of itself.
 
-    ``states`` are the splitting's, by increment. ``closure`` is the largest difference of contact
-    forces between the first and the second cycle, relative to the largest force; ``equilibrium`` ``(t, 2)`` the relative error of
+    ``states`` are the splitting's, by increment, and ``last_displacement`` ``(3, n)`` the one that
+    the next cycle starts from. ``closure`` is the largest difference of contact forces between the
+    first and the second cycle, relative to the largest force; ``equilibrium`` ``(t, 2)`` the relative error of
     forces and moments.
     """
 
     histories: tuple[InterfaceHistory, ...]
     states: tuple[Array, ...]
+    last_displacement: Array
     iterations: int
     residual: float
     converged: bool
@@ -85,23 +87,28 @@ class Structure:
         amplitudes: Array,
         gap: Array,
         friction: float,
-        guess: Sequence[Array] = (),
+        after: CycleSolution | None = None,
     ) -> CycleSolution:
-        """March through the load path twice and keep the second, closed cycle.
-
-        ``guess`` are the ``states`` of a similar cycle, to save iterations.
-        """
-        states = list(joint.march(amplitudes, gap, cycles=2, guess=guess))
-        first, last = states[: len(amplitudes)], states[len(amplitudes) :]
-        change = [float(np.abs(a.force - b.force).max()) for a, b in zip(first, last, strict=True)]
+        """Solve one closed cycle: the second from rest, or the one that follows ``after``."""
+        if after is None:
+            first = list(joint.march(amplitudes, gap))
+            displacement, guess = first[-1].displacement, [s.state for s in first]
+        else:
+            first = []
+            displacement, guess = after.last_displacement, list(after.states)
+        last = list(joint.march(amplitudes, gap, displacement, guess))
+        pairs = zip(first, last, strict=False)
+        change = [float(np.abs(one.force - two.force).max()) for one, two in pairs]
         largest = max(float(np.abs(s.force).max()) for s in last)
+        states = first + last
         return CycleSolution(
             histories=tuple(self._histories(last, friction)),
             states=tuple(s.state for s in last),
+            last_displacement=last[-1].displacement,
             iterations=sum(s.iterations for s in states),
             residual=max(s.residual for s in states),
             converged=all(s.converged for s in states),
-            closure=max(change) / largest,
+            closure=max(change, default=0.0) / largest,
             equilibrium=np.array(
                 [self.equilibrium_error(s, a) for s, a in zip(last, amplitudes, strict=True)]
             ),

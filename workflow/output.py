@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import platform
 import shutil
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import h5py
@@ -21,7 +25,9 @@ from wear.kinetics import LinearRegime, linear_regime
 from workflow.case import Case, dump_case
 from workflow.checkpoint import KINETICS, RunState
 from workflow.contact_stage import ContactStage, FirstContact
+from workflow.figures import write_figures
 from workflow.folder import OutputFolder
+from workflow.paraview import write_paraview
 from workflow.reporter import Reporter
 from workflow.store import ResultsWriter, read_arrays, replacing
 from workflow.structure_stage import StructureStage
@@ -69,21 +75,25 @@ def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> 
         }
     with reporter.stage("results"):
         _write_results(outcome, mesh, stresses, folder)
-    if outcome.case.output.paraview:
-        from workflow.paraview import write_paraview
-
-        with reporter.stage("paraview"):
-            write_paraview(folder.results, folder.paraview)
-    if outcome.case.output.figures:
-        from workflow.figures import write_figures
-
-        with reporter.stage("figures"):
-            write_figures(folder.results, folder.figures)
+    with reporter.stage("paraview and figures"):
+        _write_pictures(outcome.case, folder)
     summary = _summary(outcome, mesh, stresses, _peak_pressures(outcome, folder), reporter)
     with replacing(folder.summary) as partial:
         partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     shutil.rmtree(folder.jumps)
     _say(outcome, summary, reporter)
+
+
+def _write_pictures(case: Case, folder: OutputFolder) -> None:
+    """ParaView files and figures side by side: either takes several seconds on one core."""
+    jobs: list[tuple[Callable[[Path, Path], Any], Path]] = []
+    if case.output.paraview:
+        jobs.append((write_paraview, folder.paraview))
+    if case.output.figures:
+        jobs.append((write_figures, folder.figures))
+    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
+        for done in [pool.submit(write, folder.results, target) for write, target in jobs]:
+            done.result()
 
 
 def _regimes(outcome: Outcome) -> dict[str, dict[str, LinearRegime | None]]:

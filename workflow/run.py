@@ -99,10 +99,10 @@ class WearRun:
         )
 
     def _solve_structure(
-        self, depths: list[Array], guess: CycleSolution | None = None
+        self, depths: list[Array], after: CycleSolution | None = None
     ) -> CycleSolution:
         with self._reporter.stage("structural friction"):
-            return self._structure.cycle(depths, guess)
+            return self._structure.cycle(depths, after)
 
     def _stage_settings(self, interface: Interface) -> StageSettings:
         dovetail, side = self._structure.dovetail, SIDES[interface.name]

@@ -9,13 +9,15 @@ import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 
-from fe_models.structure import InterfaceHistory
 from sa_solver.types import Array, Frame, Grid
+
+if TYPE_CHECKING:
+    from fe_models.structure import InterfaceHistory
 
 # Unit and description of every dataset, by its own name.
 DATASETS = {

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import cached_property
 
 import numpy as np
 
 from fe_models.dovetail import Mission, dovetail_structure
-from fe_models.friction import FrictionalJoint
+from fe_models.friction import FrictionalJoint, FrictionState
 from fe_models.geometry.dovetail import Dovetail
 from fe_models.mesh import Interface, StructureMesh
 from fe_models.stress import StressField, stress_state
@@ -76,17 +76,17 @@ class StructureStage:
         """Do the costly part now: condense the structure, or find it in the cache."""
         _ = self.joint
 
-    def cycle(self, depths: list[Array], guess: CycleSolution | None = None) -> CycleSolution:
+    def cycle(self, depths: list[Array], after: CycleSolution | None = None) -> CycleSolution:
         """The closed mission cycle with the gaps widened by the worn depth of both bodies.
 
-        ``guess`` is a similar cycle, to save iterations.
+        From rest, or as the mission that follows ``after``.
         """
         solution = self.structure.solve_cycle(
             self.joint,
             self.mission.amplitudes(),
             self._gap(depths),
             self._case.friction.coefficient,
-            guess=() if guess is None else guess.states,
+            after,
         )
         if not solution.converged:
             raise MethodFailed(
@@ -101,9 +101,17 @@ class StructureStage:
 
         Cheap, and moved by wear as those of the full cycle are: the probe for drift.
         """
-        amplitudes = self.mission.amplitudes()[self.peak : self.peak + 1]
-        (state,) = self.joint.march(amplitudes, self._gap(depths))
+        (state,) = self._march_to_peak(depths, [self._unworn_peak.state])
         return self.structure.interface_resultants(state)
+
+    @cached_property
+    def _unworn_peak(self) -> FrictionState:
+        (state,) = self._march_to_peak([np.zeros(len(i)) for i in self.interfaces], [])
+        return state
+
+    def _march_to_peak(self, depths: list[Array], guess: list[Array]) -> Iterator[FrictionState]:
+        amplitudes = self.mission.amplitudes()[self.peak : self.peak + 1]
+        return self.joint.march(amplitudes, self._gap(depths), guess=guess)
 
     def stress(self, solution: CycleSolution) -> tuple[StressField, StressField]:
         """Stress of disk and blade at peak load on the unworn mesh."""

@@ -85,7 +85,7 @@ class Dovetail(Section):
     edge_radius: RoundingRadius = entry(
         "rounding of the two flank edges along the slot [mm]", "30 mm"
     )
-    edge_width: Length = entry("width of each rounded edge, beyond the flat [mm]", "1 mm")
+    edge_width: Length = entry("width of each rounded edge, beyond the flat [mm]", "1.5 mm")
     end_radius: RoundingRadius = entry("rounding of the flank at the slot ends [mm]", "150 mm")
     end_width: Length = entry("width of each rounded end, inside the slot length [mm]", "3 mm")
     neck_width: Length = entry("blade, between the tops of the flanks [mm]", "20 mm")
@@ -250,7 +250,7 @@ class Step(Section):
     """Size of a wear step: exactly one of cycles, depth and volume."""
 
     kind: Literal["explicit", "implicit"] = entry("explicit or implicit", "implicit")
-    cycles: Cycles | None = entry("jumped in a step [1]", 5000, default=None)
+    cycles: Cycles | None = entry("jumped in a step [1]", 25000, default=None)
     depth: Length | None = entry("largest depth worn in a step [mm]", "1 um", default=None)
     volume: Volume | None = entry("worn in a step [mm^3]", "0.01 mm^3", default=None)
 
@@ -275,7 +275,7 @@ class _Wear(Section):
     """What every wear law needs."""
 
     law: str  # named first in every wear section; each law narrows it to its own name
-    cycles: Cycles = entry("of the whole run [1]", 1e5)
+    cycles: Cycles = entry("of the whole run [1]", 3e5)
     step: Step = entry("how far one wear step jumps")
     stop: Stop = entry("ends the run early", default=Stop())
 
