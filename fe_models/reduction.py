@@ -47,6 +47,31 @@ class JointStiffness:
     largest: float
 
 
+    def resolvent(self) -> JointResolvent:
+        """(H + ρ)⁻¹ with ρ the geometric mean of the extreme elastic eigenvalues."""
+        rho = float(np.sqrt(self.smallest * self.largest))
+        shifted = self.stiffness.copy()
+        shifted[np.diag_indices_from(shifted)] += rho
+        factor = sl.cholesky(shifted, lower=True, overwrite_a=True, check_finite=False)
+        inverse, _ = sl.lapack.dpotri(factor, lower=1, overwrite_c=1)
+        inverse = np.tril(inverse) + np.tril(inverse, -1).T
+        return JointResolvent(inverse, rho, self.loads, self.rigid_modes)
+
+
+@dataclass(frozen=True)
+class JointResolvent:
+    """What structural friction needs of a joint.
+
+    ``inverse`` ``(3 n, 3 n)`` is (H + ρ)⁻¹ [mm/N] with ``rho`` ρ [N/mm]; ``loads`` and
+    ``rigid_modes`` are the joint's.
+    """
+
+    inverse: Array
+    rho: float
+    loads: Array
+    rigid_modes: int
+
+
 class ConstrainedBody:
     """A supported body whose interface displacements are in the interface frames.
 

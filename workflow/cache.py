@@ -8,7 +8,7 @@ from importlib.metadata import version
 from pathlib import Path
 
 import fe_models
-from fe_models.reduction import JointStiffness
+from fe_models.reduction import JointResolvent
 from workflow.store import read_arrays, write_arrays
 
 # Files are pruned, least recently used first, above this size; one default dovetail takes 134 MB.
@@ -31,7 +31,7 @@ def content_key(*parts: object) -> str:
     return digest.hexdigest()[:32]
 
 
-def load_joint(key: str) -> JointStiffness | None:
+def load_joint(key: str) -> JointResolvent | None:
     """The condensed joint of that key, or None."""
     path = cache_folder() / f"joint-{key}.h5"
     try:
@@ -39,20 +39,19 @@ def load_joint(key: str) -> JointStiffness | None:
     except OSError:
         return None
     os.utime(path)
-    return JointStiffness(
-        stiffness=arrays["stiffness"],
+    return JointResolvent(
+        inverse=arrays["inverse"],
+        rho=float(attributes["rho"]),
         loads=arrays["loads"],
         rigid_modes=int(attributes["rigid_modes"]),
-        smallest=float(attributes["smallest"]),
-        largest=float(attributes["largest"]),
     )
 
 
-def save_joint(key: str, joint: JointStiffness) -> None:
+def save_joint(key: str, joint: JointResolvent) -> None:
     """Keep a condensed joint; a cache that cannot be written is no error."""
     folder = cache_folder()
-    attributes = {name: getattr(joint, name) for name in ("rigid_modes", "smallest", "largest")}
-    arrays = {"stiffness": joint.stiffness, "loads": joint.loads}
+    attributes = {"rho": joint.rho, "rigid_modes": joint.rigid_modes}
+    arrays = {"inverse": joint.inverse, "loads": joint.loads}
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_arrays(folder / f"joint-{key}.h5", arrays, attributes)

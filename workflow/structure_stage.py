@@ -55,13 +55,13 @@ class StructureStage:
             self.mission.airfoil_mass,
             self.mission.airfoil_radius,
         )
-        stiffness = load_joint(key)
-        self.from_cache = stiffness is not None
-        if stiffness is None:
-            stiffness = self.structure.condense()
-            save_joint(key, stiffness)
-        self.rigid_modes = stiffness.rigid_modes
-        return FrictionalJoint(stiffness, self._case.friction.coefficient)
+        joint = load_joint(key)
+        self.from_cache = joint is not None
+        if joint is None:
+            joint = self.structure.condense().resolvent()
+            save_joint(key, joint)
+        self.rigid_modes = joint.rigid_modes
+        return FrictionalJoint(joint, self._case.friction.coefficient)
 
     @cached_property
     def structure(self) -> Structure:

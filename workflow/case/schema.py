@@ -250,7 +250,7 @@ class Step(Section):
     """Size of a wear step: exactly one of cycles, depth and volume."""
 
     kind: Literal["explicit", "implicit"] = entry("explicit or implicit", "implicit")
-    cycles: Cycles | None = entry("jumped in a step [1]", 25000, default=None)
+    cycles: Cycles | None = entry("jumped in a step [1]", 30000, default=None)
     depth: Length | None = entry("largest depth worn in a step [mm]", "1 um", default=None)
     volume: Volume | None = entry("worn in a step [mm^3]", "0.01 mm^3", default=None)
 
