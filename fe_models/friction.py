@@ -31,8 +31,8 @@ class FrictionState:
     """State at the end of one increment, components in the interface frames.
 
     ``force`` ``(3, n)`` on body 2 [N]; ``displacement`` ``(3, n)`` of body 2 relative to body 1 and
-    ``slip`` ``(2, n)`` its tangential part since the previous increment [mm]. ``state`` ``(3 n,)`` is
-    the splitting's, to start from again.
+    ``slip`` ``(2, n)`` its tangential part since the previous increment [mm]; ``state``
+    ``(3 n,)`` is the splitting's, to start from again.
     """
 
     force: Array

@@ -41,9 +41,10 @@ class Body:
 class Interface:
     """Two faces that meet node to node.
 
-    ``nodes_1`` and ``nodes_2`` ``(n,)`` are vertices of body 1 and body 2; ``coordinates`` ``(n, 2)``
-    their place in the interface frame [mm]; ``facets`` ``(m, 3)`` the triangles of body 2's face,
-    numbered within the interface; ``gap`` ``(n,)`` the distance of the unloaded faces [mm].
+    ``nodes_1`` and ``nodes_2`` ``(n,)`` are vertices of body 1 and body 2; ``coordinates``
+    ``(n, 2)`` their place in the interface frame [mm]; ``facets`` ``(m, 3)`` the triangles of body
+    2's face, numbered within the interface; ``gap`` ``(n,)`` the distance of the unloaded, unworn
+    faces [mm].
     """
 
     name: str
@@ -63,7 +64,9 @@ class Interface:
         a, b, c = (self.coordinates[self.facets[:, k]] for k in range(3))
         u, v = b - a, c - a
         area = 0.5 * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
-        return np.bincount(self.facets.ravel(), np.repeat(area / 3.0, 3), minlength=len(self))
+        total = np.zeros(len(self))
+        np.add.at(total, self.facets, area[:, None] / 3.0)
+        return total
 
 
 @dataclass(frozen=True)
@@ -94,9 +97,9 @@ def named_mesh(
 
 
 def matched_interface(
-    name: str, body_1: Body, body_2: Body, boundary: str, frame: Frame, gap: Array | None = None
+    name: str, body_1: Body, body_2: Body, boundary: str, frame: Frame
 ) -> Interface:
-    """Pair the vertices of the boundary of that name on both bodies.
+    """Pair the vertices of the boundary of that name on both bodies; their gap is zero.
 
     Raises :class:`MeshError` if a vertex of one face has no partner on the other.
     """
@@ -118,7 +121,7 @@ def matched_interface(
         nodes_2=nodes_2,
         coordinates=local,
         facets=np.searchsorted(nodes_2, body_2.facets(boundary)),
-        gap=np.zeros(len(nodes_2)) if gap is None else gap,
+        gap=np.zeros(len(nodes_2)),
     )
 
 

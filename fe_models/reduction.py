@@ -46,7 +46,6 @@ class JointStiffness:
     smallest: float
     largest: float
 
-
     def resolvent(self) -> JointResolvent:
         """(H + ρ)⁻¹ with ρ the geometric mean of the extreme elastic eigenvalues."""
         rho = float(np.sqrt(self.smallest * self.largest))

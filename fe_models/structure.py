@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -46,8 +45,8 @@ class CycleSolution:
 
     ``states`` are the splitting's, by increment, and ``last_displacement`` ``(3, n)`` the one that
     the next cycle starts from. ``closure`` is the largest difference of contact forces between the
-    first and the second cycle, relative to the largest force; ``equilibrium`` ``(t, 2)`` the relative error of
-    forces and moments.
+    first and the second cycle, relative to the largest force (0 for a cycle that follows another);
+    ``equilibrium`` ``(t, 2)`` the relative error of forces and moments.
     """
 
     histories: tuple[InterfaceHistory, ...]
@@ -155,12 +154,13 @@ class Structure:
         applied = self.body_2.load_resultants(amplitudes, self.support_point)
         balance = contact + applied
         balance[0] -= (balance[0] @ self.support_direction) * self.support_direction
-        force = np.linalg.norm(applied[0])
+        force = float(np.linalg.norm(applied[0]))
         if force == 0.0:
             return 0.0, 0.0
-        size = np.linalg.norm(np.ptp(np.concatenate(points), axis=0))
+        size = float(np.linalg.norm(np.ptp(np.concatenate(points), axis=0)))
         moment = max(float(np.linalg.norm(applied[1])), force * size)
-        return float(np.linalg.norm(balance[0]) / force), float(np.linalg.norm(balance[1]) / moment)
+        errors = np.linalg.norm(balance, axis=1) / (force, moment)
+        return float(errors[0]), float(errors[1])
 
 
 def load_history(interface: Interface, force: Array, slip: Array, friction: float) -> LoadHistory:
@@ -173,4 +173,6 @@ def load_history(interface: Interface, force: Array, slip: Array, friction: floa
     load = columns[0]
     columns[:, load < UNLOADED_SHARE * load.max()] = 0.0
     sliding = np.sum(force[:, 2] * sticks, axis=1) < STICKING_SHARE * load
-    return LoadHistory(*columns, *energy, sliding)
+    P, Qx, Qy, Mx, My, Mz = columns
+    Edx, Edy = energy
+    return LoadHistory(P, Qx, Qy, Mx, My, Mz, Edx, Edy, sliding)

@@ -29,8 +29,8 @@ INSIDE = -1e-9
 class FaceTransfer:
     """Transfer between the ``n`` nodes of a face and a grid's ``(nx, ny)`` cells.
 
-    ``shared`` ``(nx ny, n)`` holds the areas W [mm²]; ``nearest`` ``(nx ny,)`` the node next to each
-    cell, which stands in where the face does not cover the cell.
+    ``shared`` ``(nx ny, n)`` holds the areas W [mm²]; ``nearest`` ``(nx ny,)`` the node next to
+    each cell, which stands in where the face does not cover the cell.
     """
 
     grid: Grid
@@ -40,7 +40,6 @@ class FaceTransfer:
     @classmethod
     def between(cls, interface: Interface, grid: Grid) -> FaceTransfer:
         """Measure the shared areas of an interface's triangles and a grid in the same frame."""
-        nx, ny = grid.shape
         x, y = np.broadcast_arrays(grid.x, grid.y)
         _, nearest = cKDTree(interface.coordinates).query(np.stack([x.ravel(), y.ravel()], 1))
         sampled = _sampled_areas(interface, grid)

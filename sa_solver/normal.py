@@ -132,8 +132,8 @@ class NormalContact:
         """Pressure, gap and rigid motion under the resultants ``P`` [N], ``Mx``, ``My`` [N mm].
 
         ``height`` h is the gap before loading ``(nx, ny)`` [mm], ``compliance`` D >= 0
-        ``(nx, ny)`` [mm/MPa], ``start`` that of any state on the same grid. Converged means that every
-        residual is within ``tolerance``. A state that is not says so in its ``message``.
+        ``(nx, ny)`` [mm/MPa], ``start`` that of any state on the same grid. Converged means that
+        every residual is within ``tolerance``. A state that is not says so in its ``message``.
 
         Raises NormalContactError for heights or compliances that are not finite or have another
         shape, a negative load, or a moment that no pressure on the grid can carry.

@@ -65,7 +65,7 @@ def contact_modulus(body_1: Material, body_2: Material) -> float:
 class Grid:
     """Uniform grid of rectangular cells, centred on the frame's origin.
 
-    ``shape`` is ``(nx, ny)``, ``pitch`` is ``(dx, dy)`` in mm. Fields on it are ``(nx, ny)`` arrays.
+    ``shape`` is ``(nx, ny)``, ``pitch`` is ``(dx, dy)`` in mm. Fields on it have that shape.
     """
 
     shape: tuple[int, int]
@@ -89,12 +89,17 @@ class Grid:
     @cached_property
     def x(self) -> Array:
         """Cell centres along x, shape ``(nx, 1)`` [mm]."""
-        return ((np.arange(self.shape[0]) + 0.5) * self.pitch[0] - 0.5 * self.size[0])[:, None]
+        return _centres(self.shape[0], self.pitch[0])[:, None]
 
     @cached_property
     def y(self) -> Array:
         """Cell centres along y, shape ``(1, ny)`` [mm]."""
-        return ((np.arange(self.shape[1]) + 0.5) * self.pitch[1] - 0.5 * self.size[1])[None, :]
+        return _centres(self.shape[1], self.pitch[1])[None, :]
+
+
+def _centres(count: int, pitch: float) -> Array:
+    """Centres of ``count`` cells about zero."""
+    return (np.arange(count, dtype=np.float64) - 0.5 * (count - 1)) * pitch
 
 
 @dataclass(frozen=True)
@@ -110,8 +115,7 @@ class Frame:
 
     def components(self, vectors: Array) -> Array:
         """Local components of global ``vectors`` ``(..., 3)``."""
-        components: Array = vectors @ self.axes.T
-        return components
+        return np.asarray(vectors @ self.axes.T, dtype=np.float64)
 
     def to_global(self, components: Array) -> Array:
         """Global vectors of local ``components`` ``(..., 3)``."""
@@ -123,7 +127,7 @@ def resultants(forces: Array, x: Array, y: Array) -> Array:
     """``(P, Qx, Qy, Mx, My, Mz)`` of point forces on body 2, in the interface frame.
 
     ``forces`` has shape ``(3, ...)`` ordered x, y, z [N] (the z component is the pressure force,
-    positive); ``x`` and ``y`` broadcast against ``forces[0]`` [mm]. Returns shape ``(6,)``, N and N mm.
+    positive); ``x`` and ``y`` broadcast against ``forces[0]`` [mm]. Returns ``(6,)``, N and N mm.
     """
     fx, fy, fz = forces
     moments = np.sum(fz * y), -np.sum(fz * x), np.sum(fy * x - fx * y)

@@ -55,5 +55,6 @@ class EnergyAmplitude:
     reference_amplitude: float
 
     def depth_per_pressure(self, slip: Array, friction: float) -> Array:
-        amplitude = slip.sum(axis=0) / 4.0
-        return self.coefficient * friction * slip * (amplitude / self.reference_amplitude)
+        amplitude: Array = slip.sum(axis=0) / 4.0
+        depth: Array = self.coefficient * friction * slip * (amplitude / self.reference_amplitude)
+        return depth

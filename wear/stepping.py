@@ -15,8 +15,8 @@ from sa_solver.types import Array, LoadHistory
 from wear.laws import WearLaw
 from wear.surfaces import Surfaces
 
-# A roughness of the grid's shortest wavelength grows in explicit steps when the depth lost per
-# pressure in one step exceeds this many pitches over E*: its stiffness on the grid is 2/1.161 E*/dx.
+# In explicit steps a roughness of the grid's shortest wavelength grows when the depth lost per
+# pressure in one step exceeds this many pitches over E*, its stiffness being 2/1.161 E*/pitch.
 EXPLICIT_LIMIT = 1.161
 
 States = dict[int, NormalState]
@@ -77,7 +77,7 @@ class WearingContact:
         Over thousands of cycles it does not matter where a cycle begins. A step that ends with the
         widest contact leaves no unworn rim for the next one.
         """
-        slipping = self._slip.any(axis=(1, 2))
+        slipping = [bool(slip.any()) for slip in self._slip]
         count, heaviest = len(self._loads), int(np.argmax(self._loads.P))
         order = [(heaviest + 1 + k) % count for k in range(count)]
         return [t for t in order if slipping[t] and self._loads.P[t] > 0.0]

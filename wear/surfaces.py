@@ -29,7 +29,7 @@ class Surfaces:
 
     @property
     def heights(self) -> tuple[Array, Array]:
-        """Heights of body 1 and body 2 in the interface frame [mm]; the flank of body 1 starts flat."""
+        """Heights of body 1 and body 2 in the interface frame [mm]; body 1 starts flat."""
         return -self.depth_1, self.initial_gap + self.depth_2
 
     def worn(self, depth_1: Array, depth_2: Array) -> Surfaces:

@@ -22,10 +22,9 @@ class RunState:
     """Everything a wear run needs to go on.
 
     ``cycles`` ``(j,)`` are those at the end of every jump so far, the unworn state included;
-    ``kinetics`` ``(j, interfaces, 5)`` has the columns ``KINETICS``; ``solved_depths`` are the nodal
-    depths of the last structural solution and ``solved_resultants`` ``(interfaces, 6)`` its probe;
-    ``drift`` ``(j,)`` is the drift found after each jump and ``solutions`` counts the structural
-    solutions.
+    ``kinetics`` ``(j, interfaces, 5)`` has the columns ``KINETICS``; ``solved_resultants``
+    ``(interfaces, 6)`` is the probe at the last structural solution; ``drift`` ``(j,)`` the drift
+    found after each jump; ``solutions`` counts the structural solutions.
     """
 
     interfaces: tuple[InterfaceState, ...]
@@ -114,7 +113,7 @@ def _load_interface(arrays: dict[str, Array], group: str) -> InterfaceState:
     loads = {column.name: arrays[f"{group}/loads/{column.name}"] for column in fields(LoadHistory)}
     return InterfaceState(
         Surfaces(**surfaces),
-        LoadHistory(**loads),
+        LoadHistory(**loads),  # type: ignore[arg-type]
         arrays[f"{group}/slip"],
         energy,
         depth_rate,

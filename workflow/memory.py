@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 from workflow.case import Case
 from workflow.errors import OutOfMemory
@@ -30,15 +31,15 @@ def check_memory(case: Case) -> None:
     required, available = required_bytes(case), _available_bytes()
     if available is not None and required > available:
         raise OutOfMemory(
-            f"this case needs about {required / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB are "
-            "free: lower mesh.flank_nodes or contact.grid"
+            f"this case needs about {required / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB "
+            "are free: lower mesh.flank_nodes or contact.grid"
         )
 
 
 def _available_bytes() -> float | None:
     """Free memory, reclaimable caches included; None where the system does not tell."""
     try:
-        with open("/proc/meminfo", encoding="ascii") as file:
+        with Path("/proc/meminfo").open(encoding="ascii") as file:
             lines = dict(line.split(":") for line in file)
         return 1024.0 * float(lines["MemAvailable"].split()[0])
     except (OSError, KeyError):

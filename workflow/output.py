@@ -241,7 +241,7 @@ def _summary(
 
 def _interface_summary(outcome: Outcome, number: int, mesh: StructureMesh) -> dict[str, Any]:
     stage, structure = outcome.stages[number], outcome.structure
-    own, first = outcome.state.interfaces[number], outcome.first[number]
+    first = outcome.first[number]
     peak = structure.peak
     unworn, worn = (s.histories[number].loads for s in (outcome.unworn, outcome.worn))
     bodies = (

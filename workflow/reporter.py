@@ -70,7 +70,8 @@ class JumpProgress:
 
     def __init__(self, progress: Progress, total: float, done: float) -> None:
         self._progress = progress
-        self._task = progress.add_task("wear", total=total, completed=done, text="")
+        self._task = progress.add_task("wear", total=total, text="")
+        self.update(done, 0)
 
     def update(self, cycles: float, jump: int) -> None:
         """Show the cycles reached and the number of the jump."""

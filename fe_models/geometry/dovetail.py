@@ -8,7 +8,7 @@ a symmetric load gives a symmetric answer to rounding.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -142,7 +142,8 @@ class Dovetail:
         if wall >= slot * tangent or top[0] >= (self.rim_radius + self.lug_height) * tangent:
             raise MeshError(
                 f"the slot is wider ({2 * wall:.4g} mm) than the sector at its bottom "
-                f"({2 * slot * tangent:.4g} mm): fewer blades, a larger rim_radius or a narrower root"
+                f"({2 * slot * tangent:.4g} mm): take fewer blades, a larger rim_radius or a "
+                "narrower root"
             )
         if (
             self.neck_fillet * np.tan(0.5 * self.flank_angle) * np.cos(self.flank_angle)
@@ -163,8 +164,8 @@ class Dovetail:
         interfaces = []
         for name, side in (("intrados", 1), ("extrados", -1)):
             face = matched_interface(name, disk, blade, name, self.flank_frame(side))
-            gap = self.flank_gap(*face.coordinates.T, side)
-            interfaces.append(matched_interface(name, disk, blade, name, face.frame, gap))
+            x, y = face.coordinates.T
+            interfaces.append(replace(face, gap=self.flank_gap(x, y, side)))
         return StructureMesh(disk, blade, tuple(interfaces))
 
     def blade_section(self) -> list[Curve]:
