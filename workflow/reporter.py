@@ -25,7 +25,7 @@ class Reporter:
 
     def say(self, line: str) -> None:
         """A line on the terminal and in the log."""
-        self._console.print(line, markup=False)
+        self._console.print(line, markup=False, soft_wrap=True)
         self.log(line)
 
     def log(self, line: str) -> None:

@@ -20,6 +20,8 @@ from sa_solver.types import Array, Frame
 
 # How fast the mesh size grows with the distance from the flanks.
 SIZE_GROWTH = 0.25
+# Elements round a full circle of a fillet, whose stress is asked for.
+ELEMENTS_PER_CIRCLE = 24
 # Slope at which the faces part beyond their rounded edges, where fillets and corners begin.
 PARTING_SLOPE = 1.0
 # gmsh's numbers for first-order elements.
@@ -292,6 +294,7 @@ def _set_sizes(gmsh: Any, flanks: list[int], fine: float, coarse: float) -> None
     gmsh.option.setNumber("Mesh.MeshSizeMax", coarse)
     gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
     gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
+    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", ELEMENTS_PER_CIRCLE)
 
 
 def _mirror_mesh(model: Any, surfaces: list[int], middle: float) -> None:
