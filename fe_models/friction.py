@@ -22,8 +22,8 @@ from sa_solver.types import Array
 TOLERANCE = 1e-7
 # An unloaded increment is measured against this share of the largest load of the path.
 LOAD_FLOOR = 1e-3
-# The default joint needs 30 to 50 iterations per increment; hard ones a few hundred.
-MAX_ITERATIONS = 5000
+# An increment needs 5 to 100 iterations; one that takes more than this walks in circles.
+MAX_ITERATIONS = 1000
 
 
 @dataclass(frozen=True)
@@ -71,68 +71,93 @@ class FrictionalJoint:
         found: list[Array] = []
         for increment, load in enumerate(loads):
             scale = max(float(np.linalg.norm(load)), floor)
-            start = _predicted(found, guess, loads[: increment + 1])
-            split = self._solve(load, gap, displacement, start, scale)
-            state = self._state(split, gap, displacement)
+            starts = _starts(found, guess, loads[: increment + 1])
+            problem = _Problem(self._inverse, self._rho, self._friction, load, gap, displacement)
+            state = problem.solve(starts, scale)
             found.append(state.state)
             displacement = state.displacement
             yield state
 
-    def _solve(
-        self, load: Array, gap: Array, previous: Array, start: Array, scale: float
-    ) -> SplittingResult:
-        rho, inverse = self._rho, self._inverse
-        offset = inverse @ load
 
-        def elastic(state: Array) -> Array:
-            return rho * (inverse @ state) - offset
+class _Problem:
+    """One increment: the two steps of the splitting under one load."""
 
-        def law(trial: Array) -> Array:
-            nodal = trial.reshape(-1, 3).T
-            return (nodal + self._force(nodal, gap, previous) / rho).T.ravel()
+    def __init__(
+        self,
+        inverse: Array,
+        rho: float,
+        friction: float,
+        load: Array,
+        gap: Array,
+        previous: Array,
+    ) -> None:
+        self._inverse, self._rho, self._friction = inverse, rho, friction
+        self._gap, self._previous = gap, previous
+        self._offset = inverse @ load
 
-        return douglas_rachford(
-            elastic,
-            law,
-            start,
-            scale=scale / rho,
-            tolerance=TOLERANCE,
-            max_iterations=MAX_ITERATIONS,
-        )
+    def solve(self, starts: list[Array], scale: float) -> FrictionState:
+        """Split from the most promising start, and from the others should it fail."""
+        iterations = 0
+        for start in sorted(starts, key=self._distance):
+            split = douglas_rachford(
+                self._elastic,
+                self._law,
+                start,
+                scale=scale / self._rho,
+                tolerance=TOLERANCE,
+                max_iterations=MAX_ITERATIONS,
+            )
+            iterations += split.iterations
+            if split.converged:
+                break
+        return self._state(split, iterations)
 
-    def _force(self, trial: Array, gap: Array, previous: Array) -> Array:
+    def _elastic(self, state: Array) -> Array:
+        return self._rho * (self._inverse @ state) - self._offset
+
+    def _law(self, trial: Array) -> Array:
+        nodal = trial.reshape(-1, 3).T
+        return (nodal + self._force(nodal) / self._rho).T.ravel()
+
+    def _force(self, trial: Array) -> Array:
         """Force that brings a trial displacement ``(3, n)`` back to the law, at stiffness ρ."""
-        stick = self._rho * (previous - trial)
-        stick[2] = -self._rho * (gap + trial[2])
+        stick = self._rho * (self._previous - trial)
+        stick[2] = -self._rho * (self._gap + trial[2])
         return coulomb(stick, self._friction)
 
-    def _state(self, split: SplittingResult, gap: Array, previous: Array) -> FrictionState:
-        trial = (2.0 * split.elastic - split.state).reshape(-1, 3).T
-        force = self._force(trial, gap, previous)
+    def _distance(self, start: Array) -> float:
+        """How far a start is from a solution: the splitting's first step."""
+        elastic = self._elastic(start)
+        return float(np.linalg.norm(self._law(2.0 * elastic - start) - elastic))
+
+    def _state(self, split: SplittingResult, iterations: int) -> FrictionState:
         displacement = split.solution.reshape(-1, 3).T
-        slip = displacement[:2] - previous[:2]
         return FrictionState(
-            force,
-            displacement,
-            slip,
-            split.state,
-            split.residual,
-            split.iterations,
-            split.converged,
+            force=self._force((2.0 * split.elastic - split.state).reshape(-1, 3).T),
+            displacement=displacement,
+            slip=displacement[:2] - self._previous[:2],
+            state=split.state,
+            residual=split.residual,
+            iterations=iterations,
+            converged=split.converged,
         )
 
 
-def _predicted(found: list[Array], guess: Sequence[Array], loads: Array) -> Array:
-    """Start of the next increment, whose load is the last of ``loads``.
+def _starts(found: list[Array], guess: Sequence[Array], loads: Array) -> list[Array]:
+    """Where the next increment, whose load is the last of ``loads``, may start from.
 
-    It changes by as much as it does in the guess; without one, in proportion to the load as long
-    as that goes on in the same sense.
+    The previous state; the change that the guess makes there; and the change in proportion to the
+    load, as long as that goes on in the same sense.
     """
     increment = len(found)
+    if not found:
+        return [*guess[:1], *guess[-1:], np.zeros(loads.shape[1])]
+    starts = [found[-1]]
     if increment < len(guess):
-        return guess[increment] + (found[-1] - guess[increment - 1] if found else 0.0)
-    if increment < 2:
-        return found[-1] if found else np.zeros(loads.shape[1])
-    step, before = np.diff(loads[-3:], axis=0)[::-1]
-    ratio = max(float(step @ before / (before @ before)), 0.0)
-    return found[-1] + ratio * (found[-1] - found[-2])
+        starts.append(guess[increment] + found[-1] - guess[increment - 1])
+    if increment > 1:
+        step, before = np.diff(loads[-3:], axis=0)[::-1]
+        ratio = float(step @ before / (before @ before))
+        if ratio > 0.0:
+            starts.append(found[-1] + ratio * (found[-1] - found[-2]))
+    return starts

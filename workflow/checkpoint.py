@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from sa_solver.normal import NormalStart
 from sa_solver.types import Array, LoadHistory
 from wear.surfaces import Surfaces
 from workflow.contact_stage import InterfaceState
+from workflow.errors import UserError
 from workflow.store import read_arrays, write_arrays
 
 # Columns of the kinetics of one interface.
@@ -84,8 +86,15 @@ def save(path: Path, state: RunState) -> None:
 
 
 def load(path: Path) -> RunState:
-    """Read a state; raises OSError if there is none."""
-    arrays, attributes = read_arrays(path)
+    """Read a state; raises :class:`UserError` if the file is damaged."""
+    try:
+        return _restored(*read_arrays(path))
+    except (OSError, KeyError, TypeError, ValueError, RuntimeError) as error:
+        reason = " ".join(str(error).split())
+        raise UserError(f"{path}: damaged ({reason}): start again with `run --force`") from error
+
+
+def _restored(arrays: dict[str, Any], attributes: dict[str, Any]) -> RunState:
     return RunState(
         interfaces=tuple(
             _load_interface(arrays, f"interface_{number}")

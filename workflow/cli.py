@@ -101,7 +101,8 @@ def resume(folder: Path) -> None:
     """Continue an interrupted run from its output FOLDER."""
     from workflow.run import resume_run
 
-    resume_run(folder)
+    if not resume_run(folder):
+        click.echo(f"{folder}: this run is finished; nothing to do")
 
 
 @cli.command()

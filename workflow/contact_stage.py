@@ -76,7 +76,7 @@ class ContactStage:
         self.modulus = contact_modulus(disk, blade)
         self._contact = NormalContact(self.grid, self.modulus)
         self._laws = _law(case, "disk"), _law(case, "blade")
-        self._current: tuple[Array, WearingContact] | None = None
+        self._current: tuple[tuple[Array, Array], WearingContact] | None = None
 
     @property
     def name(self) -> str:
@@ -142,7 +142,8 @@ class ContactStage:
 
     def _wearing(self, state: InterfaceState) -> WearingContact:
         """The contact under the state's loads and slips, kept until a structural solution."""
-        if self._current is not None and np.array_equal(self._current[0], state.slip):
+        key = np.array([*vars(state.loads).values()], dtype=float), state.slip
+        if self._current is not None and all(map(np.array_equal, self._current[0], key)):
             return self._current[1]
         wearing = WearingContact(
             self._contact,
@@ -152,7 +153,7 @@ class ContactStage:
             np.hypot(*np.moveaxis(self.transfer.to_cells(state.slip), 1, 0)),
             self._case.contact.tolerance,
         )
-        self._current = state.slip, wearing
+        self._current = key, wearing
         return wearing
 
     def _after(

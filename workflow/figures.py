@@ -14,7 +14,7 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array, Grid
-from workflow.store import replacing
+from workflow.store import BODY_NAMES, grid_of, jump_names, replacing
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -35,7 +35,7 @@ STYLE: dict[Any, Any] = {
 }
 # Okabe and Ito's colours: told apart by everyone.
 BLUE, ORANGE, GREEN, PURPLE, BLACK = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222"
-BODIES = {1: ("disk", BLUE, "o"), 2: ("blade", ORANGE, "s")}
+BODY_STYLES = {1: (BLUE, "o"), 2: (ORANGE, "s")}
 PRESSURE_COLOURS, CYCLE_COLOURS = "viridis", "viridis"
 STRESS_COLOURS, CHANGE_COLOURS = "magma_r", "RdBu_r"
 CHANGE = "worn less unworn"
@@ -272,7 +272,7 @@ def _draw_profile(axis: Axes, file: h5py.File, interface: str, direction: int) -
         profile = _middle(contact[jump]["pressure"][()], direction)
         axis.plot(_centres(grid, direction), profile, color=colour, label=label)
     if "coarse" in contact:
-        coarse = _grid_of(contact["coarse"])
+        coarse = grid_of(contact["coarse"])
         profile = _middle(contact["coarse"]["pressure"][()], direction)
         label = f"half-space {coarse.shape[0]} x {coarse.shape[1]}, unworn"
         axis.plot(_centres(coarse, direction), profile, "o", color=BLACK, mfc="none", label=label)
@@ -308,7 +308,7 @@ def _edge_peak(file: h5py.File) -> str:
     name = max(peaks, key=lambda name: peaks[name])
     text = f"Edge peak on the {name}: {peaks[name]:.0f} MPa"
     if coarse := file["contact"][name].get("coarse"):
-        shape = _grid_of(coarse).shape
+        shape = grid_of(coarse).shape
         peak = _middle(coarse["pressure"][()], 0).max()
         text += f"; {shape[0]} x {shape[1]} cells see {peak:.0f} MPa"
     if f"structure/{name}/pressure" in file:
@@ -347,8 +347,8 @@ def _draw_wear(axes: Iterable[Axes], file: h5py.File, interface: str) -> float:
 
     heights, depths = axes
     surfaces, x = file["surfaces"][interface], _centres(_grid(file, interface), 0)
-    unworn = _middle_heights(surfaces[_jumps(file, interface)[0]])
-    chosen = _spread(_jumps(file, interface), MAX_PROFILES)
+    unworn = _middle_heights(surfaces[jump_names(file, interface)[0]])
+    chosen = _spread(jump_names(file, interface), MAX_PROFILES)
     for number, jump in enumerate(chosen):
         colour = colormaps[CYCLE_COLOURS](0.9 * number / max(len(chosen) - 1, 1))
         worn = _middle_heights(surfaces[jump])
@@ -361,7 +361,7 @@ def _draw_wear(axes: Iterable[Axes], file: h5py.File, interface: str) -> float:
 
 def _middle_heights(surfaces: h5py.Group) -> Array:
     """Heights of both bodies along x at y = 0, ``(2, nx)`` [µm]."""
-    return 1e3 * np.stack([_middle(surfaces[f"body_{body}"][()], 0) for body in BODIES])
+    return 1e3 * np.stack([_middle(surfaces[f"body_{body}"][()], 0) for body in BODY_NAMES])
 
 
 def _spread(items: list[str], count: int) -> list[str]:
@@ -402,12 +402,14 @@ def _draw_kinetics(
     axis: Axes, cycles: Array, group: h5py.Group, quantity: str, scale: float
 ) -> None:
     """Both bodies and their sum; dashed beyond the computed cycles."""
-    worn = {body: scale * group[f"{quantity}_{body}"][()] for body in BODIES}
-    for body, (name, colour, marker) in BODIES.items():
+    worn = {body: scale * group[f"{quantity}_{body}"][()] for body in BODY_NAMES}
+    for body, (colour, marker) in BODY_STYLES.items():
         # Bodies of one material wear alike: the second must not hide the first.
         size = 9 if body == 1 else 5
         fill = "none" if body == 1 else colour
-        axis.plot(cycles, worn[body], marker, color=colour, mfc=fill, ms=size, label=name)
+        axis.plot(
+            cycles, worn[body], marker, color=colour, mfc=fill, ms=size, label=BODY_NAMES[body]
+        )
     total = np.sum(list(worn.values()), axis=0)
     axis.plot(cycles, total, "-", color=BLACK, label="both")
     rate = scale * float(group.attrs[f"{quantity}_rate"])
@@ -415,7 +417,7 @@ def _draw_kinetics(
         beyond = cycles[-1] * np.array([1.0, EXTRAPOLATION])
         line = total[-1] + rate * (beyond - cycles[-1])
         axis.plot(beyond, line, "--", color=BLACK, label="both, extrapolated (not computed)")
-    linear_from = float(group.attrs["linear_from"])
+    linear_from = float(group.attrs[f"{quantity}_linear_from"])
     if np.isfinite(linear_from):
         axis.axvspan(linear_from, cycles[-1], color=GREEN, alpha=0.15, lw=0, label="linear regime")
 
@@ -423,7 +425,7 @@ def _draw_kinetics(
 def _worn_volume(file: h5py.File, interface: str) -> float:
     """Volume worn off both bodies in the end [mm³]."""
     group = file["kinetics"][interface]
-    return float(sum(group[f"volume_{body}"][-1] for body in BODIES))
+    return float(sum(group[f"volume_{body}"][-1] for body in BODY_NAMES))
 
 
 def _rate(group: h5py.Group) -> str:
@@ -435,12 +437,10 @@ def _rate(group: h5py.Group) -> str:
 
 
 def _regime(group: h5py.Group, cycles: Array) -> str:
-    """From when wear is linear, for a title."""
-    linear_from = float(group.attrs["linear_from"])
+    """From when the depth grows linearly, for a title."""
+    linear_from = float(group.attrs["depth_linear_from"])
     if np.isfinite(linear_from):
         return f"linear from {linear_from:,.0f} cycles"
-    if np.isfinite(float(group.attrs["depth_rate"])):
-        return "linear at the end"
     return f"not yet linear at {cycles[-1]:,.0f}"
 
 
@@ -566,14 +566,9 @@ def _zoom(axis: Axes, file: h5py.File) -> None:
 # --- reading ------------------------------------------------------------------------------------
 
 
-def _jumps(file: h5py.File, interface: str) -> list[str]:
-    """Names of the jumps that have both surfaces and a contact solution, ascending."""
-    return sorted(set(file["surfaces"][interface]) & set(file["contact"][interface]))
-
-
 def _ends(file: h5py.File, interface: str) -> list[str]:
     """First and last jump; one where nothing wore."""
-    jumps = _jumps(file, interface)
+    jumps = jump_names(file, interface)
     return jumps[:1] + jumps[1:][-1:]
 
 
@@ -588,12 +583,7 @@ def _peak(file: h5py.File) -> int:
 
 
 def _grid(file: h5py.File, interface: str) -> Grid:
-    return _grid_of(file["grid"][interface])
-
-
-def _grid_of(group: h5py.Group) -> Grid:
-    (nx, ny), (dx, dy) = group.attrs["shape"], group.attrs["pitch"]
-    return Grid((int(nx), int(ny)), (float(dx), float(dy)))
+    return grid_of(file["grid"][interface])
 
 
 CONTACT = ("grid", "contact", "surfaces")

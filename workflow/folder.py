@@ -7,9 +7,9 @@ from pathlib import Path
 
 from workflow.case import Case, dump_case, load_case
 from workflow.errors import UserError
-from workflow.store import replacing
+from workflow.store import PARTIAL, replacing
 
-FILES = ("case.yaml", "summary.json", "results.h5", "checkpoint.h5", "run.log")
+FILES = ("case.yaml", "summary.json", "results.h5", "worn.msh", "checkpoint.h5", "run.log")
 FOLDERS = ("jumps", "paraview", "figures")
 
 
@@ -46,9 +46,15 @@ class OutputFolder:
             (self.root / name).unlink(missing_ok=True)
         for name in FOLDERS:
             shutil.rmtree(self.root / name, ignore_errors=True)
+        self.clear_partial()
         self.jumps.mkdir()
         with replacing(self.case) as partial:
             partial.write_text(dump_case(case), encoding="utf-8")
+
+    def clear_partial(self) -> None:
+        """Remove what a run that was killed had begun to write."""
+        for path in [*self.root.glob(f".*{PARTIAL}*"), *self.root.glob(f"*/.*{PARTIAL}*")]:
+            path.unlink()
 
     def _refuse_foreign(self, case: Case) -> None:
         if not self.case.exists():

@@ -3,14 +3,10 @@
 from __future__ import annotations
 
 import json
-import multiprocessing
 import platform
 import shutil
-from collections.abc import Callable
-from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from importlib.metadata import version
-from pathlib import Path
 from typing import Any
 
 import h5py
@@ -29,12 +25,12 @@ from workflow.figures import write_figures
 from workflow.folder import OutputFolder
 from workflow.paraview import write_paraview
 from workflow.reporter import Reporter
-from workflow.store import ResultsWriter, read_arrays, replacing
+from workflow.store import BODY_NAMES, ResultsWriter, read_arrays, replacing
 from workflow.structure_stage import StructureStage
+from workflow.workers import side_by_side
 
 PACKAGES = ("fretscale", "numpy", "scipy", "scikit-fem", "gmsh", "pyfftw", "h5py")
 RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
-BODIES = ("disk", "blade")
 
 
 @dataclass(frozen=True)
@@ -86,14 +82,13 @@ def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> 
 
 def _write_pictures(case: Case, folder: OutputFolder) -> None:
     """ParaView files and figures side by side: either takes several seconds on one core."""
-    jobs: list[tuple[Callable[[Path, Path], Any], Path]] = []
-    if case.output.paraview:
-        jobs.append((write_paraview, folder.paraview))
-    if case.output.figures:
-        jobs.append((write_figures, folder.figures))
-    with ProcessPoolExecutor(2, multiprocessing.get_context("spawn")) as pool:
-        for done in [pool.submit(write, folder.results, target) for write, target in jobs]:
-            done.result()
+    wanted = {
+        write_paraview: (case.output.paraview, folder.paraview),
+        write_figures: (case.output.figures, folder.figures),
+    }
+    side_by_side(
+        [(write, (folder.results, target)) for write, (on, target) in wanted.items() if on]
+    )
 
 
 def _regimes(outcome: Outcome) -> dict[str, dict[str, LinearRegime | None]]:
@@ -139,7 +134,7 @@ def _write_results(
         _write_kinetics(writer, outcome)
         for moment, shape in (("unworn", structure.mesh), ("worn", mesh)):
             for name, body, field in zip(
-                BODIES, (shape.body_1, shape.body_2), stresses[moment], strict=True
+                BODY_NAMES.values(), (shape.body_1, shape.body_2), stresses[moment], strict=True
             ):
                 writer.put_body(f"bodies/{name}/{moment}", body.mesh.p.T, body.mesh.t.T, field)
 
@@ -164,14 +159,13 @@ def _write_kinetics(writer: ResultsWriter, outcome: Outcome) -> None:
         group = f"kinetics/{stage.name}"
         columns = dict(zip(KINETICS, state.kinetics[:, number].T, strict=True))
         writer.put(group, **columns)
-        depth, volume = regimes[stage.name]["depth"], regimes[stage.name]["volume"]
-        writer.file[group].attrs.update(
-            {
-                "linear_from": max(depth.start, volume.start) if depth and volume else np.nan,
-                "depth_rate": depth.rate if depth else np.nan,
-                "volume_rate": volume.rate if volume else np.nan,
-            }
-        )
+        for name, regime in regimes[stage.name].items():
+            writer.file[group].attrs.update(
+                {
+                    f"{name}_linear_from": regime.start if regime else np.nan,
+                    f"{name}_rate": regime.rate if regime else np.nan,
+                }
+            )
 
 
 def _peak_pressures(outcome: Outcome, folder: OutputFolder) -> dict[str, dict[str, float]]:
@@ -216,7 +210,7 @@ def _summary(
                         "von_mises": float(field.von_mises.max()),
                         "maximum_principal": float(field.maximum_principal.max()),
                     }
-                    for name, field in zip(BODIES, stresses[moment], strict=True)
+                    for name, field in zip(BODY_NAMES.values(), stresses[moment], strict=True)
                 }
                 for moment in stresses
             },

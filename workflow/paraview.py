@@ -24,13 +24,11 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array, Frame, Grid
-from workflow.store import replacing
+from workflow.store import BODY_NAMES, frame_of, grid_of, jump_names, replacing
 
 if TYPE_CHECKING:
     import pyvista
 
-# Names of body 1 and body 2 (sa_solver.types), for files that a user opens one by one.
-BODY_NAMES = {1: "disk", 2: "blade"}
 UNWORN = "00000"
 
 Fields = dict[str, tuple[Array, str]]
@@ -60,7 +58,7 @@ def _write_flank(file: h5py.File, interface: str, folder: Path) -> list[Path]:
     """Images of one flank, one per jump, and the series that lists them."""
     grid, frame = _placement(file, interface)
     steps: list[Step] = []
-    for jump in _jumps(file, interface):
+    for jump in jump_names(file, interface):
         path = folder / interface / f"{jump}.vti"
         image = _flank_image(grid, frame)
         _attach(image.cell_data, _flank_fields(file, interface, jump, frame))
@@ -112,15 +110,8 @@ def _cells(field: h5py.Dataset | Array) -> Array:
 
 def _placement(file: h5py.File, interface: str) -> tuple[Grid, Frame]:
     """Grid and frame of an interface."""
-    attrs = file["grid"][interface].attrs
-    nx, ny = (int(n) for n in attrs["shape"])
-    dx, dy = (float(d) for d in attrs["pitch"])
-    return Grid((nx, ny), (dx, dy)), Frame(np.array(attrs["origin"]), np.array(attrs["axes"]))
-
-
-def _jumps(file: h5py.File, interface: str) -> list[str]:
-    """Names of the jumps that have both surfaces and a contact solution, ascending."""
-    return sorted(set(file["surfaces"][interface]) & set(file["contact"][interface]))
+    group = file["grid"][interface]
+    return grid_of(group), frame_of(group)
 
 
 # --- worn surfaces ------------------------------------------------------------------------------
@@ -137,7 +128,7 @@ def _write_worn_surfaces(file: h5py.File, interface: str, folder: Path) -> list[
 
     grid, frame = _placement(file, interface)
     rows, columns = _flank_window(file, interface, grid)
-    last = _jumps(file, interface)[-1]
+    last = jump_names(file, interface)[-1]
     written = []
     for body, name in BODY_NAMES.items():
         height = file["surfaces"][interface][last][f"body_{body}"][()]

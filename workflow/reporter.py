@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 from rich.console import Console
@@ -17,6 +17,7 @@ class Reporter:
     def __init__(self, log: Path, append: bool = False) -> None:
         self._log = log.open("a" if append else "w", encoding="utf-8")
         self._console = Console(stderr=True, highlight=False)
+        self._jumping = False
         self.seconds: dict[str, float] = {}
         self.warnings: list[str] = []
 
@@ -41,10 +42,13 @@ class Reporter:
 
     @contextmanager
     def stage(self, name: str) -> Iterator[None]:
-        """Time a stage; seconds of the same name add up."""
+        """Show and time a stage; seconds of the same name add up."""
         begin = time.perf_counter()
+        # Within the wear loop the bar is on the screen, and one thing at a time can live there.
+        shown = nullcontext() if self._jumping else self._console.status(name)
         try:
-            yield
+            with shown:
+                yield
         finally:
             spent = time.perf_counter() - begin
             self.seconds[name] = self.seconds.get(name, 0.0) + spent
@@ -61,8 +65,12 @@ class Reporter:
             TextColumn("left"),
             TimeRemainingColumn(),
         )
-        with Progress(*columns, console=self._console, transient=True) as progress:
-            yield JumpProgress(progress, total, done)
+        self._jumping = True
+        try:
+            with Progress(*columns, console=self._console, transient=True) as progress:
+                yield JumpProgress(progress, total, done)
+        finally:
+            self._jumping = False
 
 
 class JumpProgress:

@@ -27,6 +27,9 @@ from workflow.structure_stage import SIDES, StructureStage
 from workflow.warnings import warn_of_contact, warn_of_structure
 from workflow.workers import Workers, contact_workers
 
+# Jumps that add up to the cycles of the run but for rounding leave no jump over.
+ROUNDING = 1e-9
+
 
 def run_case(case: Case, out: Path, force: bool) -> None:
     """Run a case from the start into a folder."""
@@ -36,19 +39,24 @@ def run_case(case: Case, out: Path, force: bool) -> None:
     _run(case, folder, resume=False)
 
 
-def resume_run(out: Path) -> None:
-    """Continue the run in a folder from its last whole jump."""
+def resume_run(out: Path) -> bool:
+    """Continue the run in a folder from its last whole jump; False if it is finished already."""
     folder = OutputFolder(out)
     case = folder.load_case()
+    if folder.summary.exists():
+        return False
     check_memory(case)
+    folder.clear_partial()
+    folder.jumps.mkdir(exist_ok=True)
     _run(case, folder, resume=True)
+    return True
 
 
 def _run(case: Case, folder: OutputFolder, resume: bool) -> None:
     reporter = Reporter(folder.log, append=resume)
     try:
         WearRun(case, folder, reporter).execute(resume)
-    except (ContactFailure, NormalContactError) as error:
+    except (ContactFailure, NormalContactError, MethodFailed) as error:
         remedy = f"; the state is kept, see `fretscale resume {folder.root}`"
         raise MethodFailed(f"{error}{remedy if folder.checkpoint.exists() else ''}") from error
     except MeshError as error:
@@ -182,7 +190,8 @@ class WearLoop:
             cycles = _quotient(step.volume, sum(own.volume_rate for own in state.interfaces))
         if step.kind == "explicit":
             self._warn_of_instability(state, cycles)
-        return min(cycles, self._case.wear.cycles - float(state.cycles[-1]))
+        left = self._case.wear.cycles - float(state.cycles[-1])
+        return left if cycles > left * (1.0 - ROUNDING) else cycles
 
     def _warn_of_instability(self, state: RunState, cycles: float) -> None:
         pairs = zip(self._stages, state.interfaces, strict=True)
@@ -198,7 +207,7 @@ class WearLoop:
         depth = state.kinetics[-1, :, :2].max()
         volume = state.kinetics[-1, :, 2:4].sum()
         return bool(
-            state.cycles[-1] >= wear.cycles
+            state.cycles[-1] >= wear.cycles * (1.0 - ROUNDING)
             or (wear.stop.depth is not None and depth >= wear.stop.depth)
             or (wear.stop.volume is not None and volume >= wear.stop.volume)
         )
@@ -209,8 +218,9 @@ class WearLoop:
             return state, 0.0
         with self._reporter.stage("drift probe"):
             probe = self._probe(state.interfaces)
+        heaviest = float(state.solved_resultants[:, 0].max())
         drift = max(
-            _drift(now, then, stage.grid.size)
+            _drift(now, then, heaviest, stage.grid.size)
             for now, then, stage in zip(probe, state.solved_resultants, self._stages, strict=True)
         )
         if drift <= self._case.coupling.drift:
@@ -253,9 +263,14 @@ class WearLoop:
             checkpoint.save(self._folder.checkpoint, state)
 
 
-def _drift(now: Array, then: Array, size: tuple[float, float]) -> float:
-    """Change of resultants relative to P, and to P times half the face for moments."""
-    load = then[0]
+def _drift(now: Array, then: Array, heaviest: float, size: tuple[float, float]) -> float:
+    """Change of resultants relative to P, and to P times half the face for moments.
+
+    A face that was open is measured by the P of the ``heaviest`` loaded.
+    """
+    load = then[0] if then[0] > 0.0 else heaviest
+    if load <= 0.0:
+        return 0.0
     half_x, half_y = 0.5 * size[0], 0.5 * size[1]
     scales = load * np.array([1.0, 1.0, 1.0, half_y, half_x, max(half_x, half_y)])
     return float(np.max(np.abs(now - then) / scales))

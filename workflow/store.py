@@ -19,6 +19,12 @@ from sa_solver.types import Array, Frame, Grid
 if TYPE_CHECKING:
     from fe_models.structure import InterfaceHistory
 
+# Names of body 1 and body 2 (sa_solver.types).
+BODY_NAMES = {1: "disk", 2: "blade"}
+
+# Ending of files that are being written.
+PARTIAL = ".part"
+
 # Unit and description of every dataset, by its own name.
 DATASETS = {
     "P": ("N", "normal force on body 2"),
@@ -56,7 +62,7 @@ DATASETS = {
 @contextmanager
 def replacing(path: Path) -> Iterator[Path]:
     """A path to write to; it takes the place of ``path`` once the writing has ended well."""
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    partial = path.with_name(f".{path.name}.{os.getpid()}{PARTIAL}")
     try:
         yield partial
         partial.replace(path)
@@ -85,6 +91,22 @@ def read_arrays(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
     with h5py.File(path, "r") as file:
         file.visititems(collect)
         return arrays, dict(file.attrs)
+
+
+def grid_of(group: h5py.Group) -> Grid:
+    """The grid that a group's attributes describe."""
+    (nx, ny), (dx, dy) = group.attrs["shape"], group.attrs["pitch"]
+    return Grid((int(nx), int(ny)), (float(dx), float(dy)))
+
+
+def frame_of(group: h5py.Group) -> Frame:
+    """The frame that a group's attributes describe."""
+    return Frame(np.array(group.attrs["origin"]), np.array(group.attrs["axes"]))
+
+
+def jump_names(file: h5py.File, interface: str) -> list[str]:
+    """Names of the jumps that have both surfaces and a contact solution, ascending."""
+    return sorted(set(file["surfaces"][interface]) & set(file["contact"][interface]))
 
 
 class ResultsWriter:

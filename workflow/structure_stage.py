@@ -9,7 +9,6 @@ import numpy as np
 
 from fe_models.dovetail import Mission, dovetail_structure
 from fe_models.friction import FrictionalJoint, FrictionState
-from fe_models.geometry.dovetail import Dovetail
 from fe_models.mesh import Interface, StructureMesh
 from fe_models.stress import StressField, stress_state
 from fe_models.structure import CycleSolution, Structure
@@ -26,8 +25,7 @@ class StructureStage:
 
     def __init__(self, case: Case) -> None:
         self._case = case
-        parameters = case.structure.model_dump(exclude={"kind"})
-        self.dovetail = Dovetail(**parameters)
+        self.dovetail = case.structure.geometry()
         self.mission = Mission(**case.load_path.model_dump())
         self.from_cache = False
 

@@ -1,7 +1,6 @@
-"""One process per interface, so that all of them compute side by side.
+"""Processes beside the main one: a worker per interface, and the writers of pictures.
 
-A worker builds its contact stage once and answers calls of its methods. It ends with its parent,
-however the parent ends: the pipe between them closes.
+A process of ours ends with its parent, however the parent ends, and leaves Ctrl-C to it.
 """
 
 from __future__ import annotations
@@ -9,12 +8,15 @@ from __future__ import annotations
 import multiprocessing
 import os
 import signal
-from collections.abc import Iterator, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import ExitStack, contextmanager
-from multiprocessing.connection import Connection
+from multiprocessing.connection import Connection, wait
+from multiprocessing.context import SpawnProcess
 from typing import Any
 
 from workflow.contact_stage import ContactStage, StageSettings
+from workflow.errors import MethodFailed
 
 # The workers share the cores among themselves; threads inside each would fight over them.
 THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -29,58 +31,131 @@ class Workers:
     def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
         """Call a method of every stage, each with its own share of the ``arguments``.
 
-        Raises what a stage raised, once all have answered.
+        Raises what a stage raised, once all have answered; :class:`MethodFailed` if one is gone.
         """
-        for connection, own in zip(self._connections, zip(*arguments, strict=True), strict=True):
-            connection.send((method, own))
-        answers = [connection.recv() for connection in self._connections]
-        for answer in answers:
-            if isinstance(answer, Exception):
-                raise answer
-        return answers
+        try:
+            for connection, own in zip(
+                self._connections, zip(*arguments, strict=True), strict=True
+            ):
+                connection.send((method, own))
+        except OSError as error:
+            raise _gone(error) from error
+        return _answers(self._connections)
 
 
 @contextmanager
 def contact_workers(settings: Sequence[StageSettings]) -> Iterator[Workers]:
     """Start a worker for every interface and end them all at the end."""
-    context = multiprocessing.get_context("spawn")
-    connections, processes = [], []
-    with ExitStack() as stack:
-        stack.enter_context(_environment(dict.fromkeys(THREAD_SETTINGS, "1")))
-        for own in settings:
-            ours, theirs = context.Pipe()
-            process = context.Process(target=_serve, args=(theirs, own), daemon=True)
-            process.start()
-            theirs.close()
-            connections.append(ours)
-            processes.append(process)
-    try:
+    with _processes(_serve, [(own,) for own in settings], one_thread=True) as connections:
         yield Workers(connections)
+
+
+def side_by_side(jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]]) -> None:
+    """Run functions, given with their arguments, each in a process of its own.
+
+    Raises what one of them raised, once all have ended.
+    """
+    with _processes(_do, jobs) as connections:
+        _answers(connections)
+
+
+@contextmanager
+def _processes(
+    target: Callable[..., None], arguments: Sequence[tuple[Any, ...]], one_thread: bool = False
+) -> Iterator[list[Connection]]:
+    """Processes that run ``target`` with their end of a pipe; ended, busy or not, at the end."""
+    context = multiprocessing.get_context("spawn")
+    connections: list[Connection] = []
+    processes: list[SpawnProcess] = []
+    try:
+        with ExitStack() as stack:
+            if one_thread:
+                stack.enter_context(_environment(dict.fromkeys(THREAD_SETTINGS, "1")))
+            stack.enter_context(_interrupts_held())
+            for own in arguments:
+                ours, theirs = context.Pipe()
+                process = context.Process(target=_run, args=(target, theirs, *own), daemon=True)
+                process.start()
+                theirs.close()
+                connections.append(ours)
+                processes.append(process)
+        yield connections
     finally:
         for connection in connections:
             connection.close()
         for process in processes:
+            process.terminate()
             process.join()
+
+
+def _run(target: Callable[..., None], connection: Connection, *arguments: Any) -> None:
+    """First thing in a new process: leave Ctrl-C to the parent, and end when it ends."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    try:
+        target(connection, *arguments)
+    except (EOFError, BrokenPipeError):
+        return
+
+
+def _end_with_parent() -> None:
+    parent = multiprocessing.parent_process()
+    assert parent is not None
+    wait([parent.sentinel])
+    os._exit(1)
 
 
 def _serve(connection: Connection, settings: StageSettings) -> None:
     """Answer calls until the other end of the pipe closes."""
-    # Ctrl-C reaches every process of a terminal; only the parent is to act on it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    stage = ContactStage(settings)
+    stage = _attempt(ContactStage, (settings,))
     while True:
-        try:
-            method, arguments = connection.recv()
-        except EOFError:
-            return
-        try:
-            answer = getattr(stage, method)(*arguments)
-        except Exception as error:
-            answer = error
-        try:
-            connection.send(answer)
-        except BrokenPipeError:
-            return
+        method, arguments = connection.recv()
+        failed = isinstance(stage, Exception)
+        connection.send(stage if failed else _attempt(getattr(stage, method), arguments))
+
+
+def _do(connection: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
+    """Run a function and answer once, with what it returned or raised."""
+    connection.send(_attempt(function, arguments))
+
+
+def _attempt(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """What the function returned or, as a value, what it raised."""
+    try:
+        return function(*arguments)
+    except Exception as error:
+        return error
+
+
+def _answers(connections: list[Connection]) -> list[Any]:
+    """An answer from every process; raises the first that is an exception."""
+    try:
+        answers = [connection.recv() for connection in connections]
+    except (EOFError, OSError) as error:
+        raise _gone(error) from error
+    for answer in answers:
+        if isinstance(answer, Exception):
+            raise answer
+    return answers
+
+
+def _gone(error: Exception) -> MethodFailed:
+    return MethodFailed(
+        f"a process of the run has gone ({type(error).__name__}): was it killed for memory?"
+    )
+
+
+@contextmanager
+def _interrupts_held() -> Iterator[None]:
+    """Hold Ctrl-C back; processes started within never see it, not even while they import."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 @contextmanager

@@ -198,18 +198,19 @@ class Dovetail:
         slot = bottom[1] - self.root_depth - self.slot_clearance
         inner, outer = self.rim_radius - self.disk_height, self.rim_radius + self.lug_height
         tangent = np.tan(np.pi / self.blades)
+        # Up the flank, as the blade's section: gmsh then splits both faces along the same diagonals.
         return _chain(
             [
-                ("inner", (0.0, inner)),
-                ("sides", (inner * tangent, inner)),
-                ("", (outer * tangent, outer)),
+                ("", (0.0, slot)),
+                ("", (wall - radius, slot), (wall - radius, slot + radius)),
+                ("", (wall, slot + radius)),
+                ("", (wall, bottom[1] - radius * sine), (wall - radius, bottom[1] - radius * sine)),
+                ("flank", tuple(bottom)),
+                ("", tuple(top)),
                 ("", (top[0], outer)),
-                ("flank", tuple(top)),
-                ("", tuple(bottom), (wall - radius, bottom[1] - radius * sine)),
-                ("", (wall, bottom[1] - radius * sine)),
-                ("", (wall, slot + radius), (wall - radius, slot + radius)),
-                ("", (wall - radius, slot)),
-                ("middle", (0.0, slot)),
+                ("sides", (outer * tangent, outer)),
+                ("inner", (inner * tangent, inner)),
+                ("middle", (0.0, inner)),
             ]
         )
 

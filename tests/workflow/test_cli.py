@@ -60,7 +60,7 @@ def test_check_says_what_would_run(dovetail_path):
     assert first == f"OK {dovetail_path}: Ti-6Al-4V dovetail, one mission per cycle"
     assert "128 x 256 cells" in result.stdout
     assert "22 increments" in result.stdout
-    assert "20 jumps" in result.stdout
+    assert "10 jumps" in result.stdout
     assert len(rows) < 8
 
 
@@ -150,9 +150,15 @@ def test_missing_library_names_its_packages(monkeypatch):
     assert system_check.remedy(OSError("disk full")) is None
 
 
-def test_verify_reports_by_exit_code(monkeypatch, dovetail_path):
+def test_verify_reports_by_exit_code(monkeypatch, dovetail_path, tmp_path):
     for passed in (True, False):
+
+        def verify_cases(paths, out, passed=passed):
+            assert (paths, out) == ((dovetail_path,), tmp_path)
+            return passed
+
         stand_in = types.ModuleType("workflow.verify")
-        stand_in.verify_cases = lambda paths, passed=passed: passed
+        stand_in.verify_cases = verify_cases
         monkeypatch.setitem(sys.modules, "workflow.verify", stand_in)
-        assert invoke("verify", dovetail_path).exit_code == (0 if passed else 1)
+        done = invoke("verify", dovetail_path, "--out", tmp_path)
+        assert done.exit_code == (0 if passed else 1)

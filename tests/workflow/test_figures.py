@@ -1,6 +1,5 @@
 """Figures: all there, legible in size, not blank, and true to the data where they show numbers."""
 
-import runpy
 from pathlib import Path
 from typing import Any
 
@@ -19,14 +18,6 @@ NAMES = {
     "kinetics",
     "structure_stress",
 }
-# The one maker of synthetic results; test modules cannot import one another.
-SYNTHETIC = runpy.run_path(str(Path(__file__).with_name("test_paraview.py")))
-
-
-@pytest.fixture(scope="module")
-def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    path: Path = SYNTHETIC["fabricate"](tmp_path_factory.mktemp("run") / "results.h5")
-    return path
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from math import cos, pi, radians, sin, tan
-from typing import Annotated, Any, Literal, get_args
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, model_validator
 from pydantic.fields import FieldInfo
@@ -16,6 +16,9 @@ from pydantic_core import PydanticCustomError
 
 from sa_solver.types import Material as ElasticMaterial
 from workflow.case.fields import Entry, Path, Quantity, Text, Whole
+
+if TYPE_CHECKING:
+    from fe_models.geometry.dovetail import Dovetail as Geometry
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual machine.
 Length = Annotated[float, Quantity("mm", above=0.0, at_most=1e4)]
@@ -151,6 +154,22 @@ class Dovetail(Section):
                 "rim_radius",
             )
         return self
+
+    @model_validator(mode="after")
+    def _can_be_drawn(self) -> Dovetail:
+        from fe_models.mesh import MeshError
+
+        try:
+            self.geometry().check()
+        except MeshError as error:
+            raise disagreement(str(error)) from error
+        return self
+
+    def geometry(self) -> Geometry:
+        """The joint as the mesher takes it."""
+        from fe_models.geometry.dovetail import Dovetail as Geometry
+
+        return Geometry(**self.model_dump(exclude={"kind"}))
 
 
 def _require_below(section: Section, key: str, limit: float, name: str) -> None:

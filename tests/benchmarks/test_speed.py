@@ -1,0 +1,93 @@
+"""The bench: work counted (iterations, convolutions) and times as ratios within one run.
+
+``make bench`` prints a line per measure and appends it to ``record.csv`` beside this file, so that
+a change of speed can be seen in the history. Seconds on shared machines say little: the record
+holds counts, and times relative to one zero-padded convolution or one product with the joint's
+matrix, measured in the same run.
+"""
+
+from __future__ import annotations
+
+import csv
+import time
+from collections.abc import Callable, Iterator
+from datetime import UTC, datetime
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from fe_models.dovetail import Mission, dovetail_structure
+from fe_models.friction import FrictionalJoint
+from fe_models.geometry.dovetail import Dovetail
+from sa_solver.normal import NormalContact
+from sa_solver.types import Grid, Material, contact_modulus
+from workflow.case import load_case
+
+RECORD = Path(__file__).with_name("record.csv")
+CASE = load_case(Path(__file__).parents[2] / "cases" / "dovetail.yaml")
+TITANIUM = Material(115e3, 0.29, 4.43e-9)
+
+
+def seconds(action: Callable[[], object], repeat: int) -> float:
+    """Shortest time of ``action`` in ``repeat`` tries."""
+    times = []
+    for _ in range(repeat):
+        begin = time.perf_counter()
+        action()
+        times.append(time.perf_counter() - begin)
+    return min(times)
+
+
+@pytest.fixture(scope="module")
+def record() -> Iterator[dict[str, float]]:
+    measures: dict[str, float] = {}
+    yield measures
+    new = not RECORD.exists()
+    with RECORD.open("a", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        if new:
+            writer.writerow(["date", "measure", "value"])
+        date = datetime.now(UTC).date().isoformat()
+        for name, value in measures.items():
+            print(f"\n{name:<55} {value:10.4g}", end="")
+            writer.writerow([date, name, f"{value:.4g}"])
+
+
+def test_contact_of_the_default_flank(record: dict[str, float]) -> None:
+    """Cold, and warm after a little wear, at peak load on 128 x 256 cells."""
+    dovetail = Dovetail(**CASE.structure.model_dump(exclude={"kind"}))
+    grid = Grid.covering(dovetail.flank_size(), CASE.contact.grid)
+    contact = NormalContact(grid, contact_modulus(TITANIUM, TITANIUM))
+    gap = dovetail.flank_gap(grid.x, grid.y, 1)
+    load, moment = 78e3, 43e3
+    cold = contact.solve(gap, load, My=moment)
+    worn = gap + 1e-5 * cold.pressure / cold.pressure.mean()
+    warm = contact.solve(worn, load, My=moment, start=cold.start)
+    assert cold.converged
+    assert warm.converged
+    one = seconds(lambda: contact.convolution.displacement(cold.pressure), 20)
+    record["contact, cold: convolutions"] = cold.convolutions
+    record["contact, warm: convolutions"] = warm.convolutions
+    spent = seconds(lambda: contact.solve(worn, load, My=moment, start=cold.start), 5)
+    record["contact, warm: time in convolutions"] = spent / one
+
+
+def test_friction_of_the_default_joint(record: dict[str, float]) -> None:
+    """Iterations of the two missions, and what an iteration costs against its matrix product."""
+    dovetail = Dovetail(**CASE.structure.model_dump(exclude={"kind"}))
+    mission = Mission(**CASE.load_path.model_dump())
+    mesh = dovetail.mesh(CASE.mesh.flank_nodes, CASE.mesh.size)
+    structure = dovetail_structure(dovetail, mesh, TITANIUM, TITANIUM, mission, 1)
+    resolvent = structure.condense().resolvent()
+    joint = FrictionalJoint(resolvent, CASE.friction.coefficient)
+    vector = np.ones(len(resolvent.inverse))
+    product = seconds(lambda: resolvent.inverse @ vector, 20)
+    begin = time.perf_counter()
+    solution = structure.solve_cycle(
+        joint, mission.amplitudes(), structure.gap(), CASE.friction.coefficient
+    )
+    spent = time.perf_counter() - begin
+    assert solution.converged
+    record["friction, two missions: iterations"] = solution.iterations
+    record["friction, iteration: time in matrix products"] = spent / solution.iterations / product

@@ -1,0 +1,232 @@
+"""Shared by the tests of ``workflow``: synthetic results, and runs of the small case."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from sa_solver.types import Array, Frame, Grid
+from workflow.cli import cli
+
+SIZE, EDGE, END = (10.0, 60.0), 1.0, 3.0
+EDGE_RADIUS, END_RADIUS = 30.0, 150.0
+INTERFACES = {"intrados": 1.0, "extrados": 0.8}  # name and its share of the load
+INCREMENTS, PEAK, FRICTION = 22, 7, 0.4
+JUMPS = np.array([0.0, 5e3, 1e4, 2e4, 4e4, 7e4, 1e5])
+
+
+def flank_frame(side: float) -> Frame:
+    """Frame of a flank at 45 degrees, right (+1) or left (-1) of the middle."""
+    x = np.array([-side, 0.0, 1.0]) / np.sqrt(2.0)
+    z = np.array([-side, 0.0, -1.0]) / np.sqrt(2.0)
+    return Frame(np.array([15.0 * side, 0.0, 245.0]), np.array([x, np.cross(z, x), z]))
+
+
+def rounding(x: Array, y: Array) -> Array:
+    """Gap of the rounded edges and ends [mm]."""
+    beyond_x = np.maximum(np.abs(x) - (0.5 * SIZE[0] - EDGE), 0.0)
+    beyond_y = np.maximum(np.abs(y) - (0.5 * SIZE[1] - END), 0.0)
+    return beyond_x**2 / (2.0 * EDGE_RADIUS) + beyond_y**2 / (2.0 * END_RADIUS)
+
+
+def peak_pressure(x: Array, y: Array, cycles: float, load: float) -> Array:
+    """A flat punch's pressure: edge peaks that wear takes off [MPa]."""
+    closed = np.clip(1.0 - rounding(x, y) / 4e-3, 0.0, None) ** 0.5
+    peaks = 1.6 * np.exp(-cycles / 2e4)
+    edge_x = np.exp(-np.abs(np.abs(x) - (0.5 * SIZE[0] - EDGE)) / 0.3)
+    edge_y = np.exp(-np.abs(np.abs(y) - (0.5 * SIZE[1] - END)) / 0.5)
+    return load * 100.0 * closed * (1.0 + peaks * (edge_x + 0.5 * edge_y)) * (1.0 + 0.02 * x)
+
+
+def depth(x: Array, y: Array, cycles: float, load: float) -> Array:
+    """Wear depth of one body [mm]."""
+    return 1e-4 * cycles / 1e5 * peak_pressure(x, y, cycles, load)
+
+
+def put(group: h5py.Group, **values: Any) -> None:
+    """Store datasets the way a run does."""
+    for name, value in values.items():
+        dataset = group.create_dataset(name, data=value)
+        dataset.attrs["unit"], dataset.attrs["description"] = "1", name
+
+
+def put_structure(file: h5py.File, name: str, load: float, cycles: float) -> None:
+    """FE face, its fields over the cycle, and the resultants."""
+    group = file.create_group(f"{'structure_worn' if cycles else 'structure'}/{name}")
+    nodes = np.meshgrid(np.linspace(-5, 5, 20), np.linspace(-30, 30, 34), indexing="ij")
+    x, y = (axis.ravel() for axis in nodes)
+    index = np.arange(x.size).reshape(20, 34)
+    facets = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:]], -1).reshape(-1, 3)
+    t = np.arange(INCREMENTS)
+    level = np.where(t <= PEAK, (t + 1) / (PEAK + 1), 1 - (t - PEAK) / (INCREMENTS - PEAK)) ** 2
+    pressure = 0.7 * np.outer(level, peak_pressure(x, y, cycles, load))
+    shear = np.stack([-FRICTION * pressure, 0.0 * pressure], axis=1)
+    fields = {"pressure": pressure, "shear": shear, "slip": 1e-4 * shear, "gap": rounding(x, y)}
+    put(group, coordinates=np.stack([x, y], 1), facets=facets, **fields)
+    normal, ratio = 5e4 * load * level, np.clip(np.where(t <= PEAK, -1, (t - 14.5) / 4), -1, 1)
+    zero, energy = np.zeros(INCREMENTS), 200.0 * load * level * (np.abs(ratio) >= 1)
+    history = {"P": normal, "Qx": ratio * FRICTION * normal, "Qy": 0.01 * normal}
+    history |= {"Mx": zero, "My": 0.3 * normal, "Mz": zero, "Edx": energy, "Edy": 0.02 * energy}
+    put(group.create_group("load_history"), **history, sliding=np.abs(ratio) >= 1)
+
+
+def put_contact(file: h5py.File, name: str, load: float, grid: Grid) -> None:
+    """Surfaces and tractions at every jump, the coarse grid and the half-space's energy."""
+    for number, cycles in enumerate(JUMPS):
+        worn = depth(grid.x, grid.y, cycles, load)
+        surface = file.create_group(f"surfaces/{name}/{number:05d}")
+        put(surface, body_1=-worn, body_2=rounding(grid.x, grid.y) + 0.5 * worn)
+        pressure = peak_pressure(grid.x, grid.y, cycles, load)
+        shear = np.stack([-FRICTION * pressure, 0.1 * pressure])
+        contact = file.create_group(f"contact/{name}/{number:05d}")
+        contact.attrs["cycles"] = cycles
+        put(contact, pressure=pressure, shear=shear, slip=-1e-5 * shear)
+    coarse = Grid.covering(SIZE, (20, 34))
+    group = file.create_group(f"contact/{name}/coarse")
+    group.attrs["shape"], group.attrs["pitch"] = coarse.shape, coarse.pitch
+    put(group, pressure=peak_pressure(coarse.x, coarse.y, 0.0, load))
+    history = file[f"structure/{name}/load_history"]
+    put(file[f"contact/{name}"], energy_half_space=0.97 * history["Edx"][()])
+
+
+def put_kinetics(file: h5py.File, name: str, grid: Grid) -> None:
+    """Depths and volumes over the cycles, from the surfaces."""
+    group, jumps = file.create_group(f"kinetics/{name}"), file[f"surfaces/{name}"]
+    for body in (1, 2):
+        heights = np.array([jumps[jump][f"body_{body}"] for jump in sorted(jumps)])
+        worn = np.abs(heights - heights[0])
+        volume = worn.sum(axis=(1, 2)) * grid.cell_area
+        put(group, **{f"depth_{body}": worn.max(axis=(1, 2)), f"volume_{body}": volume})
+    put(group, energy=1e3 * JUMPS)
+    for quantity in ("depth", "volume"):
+        both = group[f"{quantity}_1"][()] + group[f"{quantity}_2"][()]
+        group.attrs[f"{quantity}_rate"] = (both[-1] - both[-2]) / (JUMPS[-1] - JUMPS[-2])
+        group.attrs[f"{quantity}_linear_from"] = 4e4
+    if name == "extrados":  # its depth has not become linear
+        group.attrs["depth_rate"] = group.attrs["depth_linear_from"] = np.nan
+
+
+def put_bodies(file: h5py.File) -> None:
+    """Two boxes of tetrahedra, stretched along Z."""
+    import pyvista as pv
+
+    for body, height in {"disk": 200.0, "blade": 240.0}.items():
+        box = pv.ImageData(dimensions=(6, 6, 6), spacing=(10, 14, 12), origin=(-25, -35, height))
+        mesh = box.to_tetrahedra(5)
+        points = np.array(mesh.points, dtype=float)
+        for state, scale in {"unworn": 1.0, "worn": 0.9}.items():
+            stress = scale * 10.0 * np.linalg.norm(points - [15.0, 0.0, 245.0], axis=1)
+            shift = 1e-3 * scale * points * [0.0, 0.0, 1.0]
+            group = file.create_group(f"bodies/{body}/{state}")
+            put(group, points=points, tets=mesh.cells.reshape(-1, 5)[:, 1:], displacement=shift)
+            put(group, von_mises=stress, maximum_principal=0.8 * stress)
+
+
+def fabricate(path: Path, shape: tuple[int, int] = (24, 40)) -> Path:
+    """A plausible ``results.h5`` on a grid a little larger than the flank."""
+    grid = Grid.covering((10.8, 63.0), shape)
+    with h5py.File(path, "w") as file:
+        file.attrs.update(title="Synthetic dovetail", friction=FRICTION, peak_increment=PEAK)
+        for (name, load), side in zip(INTERFACES.items(), (1.0, -1.0), strict=True):
+            frame, group = flank_frame(side), file.create_group(f"grid/{name}")
+            group.attrs.update(shape=grid.shape, pitch=grid.pitch)
+            group.attrs.update(origin=frame.origin, axes=frame.axes)
+            put_structure(file, name, load, 0.0)
+            put_structure(file, name, load, JUMPS[-1])
+            put_contact(file, name, load, grid)
+            put_kinetics(file, name, grid)
+        put(file["kinetics"], cycles=JUMPS)
+        put_bodies(file)
+    return path
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Synthetic results, not to be changed."""
+    return fabricate(tmp_path_factory.mktemp("run") / "results.h5")
+
+
+# --- runs of the small case ---------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Run:
+    """A run that has ended: how, and what it left."""
+
+    ending: Result
+    folder: Path
+
+    @property
+    def summary(self) -> dict[str, Any]:
+        summary: dict[str, Any] = json.loads((self.folder / "summary.json").read_text("utf-8"))
+        return summary
+
+    def heights(self) -> dict[str, Array]:
+        """All surfaces of ``results.h5`` by interface, jump and body."""
+        found = {}
+        with h5py.File(self.folder / "results.h5") as file:
+            file["surfaces"].visititems(
+                lambda name, item: found.update({name: item[()]} if hasattr(item, "shape") else {})
+            )
+        return found
+
+
+Runner = Callable[..., Run]
+
+
+@pytest.fixture(scope="session")
+def small_path(dovetail_path: Path) -> Path:
+    """The case of a few seconds."""
+    return dovetail_path.with_name("dovetail_small.yaml")
+
+
+@pytest.fixture(scope="session", autouse=True)
+def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
+    """A cache of the tests' own: condensed once, found again by all runs of a session."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FRETSCALE_CACHE", str(tmp_path_factory.mktemp("cache")))
+        yield
+
+
+def invoke(*arguments: object) -> Result:
+    """The command in this process; anything but an exit is raised."""
+    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result
+
+
+@pytest.fixture(scope="session")
+def start(small_path: Path) -> Runner:
+    """Runs the small case with overrides and without pictures, in this process."""
+
+    def run(folder: Path, *overrides: str, force: bool = False) -> Run:
+        quiet = "output.paraview=false", "output.figures=false"
+        settings = [part for entry in (*quiet, *overrides) for part in ("--set", entry)]
+        forced = ["--force"] if force else []
+        return Run(invoke("run", small_path, "--out", folder, *forced, *settings), folder)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def resume() -> Callable[[Path], Run]:
+    """Continues a run, in this process."""
+    return lambda folder: Run(invoke("resume", folder), folder)
+
+
+@pytest.fixture(scope="session")
+def whole(start: Runner, tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """The small case from start to end, not to be changed."""
+    run = start(tmp_path_factory.mktemp("whole") / "out")
+    assert run.ending.exit_code == 0, run.ending.stderr
+    return run
