@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import ctypes
 import os
+import weakref
 from typing import Any, Protocol
 
 import numpy as np
@@ -19,6 +20,8 @@ from sa_solver.types import Array
 
 # A backward-stable factorisation leaves about 1e-13; anything above this is a wrong answer.
 RESIDUAL_LIMIT = 1e-9
+# |K| |u| / |f|, at most the condition number: 1e2 to 1e4 where a body is held, 1e16 where it is not.
+GROWTH_LIMIT = 1e12
 # Interface unknowns condensed at once without PARDISO: enough to amortise, little memory.
 COLUMNS_AT_ONCE = 256
 
@@ -27,6 +30,12 @@ PARDISO_ANALYSE_FACTORISE = 12
 
 
 Indices = NDArray[np.int64]
+
+
+SINGULAR = (
+    "the stiffness matrix is close to singular: a body is not held, or the mesh has a degenerate "
+    "element"
+)
 
 
 class SolverError(RuntimeError):
@@ -40,8 +49,15 @@ class Factorisation(Protocol):
 
 
 def factorise(matrix: sp.csr_matrix) -> Factorisation:
-    """Factorise a sparse symmetric positive definite matrix."""
-    return _Checked(matrix, _pardiso(matrix) or _superlu(matrix))
+    """Factorise a sparse symmetric positive definite matrix.
+
+    Raises :class:`SolverError` if it is singular, which one random load shows.
+    """
+    solve = _Checked(matrix, _pardiso(matrix) or _superlu(matrix))
+    load = np.random.default_rng(0).standard_normal(matrix.shape[0])
+    if np.abs(matrix).max() * np.abs(solve(load)).max() > GROWTH_LIMIT * np.abs(load).max():
+        raise SolverError(SINGULAR)
+    return solve
 
 
 def schur_complement(
@@ -77,25 +93,28 @@ class _Checked:
 
     def __call__(self, rhs: Array) -> Array:
         solution = self._solve(rhs)
-        if self._residual(rhs, solution) > RESIDUAL_LIMIT:
+        if not self._is_good(rhs, solution):
             self._solve = _superlu(self._matrix)
             solution = self._solve(rhs)
-            if self._residual(rhs, solution) > RESIDUAL_LIMIT:
-                raise SolverError(
-                    "the stiffness matrix is close to singular: a body is not held, or the mesh "
-                    "has a degenerate element"
-                )
+            if not self._is_good(rhs, solution):
+                raise SolverError(SINGULAR)
         return solution
 
-    def _residual(self, rhs: Array, solution: Array) -> float:
+    def _is_good(self, rhs: Array, solution: Array) -> bool:
+        """Whether the residual is that of rounding; NaN is not."""
         scale = np.abs(self._matrix).max() * np.abs(solution).max(initial=0.0)
         error = np.abs(self._matrix @ solution - rhs).max(initial=0.0)
-        return float(error / max(scale, np.abs(rhs).max(initial=0.0), np.finfo(float).tiny))
+        return bool(error <= RESIDUAL_LIMIT * max(scale, np.abs(rhs).max(initial=0.0)))
 
 
 def _superlu(matrix: sp.csr_matrix) -> Any:
     options = {"SymmetricMode": True}
-    factors = splu(matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0, options=options)
+    try:
+        factors = splu(
+            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0, options=options
+        )
+    except RuntimeError as error:
+        raise SolverError(SINGULAR) from error
     return factors.solve
 
 
@@ -105,13 +124,12 @@ class _Pardiso:
     def __init__(self, pypardiso: Any, upper: sp.csr_matrix) -> None:
         self._upper = upper
         self._solver = pypardiso.PyPardisoSolver(mtype=PARDISO_SPD)
+        # Unlike __del__ this also comes in time when the interpreter ends.
+        weakref.finalize(self, self._solver.free_memory, everything=True)
         self._solver.factorize(upper)
 
     def __call__(self, rhs: Array) -> Array:
         return self._solver.solve(self._upper, np.asfortranarray(rhs)).reshape(rhs.shape)
-
-    def __del__(self) -> None:
-        self._solver.free_memory(everything=True)
 
 
 def _pardiso(matrix: sp.csr_matrix) -> _Pardiso | None:
@@ -120,7 +138,8 @@ def _pardiso(matrix: sp.csr_matrix) -> _Pardiso | None:
         return None
     try:
         return _Pardiso(pypardiso, sp.triu(matrix, format="csr"))
-    except pypardiso.pardiso_wrapper.PyPardisoError:
+    except (pypardiso.pardiso_wrapper.PyPardisoError, ValueError):
+        # A matrix that is not positive definite, or has an empty row.
         return None
 
 

@@ -12,27 +12,30 @@ from workflow.errors import OutOfMemory
 DENSE_MATRICES = 6
 # Fields per cell and increment: slips, depths per pressure, pressures, starts.
 FIELDS = 12
-# Sparse factors, meshes, plots and the interpreter with its libraries.
+# Sparse factors of a structure with this many nodes took this much; they grow with this power.
+FACTOR_BYTES, FACTOR_NODES, FACTOR_POWER = 3.5e9, 1e5, 1.4
+# Meshes, plots and the interpreter with its libraries.
 REST = 1.2e9
 BYTES = 8
 
 
-def required_bytes(case: Case) -> float:
-    """Upper estimate of the memory a run takes."""
+def required_bytes(case: Case, structure_nodes: int = 0) -> float:
+    """Upper estimate of the memory a run takes, with the nodes of both bodies once known."""
     nodes = case.mesh.flank_nodes[0] * case.mesh.flank_nodes[1]
     unknowns = 3 * 2 * nodes
     cells = case.contact.grid[0] * case.contact.grid[1]
     contact = 2 * cells * case.load_path.increments * FIELDS
-    return BYTES * (DENSE_MATRICES * unknowns**2 + contact) + REST
+    factors = FACTOR_BYTES * (structure_nodes / FACTOR_NODES) ** FACTOR_POWER
+    return BYTES * (DENSE_MATRICES * unknowns**2 + contact) + factors + REST
 
 
-def check_memory(case: Case) -> None:
+def check_memory(case: Case, structure_nodes: int = 0) -> None:
     """Raise :class:`OutOfMemory` if the machine has less than the case needs."""
-    required, available = required_bytes(case), _available_bytes()
+    required, available = required_bytes(case, structure_nodes), _available_bytes()
     if available is not None and required > available:
         raise OutOfMemory(
             f"this case needs about {required / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB "
-            "are free: lower mesh.flank_nodes or contact.grid"
+            "are free: lower mesh.flank_nodes, mesh.order or contact.grid, or raise mesh.size"
         )
 
 

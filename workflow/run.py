@@ -77,8 +77,12 @@ class WearRun:
     def execute(self, resume: bool) -> None:
         """Run to the end and write everything."""
         self._reporter.say(f"{'resume' if resume else 'run'}: {self._case.title}")
+        # Read first, so that a damaged one is told before anything is computed.
+        resumed = resume and self._folder.checkpoint.exists()
+        kept = checkpoint.load(self._folder.checkpoint) if resumed else None
         with self._reporter.stage("mesh"):
             mesh = self._structure.mesh
+        check_memory(self._case, self._structure.node_count())
         settings = [self._stage_settings(interface) for interface in mesh.interfaces]
         with contact_workers(settings) as workers:
             with self._reporter.stage("condensation"):
@@ -92,11 +96,9 @@ class WearRun:
             )
             state, first = loop.begin(unworn)
             warn_of_contact(self._case, self._structure, stages, state, first, self._reporter)
-            if resume and self._folder.checkpoint.exists():
-                state = checkpoint.load(self._folder.checkpoint)
-            else:
+            if kept is None:
                 loop.keep(state)
-            state = loop.advance(state, unworn)
+            state = loop.advance(kept or state, unworn)
         pairs = zip(stages, state.interfaces, strict=True)
         depths = [stage.nodal_depths(own) for stage, own in pairs]
         worn = self._solve_structure([one + two for one, two in depths], unworn)

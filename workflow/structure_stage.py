@@ -66,6 +66,12 @@ class StructureStage:
         """Both bodies with supports and loads, unworn."""
         return self._structure(self.mesh)
 
+    def node_count(self) -> int:
+        """Nodes of both bodies, midsides included."""
+        meshes = self.mesh.body_1.mesh, self.mesh.body_2.mesh
+        midsides = [mesh.nedges for mesh in meshes if self._case.mesh.order == 2]
+        return int(sum(mesh.nvertices for mesh in meshes) + sum(midsides))
+
     def self_locking(self) -> bool:
         """Whether friction alone can hold the blade in the slot."""
         return self._case.friction.coefficient > np.tan(self.dovetail.flank_angle)
@@ -90,7 +96,7 @@ class StructureStage:
             raise MethodFailed(
                 f"structural friction did not converge: residual {solution.residual:.1e} after "
                 f"{solution.iterations} iterations; refine load_path.increments or lower "
-                "friction.coefficient"
+                "friction.coefficient, and see that load_path.aerodynamic_moment opens no flank"
             )
         return solution
 

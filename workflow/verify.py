@@ -6,12 +6,17 @@ import json
 from pathlib import Path
 from typing import Any
 
+from rich.box import SIMPLE
 from rich.console import Console
-from rich.table import Table
+from rich.table import Column, Table
 
 from workflow.case import load_case
 from workflow.errors import UserError
 from workflow.run import run_case
+
+COLUMNS = "expected", "computed", "error", "verdict", "source"
+# Columns of text where the table goes to a file.
+FILE_WIDTH = 120
 
 
 def verify_cases(cases: tuple[Path, ...], out: Path) -> bool:
@@ -20,12 +25,15 @@ def verify_cases(cases: tuple[Path, ...], out: Path) -> bool:
     for path, case in loaded:
         if not case.expect:
             raise UserError(f"{path}: nothing to verify: the case has no `expect` list")
-    table = Table("case", "quantity", "expected", "computed", "error", "verdict", "source")
+    console = Console(highlight=False, markup=False)
+    if not console.is_terminal:
+        console.width = FILE_WIDTH
     met_all = True
     for path, case in loaded:
         folder = out / Path(path).stem
         run_case(case, folder, force=True)
         summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        table = Table(Column("quantity", no_wrap=True), *COLUMNS, title=str(path), box=SIMPLE)
         for entry in case.expect:
             computed = _lookup(summary, entry.quantity, path)
             error = abs(computed - entry.value) / (abs(entry.value) or 1.0)
@@ -34,11 +42,11 @@ def verify_cases(cases: tuple[Path, ...], out: Path) -> bool:
             row = (
                 f"{entry.value:.6g}",
                 f"{computed:.6g}",
-                f"{error:.2%}",
+                f"{error:.2%}" if entry.value else f"{error:.1e}",
                 "met" if met else "MISSED",
             )
-            table.add_row(Path(path).name, entry.quantity, *row, entry.source)
-    Console(highlight=False).print(table)
+            table.add_row(entry.quantity, *row, entry.source)
+        console.print(table)
     return met_all
 
 

@@ -1,10 +1,6 @@
 """Shared by the tests of ``workflow``: synthetic results, and runs of the small case."""
 
 import json
-import os
-import signal
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path

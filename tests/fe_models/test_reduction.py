@@ -1,0 +1,234 @@
+"""Two condensed bodies joined must be the two bodies glued, or moved apart, directly."""
+
+import numpy as np
+import pytest
+
+from fe_models.constraints import Constraints
+from fe_models.dovetail import dovetail_structure
+from fe_models.reduction import ConstrainedBody, interface_frames, join
+from sa_solver.types import Material
+
+ORDERS = [1, 2]
+STEEL, TITANIUM = Material(200e3, 0.3, 7.8e-9), Material(115e3, 0.29, 4.43e-9)
+
+
+class Stacked:
+    """A held box, and a floating one on it that is pulled at its top; both spin."""
+
+    def __init__(self, box, order):
+        self.lower = box((2, 3, 2), (0.0, 0.0, 0.0), (2.0, 3.0, 1.5), STEEL, order)
+        self.upper = box((2, 3, 3), (0.0, 0.0, 1.5), (2.0, 3.0, 4.0), TITANIUM, order)
+        self.nodes_1 = self.vertices(self.lower, "z1")
+        self.nodes_2 = self.vertices(self.upper, "z0")
+        rng = np.random.default_rng(0)
+        self.axes, _ = np.linalg.qr(rng.standard_normal((3, 3)))
+        self.constraints = []
+        for elastic, face in ((self.lower, "z1"), (self.upper, "z0")):
+            constraints = Constraints(len(elastic.nodes))
+            if elastic is self.lower:
+                constraints.hold(elastic.boundary_nodes("z0"))
+            constraints.average(*elastic.midsides(face))
+            self.constraints.append(constraints)
+        pull = self.upper.traction_load("z1", lambda x: x[0], np.array([0.6, 0.0, 0.8]))
+        self.loads = [
+            np.stack([1e6 * e.centrifugal_load(), second], axis=1)
+            for e, second in ((self.lower, 0.0 * self.lower.centrifugal_load()), (self.upper, pull))
+        ]
+        frames = np.tile(self.axes, (len(self.nodes_1), 1, 1))
+        self.bodies = [
+            ConstrainedBody(elastic, constraints, nodes, frames, loads)
+            for elastic, constraints, nodes, loads in zip(
+                (self.lower, self.upper),
+                self.constraints,
+                (self.nodes_1, self.nodes_2),
+                self.loads,
+                strict=True,
+            )
+        ]
+
+    @staticmethod
+    def vertices(elastic, face):
+        nodes = elastic.body.vertices(face)
+        x, y, _ = elastic.nodes[nodes].T
+        return nodes[np.lexsort((x, y))]
+
+    def joined(self):
+        return join(*(body.condense() for body in self.bodies))
+
+    def direct(self, relative, amplitudes):
+        """Both bodies with u_2 = u_1 + w on the face as constraints of one dense system.
+
+        Returns forces on body 2 in the frame and the displacements of both bodies.
+        """
+        matrices, loads = [], []
+        for elastic, constraints, load in zip(
+            (self.lower, self.upper), self.constraints, self.loads, strict=True
+        ):
+            t = constraints.transformation()
+            matrices.append((t, (t.T @ elastic.stiffness @ t).toarray()))
+            loads.append(t.T @ load @ amplitudes)
+        sizes = [len(load) for load in loads]
+        places = [
+            [(3 * n + k) for n in nodes for k in range(3)] for nodes in (self.nodes_1, self.nodes_2)
+        ]
+        columns = [t[place].indices for (t, _), place in zip(matrices, places, strict=True)]
+        # Saddle point: the multipliers are the contact forces on body 2.
+        count, total = len(columns[0]), sum(sizes)
+        system = np.zeros((total + count, total + count))
+        system[: sizes[0], : sizes[0]] = matrices[0][1]
+        system[sizes[0] : total, sizes[0] : total] = matrices[1][1]
+        jump = np.zeros((count, total))
+        jump[np.arange(count), columns[0]] = -1.0
+        jump[np.arange(count), sizes[0] + columns[1]] = 1.0
+        system[total:, :total] = jump
+        system[:total, total:] = -jump.T
+        right = np.concatenate([*loads, (relative @ self.axes).ravel()])
+        solution = np.linalg.solve(system, right)
+        force = solution[total:].reshape(-1, 3) @ self.axes.T
+        return force, (
+            matrices[0][0] @ solution[: sizes[0]],
+            matrices[1][0] @ solution[sizes[0] : total],
+        )
+
+
+@pytest.fixture(scope="module", params=ORDERS)
+def stacked(request, box):
+    return Stacked(box, request.param)
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-3])
+def test_joint_is_the_direct_solution(stacked, apart):
+    """Glued (w = 0) or at a given relative displacement, and all that lies inside."""
+    joint = stacked.joined()
+    amplitudes = np.array([2.0, 30.0])
+    relative = apart * np.random.default_rng(1).standard_normal((len(stacked.nodes_1), 3))
+    expected, displacements = stacked.direct(relative, amplitudes)
+    force = joint.stiffness @ relative.ravel() + joint.loads @ amplitudes
+    scale = np.abs(expected).max()
+    np.testing.assert_allclose(force.reshape(-1, 3), expected, atol=1e-9 * scale)
+
+    lower, interface = stacked.bodies[0].respond(-force, amplitudes)
+    upper = stacked.bodies[1].recover(interface + relative.ravel(), amplitudes)
+    for found, exact in zip((lower, upper), displacements, strict=True):
+        np.testing.assert_allclose(found, exact, atol=1e-9 * np.abs(exact).max())
+
+
+def test_floating_body_has_six_rigid_modes(stacked):
+    joint = stacked.joined()
+    values = np.linalg.eigvalsh(joint.stiffness)
+    assert joint.rigid_modes == 6
+    assert np.abs(values[:6]).max() < 1e-10 * values[-1]
+    assert joint.smallest == pytest.approx(values[6], rel=1e-6)
+    assert joint.largest == pytest.approx(values[-1], rel=1e-9)
+
+
+def test_stiffness_of_the_joint_is_symmetric(stacked):
+    stiffness = stacked.joined().stiffness
+    assert np.abs(stiffness - stiffness.T).max() < 1e-12 * np.abs(stiffness).max()
+
+
+def test_resolvent(stacked):
+    joint = stacked.joined()
+    resolvent = joint.resolvent()
+    identity = np.eye(len(joint.stiffness))
+    product = resolvent.inverse @ (joint.stiffness + resolvent.rho * identity)
+    np.testing.assert_allclose(product, identity, atol=1e-9)
+    assert resolvent.rho == pytest.approx(np.sqrt(joint.smallest * joint.largest))
+
+
+def test_order_2_faces_stay_linear_between_vertices(box):
+    """So that faces that touch at their vertices touch everywhere."""
+    stacked = Stacked(box, 2)
+    rng = np.random.default_rng(0)
+    displacement = stacked.bodies[1].recover(
+        rng.standard_normal(3 * len(stacked.nodes_2)), np.zeros(2)
+    ).reshape(-1, 3)
+    middle, parents = stacked.upper.midsides("z0")
+    assert len(middle) > 0
+    np.testing.assert_allclose(displacement[middle], displacement[parents].mean(axis=1))
+
+
+@pytest.mark.parametrize("order", ORDERS)
+def test_uniform_pressure_crosses_the_interface(box, order):
+    """Contact patch test: bodies of one material glued carry p times the nodal areas."""
+    stacked = Stacked(box, order)
+    stacked.lower = box((2, 3, 2), (0.0, 0.0, 0.0), (2.0, 3.0, 1.5), TITANIUM, order)
+    # Order 2 ties its midsides, which shares the load among the vertices of each triangle.
+    pressure, normal = 50.0, np.array([0.0, 0.0, 1.0])
+    bodies = []
+    for elastic, face, nodes in (
+        (stacked.lower, "z1", stacked.nodes_1),
+        (stacked.upper, "z0", stacked.nodes_2),
+    ):
+        constraints = Constraints(len(elastic.nodes))
+        for name in ("x0", "y0"):
+            constraints.slide(*elastic.boundary_normals(name))
+        constraints = Constraints(len(elastic.nodes))
+        if elastic is stacked.lower:
+            constraints.slide(*elastic.boundary_normals("z0"))
+            constraints.hold(np.array([elastic.nodes.sum(axis=1).argmin()]))
+            corner = np.linalg.norm(elastic.nodes - [0.0, 3.0, 0.0], axis=1).argmin()
+            constraints.slide(np.array([corner]), np.array([[1.0, 0.0, 0.0]]))
+        constraints.average(*elastic.midsides(face))
+        frames = np.tile(np.eye(3), (len(nodes), 1, 1))
+        load = np.zeros((3 * len(elastic.nodes), 1))
+        if elastic is stacked.upper:
+            press = elastic.traction_load("z1", lambda x: np.full_like(x[0], -pressure), normal)
+            load[:, 0] = press
+        bodies.append(ConstrainedBody(elastic, constraints, nodes, frames, load))
+    joint = join(*(body.condense() for body in bodies))
+    force = joint.loads[:, 0].reshape(-1, 3)
+    nodes, weights = box(
+        (2, 3, 3), (0.0, 0.0, 1.5), (2.0, 3.0, 4.0), TITANIUM, 1
+    ).boundary_weights("z0")
+    areas = weights[np.searchsorted(nodes, stacked.nodes_2)]
+    np.testing.assert_allclose(force[:, 2], pressure * areas, rtol=1e-8)
+    np.testing.assert_allclose(force[:, :2], 0.0, atol=1e-8 * pressure)
+
+
+def test_constrained_interface_node_is_refused(box):
+    stacked = Stacked(box, 1)
+    stacked.constraints[0].hold(stacked.nodes_1[:1])
+    with pytest.raises(ValueError, match="interface node is constrained"):
+        ConstrainedBody(
+            stacked.lower,
+            stacked.constraints[0],
+            stacked.nodes_1,
+            np.tile(np.eye(3), (len(stacked.nodes_1), 1, 1)),
+            stacked.loads[0],
+        )
+
+
+def test_dovetail_has_five_rigid_modes(structure, joint):
+    """Every motion of the blade but along the slot; H does not feel them."""
+    assert joint.rigid_modes == 5
+    along, point = structure.support_direction, structure.support_point
+    axes = interface_frames(structure.mesh.interfaces)
+    at = np.concatenate(
+        [structure.mesh.body_2.mesh.p[:, face.nodes_2].T for face in structure.mesh.interfaces]
+    )
+    translations = [np.tile(d, (len(at), 1)) for d in np.eye(3) if abs(d @ along) < 0.5]
+    rotations = [np.cross(axis, at - point) for axis in np.eye(3)]
+    for motion in translations + rotations:
+        w = np.einsum("nab,nb->na", axes, motion).ravel()
+        assert np.abs(joint.stiffness @ w).max() < 1e-9 * joint.largest * np.abs(w).max()
+    w = np.einsum("nab,b->na", axes, along).ravel()
+    assert np.abs(joint.stiffness @ w).max() > 1e-4 * joint.largest
+
+
+def test_order_2_dovetail_is_softer(dovetail, titanium, mission):
+    """Its space of displacements is larger, so its energy under the same loads is."""
+    mesh = dovetail.mesh((4, 4), 15.0)
+    energies = []
+    for order in ORDERS:
+        structure = dovetail_structure(dovetail, mesh, titanium, titanium, mission, order)
+        joint = structure.condense()
+        assert joint.rigid_modes == 5
+        assert np.abs(joint.stiffness - joint.stiffness.T).max() < 1e-12 * joint.largest
+        stiffness = joint.stiffness / joint.largest
+        energies.append((joint.largest, stiffness))
+    w = np.random.default_rng(0).standard_normal((len(energies[0][1]), 10))
+    stiff, soft = (
+        np.einsum("an,an->n", w, largest * matrix @ w) for largest, matrix in energies
+    )
+    assert np.all(soft < stiff)

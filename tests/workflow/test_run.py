@@ -1,0 +1,283 @@
+"""Runs of the small case: what they leave, what they conserve, and how odd cases end."""
+
+import h5py
+import numpy as np
+import pytest
+
+from workflow import memory
+from workflow.case import load_case
+
+UM3_PER_J = 1e-12
+# Few and quick increments for the odd cases, where a run is only to end well.
+QUICK = "load_path.increments=5", "load_path.peak_at=2", "contact.grid=[16, 24]"
+
+
+def balances(run, laws):
+    """Volume from surfaces = volume of the kinetics = coefficient x energy, per body."""
+    with h5py.File(run.folder / "results.h5") as file:
+        for name in file["grid"]:
+            surfaces, kinetics = file["surfaces"][name], file["kinetics"][name]
+            area = np.prod(file["grid"][name].attrs["pitch"])
+            unworn = surfaces["00000"]
+            for number, jump in enumerate(sorted(surfaces)):
+                for body, sign in ((1, -1.0), (2, 1.0)):
+                    depth = sign * (surfaces[jump][f"body_{body}"][()] - unworn[f"body_{body}"])
+                    volume = kinetics[f"volume_{body}"][number]
+                    energy = kinetics["energy"][number]
+                    # Heights of the other body are large beside its depths: rounding.
+                    assert depth.sum() * area == pytest.approx(volume, rel=1e-9, abs=1e-12)
+                    assert depth.max() == pytest.approx(
+                        kinetics[f"depth_{body}"][number], rel=1e-9, abs=1e-14
+                    )
+                    assert volume == pytest.approx(laws[body] * energy, rel=1e-10, abs=0.0)
+            for key, column in run.summary["kinetics"][name].items():
+                np.testing.assert_array_equal(kinetics[key], column)
+                assert run.summary[name][key] == column[-1]
+
+
+# --- what a run leaves --------------------------------------------------------------------------
+
+
+def test_folder_holds_what_it_promises(whole):
+    names = {path.name for path in whole.folder.iterdir()}
+    assert names == {
+        *("case.yaml", "summary.json", "results.h5", "checkpoint.h5", "run.log", "worn.msh"),
+    }
+    assert whole.summary["jumps"] == 3
+    assert whole.summary["kinetics"]["cycles"] == [0.0, 1e4, 2e4, 3e4]
+    assert whole.summary["warnings"] == []
+    assert "Traceback" not in whole.ending.stderr
+
+
+def test_every_dataset_has_unit_and_description(whole):
+    lacking = []
+
+    def look(name, item):
+        if isinstance(item, h5py.Dataset) and not (
+            item.attrs.get("unit") and item.attrs.get("description")
+        ):
+            lacking.append(name)
+
+    with h5py.File(whole.folder / "results.h5") as file:
+        file.visititems(look)
+        assert file["case"].attrs["text"] == (whole.folder / "case.yaml").read_text("utf-8")
+    assert lacking == []
+
+
+def test_volumes_heights_and_energies_agree(whole):
+    balances(whole, {1: 1e4 * UM3_PER_J, 2: 1e4 * UM3_PER_J})
+
+
+def test_worn_mesh_holds_the_worn_volume(whole):
+    """The grid's wear is moved to the mesh with its volume; the discrete move loses 1e-4."""
+    for name in ("intrados", "extrados"):
+        own = whole.summary[name]
+        for body in (1, 2):
+            assert own[f"mesh_volume_{body}"] == pytest.approx(own[f"volume_{body}"], rel=1e-3)
+
+
+def test_symmetric_load_wears_both_flanks_alike(whole):
+    one, other = (whole.summary[name] for name in ("intrados", "extrados"))
+    for key in ("volume_1", "depth_1", "energy"):
+        assert one[key] == pytest.approx(other[key], rel=1e-6)
+
+
+def test_explicit_run_with_a_law_for_each_body_and_its_overrides_on_record(start, tmp_path):
+    run = start(
+        tmp_path / "out",
+        *("wear.step.kind=explicit", "wear.step.cycles=2000", "wear.cycles=6000"),
+        *("wear.disk.coefficient=500 um^3/J", "wear.blade.coefficient=2000 um^3/J"),
+    )
+    assert run.ending.exit_code == 0
+    assert run.summary["warnings"] == []
+    balances(run, {1: 500 * UM3_PER_J, 2: 2000 * UM3_PER_J})
+    recorded = load_case(run.folder / "case.yaml")
+    assert (recorded.wear.step.kind, recorded.wear.cycles) == ("explicit", 6000.0)
+
+
+def test_two_runs_are_bitwise_equal(start, whole, tmp_path):
+    again = start(tmp_path / "out")
+    first, second = whole.heights(), again.heights()
+    assert first.keys() == second.keys()
+    for name, height in first.items():
+        np.testing.assert_array_equal(height, second[name], err_msg=name)
+    assert again.summary["structure"]["from_cache"]
+    assert again.summary["kinetics"] == whole.summary["kinetics"]
+
+
+def test_pictures_are_written(start, tmp_path):
+    run = start(tmp_path / "out", "output.paraview=true", "output.figures=true", *QUICK)
+    assert run.ending.exit_code == 0, run.ending.stderr
+    assert len(list((run.folder / "figures").glob("*.png"))) == 6
+    assert (run.folder / "paraview" / "structure.pvd").exists()
+    assert not list(run.folder.rglob("*.part"))
+
+
+# --- steps and stops ----------------------------------------------------------------------------
+
+
+def test_last_jump_is_clipped_to_the_cycles_left(start, tmp_path):
+    run = start(tmp_path / "out", "wear.cycles=25000", *QUICK)
+    assert run.summary["kinetics"]["cycles"] == [0.0, 1e4, 2e4, 2.5e4]
+
+
+def test_jumps_that_add_up_leave_no_jump_of_rounding(start, tmp_path):
+    """Nine times 3e4/9 is not quite 3e4."""
+    assert sum([3e4 / 9] * 9) < 3e4
+    run = start(tmp_path / "out", "wear.cycles=30000", f"wear.step.cycles={3e4 / 9!r}", *QUICK)
+    assert run.summary["jumps"] == 9
+    assert run.summary["cycles"] == pytest.approx(3e4, rel=1e-12)
+
+
+def test_step_and_stop_by_depth(start, tmp_path):
+    """No jump wears much more than the step; the run ends with the jump that reaches the stop."""
+    small, stop = 0.1e-3, 0.35e-3
+    run = start(
+        tmp_path / "out",
+        *("wear.step.cycles=", "wear.step.depth=0.1 um", "wear.stop.depth=0.35 um", *QUICK),
+    )
+    assert run.ending.exit_code == 0, run.ending.stderr
+    kinetics = run.summary["kinetics"]
+    depths = np.max([kinetics[name]["depth_1"] for name in ("intrados", "extrados")], axis=0)
+    assert run.summary["cycles"] < 3e4
+    assert np.all(np.diff(depths) <= 1.2 * small)
+    assert depths[-2] < stop <= depths[-1]
+
+
+def test_step_and_stop_by_volume(start, tmp_path):
+    run = start(
+        tmp_path / "out",
+        *("wear.step.cycles=", "wear.step.volume=0.05 mm^3", "wear.stop.volume=0.12 mm^3", *QUICK),
+    )
+    kinetics = run.summary["kinetics"]
+    names = [f"volume_{body}" for body in (1, 2)]
+    volumes = np.sum(
+        [kinetics[flank][name] for flank in ("intrados", "extrados") for name in names], axis=0
+    )
+    np.testing.assert_allclose(np.diff(volumes), 0.05, rtol=0.02)
+    assert volumes[-2] < 0.12 <= volumes[-1]
+
+
+# --- back to the structure ----------------------------------------------------------------------
+
+
+def test_small_drift_limit_solves_the_structure_again(start, whole, tmp_path):
+    run = start(tmp_path / "out", "coupling.drift=1e-5")
+    assert whole.summary["structure"]["solutions"] == 1
+    assert run.summary["structure"]["solutions"] == 4
+    assert max(run.summary["structure"]["drift"]) > 1e-5
+    # Measured from the last solution: the drift of a single jump, where it adds up without.
+    (_, first, _, last), (_, begun, _, added) = (
+        own.summary["structure"]["drift"] for own in (run, whole)
+    )
+    assert first == begun
+    assert last < 1.5 * first
+    assert added > 2.0 * begun
+    volumes = [own.summary["intrados"]["volume_1"] for own in (whole, run)]
+    assert volumes[0] != volumes[1]
+    assert volumes[0] == pytest.approx(volumes[1], rel=0.02)
+
+
+def test_constant_resultants_never_drift(start, whole, tmp_path):
+    run = start(tmp_path / "out", "coupling.resultants=constant")
+    assert run.summary["structure"]["solutions"] == 1
+    assert run.summary["structure"]["drift"] == [0.0] * 4
+    # Where nothing drifts beyond the limit, both ways are one.
+    for name, height in whole.heights().items():
+        np.testing.assert_array_equal(height, run.heights()[name], err_msg=name)
+
+
+# --- warnings -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("overrides", "words"),
+    [
+        (
+            ["wear.step.kind=explicit", "wear.step.cycles=5e5", "friction.coefficient=1.2"],
+            ["amplify the grid's roughness", "locks itself"],
+        ),
+        (
+            [
+                *("structure.edge_radius=3 mm", "structure.edge_width=0.2 mm"),
+                *("materials.disk.yield_stress=100 MPa", "wear.cycles=1e4"),
+            ],
+            [
+                *("of the pressure peak at the edge", "touches the border"),
+                "above the yield stress of 100 MPa",
+            ],
+        ),
+    ],
+    ids=["steps and locking", "edges and yield"],
+)
+def test_warnings(start, tmp_path, overrides, words):
+    run = start(tmp_path / "out", "wear.cycles=1e6", *QUICK, *overrides)
+    assert run.ending.exit_code == 0, run.ending.stderr
+    told = " ".join(run.ending.stderr.split())
+    for some in words:
+        assert any(some in warning for warning in run.summary["warnings"]), some
+        assert some in told
+
+
+# --- odd cases ----------------------------------------------------------------------------------
+
+
+def test_without_friction_nothing_wears(start, tmp_path):
+    run = start(tmp_path / "out", "friction.coefficient=0", *QUICK, "output.figures=true")
+    assert run.ending.exit_code == 0, run.ending.stderr
+    own = run.summary["intrados"]
+    assert (own["energy"], own["depth_1"], own["volume_2"]) == (0.0, 0.0, 0.0)
+    # Exact without friction: P = F / (2 sin θ); F is that of the case's own expectation.
+    load = 78523.5 * (np.sin(np.pi / 4) + 0.4 * np.cos(np.pi / 4)) / np.sin(np.pi / 4)
+    assert own["peak_load"]["unworn"]["P"] == pytest.approx(load, rel=1e-3)
+
+
+@pytest.mark.parametrize("step", ["wear.step.cycles=1e4", "wear.step.depth=1 um"])
+def test_without_wear_coefficient_nothing_wears(start, tmp_path, step):
+    zero = "wear.disk.coefficient=0", "wear.blade.coefficient=0"
+    run = start(tmp_path / "out", "wear.step.cycles=", *zero, *QUICK, step)
+    assert run.ending.exit_code == 0, run.ending.stderr
+    assert run.summary["cycles"] == 3e4
+    assert run.summary["intrados"]["volume_1"] == 0.0
+    assert run.summary["intrados"]["energy"] > 0.0
+
+
+def test_blade_without_airfoil_pulls_by_its_own_mass(start, tmp_path):
+    run = start(tmp_path / "out", "load_path.airfoil_mass=0", "wear.cycles=1e4", *QUICK)
+    assert run.ending.exit_code == 0, run.ending.stderr
+    force = 628.3185**2 * 0.28976e-3 * 254.72
+    load = force / (2.0 * np.sin(np.pi / 4) * 1.4)
+    assert run.summary["intrados"]["peak_load"]["unworn"]["P"] == pytest.approx(load, rel=5e-3)
+
+
+@pytest.mark.parametrize("moment", ["1000 N*m", "3000 N*m"])
+def test_moment_that_opens_a_flank_ends_well(start, tmp_path, moment):
+    """Either a result, or one line that says why there is none."""
+    run = start(
+        tmp_path / "out", f"load_path.aerodynamic_moment={moment}", "wear.cycles=1e4", *QUICK
+    )
+    assert run.ending.exit_code in (0, 3), run.ending.stderr
+    assert "Traceback" not in run.ending.stderr
+    if run.ending.exit_code == 3:
+        assert run.ending.stderr.splitlines()[-1].startswith("fretscale: ")
+    else:
+        text = (run.folder / "summary.json").read_text("utf-8")
+        assert "NaN" not in text
+        assert "Infinity" not in text
+
+
+def test_too_little_memory_ends_before_anything_is_done(start, monkeypatch, tmp_path):
+    monkeypatch.setattr(memory, "_available_bytes", lambda: 1e9)
+    run = start(tmp_path / "out")
+    assert run.ending.exit_code == 4
+    (line,) = run.ending.stderr.splitlines()
+    assert "1.0 GB are free: lower mesh.flank_nodes" in line
+    assert not run.folder.exists()
+
+
+def test_geometry_that_cannot_be_drawn_is_a_bad_case(start, tmp_path):
+    run = start(tmp_path / "out", "structure.slot_fillet=20 mm")
+    assert run.ending.exit_code == 2
+    (line,) = run.ending.stderr.splitlines()
+    assert "structure: slot_fillet 20 mm is too large" in line
+    assert not run.folder.exists()
