@@ -10,12 +10,16 @@ from sa_solver.types import Array
 
 Indices = NDArray[np.int64]
 
+# An equation whose coefficients shrink to this share, once others are put in, says nothing new.
+ALREADY_MET = 1e-9
+
 
 class Constraints:
     """Collects constraints on ``3 n`` displacements, numbered ``3 node + component``.
 
-    A displacement that is already constrained is left as it is, so that the order of the calls
-    decides where two supports meet: hold first, then slide.
+    Where supports meet, each adds what the earlier ones leave free: a node that slides on two
+    planes moves along their edge, one that is held stays held. Only displacements that nothing
+    constrains yet can be averaged: tie nodes last.
     """
 
     def __init__(self, nodes: int) -> None:
@@ -30,8 +34,7 @@ class Constraints:
     def slide(self, nodes: Indices, normals: Array) -> None:
         """Let nodes move only across ``normals`` ``(n, 3)``: u·n = 0."""
         for node, normal in zip(nodes, normals, strict=True):
-            if 3 * int(node) not in self._eliminated:
-                self._equation(3 * int(node) + np.arange(3), normal)
+            self._equation(3 * int(node) + np.arange(3), normal)
 
     def zero_mean(self, nodes: Indices, weights: Array, direction: Array) -> None:
         """Hold the weighted mean displacement of the nodes along a unit ``direction``."""
@@ -46,10 +49,28 @@ class Constraints:
                 self._eliminate(3 * int(node) + component, 3 * row + component, share)
 
     def _equation(self, dofs: Indices, coefficients: Array) -> None:
-        pivot = int(np.argmax(np.abs(coefficients)))
-        others = np.flatnonzero(coefficients)
+        """Impose Σ c u = 0 by the free displacement that counts most in it, if there is one."""
+        free, shares = self._in_free(dofs, coefficients)
+        if np.abs(shares).max(initial=0.0) <= ALREADY_MET * np.abs(coefficients).max():
+            return
+        pivot = int(np.argmax(np.abs(shares)))
+        others = np.flatnonzero(shares)
         others = others[others != pivot]
-        self._eliminate(int(dofs[pivot]), dofs[others], -coefficients[others] / coefficients[pivot])
+        self._eliminate(int(free[pivot]), free[others], -shares[others] / shares[pivot])
+
+    def _in_free(self, dofs: Indices, coefficients: Array) -> tuple[Indices, Array]:
+        """Σ c u in the displacements that are not constrained yet: so no chain is ever closed."""
+        terms: dict[int, float] = {}
+        pending = list(zip(dofs.tolist(), coefficients.tolist(), strict=True))
+        while pending:
+            dof, share = pending.pop()
+            if dof in self._eliminated:
+                masters, factors = self._eliminated[dof]
+                pending += zip(masters.tolist(), (share * factors).tolist(), strict=True)
+            else:
+                terms[dof] = terms.get(dof, 0.0) + share
+        order = sorted(terms)
+        return np.array(order, dtype=np.int64), np.array([terms[dof] for dof in order])
 
     def _eliminate(self, dof: int, masters: Indices, coefficients: Array) -> None:
         self._eliminated.setdefault(dof, (masters, coefficients))

@@ -82,7 +82,7 @@ class ElasticBody:
     def boundary_integral(self, boundary: str, integrand: Callable[[Array], Array]) -> float:
         """Integral over a named boundary of a function of points ``(3, ...)``."""
         basis = self._facet_basis(boundary)
-        return float(np.sum(integrand(basis.global_coordinates().value) * basis.dx))
+        return float(np.sum(integrand(np.asarray(basis.global_coordinates())) * basis.dx))
 
     def boundary_weights(self, boundary: str) -> tuple[NDArray[np.int64], Array]:
         """Nodes of a boundary and the area each stands for, so that Σ w u = ∫ u dA."""

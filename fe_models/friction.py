@@ -157,7 +157,7 @@ def _starts(found: list[Array], guess: Sequence[Array], loads: Array) -> list[Ar
         starts.append(guess[increment] + found[-1] - guess[increment - 1])
     if increment > 1:
         step, before = np.diff(loads[-3:], axis=0)[::-1]
-        ratio = float(step @ before / (before @ before))
-        if ratio > 0.0:
+        if step @ before > 0.0:
+            ratio = (step @ before) / (before @ before)
             starts.append(found[-1] + ratio * (found[-1] - found[-2]))
     return starts

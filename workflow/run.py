@@ -24,7 +24,7 @@ from workflow.output import Outcome, write_output
 from workflow.reporter import Reporter
 from workflow.store import write_arrays
 from workflow.structure_stage import SIDES, StructureStage
-from workflow.warnings import warn_of_contact, warn_of_structure
+from workflow.warnings import warn_of_contact, warn_of_growth, warn_of_structure
 from workflow.workers import Workers, contact_workers
 
 # Jumps that add up to the cycles of the run but for rounding leave no jump over.
@@ -169,6 +169,7 @@ class WearLoop:
         with self._reporter.stage("wear"):
             jumped = self._workers.call("jump", state.interfaces, [cycles] * len(self._stages))
         state = replace(state, interfaces=tuple(own for own, _ in jumped))
+        warn_of_growth(self._stages, state, self._reporter)
         state, drift = self._follow_drift(state, unworn)
         state = state.record(float(state.cycles[-1]) + cycles, self._areas, drift)
         convolutions = sum(spent for _, spent in jumped)

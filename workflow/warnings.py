@@ -58,10 +58,7 @@ def warn_of_contact(
                 f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there"
             )
         if result.touches_border:
-            reporter.warn(
-                f"{stage.name}: the contact touches the border of its grid: widen "
-                "structure.edge_width or structure.end_width"
-            )
+            warn_of_border(stage, reporter)
         load = float(own.loads.P[structure.peak])
         for edge, error in edge_peak_errors(case, stage, load).items():
             if abs(error) > PEAK_ERROR:
@@ -69,6 +66,22 @@ def warn_of_contact(
                     f"{stage.name}: the grid misses {abs(error):.0%} of the pressure peak at the "
                     f"{edge}: refine contact.grid or increase structure.{edge}_radius"
                 )
+
+
+def warn_of_growth(stages: list[ContactStage], state: RunState, reporter: Reporter) -> None:
+    """Contacts that have grown to the border of their grid: they have worn there."""
+    for stage, own in zip(stages, state.interfaces, strict=True):
+        worn = own.surfaces.depth_1 + own.surfaces.depth_2
+        if worn[[0, -1], :].any() or worn[:, [0, -1]].any():
+            warn_of_border(stage, reporter)
+
+
+def warn_of_border(stage: ContactStage, reporter: Reporter) -> None:
+    """A contact cut off by the end of its grid."""
+    reporter.warn(
+        f"{stage.name}: the contact touches the border of its grid, where it is cut off: widen "
+        "structure.edge_width or structure.end_width"
+    )
 
 
 def edge_peak_errors(case: Case, stage: ContactStage, load: float) -> dict[str, float]:

@@ -109,3 +109,28 @@ def test_first_support_wins():
     constraints.hold(np.array([0]))
     constraints.slide(np.array([0, 1]), np.array([[0.0, 1.0, 0.0], [0.0, 1.0, 0.0]]))
     spans_null_space(constraints, np.eye(3 * NODES)[[0, 1, 2, 4]])
+
+
+@pytest.mark.parametrize("second", [[0.0, 1.0, 0.0], [0.6, 0.8, 0.0], [0.1, 0.2, 0.3]])
+def test_node_on_two_planes_moves_along_their_edge(second):
+    constraints = Constraints(NODES)
+    planes = np.array([[1.0, 0.0, 0.0], second])
+    constraints.slide(np.array([2, 2]), planes)
+    spans_null_space(constraints, np.hstack([np.zeros((2, 6)), planes, np.zeros((2, 9))]))
+
+
+def test_three_planes_hold_a_node(rng):
+    constraints = Constraints(NODES)
+    constraints.slide(np.array([0, 0, 0, 0]), rng.standard_normal((4, 3)))
+    spans_null_space(constraints, np.eye(3 * NODES)[:3])
+
+
+def test_mean_over_nodes_that_are_constrained_in_part(rng):
+    """Its equation holds all the same."""
+    constraints = Constraints(NODES)
+    constraints.hold(np.array([0]))
+    normal = np.array([[0.0, 0.0, 1.0]])
+    constraints.slide(np.array([1]), normal)
+    constraints.zero_mean(np.array([0, 1, 2]), np.array([5.0, 3.0, 1.0]), normal[0])
+    equations = [*np.eye(3 * NODES)[[0, 1, 2, 5]], row({2: 5.0, 5: 3.0, 8: 1.0})]
+    spans_null_space(constraints, np.array(equations))

@@ -280,10 +280,16 @@ def reference(start, tmp_path_factory):
 
 
 def kill_and_resume(small_path, folder, moments):
-    """Kill the run, and every resumption, after the given seconds; returns how many were hit."""
+    """Kill the run, and every resumption; returns how many were hit.
+
+    ``moments`` are pairs: the jump to wait for, or None, and the seconds after it.
+    """
     arguments, kills = command(small_path, folder), 0
-    for seconds in moments:
+    for jump, seconds in moments:
         process = Process(*arguments)
+        if jump is not None:
+            file = folder / "jumps" / f"{jump:05d}.h5"
+            assert wait_until(lambda file=file: file.exists(), PATIENCE)
         if process.ended(seconds):
             code, text = process.finish()
             assert code == 0, text
@@ -303,8 +309,8 @@ def kill_and_resume(small_path, folder, moments):
 
 @posix_only
 def test_three_kills_lose_nothing(small_path, resume, reference, tmp_path):
-    moments = [2.5, 2.5, 3.0]
-    assert kill_and_resume(small_path, tmp_path / "out", moments) >= 2
+    moments = [(0, 0.0), (3, 0.02), (8, 0.05)]
+    assert kill_and_resume(small_path, tmp_path / "out", moments) == 3
     assert_equal_after(resume, tmp_path / "out", reference)
 
 
@@ -315,7 +321,7 @@ def test_twenty_kills_lose_nothing(small_path, resume, reference, tmp_path):
     dice, kills, number = random.Random(20), 0, 0
     while kills < 20:
         folder = tmp_path / f"out{number}"
-        moments = [dice.uniform(0.2, RUN_SECONDS) for _ in range(4)]
+        moments = [(None, dice.uniform(0.2, RUN_SECONDS)) for _ in range(4)]
         kills += kill_and_resume(small_path, folder, moments)
         assert_equal_after(resume, folder, reference)
         number += 1
