@@ -20,7 +20,7 @@ from sa_solver.types import Array
 
 # A backward-stable factorisation leaves about 1e-13; anything above this is a wrong answer.
 RESIDUAL_LIMIT = 1e-9
-# |K| |u| / |f|, at most the condition number: 1e2 to 1e4 where a body is held, 1e16 where it is not.
+# |K| |u| / |f|, at most the condition number: 1e2 to 1e4 if a body is held, 1e16 if it is not.
 GROWTH_LIMIT = 1e12
 # Interface unknowns condensed at once without PARDISO: enough to amortise, little memory.
 COLUMNS_AT_ONCE = 256

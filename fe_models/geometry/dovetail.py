@@ -198,7 +198,7 @@ class Dovetail:
         slot = bottom[1] - self.root_depth - self.slot_clearance
         inner, outer = self.rim_radius - self.disk_height, self.rim_radius + self.lug_height
         tangent = np.tan(np.pi / self.blades)
-        # Up the flank, as the blade's section: gmsh then splits both faces along the same diagonals.
+        # Up the flank, as the blade's section: gmsh then splits both faces along equal diagonals.
         return _chain(
             [
                 ("", (0.0, slot)),

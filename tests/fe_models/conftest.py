@@ -71,13 +71,17 @@ def coarse_mesh(dovetail: Dovetail) -> StructureMesh:
 def structure_of(
     dovetail: Dovetail, titanium: Material, mission: Mission
 ) -> Callable[..., tuple[Structure, JointStiffness]]:
-    """Coarse structure and condensed joint of the default dovetail with some fields changed."""
+    """Coarse structure and condensed joint of the default dovetail with some fields changed.
+
+    Of the mission only the airfoil is built in; speeds and moment are amplitudes.
+    """
 
     @cache
-    def build(**changes) -> tuple[Structure, JointStiffness]:
+    def build(airfoil_mass: float = 0.8e-3, **changes) -> tuple[Structure, JointStiffness]:
         changed = replace(dovetail, **changes)
         mesh = changed.mesh(FLANK_NODES, SIZE)
-        structure = dovetail_structure(changed, mesh, titanium, titanium, mission, 1)
+        lifted = replace(mission, airfoil_mass=airfoil_mass)
+        structure = dovetail_structure(changed, mesh, titanium, titanium, lifted, 1)
         return structure, structure.condense()
 
     return build

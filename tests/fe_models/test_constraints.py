@@ -62,11 +62,7 @@ def test_zero_mean(rng):
     direction = np.array([0.6, 0.8, 0.0])
     constraints.zero_mean(nodes, weights, direction)
     equation = row(
-        {
-            3 * n + k: w * direction[k]
-            for n, w in zip(nodes, weights, strict=True)
-            for k in range(3)
-        }
+        {3 * n + k: w * direction[k] for n, w in zip(nodes, weights, strict=True) for k in range(3)}
     )
     spans_null_space(constraints, equation[None])
 

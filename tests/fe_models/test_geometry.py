@@ -38,9 +38,7 @@ def test_faces_are_split_along_the_same_diagonals(joint_and_mesh):
     _, mesh = joint_and_mesh
     for face in mesh.interfaces:
         number = {int(node): k for k, node in enumerate(face.nodes_1)}
-        of_body_1 = [
-            sorted(number[int(v)] for v in row) for row in mesh.body_1.facets(face.name)
-        ]
+        of_body_1 = [sorted(number[int(v)] for v in row) for row in mesh.body_1.facets(face.name)]
         assert sorted(of_body_1) == sorted(np.sort(face.facets, axis=1).tolist())
 
 
@@ -48,9 +46,7 @@ def test_flanks_have_their_area(joint_and_mesh):
     """The face is a parallelogram of flank width and slot length."""
     dovetail, mesh = joint_and_mesh
     for side, face in zip((1, -1), mesh.interfaces, strict=True):
-        up = np.array(
-            [-side * np.sin(dovetail.flank_angle), 0.0, np.cos(dovetail.flank_angle)]
-        )
+        up = np.array([-side * np.sin(dovetail.flank_angle), 0.0, np.cos(dovetail.flank_angle)])
         edges = dovetail.flank_width * up, dovetail.slot_length * dovetail.slot_direction
         area = np.linalg.norm(np.cross(*edges))
         assert face.nodal_areas.sum() == pytest.approx(area, rel=1e-12)

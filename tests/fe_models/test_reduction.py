@@ -140,9 +140,11 @@ def test_order_2_faces_stay_linear_between_vertices(box):
     """So that faces that touch at their vertices touch everywhere."""
     stacked = Stacked(box, 2)
     rng = np.random.default_rng(0)
-    displacement = stacked.bodies[1].recover(
-        rng.standard_normal(3 * len(stacked.nodes_2)), np.zeros(2)
-    ).reshape(-1, 3)
+    displacement = (
+        stacked.bodies[1]
+        .recover(rng.standard_normal(3 * len(stacked.nodes_2)), np.zeros(2))
+        .reshape(-1, 3)
+    )
     middle, parents = stacked.upper.midsides("z0")
     assert len(middle) > 0
     np.testing.assert_allclose(displacement[middle], displacement[parents].mean(axis=1))
@@ -177,9 +179,9 @@ def test_uniform_pressure_crosses_the_interface(box, order):
         bodies.append(ConstrainedBody(elastic, constraints, nodes, frames, load))
     joint = join(*(body.condense() for body in bodies))
     force = joint.loads[:, 0].reshape(-1, 3)
-    nodes, weights = box(
-        (2, 3, 3), (0.0, 0.0, 1.5), (2.0, 3.0, 4.0), TITANIUM, 1
-    ).boundary_weights("z0")
+    nodes, weights = box((2, 3, 3), (0.0, 0.0, 1.5), (2.0, 3.0, 4.0), TITANIUM, 1).boundary_weights(
+        "z0"
+    )
     areas = weights[np.searchsorted(nodes, stacked.nodes_2)]
     np.testing.assert_allclose(force[:, 2], pressure * areas, rtol=1e-8)
     np.testing.assert_allclose(force[:, :2], 0.0, atol=1e-8 * pressure)

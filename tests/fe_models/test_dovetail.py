@@ -1,0 +1,225 @@
+"""The dovetail under its mission: loads, equilibrium, and the laws of two-flank joints."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fe_models import friction
+from fe_models.friction import FrictionalJoint
+from fe_models.remesh import element_volumes
+from fe_models.structure import load_history
+from sa_solver.types import LoadHistory
+
+DEGREES = np.pi / 180.0
+# The disk of the default case is too stout: at 60° the slot opens so little under speed that
+# parts of the flanks never slide. A deep disk with few blades opens it more, a light airfoil
+# closes the flanks less: every flank angle then slides as a whole.
+COMPLIANT = {"disk_height": 200.0, "blades": 16, "airfoil_mass": 0.4e-3}
+PEAK = 7
+
+
+def pull(structure, amplitudes):
+    """Total force on the blade along the load axis at every increment [N]."""
+    axis = np.array([0.0, 0.0, 1.0])
+    return np.array([structure.body_2.load_resultants(a, 0.0 * axis)[0] @ axis for a in amplitudes])
+
+
+def test_speed_rises_and_falls(mission):
+    speeds = mission.speeds() / mission.rotation_speed
+    np.testing.assert_allclose(speeds[:8], np.arange(1, 9) / 8)
+    np.testing.assert_allclose(speeds[7:], np.arange(14, -1, -1) / 14, atol=1e-15)
+    amplitudes = mission.amplitudes()
+    np.testing.assert_allclose(amplitudes[:, 0], mission.speeds() ** 2)
+    np.testing.assert_allclose(amplitudes[:, 1], 30e3 * speeds**2)
+
+
+def test_blade_carries_its_mass_the_airfoil_and_the_moment(structure, mission):
+    """F = Ω² (ρ V r + m R); the moment acts about the slot and along it."""
+    amplitudes = mission.amplitudes()[PEAK]
+    mesh = structure.mesh.body_2.mesh
+    moments = mesh.p[:, mesh.t].mean(axis=1) @ np.abs(element_volumes(mesh))
+    force, moment = structure.body_2.load_resultants(amplitudes, np.zeros(3))
+    expected = amplitudes[0] * (4.43e-9 * moments[2] + 0.8e-3 * 400.0)
+    assert force[2] == pytest.approx(expected, rel=1e-10)
+    np.testing.assert_allclose(force[:2], 0.0, atol=1e-9 * expected)
+    # Pulling at X > 0 turns about -Y.
+    np.testing.assert_allclose(moment, [0.0, -30e3, 0.0], atol=1e-8 * expected)
+
+
+def test_moment_presses_on_the_intrados(solved, mission):
+    intrados, extrados = (h.loads for h in solved(0.4, mission).histories)
+    assert np.all(intrados.P[:8] > extrados.P[:8])
+
+
+@pytest.mark.parametrize("mu", [0.0, 0.2, 0.4, 0.8])
+@pytest.mark.parametrize("angle", [35, 45, 55, 65])
+def test_flanks_carry_the_pull(structure_of, solved, symmetric, angle, mu):
+    """F = 2 (P sin θ - Qx cos θ) at every increment, on both flanks alike."""
+    theta = angle * DEGREES
+    structure, _ = structure_of(flank_angle=theta)
+    cycle = solved(mu, symmetric, flank_angle=theta)
+    assert cycle.converged
+    force = pull(structure, symmetric.amplitudes())
+    both = [h.loads for h in cycle.histories]
+    total = sum(load.P * np.sin(theta) - load.Qx * np.cos(theta) for load in both)
+    np.testing.assert_allclose(total, force, atol=1e-6 * force.max())
+    for name in ("P", "Qx"):
+        one, two = (getattr(load, name) for load in both)
+        # Mirrored problems, each solved to friction.TOLERANCE.
+        np.testing.assert_allclose(one, two, atol=1e-6 * force.max())
+
+
+def test_flanks_are_alike_to_the_last_digits(structure, joint, symmetric, monkeypatch):
+    """The mesh is its own mirror image, so what differs is the solver's remainder."""
+    monkeypatch.setattr(friction, "TOLERANCE", 1e-12)
+    frictional = FrictionalJoint(joint.resolvent(), 0.4)
+    cycle = structure.solve_cycle(frictional, symmetric.amplitudes(), structure.gap(), 0.4)
+    assert cycle.converged
+    intrados, extrados = (h.loads for h in cycle.histories)
+    largest = intrados.P.max()
+    for name, sign in (("P", 1), ("Qx", 1), ("Qy", -1), ("Mx", -1), ("My", 1), ("Mz", -1)):
+        one, two = getattr(intrados, name), getattr(extrados, name)
+        # y points opposite ways on the two flanks.
+        np.testing.assert_allclose(one, sign * two, atol=1e-9 * largest)
+    for name in ("Edx", "Edy"):
+        one, two = getattr(intrados, name), getattr(extrados, name)
+        np.testing.assert_allclose(one, two, atol=1e-9 * one.max())
+
+
+@pytest.mark.parametrize("mu", [0.2, 0.4, 0.6])
+@pytest.mark.parametrize("angle", [40, 50, 60])
+def test_gross_slip_up_and_reversed(structure_of, solved, symmetric, angle, mu):
+    """P = F / 2 (sin θ + µ cos θ) as the load rises, with - once the flanks slide back.
+
+    What is left, well below 1 %, is friction along y: the flanks also lengthen along the slot.
+    """
+    theta = angle * DEGREES
+    changes = COMPLIANT | {"flank_angle": theta}
+    structure, _ = structure_of(**changes)
+    cycle = solved(mu, symmetric, **changes)
+    assert cycle.converged
+    force = pull(structure, symmetric.amplitudes())
+    sine, cosine = np.sin(theta), np.cos(theta)
+    for history in cycle.histories:
+        loads = history.loads
+        assert loads.sliding[: PEAK + 1].all()
+        rising = 0.5 * force[: PEAK + 1] / (sine + mu * cosine)
+        np.testing.assert_allclose(loads.P[: PEAK + 1], rising, rtol=1e-2)
+        assert np.all(loads.Qx[: PEAK + 1] < 0.0)
+        # Past the peak it sticks: less shear than Coulomb allows, and P above that of sliding.
+        assert not loads.sliding[PEAK + 1]
+        assert abs(loads.Qx[PEAK + 1]) < 0.95 * mu * loads.P[PEAK + 1]
+        assert loads.P[PEAK + 1] > 1.01 * 0.5 * force[PEAK + 1] / (sine + mu * cosine)
+        # Only the rims of the flanks still creep.
+        assert loads.Edx[PEAK + 1] < 0.2 * loads.Edx[PEAK]
+        # The last loaded increment slides back.
+        assert loads.sliding[-2]
+        assert loads.Qx[-2] > 0.0
+        falling = 0.5 * force[-2] / (sine - mu * cosine)
+        assert loads.P[-2] == pytest.approx(falling, rel=1e-2)
+
+
+def test_self_locking_joint_stays_loaded(structure_of, solved, symmetric):
+    """tan 35° < 0.8: without pull the flanks hold each other by friction, and the blade stays."""
+    changes = {"flank_angle": 35.0 * DEGREES}
+    cycle = solved(0.8, symmetric, **changes)
+    assert cycle.converged
+    loads = cycle.histories[0].loads
+    assert loads.P[-1] > 0.1 * loads.P.max()
+    # What is left balances itself: P sin θ = Qx cos θ.
+    assert loads.Qx[-1] == pytest.approx(loads.P[-1] * np.tan(35.0 * DEGREES), rel=1e-5)
+
+
+def test_unloaded_end_leaves_nothing(solved, mission):
+    """At rest the flanks neither push nor rub, to the digit: no remainders of the solver."""
+    for history in solved(0.4, mission).histories:
+        for name in ("P", "Qx", "Qy", "Mx", "My", "Mz"):
+            assert getattr(history.loads, name)[-1] == 0.0
+        assert not history.loads.sliding[-1]
+
+
+def test_energy_is_never_negative_and_adds_up(solved, mission):
+    """Work of the shears over the slips, per direction and of each node."""
+    for history in solved(0.4, mission).histories:
+        total = history.loads.Edx + history.loads.Edy
+        assert total.min() >= -1e-9 * total.max()
+        nodal = -np.sum(history.force[:, :2] * history.slip, axis=1)
+        np.testing.assert_allclose(nodal.sum(axis=1), total, atol=1e-12 * total.max())
+        assert nodal.min() >= -1e-9 * nodal.max()
+
+
+def test_frictionless_joint_dissipates_nothing(structure, solved, symmetric):
+    cycle = solved(0.0, symmetric)
+    force = pull(structure, symmetric.amplitudes())
+    for history in cycle.histories:
+        np.testing.assert_allclose(history.loads.Edx, 0.0, atol=1e-9)
+        np.testing.assert_allclose(history.loads.Qx, 0.0, atol=1e-9)
+        # Without friction P depends on the load alone, rising or falling.
+        expected = 0.5 * force / np.sin(45.0 * DEGREES)
+        np.testing.assert_allclose(history.loads.P, expected, atol=1e-6 * expected.max())
+
+
+def test_resultants_are_those_of_the_forces(structure, solved, mission):
+    """Moments of the nodal forces about the face's centre, from cross products in space."""
+    for history in solved(0.4, mission).histories:
+        face = history.interface
+        at = structure.mesh.body_2.mesh.p[:, face.nodes_2].T - face.frame.origin
+        forces = face.frame.to_global(history.force[PEAK].T)
+        moment = face.frame.components(np.cross(at, forces).sum(axis=0))
+        force = face.frame.components(forces.sum(axis=0))
+        loads = history.loads
+        # Mx, My of the sign convention are those of the pressure: those of r × f.
+        expected = [loads.Qx[PEAK], loads.Qy[PEAK], loads.P[PEAK]]
+        np.testing.assert_allclose(force, expected, rtol=1e-9)
+        expected = [loads.Mx[PEAK], loads.My[PEAK], loads.Mz[PEAK]]
+        np.testing.assert_allclose(moment, expected, atol=1e-7 * np.abs(moment).max())
+
+
+def test_equilibrium_error_sees_a_wrong_force(structure, joint, mission):
+    """1 % more pressure on all nodes is about 1 % of the load out of balance."""
+    frictional = FrictionalJoint(joint.resolvent(), 0.4)
+    amplitudes = mission.amplitudes()
+    state = list(frictional.march(amplitudes[:8], structure.gap()))[-1]
+    assert max(structure.equilibrium_error(state, amplitudes[PEAK])) < 1e-6
+    wrong = replace(state, force=1.01 * state.force)
+    force, moment = structure.equilibrium_error(wrong, amplitudes[PEAK])
+    assert force == pytest.approx(0.01, rel=1e-3)
+    turned = state.force.copy()
+    turned[2, 0] += 1000.0
+    force, moment = structure.equilibrium_error(replace(state, force=turned), amplitudes[PEAK])
+    assert force > 1e-3
+    assert moment > 1e-4
+
+
+def test_skewed_joint(structure_of, solved, symmetric):
+    """A slot turned by 15°: half a turn about the load axis brings it back onto itself.
+
+    The mesh does not quite come back, so the flanks are alike to discretisation.
+    """
+    changes = {"skew": 15.0 * DEGREES}
+    cycle = solved(0.4, symmetric, **changes)
+    assert cycle.converged
+    assert cycle.equilibrium.max() <= 1e-6
+    intrados, extrados = (h.loads for h in cycle.histories)
+    for name in ("P", "Qx", "Qy"):
+        one, two = getattr(intrados, name), getattr(extrados, name)
+        np.testing.assert_allclose(one, two, atol=1e-2 * intrados.P.max())
+
+
+def test_load_history_of_one_node(coarse_mesh):
+    """All load on one node: moments are its coordinates times its pressure."""
+    face = coarse_mesh.interfaces[0]
+    force, slip = np.zeros((2, 3, len(face))), np.zeros((2, 2, len(face)))
+    node = 17
+    force[0, :, node] = [-4.0, 3.0, 10.0]
+    slip[0, :, node] = [0.8e-3, -0.6e-3]
+    loads = load_history(face, force, slip, 0.5)
+    x, y = face.coordinates[node]
+    assert isinstance(loads, LoadHistory)
+    found = [getattr(loads, name)[0] for name in ("P", "Qx", "Qy", "Mx", "My", "Mz")]
+    expected = [10.0, -4.0, 3.0, 10.0 * y, -10.0 * x, 3.0 * x + 4.0 * y]
+    np.testing.assert_allclose(found, expected)
+    np.testing.assert_allclose([loads.Edx[0], loads.Edy[0]], [3.2e-3, 1.8e-3])
+    assert loads.sliding.tolist() == [True, False]
+    assert not load_history(face, force, slip, 0.6).sliding[0]

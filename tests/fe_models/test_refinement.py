@@ -1,0 +1,49 @@
+"""How much of the answer is the mesh's: resultants converge, edge peaks do not."""
+
+import numpy as np
+import pytest
+
+from fe_models.dovetail import dovetail_structure
+from fe_models.friction import FrictionalJoint
+from fe_models.stress import stress_state
+
+FRICTION, PEAK = 0.4, 7
+
+
+def solve(dovetail, titanium, mission, flank_nodes, size):
+    """Per flank (P, Qx, Mx, My) at the peak and the largest slip of a node per cycle; stresses."""
+    mesh = dovetail.mesh(flank_nodes, size)
+    structure = dovetail_structure(dovetail, mesh, titanium, titanium, mission, 1)
+    frictional = FrictionalJoint(structure.condense().resolvent(), FRICTION)
+    amplitudes = mission.amplitudes()
+    cycle = structure.solve_cycle(frictional, amplitudes, structure.gap(), FRICTION)
+    assert cycle.converged
+    assert cycle.equilibrium.max() <= 1e-6
+    loads = [
+        [getattr(h.loads, name)[PEAK] for name in ("P", "Qx", "Mx", "My")] for h in cycle.histories
+    ]
+    slip = [np.linalg.norm(h.slip, axis=1).sum(axis=0).max() for h in cycle.histories]
+    fields = stress_state(
+        structure,
+        np.concatenate([h.force[PEAK] for h in cycle.histories], axis=1),
+        np.concatenate([h.displacement[PEAK] for h in cycle.histories], axis=1),
+        amplitudes[PEAK],
+    )
+    return np.array(loads), np.array(slip), np.array([f.von_mises.max() for f in fields])
+
+
+@pytest.mark.slow
+def test_refined_mesh_moves_the_load_by_less_than_half_a_percent(dovetail, titanium, mission):
+    """From 8 x 14 nodes per flank over 13 x 23 to the default of 20 x 34."""
+    ladder = [((8, 14), 8.0), ((13, 23), 6.5), ((20, 34), 5.0)]
+    results = [solve(dovetail, titanium, mission, *mesh) for mesh in ladder]
+    (_, coarse_slip, _), (middle, middle_slip, _), (fine, fine_slip, stress) = results
+    for mesh, (loads, slip, peak) in zip(ladder, results, strict=True):
+        print(mesh, "P, Qx, Mx, My", loads.round(1).tolist(), "slip [mm]", slip, "MPa", peak)  # noqa: T201
+    np.testing.assert_allclose(middle[:, :2], fine[:, :2], rtol=5e-3)
+    # Moments are small differences of large ones: measured against P times the flank's width.
+    arm = fine[:, :1] * dovetail.flank_width
+    assert np.all(np.abs(middle[:, 2:] - fine[:, 2:]) < 5e-3 * arm)
+    np.testing.assert_allclose(middle_slip, fine_slip, rtol=5e-2)
+    assert np.all(np.abs(fine_slip - middle_slip) < np.abs(fine_slip - coarse_slip))
+    assert np.all(stress > 0.0)

@@ -1,0 +1,126 @@
+"""Stress of both bodies at a state of the joint."""
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from fe_models.remesh import element_volumes
+from fe_models.stress import stress_state
+
+PEAK = 7
+
+
+def state(cycle, increment):
+    force = np.concatenate([h.force[increment] for h in cycle.histories], axis=1)
+    relative = np.concatenate([h.displacement[increment] for h in cycle.histories], axis=1)
+    return force, relative
+
+
+@pytest.fixture(scope="module")
+def peak(structure, solved, symmetric):
+    """Amplitudes, contact forces and stress fields at the peak of the symmetric mission."""
+    amplitudes = symmetric.amplitudes()[PEAK]
+    force, relative = state(solved(0.4, symmetric), PEAK)
+    return amplitudes, force, relative, stress_state(structure, force, relative, amplitudes)
+
+
+def test_unloaded_joint_has_no_stress(structure):
+    nothing = np.zeros((3, len(structure.gap())))
+    for field in stress_state(structure, nothing, nothing, np.zeros(2)):
+        for values in (field.displacement, field.von_mises, field.maximum_principal):
+            assert np.abs(values).max() == 0.0
+
+
+def test_contact_forces_are_recovered(structure, peak):
+    """K u - loads, from the displacements alone, is the contact force on the flanks of either body.
+
+    It vanishes at every other node that is not supported.
+    """
+    _, force, _, fields = peak
+    amplitudes = peak[0]
+    bodies = (structure.body_1, structure.body_2)
+    supports = ({"inner", "sides"}, {"root_bottom"})
+    for number, (body, field) in enumerate(zip(bodies, fields, strict=True)):
+        elastic = body.elastic
+        residual = elastic.stiffness @ field.displacement.ravel() - body._loads @ amplitudes
+        residual = residual.reshape(-1, 3)
+        start, faces = 0, []
+        for face in structure.mesh.interfaces:
+            nodes = (face.nodes_1, face.nodes_2)[number]
+            expected = (-1.0, 1.0)[number] * force[:, start : start + len(face)].T
+            found = face.frame.components(residual[nodes])
+            np.testing.assert_allclose(found, expected, atol=2e-6 * np.abs(force).max())
+            start += len(face)
+            faces.append(nodes)
+        touched = [elastic.boundary_nodes(name) for name in supports[number]]
+        free = np.setdiff1d(np.arange(len(residual)), np.concatenate(faces + touched))
+        assert np.abs(residual[free]).max() < 1e-8 * np.abs(force).max()
+
+
+def test_relative_displacements_are_those_given(structure, peak):
+    """Body 2 follows body 1 at the distance that the friction solver found."""
+    _, _, relative, (disk, blade) = peak
+    start = 0
+    for face in structure.mesh.interfaces:
+        apart = blade.displacement[face.nodes_2] - disk.displacement[face.nodes_1]
+        found = face.frame.components(apart)
+        expected = relative[:, start : start + len(face)].T
+        np.testing.assert_allclose(found, expected, atol=1e-9)
+        start += len(face)
+
+
+def test_supports_hold(structure, peak):
+    """The bore stays, the sides of the sector slide in their planes, the root stays on average."""
+    _, _, _, (disk, blade) = peak
+    body = structure.body_1.elastic
+    np.testing.assert_allclose(disk.displacement[body.boundary_nodes("inner")], 0.0, atol=1e-15)
+    nodes, normals = body.boundary_normals("sides")
+    across = np.sum(disk.displacement[nodes] * normals, axis=1)
+    np.testing.assert_allclose(across, 0.0, atol=1e-12)
+    nodes, weights = structure.body_2.elastic.boundary_weights("root_bottom")
+    along = blade.displacement[nodes] @ structure.support_direction
+    assert abs(weights @ along) < 1e-12 * weights.sum()
+
+
+def test_symmetric_load_gives_symmetric_stress(structure, peak):
+    _, _, _, fields = peak
+    for body, field in zip((structure.mesh.body_1, structure.mesh.body_2), fields, strict=True):
+        points = body.mesh.p.T
+        _, image = cKDTree(points).query(points * [-1.0, 1.0, 1.0])
+        for values in (field.von_mises, field.maximum_principal):
+            np.testing.assert_allclose(values[image], values, atol=1e-5 * values.max())
+        mirrored = field.displacement[image] * [-1.0, 1.0, 1.0]
+        size = np.abs(field.displacement).max()
+        np.testing.assert_allclose(mirrored, field.displacement, atol=1e-6 * size)
+
+
+def test_shank_carries_the_pull(structure, peak):
+    """Virial of a body in equilibrium: ∫ σ = Σ r ⊗ f over the forces on it, for all components."""
+    _, _, _, (_, blade) = peak
+    elastic = structure.body_2.elastic
+    stress = elastic.stress(blade.displacement.ravel())
+    total = stress @ np.abs(element_volumes(elastic.body.mesh))
+    forces = elastic.stiffness @ blade.displacement.ravel()
+    moments = elastic.nodes.T @ forces.reshape(-1, 3)
+    moments = 0.5 * (moments + moments.T)
+    expected = moments[[0, 1, 2, 0, 1, 2], [0, 1, 2, 1, 2, 0]]
+    np.testing.assert_allclose(total, expected, atol=1e-9 * np.abs(expected).max())
+
+
+def test_neck_stress_is_pull_over_area(structure, dovetail, peak):
+    """Mean of σ_zz over a slice of the shank far from fillet and top."""
+    amplitudes, _, _, (_, blade) = peak
+    elastic = structure.body_2.elastic
+    mesh = elastic.body.mesh
+    centre = mesh.p[:, mesh.t].mean(axis=1)
+    volume = np.abs(element_volumes(mesh))
+    low, high = dovetail.rim_radius + 8.0, dovetail.rim_radius + dovetail.shank_height
+    inside = (centre[2] > low) & (centre[2] < high)
+    stress = elastic.stress(blade.displacement.ravel())[2]
+    mean = np.sum((stress * volume)[inside]) / volume[inside].sum()
+    area = dovetail.neck_width * dovetail.slot_length
+    # Airfoil, and on average half of the slice's own mass above it.
+    airfoil = amplitudes[0] * 0.8e-3 * 400.0
+    mass = 4.43e-9 * volume[inside].sum()
+    own = 0.5 * amplitudes[0] * mass * 0.5 * (low + high)
+    assert mean == pytest.approx((airfoil + own) / area, rel=2e-2)
