@@ -58,6 +58,14 @@ class CycleSolution:
     closure: float
     equilibrium: Array
 
+    def fields(self) -> dict[str, Array]:
+        """Force, displacement and slip over all interfaces, to keep and to restore from."""
+        names = ("force", "displacement", "slip")
+        return {
+            name: np.concatenate([getattr(own, name) for own in self.histories], axis=-1)
+            for name in names
+        }
+
 
 @dataclass(frozen=True)
 class Structure:
@@ -100,23 +108,27 @@ class Structure:
         change = [float(np.abs(one.force - two.force).max()) for one, two in pairs]
         largest = max(float(np.abs(s.force).max()) for s in last)
         states = first + last
+        fields = {
+            name: np.stack([getattr(s, name) for s in last])
+            for name in ("force", "displacement", "slip")
+        }
         return CycleSolution(
-            histories=tuple(self._histories(last, friction)),
+            histories=self.histories(**fields, friction=friction),
             states=tuple(s.state for s in last),
             last_displacement=last[-1].displacement,
             iterations=sum(s.iterations for s in states),
             residual=max(s.residual for s in states),
             converged=all(s.converged for s in states),
-            closure=max(change, default=0.0) / largest,
+            closure=max(change, default=0.0) / largest if largest > 0.0 else 0.0,
             equilibrium=np.array(
                 [self.equilibrium_error(s, a) for s, a in zip(last, amplitudes, strict=True)]
             ),
         )
 
-    def _histories(self, states: list[FrictionState], friction: float) -> list[InterfaceHistory]:
-        force = np.stack([s.force for s in states])
-        displacement = np.stack([s.displacement for s in states])
-        slip = np.stack([s.slip for s in states])
+    def histories(
+        self, force: Array, displacement: Array, slip: Array, friction: float
+    ) -> tuple[InterfaceHistory, ...]:
+        """Histories of the interfaces from the fields ``(t, components, n)`` over all of them."""
         histories, start = [], 0
         for interface in self.mesh.interfaces:
             own = slice(start, start + len(interface))
@@ -124,7 +136,7 @@ class Structure:
             loads = load_history(interface, parts[0], parts[2], friction)
             histories.append(InterfaceHistory(interface, loads, *parts))
             start += len(interface)
-        return histories
+        return tuple(histories)
 
     def interface_resultants(self, state: FrictionState) -> Array:
         """``(P, Qx, Qy, Mx, My, Mz)`` of every interface, ``(interfaces, 6)``."""

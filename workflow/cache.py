@@ -1,4 +1,4 @@
-"""Condensed structures on disk, found again by the content they were made from."""
+"""Condensed structures and solved missions on disk, found again by what they were made from."""
 
 from __future__ import annotations
 
@@ -6,9 +6,15 @@ import hashlib
 import os
 from importlib.metadata import version
 from pathlib import Path
+from typing import Any
+
+import numpy as np
 
 import fe_models
+import sa_solver
 from fe_models.reduction import JointResolvent
+from fe_models.structure import CycleSolution, Structure
+from sa_solver.types import Array
 from workflow.store import read_arrays, write_arrays
 
 # Files are pruned, least recently used first, above this size; one default dovetail takes 134 MB.
@@ -25,20 +31,20 @@ def cache_folder() -> Path:
 def content_key(*parts: object) -> str:
     """Hash of the parts, of the structural code and of the packages it relies on."""
     digest = hashlib.sha256(repr(parts).encode())
-    for source in sorted(Path(fe_models.__file__).parent.rglob("*.py")):
-        digest.update(source.read_bytes())
+    for package in (fe_models, sa_solver):
+        assert package.__file__ is not None
+        for source in sorted(Path(package.__file__).parent.rglob("*.py")):
+            digest.update(source.read_bytes())
     digest.update(repr([(name, version(name)) for name in SOLVERS]).encode())
     return digest.hexdigest()[:32]
 
 
 def load_joint(key: str) -> JointResolvent | None:
     """The condensed joint of that key, or None."""
-    path = cache_folder() / f"joint-{key}.h5"
-    try:
-        arrays, attributes = read_arrays(path)
-    except OSError:
+    found = _load(f"joint-{key}")
+    if found is None:
         return None
-    os.utime(path)
+    arrays, attributes = found
     return JointResolvent(
         inverse=arrays["inverse"],
         rho=float(attributes["rho"]),
@@ -48,20 +54,60 @@ def load_joint(key: str) -> JointResolvent | None:
 
 
 def save_joint(key: str, joint: JointResolvent) -> None:
-    """Keep a condensed joint; a cache that cannot be written is no error."""
-    folder = cache_folder()
-    attributes = {"rho": joint.rho, "rigid_modes": joint.rigid_modes}
+    """Keep a condensed joint."""
     arrays = {"inverse": joint.inverse, "loads": joint.loads}
+    _save(f"joint-{key}", arrays, {"rho": joint.rho, "rigid_modes": joint.rigid_modes})
+
+
+def load_cycle(key: str, structure: Structure, friction: float) -> CycleSolution | None:
+    """The solved cycle of that key on its structure, or None."""
+    found = _load(f"cycle-{key}")
+    if found is None:
+        return None
+    arrays, attributes = found
+    fields = {name: arrays[name] for name in ("force", "displacement", "slip")}
+    return CycleSolution(
+        histories=structure.histories(**fields, friction=friction),
+        states=tuple(arrays["states"]),
+        last_displacement=fields["displacement"][-1],
+        iterations=int(attributes["iterations"]),
+        residual=float(attributes["residual"]),
+        converged=True,
+        closure=float(attributes["closure"]),
+        equilibrium=arrays["equilibrium"],
+    )
+
+
+def save_cycle(key: str, cycle: CycleSolution) -> None:
+    """Keep a solved, converged cycle."""
+    arrays = {"states": np.stack(cycle.states), "equilibrium": cycle.equilibrium}
+    attributes = {name: getattr(cycle, name) for name in ("iterations", "residual", "closure")}
+    _save(f"cycle-{key}", cycle.fields() | arrays, attributes)
+
+
+def _load(name: str) -> tuple[dict[str, Any], dict[str, Any]] | None:
+    path = cache_folder() / f"{name}.h5"
+    try:
+        found = read_arrays(path)
+        os.utime(path)
+    except OSError:
+        return None
+    return found
+
+
+def _save(name: str, arrays: dict[str, Array], attributes: dict[str, Any]) -> None:
+    """Write a file; a cache that cannot be written is no error."""
+    folder = cache_folder()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        write_arrays(folder / f"joint-{key}.h5", arrays, attributes)
+        write_arrays(folder / f"{name}.h5", arrays, attributes)
         _prune(folder)
     except OSError:
         return
 
 
 def _prune(folder: Path) -> None:
-    files = sorted(folder.glob("joint-*.h5"), key=lambda path: path.stat().st_mtime, reverse=True)
+    files = sorted(folder.glob("*.h5"), key=lambda path: path.stat().st_mtime, reverse=True)
     total = 0
     for path in files:
         total += path.stat().st_size

@@ -87,7 +87,8 @@ class WearRun:
         with contact_workers(settings) as workers:
             with self._reporter.stage("condensation"):
                 self._structure.prepare()
-            unworn = self._solve_structure([np.zeros(len(i)) for i in mesh.interfaces])
+            with self._reporter.stage("structural friction"):
+                unworn = self._structure.unworn_cycle()
             warn_of_structure(self._case, self._structure, unworn, self._reporter)
             with self._reporter.stage("contact set-up"):
                 stages = [ContactStage(own) for own in settings]
@@ -101,18 +102,13 @@ class WearRun:
             state = loop.advance(kept or state, unworn)
         pairs = zip(stages, state.interfaces, strict=True)
         depths = [stage.nodal_depths(own) for stage, own in pairs]
-        worn = self._solve_structure([one + two for one, two in depths], unworn)
+        with self._reporter.stage("structural friction"):
+            worn = self._structure.cycle([one + two for one, two in depths], unworn)
         write_output(
             Outcome(self._case, self._structure, stages, state, unworn, worn, first, depths),
             self._folder,
             self._reporter,
         )
-
-    def _solve_structure(
-        self, depths: list[Array], after: CycleSolution | None = None
-    ) -> CycleSolution:
-        with self._reporter.stage("structural friction"):
-            return self._structure.cycle(depths, after)
 
     def _stage_settings(self, interface: Interface) -> StageSettings:
         dovetail, side = self._structure.dovetail, SIDES[interface.name]

@@ -13,7 +13,7 @@ from fe_models.mesh import Interface, StructureMesh
 from fe_models.stress import StressField, stress_state
 from fe_models.structure import CycleSolution, Structure
 from sa_solver.types import Array
-from workflow.cache import content_key, load_joint, save_joint
+from workflow.cache import content_key, load_cycle, load_joint, save_cycle, save_joint
 from workflow.case import Case
 from workflow.errors import MethodFailed
 
@@ -46,13 +46,7 @@ class StructureStage:
     @cached_property
     def joint(self) -> FrictionalJoint:
         """The condensed joint, from the cache when it is there."""
-        key = content_key(
-            self.dovetail,
-            self._case.mesh,
-            self._case.materials,
-            self.mission.airfoil_mass,
-            self.mission.airfoil_radius,
-        )
+        key = content_key(*self._joint_parts())
         joint = load_joint(key)
         self.from_cache = joint is not None
         if joint is None:
@@ -60,6 +54,11 @@ class StructureStage:
             save_joint(key, joint)
         self.rigid_modes = joint.rigid_modes
         return FrictionalJoint(joint, self._case.friction.coefficient)
+
+    def _joint_parts(self) -> tuple[object, ...]:
+        """Everything the condensed joint depends on."""
+        mission = self.mission.airfoil_mass, self.mission.airfoil_radius
+        return self.dovetail, self._case.mesh, self._case.materials, mission
 
     @cached_property
     def structure(self) -> Structure:
@@ -79,6 +78,16 @@ class StructureStage:
     def prepare(self) -> None:
         """Do the costly part now: condense the structure, or find it in the cache."""
         _ = self.joint
+
+    def unworn_cycle(self) -> CycleSolution:
+        """The closed mission cycle from rest with unworn flanks, from the cache if it is there."""
+        friction = self._case.friction.coefficient
+        key = content_key(*self._joint_parts(), self.mission, friction)
+        cycle = load_cycle(key, self.structure, friction)
+        if cycle is None:
+            cycle = self.cycle([np.zeros(len(i)) for i in self.interfaces])
+            save_cycle(key, cycle)
+        return cycle
 
     def cycle(self, depths: list[Array], after: CycleSolution | None = None) -> CycleSolution:
         """The closed mission cycle with the gaps widened by the worn depth of both bodies.
