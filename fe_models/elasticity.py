@@ -55,7 +55,8 @@ class ElasticBody:
         stiffness = sp.csr_matrix((3 * len(self.nodes),) * 2)
         for (a, b), form in forms.items():
             block = lame * form + shear * form.T
-            block += shear * laplace if a == b else 0.0 * laplace
+            if a == b:
+                block += shear * laplace
             place = sp.csr_matrix(([1.0], ([a], [b])), shape=(3, 3))
             stiffness += sp.kron(block, place, format="csr")
         return stiffness

@@ -15,6 +15,8 @@ from sa_solver.types import Array, LoadHistory, resultants
 STICKING_SHARE = 1e-2
 # Below this share of the cycle's largest P the resultants are the friction solver's remainder.
 UNLOADED_SHARE = 1e-6
+# What a history holds of each increment, over the nodes of its interface.
+FIELDS = ("force", "displacement", "slip")
 # A node slips when its shear reaches this share of Coulomb's limit.
 LIMIT_SHARE = 1.0 - 1e-6
 
@@ -60,10 +62,9 @@ class CycleSolution:
 
     def fields(self) -> dict[str, Array]:
         """Force, displacement and slip over all interfaces, to keep and to restore from."""
-        names = ("force", "displacement", "slip")
         return {
             name: np.concatenate([getattr(own, name) for own in self.histories], axis=-1)
-            for name in names
+            for name in FIELDS
         }
 
 
@@ -108,10 +109,7 @@ class Structure:
         change = [float(np.abs(one.force - two.force).max()) for one, two in pairs]
         largest = max(float(np.abs(s.force).max()) for s in last)
         states = first + last
-        fields = {
-            name: np.stack([getattr(s, name) for s in last])
-            for name in ("force", "displacement", "slip")
-        }
+        fields = {name: np.stack([getattr(s, name) for s in last]) for name in FIELDS}
         return CycleSolution(
             histories=self.histories(**fields, friction=friction),
             states=tuple(s.state for s in last),
@@ -129,23 +127,21 @@ class Structure:
         self, force: Array, displacement: Array, slip: Array, friction: float
     ) -> tuple[InterfaceHistory, ...]:
         """Histories of the interfaces from the fields ``(t, components, n)`` over all of them."""
-        histories, start = [], 0
-        for interface in self.mesh.interfaces:
-            own = slice(start, start + len(interface))
+        histories = []
+        for interface, own in self._shares():
             parts = force[..., own], displacement[..., own], slip[..., own]
             loads = load_history(interface, parts[0], parts[2], friction)
             histories.append(InterfaceHistory(interface, loads, *parts))
-            start += len(interface)
         return tuple(histories)
 
     def interface_resultants(self, state: FrictionState) -> Array:
         """``(P, Qx, Qy, Mx, My, Mz)`` of every interface, ``(interfaces, 6)``."""
-        rows, start = [], 0
-        for interface in self.mesh.interfaces:
-            own = slice(start, start + len(interface))
-            rows.append(resultants(state.force[:, own], *interface.coordinates.T))
-            start += len(interface)
-        return np.array(rows)
+        return np.array(
+            [
+                resultants(state.force[:, own], *interface.coordinates.T)
+                for interface, own in self._shares()
+            ]
+        )
 
     def equilibrium_error(self, state: FrictionState, amplitudes: Array) -> tuple[float, float]:
         """Relative error of forces and of moments on body 2, support included.
@@ -154,15 +150,12 @@ class Structure:
         no moment is applied.
         """
         contact = np.zeros((2, 3))
-        start = 0
         points = []
-        for interface in self.mesh.interfaces:
-            own = slice(start, start + len(interface))
+        for interface, own in self._shares():
             forces = interface.frame.to_global(state.force[:, own].T)
             at = self.mesh.body_2.mesh.p[:, interface.nodes_2].T - self.support_point
             contact += forces.sum(axis=0), np.cross(at, forces).sum(axis=0)
             points.append(at)
-            start += len(interface)
         applied = self.body_2.load_resultants(amplitudes, self.support_point)
         balance = contact + applied
         balance[0] -= (balance[0] @ self.support_direction) * self.support_direction
@@ -173,6 +166,14 @@ class Structure:
         moment = max(float(np.linalg.norm(applied[1])), force * size)
         errors = np.linalg.norm(balance, axis=1) / (force, moment)
         return float(errors[0]), float(errors[1])
+
+    def _shares(self) -> list[tuple[Interface, slice]]:
+        """Every interface and its nodes' place among those of all of them."""
+        ends = np.cumsum([len(i) for i in self.mesh.interfaces]).tolist()
+        return [
+            (interface, slice(end - len(interface), end))
+            for interface, end in zip(self.mesh.interfaces, ends, strict=True)
+        ]
 
 
 def load_history(interface: Interface, force: Array, slip: Array, friction: float) -> LoadHistory:

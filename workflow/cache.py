@@ -13,7 +13,7 @@ import numpy as np
 import fe_models
 import sa_solver
 from fe_models.reduction import JointResolvent
-from fe_models.structure import CycleSolution, Structure
+from fe_models.structure import FIELDS, CycleSolution, Structure
 from sa_solver.types import Array
 from workflow.store import read_arrays, write_arrays
 
@@ -65,7 +65,7 @@ def load_cycle(key: str, structure: Structure, friction: float) -> CycleSolution
     if found is None:
         return None
     arrays, attributes = found
-    fields = {name: arrays[name] for name in ("force", "displacement", "slip")}
+    fields = {name: arrays[name] for name in FIELDS}
     return CycleSolution(
         histories=structure.histories(**fields, friction=friction),
         states=tuple(arrays["states"]),

@@ -106,10 +106,6 @@ class ContactStage:
         surfaces, result = step(state.surfaces, state.starts, cycles)
         return self._after(state, surfaces, result, cycles), result.convolutions
 
-    def reload(self, state: InterfaceState, history: InterfaceHistory) -> InterfaceState:
-        """The state under the loads and slips of a new structural solution."""
-        return replace(state, loads=history.loads, slip=history.slip)
-
     def stable_cycles(self, state: InterfaceState) -> float:
         """Largest stable explicit jump."""
         return self._wearing(state).stable_cycles()

@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array, Grid
+from wear.kinetics import LinearRegime
 from workflow.store import BODY_NAMES, grid_of, jump_names, replacing
 
 if TYPE_CHECKING:
@@ -413,11 +414,11 @@ def _draw_kinetics(
     total = np.sum(list(worn.values()), axis=0)
     axis.plot(cycles, total, "-", color=BLACK, label="both")
     rate = scale * float(group.attrs[f"{quantity}_rate"])
+    linear_from = float(group.attrs[f"{quantity}_linear_from"])
     if np.isfinite(rate):
         beyond = cycles[-1] * np.array([1.0, EXTRAPOLATION])
-        line = total[-1] + rate * (beyond - cycles[-1])
+        line = LinearRegime(linear_from, rate, cycles[-1], total[-1]).extrapolate(beyond)
         axis.plot(beyond, line, "--", color=BLACK, label="both, extrapolated (not computed)")
-    linear_from = float(group.attrs[f"{quantity}_linear_from"])
     if np.isfinite(linear_from):
         axis.axvspan(linear_from, cycles[-1], color=GREEN, alpha=0.15, lw=0, label="linear regime")
 

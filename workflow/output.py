@@ -6,6 +6,7 @@ import json
 import platform
 import shutil
 from dataclasses import dataclass
+from functools import cached_property
 from importlib.metadata import version
 from typing import Any
 
@@ -51,6 +52,19 @@ class Outcome:
     first: list[FirstContact]
     depths: list[tuple[Array, Array]]
 
+    @cached_property
+    def regimes(self) -> dict[str, dict[str, LinearRegime | None]]:
+        """Linear regimes of depth and volume, both bodies together, by interface."""
+        columns = {"depth": slice(0, 2), "volume": slice(2, 4)}
+        cycles, kinetics = self.state.cycles, self.state.kinetics
+        return {
+            stage.name: {
+                name: linear_regime(cycles, kinetics[:, number, pick].sum(axis=1))
+                for name, pick in columns.items()
+            }
+            for number, stage in enumerate(self.stages)
+        }
+
 
 Stress = tuple[StressField, StressField]
 
@@ -61,7 +75,8 @@ def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> 
     with reporter.stage("re-meshing"):
         mesh = worn_mesh(structure.mesh, outcome.depths)
         with replacing(folder.root / "worn.msh") as partial:
-            path = partial.with_suffix(".msh")
+            # gmsh goes by the ending; the name stays one that a resumed run clears away.
+            path = partial.with_name(f"{partial.name}.msh")
             write_msh(path, mesh)
             path.replace(partial)
     with reporter.stage("stress"):
@@ -89,19 +104,6 @@ def _write_pictures(case: Case, folder: OutputFolder) -> None:
     side_by_side(
         [(write, (folder.results, target)) for write, (on, target) in wanted.items() if on]
     )
-
-
-def _regimes(outcome: Outcome) -> dict[str, dict[str, LinearRegime | None]]:
-    """Linear regimes of depth and volume, both bodies together, by interface."""
-    cycles = outcome.state.cycles
-    columns = {"depth": slice(0, 2), "volume": slice(2, 4)}
-    return {
-        stage.name: {
-            name: linear_regime(cycles, outcome.state.kinetics[:, number, pick].sum(axis=1))
-            for name, pick in columns.items()
-        }
-        for number, stage in enumerate(outcome.stages)
-    }
 
 
 def _write_results(
@@ -153,13 +155,13 @@ def _write_jumps(writer: ResultsWriter, outcome: Outcome, folder: OutputFolder) 
 
 
 def _write_kinetics(writer: ResultsWriter, outcome: Outcome) -> None:
-    state, regimes = outcome.state, _regimes(outcome)
+    state = outcome.state
     writer.put("kinetics", cycles=state.cycles)
     for number, stage in enumerate(outcome.stages):
         group = f"kinetics/{stage.name}"
         columns = dict(zip(KINETICS, state.kinetics[:, number].T, strict=True))
         writer.put(group, **columns)
-        for name, regime in regimes[stage.name].items():
+        for name, regime in outcome.regimes[stage.name].items():
             writer.file[group].attrs.update(
                 {
                     f"{name}_linear_from": regime.start if regime else np.nan,
@@ -262,7 +264,7 @@ def _interface_summary(outcome: Outcome, number: int, mesh: StructureMesh) -> di
         "convolutions": first.convolutions,
         "linear_regime": {
             name: None if regime is None else vars(regime)
-            for name, regime in _regimes(outcome)[stage.name].items()
+            for name, regime in outcome.regimes[stage.name].items()
         },
     }
 

@@ -227,10 +227,10 @@ class WearLoop:
         with self._reporter.stage("structural friction"):
             solution = self._structure.cycle(self._total_depths(state.interfaces), unworn)
         self._reporter.log(f"drift {drift:.2%}: resultants computed again")
-        reloaded = map(ContactStage.reload, self._stages, state.interfaces, solution.histories)
+        pairs = zip(state.interfaces, solution.histories, strict=True)
         return replace(
             state,
-            interfaces=tuple(reloaded),
+            interfaces=tuple(replace(own, loads=h.loads, slip=h.slip) for own, h in pairs),
             solved_resultants=probe,
             solutions=state.solutions + 1,
         ), drift

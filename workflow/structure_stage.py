@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from functools import cached_property
 
 import numpy as np
@@ -139,11 +139,9 @@ class StructureStage:
     def _stress(
         self, structure: Structure, solution: CycleSolution
     ) -> tuple[StressField, StressField]:
-        force, relative = (
-            np.concatenate([pick(history)[self.peak] for history in solution.histories], axis=-1)
-            for pick in _FORCE_AND_DISPLACEMENT
-        )
-        return stress_state(structure, force, relative, self.mission.amplitudes()[self.peak])
+        fields = {name: values[self.peak] for name, values in solution.fields().items()}
+        amplitudes = self.mission.amplitudes()[self.peak]
+        return stress_state(structure, fields["force"], fields["displacement"], amplitudes)
 
     def _structure(self, mesh: StructureMesh) -> Structure:
         return dovetail_structure(
@@ -157,9 +155,3 @@ class StructureStage:
 
     def _gap(self, depths: list[Array]) -> Array:
         return self.structure.gap() + np.concatenate(depths)
-
-
-_FORCE_AND_DISPLACEMENT: tuple[Callable, Callable] = (
-    lambda history: history.force,
-    lambda history: history.displacement,
-)

@@ -7,6 +7,7 @@ seen by the rest of the program is the plain ``float``, in base units.
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
@@ -33,18 +34,18 @@ def shown(value: object) -> str:
     return text if len(text) <= LONGEST_SHOWN else text[:LONGEST_SHOWN] + "..."
 
 
-class Entry:
+class Entry(ABC):
     """An annotation that validates one value; ``allowed`` is the sentence about what it takes."""
 
     @property
-    def allowed(self) -> str:
-        raise NotImplementedError
+    @abstractmethod
+    def allowed(self) -> str: ...
 
-    def parse(self, value: object) -> Any:
-        raise NotImplementedError
+    @abstractmethod
+    def parse(self, value: object) -> Any: ...
 
-    def json_schema(self) -> dict[str, Any]:
-        raise NotImplementedError
+    @abstractmethod
+    def json_schema(self) -> dict[str, Any]: ...
 
     def refusal(self, value: object, wrong: str) -> PydanticCustomError:
         """The error: the value, what is wrong with it, what is allowed."""
