@@ -18,7 +18,8 @@ test-full: check lint
 	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 -m "slow or not slow"
 
 bench: check
-	$(BIN)/python -m pytest -q -s -m "slow or not slow" tests/benchmarks
+	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[test,bench]'
+	$(ONE_THREAD) $(BIN)/python -m pytest -q -s -m "slow or not slow" tests/benchmarks
 
 lint: install
 	$(BIN)/ruff check .

@@ -2,38 +2,55 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from sa_solver.convolution import HalfSpaceConvolution
-from sa_solver.rigid_modes import RigidModes
+from sa_solver.half_space import HalfSpace
+from sa_solver.rigid_modes import APPROACH, RigidModes, Window
 from sa_solver.types import Array
+
+Work = Counter[tuple[int, int]]
+"""How many convolutions were done, by the shape of their transforms."""
 
 
 @dataclass(frozen=True)
 class NormalProblem:
-    """p >= 0, g = h + K p + D p - rigid >= 0, p g = 0, with three resultants imposed.
+    """p >= 0, g = h + K p + D p - rigid >= 0, p g = 0, with the resultants of free modes imposed.
 
-    ``height`` and ``compliance`` (or None for 0) are ``(nx, ny)`` [mm], [mm/MPa]; ``target`` holds
-    the scaled resultants of :meth:`RigidModes.scaled`.
+    ``height`` ``(nx, ny)`` [mm] is the gap before loading, imposed motions taken off;
+    ``compliance`` is D ``(nx, ny)`` [mm/MPa] or None for 0; ``target`` ``(k,)`` holds the sums of
+    pressure times mode. ``work`` counts convolutions, those of all problems made from this one too.
     """
 
     height: Array
     target: Array
     modes: RigidModes
-    convolution: HalfSpaceConvolution
+    half_space: HalfSpace
     compliance: Array | None
+    work: Work
 
     def displacement(self, pressure: Array) -> Array:
         """``(K + D) p`` [mm], one convolution."""
-        elastic = self.convolution.displacement(pressure)
+        self.work[self.half_space.padded] += 1
+        elastic = self.half_space.normal(pressure)
         return elastic if self.compliance is None else elastic + self.compliance * pressure
+
+    def cropped(self, window: Window, half_space: HalfSpace) -> NormalProblem:
+        """The problem with pressure only on the cells of ``window``."""
+        return replace(
+            self,
+            height=np.ascontiguousarray(self.height[window]),
+            modes=self.modes.cropped(window),
+            half_space=half_space,
+            compliance=None if self.compliance is None else self.compliance[window],
+        )
 
 
 @dataclass(frozen=True)
 class Iterate:
-    """Pressure, its displacement ``(K + D) p`` and the scaled rigid motion ``(3,)``."""
+    """Pressure, its displacement ``(K + D) p`` and the free rigid motions ``(k,)``."""
 
     pressure: Array
     displacement: Array
@@ -41,7 +58,9 @@ class Iterate:
 
     def gap(self, problem: NormalProblem) -> Array:
         """``g = h + (K + D) p - rigid`` [mm]."""
-        return problem.height + self.displacement - problem.modes.motion(self.rigid)
+        gap = problem.height + self.displacement
+        problem.modes.take_off(gap, self.rigid, out=gap)
+        return gap
 
 
 @dataclass(frozen=True)
@@ -49,9 +68,10 @@ class NormalResiduals:
     """How far a state is from solving the problem, dimensionless, independent of the method.
 
     ``force``: |Σ p S - P| / P; ``moment``: the larger of |Σ p y S - Mx| / (P Ly) and
-    |Σ p x S + My| / (P Lx) with Lx, Ly half the grid's size; ``penetration``: largest negative gap
-    over the largest displacement (K + D) p; ``complementarity``: max |p g| over the largest
-    pressure times the largest displacement. Pressure is never negative.
+    |Σ p x S + My| / (P Lx) with Lx, Ly half the grid's size; both count what is imposed only.
+    ``penetration``: largest negative gap over the largest displacement (K + D) p;
+    ``complementarity``: max |p g| over the largest pressure times the largest displacement.
+    Pressure is never negative.
     """
 
     force: float
@@ -70,17 +90,24 @@ def contact_residuals(pressure: Array, displacement: Array, gap: Array) -> tuple
     scale = float(displacement.max())
     if not scale > 0.0:
         return np.inf, np.inf
-    complementarity = np.abs(pressure * gap).max() / (pressure.max() * scale)
-    return max(0.0, -float(gap.min())) / scale, float(complementarity)
+    product = pressure * gap
+    largest = max(product.max(), -product.min())
+    return max(0.0, -float(gap.min())) / scale, float(largest / (pressure.max() * scale))
 
 
 def residuals(problem: NormalProblem, iterate: Iterate) -> NormalResiduals:
     """All four residuals of ``iterate``."""
-    sums = problem.modes.shapes @ iterate.pressure.ravel()
-    missing = np.abs(sums - problem.target) / problem.target[0]
+    total = iterate.pressure.sum()
+    if not total > 0.0:
+        return NormalResiduals(np.inf, np.inf, np.inf, np.inf)
+    missing = np.abs(problem.modes.sums(iterate.pressure) - problem.target) / total
+    first = 1 if APPROACH in problem.modes.free else 0
     penetration, complementarity = contact_residuals(
         iterate.pressure, iterate.displacement, iterate.gap(problem)
     )
     return NormalResiduals(
-        float(missing[0]), float(missing[1:].max()), penetration, complementarity
+        float(missing[:first].max(initial=0.0)),
+        float(missing[first:].max(initial=0.0)),
+        penetration,
+        complementarity,
     )

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg
+from numpy.typing import NDArray
 
 from sa_solver.types import Array
 
@@ -100,13 +101,16 @@ class AndersonMemory:
     """Anderson acceleration (type II) of a fixed-point iteration ``s ← s + f(s)``.
 
     Holds the last ``depth`` differences of images and of residuals, and the Gram matrix of the
-    latter, of which each iteration renews one row and column.
+    latter, of which each iteration renews one row and column. Differences are kept in single
+    precision, over the first residual's size: they only correct an image that is exact, take the
+    same number of iterations as in double precision, and reading them is most of the work.
     """
 
     def __init__(self, size: int, depth: int) -> None:
         """Memory for vectors of ``size`` values."""
-        self._images = np.empty((depth, size))
-        self._residuals = np.empty((depth, size))
+        self._images = np.empty((depth, size), dtype=np.float32)
+        self._residuals = np.empty((depth, size), dtype=np.float32)
+        self._unit = 1.0
         self._gram = np.zeros((depth, depth))
         self._depth = depth
         self._last_image = self._last_residual = np.empty(0)
@@ -119,6 +123,8 @@ class AndersonMemory:
         norm = float(np.linalg.norm(residual))
         if self._depth == 0:
             return image
+        if self._seen == 0:
+            self._unit = max(norm, TINY)
         if self._seen > 0 and norm > RESTART_GROWTH * self._last_norm:
             self._seen = 0
         accelerated = self._accelerate(image, residual) if self._seen > 0 else image
@@ -130,12 +136,21 @@ class AndersonMemory:
         """Combine the remembered images so that the combined residual is least."""
         slot = (self._seen - 1) % self._depth
         used = min(self._seen, self._depth)
-        np.subtract(residual, self._last_residual, out=self._residuals[slot])
-        np.subtract(image, self._last_image, out=self._images[slot])
-        products = self._residuals[:used] @ np.stack([self._residuals[slot], residual], axis=1)
-        self._gram[slot, :used] = self._gram[:used, slot] = products[:, 0]
-        weights = _solve_gram(self._gram[:used, :used], products[:, 1])
-        return image - weights @ self._images[:used]
+        self._keep(self._residuals[slot], residual, self._last_residual)
+        self._keep(self._images[slot], image, self._last_image)
+        remembered = self._residuals[:used]
+        self._gram[slot, :used] = self._gram[:used, slot] = remembered @ self._residuals[slot]
+        scaled = (residual / self._unit).astype(np.float32)
+        products = (remembered @ scaled).astype(np.float64)
+        weights = _solve_gram(self._gram[:used, :used], products)
+        correction = weights.astype(np.float32) @ self._images[:used]
+        accelerated: Array = image - self._unit * correction
+        return accelerated
+
+    def _keep(self, place: NDArray[np.float32], new: Array, last: Array) -> None:
+        """The difference of ``new`` and ``last`` over the unit, into ``place``."""
+        np.subtract(new, last, out=place, casting="same_kind")
+        place /= self._unit
 
 
 def _solve_gram(gram: Array, right: Array) -> Array:

@@ -62,19 +62,90 @@ def contact_modulus(body_1: Material, body_2: Material) -> float:
 
 
 @dataclass(frozen=True)
+class ElasticPair:
+    """Two half-spaces in contact, as the compliances that their relative displacement depends on.
+
+    All in 1/MPa: ``normal`` Σ (1-ν)/G, ``shear`` Σ 1/G, ``poisson`` Σ ν/G and ``coupling``
+    ½ [(1-2ν2)/G2 - (1-2ν1)/G1], exactly 0 for identical materials. An infinite Young's modulus is
+    a rigid body; both rigid are not an elastic pair (ValueError).
+    """
+
+    body_1: Material
+    body_2: Material
+
+    def __post_init__(self) -> None:
+        for material in (self.body_1, self.body_2):
+            if not (material.young > 0.0 and 0.0 <= material.poisson <= 0.5):
+                raise ValueError(
+                    f"Young's modulus {material.young:g} MPa, Poisson's ratio "
+                    f"{material.poisson:g}: give a modulus above 0 and a ratio of 0 to 0.5"
+                )
+        if not self.normal > 0.0:
+            raise ValueError("two rigid bodies: give one of them a finite Young's modulus")
+
+    @property
+    def normal(self) -> float:
+        return sum((1.0 - m.poisson) / m.shear_modulus for m in (self.body_1, self.body_2))
+
+    @property
+    def shear(self) -> float:
+        return sum(1.0 / m.shear_modulus for m in (self.body_1, self.body_2))
+
+    @property
+    def poisson(self) -> float:
+        return sum(m.poisson / m.shear_modulus for m in (self.body_1, self.body_2))
+
+    @property
+    def coupling(self) -> float:
+        first, second = (
+            (1.0 - 2.0 * m.poisson) / m.shear_modulus for m in (self.body_1, self.body_2)
+        )
+        return 0.5 * (second - first)
+
+    @property
+    def contact_modulus(self) -> float:
+        """E* = 2 / Σ (1-ν)/G [MPa] (Johnson 1985, eq. 4.20)."""
+        return 2.0 / self.normal
+
+    @property
+    def dundurs_beta(self) -> float:
+        """β of Dundurs 1969, positive where body 2 is the more compliant in ``(1-2ν)/G``."""
+        return self.coupling / self.normal
+
+    @property
+    def similar(self) -> bool:
+        """Whether pressure and shear do not influence each other."""
+        return self.coupling == 0.0
+
+
+@dataclass(frozen=True)
 class Grid:
     """Uniform grid of rectangular cells, centred on the frame's origin.
 
-    ``shape`` is ``(nx, ny)``, ``pitch`` is ``(dx, dy)`` in mm. Fields on it have that shape.
+    ``shape`` is ``(nx, ny)``, ``pitch`` is ``(dx, dy)`` in mm. Fields on it have that shape. A
+    ``line`` grid has cells along x only, slices 1 mm long of strips that go on along y for ever
+    (plane strain): resultants on it are per mm.
     """
 
     shape: tuple[int, int]
     pitch: tuple[float, float]
+    line: bool = False
+
+    def __post_init__(self) -> None:
+        if min(self.shape) < 1 or not all(0.0 < pitch < np.inf for pitch in self.pitch):
+            raise ValueError(f"a grid of {self.shape} cells of {self.pitch} mm has no area")
+        if self.line and (self.shape[1] != 1 or self.pitch[1] != 1.0):
+            raise ValueError("a line grid has one row of cells 1 mm long: use Grid.strips")
+
+    @classmethod
+    def strips(cls, width: float, count: int) -> Grid:
+        """Line contact: ``count`` strips that together cover ``width`` (mm)."""
+        return cls((count, 1), (width / max(count, 1), 1.0), line=True)
 
     @classmethod
     def covering(cls, size: tuple[float, float], shape: tuple[int, int]) -> Grid:
         """The grid of ``shape`` cells that exactly covers a rectangle of ``size`` (mm, mm)."""
-        return cls(shape, (size[0] / shape[0], size[1] / shape[1]))
+        return cls(shape, (size[0] / max(shape[0], 1), size[1] / max(shape[1], 1)))
 
     @property
     def cell_area(self) -> float:

@@ -1,7 +1,8 @@
 """Cycle-jumped wear of one interface: pressures of a cycle, and the depth of many alike.
 
-Pressure comes from the half-space solver under the resultants of each increment, slip from the
-structure; where it slips, q = µ p (wear method 1 of Gallego 2007).
+Pressure comes from the half-space solver under the resultants of each increment. Slip is given: by
+the structure (wear method 1 of Gallego 2007) or by the half-space (method 2, see
+:mod:`wear.full_cycle`), and does not change during a step. Where it slips, q = µ p.
 """
 
 from __future__ import annotations
@@ -51,7 +52,8 @@ class WearingContact:
     """One interface under the loads and slips of a cycle.
 
     ``slip`` ``(t, nx, ny)`` is the size of the slip in each increment [mm]; ``laws`` are those of
-    body 1 and body 2.
+    body 1 and body 2. ``uplift`` ``(t, nx, ny)`` [mm] is the normal displacement under the shear of
+    each increment, None for similar bodies.
     """
 
     def __init__(
@@ -62,11 +64,13 @@ class WearingContact:
         loads: LoadHistory,
         slip: Array,
         tolerance: float,
+        uplift: Array | None = None,
     ) -> None:
         self.contact = contact
         self._friction = friction
         self._loads = loads
         self._slip = slip
+        self._uplift = uplift
         self._tolerance = tolerance
         self._wear_1, self._wear_2 = (law.depth_per_pressure(slip, friction) for law in laws)
 
@@ -90,7 +94,7 @@ class WearingContact:
         """
         fastest = float((self._wear_1 + self._wear_2).sum(axis=0).max())
         pitch = min(self.contact.grid.pitch)
-        limit = EXPLICIT_LIMIT * pitch / self.contact.convolution.contact_modulus
+        limit = EXPLICIT_LIMIT * pitch / self.contact.half_space.pair.contact_modulus
         return limit / fastest if fastest > 0.0 else np.inf
 
     def solve(self, surfaces: Surfaces, increment: int, start: NormalStart | None) -> NormalState:
@@ -133,7 +137,7 @@ class WearingContact:
     ) -> NormalState:
         loads = self._loads
         state = self.contact.solve(
-            gap,
+            gap if self._uplift is None else gap + self._uplift[increment],
             float(loads.P[increment]),
             float(loads.Mx[increment]),
             float(loads.My[increment]),

@@ -16,7 +16,7 @@ import click
 from workflow import errors
 
 if TYPE_CHECKING:
-    from workflow.case import Case
+    from workflow.case import Case, ContactCase, LineContactCase, WearCase
 
 
 class _OneLineGroup(click.Group):
@@ -138,7 +138,7 @@ def check(case: str, overrides: tuple[str, ...]) -> None:
 @click.argument("kind")
 @click.argument("file", required=False, type=click.Path(path_type=Path))
 def new(kind: str, file: Path | None) -> None:
-    """Write a commented case of KIND (dovetail) to FILE, or print it."""
+    """Write a commented case of KIND (dovetail, bodies, line) to FILE, or print it."""
     from workflow.case import KINDS, template
 
     if kind not in KINDS:
@@ -158,13 +158,19 @@ def schema() -> None:
     """Print the JSON schema of a case, for editors."""
     import json
 
-    from workflow.case import Case
+    from workflow.case import json_schema
 
-    click.echo(json.dumps(Case.model_json_schema(), indent=2, allow_nan=False, ensure_ascii=False))
+    click.echo(json.dumps(json_schema(), indent=2, allow_nan=False, ensure_ascii=False))
 
 
 def _outline(case: Case) -> list[tuple[str, str]]:
     """What would run, in a few rows."""
+    from workflow.case import WearCase
+
+    return _wear_outline(case) if isinstance(case, WearCase) else _contact_outline(case)
+
+
+def _wear_outline(case: WearCase) -> list[tuple[str, str]]:
     path, mesh, grid, wear = case.load_path, case.mesh, case.contact.grid, case.wear
     nodes = mesh.flank_nodes
     return [
@@ -175,12 +181,25 @@ def _outline(case: Case) -> list[tuple[str, str]]:
     ]
 
 
-def _step(case: Case) -> str:
+def _step(case: WearCase) -> str:
     """Size of a wear step, with the number of jumps where it is known beforehand."""
     step = case.wear.step
     if step.cycles is not None:
         return f"{step.cycles:g} cycles: {ceil(case.wear.cycles / step.cycles)} jumps"
     return f"{step.depth:g} mm" if step.depth is not None else f"{step.volume:g} mm^3"
+
+
+def _contact_outline(case: ContactCase | LineContactCase) -> list[tuple[str, str]]:
+    from workflow.bodies import grid_of
+
+    grid, table = grid_of(case), case.load_path.table()
+    cells = f"{grid.shape[0]} strips" if grid.line else f"{grid.shape[0]} x {grid.shape[1]} cells"
+    pitch = f"{grid.pitch[0]:.4g} mm" if grid.line else "{:.4g} x {:.4g} mm".format(*grid.pitch)
+    return [
+        ("structure", f"{case.structure.shape}, {'line contact' if grid.line else 'no structure'}"),
+        ("load path", f"{len(table)} increments of {', '.join(table.columns)}"),
+        ("contact", f"{cells} of {pitch}, history {case.contact.history}"),
+    ]
 
 
 def main() -> None:

@@ -10,12 +10,15 @@ import numpy as np
 from fe_models.mesh import Interface
 from fe_models.structure import InterfaceHistory
 from fe_models.transfer import FaceTransfer
+from sa_solver.contact import ContactState, FrictionalContact
+from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalStart
-from sa_solver.types import Array, Grid, LoadHistory, contact_modulus
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
+from wear.full_cycle import full_cycle
 from wear.laws import Archard, Energy, EnergyAmplitude, WearLaw
 from wear.stepping import CycleResult, Starts, WearingContact
 from wear.surfaces import Surfaces
-from workflow.case import Case
+from workflow.case import WearCase
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,7 @@ class StageSettings:
     ``size`` of the face (mm, mm) and ``gap`` the unworn gap [mm] at x and y of the face.
     """
 
-    case: Case
+    case: WearCase
     interface: Interface
     size: tuple[float, float]
     gap: Callable[[Array, Array], Array]
@@ -53,7 +56,8 @@ class StageSettings:
 class FirstContact:
     """What the contact of the unworn cycle says: see :class:`wear.stepping.CycleResult`.
 
-    ``energy`` ``(t,)`` [N mm]; ``highest_pressure`` [MPa] of all increments.
+    ``energy`` ``(t,)`` [N mm]; ``highest_pressure`` [MPa] of all increments; ``cycle`` the states
+    at its increments where the half-space has its own friction (method full), else empty.
     """
 
     energy: Array
@@ -61,6 +65,15 @@ class FirstContact:
     touches_border: bool
     largest_residual: float
     convolutions: int
+    cycle: tuple[ContactState, ...]
+
+
+@dataclass(frozen=True)
+class Wearing:
+    """A contact that wears, and the cycle its slips come from (empty: from the structure)."""
+
+    contact: WearingContact
+    cycle: tuple[ContactState, ...]
 
 
 class ContactStage:
@@ -73,10 +86,19 @@ class ContactStage:
         self.grid = Grid.covering(settings.size, case.contact.grid)
         self.transfer = FaceTransfer.between(settings.interface, self.grid)
         blade, disk = case.materials.blade.elastic(), case.materials.disk.elastic()
-        self.modulus = contact_modulus(disk, blade)
-        self._contact = NormalContact(self.grid, self.modulus)
+        self.pair = ElasticPair(disk, blade)
+        half_space = HalfSpace(self.grid, self.pair)
+        self._contact = NormalContact(half_space)
+        self._frictional: FrictionalContact | None = None
+        if case.contact.method == "full":
+            self._frictional = FrictionalContact(
+                half_space,
+                case.friction.coefficient,
+                case.contact.tolerance,
+                case.contact.gross_slip,
+            )
         self._laws = _law(case, "disk"), _law(case, "blade")
-        self._current: tuple[tuple[Array, Array], WearingContact] | None = None
+        self._current: tuple[tuple[Array, ...], Wearing] | None = None
 
     @property
     def name(self) -> str:
@@ -87,20 +109,22 @@ class ContactStage:
         surfaces = Surfaces.unworn(self._gap(self.grid.x, self.grid.y))
         state = InterfaceState(surfaces, history.loads, history.slip, 0.0, 0.0, 0.0, {})
         loaded = np.flatnonzero(history.loads.P > 0.0).tolist()
-        result = self._wearing(state).cycle(surfaces, {}, loaded)
+        wearing = self._wearing(state)
+        result = wearing.contact.cycle(surfaces, {}, loaded)
         states = result.states.values()
         first = FirstContact(
             energy=result.energy,
             highest_pressure=max((float(s.pressure.max()) for s in states), default=0.0),
             touches_border=any(s.touches_border for s in states),
             largest_residual=max((s.residuals.largest for s in states), default=0.0),
-            convolutions=result.convolutions,
+            convolutions=result.convolutions + sum(s.convolutions for s in wearing.cycle),
+            cycle=wearing.cycle,
         )
         return self._after(state, surfaces, result, 0.0), first
 
     def jump(self, state: InterfaceState, cycles: float) -> tuple[InterfaceState, int]:
         """Wear ``cycles`` cycles in one step; also the convolutions it took."""
-        wearing = self._wearing(state)
+        wearing = self._wearing(state).contact
         implicit = self._case.wear.step.kind == "implicit"
         step = wearing.implicit_step if implicit else wearing.explicit_step
         surfaces, result = step(state.surfaces, state.starts, cycles)
@@ -108,15 +132,18 @@ class ContactStage:
 
     def stable_cycles(self, state: InterfaceState) -> float:
         """Largest stable explicit jump."""
-        return self._wearing(state).stable_cycles()
+        return self._wearing(state).contact.stable_cycles()
 
     def peak_fields(self, state: InterfaceState, peak: int) -> dict[str, Array]:
         """Pressure, shear and slip at peak load on the present surfaces, for the record."""
+        wearing = self._wearing(state)
+        if wearing.cycle:
+            own = wearing.cycle[peak]
+            return {"pressure": own.pressure, "shear": own.shear, "slip": own.slip}
         slip = self.transfer.to_cells(state.slip[peak])
         size = np.hypot(*slip)
         opposing = np.divide(-slip, size, out=np.zeros_like(slip), where=size > 0.0)
-        wearing = self._wearing(state)
-        pressure = wearing.solve(state.surfaces, peak, state.starts.get(peak)).pressure
+        pressure = wearing.contact.solve(state.surfaces, peak, state.starts.get(peak)).pressure
         shear = self._case.friction.coefficient * pressure * opposing
         return {"pressure": pressure, "shear": shear, "slip": slip}
 
@@ -124,7 +151,8 @@ class ContactStage:
         """Unworn peak pressure on a grid as coarse as the mesh of the structure."""
         grid = self.coarse_grid
         at_peak = (float(column[peak]) for column in (loads.P, loads.Mx, loads.My))
-        return NormalContact(grid, self.modulus).solve(self._gap(grid.x, grid.y), *at_peak).pressure
+        contact = NormalContact(HalfSpace(grid, self.pair))
+        return contact.solve(self._gap(grid.x, grid.y), *at_peak).pressure
 
     @property
     def coarse_grid(self) -> Grid:
@@ -136,21 +164,40 @@ class ContactStage:
         surfaces = state.surfaces
         return self.transfer.to_nodes(surfaces.depth_1), self.transfer.to_nodes(surfaces.depth_2)
 
-    def _wearing(self, state: InterfaceState) -> WearingContact:
-        """The contact under the state's loads and slips, kept until a structural solution."""
-        key = np.array([*vars(state.loads).values()], dtype=float), state.slip
+    def _wearing(self, state: InterfaceState) -> Wearing:
+        """The contact under the state's loads and slips, kept until these change.
+
+        Slips of the structure change with its solution, those of the half-space with wear.
+        """
+        key: tuple[Array, ...] = np.array([*vars(state.loads).values()], dtype=float), state.slip
+        if self._frictional is not None:
+            key = *key, state.surfaces.gap
         if self._current is not None and all(map(np.array_equal, self._current[0], key)):
             return self._current[1]
-        wearing = WearingContact(
+        cycle: tuple[ContactState, ...] = ()
+        slip, uplift = self.transfer.to_cells(state.slip), None
+        if self._frictional is not None:
+            cycle = tuple(full_cycle(self._frictional, state.surfaces.gap, state.loads))
+            slip = np.stack([own.slip for own in cycle])
+            uplift = self._uplift(cycle)
+        contact = WearingContact(
             self._contact,
             self._laws,
             self._case.friction.coefficient,
             state.loads,
-            np.hypot(*np.moveaxis(self.transfer.to_cells(state.slip), 1, 0)),
+            np.hypot(slip[:, 0], slip[:, 1]),
             self._case.contact.tolerance,
+            uplift,
         )
-        self._current = key, wearing
-        return wearing
+        self._current = key, Wearing(contact, cycle)
+        return self._current[1]
+
+    def _uplift(self, cycle: tuple[ContactState, ...]) -> Array | None:
+        """Normal displacement under the shear of each increment; None for similar bodies."""
+        if self.pair.similar:
+            return None
+        half_space = self._contact.half_space
+        return np.stack([half_space.normal_under_shear(own.shear) for own in cycle])
 
     def _after(
         self, state: InterfaceState, surfaces: Surfaces, result: CycleResult, cycles: float
@@ -167,7 +214,7 @@ class ContactStage:
         )
 
 
-def _law(case: Case, body: str) -> WearLaw:
+def _law(case: WearCase, body: str) -> WearLaw:
     own = getattr(case.wear, body)
     if case.wear.law == "archard":
         return Archard(own.coefficient, own.hardness)

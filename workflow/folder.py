@@ -5,7 +5,7 @@ from __future__ import annotations
 import shutil
 from pathlib import Path
 
-from workflow.case import Case, dump_case, load_case
+from workflow.case import Case, WearCase, dump_case, load_case
 from workflow.errors import UserError
 from workflow.store import PARTIAL, replacing
 
@@ -47,7 +47,8 @@ class OutputFolder:
         for name in FOLDERS:
             shutil.rmtree(self.root / name, ignore_errors=True)
         self.clear_partial()
-        self.jumps.mkdir()
+        if isinstance(case, WearCase):
+            self.jumps.mkdir()
         with replacing(self.case) as partial:
             partial.write_text(dump_case(case), encoding="utf-8")
 

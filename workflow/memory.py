@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import os
+from math import prod
 from pathlib import Path
 
-from workflow.case import Case
+from workflow.case import Case, LineContactCase, WearCase
 from workflow.errors import OutOfMemory
 
 # Dense interface matrices alive at once while the joint is condensed.
 DENSE_MATRICES = 6
 # Fields per cell and increment: slips, depths per pressure, pressures, starts.
 FIELDS = 12
+# A contact case: fields kept of a state, and spectra and iterates alive during a solve, per cell.
+STATE_FIELDS, SPECTRA = 6, 300
 # Sparse factors of a structure with this many nodes took this much; they grow with this power.
 FACTOR_BYTES, FACTOR_NODES, FACTOR_POWER = 3.5e9, 1e5, 1.4
 # Meshes, plots and the interpreter with its libraries.
@@ -21,6 +24,10 @@ BYTES = 8
 
 def required_bytes(case: Case, structure_nodes: int = 0) -> float:
     """Upper estimate of the memory a run takes, with the nodes of both bodies once known."""
+    if not isinstance(case, WearCase):
+        cells = case.contact.grid if isinstance(case, LineContactCase) else prod(case.contact.grid)
+        increments = len(case.load_path.table())
+        return BYTES * cells * (SPECTRA + STATE_FIELDS * increments) + REST
     nodes = case.mesh.flank_nodes[0] * case.mesh.flank_nodes[1]
     unknowns = 3 * 2 * nodes
     cells = case.contact.grid[0] * case.contact.grid[1]
@@ -33,9 +40,14 @@ def check_memory(case: Case, structure_nodes: int = 0) -> None:
     """Raise :class:`OutOfMemory` if the machine has less than the case needs."""
     required, available = required_bytes(case, structure_nodes), _available_bytes()
     if available is not None and required > available:
+        remedy = (
+            "lower mesh.flank_nodes, mesh.order or contact.grid, or raise mesh.size"
+            if isinstance(case, WearCase)
+            else "lower contact.grid or the increments of load_path"
+        )
         raise OutOfMemory(
             f"this case needs about {required / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB "
-            "are free: lower mesh.flank_nodes, mesh.order or contact.grid, or raise mesh.size"
+            f"are free: {remedy}"
         )
 
 

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import json
-import platform
 import shutil
 from dataclasses import dataclass
 from functools import cached_property
-from importlib.metadata import version
 from typing import Any
 
 import h5py
@@ -19,8 +17,9 @@ from fe_models.stress import StressField
 from fe_models.structure import CycleSolution
 from sa_solver.types import Array
 from wear.kinetics import LinearRegime, linear_regime
-from workflow.case import Case, dump_case
+from workflow.case import WearCase, dump_case
 from workflow.checkpoint import KINETICS, RunState
+from workflow.comparison import comparison_summary, write_comparison
 from workflow.contact_stage import ContactStage, FirstContact
 from workflow.figures import write_figures
 from workflow.folder import OutputFolder
@@ -28,9 +27,9 @@ from workflow.paraview import write_paraview
 from workflow.reporter import Reporter
 from workflow.store import BODY_NAMES, ResultsWriter, read_arrays, replacing
 from workflow.structure_stage import StructureStage
+from workflow.versions import versions
 from workflow.workers import side_by_side
 
-PACKAGES = ("fretscale", "numpy", "scipy", "scikit-fem", "gmsh", "pyfftw", "h5py")
 RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
 
 
@@ -43,7 +42,7 @@ class Outcome:
     interface.
     """
 
-    case: Case
+    case: WearCase
     structure: StructureStage
     stages: list[ContactStage]
     state: RunState
@@ -95,7 +94,7 @@ def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> 
     _say(outcome, summary, reporter)
 
 
-def _write_pictures(case: Case, folder: OutputFolder) -> None:
+def _write_pictures(case: WearCase, folder: OutputFolder) -> None:
     """ParaView files and figures side by side: either takes several seconds on one core."""
     wanted = {
         write_paraview: (case.output.paraview, folder.paraview),
@@ -119,7 +118,7 @@ def _write_results(
                 "peak_increment": peak,
             }
         )
-        file.create_group("case").attrs.update({"text": dump_case(outcome.case)} | _versions())
+        file.create_group("case").attrs.update({"text": dump_case(outcome.case)} | versions())
         for group, solution in (("structure", outcome.unworn), ("structure_worn", outcome.worn)):
             for history in solution.histories:
                 writer.put_structure(f"{group}/{history.interface.name}", history)
@@ -132,6 +131,8 @@ def _write_results(
             grid = stage.coarse_grid
             file[coarse].attrs.update({"shape": grid.shape, "pitch": grid.pitch})
             writer.put(f"contact/{stage.name}", energy_half_space=result.energy)
+            if result.cycle:
+                write_comparison(writer, stage.name, result.cycle, peak)
         _write_jumps(writer, outcome, folder)
         _write_kinetics(writer, outcome)
         for moment, shape in (("unworn", structure.mesh), ("worn", mesh)):
@@ -231,7 +232,7 @@ def _summary(
         },
         "warnings": reporter.warnings,
         "seconds": {name: round(value, 2) for name, value in reporter.seconds.items()},
-        "versions": _versions(),
+        "versions": versions(),
     }
 
 
@@ -260,6 +261,7 @@ def _interface_summary(outcome: Outcome, number: int, mesh: StructureMesh) -> di
             "half_space": float(first.energy.sum()),
             "structure": float((unworn.Edx + unworn.Edy).sum()),
         },
+        **({"by_increment": comparison_summary(first.cycle, unworn)} if first.cycle else {}),
         "contact_residual": first.largest_residual,
         "convolutions": first.convolutions,
         "linear_regime": {
@@ -267,10 +269,6 @@ def _interface_summary(outcome: Outcome, number: int, mesh: StructureMesh) -> di
             for name, regime in outcome.regimes[stage.name].items()
         },
     }
-
-
-def _versions() -> dict[str, str]:
-    return {"python": platform.python_version()} | {name: version(name) for name in PACKAGES}
 
 
 def _say(outcome: Outcome, summary: dict[str, Any], reporter: Reporter) -> None:

@@ -3,12 +3,19 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from pathlib import Path
 
 from rich.console import Console
-from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn, TimeRemainingColumn
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
 
 
 class Reporter:
@@ -17,7 +24,7 @@ class Reporter:
     def __init__(self, log: Path, append: bool = False) -> None:
         self._log = log.open("a" if append else "w", encoding="utf-8")
         self._console = Console(stderr=True, highlight=False)
-        self._jumping = False
+        self._bar_shown = False
         self.seconds: dict[str, float] = {}
         self.warnings: list[str] = []
 
@@ -44,8 +51,8 @@ class Reporter:
     def stage(self, name: str) -> Iterator[None]:
         """Show and time a stage; seconds of the same name add up."""
         begin = time.perf_counter()
-        # Within the wear loop the bar is on the screen, and one thing at a time can live there.
-        shown = nullcontext() if self._jumping else self._console.status(name)
+        # One thing at a time can live on the screen.
+        shown = nullcontext() if self._bar_shown else self._console.status(name)
         try:
             with shown:
                 yield
@@ -53,6 +60,25 @@ class Reporter:
             spent = time.perf_counter() - begin
             self.seconds[name] = self.seconds.get(name, 0.0) + spent
             self.log(f"{name}: {spent:.2f} s")
+
+    @contextmanager
+    def increments(self, total: int) -> Iterator[Callable[[int], None]]:
+        """A bar over the increments of a path; yields what is told the number reached."""
+        columns = (
+            TextColumn("contact"),
+            BarColumn(),
+            MofNCompleteColumn(),
+            TimeElapsedColumn(),
+            TextColumn("left"),
+            TimeRemainingColumn(),
+        )
+        self._bar_shown = True
+        try:
+            with Progress(*columns, console=self._console, transient=True) as progress:
+                task = progress.add_task("contact", total=total)
+                yield lambda reached: progress.update(task, completed=reached)
+        finally:
+            self._bar_shown = False
 
     @contextmanager
     def jumps(self, total: float, done: float) -> Iterator[JumpProgress]:
@@ -65,12 +91,12 @@ class Reporter:
             TextColumn("left"),
             TimeRemainingColumn(),
         )
-        self._jumping = True
+        self._bar_shown = True
         try:
             with Progress(*columns, console=self._console, transient=True) as progress:
                 yield JumpProgress(progress, total, done)
         finally:
-            self._jumping = False
+            self._bar_shown = False
 
 
 class JumpProgress:

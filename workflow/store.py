@@ -22,6 +22,12 @@ if TYPE_CHECKING:
 # Names of body 1 and body 2 (sa_solver.types).
 BODY_NAMES = {1: "disk", 2: "blade"}
 
+# Name of the only interface of a contact case.
+BODIES = "bodies"
+
+# Units of the forces and moments of a line contact, by those of a contact over an area.
+PER_LENGTH = {"N": "N/mm", "N mm": "N mm/mm"}
+
 # Ending of files that are being written.
 PARTIAL = ".part"
 
@@ -40,8 +46,22 @@ DATASETS = {
     "facets": ("1", "corner nodes of the triangles"),
     "gap": ("mm", "distance of the unloaded faces"),
     "pressure": ("MPa", "contact pressure"),
-    "shear": ("MPa", "shear on body 2, x and y; µp where the structure slips, else 0 on the grid"),
+    "shear": (
+        "MPa",
+        "shear on body 2, x and y; in a wear run µp where the structure slips, else 0",
+    ),
     "slip": ("mm", "slip of body 2 over body 1 in the increment, x and y"),
+    "increment": ("1", "row of the path, counted from 1"),
+    "approach": ("mm", "motion of body 1 towards body 2"),
+    "shift_x": ("mm", "motion of body 1 relative to body 2 along x"),
+    "shift_y": ("mm", "motion of body 1 relative to body 2 along y"),
+    "tilt_x": ("rad", "rotation of body 1 relative to body 2 about x"),
+    "tilt_y": ("rad", "rotation of body 1 relative to body 2 about y"),
+    "twist": ("rad", "rotation of body 1 relative to body 2 about z"),
+    "bulk_stress_1": ("MPa", "stress along x in body 1 far below the contact"),
+    "bulk_stress_2": ("MPa", "stress along x in body 2 far above the contact"),
+    "height": ("mm", "gap before loading"),
+    "sticking": ("1", "whether the cell is pressed and its shear below µp"),
     "energy_half_space": ("N mm", "energy dissipated in each increment, half-space pressure"),
     "body_1": ("mm", "height of body 1 in the interface frame"),
     "body_2": ("mm", "height of body 2 in the interface frame"),
@@ -96,7 +116,7 @@ def read_arrays(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
 def grid_of(group: h5py.Group) -> Grid:
     """The grid that a group's attributes describe."""
     (nx, ny), (dx, dy) = group.attrs["shape"], group.attrs["pitch"]
-    return Grid((int(nx), int(ny)), (float(dx), float(dy)))
+    return Grid((int(nx), int(ny)), (float(dx), float(dy)), bool(group.attrs.get("line", False)))
 
 
 def frame_of(group: h5py.Group) -> Frame:
@@ -112,8 +132,10 @@ def jump_names(file: h5py.File, interface: str) -> list[str]:
 class ResultsWriter:
     """Fills an open ``results.h5``; every dataset gets its unit and description."""
 
-    def __init__(self, file: h5py.File) -> None:
+    def __init__(self, file: h5py.File, per_length: bool = False) -> None:
+        """Forces and energies are ``per_length`` in a line contact."""
         self.file = file
+        self._units = PER_LENGTH if per_length else {}
 
     def put(self, group: str, **datasets: Any) -> None:
         """Write datasets into a group."""
@@ -121,7 +143,8 @@ class ResultsWriter:
             values = np.asarray(values)
             large = {"compression": "gzip", "compression_opts": 1} if values.size > 4096 else {}
             dataset = self.file.create_dataset(f"{group}/{name}", data=values, **large)
-            dataset.attrs["unit"], dataset.attrs["description"] = DATASETS[name]
+            unit, dataset.attrs["description"] = DATASETS[name]
+            dataset.attrs["unit"] = self._units.get(unit, unit)
 
     def put_grid(self, name: str, grid: Grid, frame: Frame) -> None:
         """Grid of an interface and its place in space."""
@@ -129,6 +152,8 @@ class ResultsWriter:
         group.attrs.update(
             {"shape": grid.shape, "pitch": grid.pitch, "origin": frame.origin, "axes": frame.axes}
         )
+        if grid.line:
+            group.attrs["line"] = True
 
     def put_structure(self, group: str, history: InterfaceHistory) -> None:
         """What the structure gives for one interface over a cycle."""

@@ -14,7 +14,7 @@ from fe_models.stress import StressField, stress_state
 from fe_models.structure import CycleSolution, Structure
 from sa_solver.types import Array
 from workflow.cache import content_key, load_cycle, load_joint, save_cycle, save_joint
-from workflow.case import Case
+from workflow.case import WearCase
 from workflow.errors import MethodFailed
 
 SIDES = {"intrados": 1, "extrados": -1}
@@ -23,7 +23,7 @@ SIDES = {"intrados": 1, "extrados": -1}
 class StructureStage:
     """Everything the run asks of the structure. Worn depths are nodal, ``(n,)`` per interface."""
 
-    def __init__(self, case: Case) -> None:
+    def __init__(self, case: WearCase) -> None:
         self._case = case
         self.dovetail = case.structure.geometry()
         self.mission = Mission(**case.load_path.model_dump())

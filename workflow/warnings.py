@@ -6,7 +6,7 @@ import numpy as np
 
 from fe_models.structure import CycleSolution
 from sa_solver.reference.flat_rounded import FlatRounded
-from workflow.case import Case
+from workflow.case import WearCase
 from workflow.checkpoint import RunState
 from workflow.contact_stage import ContactStage, FirstContact
 from workflow.reporter import Reporter
@@ -19,7 +19,7 @@ PEAK_ERROR = 0.05
 
 
 def warn_of_structure(
-    case: Case, structure: StructureStage, unworn: CycleSolution, reporter: Reporter
+    case: WearCase, structure: StructureStage, unworn: CycleSolution, reporter: Reporter
 ) -> None:
     """Self-locking joints, cycles that do not close, faces that lose their contact."""
     if structure.self_locking():
@@ -39,14 +39,20 @@ def warn_of_structure(
 
 
 def warn_of_contact(
-    case: Case,
+    case: WearCase,
     structure: StructureStage,
     stages: list[ContactStage],
     state: RunState,
     first: list[FirstContact],
     reporter: Reporter,
 ) -> None:
-    """Pressures above yield, contacts at the border, edge peaks the grid cannot show."""
+    """Unlike bodies, pressures above yield, contacts at the border, edge peaks cut by the grid."""
+    pair = stages[0].pair
+    if case.contact.method == "normal" and not pair.similar:
+        reporter.warn(
+            f"the materials differ (Dundurs' beta {pair.dundurs_beta:.2g}): shear then moves the "
+            "surfaces normally, which contact.method: normal leaves out; use full"
+        )
     yield_stress = min(
         m.elastic().yield_stress for m in (case.materials.blade, case.materials.disk)
     )
@@ -84,7 +90,7 @@ def warn_of_border(stage: ContactStage, reporter: Reporter) -> None:
     )
 
 
-def edge_peak_errors(case: Case, stage: ContactStage, load: float) -> dict[str, float]:
+def edge_peak_errors(case: WearCase, stage: ContactStage, load: float) -> dict[str, float]:
     """What the grid makes of the closed form's edge peaks, relative, under a centred ``load``.
 
     The plane strain profile across the flank stands for both: the peak at the slot ends is set by
@@ -97,6 +103,8 @@ def edge_peak_errors(case: Case, stage: ContactStage, load: float) -> dict[str, 
     per_length = load / (dovetail.slot_length - 2.0 * dovetail.end_width)
     radii = {"edge": dovetail.edge_radius, "end": dovetail.end_radius}
     return {
-        edge: FlatRounded(half_width, radius, per_length, stage.modulus).peak_error(pitch)
+        edge: FlatRounded(half_width, radius, per_length, stage.pair.contact_modulus).peak_error(
+            pitch
+        )
         for (edge, radius), pitch in zip(radii.items(), stage.grid.pitch, strict=True)
     }

@@ -1,13 +1,19 @@
-"""Hertz contact of spheres and of parallel cylinders.
+"""Hertz contact of spheres, of general quadratic surfaces and of parallel cylinders.
 
-Source: Johnson 1985, *Contact Mechanics*, section 4.2, eqs 4.22-4.24 (point) and 4.43-4.46 (line).
+Valid for frictionless or elastically similar half-spaces, contacts small against the radii.
+
+Source: Johnson 1985, *Contact Mechanics*, section 4.2, eqs 4.22-4.24 (point) and 4.43-4.46 (line);
+section 3.5 for the displacements inside an ellipse.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
+from scipy.optimize import brentq
+from scipy.special import elliprd, elliprf
 
 from sa_solver.types import Array
 
@@ -46,6 +52,69 @@ class Sphere:
 
 
 @dataclass(frozen=True)
+class Ellipse:
+    """Relative radii ``radius_x`` and ``radius_y`` [mm] pressed with ``load`` [N] at E* [MPa].
+
+    x and y are the principal directions, ``radius_x`` curves the section ``y = 0``; either may be
+    the larger, by any ratio. The semi-axes are a along x and b along y. Inside the ellipse a
+    pressure p0 sqrt(1 - x²/a² - y²/b²) moves the surface by
+
+        u_z = (p0 a b / E*) [R_F(0, a², b²) - (x²/3) R_D(0, b², a²) - (y²/3) R_D(0, a², b²)]
+
+    with Carlson's complete elliptic integrals R_F and R_D, which are Johnson's integrals of section
+    3.5 without his modulus. u_z = δz - gap gives the ratio b/a (a root), then a and δz, exactly.
+    """
+
+    load: float
+    radius_x: float
+    radius_y: float
+    contact_modulus: float
+
+    @cached_property
+    def axis_ratio(self) -> float:
+        """b/a, the root of R_D(0, κ², 1) / R_D(0, 1, κ²) = Ry / Rx."""
+        target = float(np.log(self.radius_y / self.radius_x))
+
+        def excess(log_ratio: float) -> float:
+            square = np.exp(2.0 * log_ratio)
+            return float(np.log(elliprd(0.0, square, 1.0) / elliprd(0.0, 1.0, square))) - target
+
+        # b/a lies between the square root of Ry/Rx and Ry/Rx itself; 1 keeps the circle inside.
+        reach = abs(target) + 1.0
+        return float(np.exp(brentq(excess, -reach, reach, xtol=1e-15)))
+
+    @cached_property
+    def semi_axes(self) -> tuple[float, float]:
+        """(a, b) along x and y [mm], a³ = (P Rx / π E*) R_D(0, (b/a)², 1)."""
+        volume = self.load * self.radius_x / (np.pi * self.contact_modulus)
+        a = float(np.cbrt(volume * elliprd(0.0, self.axis_ratio**2, 1.0)))
+        return a, self.axis_ratio * a
+
+    @property
+    def peak_pressure(self) -> float:
+        """p0 = 3 P / 2 π a b [MPa]."""
+        a, b = self.semi_axes
+        return 1.5 * self.load / (np.pi * a * b)
+
+    @property
+    def approach(self) -> float:
+        """δz = (3 P / 2 π E*) R_F(0, a², b²) [mm]."""
+        a, b = self.semi_axes
+        integral = float(elliprf(0.0, a**2, b**2))
+        return 1.5 * self.load * integral / (np.pi * self.contact_modulus)
+
+    def gap(self, x: Array, y: Array) -> Array:
+        """Gap before loading, ``x² / 2 Rx + y² / 2 Ry`` [mm]."""
+        return x**2 / (2.0 * self.radius_x) + y**2 / (2.0 * self.radius_y)
+
+    def pressure(self, x: Array, y: Array) -> Array:
+        """p0 sqrt(1 - x²/a² - y²/b²), 0 outside [MPa]; ``x`` and ``y`` broadcast [mm]."""
+        a, b = self.semi_axes
+        inside = np.maximum(0.0, 1.0 - (x / a) ** 2 - (y / b) ** 2)
+        return self.peak_pressure * np.sqrt(inside)
+
+
+@dataclass(frozen=True)
 class Cylinder:
     """Parallel cylinders of relative ``radius`` [mm] under ``load`` per length [N/mm], E* [MPa]."""
 
@@ -62,6 +131,19 @@ class Cylinder:
     def peak_pressure(self) -> float:
         """p0 = 2 P / π a [MPa]."""
         return 2.0 * self.load / (np.pi * self.half_width)
+
+    def approach(self, datum: float) -> float:
+        """δz = (2 P / π E*) [ln(2 L / a) + 1/2] [mm], for the ``datum`` L [mm].
+
+        A line contact's approach is defined only up to a constant: this one goes with
+        u_z = -(2 / π E*) ∫ p ln(|x - ξ| / L) dξ, a line load's displacement being 0 at L from it.
+        """
+        logarithm = float(np.log(2.0 * datum / self.half_width))
+        return 2.0 * self.load * (logarithm + 0.5) / (np.pi * self.contact_modulus)
+
+    def gap(self, x: Array) -> Array:
+        """Gap before loading, ``x² / 2 R`` [mm]."""
+        return x**2 / (2.0 * self.radius)
 
     def pressure(self, x: Array) -> Array:
         """p0 sqrt(1 - x²/a²), 0 outside the contact [MPa]."""

@@ -20,8 +20,9 @@ import pytest
 from fe_models.dovetail import Mission, dovetail_structure
 from fe_models.friction import FrictionalJoint
 from fe_models.geometry.dovetail import Dovetail
+from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
-from sa_solver.types import Grid, Material, contact_modulus
+from sa_solver.types import ElasticPair, Grid, Material
 from workflow.case import load_case
 
 RECORD = Path(__file__).with_name("record.csv")
@@ -58,7 +59,7 @@ def test_contact_of_the_default_flank(record: dict[str, float]) -> None:
     """Cold, and warm after a little wear, at peak load on 128 x 256 cells."""
     dovetail = Dovetail(**CASE.structure.model_dump(exclude={"kind"}))
     grid = Grid.covering(dovetail.flank_size(), CASE.contact.grid)
-    contact = NormalContact(grid, contact_modulus(TITANIUM, TITANIUM))
+    contact = NormalContact(HalfSpace(grid, ElasticPair(TITANIUM, TITANIUM)))
     gap = dovetail.flank_gap(grid.x, grid.y, 1)
     load, moment = 78e3, 43e3
     cold = contact.solve(gap, load, My=moment)
@@ -66,7 +67,7 @@ def test_contact_of_the_default_flank(record: dict[str, float]) -> None:
     warm = contact.solve(worn, load, My=moment, start=cold.start)
     assert cold.converged
     assert warm.converged
-    one = seconds(lambda: contact.convolution.displacement(cold.pressure), 20)
+    one = seconds(lambda: contact.half_space.normal(cold.pressure), 20)
     record["contact, cold: convolutions"] = cold.convolutions
     record["contact, warm: convolutions"] = warm.convolutions
     spent = seconds(lambda: contact.solve(worn, load, My=moment, start=cold.start), 5)

@@ -5,15 +5,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sa_solver import normal
-from sa_solver.convolution import HalfSpaceConvolution
+from sa_solver import nested_solver, normal_splitting
+from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalContactError
 from sa_solver.reference.flat_rounded import FlatRounded
 from sa_solver.reference.hertz import Sphere
-from sa_solver.types import Grid, Material, contact_modulus
+from sa_solver.types import ElasticPair, Grid, Material
 
 TITANIUM = Material(115e3, 0.29)
-MODULUS = contact_modulus(TITANIUM, TITANIUM)
+PAIR = ElasticPair(TITANIUM, TITANIUM)
+MODULUS = PAIR.contact_modulus
 SPHERE = Sphere(400.0, 10.0, MODULUS)
 SOLVED = 1e-8
 """What the solver imposes: resultants, penetration, complementarity."""
@@ -22,7 +23,7 @@ SOLVED = 1e-8
 def assert_solves(grid, height, P, Mx, My, state, compliance=0.0):
     """Residuals from the fields alone, with a fresh convolution."""
     p, S = state.pressure, grid.cell_area
-    displacement = HalfSpaceConvolution(grid, MODULUS).displacement(p) + compliance * p
+    displacement = HalfSpace(grid, PAIR).normal(p) + compliance * p
     rigid = state.approach + state.tilt_x * grid.y - state.tilt_y * grid.x
     gap = height + displacement - rigid
     scale = displacement.max()
@@ -61,7 +62,7 @@ def rough(grid, amplitude):
 # -- Hertz --
 def test_sphere_on_a_fine_grid():
     grid, height = sphere_on(128)
-    state = NormalContact(grid, MODULUS).solve(height, 400.0)
+    state = NormalContact(HalfSpace(grid, PAIR)).solve(height, 400.0)
     assert_solves(grid, height, 400.0, 0.0, 0.0, state)
     assert state.pressure.max() == pytest.approx(1450.3, rel=1e-3)
     assert state.approach == pytest.approx(13.168e-3, rel=2e-4)
@@ -75,7 +76,7 @@ def test_sphere_converges():
     errors = []
     for cells in (32, 64, 128, 256):
         grid, height = sphere_on(cells)
-        state = NormalContact(grid, MODULUS).solve(height, 400.0)
+        state = NormalContact(HalfSpace(grid, PAIR)).solve(height, 400.0)
         exact = SPHERE.pressure(grid.x, grid.y)
         l2 = np.linalg.norm(state.pressure - exact) / np.linalg.norm(exact)
         errors.append((abs(state.approach / SPHERE.approach - 1.0), l2))
@@ -89,7 +90,7 @@ def test_a_moment_moves_the_paraboloid(cells_off):
     """A paraboloid about an apex d off centre differs from a centred one by a tilt and a constant,
     so a load with moment P d presses the same field, d further; with whole cells exactly so."""
     grid = Grid.covering((1.5, 1.2), (60, 48))
-    contact, height = NormalContact(grid, MODULUS), SPHERE.gap(grid.x, grid.y)
+    contact, height = NormalContact(HalfSpace(grid, PAIR)), SPHERE.gap(grid.x, grid.y)
     offset = np.array(cells_off) * grid.pitch
     centred = contact.solve(height, 400.0)
     moved = contact.solve(height, 400.0, Mx=400.0 * offset[1], My=-400.0 * offset[0])
@@ -103,7 +104,7 @@ def test_a_moment_moves_the_paraboloid(cells_off):
 def test_a_single_row_of_cells():
     grid = Grid((1, 21), (0.1, 0.1))
     height = SPHERE.gap(grid.x, grid.y)
-    state = NormalContact(grid, MODULUS).solve(height, 40.0, Mx=4.0)
+    state = NormalContact(HalfSpace(grid, PAIR)).solve(height, 40.0, Mx=4.0)
     assert_solves(grid, height, 40.0, 4.0, 0.0, state)
     assert state.tilt_y == 0.0
 
@@ -111,7 +112,7 @@ def test_a_single_row_of_cells():
 def test_a_load_on_few_cells():
     grid = Grid.covering((4.0, 4.0), (64, 64))
     height = ((grid.x - 0.5) ** 2 + (grid.y - 0.3) ** 2) / 20.0
-    state = NormalContact(grid, MODULUS).solve(height, 0.04, Mx=0.012, My=-0.02)
+    state = NormalContact(HalfSpace(grid, PAIR)).solve(height, 0.04, Mx=0.012, My=-0.02)
     assert_solves(grid, height, 0.04, 0.012, -0.02, state)
 
 
@@ -122,7 +123,7 @@ def test_flat_meets_resultants_and_law(share, eccentricity):
     grid, height = flat()
     P = 9e4 * share
     Mx, My = P * eccentricity[1], -P * eccentricity[0]
-    state = NormalContact(grid, MODULUS).solve(height, P, Mx, My)
+    state = NormalContact(HalfSpace(grid, PAIR)).solve(height, P, Mx, My)
     assert_solves(grid, height, P, Mx, My, state)
     assert state.method == "conjugate gradients"
 
@@ -130,7 +131,7 @@ def test_flat_meets_resultants_and_law(share, eccentricity):
 def test_middle_of_a_long_flat_is_the_plane_closed_form():
     """Profile within 3 % of the peak, peak within 1 %: discretisation, one cell at the edge."""
     grid, height = flat((256, 64))
-    state = NormalContact(grid, MODULUS).solve(height, 9e4)
+    state = NormalContact(HalfSpace(grid, PAIR)).solve(height, 9e4)
     profile = state.pressure[:, 32]
     closed = FlatRounded(4.0, 30.0, profile.sum() * grid.pitch[0], MODULUS)
     assert profile.max() == pytest.approx(closed.peak[0], rel=0.01)
@@ -146,7 +147,7 @@ def test_the_peak_error_foretold_bounds_the_one_made(radius, cells):
     dx = np.maximum(np.abs(grid.x) - 4.0, 0.0)
     dy = np.maximum(np.abs(grid.y) - 27.0, 0.0)
     height = dx**2 / (2.0 * radius) + dy**2 / 300.0
-    profile = NormalContact(grid, MODULUS).solve(height, 9e4).pressure[:, 32]
+    profile = NormalContact(HalfSpace(grid, PAIR)).solve(height, 9e4).pressure[:, 32]
     closed = FlatRounded(4.0, radius, profile.sum() * grid.pitch[0], MODULUS)
     made = profile.max() / closed.peak[0] - 1.0
     assert abs(made) <= abs(closed.peak_error(grid.pitch[0])) + 2e-4
@@ -156,7 +157,7 @@ def test_the_peak_error_foretold_bounds_the_one_made(radius, cells):
 def test_rough_flat(amplitude):
     grid, height = flat()
     height = height + rough(grid, amplitude)
-    state = NormalContact(grid, MODULUS).solve(height, 9e4, Mx=9e4)
+    state = NormalContact(HalfSpace(grid, PAIR)).solve(height, 9e4, Mx=9e4)
     assert_solves(grid, height, 9e4, 9e4, 0.0, state)
 
 
@@ -164,7 +165,7 @@ def test_rough_flat(amplitude):
 def test_any_start_gives_the_same_answer():
     """1e-8 on the gap leaves 1e-5 of the peak on single cells (they are stiffer by their size)."""
     grid, height = flat()
-    contact = NormalContact(grid, MODULUS)
+    contact = NormalContact(HalfSpace(grid, PAIR))
     cold = contact.solve(height, 9e4, My=9e3)
     one = np.zeros(grid.shape)
     one[10, 10] = 1.0
@@ -180,7 +181,7 @@ def test_any_start_gives_the_same_answer():
 
 def test_a_solution_is_its_own_start():
     grid, height = flat()
-    contact = NormalContact(grid, MODULUS)
+    contact = NormalContact(HalfSpace(grid, PAIR))
     state = contact.solve(height, 9e4)
     again = contact.solve(height, 9e4, start=state)
     assert again.convolutions == 0
@@ -190,7 +191,7 @@ def test_a_solution_is_its_own_start():
 def test_a_worn_flat_starts_warm():
     """Wear of 2 % of the approach between jumps: at most 25 convolutions, as a run's time asks."""
     grid, height = flat((128, 128))
-    contact = NormalContact(grid, MODULUS)
+    contact = NormalContact(HalfSpace(grid, PAIR))
     state = contact.solve(height, 9e4, Mx=9e4)
     depth = 0.02 * state.approach * state.pressure / state.pressure.max()
     worn = contact.solve(height + depth, 9e4, Mx=9e4, start=state)
@@ -202,9 +203,9 @@ def test_a_worn_flat_starts_warm():
 def test_the_splitting_agrees_with_conjugate_gradients(monkeypatch, wear):
     grid, height = flat((32, 48))
     compliance = wear * (np.abs(grid.x) > 2.0) * np.ones(grid.shape)
-    contact = NormalContact(grid, MODULUS)
+    contact = NormalContact(HalfSpace(grid, PAIR))
     expected = contact.solve(height, 9e4, Mx=9e4, My=9e3, compliance=compliance)
-    monkeypatch.setattr(normal, "GRADIENT_ITERATIONS", 0)
+    monkeypatch.setattr(nested_solver, "GRADIENT_ITERATIONS", 0)
     state = contact.solve(height, 9e4, Mx=9e4, My=9e3, compliance=compliance)
     assert (expected.method, state.method) == ("conjugate gradients", "splitting")
     assert_solves(grid, height, 9e4, 9e4, 9e3, state, compliance)
@@ -213,10 +214,10 @@ def test_the_splitting_agrees_with_conjugate_gradients(monkeypatch, wear):
 
 
 def test_failure_is_a_value_with_a_remedy(monkeypatch):
-    monkeypatch.setattr(normal, "GRADIENT_ITERATIONS", 1)
-    monkeypatch.setattr(normal, "SPLITTING_ITERATIONS", 2)
+    monkeypatch.setattr(nested_solver, "GRADIENT_ITERATIONS", 1)
+    monkeypatch.setattr(normal_splitting, "SPLITTING_ITERATIONS", 2)
     grid, height = flat((16, 16))
-    state = NormalContact(grid, MODULUS).solve(height, 9e4)
+    state = NormalContact(HalfSpace(grid, PAIR)).solve(height, 9e4)
     assert not state.converged
     assert "loosen" in state.message
     assert np.sum(state.pressure) * grid.cell_area == pytest.approx(9e4, rel=SOLVED)
@@ -239,7 +240,7 @@ def test_implicit_wear_is_consistent(kind, size):
     """Heights worn by D p, without compliance, carry the same pressure."""
     grid, height = flat()
     compliance = size * compliances(grid)[kind]
-    contact = NormalContact(grid, MODULUS)
+    contact = NormalContact(HalfSpace(grid, PAIR))
     state = contact.solve(height, 9e4, Mx=9e4, compliance=compliance)
     assert_solves(grid, height, 9e4, 9e4, 0.0, state, compliance)
     assert state.method == "conjugate gradients"
@@ -252,7 +253,7 @@ def test_wear_without_end_spreads_the_load_evenly():
     """D far above K: pressure uniform under a centred load, linear under a moment."""
     grid, height = flat((32, 32))
     compliance = np.full(grid.shape, 1e3)
-    state = NormalContact(grid, MODULUS).solve(height, 9e4, Mx=9e4, compliance=compliance)
+    state = NormalContact(HalfSpace(grid, PAIR)).solve(height, 9e4, Mx=9e4, compliance=compliance)
     linear = 9e4 / 600.0 + 9e4 * grid.y / (grid.cell_area * 32 * np.sum(grid.y**2))
     np.testing.assert_allclose(state.pressure, linear * np.ones(grid.shape), rtol=1e-4)
 
@@ -260,7 +261,7 @@ def test_wear_without_end_spreads_the_load_evenly():
 # -- edges of validity --
 def test_no_load_no_pressure():
     grid, height = flat((16, 16))
-    state = NormalContact(grid, MODULUS).solve(height + 0.25, 0.0)
+    state = NormalContact(HalfSpace(grid, PAIR)).solve(height + 0.25, 0.0)
     assert state.converged
     assert np.count_nonzero(state.pressure) == 0
     assert state.approach == pytest.approx(0.25)
@@ -269,7 +270,7 @@ def test_no_load_no_pressure():
 
 def test_contact_at_the_border_is_measured():
     grid = Grid.covering((0.6, 1.0), (48, 80))
-    state = NormalContact(grid, MODULUS).solve(SPHERE.gap(grid.x, grid.y), 400.0)
+    state = NormalContact(HalfSpace(grid, PAIR)).solve(SPHERE.gap(grid.x, grid.y), 400.0)
     assert state.touches_border
     assert 0.0 < state.border_load < 0.1
 
@@ -287,19 +288,19 @@ def test_contact_at_the_border_is_measured():
 def test_loads_that_no_pressure_carries(P, Mx, My, words):
     grid, height = flat()
     with pytest.raises(NormalContactError, match=words):
-        NormalContact(grid, MODULUS).solve(height, P, Mx, My)
+        NormalContact(HalfSpace(grid, PAIR)).solve(height, P, Mx, My)
 
 
 def test_a_load_just_inside_the_cells_is_carried():
     grid, height = flat((32, 32))
     P, reach = 1e3, 0.999 * float(grid.x.max())
-    state = NormalContact(grid, MODULUS).solve(height, P, My=-P * reach)
+    state = NormalContact(HalfSpace(grid, PAIR)).solve(height, P, My=-P * reach)
     assert_solves(grid, height, P, 0.0, -P * reach, state)
 
 
 def test_bad_fields_and_grids():
     grid, height = flat((16, 16))
-    contact = NormalContact(grid, MODULUS)
+    contact = NormalContact(HalfSpace(grid, PAIR))
     hole = height.copy()
     hole[3, 3] = np.nan
     with pytest.raises(NormalContactError, match="NaN"):
@@ -309,8 +310,8 @@ def test_bad_fields_and_grids():
     with pytest.raises(NormalContactError, match="compliances"):
         contact.solve(height, 1.0, compliance=-np.ones(grid.shape))
     with pytest.raises(NormalContactError, match="cells"):
-        NormalContact(Grid((1, 1), (1.0, 1.0)), MODULUS)
+        NormalContact(HalfSpace(Grid((1, 1), (1.0, 1.0)), PAIR))
     other, other_height = flat((8, 8))
-    start = NormalContact(other, MODULUS).solve(other_height, 1.0)
+    start = NormalContact(HalfSpace(other, PAIR)).solve(other_height, 1.0)
     with pytest.raises(NormalContactError, match="same grid"):
         contact.solve(height, 1.0, start=start)

@@ -6,14 +6,18 @@ A ball on a small grid under one or several loads, sliding as a whole unless sai
 import numpy as np
 import pytest
 
+from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
-from sa_solver.types import Array, Grid, LoadHistory
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from wear.laws import Archard, Energy, EnergyAmplitude, WearLaw
 from wear.stepping import ContactFailure, WearingContact
 from wear.surfaces import Surfaces
 
 GRID = Grid.covering((4.0, 4.0), (24, 24))
-MODULUS, RADIUS, LOAD = 6e4, 40.0, 2000.0
+RADIUS, LOAD = 40.0, 2000.0
+BODY = Material(12e4 * (1 - 0.3**2), 0.3)
+PAIR = ElasticPair(BODY, BODY)
+MODULUS = PAIR.contact_modulus  # 6e4 MPa
 FRICTION, SLIP = 0.4, 0.02
 TOLERANCE = 1e-9
 BALL = (GRID.x**2 + GRID.y**2) / (2.0 * RADIUS)
@@ -34,7 +38,7 @@ def wearing(
 ) -> WearingContact:
     history = loads(LOAD) if history is None else history
     slip = np.full((len(history), *GRID.shape), SLIP) if slip is None else slip
-    contact = NormalContact(GRID, MODULUS)
+    contact = NormalContact(HalfSpace(GRID, PAIR))
     return WearingContact(contact, laws, FRICTION, history, slip, TOLERANCE)
 
 

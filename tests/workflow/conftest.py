@@ -95,6 +95,19 @@ def put_contact(file: h5py.File, name: str, load: float, grid: Grid) -> None:
     put(file[f"contact/{name}"], energy_half_space=0.97 * history["Edx"][()])
 
 
+def put_comparison(file: h5py.File, name: str, load: float, grid: Grid) -> None:
+    """The half-space's own cycle: its loads, and its fields at three increments."""
+    structure = file[f"structure/{name}/load_history"]
+    history = {key: column[()] for key, column in structure.items()}
+    history["Qx"] = 0.998 * history["Qx"]
+    put(file.create_group(f"comparison/{name}/load_history"), **history)
+    for increment in (PEAK, PEAK + 4, PEAK + 7):
+        pressure = peak_pressure(grid.x, grid.y, 0.0, load) / (1 + increment - PEAK)
+        shear = np.stack([-FRICTION * pressure, 0.1 * pressure])
+        group = file.create_group(f"comparison/{name}/{increment:05d}")
+        put(group, pressure=pressure, shear=shear, slip=-1e-5 * shear)
+
+
 def put_kinetics(file: h5py.File, name: str, grid: Grid) -> None:
     """Depths and volumes over the cycles, from the surfaces."""
     group, jumps = file.create_group(f"kinetics/{name}"), file[f"surfaces/{name}"]
@@ -140,6 +153,7 @@ def fabricate(path: Path, shape: tuple[int, int] = (24, 40)) -> Path:
             put_structure(file, name, load, 0.0)
             put_structure(file, name, load, JUMPS[-1])
             put_contact(file, name, load, grid)
+            put_comparison(file, name, load, grid)
             put_kinetics(file, name, grid)
         put(file["kinetics"], cycles=JUMPS)
         put_bodies(file)

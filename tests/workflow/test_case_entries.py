@@ -5,14 +5,18 @@ The entries are found by walking the schema, so that a new one cannot be forgott
 
 import functools
 import math
-from typing import get_args
+from dataclasses import dataclass
+from pathlib import Path as Folder
+from typing import Any, get_args
 
+import numpy as np
 import pytest
 from pydantic import BaseModel
 
-from workflow.case import CaseError, load_case, parse_case, source
-from workflow.case.fields import Path, Quantity, Text, Whole
-from workflow.case.schema import Case, entry_of, sections_of
+from workflow.case import KINDS, CaseError, load_case, parse_case, source, template
+from workflow.case.fields import File, Path, Quantity, Text, Whole
+from workflow.case.load_table import FORCES, MOTIONS
+from workflow.case.sections import entry_of, sections_of
 
 ARCHARD = {
     "law": "archard",
@@ -29,30 +33,75 @@ AMPLITUDE = {
     "disk": {"coefficient": "1e4 um^3/J"},
 }
 EXPECT = [{"quantity": "a.b", "value": "3 um", "tolerance": "1 %", "source": "a test"}]
-# Sections that the default case does not have, by the law they need.
+# Sections that the templates do not have, by the law or shape they need.
 WITH = {
     "energy": [f"expect={EXPECT}", "wear.stop={depth: 1 mm, volume: 1 mm^3}"],
     "energy_amplitude": [f"wear={AMPLITUDE}"],
     "archard": [f"wear={ARCHARD}"],
+    "sphere": [],
+    "ellipsoid": ["structure={kind: bodies, shape: ellipsoid, radius_x: 1 mm, radius_y: 2 mm}"],
+    "cylinder": [],
+    "flat_rounded": [
+        "structure={kind: bodies, shape: flat_rounded, half_width: 1 mm, edge_radius: 2 mm}"
+    ],
+    "heights": ["structure={kind: bodies, shape: heights, file: gap.npy}"],
 }
+# Each kind's own cells, for the files that the cases name.
+CELLS = {"dovetail": (8, 8), "bodies": (128, 128), "line": (512,)}
 
 
-def leaves(model, path=()):
-    """``(path, field)`` of every leaf; list entries and unions are entered."""
+@dataclass(frozen=True)
+class Leaf:
+    """An entry of a kind of case: its dotted key, and the overrides that make the case have it."""
+
+    kind: str
+    key: str
+    needed: list[str]
+    field: Any
+
+    @property
+    def name(self) -> str:
+        return self.key.rpartition(".")[2]
+
+    @property
+    def is_list(self) -> bool:
+        return "tuple" in str(self.field.annotation)
+
+
+def leaves(model, path=(), tags=()):
+    """``(path, tags, field)`` of every leaf; list entries and unions are entered."""
     for name, field in model.model_fields.items():
         sections = list(sections_of(field.annotation))
         index = (0,) if field.default == () and sections else ()
         for section in sections:
-            kind = section.model_fields.get("law")
-            tag = get_args(kind.annotation) if kind else ()
-            yield from leaves(section, (*path, name, *index, *tag))
+            choices = [section.model_fields[key] for key in ("law", "shape")
+                       if key in section.model_fields]  # fmt: skip
+            tag = [get_args(choice.annotation)[0] for choice in choices]
+            yield from leaves(section, (*path, name, *index), (*tags, *tag))
         if not sections:
-            yield (*path, name), field
+            yield (*path, name), tags, field
+
+
+def all_leaves():
+    for kind, model in KINDS.items():
+        for path, tags, field in leaves(model):
+            needed = [entry for tag in tags for entry in WITH[tag]]
+            if path[0] == "expect":
+                needed = [*needed, f"expect={EXPECT}"]
+            if path[:2] == ("wear", "stop") and tags == ():
+                needed = [*needed, *WITH["energy"][1:]]
+            yield Leaf(kind, ".".join(map(str, path)), needed, field)
 
 
 PARSED = functools.cache(source.parse_yaml)
-LEAVES = list(leaves(Case))
-QUANTITIES = [(path, f) for path, f in LEAVES if isinstance(entry_of(f), Quantity)]
+LEAVES = list(all_leaves())
+QUANTITIES = [leaf for leaf in LEAVES if isinstance(entry_of(leaf.field), Quantity)]
+each_leaf = pytest.mark.parametrize(
+    "leaf", LEAVES, ids=lambda leaf: f"{leaf.kind}:{leaf.key}:{len(''.join(leaf.needed))}"
+)
+each_quantity = pytest.mark.parametrize(
+    "leaf", QUANTITIES, ids=lambda leaf: f"{leaf.kind}:{leaf.key}:{len(''.join(leaf.needed))}"
+)
 
 
 @pytest.fixture(autouse=True)
@@ -61,64 +110,72 @@ def _parse_once(monkeypatch):
     monkeypatch.setattr(source, "parse_yaml", PARSED)
 
 
-def names(rows):
-    return [".".join(map(str, path)) for path, _ in rows]
+@pytest.fixture(scope="module")
+def folders(tmp_path_factory) -> dict[str, Folder]:
+    """A folder for the template of each kind, with the files that its examples name."""
+    made = {}
+    for kind, cells in CELLS.items():
+        made[kind] = tmp_path_factory.mktemp(kind)
+        np.save(made[kind] / "gap.npy", np.zeros(cells))
+        (made[kind] / "history.csv").write_text("P,Qx\n1,0\n1,0.1\n", encoding="utf-8")
+    return made
 
 
-def place(path):
-    """Dotted key, and the overrides that make the case have it."""
-    laws = [law for law in WITH if law in path and "wear" in path]
-    key = ".".join(str(part) for part in path if part not in laws)
-    return key, WITH[laws[0] if laws else "energy"]
+def load(leaf, folders, *overrides):
+    """The template of the leaf's kind with the overrides that it needs and more."""
+    path = folders[leaf.kind] / "case.yaml"
+    return parse_case(template(leaf.kind), str(path), [*leaf.needed, *overrides])
 
 
-def refused(path, dovetail_path, value):
+def refused(leaf, folders, value):
     """The message that refuses ``value``: one line, which names the entry."""
-    key, needed = place(path)
     with pytest.raises(CaseError) as refusal:
-        load_case(dovetail_path, [*needed, f"{key}={value}"])
+        load(leaf, folders, f"{leaf.key}={value}")
     (line,) = str(refusal.value).splitlines()
-    assert line.startswith(f"--set {key}"), line
+    assert line.startswith(f"--set {leaf.key}"), line
     assert "allowed: " in line, line
     return line
 
 
 def test_walk_finds_the_leaves():
-    found = {place(path)[0] for path, _ in LEAVES}
+    found = {leaf.key for leaf in LEAVES}
     assert {"wear.blade.hardness", "wear.reference_amplitude", "expect.0.tolerance"} <= found
-    assert len(LEAVES) > 60
+    assert {"load_path.legs.0.approach", "structure.radius_y", "contact.datum"} <= found
+    assert len(LEAVES) > 160
 
 
-@pytest.mark.parametrize(("path", "field"), LEAVES, ids=names(LEAVES))
-def test_wrong_type_is_refused(path, field, dovetail_path):
+@each_leaf
+def test_wrong_type_is_refused(leaf, folders):
     values = ["{a: 1}"]
-    if "tuple" in str(field.annotation):
+    if leaf.is_list:
         values += ["3", "word", "true"]
-    elif isinstance(entry_of(field), Quantity | Whole):
+    elif isinstance(entry_of(leaf.field), Quantity | Whole):
         values += ["true", "word", "'1'", ".nan", ".inf", "-.inf", "[1]"]
-    elif isinstance(entry_of(field), Text | Path):
+    elif isinstance(entry_of(leaf.field), Text | Path | File):
         values += ["3", "true", "' '", r'"a\nb"', "[a]"]
-    elif field.annotation is bool:
+    elif leaf.field.annotation is bool:
         values += ["1", "yes", "[true]"]
+    # A grid of one size is that of a line contact: these make another kind of case of it.
+    if leaf.key == "contact.size" and "shape: heights" in str(leaf.needed):
+        values = ["{a: 1}"]
     for value in values:
-        refused(path, dovetail_path, value)
+        refused(leaf, folders, value)
 
 
-@pytest.mark.parametrize(("path", "field"), QUANTITIES, ids=names(QUANTITIES))
-def test_wrong_unit_is_refused(path, field, dovetail_path):
-    assert "unknown unit" in refused(path, dovetail_path, "1 furlongs_per_bushel")
-    if entry_of(field).unit is not None:
-        assert "cannot be converted" in refused(path, dovetail_path, "1 K^3/mol")
+@each_quantity
+def test_wrong_unit_is_refused(leaf, folders):
+    wrong = "[1, {}]" if leaf.is_list else "{}"
+    assert "unknown unit" in refused(leaf, folders, wrong.format("1 furlongs_per_bushel"))
+    if entry_of(leaf.field).unit is not None:
+        assert "cannot be converted" in refused(leaf, folders, wrong.format("1 K^3/mol"))
 
 
-@pytest.mark.parametrize(("path", "field"), LEAVES, ids=names(LEAVES))
-def test_value_out_of_range_is_refused(path, field, dovetail_path):
-    entry = entry_of(field)
+@each_leaf
+def test_value_out_of_range_is_refused(leaf, folders):
+    entry = entry_of(leaf.field)
     limits = []
     if isinstance(entry, Whole):
         limits = [entry.at_least - 1, entry.at_most + 1]
-        if "tuple" in str(field.annotation):
-            limits = [[entry.at_least, limit] for limit in limits]
     if isinstance(entry, Quantity) and entry.unit is not None:
         limits = [
             *(entry.above, entry.below),
@@ -127,28 +184,36 @@ def test_value_out_of_range_is_refused(path, field, dovetail_path):
         limits = [limit for limit in limits if math.isfinite(limit)]
         assert len(limits) >= 2, "a quantity needs two limits, or says nothing about its unit"
     for limit in limits:
-        refused(path, dovetail_path, repr(limit))
+        inside = getattr(entry, "at_least", 0)
+        value = [inside if isinstance(entry, Whole) else 1.0, limit] if leaf.is_list else limit
+        refused(leaf, folders, repr(value))
 
 
-@pytest.mark.parametrize(("path", "field"), LEAVES, ids=names(LEAVES))
-def test_entry_is_described(path, field):
-    assert field.description
-    entry = entry_of(field)
+@each_leaf
+def test_entry_is_described(leaf):
+    assert leaf.field.description
+    entry = entry_of(leaf.field)
     if isinstance(entry, Quantity) and entry.unit is not None:
-        assert field.description.endswith(f"[{entry.unit}]")
+        assert leaf.field.description.endswith(f"[{entry.unit}]")
 
 
-@pytest.mark.parametrize(("path", "field"), LEAVES, ids=names(LEAVES))
-def test_example_is_accepted(path, field, dovetail_path):
-    (example,) = field.examples
-    key, needed = place(path)
-    if key in ("wear.step.depth", "wear.step.volume"):  # take the place of the cycles
-        key, example = "wear.step", f"{{kind: explicit, {path[-1]}: {example}}}"
+@each_leaf
+def test_example_is_accepted(leaf, folders):
+    (example,) = leaf.field.examples
     example = str(example).lower() if isinstance(example, bool) else example
-    load_case(dovetail_path, [*needed, f"{key}={example}"])
+    key = leaf.key
+    if key in ("wear.step.depth", "wear.step.volume"):  # take the place of the cycles
+        key, example = "wear.step", f"{{kind: explicit, {leaf.name}: {example}}}"
+    if key == "load_path.file":  # takes the place of the legs
+        key, example = "load_path", f"{{file: {example}}}"
+    if leaf.name in MOTIONS:  # take the place of the forces
+        force = {"P": 1.0} if leaf.name != "approach" else {}
+        assert len(FORCES) == len(MOTIONS)
+        key, example = "load_path.legs", f"[{force | {leaf.name: example}}]".replace("'", "")
+    load(leaf, folders, f"{key}={example}")
 
 
-@pytest.mark.parametrize("law", WITH)
+@pytest.mark.parametrize("law", ["energy", "energy_amplitude", "archard"])
 def test_unknown_key_is_refused_in_every_section(law, dovetail_path):
     case = load_case(dovetail_path, WITH[law])
 

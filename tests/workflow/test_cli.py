@@ -64,20 +64,32 @@ def test_check_says_what_would_run(dovetail_path):
     assert len(rows) < 8
 
 
-def test_new_writes_a_case_that_checks(tmp_path):
+@pytest.mark.parametrize(
+    ("kind", "words"),
+    [
+        ("dovetail", "10 jumps"),
+        ("bodies", "128 x 128 cells of 0.007812 x 0.007812 mm, history auto"),
+        ("line", "512 strips of 0.003906 mm"),
+    ],
+)
+def test_new_writes_a_case_that_checks(tmp_path, kind, words):
     path = tmp_path / "mine.yaml"
-    assert invoke("new", "dovetail", path).exit_code == 0
-    assert invoke("check", path).exit_code == 0
-    assert invoke("new", "dovetail").stdout == path.read_text(encoding="utf-8")
-    again = invoke("new", "dovetail", path)
+    assert invoke("new", kind, path).exit_code == 0
+    checked = invoke("check", path)
+    assert checked.exit_code == 0
+    assert words in checked.stdout
+    assert invoke("new", kind).stdout == path.read_text(encoding="utf-8")
+    again = invoke("new", kind, path)
     assert (again.exit_code, again.stderr.count("\n")) == (2, 1)
     assert "exists" in again.stderr
 
 
 def test_schema_is_json_with_descriptions():
     schema = json.loads(invoke("schema").stdout)
-    assert schema["additionalProperties"] is False
-    for name, section in {**schema["$defs"], "Case": schema}.items():
+    kinds = [kind["$ref"].rpartition("/")[2] for kind in schema["anyOf"]]
+    assert kinds == ["WearCase", "ContactCase", "LineContactCase"]
+    for name, section in schema["$defs"].items():
+        assert section["additionalProperties"] is False, name
         for key, entry in section["properties"].items():
             assert entry.get("description"), f"{name}.{key}"
 

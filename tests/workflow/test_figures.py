@@ -7,8 +7,9 @@ import h5py
 import numpy as np
 import pytest
 
-from workflow import figures
+from workflow.figures import wear as figures
 from workflow.figures import write_figures
+from workflow.figures.style import STYLE
 
 NAMES = {
     "resultants",
@@ -17,6 +18,7 @@ NAMES = {
     "worn_profiles",
     "kinetics",
     "structure_stress",
+    "half_space_and_structure",
 }
 
 
@@ -60,7 +62,7 @@ def test_titles_fit_the_width(results: Path) -> None:
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    with h5py.File(results) as file, rc_context(figures.STYLE):
+    with h5py.File(results) as file, rc_context(STYLE):
         for draw, _ in figures.FIGURES.values():
             figure = draw(file)
             FigureCanvasAgg(figure).draw()
@@ -178,7 +180,7 @@ def test_figures_without_data_are_left_out(changed: Path, tmp_path: Path) -> Non
             del file[group]
         del file["contact/intrados/coarse"]
     names = {path.stem for path in write_figures(changed, tmp_path / "figures")}
-    assert names == NAMES - {"resultants", "structure_stress"}
+    assert names == NAMES - {"resultants", "structure_stress", "half_space_and_structure"}
 
 
 def test_run_without_wear_can_be_drawn(changed: Path, tmp_path: Path) -> None:

@@ -15,7 +15,7 @@ import h5py
 import numpy as np
 import pytest
 
-import workflow.run
+import workflow.wear_run
 from workflow import checkpoint, workers
 
 # Many quick jumps, so that a random moment mostly falls among them.
@@ -54,7 +54,7 @@ def jumps_kept(folder: Path) -> int:
 @pytest.fixture(scope="module")
 def stopped(start, tmp_path_factory):
     """A run that got Ctrl-C once two jumps were kept; not to be changed."""
-    keep = workflow.run.WearLoop.keep
+    keep = workflow.wear_run.WearLoop.keep
 
     def interrupting(loop, state):
         keep(loop, state)
@@ -62,7 +62,7 @@ def stopped(start, tmp_path_factory):
             raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(workflow.run.WearLoop, "keep", interrupting)
+        patch.setattr(workflow.wear_run.WearLoop, "keep", interrupting)
         run = start(tmp_path_factory.mktemp("stopped") / "out")
     assert run.ending.exit_code == 130
     assert run.ending.stderr.splitlines()[-1].startswith("fretscale: interrupted")
@@ -129,7 +129,7 @@ def test_interruption_after_the_last_jump_writes_the_output(start, resume, monke
     quick = "wear.cycles=1e4", "contact.grid=[16, 24]"
     reference = start(tmp_path / "reference", *quick)
     with monkeypatch.context() as patch:
-        patch.setattr(workflow.run, "write_output", refuse)
+        patch.setattr(workflow.wear_run, "write_output", refuse)
         run = start(tmp_path / "out", *quick)
     assert run.ending.exit_code == 130
     assert jumps_kept(run.folder) == 1
@@ -139,7 +139,7 @@ def test_interruption_after_the_last_jump_writes_the_output(start, resume, monke
 def test_method_that_fails_later_says_how_to_go_on(start, resume, whole, monkeypatch, tmp_path):
     from wear.stepping import ContactFailure
 
-    jump = workflow.run.WearLoop._jump
+    jump = workflow.wear_run.WearLoop._jump
 
     def failing(loop, state, unworn):
         if state.jump == 1:
@@ -147,7 +147,7 @@ def test_method_that_fails_later_says_how_to_go_on(start, resume, whole, monkeyp
         return jump(loop, state, unworn)
 
     with monkeypatch.context() as patch:
-        patch.setattr(workflow.run.WearLoop, "_jump", failing)
+        patch.setattr(workflow.wear_run.WearLoop, "_jump", failing)
         run = start(tmp_path / "out")
     assert run.ending.exit_code == 3
     last = run.ending.stderr.splitlines()[-1]

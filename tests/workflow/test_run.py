@@ -281,3 +281,60 @@ def test_geometry_that_cannot_be_drawn_is_a_bad_case(start, tmp_path):
     (line,) = run.ending.stderr.splitlines()
     assert "structure: slot_fillet 20 mm is too large" in line
     assert not run.folder.exists()
+
+
+# --- method full ---------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def full(start, tmp_path_factory):
+    folder = tmp_path_factory.mktemp("full") / "run"
+    return start(folder, *QUICK, "contact.method=full", "output.figures=true")
+
+
+def test_volumes_and_energies_agree(full):
+    balances(full, {1: 1e4 * UM3_PER_J, 2: 1e4 * UM3_PER_J})
+
+
+@pytest.mark.parametrize("flank", ["intrados", "extrados"])
+def test_where_the_flank_slides_energy_is_the_structures(full, flank):
+    own = full.summary[flank]["by_increment"]
+    sliding = np.array(own["sliding"])
+    assert sliding.any()
+    assert not sliding.all()
+    energy = {
+        side: np.array(own["Edx"][side]) + np.array(own["Edy"][side])
+        for side in ("half_space", "structure")
+    }
+    np.testing.assert_allclose(
+        energy["half_space"][sliding], energy["structure"][sliding], rtol=1e-5
+    )
+    force = {side: np.array(own["Qx"][side]) for side in ("half_space", "structure")}
+    np.testing.assert_allclose(force["half_space"], force["structure"], rtol=0.02, atol=1e-3)
+
+
+def test_fields_are_kept_and_drawn(full):
+    assert (full.folder / "figures" / "half_space_and_structure.png").stat().st_size > 10_000
+    with h5py.File(full.folder / "results.h5") as file:
+        shown = [key for key in file["comparison/intrados"] if key != "load_history"]
+        assert 1 <= len(shown) <= 3
+        friction = file.attrs["friction"]
+        for key in shown:
+            fields = file[f"comparison/intrados/{key}"]
+            shear = np.hypot(*fields["shear"][()])
+            assert np.all(shear <= friction * fields["pressure"][()] * (1.0 + 1e-12))
+
+
+def test_both_directions_of_sliding_give_the_same_energy(start, full, tmp_path):
+    other = start(tmp_path / "out", *QUICK, "contact.method=full", "contact.gross_slip=energies")
+    for flank in ("intrados", "extrados"):
+        one, two = (run.summary[flank]["energy_per_cycle"]["half_space"] for run in (full, other))
+        assert two == pytest.approx(one, rel=0.01)
+
+
+def test_unlike_materials_run_coupled_and_are_warned_of_otherwise(start, tmp_path):
+    steel = "materials.disk.young=200 GPa"
+    coupled = start(tmp_path / "full", *QUICK, steel, "contact.method=full")
+    assert not any("Dundurs" in text for text in coupled.summary["warnings"])
+    normal = start(tmp_path / "normal", *QUICK, steel)
+    assert any("Dundurs" in text for text in normal.summary["warnings"])

@@ -9,10 +9,10 @@ from typing import Any, get_args
 from pydantic_core import ErrorDetails
 
 from workflow.case.fields import shown
-from workflow.case.schema import Case, Section, sections_of
+from workflow.case.sections import Section, sections_of
 from workflow.case.source import KeyPath, Source, child, dotted, split_path
 
-KINDS_ARE_NAMED_BY = ("kind", "law")  # keys that choose between sections
+KINDS_ARE_NAMED_BY = ("kind", "law", "shape")  # keys that choose between sections
 
 # What to say about pydantic's own errors, in the words of a case.
 SENTENCES = {
@@ -25,102 +25,122 @@ SENTENCES = {
 }
 
 
-def lines_about(source: Source, errors: Iterable[ErrorDetails]) -> list[str]:
-    """The lines of text about ``errors``, in the order of the file."""
-    errors = list(errors)
-    unknown = [_path(source, details) for details in errors if details["type"] == "extra_forbidden"]
-    meant = {(*path[:-1], near) for path in unknown if (near := _nearest(source, path))}
-    # A misspelt key is unknown and its right spelling missing; one line is enough.
-    told = [d for d in errors if d["type"] != "missing" or _path(source, d) not in meant]
-    return [line for _, line in sorted({_line_about(source, details) for details in told})]
+def lines_about(source: Source, case: type[Section], errors: Iterable[ErrorDetails]) -> list[str]:
+    """The lines of text about ``errors`` of a ``case``, in the order of the file."""
+    return _Explanation(source, case).lines(list(errors))
 
 
-def _line_about(source: Source, details: ErrorDetails) -> tuple[int, str]:
-    """Line number, for sorting, and the line of text about one error."""
-    path, message = _explain(source, details)
-    number, place = source.where(path)
-    key = dotted(path)
-    if not key or place.startswith(f"--set {key}="):
-        return number, f"{place}: {message}"
-    return number, f"{place}: {key}: {message}"
+class _Explanation:
+    """What is wrong with one text, read as one kind of case."""
 
+    def __init__(self, source: Source, case: type[Section]) -> None:
+        self.source, self.case = source, case
 
-def _explain(source: Source, details: ErrorDetails) -> tuple[KeyPath, str]:
-    """Path of the entry to look at, and the sentence about it."""
-    kind, value = details["type"], shown(details["input"])
-    context: dict[str, Any] = details.get("ctx", {})
-    path = _path(source, details)
-    match kind:
-        case "entry":
-            return path, details["msg"]
-        case "disagreement":
-            return _disagreeing(source, path, context["keys"]), details["msg"]
-        case "missing":
-            return _missing(source, path)
-        case "extra_forbidden":
-            return path, _unknown(source, path)
-        case "union_tag_not_found" | "union_tag_invalid":
-            return _wrong_kind(source, path, context["discriminator"].strip("'"))
-    sentence = SENTENCES[kind].format(**context) if kind in SENTENCES else details["msg"]
-    return path, f"{value}: {sentence}"
+    def lines(self, errors: list[ErrorDetails]) -> list[str]:
+        unknown = [
+            self._path(details) for details in errors if details["type"] == "extra_forbidden"
+        ]
+        meant = {(*path[:-1], near) for path in unknown if (near := self._nearest(path))}
+        # A misspelt key is unknown and its right spelling missing; one line is enough.
+        told = [d for d in errors if d["type"] != "missing" or self._path(d) not in meant]
+        return [line for _, line in sorted({self._line_about(details) for details in told})]
 
+    def _line_about(self, details: ErrorDetails) -> tuple[int, str]:
+        """Line number, for sorting, and the line of text about one error."""
+        path, message = self._explain(details)
+        number, place = self.source.where(path)
+        key = dotted(path)
+        if not key or place.startswith(f"--set {key}="):
+            return number, f"{place}: {message}"
+        return number, f"{place}: {key}: {message}"
 
-def _disagreeing(source: Source, path: KeyPath, keys: Sequence[str]) -> KeyPath:
-    """The entry to point at: one that an override has set, else the first."""
-    paths = [(*path, *split_path(key)) for key in keys]
-    overridden = [p for p in paths if source.is_override(p)]
-    return (overridden or paths or [path])[0]
+    def _explain(self, details: ErrorDetails) -> tuple[KeyPath, str]:
+        """Path of the entry to look at, and the sentence about it."""
+        kind, value = details["type"], shown(details["input"])
+        context: dict[str, Any] = details.get("ctx", {})
+        path = self._path(details)
+        match kind:
+            case "entry":
+                return path, details["msg"]
+            case "disagreement":
+                return self._disagreeing(path, context["keys"]), details["msg"]
+            case "missing":
+                return self._missing(path)
+            case "extra_forbidden":
+                return path, self._unknown(path)
+            case "union_tag_not_found" | "union_tag_invalid":
+                return self._wrong_kind(path, context["discriminator"].strip("'"))
+        sentence = SENTENCES[kind].format(**context) if kind in SENTENCES else details["msg"]
+        return path, f"{value}: {sentence}"
 
+    def _disagreeing(self, path: KeyPath, keys: Sequence[str]) -> KeyPath:
+        """The entry to point at: one that an override has set, else the first."""
+        paths = [(*path, *split_path(key)) for key in keys]
+        overridden = [p for p in paths if self.source.is_override(p)]
+        return (overridden or paths or [path])[0]
 
-def _missing(source: Source, path: KeyPath) -> tuple[KeyPath, str]:
-    *parent, key = path
-    if isinstance(key, int):
-        return tuple(parent), f"a list of {key}: too short; allowed: such as [a, b]"
-    models = models_at(source, parent)
-    field = next(m.model_fields[key] for m in models if key in m.model_fields)
-    example = f", such as {field.examples[0]}" if field.examples else ""
-    return path, f"missing; allowed: {field.description}{example}"
+    def _missing(self, path: KeyPath) -> tuple[KeyPath, str]:
+        *parent, key = path
+        if isinstance(key, int):
+            return tuple(parent), f"a list of {key}: too short; allowed: such as [a, b]"
+        models = self._models_at(parent)
+        field = next(m.model_fields[key] for m in models if key in m.model_fields)
+        example = f", such as {field.examples[0]}" if field.examples else ""
+        return path, f"missing; allowed: {field.description}{example}"
 
+    def _unknown(self, path: KeyPath) -> str:
+        near = self._nearest(path)
+        if near:
+            return f"unknown key; did you mean '{near}'?"
+        return f"unknown key; allowed: {', '.join(self._known(path))}"
 
-def _unknown(source: Source, path: KeyPath) -> str:
-    near = _nearest(source, path)
-    if near:
-        return f"unknown key; did you mean '{near}'?"
-    return f"unknown key; allowed: {', '.join(_known(source, path))}"
+    def _nearest(self, path: KeyPath) -> str | None:
+        """The known key that an unknown one at ``path`` resembles most."""
+        near = difflib.get_close_matches(str(path[-1]), self._known(path), n=1)
+        return near[0] if near else None
 
+    def _known(self, path: KeyPath) -> list[str]:
+        """Every key allowed beside the one at ``path``."""
+        models = self._models_at(path[:-1])
+        return list(dict.fromkeys(name for model in models for name in model.model_fields))
 
-def _nearest(source: Source, path: KeyPath) -> str | None:
-    """The known key that an unknown one at ``path`` resembles most."""
-    near = difflib.get_close_matches(str(path[-1]), _known(source, path), n=1)
-    return near[0] if near else None
+    def _wrong_kind(self, path: KeyPath, key: str) -> tuple[KeyPath, str]:
+        """A missing or unknown choice between kinds of section."""
+        models = self._models_at(path)
+        known = [kind for model in models for kind in get_args(model.model_fields[key].annotation)]
+        value = self.source.at((*path, key))
+        wrong = "missing" if value is None else f"{shown(value)}: not known"
+        return (*path, key), f"{wrong}; allowed: {', '.join(known)}"
 
+    def _models_at(self, path: Iterable[str | int]) -> list[type[Section]]:
+        """The models for the section at ``path``: of the kind it names, or of all kinds."""
+        node: Any = self.source.data
+        models: list[type[Section]] = [self.case]
+        for key in path:
+            node = child(node, key)
+            if isinstance(key, str):
+                fields = [m.model_fields[key] for m in models if key in m.model_fields]
+                models = [section for f in fields for section in sections_of(f.annotation)]
+            models = [m for m in models if _is_kind(m, node)] or models
+        return models
 
-def _known(source: Source, path: KeyPath) -> list[str]:
-    """Every key allowed beside the one at ``path``."""
-    models = models_at(source, path[:-1])
-    return list(dict.fromkeys(name for model in models for name in model.model_fields))
-
-
-def _wrong_kind(source: Source, path: KeyPath, key: str) -> tuple[KeyPath, str]:
-    """A missing or unknown choice between kinds of section."""
-    models = models_at(source, path)
-    known = [kind for model in models for kind in get_args(model.model_fields[key].annotation)]
-    value = source.at((*path, key))
-    wrong = "missing" if value is None else f"{shown(value)}: not known"
-    return (*path, key), f"{wrong}; allowed: {', '.join(known)}"
-
-
-def models_at(source: Source, path: Iterable[str | int]) -> list[type[Section]]:
-    """The models for the section at ``path``: of the kind it names, or of all kinds."""
-    models: list[type[Section]] = [Case]
-    node: Any = source.data
-    for key in path:
-        node = child(node, key)
-        if isinstance(key, str):
-            fields = [m.model_fields[key] for m in models if key in m.model_fields]
-            models = [section for f in fields for section in sections_of(f.annotation)]
-        models = [m for m in models if _is_kind(m, node)] or models
-    return models
+    def _path(self, details: ErrorDetails) -> KeyPath:
+        """Where an error is, without the kinds that pydantic puts in where it chose a section."""
+        path: list[str | int] = []
+        node: Any = self.source.data
+        tag_seen = False
+        loc = details["loc"]
+        named = details["type"] in ("missing", "extra_forbidden")  # then the last part is a key
+        for index, key in enumerate(loc):
+            is_kind = key in [child(node, name) for name in KINDS_ARE_NAMED_BY]
+            if is_kind and not tag_seen and not (named and index == len(loc) - 1):
+                tag_seen = True
+                continue
+            if isinstance(key, str) and key.startswith("("):  # a tag of ours, as (section)
+                continue
+            path.append(key)
+            node, tag_seen = child(node, key), False
+        return tuple(path)
 
 
 def _is_kind(model: type[Section], node: Any) -> bool:
@@ -129,20 +149,3 @@ def _is_kind(model: type[Section], node: Any) -> bool:
     return all(
         child(node, name) in get_args(model.model_fields[name].annotation) for name in choices
     )
-
-
-def _path(source: Source, details: ErrorDetails) -> KeyPath:
-    """Where an error is, without the kinds that pydantic puts in where it chose a section."""
-    path: list[str | int] = []
-    node: Any = source.data
-    tag_seen = False
-    loc = details["loc"]
-    named = details["type"] in ("missing", "extra_forbidden")  # then the last part is a key
-    for index, key in enumerate(loc):
-        is_kind = key in [child(node, name) for name in KINDS_ARE_NAMED_BY]
-        if is_kind and not tag_seen and not (named and index == len(loc) - 1):
-            tag_seen = True
-            continue
-        path.append(key)
-        node, tag_seen = child(node, key), False
-    return tuple(path)

@@ -7,11 +7,13 @@ seen by the rest of the program is the plain ``float``, in base units.
 from __future__ import annotations
 
 import math
+import os
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
+from pathlib import Path as Pathname
 from typing import Any
 
-from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from workflow.case import units
@@ -196,3 +198,46 @@ class Path(Entry):
 
     def json_schema(self) -> dict[str, Any]:
         return {"type": "string", "pattern": r"^[\w-]+(\.[\w-]+)*$"}
+
+
+@dataclass(frozen=True)
+class File(Entry):
+    """A file there is, relative to the folder of the case; read as its absolute path.
+
+    Data in an HDF5 file are named after a colon: ``gaps.h5:scan/gap``. The folder comes from the
+    validation context, entry ``folder``.
+    """
+
+    endings: tuple[str, ...]
+
+    @property
+    def allowed(self) -> str:
+        return f"a file {', '.join(self.endings)}, as seen from the folder of the case"
+
+    def parse(self, value: object, folder: str = "") -> str:
+        if not isinstance(value, str):
+            raise self.refusal(value, "not a file name")
+        name, dataset = split_dataset(value)
+        if not value.isprintable() or not name.endswith(self.endings):
+            raise self.refusal(value, "not a file of this kind")
+        path = os.path.abspath(os.path.join(folder, name))  # noqa: PTH100, PTH118
+        if not Pathname(path).is_file():
+            raise self.refusal(value, "no such file")
+        return f"{path}:{dataset}" if dataset else path
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        def parse(value: object, info: ValidationInfo) -> str:
+            return self.parse(value, (info.context or {}).get("folder", ""))
+
+        return core_schema.with_info_plain_validator_function(parse)
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"type": "string", "minLength": 1}
+
+
+def split_dataset(text: str) -> tuple[str, str]:
+    """File and dataset of ``file.h5:dataset``; an empty dataset where there is none."""
+    name, colon, dataset = text.rpartition(".h5:")
+    return (f"{name}.h5", dataset) if colon else (text, "")

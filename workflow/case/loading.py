@@ -7,9 +7,18 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from workflow.case.contact_case import (
+    AREA_SHAPES,
+    HEIGHTS,
+    LINE_SHAPES,
+    ContactCase,
+    LineContactCase,
+)
 from workflow.case.explain import lines_about
+from workflow.case.fields import shown
 from workflow.case.schema import Case
-from workflow.case.source import Source, read_text
+from workflow.case.source import KeyPath, Source, dotted, read_text
+from workflow.case.wear_case import WearCase
 from workflow.errors import CaseError
 
 
@@ -23,9 +32,38 @@ def load_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
 
 
 def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
-    """As ``load_case``, from ``text``; ``name`` stands for the file in messages."""
+    """As ``load_case``, from ``text``; ``name`` stands for the file in messages.
+
+    Files that the case names are looked for from the folder of ``name``.
+    """
     source = Source(name, text, overrides)
+    kind = _kind_of_case(source)
     try:
-        return Case.model_validate(source.data)
+        return kind.model_validate(source.data, context={"folder": str(Path(name).parent)})
     except ValidationError as error:
-        raise CaseError("\n".join(lines_about(source, error.errors()))) from None
+        raise CaseError("\n".join(lines_about(source, kind, error.errors()))) from None
+
+
+def _kind_of_case(source: Source) -> type[WearCase] | type[ContactCase] | type[LineContactCase]:
+    """The kind that the source means by its analysis and shape, whatever else is wrong."""
+    if _choice(source, ("analysis",), ("wear", "contact")) == "wear":
+        return WearCase
+    _choice(source, ("structure", "kind"), ("bodies",))
+    shapes = (*AREA_SHAPES, *LINE_SHAPES, HEIGHTS)
+    shape = _choice(source, ("structure", "shape"), shapes)
+    # Heights know no dimension: a grid of one size is that of a line contact.
+    one_size = isinstance(source.at(("contact", "size")), str | int | float)
+    line = one_size if shape == HEIGHTS else shape in LINE_SHAPES
+    return LineContactCase if line else ContactCase
+
+
+def _choice(source: Source, path: KeyPath, allowed: tuple[str, ...]) -> str:
+    """The word at ``path``, one of those ``allowed``; else raises ``CaseError``."""
+    value = source.at(path)
+    if isinstance(value, str) and value in allowed:
+        return value
+    wrong = "missing" if value is None else f"{shown(value)}: not known"
+    place = source.where(path)[1]
+    key = dotted(path)
+    named = "" if place.startswith(f"--set {key}=") else f"{key}: "
+    raise CaseError(f"{place}: {named}{wrong}; allowed: {', '.join(allowed)}")

@@ -7,24 +7,32 @@ from typing import Any
 
 from pydantic.fields import FieldInfo
 
-from workflow.case.schema import Case, Section, sections_of
+from workflow.case.contact_case import ContactCase, LineContactCase
+from workflow.case.sections import Section, sections_of
+from workflow.case.wear_case import WearCase
 from workflow.case.writing import Row, render
 
-KINDS = ("dovetail",)
+# What `fretscale new` can write.
+KINDS: dict[str, type[Section]] = {
+    "dovetail": WearCase,
+    "bodies": ContactCase,
+    "line": LineContactCase,
+}
 
 HEADER = """\
 # A number without a unit is in the base unit, given in brackets. `fretscale check` tells what is
 # wrong with a case, `fretscale run` runs it. Entries behind a # are optional.
 """
-# Optional entries the template fills in: a material that can yield, and the one size a step needs.
-FILLED_IN = ("yield_stress", "cycles")
+# Optional entries the template fills in: a material that can yield, the one size a step needs, and
+# legs that press.
+FILLED_IN = ("yield_stress", "cycles", "legs", "P")
 
 
 def template(kind: str) -> str:
     """A commented case of ``kind``, ready to run, with every entry there is."""
     if kind not in KINDS:
         raise ValueError(f"{kind}: no such template; allowed: {', '.join(KINDS)}")
-    return HEADER + render(_rows(Case))
+    return HEADER + render(_rows(KINDS[kind]))
 
 
 def _rows(model: type[Section]) -> list[Row]:

@@ -1,13 +1,8 @@
-"""Figures of a run: resultants, peak pressure, worn profiles, kinetics and the structure's stress.
-
-Each figure reads ``results.h5`` and nothing else; numbers in the titles come from the data. A
-figure whose data a run does not have is left out. Images are 1200 pixels wide.
-"""
+"""Figures of a wear run: resultants, peak pressure, worn profiles, kinetics, structure's stress."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import h5py
@@ -15,39 +10,31 @@ import numpy as np
 
 from sa_solver.types import Array, Grid
 from wear.kinetics import LinearRegime
-from workflow.store import BODY_NAMES, grid_of, jump_names, replacing
+from workflow.figures.comparison import half_space_and_structure
+from workflow.figures.fields import (
+    MAP_PERCENTILE,
+    MAX_PROFILES,
+    centres,
+    draw_map,
+    map_top,
+    middle,
+    spread,
+)
+from workflow.figures.style import BLACK, BLUE, FONT_SIZE, GREEN, ORANGE, PURPLE, new_figure
+from workflow.store import BODY_NAMES, grid_of, jump_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-WIDTH_INCHES, DOTS_PER_INCH = 12.0, 100
-FONT_SIZE = 13
-STYLE: dict[Any, Any] = {
-    "font.size": FONT_SIZE,
-    "axes.titlesize": 13,
-    "axes.titlelocation": "left",
-    "axes.grid": True,
-    "grid.alpha": 0.3,
-    "legend.fontsize": 11,
-    "legend.framealpha": 0.85,
-    "figure.titlesize": 15,
-    "lines.linewidth": 1.8,
-}
-# Okabe and Ito's colours: told apart by everyone.
-BLUE, ORANGE, GREEN, PURPLE, BLACK = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222"
 BODY_STYLES = {1: (BLUE, "o"), 2: (ORANGE, "s")}
-PRESSURE_COLOURS, CYCLE_COLOURS = "viridis", "viridis"
+CYCLE_COLOURS = "viridis"
 STRESS_COLOURS, CHANGE_COLOURS = "magma_r", "RdBu_r"
 CHANGE = "worn less unworn"
 
-# Edge peaks are a few cells: a scale that reached them would leave the rest in one colour.
-MAP_PERCENTILE = 99.5
 # Nodes this close to the nearest row count as on the line, as a share of the face: less than half
 # the rows of a mesh of 34 nodes, enough for rows that are not quite straight.
 ROW_SHARE = 0.01
-# More profiles than this overlap.
-MAX_PROFILES = 6
 # The rounding is many times deeper than young wear: heights are shown up to so many depths.
 HEIGHT_IN_DEPTHS = 2.0
 # How far the kinetics are extended, in computed numbers of cycles.
@@ -69,43 +56,13 @@ class _Section(NamedTuple):
     outline: Array
 
 
-def write_figures(results: Path, folder: Path) -> list[Path]:
-    """Draw the figures of ``results`` (a ``results.h5``) as PNG files; returns their paths."""
-    import matplotlib
-
-    folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    with h5py.File(results) as file, matplotlib.rc_context(STYLE):
-        for name, (draw, needed) in FIGURES.items():
-            if all(group in file for group in needed):
-                path = folder / f"{name}.png"
-                _save(draw(file), path)
-                written.append(path)
-    return written
-
-
-def _save(figure: Figure, path: Path) -> None:
-    """Write ``figure``; it appears under its name only when it is complete."""
-    with replacing(path) as partial:
-        figure.savefig(partial, format="png", dpi=DOTS_PER_INCH)
-
-
-def _figure(title: str, height: float) -> Figure:
-    """An empty figure with a title, ``height`` in inches."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(WIDTH_INCHES, height), layout="constrained")
-    figure.suptitle(title, fontweight="bold")
-    return figure
-
-
 # --- resultants ---------------------------------------------------------------------------------
 
 
 def resultants(file: h5py.File) -> Figure:
     """P, Qx within the Coulomb limits, and energy per increment, one column per interface."""
     interfaces = list(file["structure"])
-    figure = _figure(f"Resultants over one cycle: {_who_slides(file)}", 9.0)
+    figure = new_figure(f"Resultants over one cycle: {_who_slides(file)}", 9.0)
     axes = figure.subplots(3, len(interfaces), sharex=True, sharey="row", squeeze=False)
     for column, interface in zip(axes.T, interfaces, strict=True):
         history = {k: v[()] for k, v in file["structure"][interface]["load_history"].items()}
@@ -198,11 +155,13 @@ def pressure_maps(file: h5py.File) -> Figure:
     """Peak-load pressure of every flank, unworn above worn, on one colour scale."""
     states = [(name, jump) for name in file["contact"] for jump in _ends(file, name)]
     fields = [file["contact"][name][jump]["pressure"][()] for name, jump in states]
-    top = _map_top(fields)
-    figure = _figure(f"Largest pressure at peak load: {_peak_change(file)}", 2.0 * len(states) + 1)
+    top = map_top(fields)
+    figure = new_figure(
+        f"Largest pressure at peak load: {_peak_change(file)}", 2.0 * len(states) + 1
+    )
     axes = figure.subplots(len(states), 1, sharex=True, squeeze=False)[:, 0]
     for axis, (name, jump), field in zip(axes, states, fields, strict=True):
-        image = _draw_map(axis, field, _grid(file, name), top)
+        image = draw_map(axis, field, _grid(file, name), top)
         cycles = _cycles(file, name, jump)
         axis.set_title(f"{name}, {cycles}: largest {field.max():.0f} MPa, {_open(field)}")
     axes[-1].set_xlabel("y, along the slot [mm]")
@@ -210,28 +169,6 @@ def pressure_maps(file: h5py.File) -> Figure:
     label = f"pressure [MPa]; white: open; arrow: highest {100 - MAP_PERCENTILE:g}% of the cells"
     figure.colorbar(image, ax=axes, label=label, extend="max", shrink=0.8, pad=0.01)
     return figure
-
-
-def _draw_map(axis: Axes, field: Array, grid: Grid, top: float) -> Any:
-    """One field with y to the right, to scale."""
-    half = 0.5 * grid.size[1], 0.5 * grid.size[0]
-    axis.grid(visible=False)
-    axis.locator_params(axis="y", nbins=3)
-    return axis.imshow(
-        np.ma.masked_less_equal(field, 0.0),
-        origin="lower",
-        extent=(-half[0], half[0], -half[1], half[1]),
-        cmap=PRESSURE_COLOURS,
-        vmin=0.0,
-        vmax=top,
-        interpolation="nearest",
-    )
-
-
-def _map_top(fields: list[Array]) -> float:
-    """Top of the colour scale [MPa]."""
-    closed = np.concatenate([field[field > 0.0] for field in fields])
-    return float(np.percentile(closed, MAP_PERCENTILE)) if closed.size else 1.0
 
 
 def _open(field: Array) -> str:
@@ -251,7 +188,7 @@ def _peak_change(file: h5py.File) -> str:
 def pressure_profiles(file: h5py.File) -> Figure:
     """Peak-load pressure across and along the middle of each flank, with the coarse answers."""
     interfaces = list(file["contact"])
-    figure = _figure(_edge_peak(file), 9.0)
+    figure = new_figure(_edge_peak(file), 9.0)
     axes = figure.subplots(2, len(interfaces), sharey="row", sharex="row", squeeze=False)
     for column, interface in zip(axes.T, interfaces, strict=True):
         for direction, axis in enumerate(column):
@@ -270,27 +207,17 @@ def _draw_profile(axis: Axes, file: h5py.File, interface: str, direction: int) -
     contact, grid = file["contact"][interface], _grid(file, interface)
     for jump, colour in zip(_ends(file, interface), (BLUE, ORANGE), strict=False):
         label = f"half-space {grid.shape[0]} x {grid.shape[1]}, {_cycles(file, interface, jump)}"
-        profile = _middle(contact[jump]["pressure"][()], direction)
-        axis.plot(_centres(grid, direction), profile, color=colour, label=label)
+        profile = middle(contact[jump]["pressure"][()], direction)
+        axis.plot(centres(grid, direction), profile, color=colour, label=label)
     if "coarse" in contact:
         coarse = grid_of(contact["coarse"])
-        profile = _middle(contact["coarse"]["pressure"][()], direction)
+        profile = middle(contact["coarse"]["pressure"][()], direction)
         label = f"half-space {coarse.shape[0]} x {coarse.shape[1]}, unworn"
-        axis.plot(_centres(coarse, direction), profile, "o", color=BLACK, mfc="none", label=label)
+        axis.plot(centres(coarse, direction), profile, "o", color=BLACK, mfc="none", label=label)
     if f"structure/{interface}/pressure" in file:
         place, pressure = _nodes_on_middle(file, interface, direction)
         axis.plot(place, pressure, "x", color=PURPLE, mew=2, label="finite elements, unworn")
     axis.set_xlabel(("x [mm]", "y [mm]")[direction])
-
-
-def _middle(field: Array, direction: int) -> Array:
-    """Values along x (0) or y (1) next to the other axis' middle."""
-    return np.take(field, field.shape[1 - direction] // 2, axis=1 - direction)
-
-
-def _centres(grid: Grid, direction: int) -> Array:
-    """Cell centres along x (0) or y (1)."""
-    return (grid.x, grid.y)[direction].ravel()
 
 
 def _nodes_on_middle(file: h5py.File, interface: str, direction: int) -> tuple[Array, Array]:
@@ -305,12 +232,12 @@ def _nodes_on_middle(file: h5py.File, interface: str, direction: int) -> tuple[A
 def _edge_peak(file: h5py.File) -> str:
     """Largest pressure at y = 0 of the flank where it is largest, by every method."""
     unworn = {name: file["contact"][name][_ends(file, name)[0]] for name in file["contact"]}
-    peaks = {name: _middle(group["pressure"][()], 0).max() for name, group in unworn.items()}
+    peaks = {name: middle(group["pressure"][()], 0).max() for name, group in unworn.items()}
     name = max(peaks, key=lambda name: peaks[name])
     text = f"Edge peak on the {name}: {peaks[name]:.0f} MPa"
     if coarse := file["contact"][name].get("coarse"):
         shape = grid_of(coarse).shape
-        peak = _middle(coarse["pressure"][()], 0).max()
+        peak = middle(coarse["pressure"][()], 0).max()
         text += f"; {shape[0]} x {shape[1]} cells see {peak:.0f} MPa"
     if f"structure/{name}/pressure" in file:
         text += f", finite elements {_nodes_on_middle(file, name, 0)[1].max():.0f} MPa"
@@ -323,7 +250,7 @@ def _edge_peak(file: h5py.File) -> str:
 def worn_profiles(file: h5py.File) -> Figure:
     """Both surfaces and the depth worn off, across the middle of each flank, as cycles go by."""
     interfaces = list(file["surfaces"])
-    figure = _figure("", 9.0)
+    figure = new_figure("", 9.0)
     axes = figure.subplots(2, len(interfaces), sharex=True, sharey="row", squeeze=False)
     deepest = []
     for column, interface in zip(axes.T, interfaces, strict=True):
@@ -347,9 +274,9 @@ def _draw_wear(axes: Iterable[Axes], file: h5py.File, interface: str) -> float:
     from matplotlib import colormaps
 
     heights, depths = axes
-    surfaces, x = file["surfaces"][interface], _centres(_grid(file, interface), 0)
+    surfaces, x = file["surfaces"][interface], centres(_grid(file, interface), 0)
     unworn = _middle_heights(surfaces[jump_names(file, interface)[0]])
-    chosen = _spread(jump_names(file, interface), MAX_PROFILES)
+    chosen = spread(jump_names(file, interface), MAX_PROFILES)
     for number, jump in enumerate(chosen):
         colour = colormaps[CYCLE_COLOURS](0.9 * number / max(len(chosen) - 1, 1))
         worn = _middle_heights(surfaces[jump])
@@ -362,13 +289,7 @@ def _draw_wear(axes: Iterable[Axes], file: h5py.File, interface: str) -> float:
 
 def _middle_heights(surfaces: h5py.Group) -> Array:
     """Heights of both bodies along x at y = 0, ``(2, nx)`` [µm]."""
-    return 1e3 * np.stack([_middle(surfaces[f"body_{body}"][()], 0) for body in BODY_NAMES])
-
-
-def _spread(items: list[str], count: int) -> list[str]:
-    """At most ``count`` of the items, evenly spread, first and last among them."""
-    places = np.linspace(0, len(items) - 1, min(count, len(items)))
-    return [items[round(place)] for place in places]
+    return 1e3 * np.stack([middle(surfaces[f"body_{body}"][()], 0) for body in BODY_NAMES])
 
 
 def kinetics(file: h5py.File) -> Figure:
@@ -377,7 +298,7 @@ def kinetics(file: h5py.File) -> Figure:
     cycles = file["kinetics/cycles"][()]
     totals = (f"{name} {_worn_volume(file, name):.3g} mm³" for name in interfaces)
     title = f"Worn off in {cycles[-1]:,.0f} cycles: {', '.join(totals)}"
-    figure = _figure(title, 9.0)
+    figure = new_figure(title, 9.0)
     axes = figure.subplots(2, len(interfaces), sharex=True, sharey="row", squeeze=False)
     for column, interface in zip(axes.T, interfaces, strict=True):
         group = file["kinetics"][interface]
@@ -455,7 +376,7 @@ def structure_stress(file: h5py.File) -> Figure:
     top = max(ranges[state][1] for state in panels if state != CHANGE)
     texts = (f"{ranges[state][1]:.0f} MPa {state}" for state in panels if state != CHANGE)
     title = f"Von Mises stress in mid-slot at peak load: at most {', '.join(texts)}"
-    figure = _figure(title, 1.0 + 4.2 * len(panels))
+    figure = new_figure(title, 1.0 + 4.2 * len(panels))
     axes = figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for axis, (state, sections) in zip(axes, panels.items(), strict=True):
         low, high = ranges[state]
@@ -587,6 +508,15 @@ def _grid(file: h5py.File, interface: str) -> Grid:
     return grid_of(file["grid"][interface])
 
 
+def figures_of(file: h5py.File) -> dict[str, Callable[[h5py.File], Figure]]:
+    """The figures there are data for, by name."""
+    return {
+        name: draw
+        for name, (draw, needed) in FIGURES.items()
+        if all(group in file for group in needed)
+    }
+
+
 CONTACT = ("grid", "contact", "surfaces")
 # What each figure is called, and the groups it needs.
 FIGURES: dict[str, tuple[Callable[[h5py.File], Figure], tuple[str, ...]]] = {
@@ -596,4 +526,5 @@ FIGURES: dict[str, tuple[Callable[[h5py.File], Figure], tuple[str, ...]]] = {
     "worn_profiles": (worn_profiles, CONTACT),
     "kinetics": (kinetics, ("kinetics",)),
     "structure_stress": (structure_stress, ("bodies", "grid")),
+    "half_space_and_structure": (half_space_and_structure, ("comparison", "structure", "grid")),
 }

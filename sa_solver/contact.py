@@ -1,0 +1,382 @@
+"""One increment of a frictional contact: normal and tangential problem, from state to state.
+
+For similar bodies the normal problem does not feel shear and is solved first; its µp is the limit
+of the tangential one. Dissimilar bodies have both solved together. Where the load asks for more
+shear than friction carries, the contact slides as a whole, by the energies that the load history
+gives (:mod:`sa_solver.gross_slip`).
+
+Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914; Gallego 2007,
+eqs 6-8.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sa_solver.coupled import CoupledContact, CoupledStart, CoupledState
+from sa_solver.friction_limit import largest_share
+from sa_solver.gross_slip import Direction, Sliding, State, gross_slip, sliding_direction
+from sa_solver.half_space import HalfSpace
+from sa_solver.normal import NormalContact, NormalStart, NormalState
+from sa_solver.tangential import TangentialContact, TangentialState
+from sa_solver.tangential_problem import PlanarModes
+from sa_solver.types import Array
+
+GROSS_SHARE = 0.99
+"""Share of the largest shear force from which the contact counts as sliding, where energies are at
+hand: from there on the force hardly says how far, the energy does. A structure whose last nodes
+stick at the ends of a flank holds 0.2 % less than friction could while it slides by tens of µm."""
+
+ROUNDING = 1e-12
+"""How far below its limit shear on the limit may be."""
+
+SHARE_CHECKED = 0.5
+"""Share of µP or of its moment from which the largest force is computed."""
+
+NORMAL = (0, 3, 4)
+TANGENTIAL = (1, 2, 5)
+"""Places of P, Mx, My and of Qx, Qy, Mz among the six resultants (P, Qx, Qy, Mx, My, Mz)."""
+
+
+class FrictionError(ValueError):
+    """The friction coefficient is not a number of 0 or more."""
+
+
+@dataclass(frozen=True)
+class Load:
+    """What is imposed at the end of an increment.
+
+    ``values`` (6,) are (P, Qx, Qy, Mx, My, Mz) [N, N mm; per mm on line grids] or, where
+    ``motion`` (6,) says so, the motions (δz, δx, δy, φx, φy, φz) [mm, rad] since the bodies were
+    apart. ``strain`` is the mismatch ε_2 - ε_1 along x of the unloaded surfaces (bulk stress).
+    ``energy`` (2,) [N mm], if known, is what the increment dissipates in x and in y.
+    """
+
+    values: Array
+    motion: tuple[bool, ...] = (False,) * 6
+    strain: float = 0.0
+    energy: Array | None = None
+
+
+@dataclass(frozen=True)
+class ContactState:
+    """State of a frictional contact at the end of an increment.
+
+    Fields: ``traction`` ``(3, nx, ny)`` ordered qx, qy, p [MPa], its ``displacement`` K t
+    ``(3, nx, ny)`` [mm], ``slip`` ``(2, nx, ny)`` of the increment [mm], ``gap`` ``(nx, ny)`` [mm],
+    ``sticking`` ``(nx, ny)``. ``resultants`` (6,) and ``rigid`` (6,) are ordered as in
+    :class:`Load`; ``rigid`` counts from the bodies apart. ``energy`` (2,) is dissipated in the
+    increment in x and y [N mm]. ``sliding`` says that the whole contact slipped by its energy: then
+    the Q in ``resultants`` follows, and need not be the one given. ``residual`` is the largest of
+    the residuals of the problems solved; ``message`` is empty when ``converged``.
+    """
+
+    traction: Array
+    displacement: Array
+    slip: Array
+    gap: Array
+    sticking: NDArray[np.bool_]
+    resultants: Array
+    rigid: Array
+    strain: float
+    energy: Array
+    sliding: bool
+    residual: float
+    converged: bool
+    message: str
+    convolutions: int
+    border_load: float
+    start: CoupledStart | None = None
+
+    @property
+    def pressure(self) -> Array:
+        """p ``(nx, ny)`` [MPa]."""
+        pressure: Array = self.traction[2]
+        return pressure
+
+    @property
+    def shear(self) -> Array:
+        """qx, qy ``(2, nx, ny)`` [MPa]."""
+        return self.traction[:2]
+
+
+class FrictionalContact:
+    """Contact with friction on one grid; owns the solvers."""
+
+    def __init__(
+        self,
+        half_space: HalfSpace,
+        friction: float,
+        tolerance: float = 1e-8,
+        sliding: Direction = "force",
+    ) -> None:
+        """Plan for ``half_space`` and Coulomb's coefficient ``friction`` µ.
+
+        ``sliding`` is how gross slip finds its direction: see :mod:`sa_solver.gross_slip`.
+
+        Raises FrictionError unless µ is finite and 0 or more.
+        """
+        if not (np.isfinite(friction) and friction >= 0.0):
+            raise FrictionError(f"friction coefficient {friction}: must be a number of 0 or more")
+        self.half_space, self.grid = half_space, half_space.grid
+        self.friction, self.tolerance, self._sliding = friction, tolerance, sliding
+        self._modes = PlanarModes.on(self.grid)
+
+    def apart(self, height: Array) -> ContactState:
+        """The bodies before they touch, at the gap ``height`` ``(nx, ny)`` [mm]."""
+        field = np.zeros((3, *self.grid.shape))
+        return ContactState(
+            traction=field,
+            displacement=field,
+            slip=field[:2],
+            gap=height,
+            sticking=np.zeros(self.grid.shape, dtype=bool),
+            resultants=np.zeros(6),
+            rigid=np.zeros(6),
+            strain=0.0,
+            energy=np.zeros(2),
+            sliding=False,
+            residual=0.0,
+            converged=True,
+            message="",
+            convolutions=0,
+            border_load=0.0,
+        )
+
+    def advance(self, before: ContactState, height: Array, load: Load) -> ContactState:
+        """The state under ``load``, from the state ``before`` it.
+
+        ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies. Raises what the solvers
+        raise for impossible data: NormalContactError, TangentialContactError.
+        """
+        if not self.half_space.pair.similar:
+            return self._together(before, height, load)
+        normal = self._press(before, height, load)
+        limit = self.friction * normal.pressure
+        offset = self.offset(before, load)
+        sliding = self._slides(limit, load)
+        if sliding:
+            tangential = self._slide(limit, offset, load)
+        else:
+            tangential = self._shear(before, limit, offset, load)
+        return self._state(before, load, normal, tangential, sliding)
+
+    def offset(self, before: ContactState, load: Load) -> Array:
+        """Tangential displacement ``(2, nx, ny)`` [mm] of the increment without its tractions."""
+        offset = -before.displacement[:2]
+        offset[0] += (load.strain - before.strain) * self.grid.x
+        return offset
+
+    # -- similar bodies -----------------------------------------------------------------------
+    @cached_property
+    def normal(self) -> NormalContact:
+        return NormalContact(self.half_space)
+
+    @cached_property
+    def tangential(self) -> TangentialContact:
+        return TangentialContact(self.half_space)
+
+    def _press(self, before: ContactState, height: Array, load: Load) -> NormalState:
+        P, Mx, My, approach, tilt_x, tilt_y = (
+            float(load.values[k]) if load.motion[k] is moved else None
+            for moved in (False, True)
+            for k in NORMAL
+        )
+        if self.grid.line:
+            Mx = tilt_x = None
+        start = None
+        if before.pressure.any():
+            start = NormalStart(before.pressure, before.displacement[2])
+        return self.normal.solve(
+            height,
+            P,
+            Mx,
+            My,
+            approach=approach,
+            tilt_x=tilt_x,
+            tilt_y=tilt_y,
+            tolerance=self.tolerance,
+            start=start,
+        )
+
+    def _shear(
+        self, before: ContactState, limit: Array, offset: Array, load: Load
+    ) -> TangentialState:
+        names = ("Qx", "Qy", "Mz"), ("shift_x", "shift_y", "twist")
+        imposed: dict[str, float] = {}
+        for place, k in enumerate(TANGENTIAL):
+            own = load.values[k] - (before.rigid[k] if load.motion[k] else 0.0)
+            imposed[names[load.motion[k]][place]] = float(own)
+        if self.grid.line:
+            imposed = {name: own for name, own in imposed.items() if name not in ("Mz", "twist")}
+        return self.tangential.solve(
+            limit, offset, **imposed, tolerance=self.tolerance, start=before.shear
+        )
+
+    def _slide(self, limit: Array, offset: Array, load: Load) -> TangentialState:
+        """Gross slip by the energy of ``load``."""
+        area = self.grid.cell_area
+        start = limit * sliding_direction(load.values[1:3])[:, None, None]
+        moved = self.half_space.shear(start) + offset
+        twist = {} if self.grid.line else {"twist": 0.0}
+        spent = 0
+
+        def slide(shift: Array, tolerance: float) -> Sliding[TangentialState]:
+            nonlocal start, spent
+            x, y = map(float, shift)
+            state = self.tangential.solve(
+                limit, offset, shift_x=x, shift_y=y, **twist, tolerance=tolerance, start=start
+            )
+            start, spent = state.shear, spent + state.convolutions
+            energy = self._dissipated(state.shear, state.slip)
+            return Sliding(state, np.array([state.Qx, state.Qy]), energy)
+
+        stored = float(np.vdot(start, moved))
+        state = self._by_energy(slide, float(limit.sum()) * area, load, stored)
+        return replace(state, convolutions=spent)
+
+    def _by_energy(
+        self,
+        slide: Callable[[Array, float], Sliding[State]],
+        carried: float,
+        load: Load,
+        stored: float,
+    ) -> State:
+        assert load.energy is not None
+        return gross_slip(
+            slide,
+            carried,
+            load.energy,
+            load.values[1:3],
+            self.tolerance,
+            self._sliding,
+            stored * self.grid.cell_area,
+        ).state
+
+    def _slides(self, limit: Array, load: Load) -> bool:
+        """Whether the energy is known and forces are within 1 % of the largest friction carries."""
+        if load.energy is None or not load.energy.sum() > 0.0:
+            return False
+        modes = self._modes
+        forces = load.values[[TANGENTIAL[k] for k in modes.free]]
+        target = forces / (modes.lengths * self.grid.cell_area)
+        carried = float(limit.sum())
+        if any(load.motion[k] for k in TANGENTIAL) or carried == 0.0:
+            return False
+        if np.linalg.norm(target) < SHARE_CHECKED * carried:
+            return False
+        pressed = limit > 0.0
+        shapes = modes.fields()[:, :, pressed]
+        return GROSS_SHARE * largest_share(limit[pressed], shapes, target) <= 1.0
+
+    def _state(
+        self,
+        before: ContactState,
+        load: Load,
+        normal: NormalState,
+        tangential: TangentialState,
+        sliding: bool,
+    ) -> ContactState:
+        shift = np.array([tangential.shift_x, tangential.shift_y, tangential.twist])
+        rigid = np.array([normal.approach, 0.0, 0.0, normal.tilt_x, normal.tilt_y, 0.0])
+        rigid[list(TANGENTIAL)] = before.rigid[list(TANGENTIAL)] + shift
+        resultants = np.array([normal.P, 0.0, 0.0, normal.Mx, normal.My, 0.0])
+        resultants[list(TANGENTIAL)] = tangential.Qx, tangential.Qy, tangential.Mz
+        messages = [own for own in (normal.message, tangential.message) if own]
+        return ContactState(
+            traction=np.stack([*tangential.shear, normal.pressure]),
+            displacement=np.stack([*tangential.displacement, normal.displacement]),
+            slip=tangential.slip,
+            gap=normal.gap,
+            sticking=tangential.sticking,
+            resultants=resultants,
+            rigid=rigid,
+            strain=load.strain,
+            energy=self._dissipated(tangential.shear, tangential.slip),
+            sliding=sliding,
+            residual=max(normal.residuals.largest, tangential.residuals.largest),
+            converged=normal.converged and tangential.converged,
+            message="; ".join(messages),
+            convolutions=normal.convolutions + tangential.convolutions,
+            border_load=normal.border_load,
+        )
+
+    def _dissipated(self, shear: Array, slip: Array) -> Array:
+        """-Σ q Δs S in x and in y [N mm]."""
+        dissipated: Array = -np.sum(shear * slip, axis=(1, 2)) * self.grid.cell_area
+        return dissipated
+
+    # -- dissimilar bodies --------------------------------------------------------------------
+    @cached_property
+    def _coupled(self) -> CoupledContact:
+        return CoupledContact(self.half_space, self.friction)
+
+    def _together(self, before: ContactState, height: Array, load: Load) -> ContactState:
+        offset = self.offset(before, load)
+        sliding = False
+        if load.energy is not None:
+            # The pressure hardly changes with shear: that without friction will do to judge it.
+            limit = self.friction * self._press(before, height, load).pressure
+            sliding = self._slides(limit, load)
+        if sliding:
+            state = self._slide_together(before, height, offset, load, limit)
+        else:
+            values = load.values.copy()
+            for k in TANGENTIAL:
+                values[k] -= before.rigid[k] if load.motion[k] else 0.0
+            state = self._coupled.solve(
+                height, offset, values, load.motion, tolerance=self.tolerance, start=before.start
+            )
+        rigid = state.rigid.copy()
+        rigid[list(TANGENTIAL)] += before.rigid[list(TANGENTIAL)]
+        pressed = state.pressure > 0.0
+        limit = self.friction * state.pressure
+        return ContactState(
+            traction=state.traction,
+            displacement=state.displacement,
+            slip=np.where(pressed, state.slip, 0.0),
+            gap=state.gap,
+            sticking=pressed & (np.hypot(*state.shear) < limit * (1.0 - ROUNDING)),
+            resultants=state.resultants,
+            rigid=rigid,
+            strain=load.strain,
+            energy=self._dissipated(state.shear, state.slip),
+            sliding=sliding,
+            residual=state.residuals.largest,
+            converged=state.converged,
+            message=state.message,
+            convolutions=state.convolutions,
+            border_load=state.border_load,
+            start=state.start,
+        )
+
+    def _slide_together(
+        self, before: ContactState, height: Array, offset: Array, load: Load, limit: Array
+    ) -> CoupledState:
+        """Gross slip by the energy of ``load``."""
+        values, start = load.values.copy(), before.start
+        values[5] = 0.0
+        motion = (load.motion[0], True, True, load.motion[3], load.motion[4], not self.grid.line)
+        shear = limit * sliding_direction(load.values[1:3])[:, None, None]
+        moved = self.half_space.shear(shear) + offset
+
+        spent = 0
+
+        def slide(shift: Array, tolerance: float) -> Sliding[CoupledState]:
+            nonlocal start, spent
+            values[1:3] = shift
+            state = self._coupled.solve(
+                height, offset, values, motion, tolerance=tolerance, start=start
+            )
+            start, spent = state.start, spent + state.convolutions
+            energy = self._dissipated(state.shear, state.slip)
+            return Sliding(state, state.resultants[1:3], energy)
+
+        carried = self.friction * float(load.values[0])
+        state = self._by_energy(slide, carried, load, float(np.vdot(shear, moved)))
+        return replace(state, convolutions=spent)

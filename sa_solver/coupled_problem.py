@@ -1,0 +1,166 @@
+"""The discrete contact problem of dissimilar bodies, normal and tangential together.
+
+Tractions ``t = (qx, qy, p)`` and relative displacements ``v = (Δsx, Δsy, g)`` of one increment obey
+
+    v = K t + D t + offset - R c
+    p >= 0,  g >= 0,  p g = 0,    |q| <= µp,  Δs = -λ q,  λ >= 0,  λ (µp - |q|) = 0
+
+K is the half-space with all nine influence functions, D a local compliance of the pressure alone, R
+the six rigid motions and c their sizes, each imposed or such that its resultant is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sa_solver.contact_law import project_on_disk
+from sa_solver.half_space import HalfSpace
+from sa_solver.influence import X, Z
+from sa_solver.types import Array, Grid
+
+SMALLEST_SHARE = 1e-4
+"""Where the tangential displacement is below this share of the normal one, friction hardly acts:
+its residual is measured against that share, since against rounding it would never be small."""
+
+RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
+"""Order of resultants, and of the motions conjugate to them: δz, δx, δy, φx, φy, φz."""
+
+
+class RigidMotions:
+    """The six rigid motions on a grid, and the resultants that are their conjugates.
+
+    Coefficients ``(6,)`` are in mm: rotations times ``lengths``, half the grid's size across their
+    axis. Resultants ``(6,)`` are in MPa: over the cell area, and moments over ``lengths`` too.
+    ``present`` are the motions that move some cell of the grid.
+    """
+
+    def __init__(self, grid: Grid) -> None:
+        """Motions of ``grid``. A line contact goes on along y and knows neither φx nor φz."""
+        half_x, half_y = (0.5 * size for size in grid.size)
+        half = max(half_x, half_y)
+        self.grid = grid
+        self.lengths = np.array([1.0, 1.0, 1.0, half_y, half_x, half])
+        self._x, self._y = grid.x.ravel(), grid.y.ravel()
+        tilts = not grid.line and bool(self._y.any()), bool(self._x.any())
+        self._felt = np.array([True, True, True, *tilts, not grid.line and any(tilts)])
+        self.present = tuple(int(k) for k in np.flatnonzero(self._felt))
+
+    def motion(self, coefficients: Array) -> Array:
+        """The field ``R c`` ``(3, nx, ny)`` [mm] of ``coefficients`` ``(6,)``."""
+        dz, dx, dy, tilt_x, tilt_y, twist = coefficients / self.lengths
+        field = np.empty((3, *self.grid.shape))
+        field[0] = dx - twist * self._y
+        field[1] = (dy + twist * self._x)[:, None]
+        field[2] = (dz - tilt_y * self._x)[:, None] + tilt_x * self._y
+        return field
+
+    def sums(self, traction: Array) -> Array:
+        """Products ``(6,)`` of ``traction`` ``(3, nx, ny)`` with the motions of unit size.
+
+        0 for motions that are not present.
+        """
+        along_x, along_y = traction.sum(axis=2), traction.sum(axis=1)
+        qx, qy, p = along_x.sum(axis=1)
+        moments = (
+            along_y[2] @ self._y,
+            -(along_x[2] @ self._x),
+            along_x[1] @ self._x - along_y[0] @ self._y,
+        )
+        sums: Array = self._felt * np.array([p, qx, qy, *moments]) / self.lengths
+        return sums
+
+    def resultants(self, traction: Array) -> Array:
+        """``(P, Qx, Qy, Mx, My, Mz)`` [N, N mm] of ``traction`` ``(3, nx, ny)`` [MPa]."""
+        physical: Array = self.sums(traction) * self.lengths * self.grid.cell_area
+        return physical
+
+
+@dataclass(frozen=True)
+class CoupledProblem:
+    """Data of one increment.
+
+    ``offset`` ``(3, nx, ny)`` [mm] holds, in z, the gap before loading and, in x and y, what the
+    slip is counted from, with all ``imposed`` motions ``(6,)`` taken off; ``free`` are the motions
+    whose resultants ``target`` ``(len(free),)`` [MPa] are imposed instead; ``compliance`` D
+    ``(nx, ny)`` [mm/MPa] or 0.
+    """
+
+    half_space: HalfSpace
+    motions: RigidMotions
+    friction: float
+    offset: Array
+    imposed: Array
+    free: tuple[int, ...]
+    target: Array
+    compliance: Array | float
+
+    @property
+    def load(self) -> float | None:
+        """P over the cell area [MPa], or None where the approach is imposed instead."""
+        return float(self.target[0]) if 0 in self.free else None
+
+    def relative(self, traction: Array, displacement: Array, rigid: Array) -> Array:
+        """``v`` ``(3, nx, ny)`` [mm] under tractions t, K t and free motions ``rigid`` ``(6,)``."""
+        relative = displacement + self.offset - self.motions.motion(rigid)
+        relative[Z] += self.compliance * traction[Z]
+        return relative
+
+
+@dataclass(frozen=True)
+class CoupledResiduals:
+    """How far a state is from solving the problem, dimensionless, independent of the method.
+
+    ``force``: largest error of an imposed P, Qx or Qy over P; ``moment``: of an imposed Mx, My or
+    Mz over P times half the grid's size; ``penetration`` and ``complementarity`` as in
+    :class:`~sa_solver.normal_problem.NormalResiduals`; ``coulomb``: largest
+    ``κ |q - Π(q - Δs/κ)|`` over the largest ``|u_τ|`` (or, if that is more, 1e-4 of the largest
+    u_z), Π the projection on the disk of radius µp
+    and κ a cell's own compliance, which vanishes only where Coulomb's law holds. Pressure is never
+    negative and shear never above µp.
+    """
+
+    force: float
+    moment: float
+    penetration: float
+    complementarity: float
+    coulomb: float
+
+    @property
+    def largest(self) -> float:
+        """The largest of the five."""
+        return max(self.force, self.moment, self.penetration, self.complementarity, self.coulomb)
+
+
+def residuals(
+    problem: CoupledProblem, traction: Array, displacement: Array, relative: Array
+) -> CoupledResiduals:
+    """All residuals of a state: ``t``, ``K t`` and ``v``, each ``(3, nx, ny)``."""
+    pressure, gap = traction[Z], relative[Z]
+    load = float(pressure.sum())
+    depth = float((displacement[Z] + problem.compliance * pressure).max())
+    if not (load > 0.0 and depth > 0.0):
+        return CoupledResiduals(*[np.inf] * 5)
+    errors = np.zeros(6)
+    errors[list(problem.free)] = np.abs(
+        problem.motions.sums(traction)[list(problem.free)] - problem.target
+    )
+    errors /= problem.load or load
+    return CoupledResiduals(
+        force=float(errors[:3].max()),
+        moment=float(errors[3:].max()),
+        penetration=max(0.0, -float(gap.min())) / depth,
+        complementarity=float(np.abs(pressure * gap).max() / (pressure.max() * depth)),
+        coulomb=_coulomb_residual(problem, traction, displacement, relative[:Z]),
+    )
+
+
+def _coulomb_residual(
+    problem: CoupledProblem, traction: Array, displacement: Array, slip: Array
+) -> float:
+    own = problem.half_space.self_compliance(X)
+    shear, limit = traction[:Z], problem.friction * traction[Z]
+    step = own * np.hypot(*(shear - project_on_disk(shear - slip / own, limit)))
+    tangential, normal = float(np.hypot(*displacement[:Z]).max()), float(displacement[Z].max())
+    return float(step.max()) / max(tangential, SMALLEST_SHARE * normal)

@@ -1,0 +1,70 @@
+"""Accelerated projected gradients for shear within Coulomb's disks: slow, but sure to converge.
+
+The problem is the minimum of a strongly convex quadratic on a convex set, so steps against the
+gradient no longer than the inverse of the largest eigenvalue of K, each projected on the set,
+converge whatever the limits are; momentum makes the count grow only with the root of the ratio of
+eigenvalues, about that of the cells across. Newton's method takes ten times fewer, but may stall
+where limits differ by orders of magnitude from cell to cell.
+
+Sources: Nesterov 1983, Sov. Math. Dokl. 27, 372 (momentum); O'Donoghue & Candès 2015, Found. Comput.
+Math. 15, 715, doi:10.1007/s10208-013-9150-3 (restarts).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from sa_solver.disk_newton import DiskSolution
+from sa_solver.tangential_problem import TangentialProblem
+from sa_solver.types import Array
+
+
+def gradients_on_disks(
+    problem: TangentialProblem, shear: Array, tolerance: float, max_iterations: int
+) -> DiskSolution:
+    """Solve ``problem`` from an admissible ``shear`` ``(2, nx, ny)`` with the right resultants.
+
+    Stops when :meth:`TangentialProblem.residual` is within ``tolerance``, or says that it did not.
+    """
+    operator = problem.operator
+    stiffness = 1.0 / operator.largest_eigenvalue
+    everywhere = problem.pressed.astype(np.float64)
+    best, momentum = np.inf, 1.0
+    displacement = operator.displacement(shear)
+    solution = _solution(problem, shear, displacement, np.zeros(len(problem.target)), np.inf, 0)
+    ahead, ahead_displacement = shear, displacement
+    for iteration in range(1, max_iterations + 1):
+        trial = ahead - stiffness * (ahead_displacement + problem.offset) * everywhere
+        found = problem.balance(trial, weight=everywhere)
+        if found is None:
+            break
+        new, coefficients = found
+        # Momentum that would carry the shear back where it came from is dropped.
+        restart = float(np.vdot(ahead - new, new - shear)) > 0.0
+        following = 1.0 if restart else 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * momentum**2))
+        share = 0.0 if restart else (momentum - 1.0) / following
+        new_displacement = operator.displacement(new)
+        rigid = coefficients / stiffness
+        residual = problem.residual(new, new_displacement, rigid)
+        if residual < best:
+            best = residual
+            solution = _solution(problem, new, new_displacement, rigid, residual, iteration)
+        if residual <= tolerance:
+            return _solution(problem, new, new_displacement, rigid, residual, iteration, True)
+        ahead = new + share * (new - shear)
+        ahead_displacement = new_displacement + share * (new_displacement - displacement)
+        shear, displacement, momentum = new, new_displacement, following
+    return solution
+
+
+def _solution(
+    problem: TangentialProblem,
+    shear: Array,
+    displacement: Array,
+    rigid: Array,
+    residual: float,
+    iterations: int,
+    converged: bool = False,
+) -> DiskSolution:
+    slipping = problem.on_circle(shear)
+    return DiskSolution(shear, displacement, rigid, slipping, residual, iterations, converged)

@@ -1,0 +1,105 @@
+"""Gross slip: the rigid motion of a contact that slides, from the energy it dissipates.
+
+A force at its limit no longer says how far the bodies slide; energies do. The rigid increments Δδx,
+Δδy are found such that the contact dissipates Edx + Edy, in one of two directions: ``energies``,
+that which shares the sum between x and y as given (Gallego 2007, eq. 8), with the signs that make
+slip oppose the given force, or ``force``, that in which the shear force has the given direction.
+Rotation is neglected. The two agree where the bodies slide as rigid ones do. Where the surfaces
+also slip sideways, outwards from the middle, eq. 8 takes that for sliding: it implies a force
+across that nothing balances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Generic, Literal, TypeVar
+
+import numpy as np
+
+from sa_solver.types import Array
+
+Direction = Literal["force", "energies"]
+
+ACCURACY = 1e-6
+"""Error of the energy, relative, and of the direction, in rad, at which the search ends. Shear
+solved to 1e-8 has its direction to about 1e-7."""
+
+LOOSEST = 1e-3
+LOOSER = 0.01
+"""Tolerance of the first contact problem, and of the others over the error before them."""
+
+ITERATIONS = 30
+"""Contact problems solved; 3 to 8 are usual."""
+
+State = TypeVar("State")
+
+
+@dataclass(frozen=True)
+class Sliding(Generic[State]):
+    """A state under imposed motion, its shear force (Qx, Qy) [N] and energy (Edx, Edy) [N mm]."""
+
+    state: State
+    force: Array
+    energy: Array
+
+
+@dataclass(frozen=True)
+class GrossSlip(Generic[State]):
+    """State of the sliding contact, and its error: see :data:`ACCURACY`.
+
+    Shear is coupled by Poisson's ratio, so no direction of sliding spares x or y all energy: then
+    the error of ``energies`` in direction stays, and the sum is met.
+    """
+
+    state: State
+    error: float
+
+
+def gross_slip(
+    slide: Callable[[Array, float], Sliding[State]],
+    carried: float,
+    energy: Array,
+    force: Array,
+    tolerance: float,
+    direction: Direction = "force",
+    stored: float = 0.0,
+) -> GrossSlip[State]:
+    """State of a sliding contact that dissipates ``energy`` (Edx, Edy) [N mm], their sum above 0.
+
+    ``slide`` solves the contact for a motion (Δδx, Δδy) [mm] to a tolerance, ``carried`` is µP [N]
+    and ``force`` the given (Qx, Qy) [N]. ``stored`` [N mm] is the work that the shear of sliding
+    does on its own displacement, about: it makes the first guess a good one.
+
+    While all slips, a longer motion dissipates µP more per length, and a turned one turns force and
+    shares of energy with it: both are corrected at once by what is missing.
+    """
+    total = float(energy.sum())
+    wanted = angle = _angle(force if direction == "force" else np.sqrt(energy.clip(0.0)))
+    length = max(0.0, total + stored) / carried
+    inner = LOOSEST
+    for _ in range(ITERATIONS):
+        found = slide(length * sliding_direction(force, angle), max(inner, tolerance))
+        measured = _angle(found.force if direction == "force" else np.sqrt(found.energy.clip(0.0)))
+        missing = total - float(found.energy.sum())
+        turned = float(np.clip(angle + wanted - measured, 0.0, 0.5 * np.pi))
+        change = max(abs(missing) / total, abs(turned - angle))
+        if change <= ACCURACY and inner <= tolerance:
+            break
+        inner = max(tolerance, LOOSER * min(change, inner))
+        length = max(0.0, length + missing / carried)
+        angle = turned
+    return GrossSlip(found.state, max(abs(missing) / total, abs(wanted - measured)))
+
+
+def sliding_direction(force: Array, angle: float | None = None) -> Array:
+    """Unit vector ``(2,)`` in the quadrant of ``force``, at its own angle unless one is given."""
+    angle = _angle(force) if angle is None else angle
+    vector: Array = np.where(force < 0.0, -1.0, 1.0) * np.array([np.cos(angle), np.sin(angle)])
+    return vector
+
+
+def _angle(vector: Array) -> float:
+    """Direction of (±x, ±y) in the first quadrant [rad]."""
+    along, across = np.abs(vector)
+    return float(np.arctan2(across, along))

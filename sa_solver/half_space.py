@@ -1,0 +1,209 @@
+"""Two elastic half-spaces on a uniform grid: displacement under tractions by FFT.
+
+Zero padding to at least ``2n - 1`` makes the circular convolution with influence coefficients the
+linear one (Liu, Wang & Liu 2000, Wear 243, 101, doi:10.1016/S0043-1648(00)00427-0). On a line grid
+the same holds for half-planes in plane strain.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.fft
+
+from sa_solver.influence import X, Y, Z, rectangle_influence, strip_influence
+from sa_solver.transform import SpectralFilter, Transform, plan_transform
+from sa_solver.types import Array, ElasticPair, Grid
+
+NORMAL = (Z,)
+SHEAR = (X, Y)
+ALL = (X, Y, Z)
+
+DATUM = 2.0
+"""Default datum of a line contact, in widths of its grid. From one width up the logarithmic kernel
+is positive on the padded grid."""
+
+SHIFT = 0.5
+"""ρ of a resolvent over the geometric mean of the extreme eigenvalues of K: the fewest iterations
+of the splitting on spheres and flats; 0.2 and 2 take up to twice as many."""
+
+SMALLEST_EIGENVALUE = 0.5
+"""Smallest eigenvalue of K over the self-compliance of a cell, about, on square cells; less on long
+ones (0.2) and lines (0.1). It only sets ρ, not the solution."""
+
+Components = tuple[int, ...]
+Shape = tuple[int, int]
+
+
+class HalfSpace:
+    """Displacement of body 2's surface relative to body 1's under tractions on a grid.
+
+    ``count`` is the number of zero-padded convolutions done so far, of one component (pressure),
+    two (shear) or three.
+    """
+
+    def __init__(
+        self, grid: Grid, pair: ElasticPair, threads: int = 1, datum: float | None = None
+    ) -> None:
+        """``datum`` [mm] is for line grids: how far from a line force its displacement vanishes.
+
+        Raises ValueError for a datum shorter than the grid.
+        """
+        self.grid, self.pair, self.threads = grid, pair, threads
+        self.datum = DATUM * grid.size[0] if datum is None else datum
+        if grid.line and not grid.size[0] <= self.datum < np.inf:
+            raise ValueError(
+                f"datum {self.datum:g} mm is not between the width of the grid, "
+                f"{grid.size[0]:g} mm, and infinity: give the depth of the bodies"
+            )
+        self.padded = padded_shape(grid)
+        self.count = 0
+        self._filters: dict[tuple[Components, Components], SpectralFilter] = {}
+        self._symbols: dict[tuple[int, int, Shape], Array] = {}
+        self._transforms: dict[tuple[Shape, Shape, int], Transform] = {}
+
+    def normal(self, pressure: Array) -> Array:
+        """``u_z`` under ``pressure`` alone, both ``(nx, ny)`` [MPa] → [mm]."""
+        displacement: Array = self._convolve(pressure[None], NORMAL, NORMAL)[0]
+        return displacement
+
+    def shear(self, shear: Array) -> Array:
+        """``u_x, u_y`` under ``shear`` alone, both ``(2, nx, ny)`` [MPa] → [mm]."""
+        return self._convolve(shear, SHEAR, SHEAR)
+
+    def displacement(self, traction: Array) -> Array:
+        """``u`` under ``traction``, both ``(3, nx, ny)`` ordered x, y, z [MPa] → [mm]."""
+        return self._convolve(traction, ALL, ALL)
+
+    def shear_under_pressure(self, pressure: Array) -> Array:
+        """``u_x, u_y`` ``(2, nx, ny)`` under ``pressure`` ``(nx, ny)``; 0 for similar bodies."""
+        if self.pair.similar:
+            return np.zeros((2, *pressure.shape))
+        return self._convolve(pressure[None], SHEAR, NORMAL)
+
+    def normal_under_shear(self, shear: Array) -> Array:
+        """``u_z`` ``(nx, ny)`` under ``shear`` ``(2, nx, ny)``; 0 for similar bodies."""
+        if self.pair.similar:
+            return np.zeros(shear.shape[1:])
+        displacement: Array = self._convolve(shear, NORMAL, SHEAR)[0]
+        return displacement
+
+    def symbol(self, row: int, column: int, period: Shape | None = None) -> Array:
+        """Eigenvalues of the influence coefficients made periodic, ``(mx, my//2 + 1)`` [mm/MPa].
+
+        ``period`` is the padded shape unless given; each displacement is taken at the nearest
+        image. The matrix of symbols is Hermitian: made real and symmetric here by counting
+        components along z in units of the imaginary one.
+        """
+        key = (min(row, column), max(row, column), period or self.padded)
+        if key not in self._symbols:
+            self._symbols[key] = self._compute_symbol(*key)
+        return self._symbols[key]
+
+    def self_compliance(self, component: int) -> float:
+        """Displacement at the centre of a cell under unit traction on it [mm/MPa]."""
+        edges = [np.array([-0.5, 0.5]) * pitch for pitch in self.grid.pitch]
+        return float(self._influence(edges[0], edges[1], component, component)[0, 0])
+
+    def transform(self, shape: Shape, padded: Shape, components: int) -> Transform:
+        """A transform planned once for all who need this size."""
+        key = (shape, padded, components)
+        if key not in self._transforms:
+            self._transforms[key] = plan_transform(*key, self.threads)
+        return self._transforms[key]
+
+    def _convolve(self, fields: Array, rows: Components, columns: Components) -> Array:
+        self.count += 1
+        if (rows, columns) not in self._filters:
+            transform = self.transform(self.grid.shape, self.padded, max(len(rows), len(columns)))
+            symbols = [[self.symbol(row, column) for column in columns] for row in rows]
+            self._filters[rows, columns] = spectral_filter(transform, symbols, rows, columns)
+        return self._filters[rows, columns].apply(fields)
+
+    def _influence(self, edges_x: Array, edges_y: Array, row: int, column: int) -> Array:
+        if self.grid.line:
+            return strip_influence(edges_x, self.pair, row, column, self.datum)[:, None]
+        return rectangle_influence(edges_x, edges_y, self.pair, row, column)
+
+    def _compute_symbol(self, row: int, column: int, period: Shape) -> Array:
+        """DFT of a quarter of the kernel, continued by its parity along x and along y."""
+        edges = [
+            (np.arange(m // 2 + 2, dtype=np.float64) - 0.5) * pitch
+            for m, pitch in zip(period, self.grid.pitch, strict=True)
+        ]
+        kernel = self._influence(edges[0], edges[1], row, column)
+        for axis, m in enumerate(period):
+            kernel = _continued(kernel, axis, m, odd=(row == axis) != (column == axis))
+        spectrum = scipy.fft.rfft2(kernel)
+        # -i times the symbol of an odd kernel from (x, y) to z is its real counterpart.
+        symbol = spectrum.real if (row == Z) == (column == Z) else -spectrum.imag
+        return np.ascontiguousarray(symbol)
+
+
+def spectral_filter(
+    transform: Transform, symbols: list[list[Array]], rows: Components, columns: Components
+) -> SpectralFilter:
+    """A filter with components ``rows`` out and ``columns`` in, from real symbols."""
+    if rows == columns == NORMAL:
+        return SpectralFilter(transform, symbols)
+    imaginary = [
+        [k for k, component in enumerate(own) if component == Z] for own in (columns, rows)
+    ]
+    return SpectralFilter(transform, symbols, (imaginary[0], imaginary[1]))
+
+
+def padded_shape(grid: Grid) -> Shape:
+    """The fast transform lengths that hold the linear convolution on ``grid``."""
+    nx, ny = (int(scipy.fft.next_fast_len(2 * n - 1, real=True)) for n in grid.shape)
+    return nx, ny
+
+
+def _continued(kernel: Array, axis: int, period: int, odd: bool) -> Array:
+    """A kernel at distances 0 to period//2 along ``axis``, continued to a whole period."""
+    kernel = np.moveaxis(kernel, axis, 0)[: period // 2 + 1]
+    mirrored = kernel[1 : (period + 1) // 2][::-1]
+    if odd:
+        kernel, mirrored = kernel.copy(), -mirrored
+        if period % 2 == 0:
+            kernel[-1] = 0.0  # as far from one image as from the next, which cancels it
+    return np.moveaxis(np.concatenate([kernel, mirrored]), 0, axis)
+
+
+class HalfSpaceResolvent:
+    """``(K + ρ)⁻¹`` on the zero-padded grid, where K is circulant and the inverse exact.
+
+    Fields have the shape ``padded``; the grid is their first ``(nx, ny)`` block.
+    """
+
+    def __init__(self, half_space: HalfSpace, components: Components) -> None:
+        """Plan for tractions with these ``components``."""
+        self.padded = half_space.padded
+        self._half_space = half_space
+        largest = max(float(half_space.symbol(k, k).max()) for k in components)
+        smallest = SMALLEST_EIGENVALUE * min(half_space.self_compliance(k) for k in components)
+        self.shift = SHIFT * float(np.sqrt(largest * smallest))
+        """ρ [mm/MPa]."""
+        symbols = [[half_space.symbol(i, j) for j in components] for i in components]
+        for k, row in enumerate(symbols):
+            row[k] = row[k] + self.shift
+        transform = half_space.transform(self.padded, self.padded, len(components))
+        inverse = inverse_symbols(symbols)
+        self._filter = spectral_filter(transform, inverse, components, components)
+
+    def solve(self, displacement: Array) -> Array:
+        """Traction ``(K + ρ)⁻¹ u`` for ``u`` ``(c, mx, my)`` on the padded grid [mm] → [MPa]."""
+        self._half_space.count += 1
+        return self._filter.apply(displacement)
+
+
+def inverse_symbols(symbols: list[list[Array]]) -> list[list[Array]]:
+    """The inverse of a matrix of symbols, frequency by frequency."""
+    if len(symbols) == 1:
+        return [[1.0 / symbols[0][0]]]
+    if len(symbols) == 2:
+        (a, b), (c, d) = symbols
+        determinant = a * d - b * c
+        return [[d / determinant, -b / determinant], [-c / determinant, a / determinant]]
+    matrices = np.moveaxis(np.array(symbols), (0, 1), (-2, -1))
+    inverses = np.linalg.inv(matrices)
+    count = range(len(symbols))
+    return [[np.ascontiguousarray(inverses[..., i, j]) for j in count] for i in count]

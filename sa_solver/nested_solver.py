@@ -1,0 +1,207 @@
+"""Normal contact on one grid: started from coarser ones, searched in a box around the contact.
+
+Both only save time: the answer is verified by a convolution on the whole grid.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+
+import numpy as np
+
+from sa_solver.active_box import Box
+from sa_solver.bound_cg import SearchResult, bound_conjugate_gradients
+from sa_solver.few_cells import solve_few_cells
+from sa_solver.half_space import HalfSpace
+from sa_solver.nested_grids import Transfer, coarsened
+from sa_solver.normal_problem import Iterate, NormalProblem, residuals
+from sa_solver.normal_splitting import split
+from sa_solver.preconditioner import NormalPreconditioner
+from sa_solver.rigid_modes import APPROACH, TILT_X, TILT_Y, RigidModes
+from sa_solver.types import Array, Grid
+
+GRADIENT_ITERATIONS = 200
+"""Conjugate gradients took at most 45 on every case tried; beyond this they are taken to circle
+between contact sets."""
+
+COARSE_TOLERANCE = 1e-3
+"""Of residuals on coarser grids, whose pressure is off by more than that at the contact's edge."""
+
+BOXES = 4
+"""Boxes whose transforms are kept, the last used: a wear run needs two or three."""
+
+
+@dataclass(frozen=True)
+class Solution:
+    """The last iterate on the whole grid, and how it was found."""
+
+    iterate: Iterate
+    iterations: int
+    method: str
+
+
+class _Stage:
+    """The half-space and its preconditioner on a box of cells."""
+
+    def __init__(self, half_space: HalfSpace) -> None:
+        self.half_space = half_space
+        self.preconditioner = NormalPreconditioner(half_space)
+
+
+class NestedSolver:
+    """Solves normal contact problems on one grid; owns what was planned for it."""
+
+    def __init__(self, half_space: HalfSpace) -> None:
+        self.half_space = half_space
+        self._boxed = lru_cache(BOXES)(self._plan)
+
+    def cold_start(self, problem: NormalProblem) -> Array | None:
+        """A balanced pressure >= 0, from coarser grids where there are any.
+
+        None where no pressure on this grid can be balanced or, if the approach is imposed, nothing
+        presses on cells of this size.
+        """
+        if APPROACH not in problem.modes.free and problem.height.min() >= 0.0:
+            return None
+        nested = self._from_coarser(problem)
+        return nested if nested is not None else _uniform(problem)
+
+    def solve(
+        self, problem: NormalProblem, pressure: Array, displacement: Array | None, tolerance: float
+    ) -> Solution:
+        """Solve from a balanced ``pressure`` >= 0, whose ``displacement`` may be known."""
+        box, iterations = Box.around(pressure > 0.0), 0
+        while True:
+            box, found = self._search(problem, box, pressure, displacement, tolerance)
+            iterations += found.iterations
+            iterate = found.iterate
+            if not found.converged:
+                return self._rescue(problem, box.placed(iterate.pressure), iterations, tolerance)
+            if box.size == box.shape:
+                return Solution(iterate, iterations, "conjugate gradients")
+            pressure = box.placed(iterate.pressure)
+            displacement = problem.displacement(pressure)
+            iterate = Iterate(pressure, displacement, iterate.rigid)
+            missed = iterate.gap(problem) < -tolerance * displacement.max()
+            missed[box.window] = False
+            if not missed.any():
+                return Solution(iterate, iterations, "conjugate gradients")
+            missed[box.window] = True
+            box = Box.around(missed)
+
+    def _search(
+        self,
+        problem: NormalProblem,
+        box: Box,
+        pressure: Array,
+        displacement: Array | None,
+        tolerance: float,
+    ) -> tuple[Box, SearchResult]:
+        """Solve with pressure in a box only, enlarged while the contact reaches its sides."""
+        while True:
+            stage = self._stage(box)
+            inner = problem.cropped(box.window, stage.half_space)
+            stage.preconditioner.include(inner.compliance)
+            inside = np.ascontiguousarray(pressure[box.window])
+            moved = inner.displacement(inside) if displacement is None else displacement[box.window]
+            found = bound_conjugate_gradients(
+                inner,
+                stage.preconditioner,
+                inside,
+                moved,
+                tolerance,
+                GRADIENT_ITERATIONS,
+                box.left_by,
+            )
+            if not found.left:
+                return box, found
+            pressure, displacement = box.placed(found.iterate.pressure), None
+            box = box.grown()
+
+    def _rescue(
+        self, problem: NormalProblem, pressure: Array, iterations: int, tolerance: float
+    ) -> Solution:
+        """Solve on the whole grid by slower methods, from the last ``pressure`` of the search."""
+        few, steps = solve_few_cells(problem, tolerance)
+        if few is not None and residuals(problem, few).largest <= tolerance:
+            return Solution(few, iterations + steps, "active set")
+        rigid = np.zeros(len(problem.modes.free))
+        last = Iterate(pressure, problem.displacement(pressure), rigid)
+        iterate, more = split(problem, last, tolerance)
+        return Solution(iterate, iterations + steps + more, "splitting")
+
+    # -- coarser grids ------------------------------------------------------------------------
+    @cached_property
+    def _coarser(self) -> tuple[NestedSolver, Transfer] | None:
+        """The solver on the next coarser grid, and how fields pass to and from it."""
+        own = self.half_space
+        grid = coarsened(own.grid)
+        if grid is None:
+            return None
+        return NestedSolver(_half_space_on(grid, own)), Transfer(own.grid, grid)
+
+    def _from_coarser(self, problem: NormalProblem) -> Array | None:
+        if self._coarser is None:
+            return None
+        solver, transfer = self._coarser
+        coarse = solver._coarse(problem, transfer)
+        start = solver.cold_start(coarse)
+        if start is None:
+            return None
+        box = Box.around(start > 0.0)
+        box, found = solver._search(coarse, box, start, None, COARSE_TOLERANCE)
+        pressure = transfer.interpolated(box.placed(found.iterate.pressure))
+        return problem.modes.balance(pressure, problem.target)
+
+    def _coarse(self, problem: NormalProblem, transfer: Transfer) -> NormalProblem:
+        """``problem`` with heights and compliances averaged over this solver's larger cells."""
+        grid, compliance = self.half_space.grid, problem.compliance
+        return replace(
+            problem,
+            height=transfer.averaged(problem.height),
+            target=problem.target * (transfer.fine.cell_area / grid.cell_area),
+            modes=RigidModes.on(grid, problem.modes.free),
+            half_space=self.half_space,
+            compliance=None if compliance is None else transfer.averaged(compliance),
+        )
+
+    # -- boxes --------------------------------------------------------------------------------
+    def _stage(self, box: Box) -> _Stage:
+        return self._whole if box.size == box.shape else self._boxed(box.size)
+
+    @cached_property
+    def _whole(self) -> _Stage:
+        return _Stage(self.half_space)
+
+    def _plan(self, size: tuple[int, int]) -> _Stage:
+        return _Stage(_half_space_on(replace(self.half_space.grid, shape=size), self.half_space))
+
+
+def _half_space_on(grid: Grid, like: HalfSpace) -> HalfSpace:
+    return HalfSpace(grid, like.pair, like.threads, like.datum)
+
+
+def _uniform(problem: NormalProblem) -> Array | None:
+    """Uniform pressure on the largest rectangle of cells centred on the load, balanced.
+
+    Where the approach is imposed, on the cells that penetrate if that can be balanced, of a size
+    that lifts the deepest.
+    """
+    modes, target = problem.modes, problem.target
+    if APPROACH not in modes.free:
+        for cells in (problem.height < 0.0, np.ones(problem.height.shape, dtype=bool)):
+            pressure = cells.astype(np.float64)
+            depth = max(-problem.height.min(), 1e-3 * np.ptp(problem.height))
+            pressure *= depth / problem.displacement(pressure).max()
+            balanced = modes.balance(pressure, target)
+            if balanced is not None:
+                return balanced
+        return None
+    sums = dict(zip(modes.free, target / target[0], strict=True))
+    at = -sums.get(TILT_Y, 0.0), sums.get(TILT_X, 0.0)
+    near = []
+    for centres, place in zip((modes.x, modes.y), at, strict=True):
+        pitch = 2.0 / len(centres)
+        near.append(np.abs(centres - place) <= max(1.0 - abs(place), pitch))
+    return modes.balance(np.outer(near[0], near[1]).astype(np.float64), target)

@@ -1,0 +1,84 @@
+"""What is imposed on a normal contact: of each rigid freedom its resultant or its motion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from sa_solver.rigid_modes import APPROACH, mode_lengths
+from sa_solver.types import Array, Grid
+
+
+class NormalContactError(ValueError):
+    """The data of a normal contact problem admit no solution."""
+
+
+@dataclass(frozen=True)
+class NormalControl:
+    """One of each pair: ``P`` [N] or ``approach`` [mm], ``Mx`` [N mm] or ``tilt_x`` [rad], ``My``
+    or ``tilt_y``.
+
+    A moment is 0 where neither it nor its tilt is given. Raises NormalContactError for both or
+    neither of a pair, values that are not finite, and a load that pulls.
+    """
+
+    P: float | None = None
+    Mx: float | None = None
+    My: float | None = None
+    approach: float | None = None
+    tilt_x: float | None = None
+    tilt_y: float | None = None
+
+    def __post_init__(self) -> None:
+        for force, motion in (("P", "approach"), ("Mx", "tilt_x"), ("My", "tilt_y")):
+            if None not in (getattr(self, force), getattr(self, motion)):
+                raise NormalContactError(
+                    f"{force} and {motion} are both given: impose one, the other follows"
+                )
+        if self.P is None and self.approach is None:
+            raise NormalContactError("neither P nor approach is given: impose one of them")
+        given = [value for value in vars(self).values() if value is not None]
+        if not np.all(np.isfinite(given)):
+            raise NormalContactError(
+                f"resultants and motions {given} must be finite: check the load history"
+            )
+        if self.P is not None and self.P < 0.0:
+            raise NormalContactError(f"load {self.P:g} N pulls: give P >= 0")
+
+    @property
+    def free(self) -> tuple[int, ...]:
+        """The modes whose resultants are imposed, and whose motions are unknown."""
+        motions = (self.approach, self.tilt_x, self.tilt_y)
+        return tuple(mode for mode, motion in enumerate(motions) if motion is None)
+
+    @property
+    def resultants(self) -> Array:
+        """P, Mx, My, with 0 where the motion is imposed, ``(3,)``."""
+        return np.array([value or 0.0 for value in (self.P, self.Mx, self.My)])
+
+    @property
+    def motions(self) -> Array:
+        """δz, φx, φy, with 0 where the resultant is imposed, ``(3,)``."""
+        return np.array([value or 0.0 for value in (self.approach, self.tilt_x, self.tilt_y)])
+
+    def sums(self, grid: Grid, free: tuple[int, ...]) -> Array:
+        """Sums of pressure times the modes ``free`` that the resultants ask for [MPa]."""
+        sums: Array = self.resultants / (mode_lengths(grid) * grid.cell_area)
+        return sums[list(free)]
+
+    def check_moments(self, grid: Grid) -> None:
+        """Raise NormalContactError for a moment that pressure on ``grid`` cannot carry.
+
+        Under an imposed load it acts strictly inside the convex hull of the cell centres.
+        """
+        P, Mx, My = self.resultants
+        for name, moment, centres in (("Mx", Mx, grid.y), ("My", -My, grid.x)):
+            reach = float(centres.max())
+            if moment == 0.0 or (APPROACH not in self.free and reach > 0.0):
+                continue
+            if abs(moment) >= P * reach:
+                raise NormalContactError(
+                    f"{name} = {abs(moment):g} N mm under P = {P:g} N puts the load outside the "
+                    f"cells, over {reach:g} mm off centre: enlarge the grid or lower the moment"
+                )

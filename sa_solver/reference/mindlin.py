@@ -1,0 +1,115 @@
+"""Tangential contact of spheres under constant normal load (Cattaneo 1938, Mindlin 1949).
+
+The stuck circle is concentric with the contact; outside it the shear is µ p, and
+
+    c = a (1 - |Q| / µP)^(1/3)
+    qx = (µ p0 / a) [sqrt(a² - r²) - sqrt(c² - r²)]          (the second root for r < c only)
+    δx = (3 µP / 16 a) Σ (2 - ν)/G [1 - (1 - |Q| / µP)^(2/3)]
+
+qy = 0 is assumed. The stuck circle then moves rigidly, whatever ν; in the slip annulus slip is not
+quite opposite to the shear unless ν = 0, for which the solution is exact. Bodies of unlike elastic
+constants are treated as if pressure made no tangential displacement (small Dundurs' β).
+
+Source: Cattaneo 1938, Rend. Accad. Naz. Lincei 27, 342; Mindlin 1949, J. Appl. Mech. 16, 259;
+Mindlin & Deresiewicz 1953, J. Appl. Mech. 20, 327, doi:10.1115/1.4010702; Johnson 1985, *Contact
+Mechanics*, sections 7.2 and 7.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sa_solver.reference.hertz import Sphere
+from sa_solver.reference.masing import superpose
+from sa_solver.types import Array, Material, contact_modulus
+
+
+@dataclass(frozen=True)
+class ShearedSphere:
+    """Sphere of relative ``radius`` [mm] under a constant ``load`` [N], sheared along x.
+
+    ``friction`` is µ. Tangential forces are those on body 2, displacements those of body 1 relative
+    to body 2 far from the contact: they have the same sign on first loading. Methods raise
+    ``ValueError`` beyond |Q| = µP.
+    """
+
+    load: float
+    radius: float
+    body_1: Material
+    body_2: Material
+    friction: float
+
+    @cached_property
+    def contact(self) -> Sphere:
+        """The normal contact, which shear does not change."""
+        return Sphere(self.load, self.radius, contact_modulus(self.body_1, self.body_2))
+
+    @property
+    def sliding_force(self) -> float:
+        """µP [N]."""
+        return self.friction * self.load
+
+    @property
+    def tangential_compliance(self) -> float:
+        """dδx/dQ where nothing slips, ``Σ (2 - ν)/G / 8 a`` [mm/N]."""
+        bodies = (self.body_1, self.body_2)
+        compliance = sum((2.0 - m.poisson) / m.shear_modulus for m in bodies)
+        return compliance / (8.0 * self.contact.contact_radius)
+
+    def stick_radius(self, tangential: float) -> float:
+        """c [mm] on first loading to ``tangential`` [N]."""
+        return self.contact.contact_radius * float(np.cbrt(self._reserve(tangential)))
+
+    def shear(self, x: Array, y: Array, tangential: float) -> Array:
+        """qx on first loading to ``tangential`` [N]; ``x`` and ``y`` broadcast [mm] [MPa]."""
+        a, c = self.contact.contact_radius, self.stick_radius(tangential)
+        radius_squared = x**2 + y**2
+        sliding = np.sqrt(np.maximum(0.0, a**2 - radius_squared))
+        stuck = np.sqrt(np.maximum(0.0, c**2 - radius_squared))
+        scale = np.sign(tangential) * self.friction * self.contact.peak_pressure / a
+        shear: Array = scale * (sliding - stuck)
+        return shear
+
+    def displacement(self, tangential: float) -> float:
+        """δx [mm] on first loading to ``tangential`` [N]."""
+        spent = 1.0 - float(np.cbrt(self._reserve(tangential))) ** 2
+        return float(np.sign(tangential)) * self._sliding_displacement * spent
+
+    def shear_after(self, x: Array, y: Array, loads: Sequence[float]) -> Array:
+        """qx [MPa] after the turning points ``loads`` of the tangential force [N]."""
+        return superpose(lambda tangential: self.shear(x, y, tangential), loads)
+
+    def displacement_after(self, loads: Sequence[float]) -> float:
+        """δx [mm] after the turning points ``loads`` of the tangential force [N].
+
+        Between ±Q the loop's turning points are ±``displacement(Q)``: this is its amplitude, half
+        of what the body travels from one end to the other.
+        """
+        return superpose(self.displacement, loads)
+
+    def loop_energy(self, amplitude: float) -> float:
+        """Energy of one cycle between ±``amplitude`` [N], the loop's area ∮ Q dδx [N mm].
+
+        4 µP δ1 [(6/5)(1 - v^(5/3)) - (Q/µP)(1 + v^(2/3))], with v = 1 - Q/µP and δ1 the
+        displacement at the onset of sliding.
+        """
+        reserve = self._reserve(amplitude)
+        power = float(np.cbrt(reserve)) ** 2
+        shape = 1.2 * (1.0 - reserve * power) - (1.0 - reserve) * (1.0 + power)
+        return 4.0 * self.sliding_force * self._sliding_displacement * shape
+
+    @property
+    def _sliding_displacement(self) -> float:
+        """δ1 [mm], at the onset of sliding: 3/2 of what no slip would give."""
+        return 1.5 * self.sliding_force * self.tangential_compliance
+
+    def _reserve(self, tangential: float) -> float:
+        """1 - |Q| / µP, what is left before sliding."""
+        reserve = 1.0 - abs(tangential) / self.sliding_force
+        if reserve < 0.0:
+            raise ValueError(f"Q = {tangential} N slides: it is beyond µP = {self.sliding_force} N")
+        return reserve

@@ -1,0 +1,335 @@
+"""Tangential contact of two elastic half-spaces with friction, for a given pressure.
+
+    Δs = K q + offset - Δδ - Δφz (-y, x)
+    stick: Δs = 0;  slip: |q| = µp, q opposite to Δs
+    Σ q S = (Qx, Qy), Σ (qy x - qx y) S = Mz, or the motions Δδx, Δδy, Δφz imposed instead
+
+K couples both shear directions (Cerruti). The ``offset`` carries history: less the displacement of
+the previous state, plus whatever else displaces the surfaces (bulk stress, pressure on dissimilar
+bodies). Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914 (the
+problem); the method is that of :mod:`sa_solver.disk_newton`, with :mod:`sa_solver.disk_gradient` to
+fall back on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sa_solver.disk_gradient import gradients_on_disks
+from sa_solver.disk_newton import DiskSolution, newton_on_disks
+from sa_solver.friction_limit import largest_share
+from sa_solver.half_space import HalfSpace
+from sa_solver.tangential_levels import ShearLevel
+from sa_solver.tangential_problem import PlanarModes, TangentialProblem
+from sa_solver.types import Array
+
+Window = tuple[slice, slice]
+
+TOLERANCE = 1e-8
+"""Default bound on every residual of :class:`TangentialResiduals`."""
+
+ITERATIONS = 300
+"""Conjugate directions; 10 to 60 are usual, 100 for rough surfaces close to sliding."""
+
+NEST = lambda start: True
+FALLBACK_ITERATIONS = 3000
+"""Projected gradients where Newton's method stalls; 100 to 1000 are usual."""
+
+BOX_STEP = 16
+"""Boxes around the pressed cells grow in these steps, so that few transforms need be planned."""
+
+NAMES = ("Qx", "Qy", "Mz")
+UNITS = ("N", "N", "N mm")
+
+
+class TangentialContactError(ValueError):
+    """The data of a tangential contact problem admit no solution."""
+
+
+class FrictionLimitError(TangentialContactError):
+    """Friction cannot carry the shear force; ``share`` of it is the largest it can."""
+
+    def __init__(self, share: float, message: str) -> None:
+        super().__init__(message)
+        self.share = share
+
+
+@dataclass(frozen=True)
+class TangentialResiduals:
+    """How far a state is from solving the problem, dimensionless, independent of the method.
+
+    ``force``: the largest error of an imposed Qx or Qy over Σ µp S; ``moment``: that of Mz over Σ
+    µp S times half the larger side of the grid; ``coulomb``: see
+    :meth:`~sa_solver.tangential_problem.TangentialProblem.residual`. Shear never exceeds µp.
+    """
+
+    force: float
+    moment: float
+    coulomb: float
+
+    @property
+    def largest(self) -> float:
+        """The largest of the three."""
+        return max(self.force, self.moment, self.coulomb)
+
+
+@dataclass(frozen=True)
+class TangentialState:
+    """Solution of a tangential contact problem.
+
+    ``shear`` [MPa], ``slip`` Δs (0 off the contact) and ``displacement`` K q [mm] are
+    ``(2, nx, ny)``, ``sticking`` ``(nx, ny)``. ``shift_x``, ``shift_y`` Δδ [mm] and ``twist`` Δφz
+    [rad] are the rigid motions of the increment, ``Qx``, ``Qy`` [N], ``Mz`` [N mm] the resultants.
+    ``message`` is empty when ``converged``, else says what is wrong and what to try.
+    ``convolutions`` have two components, on a box around the pressed cells.
+    """
+
+    shear: Array
+    slip: Array
+    displacement: Array
+    sticking: NDArray[np.bool_]
+    shift_x: float
+    shift_y: float
+    twist: float
+    Qx: float
+    Qy: float
+    Mz: float
+    residuals: TangentialResiduals
+    converged: bool
+    message: str
+    iterations: int
+    convolutions: int
+
+
+class TangentialContact:
+    """Tangential contact solver on one grid; owns the planned transforms."""
+
+    def __init__(self, half_space: HalfSpace) -> None:
+        """Plan for ``half_space``."""
+        self.half_space = half_space
+        self.grid = half_space.grid
+        self._modes = PlanarModes.on(half_space.grid)
+        self._levels: dict[tuple[int, int], ShearLevel] = {}
+
+    def solve(
+        self,
+        limit: Array,
+        offset: Array | None = None,
+        Qx: float = 0.0,
+        Qy: float = 0.0,
+        Mz: float = 0.0,
+        *,
+        shift_x: float | None = None,
+        shift_y: float | None = None,
+        twist: float | None = None,
+        tolerance: float = TOLERANCE,
+        start: Array | None = None,
+    ) -> TangentialState:
+        """Shear and slip of one increment.
+
+        ``limit`` is µp ``(nx, ny)`` [MPa], ``offset`` ``(2, nx, ny)`` [mm] (0 if None), ``start`` a
+        shear field to begin from. Of ``Qx`` [N] and ``shift_x`` [mm], ``Qy`` and ``shift_y``,
+        ``Mz`` [N mm] and ``twist`` [rad], the motion counts where it is given. A line grid knows
+        no twist.
+
+        Raises TangentialContactError for fields that are not finite, have another shape or a
+        negative limit, and FrictionLimitError for a force beyond the largest that friction can
+        carry.
+        """
+        offset = np.zeros((2, *self.grid.shape)) if offset is None else offset
+        self._check(limit, offset, (Qx, Qy, Mz), (shift_x, shift_y, twist))
+        motions = [shift_x, shift_y, twist]
+        modes = self._modes
+        free = tuple(k for k in modes.free if motions[k] is None)
+        imposed = np.array([motions[k] or 0.0 for k in modes.free])
+        forces = np.array([(Qx, Qy, Mz)[k] for k in modes.free])
+        if not limit.any():
+            return self._without_contact(forces, free, imposed)
+        window, level = self._box(limit)
+        problem = self._problem(window, level, limit, offset, forces, imposed, free)
+        before = level.half_space.count
+        begin = np.zeros_like(problem.offset)
+        if start is not None:
+            begin += start[:, *window] * problem.pressed
+        shear = level.begin(problem, begin) if NEST(start) else problem.balanced(begin)
+        if shear is None:
+            raise self._beyond_friction(problem, forces)
+        solution = newton_on_disks(problem, shear, tolerance, ITERATIONS)
+        if not solution.converged:
+            fallback = gradients_on_disks(problem, solution.shear, tolerance, FALLBACK_ITERATIONS)
+            solution = replace(fallback, iterations=solution.iterations + fallback.iterations)
+        rigid = imposed.copy()
+        rigid[list(free)] = solution.rigid / problem.modes.lengths
+        convolutions = level.half_space.count - before
+        return self._state(problem, solution, window, rigid, tolerance, convolutions)
+
+    # -- steps of solve -----------------------------------------------------------------------
+    def _box(self, limit: Array) -> tuple[Window, ShearLevel]:
+        """A box of cells around the pressed ones, and its operators."""
+        window = []
+        for axis, size in enumerate(self.grid.shape):
+            pressed = np.flatnonzero(limit.any(axis=1 - axis))
+            extent = int(pressed[-1] - pressed[0]) + 1
+            length = min(size, -(-extent // BOX_STEP) * BOX_STEP)
+            first = min(int(pressed[0]), size - length)
+            window.append(slice(first, first + length))
+        box = window[0].stop - window[0].start, window[1].stop - window[1].start
+        if box not in self._levels:
+            own = self.half_space
+            if box != self.grid.shape:
+                own = HalfSpace(replace(self.grid, shape=box), own.pair, own.threads, own.datum)
+            self._levels[box] = ShearLevel(own)
+        return (window[0], window[1]), self._levels[box]
+
+    def _problem(
+        self,
+        window: Window,
+        level: ShearLevel,
+        limit: Array,
+        offset: Array,
+        forces: Array,
+        imposed: Array,
+        free: tuple[int, ...],
+    ) -> TangentialProblem:
+        modes = self._modes.cropped(window)
+        moved = offset[:, *window].copy()
+        modes.add_motion(moved, -imposed * modes.lengths)
+        sums = forces / (modes.lengths * self.grid.cell_area)
+        return TangentialProblem(
+            limit=np.ascontiguousarray(limit[window]),
+            offset=moved,
+            modes=modes.only(free),
+            target=sums[list(free)],
+            operator=level.operator,
+        )
+
+    def _state(
+        self,
+        problem: TangentialProblem,
+        solution: DiskSolution,
+        window: Window,
+        rigid: Array,
+        tolerance: float,
+        convolutions: int,
+    ) -> TangentialState:
+        slip = problem.slip(solution.displacement, solution.rigid)
+        shear = self._field(solution.shear, window)
+        free = problem.modes.free
+        errors = np.zeros(3)
+        sums = problem.modes.sums(solution.shear)
+        errors[list(free)] = np.abs(sums - problem.target) / problem.largest
+        residuals = TangentialResiduals(
+            float(errors[:2].max()), float(errors[2]), solution.residual
+        )
+        converged = residuals.largest <= tolerance
+        sticking = np.zeros(self.grid.shape, dtype=bool)
+        sticking[window] = problem.pressed & ~solution.slipping
+        motions = np.append(rigid, 0.0)
+        loads = self._modes.sums(shear) * self._modes.lengths * self.grid.cell_area
+        loads = np.append(loads, 0.0)
+        whole = solution.shear.shape == shear.shape
+        return TangentialState(
+            shear=shear,
+            slip=self._field(slip * problem.pressed, window),
+            displacement=solution.displacement if whole else self.half_space.shear(shear),
+            sticking=sticking,
+            shift_x=float(motions[0]),
+            shift_y=float(motions[1]),
+            twist=float(motions[2]),
+            Qx=float(loads[0]),
+            Qy=float(loads[1]),
+            Mz=float(loads[2]),
+            residuals=residuals,
+            converged=converged,
+            message="" if converged else _failure(residuals, tolerance),
+            iterations=solution.iterations,
+            convolutions=convolutions,
+        )
+
+    def _field(self, part: Array, window: Window) -> Array:
+        """A field ``(2, nx, ny)``, 0 off the ``window``."""
+        field = np.zeros((2, *self.grid.shape))
+        field[:, *window] = part
+        return field
+
+    def _without_contact(
+        self, forces: Array, free: tuple[int, ...], imposed: Array
+    ) -> TangentialState:
+        """Bodies apart: no shear, and no slip either."""
+        if forces[list(free)].any():
+            raise FrictionLimitError(
+                0.0,
+                "a shear force without pressure: no cell is in contact; give a normal load first, "
+                "or impose motions instead of forces",
+            )
+        zero = np.zeros((2, *self.grid.shape))
+        motions = np.append(imposed, 0.0)
+        return TangentialState(
+            shear=zero,
+            slip=zero.copy(),
+            displacement=zero.copy(),
+            sticking=np.zeros(self.grid.shape, dtype=bool),
+            shift_x=float(motions[0]),
+            shift_y=float(motions[1]),
+            twist=float(motions[2]),
+            Qx=0.0,
+            Qy=0.0,
+            Mz=0.0,
+            residuals=TangentialResiduals(0.0, 0.0, 0.0),
+            converged=True,
+            message="",
+            iterations=0,
+            convolutions=0,
+        )
+
+    def _beyond_friction(self, problem: TangentialProblem, forces: Array) -> FrictionLimitError:
+        pressed, free = problem.pressed, problem.modes.free
+        shapes = problem.modes.fields()[:, :, pressed]
+        share = largest_share(problem.limit[pressed], shapes, problem.target)
+        given, largest = (
+            ", ".join(f"{NAMES[k]} = {scale * forces[k]:.6g} {UNITS[k]}" for k in free)
+            for scale in (1.0, share)
+        )
+        return FrictionLimitError(
+            share,
+            f"friction cannot carry {given}; the largest in this direction is {largest}: lower the "
+            "force, raise the pressure, or impose the sliding motion or its energy instead",
+        )
+
+    def _check(
+        self,
+        limit: Array,
+        offset: Array,
+        forces: tuple[float, float, float],
+        motions: tuple[float | None, float | None, float | None],
+    ) -> None:
+        for name, field, shape in (
+            ("limits", limit, self.grid.shape),
+            ("offsets", offset, (2, *self.grid.shape)),
+        ):
+            if field.shape != shape:
+                raise TangentialContactError(f"{name} have shape {field.shape}: give {shape}")
+            if not np.all(np.isfinite(field)):
+                raise TangentialContactError(
+                    f"{name} hold NaN or infinity: check pressure, friction and history"
+                )
+        if limit.min() < 0.0:
+            raise TangentialContactError(
+                "limits µp must be 0 or more: check the sign of friction and pressure"
+            )
+        given = [*forces, *(own for own in motions if own is not None)]
+        if not all(np.isfinite(given)):
+            raise TangentialContactError(f"loads {given} must be finite: check the load history")
+        if self.grid.line and (forces[2] != 0.0 or motions[2]):
+            raise TangentialContactError("a line contact carries no Mz: give Qx and Qy only")
+
+
+def _failure(residuals: TangentialResiduals, tolerance: float) -> str:
+    return (
+        f"the tangential contact stopped at a residual of {residuals.largest:.1e} (stick and slip "
+        f"{residuals.coulomb:.1e}, force {residuals.force:.1e}) above the tolerance "
+        f"{tolerance:.0e}: loosen the tolerance, take smaller increments, or refine the grid"
+    )

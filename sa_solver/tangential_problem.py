@@ -1,0 +1,336 @@
+"""The discrete tangential contact problem on a box of cells, and its residual.
+
+Fields cover the box, shape ``(2, nx, ny)``; cells without limit (µp = 0) carry no shear and their
+slip counts for nothing. With the displacement K q, an imposed ``offset`` and rigid motions R c,
+
+    Δs = K q + offset - R c,    |q| <= µp,    Δs = -λ q with λ >= 0, λ (µp - |q|) = 0,
+
+where as many resultants Rᵀq are imposed as there are rigid motions in R. For a given limit this is
+the minimum of ½ q·Kq + q·offset over the disks, and unique.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sa_solver.half_space import SHEAR, HalfSpace, inverse_symbols, spectral_filter
+from sa_solver.transform import SpectralFilter
+from sa_solver.types import Array, Grid
+
+Mask = NDArray[np.bool_]
+
+BALANCE_TOLERANCE = 1e-13
+"""Resultants left by :func:`balanced`, relative to the largest shear force: rounding of a sum."""
+
+BALANCE_ITERATIONS = 200
+"""Newton takes 2 to 10, more only within 1e-3 of the largest force."""
+
+RIDGE = 1e-14
+"""Keeps the Hessian of :func:`balanced` regular where no cell can change its shear any more."""
+
+SOFTENING = 0.3
+"""Compliance added to the preconditioner, in units of a cell's own, for what curvature adds on the
+whole. 0.3 takes a tenth fewer convolutions than 0, and 1 no fewer."""
+
+REACHED = 1e-12
+"""Relative distance from the limit that rounding leaves to shear that has reached it."""
+
+SMALLEST_INCREMENT = 1e-4
+"""Residuals are relative to the displacement of an increment, unless it is so small a share of the
+displacement present that rounding would be measured."""
+
+LEVELS = 2
+LEVEL_RATIO = 8.0
+"""xx"""
+
+TINY = 1e-200
+"""Keeps divisions by a vanishing size finite, and their result."""
+
+
+def squared(field: Array) -> Array:
+    """|q|² ``(nx, ny)`` of a field ``(2, nx, ny)``."""
+    square = field[0] * field[0]
+    square += field[1] * field[1]
+    return square
+
+
+def dot(one: Array, other: Array) -> Array:
+    """Product ``(nx, ny)`` of two fields ``(2, nx, ny)``, cell by cell."""
+    product = one[0] * other[0]
+    product += one[1] * other[1]
+    return product
+
+
+@dataclass(frozen=True)
+class PlanarModes:
+    """Those rigid motions δx, δy, φz in the contact plane that are ``free``, on a box of cells.
+
+    The rotation is scaled by ``length``, half the larger side of the grid: ``x`` ``(nx,)`` and
+    ``y`` ``(ny,)`` are cell centres over that. Coefficients and sums ``(k,)`` are of the free
+    modes; products with a shear field are Qx/S, Qy/S, Mz/(L S), all in MPa.
+    """
+
+    x: Array
+    y: Array
+    length: float
+    free: tuple[int, ...] = (0, 1, 2)
+
+    @classmethod
+    def on(cls, grid: Grid) -> PlanarModes:
+        """All modes of a whole grid; a line contact has no rotation."""
+        length = 0.5 * max(grid.size)
+        free = (0, 1) if grid.line else (0, 1, 2)
+        return cls(grid.x[:, 0] / length, grid.y[0] / length, length, free)
+
+    def cropped(self, window: tuple[slice, slice]) -> PlanarModes:
+        """The same modes on part of the cells."""
+        return replace(self, x=self.x[window[0]], y=self.y[window[1]])
+
+    def only(self, free: tuple[int, ...]) -> PlanarModes:
+        """Fewer of the modes."""
+        return replace(self, free=free)
+
+    @property
+    def lengths(self) -> Array:
+        """Resultants over sums and cell area, ``(k,)``: 1, 1 and the length."""
+        return np.array([1.0, 1.0, self.length])[list(self.free)]
+
+    def sums(self, field: Array) -> Array:
+        """Products ``(k,)`` of a field ``(2, nx, ny)`` with the modes."""
+        along_x, along_y = field @ self._lines_y
+        turned = self.x @ along_y[:, 0] - along_x[:, 1].sum()
+        every = np.array([along_x[:, 0].sum(), along_y[:, 0].sum(), turned])
+        return every[list(self.free)]
+
+    def add_motion(self, field: Array, coefficients: Array) -> None:
+        """Add the rigid motion with these coefficients ``(k,)`` to a field ``(2, nx, ny)``."""
+        along_x, along_y = self._profiles(coefficients)
+        field[0] += along_x
+        field[1] += along_y[:, None]
+
+    def add_weighted(self, field: Array, weight: Array, coefficients: Array) -> None:
+        """Add ``weight`` ``(nx, ny)`` times a rigid motion to a field ``(2, nx, ny)``."""
+        along_x, along_y = self._profiles(coefficients)
+        field[0] += weight * along_x
+        field[1] += weight * along_y[:, None]
+
+    def fields(self) -> Array:
+        """The modes themselves, ``(k, 2, nx, ny)``."""
+        fields = np.zeros((len(self.free), 2, self.x.size, self.y.size))
+        for field, unit in zip(fields, np.eye(len(self.free)), strict=True):
+            self.add_motion(field, unit)
+        return fields
+
+    def products(self, xx: Array, xy: Array, yy: Array) -> Array:
+        """Products ``(k, k)`` of the modes with one another under a field of tensors."""
+        moments = np.array([tensor @ self._lines_y for tensor in (xx, xy, yy)])
+        (xx_, xy_, yy_), x = moments, self.x
+        turned_x = x @ xy_[:, 0] - xx_[:, 1].sum()
+        turned_y = x @ yy_[:, 0] - xy_[:, 1].sum()
+        twice = xx_[:, 2].sum() - 2.0 * (x @ xy_[:, 1]) + (x * x) @ yy_[:, 0]
+        both = xy_[:, 0].sum()
+        every = np.array(
+            [
+                [xx_[:, 0].sum(), both, turned_x],
+                [both, yy_[:, 0].sum(), turned_y],
+                [turned_x, turned_y, twice],
+            ]
+        )
+        return every[np.ix_(self.free, self.free)]
+
+    @cached_property
+    def _lines_y(self) -> Array:
+        """1, y and y² as columns, ``(ny, 3)``."""
+        return np.stack([np.ones_like(self.y), self.y, self.y * self.y], axis=1)
+
+    def _profiles(self, coefficients: Array) -> tuple[Array, Array]:
+        """The motion along x, ``(ny,)``, and along y, ``(nx,)``."""
+        every = np.zeros(3)
+        every[list(self.free)] = coefficients
+        return every[0] - every[2] * self.y, every[1] + every[2] * self.x
+
+
+@dataclass(frozen=True)
+class TangentialProblem:
+    """Data of one problem.
+
+    ``limit`` µp >= 0 ``(nx, ny)`` [MPa], ``offset`` ``(2, nx, ny)`` [mm] with all imposed motions
+    in it, the ``modes`` that are free and ``target`` ``(k,)``, their sums [MPa]; ``operator`` is K.
+    """
+
+    limit: Array
+    offset: Array
+    modes: PlanarModes
+    target: Array
+    operator: BoxOperator
+
+    @cached_property
+    def per_limit(self) -> Array:
+        """1/µp, 0 where there is no limit."""
+        inverse = np.zeros_like(self.limit)
+        return np.divide(1.0, self.limit, out=inverse, where=self.pressed)
+
+    @cached_property
+    def pressed(self) -> Mask:
+        """Cells that can carry shear."""
+        pressed: Mask = self.limit > 0.0
+        return pressed
+
+    @cached_property
+    def largest(self) -> float:
+        """Σ µp [MPa]."""
+        return float(self.limit.sum())
+
+    def energy(self, shear: Array, displacement: Array) -> float:
+        """½ q·Kq + q·offset [MPa mm]: least at the solution."""
+        return float(0.5 * np.vdot(shear, displacement) + np.vdot(shear, self.offset))
+
+    def slip(self, displacement: Array, rigid: Array) -> Array:
+        """Δs ``(2, nx, ny)`` [mm] at free rigid motions ``(k,)``, also where nothing presses."""
+        slip = displacement + self.offset
+        self.modes.add_motion(slip, -rigid)
+        return slip
+
+    def residual(self, shear: Array, displacement: Array, rigid: Array) -> float:
+        """Largest |q - Π(q - Δs/κ)| κ over the displacement, Π the projection on the disks.
+
+        It vanishes only at the solution, whatever the scale κ [mm/MPa], here a cell's own
+        compliance. Relative to the largest displacement |K q + offset| of a pressed cell, but at
+        least to ``SMALLEST_INCREMENT`` of K q.
+        """
+        own = self.operator.self_compliance
+        step = self.slip(displacement, rigid)
+        step *= -1.0 / own
+        step += shear
+        step *= self.limit / np.maximum(np.sqrt(squared(step)), np.maximum(self.limit, TINY))
+        step -= shear
+        increment = float(squared(displacement + self.offset)[self.pressed].max())
+        present = SMALLEST_INCREMENT**2 * float(squared(displacement)[self.pressed].max())
+        scale = np.sqrt(max(increment, present))
+        largest = own * float(np.sqrt(squared(step).max()))
+        return float(largest / scale) if scale > 0.0 else largest
+
+    def on_circle(self, shear: Array) -> Mask:
+        """Pressed cells whose shear has reached its limit."""
+        reached: Mask = squared(shear) >= (self.limit * (1.0 - REACHED)) ** 2
+        return reached & self.pressed
+
+    def balanced(self, shear: Array, on_circle: Mask | None = None) -> Array | None:
+        """The shear that :meth:`balance` finds, or None."""
+        found = self.balance(shear, on_circle)
+        return None if found is None else found[0]
+
+    def balance(
+        self, shear: Array, on_circle: Mask | None = None, weight: Array | None = None
+    ) -> tuple[Array, Array] | None:
+        """Admissible shear near ``shear`` with the resultants ``target``, and c; or None.
+
+        ``shear`` ``(2, nx, ny)`` must vanish where nothing presses. The result is Π(q + w R c), Π
+        the projection on the disks or, where ``on_circle`` ``(nx, ny)``, on their circles, and w
+        the ``weight`` ``(nx, ny)``, µp unless given. Its resultants are the gradient of a convex
+        function of c, whose minimum Newton's method finds. None means that no admissible shear has
+        the resultants, or none within rounding.
+        """
+        weight = self.limit if weight is None else weight
+        on_circle = np.zeros_like(self.pressed) if on_circle is None else on_circle
+        floor = np.where(on_circle, TINY, np.maximum(self.limit, TINY))
+        start = coefficients = step = np.zeros(len(self.target))
+        potential, cautious = np.inf, step
+        for _ in range(BALANCE_ITERATIONS):
+            raw = shear.copy()
+            self.modes.add_weighted(raw, weight, coefficients)
+            magnitude = np.sqrt(squared(raw))
+            factor = self.limit / np.maximum(magnitude, floor)
+            admissible = factor * raw
+            missing = self.target - self.modes.sums(admissible)
+            if np.abs(missing).max(initial=0.0) <= BALANCE_TOLERANCE * self.largest:
+                return admissible, coefficients
+            value = self._envelope(magnitude, factor, weight) - float(self.target @ coefficients)
+            if value > potential + BALANCE_TOLERANCE * self.largest:
+                step = max(0.25 * step, cautious, key=np.linalg.norm)
+                coefficients = start + step
+                continue
+            outside = on_circle | (magnitude > self.limit)
+            newton, majorant = self._hessians(admissible, factor * weight, outside)
+            ridge = RIDGE * float(np.trace(majorant)) * np.eye(len(missing))
+            step = np.linalg.solve(newton + ridge, missing)
+            cautious = np.linalg.solve(majorant + ridge, missing)
+            start, potential = coefficients, value
+            coefficients = start + step
+        return None
+
+    def _envelope(self, magnitude: Array, factor: Array, weight: Array) -> float:
+        """The convex function of :meth:`balance` without its linear part [MPa]."""
+        reached = magnitude * factor
+        magnitude = magnitude - 0.5 * reached
+        reached *= np.where(self.pressed, 1.0 / np.maximum(weight, TINY), 0.0)
+        return float(np.vdot(reached, magnitude))
+
+    def _hessians(self, admissible: Array, slope: Array, outside: Mask) -> tuple[Array, Array]:
+        """Derivative ``(k, k)`` of the resultants of :meth:`balance`, and a bound of it.
+
+        A step by the bound always lowers the convex function: it majorises the envelope.
+        """
+        normal = admissible * self.per_limit
+        along = np.where(outside, slope, 0.0) * normal
+        lost = self.modes.products(along[0] * normal[0], along[0] * normal[1], along[1] * normal[1])
+        majorant = self.modes.products(slope, np.zeros_like(slope), slope)
+        return majorant - lost, majorant
+
+
+class BoxOperator:
+    """K for shear on a box of cells, and its approximate inverse.
+
+    The preconditioner is the inverse symbol of the box made periodic, without padding (Vollebregt
+    2014, doi:10.1016/j.jcp.2013.10.005).
+    """
+
+    def __init__(self, half_space: HalfSpace) -> None:
+        """Plan for the box that ``half_space`` covers."""
+        self._half_space = half_space
+        self.self_compliance = half_space.self_compliance(SHEAR[0])
+        self._inverses: dict[int, SpectralFilter] = {}
+
+    @cached_property
+    def largest_eigenvalue(self) -> float:
+        """Upper bound of K's eigenvalues [mm/MPa]: the largest of the padded, circulant matrix."""
+        xx, xy, yy = (self._half_space.symbol(*pair) for pair in ((0, 0), (0, 1), (1, 1)))
+        return float(np.max(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)))
+
+    def displacement(self, shear: Array) -> Array:
+        """K q ``(2, nx, ny)`` [mm] of ``shear`` ``(2, nx, ny)`` [MPa]: one convolution."""
+        return self._half_space.shear(shear)
+
+    def precondition(self, displacement: Array, level: int) -> Array:
+        """About (K + D)⁻¹ u ``(2, nx, ny)`` [MPa] of ``displacement`` u ``(2, nx, ny)`` [mm].
+
+        The local compliance D [mm/MPa] is that of ``level``.
+        """
+        if level not in self._inverses:
+            self._inverses[level] = self._inverse(level)
+        return self._inverses[level].apply(displacement)
+
+    def windows(self, compliance: Array) -> list[tuple[int, Array]]:
+        """Levels that a local ``compliance`` D ``(nx, ny)`` takes, and windows χ ``(nx, ny)``.
+
+        (K + D)⁻¹ is about Σ χj (K + Dj)⁻¹ χj, Σ χj² = 1, the levels being evenly spaced in log D.
+        """
+        place = np.log1p(compliance / self.self_compliance) / np.log(LEVEL_RATIO)
+        within = np.minimum(place, LEVELS - 1)
+        beyond = LEVEL_RATIO ** (within - place)
+        levels = range(int(np.ceil(within.max())) + 1)
+        hats = [np.maximum(0.0, 1.0 - np.abs(within - level)) * beyond for level in levels]
+        return [(level, np.sqrt(hat)) for level, hat in enumerate(hats) if hat.any()]
+
+    def _inverse(self, level: int) -> SpectralFilter:
+        half_space, shape = self._half_space, self._half_space.grid.shape
+        symbols = [[half_space.symbol(i, j, shape) for j in SHEAR] for i in SHEAR]
+        local = (SOFTENING + LEVEL_RATIO**level - 1.0) * self.self_compliance
+        for k, row in enumerate(symbols):
+            row[k] = row[k] + local
+        transform = half_space.transform(shape, shape, 2)
+        return spectral_filter(transform, inverse_symbols(symbols), SHEAR, SHEAR)

@@ -1,0 +1,493 @@
+"""Contact of dissimilar bodies: closed forms, similarity, symmetry, energy, other methods."""
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+from scipy.special import ellipk
+
+import sa_solver.coupled as coupled
+from sa_solver.alternating import AlternatingContact
+from sa_solver.coupled import CoupledContact, CoupledContactError
+from sa_solver.coupled_problem import RigidMotions
+from sa_solver.half_space import HalfSpace
+from sa_solver.normal import NormalContact
+from sa_solver.tangential import FrictionLimitError, TangentialContact
+from sa_solver.types import ElasticPair, Grid, Material, resultants
+
+TOLERANCE = 1e-8
+STEEL = Material(200e3, 0.3)
+P = 100.0
+RADIUS = 10.0
+
+
+def rigid_on_elastic(beta):
+    """A pair with Dundurs' ``beta``: body 1 rigid, body 2 with ν from 0.5 to 0."""
+    return ElasticPair(Material(np.inf, 0.3), Material(70e3, (1 - 2 * beta) / (2 - 2 * beta)))
+
+
+def sphere(cells, beta, friction, width=2.6):
+    """Sphere contact on a grid of ``width`` Hertzian contact radii, and its height."""
+    pair = rigid_on_elastic(beta)
+    radius = (0.75 * P * RADIUS / pair.contact_modulus) ** (1 / 3)
+    grid = Grid.covering((width * radius, width * radius), (cells, cells))
+    height = (grid.x**2 + grid.y**2) / (2 * RADIUS)
+    return CoupledContact(HalfSpace(grid, pair), friction), height
+
+
+def cylinder(cells, beta, friction):
+    """The same for a line contact under P newtons per mm."""
+    pair = rigid_on_elastic(beta)
+    half_width = np.sqrt(4 * P * RADIUS / (np.pi * pair.contact_modulus))
+    grid = Grid.strips(2.6 * half_width, cells)
+    height = np.broadcast_to(grid.x**2 / (2 * RADIUS), grid.shape)
+    return CoupledContact(HalfSpace(grid, pair), friction), height
+
+
+def flat_strip(cells, beta, friction):
+    """A rigid flat punch of sharp edges in plane strain."""
+    grid = Grid.strips(1.2, cells)
+    height = np.where(np.abs(grid.x) < 0.5, 0.0, 1.0)
+    return CoupledContact(HalfSpace(grid, rigid_on_elastic(beta)), friction), height
+
+
+def loads(load=P, Qx=0.0, Qy=0.0, Mx=0.0, My=0.0, Mz=0.0):
+    return np.array([load, Qx, Qy, Mx, My, Mz])
+
+
+def march(contact, height, path, motion=coupled.ALL_FORCES):
+    """States along ``path``, an iterable of six values; all must converge."""
+    states, offset, start = [], None, None
+    for values in path:
+        state = contact.solve(height, offset, values, motion, start=start)
+        assert state.converged, state.message
+        states.append(state)
+        offset, start = -state.displacement[:2], state.start
+    return states
+
+
+def sticking(state, friction):
+    shear = np.hypot(*state.shear)
+    return (state.pressure > 0) & (shear < friction * state.pressure * (1 - 1e-7))
+
+
+def stick_share(state, friction):
+    """Share of the pressed cells that stick: in plane strain c/a."""
+    return sticking(state, friction).sum() / (state.pressure > 0).sum()
+
+
+def assert_same(found, expected, accuracy):
+    np.testing.assert_allclose(found, expected, rtol=0, atol=accuracy * np.abs(expected).max())
+
+
+def assert_solves(contact, height, offset, state):
+    """Every condition of the problem, from the tractions alone."""
+    friction, scale = contact.friction, np.abs(state.displacement).max()
+    displacement = contact.half_space.displacement(state.traction)
+    rigid = RigidMotions(contact.grid)
+    relative = displacement - rigid.motion(state.rigid * rigid.lengths)
+    relative[2] += height
+    relative[:2] += 0.0 if offset is None else offset
+    pressed, stuck = state.pressure > 0, sticking(state, friction)
+    slipping = pressed & ~stuck
+    shear, slip = state.shear, relative[:2]
+    assert state.pressure.min() >= 0
+    assert relative[2].min() >= -1e-7 * scale
+    assert np.abs(relative[2][pressed]).max() <= 1e-6 * scale
+    assert np.all(np.hypot(*shear) <= friction * state.pressure * (1 + 1e-12))
+    assert np.abs(slip[:, stuck]).max(initial=0) <= 1e-6 * scale
+    power = np.sum(shear * slip, axis=0)[slipping]
+    bound = friction * state.pressure[slipping] * np.hypot(*slip)[slipping]
+    np.testing.assert_allclose(power, -bound, atol=1e-6 * scale * state.pressure.max())
+
+
+# -- it converges, and to a solution ---------------------------------------------------------
+@pytest.mark.parametrize("beta", [0.05, 0.3, 0.5])
+@pytest.mark.parametrize("friction", [0.05, 0.3, 1.0])
+@pytest.mark.parametrize("build", [sphere, cylinder])
+def test_every_condition_is_met(build, beta, friction):
+    contact, height = build(24 if build is sphere else 100, beta, friction)
+    moment = 0.0 if build is cylinder else 0.05 * friction * P * height.max()
+    for share in (0.0, 0.5, 0.95):
+        values = loads(Qx=0.8 * share * friction * P, Qy=0.6 * share * friction * P, Mz=moment)
+        state = contact.solve(height, None, values, tolerance=TOLERANCE)
+        assert state.converged
+        assert state.message == ""
+        assert state.residuals.largest <= TOLERANCE
+        assert state.convolutions < 400
+        assert not state.touches_border
+        np.testing.assert_allclose(state.resultants, values, atol=1e-7 * P)
+        x, y = contact.grid.x, contact.grid.y
+        own = resultants(state.traction * contact.grid.cell_area, x, y)
+        if build is sphere:
+            np.testing.assert_allclose(state.resultants, own, atol=1e-12 * P)
+        assert_solves(contact, height, None, state)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_rough_contacts_under_random_loads(seed):
+    """Tilted and turned so that the shear force acts at the centre of pressure."""
+    rng = np.random.default_rng(seed)
+    friction = 10 ** rng.uniform(-1.5, 0.0)
+    contact, height = sphere(24, rng.uniform(0.0, 0.5), friction)
+    x, y = contact.grid.x, contact.grid.y
+    rough = height + 0.02 * height.max() * rng.standard_normal(height.shape)
+    offset, start = None, None
+    for _ in range(3):
+        at_x, at_y = 0.1 * rng.uniform(-1.0, 1.0, 2) * (x.max(), y.max())
+        Qx, Qy = rng.uniform(-0.6, 0.6, 2) * friction * P
+        values = loads(P, Qx, Qy, P * at_y, -P * at_x, Qy * at_x - Qx * at_y)
+        state = contact.solve(rough, offset, values, start=start)
+        assert state.converged, state.message
+        assert -np.vdot(state.shear, state.slip) >= -1e-9 * P
+        offset, start = -state.displacement[:2], state.start
+
+
+def test_history_under_all_six_resultants():
+    contact, height = sphere(24, 0.4, 0.5)
+    reach = contact.grid.x.max()
+    path = [
+        P * np.array([0.5, 0.0, 0.0, 0.0, 0.0, 0.0]),
+        P * np.array([1.0, 0.2, -0.1, 0.1 * reach, -0.05 * reach, 0.02 * reach]),
+        P * np.array([0.8, -0.2, 0.1, -0.1 * reach, 0.1 * reach, -0.02 * reach]),
+    ]
+    states = march(contact, height, path)
+    for k, (state, values) in enumerate(zip(states, path, strict=True)):
+        offset = None if k == 0 else -states[k - 1].displacement[:2]
+        np.testing.assert_allclose(state.resultants, values, atol=1e-7 * P)
+        assert_solves(contact, height, offset, state)
+
+
+# -- limits that other solvers and closed forms know ----------------------------------------
+def test_without_friction_it_is_the_normal_contact():
+    contact, height = sphere(32, 0.5, 0.0)
+    worn = 1e-6 * (1.0 + contact.grid.x / contact.grid.size[0]) * np.ones(contact.grid.shape)
+    moment = 0.1 * P * contact.grid.x.max()
+    for compliance in (None, worn):
+        state = contact.solve(height, None, loads(My=moment), compliance=compliance)
+        normal = NormalContact(contact.half_space).solve(
+            height, P, My=moment, tolerance=1e-10, compliance=compliance
+        )
+        assert state.converged
+        assert np.array_equal(state.shear, np.zeros((2, 32, 32)))
+        assert_same(state.pressure, normal.pressure, 1e-6)
+        assert_same(state.gap, normal.gap, 1e-7)
+        assert state.rigid[0] == pytest.approx(normal.approach, rel=1e-7)
+        assert state.rigid[4] == pytest.approx(normal.tilt_y, rel=1e-6)
+
+
+def test_similar_bodies_are_pressed_first_and_then_sheared():
+    grid = Grid.covering((1.1, 1.1), (32, 32))
+    half_space = HalfSpace(grid, ElasticPair(STEEL, STEEL))
+    height = (grid.x**2 + grid.y**2) / (2 * RADIUS)
+    friction, Qx, Mz = 0.4, 0.2 * P, 0.02 * P
+    state = CoupledContact(half_space, friction).solve(height, None, loads(Qx=Qx, Mz=Mz))
+    normal = NormalContact(half_space).solve(height, P, tolerance=1e-10)
+    tangential = TangentialContact(half_space).solve(
+        friction * normal.pressure, None, Qx, 0.0, Mz, tolerance=1e-10
+    )
+    assert_same(state.pressure, normal.pressure, 1e-6)
+    assert_same(state.shear, tangential.shear, 1e-6)
+    motions = tangential.shift_x, tangential.shift_y, tangential.twist
+    np.testing.assert_allclose(state.rigid[[1, 2, 5]], motions, rtol=0, atol=1e-6 * motions[0])
+
+
+def test_similar_bodies_without_shear_force_have_no_shear():
+    grid = Grid.covering((1.1, 1.1), (24, 24))
+    contact = CoupledContact(HalfSpace(grid, ElasticPair(STEEL, STEEL)), 0.4)
+    state = contact.solve((grid.x**2 + grid.y**2) / (2 * RADIUS), None, loads())
+    assert state.converged
+    assert np.abs(state.shear).max() < 1e-9 * state.pressure.max()
+
+
+def test_stuck_flat_punch():
+    """Mossakovskii: P = 4 G a δ ln(3-4ν)/(1-2ν); without friction 4 G a δ/(1-ν).
+
+    Here ν = 0. Their ratio hardly depends on what radius the grid gives to the punch.
+    """
+    grid = Grid.covering((2.2, 2.2), (48, 48))
+    height = np.where(np.hypot(grid.x, grid.y) < 1.0, 0.0, 1.0)
+    half_space = HalfSpace(grid, rigid_on_elastic(0.5))
+    smooth, stuck = (
+        CoupledContact(half_space, friction).solve(height, None, loads()) for friction in (0.0, 3.0)
+    )
+    assert np.all(sticking(stuck, 3.0) == (stuck.pressure > 0))
+    assert smooth.rigid[0] / stuck.rigid[0] == pytest.approx(np.log(3.0), rel=3e-3)
+
+
+def test_stick_zone_of_a_flat_strip_for_weak_coupling():
+    """K'(c/a)/K(c/a) = β/µ for small β (Goodman's approximation; Spence 1973)."""
+    beta = 0.05
+    for friction in (0.05, 0.1):
+        contact, height = flat_strip(600, beta, friction)
+        state = contact.solve(height, None, loads())
+        expected = brentq(
+            lambda k, ratio=beta / friction: ellipk(1 - k**2) - ratio * ellipk(k**2), 0.01, 0.9999
+        )
+        assert stick_share(state, friction) == pytest.approx(expected, abs=0.008)
+
+
+@pytest.mark.parametrize("beta", [0.3, 0.5])
+def test_punch_and_growing_contacts_share_one_stick_zone(beta):
+    """Spence 1968: c/a is the same for every power-law profile under a load that grows.
+
+    A flat punch, solved in one step, has no increments to refine; with a cylinder c/a comes closer
+    with every refinement of the increments and stays the same while the load grows.
+    """
+    friction = beta
+    contact, height = flat_strip(400, beta, friction)
+    punch = stick_share(contact.solve(height, None, loads()), friction)
+    contact, height = cylinder(200, beta, friction)
+    errors = []
+    for count in (4, 16):
+        path = [loads((k / count) ** 2 * P) for k in range(1, count + 1)]
+        half, *_, full = march(contact, height, path)[count // 2 - 1 :]
+        errors.append(punch - stick_share(full, friction))
+    assert 0 < errors[1] < 0.4 * errors[0]
+    assert errors[1] < 0.03
+    assert stick_share(half, friction) == pytest.approx(stick_share(full, friction), abs=0.03)
+
+
+def test_one_step_and_many_differ():
+    """Loading dissimilar bodies depends on the path: one step sticks less."""
+    contact, height = sphere(32, 0.5, 0.5)
+    one = contact.solve(height, None, loads())
+    many = march(contact, height, [loads(k / 6 * P) for k in range(1, 7)])[-1]
+    assert stick_share(many, 0.5) > stick_share(one, 0.5) + 0.1
+
+
+@pytest.mark.parametrize("friction", [0.2, 1.0])
+def test_adjusting_in_turns_gives_the_same(friction):
+    """The alternating iteration, where it converges, is an independent method."""
+    contact, height = sphere(24, 0.5, friction)
+    values = loads(Qx=0.5 * friction * P)
+    together = contact.solve(height, None, values, tolerance=1e-9)
+    in_turns = AlternatingContact(contact.half_space, friction).solve(height, None, values)
+    assert in_turns.converged
+    assert_same(together.traction, in_turns.traction, 1e-5)
+    assert_same(together.displacement, in_turns.displacement, 1e-6)
+
+
+# -- symmetry ---------------------------------------------------------------------------------
+def test_swapping_the_bodies_reverses_shear_and_nothing_else():
+    contact, height = sphere(24, 0.3, 0.4)
+    pair = contact.half_space.pair
+    half_space = HalfSpace(contact.grid, ElasticPair(pair.body_2, pair.body_1))
+    swapped = CoupledContact(half_space, 0.4)
+    values = loads(Qx=10.0, Qy=5.0, My=2.0, Mz=1.0)
+    turn = np.array([1.0, -1.0, -1.0, 1.0, 1.0, -1.0])
+    state = contact.solve(height, None, values)
+    other = swapped.solve(height, None, turn * values)
+    assert_same(other.pressure, state.pressure, 1e-6)
+    assert_same(other.shear, -state.shear, 1e-6)
+    np.testing.assert_allclose(other.rigid, turn * state.rigid, atol=1e-6 * state.rigid[0])
+
+
+def test_shear_turns_with_the_load():
+    contact, height = sphere(24, 0.4, 0.4)
+    along_x = contact.solve(height, None, loads(Qx=20.0))
+    along_y = contact.solve(height, None, loads(Qy=20.0))
+    assert_same(along_y.traction[[1, 0, 2]].swapaxes(1, 2), along_x.traction, 1e-6)
+    diagonal = contact.solve(height, None, loads(Qx=14.0, Qy=14.0))
+    assert_same(diagonal.traction[[1, 0, 2]].swapaxes(1, 2), diagonal.traction, 1e-6)
+
+
+def test_pressing_alone_shears_towards_or_from_the_centre():
+    """Body 2, the more compliant, is drawn in under pressure and friction holds it back."""
+    for build, cells in ((sphere, 24), (cylinder, 100)):
+        contact, height = build(cells, 0.4, 0.4)
+        state = contact.solve(height, None, loads())
+        outwards = state.shear[0] * contact.grid.x + state.shear[1] * contact.grid.y
+        pressed = state.pressure > 0
+        assert outwards[pressed].min() > -1e-6 * state.pressure.max() * contact.grid.x.max()
+        for axis in (0, 1):
+            sign = np.array([-1.0 if k == axis else 1.0 for k in range(3)])[:, None, None]
+            assert_same(sign * np.flip(state.traction, 1 + axis), state.traction, 1e-6)
+
+
+# -- energy -----------------------------------------------------------------------------------
+@pytest.mark.parametrize("build", [sphere, cylinder])
+def test_dissipation_is_the_work_of_the_shear_forces_less_what_is_stored(build):
+    """Per increment: -Σ q·Δs S = Q·Δδ + Mz Δφz - Σ q·Δu S >= 0."""
+    contact, height = build(24 if build is sphere else 100, 0.4, 0.4)
+    path = [loads(k / 3 * P) for k in (1, 2, 3)]
+    path += [loads(Qx=0.3 * P * np.sin(angle)) for angle in np.linspace(0.5, 6.0, 8)]
+    area, before = contact.grid.cell_area, np.zeros((3, *contact.grid.shape))
+    total, scale = 0.0, P * RADIUS * 1e-3
+    for state in march(contact, height, path):
+        dissipated = -np.vdot(state.shear, state.slip) * area
+        change = state.displacement[:2] - before[:2]
+        shear_work = state.resultants[[1, 2, 5]] @ state.rigid[[1, 2, 5]]
+        assert dissipated >= -1e-9 * scale
+        balance = shear_work - np.vdot(state.shear, change) * area
+        assert dissipated == pytest.approx(balance, abs=1e-9 * scale)
+        total, before = total + dissipated, state.displacement
+    assert total > 1e-4 * scale
+
+
+# -- control, starts, time --------------------------------------------------------------------
+@pytest.mark.parametrize("build", [sphere, cylinder])
+def test_imposing_the_motions_found_gives_the_forces_back(build):
+    contact, height = build(24 if build is sphere else 100, 0.4, 0.5)
+    values = loads(Qx=20.0, Qy=10.0, My=1.0) if build is cylinder else loads(P, 20, 10, 2, 1, 1)
+    by_force = contact.solve(height, None, values, tolerance=1e-9)
+    moved = [(True,) * 6, (True, False, True, False, True, False)]
+    for motion in moved:
+        mixed = np.where(motion, by_force.rigid, values)
+        by_motion = contact.solve(height, None, mixed, motion, tolerance=1e-9)
+        assert by_motion.converged
+        np.testing.assert_allclose(by_motion.resultants, values, atol=1e-5 * P)
+        np.testing.assert_allclose(by_motion.rigid, by_force.rigid, atol=1e-7 * by_force.rigid[0])
+        assert_same(by_motion.traction, by_force.traction, 1e-5)
+
+
+def test_a_large_imposed_shift_slides_everywhere():
+    contact, height = sphere(24, 0.4, 0.5)
+    values = loads()
+    values[1] = 1.0
+    motion = (False, True, False, False, False, False)
+    state = contact.solve(height, None, values, motion)
+    assert state.converged
+    assert not sticking(state, 0.5).any()
+    assert state.resultants[1] == pytest.approx(0.5 * P, rel=1e-3)
+
+
+def test_an_imposed_mismatch_shears_the_contact():
+    """A stretch of the surfaces by bulk stress is resisted by antisymmetric shear."""
+    contact, height = cylinder(100, 0.2, 0.5)
+    first = contact.solve(height, None, loads())
+    offset = -first.displacement[:2]
+    same = contact.solve(height, offset, loads())
+    offset[0] += 2e-3 * contact.grid.x
+    stretched = contact.solve(height, offset, loads())
+    assert stretched.converged
+    assert_same(same.traction, first.traction, 1e-5)
+    assert np.sum(stretched.shear[0] * contact.grid.x) < np.sum(first.shear[0] * contact.grid.x)
+
+
+def test_a_start_saves_iterations_and_changes_nothing():
+    contact, height = sphere(32, 0.4, 0.5)
+    first = contact.solve(height, None, loads())
+    again = contact.solve(height, None, loads(), start=first.start)
+    assert again.iterations < 5
+    offset = -first.displacement[:2]
+    cold = contact.solve(height, offset, loads(Qx=20.0))
+    warm = contact.solve(height, offset, loads(Qx=20.0), start=first.start)
+    assert warm.iterations < cold.iterations
+    assert_same(warm.traction, cold.traction, 1e-6)
+
+
+def test_iterations_hardly_grow_with_the_grid():
+    """As the fourth root of the number of cells across, about."""
+    counts = []
+    for cells in (24, 96):
+        contact, height = sphere(cells, 0.5, 0.5)
+        counts.append(contact.solve(height, None, loads(Qx=0.25 * P)).iterations)
+    assert counts[1] < 2.0 * counts[0]
+    assert counts[1] < 100
+
+
+# -- failure is visible -----------------------------------------------------------------------
+def test_no_load_means_no_tractions():
+    contact, height = sphere(24, 0.4, 0.5)
+    state = contact.solve(height, None, loads(0.0))
+    assert state.converged
+    assert not state.traction.any()
+    assert state.gap.min() == 0.0
+    assert state.rigid[0] == height.min()
+    following = contact.solve(height, -state.displacement[:2], loads(), start=state.start)
+    assert following.converged
+
+
+def test_bodies_kept_apart_do_not_touch():
+    contact, height = sphere(24, 0.4, 0.5)
+    values = np.array([-1e-3, 0.0, 0.0, 0.0, 0.0, 0.0])
+    state = contact.solve(height, None, values, (True, False, False, True, True, False))
+    assert state.converged
+    assert not state.traction.any()
+    assert state.gap.min() == pytest.approx(1e-3 + height.min())
+
+
+@pytest.mark.parametrize("friction", [-0.1, np.nan, np.inf])
+def test_friction_must_make_sense(friction):
+    with pytest.raises(CoupledContactError, match="friction"):
+        sphere(8, 0.4, friction)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"height": np.full((8, 8), np.nan)}, "heights hold NaN"),
+        ({"height": np.zeros((8, 9))}, "heights have shape"),
+        ({"offset": np.full((2, 8, 8), np.inf)}, "offsets hold NaN"),
+        ({"compliance": np.full((8, 8), -1.0)}, "wear rate's sign"),
+        ({"values": loads(np.nan)}, "must be finite"),
+        ({"values": loads(-1.0)}, "pulls"),
+        ({"values": loads(My=1e3)}, "outside the cells"),
+        ({"values": np.zeros(5)}, "six values"),
+    ],
+)
+def test_impossible_data_are_refused(change, message):
+    contact, height = sphere(8, 0.4, 0.5)
+    data = {"height": height, "offset": None, "values": loads()} | change
+    with pytest.raises(CoupledContactError, match=message):
+        contact.solve(**data)
+
+
+def test_a_line_contact_refuses_what_has_no_meaning_on_it():
+    contact, height = cylinder(40, 0.4, 0.5)
+    for name in ("Mx", "Mz"):
+        with pytest.raises(CoupledContactError, match=f"{name} or its motion has no meaning"):
+            contact.solve(height, None, loads(**{name: 1.0}))
+
+
+def test_a_start_from_another_grid_is_refused():
+    contact, height = sphere(8, 0.4, 0.5)
+    other, other_height = sphere(12, 0.4, 0.5)
+    start = other.solve(other_height, None, loads()).start
+    with pytest.raises(CoupledContactError, match="another grid"):
+        contact.solve(height, None, loads(), start=start)
+
+
+def test_a_shear_force_above_friction_is_refused_at_once():
+    contact, height = sphere(24, 0.4, 0.5)
+    with pytest.raises(FrictionLimitError, match="largest is µP = 50 N") as refusal:
+        contact.solve(height, None, loads(Qx=60.0, Qy=80.0))
+    assert refusal.value.share == pytest.approx(0.5)
+
+
+def test_a_torque_above_friction_is_reported_with_the_largest(monkeypatch):
+    """3π µPa/16 for similar bodies: here the pressure differs a little from Hertz's."""
+    monkeypatch.setattr(coupled, "ITERATIONS", 150)
+    contact, height = sphere(24, 0.2, 0.5)
+    radius = contact.grid.size[0] / 2.6
+    largest = 3 * np.pi / 16 * 0.5 * P * radius
+    assert contact.solve(height, None, loads(Mz=0.9 * largest)).converged
+    state = contact.solve(height, None, loads(Mz=1.2 * largest))
+    assert not state.converged
+    assert "friction cannot carry" in state.message
+    assert float(state.message.split("Mz = ")[2].split(" ")[0]) == pytest.approx(largest, rel=0.1)
+
+
+def test_too_few_iterations_are_said(monkeypatch):
+    monkeypatch.setattr(coupled, "ITERATIONS", 5)
+    contact, height = sphere(24, 0.4, 0.5)
+    state = contact.solve(height, None, loads())
+    assert not state.converged
+    assert state.iterations == 5
+    assert state.residuals.largest > TOLERANCE
+    assert "loosen the tolerance" in state.message
+
+
+def test_a_contact_of_few_cells_asks_for_a_finer_grid(monkeypatch):
+    monkeypatch.setattr(coupled, "ITERATIONS", 20)
+    contact, height = sphere(24, 0.4, 0.5)
+    state = contact.solve(30.0 * height, None, loads(1e-5 * P, Mz=1e-8))
+    assert not state.converged
+    assert "cells carry the load, refine the grid" in state.message
+
+
+def test_contact_at_the_border_is_said():
+    contact, height = sphere(24, 0.4, 0.5, width=1.6)
+    state = contact.solve(height, None, loads())
+    assert state.converged
+    assert state.touches_border

@@ -1,0 +1,384 @@
+"""Displacement of two half-spaces by FFT: direct summation, closed forms, symmetry, energy."""
+
+import numpy as np
+import pytest
+
+from sa_solver.half_space import ALL, NORMAL, SHEAR, HalfSpace, HalfSpaceResolvent
+from sa_solver.influence import X, Y, Z, rectangle_influence, strip_influence
+from sa_solver.types import ElasticPair, Grid, Material
+
+RIGID = Material(np.inf, 0.3)
+STEEL = Material(200e3, 0.3)
+ALUMINIUM = Material(70e3, 0.1)
+DISSIMILAR = ElasticPair(STEEL, ALUMINIUM)
+SIMILAR = ElasticPair(STEEL, STEEL)
+STRONGEST = ElasticPair(RIGID, Material(70e3, 0.0))
+"""β = 0.5, the largest of materials with ν >= 0."""
+
+GRIDS = {
+    "even": Grid((6, 4), (0.3, 0.5)),
+    "odd": Grid((7, 5), (0.3, 0.5)),
+    "mixed": Grid((4, 9), (0.5, 0.2)),
+    "row": Grid((1, 8), (0.3, 0.5)),
+    "column": Grid((7, 1), (0.3, 0.5)),
+    "cell": Grid((1, 1), (0.3, 0.5)),
+    "line, even": Grid.strips(2.0, 8),
+    "line, odd": Grid.strips(2.0, 9),
+}
+LARGER_GRIDS = {
+    "square": Grid((64, 64), (1.0, 1.0)),
+    "long along y": Grid((16, 128), (1.0, 0.05)),
+    "long along x": Grid((128, 16), (1.0, 0.05)),
+    "flat cells": Grid((16, 16), (1.0, 0.02)),
+    "line": Grid.strips(4.0, 101),
+    "fine line": Grid.strips(4.0, 1000),
+}
+EVERY_GRID = GRIDS | LARGER_GRIDS
+COMPONENT_SETS = [NORMAL, SHEAR, ALL]
+ROUNDING = 1e-12
+
+every_small_grid = pytest.mark.parametrize("grid", GRIDS.values(), ids=GRIDS.keys())
+every_grid = pytest.mark.parametrize("grid", EVERY_GRID.values(), ids=EVERY_GRID.keys())
+
+
+def tractions(grid, count=1, seed=0):
+    return np.random.default_rng(seed).standard_normal((count, 3, *grid.shape))
+
+
+def assert_same(found, expected, accuracy=ROUNDING):
+    """Equal to ``accuracy`` of the largest value."""
+    np.testing.assert_allclose(found, expected, rtol=0, atol=accuracy * np.abs(expected).max())
+
+
+def kernel(grid, pair, distances, datum):
+    """All nine influence coefficients ``(3, 3, ...)`` at steps ``distances`` along x and y."""
+    edges = [
+        np.append(steps - 0.5, steps[-1] + 0.5) * pitch
+        for steps, pitch in zip(distances, grid.pitch, strict=True)
+    ]
+
+    def coefficients(i, j):
+        if grid.line:
+            return strip_influence(edges[0], pair, i, j, datum)[:, None]
+        return rectangle_influence(*edges, pair, i, j)
+
+    return np.array([[coefficients(i, j) for j in range(3)] for i in range(3)])
+
+
+def dense_operator(grid, pair, datum=None):
+    """K as a matrix ``(3 n, 3 n)``, from the influence coefficients alone."""
+    datum = 2.0 * grid.size[0] if datum is None else datum
+    distances = [np.arange(1 - n, n) for n in grid.shape]
+    coefficients = kernel(grid, pair, distances, datum)
+    ix, iy = (np.arange(n)[:, None] - np.arange(n) + n - 1 for n in grid.shape)
+    blocks = coefficients[:, :, ix[:, None, :, None], iy[None, :, None, :]]
+    size = 3 * grid.shape[0] * grid.shape[1]
+    return blocks.transpose(0, 2, 3, 1, 4, 5).reshape(size, size)
+
+
+def circulant(half_space, traction):
+    """K on the padded grid made periodic, by complex transforms of the whole kernel.
+
+    As far from one image as from the next, the displacement is the mean of both.
+    """
+    grid, period = half_space.grid, half_space.padded
+    distances = [np.arange(-(m // 2), m // 2 + 1) for m in period]
+    coefficients = kernel(grid, half_space.pair, distances, half_space.datum)
+    for axis, m in ((2, period[0]), (3, period[1])):
+        coefficients = np.moveaxis(coefficients, axis, 0)
+        if m % 2 == 0:
+            coefficients[0] = 0.5 * (coefficients[0] + coefficients[-1])
+            coefficients = coefficients[:-1]
+        coefficients = np.moveaxis(np.roll(coefficients, -(m // 2), axis=0), 0, axis)
+    product = np.einsum("ijxy,jxy->ixy", np.fft.fft2(coefficients), np.fft.fft2(traction))
+    return np.fft.ifft2(product).real
+
+
+def symbols(half_space):
+    """The matrix of symbols ``(mx, my//2 + 1, 3, 3)``."""
+    rows = [[half_space.symbol(i, j) for j in ALL] for i in ALL]
+    return np.moveaxis(np.array(rows), (0, 1), (-2, -1))
+
+
+@every_small_grid
+@pytest.mark.parametrize("pair", [DISSIMILAR, SIMILAR, STRONGEST])
+def test_displacement_is_direct_summation(grid, pair):
+    (traction,) = tractions(grid)
+    direct = dense_operator(grid, pair) @ traction.ravel()
+    assert_same(HalfSpace(grid, pair).displacement(traction).ravel(), direct)
+
+
+def test_direct_summation_also_holds_on_two_threads():
+    grid = GRIDS["mixed"]
+    (traction,) = tractions(grid)
+    half_space = HalfSpace(grid, DISSIMILAR, threads=2)
+    direct = dense_operator(grid, DISSIMILAR) @ traction.ravel()
+    assert_same(half_space.displacement(traction).ravel(), direct)
+
+
+@every_small_grid
+@pytest.mark.parametrize("pair", [DISSIMILAR, SIMILAR])
+def test_parts_are_those_of_the_full_vector(grid, pair):
+    (traction,) = tractions(grid)
+    pressure, shear = traction[Z], traction[:Z]
+    half_space = HalfSpace(grid, pair)
+    under_pressure = half_space.displacement(np.array([0 * pressure, 0 * pressure, pressure]))
+    under_shear = half_space.displacement(np.array([*shear, 0 * pressure]))
+    scale = np.abs(under_pressure).max()
+    expected = [
+        (half_space.normal(pressure), under_pressure[Z]),
+        (half_space.shear_under_pressure(pressure), under_pressure[:Z]),
+        (half_space.shear(shear), under_shear[:Z]),
+        (half_space.normal_under_shear(shear), under_shear[Z]),
+    ]
+    for part, whole in expected:
+        assert part.shape == whole.shape
+        np.testing.assert_allclose(part, whole, rtol=0, atol=ROUNDING * scale)
+
+
+def test_identical_bodies_have_no_cross_terms_at_all():
+    grid = GRIDS["odd"]
+    half_space = HalfSpace(grid, SIMILAR)
+    (traction,) = tractions(grid)
+    assert np.array_equal(half_space.shear_under_pressure(traction[Z]), np.zeros((2, 7, 5)))
+    assert np.array_equal(half_space.normal_under_shear(traction[:Z]), np.zeros((7, 5)))
+    assert half_space.count == 0
+    traction[Z] = 0.0
+    assert np.array_equal(half_space.displacement(traction)[Z], np.zeros((7, 5)))
+
+
+@every_small_grid
+def test_swapping_the_bodies_changes_the_sign_of_the_cross_terms_alone(grid):
+    (traction,) = tractions(grid)
+    swapped = HalfSpace(grid, ElasticPair(DISSIMILAR.body_2, DISSIMILAR.body_1))
+    mirror = np.array([1.0, 1.0, -1.0])[:, None, None]
+    expected = mirror * swapped.displacement(mirror * traction)
+    assert_same(HalfSpace(grid, DISSIMILAR).displacement(traction), expected, 1e-14)
+
+
+@every_grid
+@pytest.mark.parametrize("pair", [DISSIMILAR, STRONGEST])
+def test_reciprocity(grid, pair):
+    """Betti: the work of one traction on the displacement of another is mutual."""
+    first, second = tractions(grid, 2)
+    half_space = HalfSpace(grid, pair)
+    displacement = half_space.displacement(second)
+    work = np.vdot(half_space.displacement(first), second)
+    scale = np.linalg.norm(first) * np.linalg.norm(displacement)
+    assert np.vdot(first, displacement) == pytest.approx(work, abs=1e-13 * scale)
+
+
+@every_small_grid
+@pytest.mark.parametrize("axis", [X, Y])
+def test_mirrored_tractions_give_mirrored_displacements(grid, axis):
+    """The component along the mirrored direction changes sign, the others do not."""
+    (traction,) = tractions(grid)
+    half_space = HalfSpace(grid, DISSIMILAR)
+    signs = np.ones((3, 1, 1))
+    signs[axis] = -1.0
+    mirrored = half_space.displacement(signs * np.flip(traction, 1 + axis))
+    assert_same(signs * np.flip(mirrored, 1 + axis), half_space.displacement(traction))
+
+
+def test_exchanging_x_and_y_exchanges_the_components():
+    grid, transposed = Grid((6, 5), (0.3, 0.5)), Grid((5, 6), (0.5, 0.3))
+    (traction,) = tractions(grid)
+    exchange = [Y, X, Z]
+    other = HalfSpace(transposed, DISSIMILAR).displacement(traction[exchange].transpose(0, 2, 1))
+    expected = HalfSpace(grid, DISSIMILAR).displacement(traction)
+    assert_same(other[exchange].transpose(0, 2, 1), expected)
+
+
+def test_every_convolution_counts_once_whatever_its_components():
+    grid = GRIDS["even"]
+    half_space = HalfSpace(grid, DISSIMILAR)
+    (traction,) = tractions(grid)
+    assert half_space.count == 0
+    for count, (apply, field) in enumerate(
+        [
+            (half_space.normal, traction[Z]),
+            (half_space.shear, traction[:Z]),
+            (half_space.displacement, traction),
+            (half_space.shear_under_pressure, traction[Z]),
+            (half_space.normal_under_shear, traction[:Z]),
+            (half_space.normal, traction[Z]),
+        ],
+        start=1,
+    ):
+        apply(field)
+        assert half_space.count == count
+
+
+@pytest.mark.parametrize("grid", [GRIDS["odd"], GRIDS["line, odd"]])
+def test_self_compliance_is_the_displacement_of_a_loaded_cell(grid):
+    half_space = HalfSpace(grid, DISSIMILAR)
+    middle = tuple(n // 2 for n in grid.shape)
+    for component in ALL:
+        traction = np.zeros((3, *grid.shape))
+        traction[component][middle] = 1.0
+        displacement = half_space.displacement(traction)[component][middle]
+        assert half_space.self_compliance(component) == pytest.approx(displacement, rel=ROUNDING)
+
+
+def hertz_disc(cells):
+    """Grid just larger than the unit disc, and √(1-r²) on it."""
+    grid = Grid.covering((2.2, 2.2), (cells, cells))
+    return grid, np.sqrt(np.maximum(0.0, 1.0 - grid.x**2 - grid.y**2))
+
+
+@pytest.mark.parametrize(("cells", "accuracy"), [(32, 4e-3), (128, 5e-4)])
+def test_shear_of_hertzian_shape(cells, accuracy):
+    """Johnson eqs 3.91a, b, of both bodies together; the edge leaves O(pitch^1.5)."""
+    grid, profile = hertz_disc(cells)
+    pair = DISSIMILAR
+    s, v = pair.shear, pair.poisson
+    inside = grid.x**2 + grid.y**2 < 1.0
+    u_x = np.pi / 32.0 * (4 * (2 * s - v) - (4 * s - 3 * v) * grid.x**2 - (4 * s - v) * grid.y**2)
+    u_y = np.pi / 32.0 * 2.0 * v * grid.x * grid.y
+    found = HalfSpace(grid, pair).shear(np.array([profile, 0.0 * profile]))
+    assert np.abs(found[X] - u_x)[inside].max() < accuracy * u_x.max()
+    assert np.abs(found[Y] - u_y)[inside].max() < accuracy * u_x.max()
+
+
+@pytest.mark.parametrize(("cells", "accuracy"), [(32, 4e-3), (128, 5e-4)])
+def test_pressure_of_hertzian_shape_pulls_the_softer_surface_inwards(cells, accuracy):
+    """Johnson eqs 3.41a, b: u_r = -(1-2ν)/(6 G) p0 [1 - (1-r²)^1.5] / r, body 2 less body 1."""
+    grid, profile = hertz_disc(cells)
+    pair = DISSIMILAR
+    squares = grid.x**2 + grid.y**2
+    inside = squares < 1.0
+    u_z = np.pi / 4.0 / pair.contact_modulus * (2.0 - squares)
+    radial = -pair.coupling / 3.0 * (1.0 - profile**3) / squares
+    half_space = HalfSpace(grid, pair)
+    scale = accuracy * u_z.max()
+    assert np.abs(half_space.normal(profile) - u_z)[inside].max() < scale
+    found = half_space.shear_under_pressure(profile)
+    assert pair.body_2.shear_modulus < pair.body_1.shear_modulus
+    assert found[X][-cells // 4, cells // 2] < 0.0  # where x > 0
+    for component, coordinate in ((X, grid.x), (Y, grid.y)):
+        assert np.abs(found[component] - radial * coordinate)[inside].max() < scale
+
+
+@pytest.mark.parametrize(("cells", "accuracy"), [(50, 4e-3), (400, 1.8e-4)])
+def test_line_load_of_hertzian_shape(cells, accuracy):
+    """Parabola under the load (Johnson eq. 4.45), -∫ ln|s/L| p ds at its centre, and the jump."""
+    grid, datum = Grid.strips(2.2, cells), 5.0
+    x, pair = grid.x, DISSIMILAR
+    profile = np.sqrt(np.maximum(0.0, 1.0 - x**2))
+    inside = np.abs(x) < 1.0
+    shape = 0.5 * (np.log(2.0 * datum) + 0.5 - x**2)
+    one_sided = np.arcsin(np.clip(x, -1.0, 1.0)) + x * profile  # ∫ sgn(x-s) √(1-s²) ds
+    zero = 0.0 * profile
+    half_space = HalfSpace(grid, pair, datum=datum)
+    cases = [
+        ([profile, zero, zero], [pair.normal * shape, zero, 0.5 * pair.coupling * one_sided]),
+        ([zero, profile, zero], [zero, pair.shear * shape, zero]),
+        ([zero, zero, profile], [-0.5 * pair.coupling * one_sided, zero, pair.normal * shape]),
+    ]
+    for traction, expected in cases:
+        error = half_space.displacement(np.array(traction)) - np.array(expected)
+        assert np.abs(error[:, inside]).max() < accuracy * pair.normal * shape.max()
+
+
+def test_the_default_datum_is_two_widths_away():
+    grid = GRIDS["line, even"]
+    (traction,) = tractions(grid)
+    half_spaces = [HalfSpace(grid, DISSIMILAR, datum=datum) for datum in (None, 4.0)]
+    assert half_spaces[0].datum == 4.0
+    assert np.array_equal(*(h.displacement(traction) for h in half_spaces))
+
+
+@pytest.mark.parametrize("datum", [1.99, 0.0, -4.0, np.nan])
+def test_a_datum_shorter_than_the_grid_is_refused(datum):
+    with pytest.raises(ValueError, match="width of the grid, 2 mm"):
+        HalfSpace(Grid.strips(2.0, 8), DISSIMILAR, datum=datum)
+
+
+@every_grid
+@pytest.mark.parametrize("poisson", [0.0, 0.1, 0.3, 0.5])
+@pytest.mark.parametrize("rigid_below", [True, False])
+def test_symbol_is_positive_definite(grid, poisson, rigid_below):
+    """At every frequency, with β up to 0.5 and the datum as near as it may be.
+
+    Otherwise neither the resolvent nor the preconditioner would be positive definite.
+    """
+    body = Material(70e3, poisson)
+    pair = ElasticPair(RIGID, body) if rigid_below else ElasticPair(body, RIGID)
+    half_space = HalfSpace(grid, pair, datum=grid.size[0])
+    assert np.linalg.eigvalsh(symbols(half_space)).min() > 0.0
+
+
+@every_small_grid
+@pytest.mark.parametrize("pair", [DISSIMILAR, STRONGEST])
+def test_strain_energy_is_positive(grid, pair):
+    """Of every traction: the smallest eigenvalue of K summed directly."""
+    assert np.linalg.eigvalsh(dense_operator(grid, pair, grid.size[0])).min() > 0.0
+
+
+@every_grid
+def test_strain_energy_of_random_tractions_is_positive(grid):
+    half_space = HalfSpace(grid, STRONGEST, datum=grid.size[0])
+    for traction in tractions(grid, 5):
+        assert np.vdot(traction, half_space.displacement(traction)) > 0.0
+
+
+@every_small_grid
+@pytest.mark.parametrize("components", COMPONENT_SETS)
+def test_resolvent_inverts_the_circulant(grid, components):
+    half_space = HalfSpace(grid, DISSIMILAR)
+    resolvent = HalfSpaceResolvent(half_space, components)
+    assert resolvent.shift > 0.0
+    traction = np.zeros((3, *resolvent.padded))
+    shape = (len(components), *resolvent.padded)
+    traction[list(components)] = np.random.default_rng(6).standard_normal(shape)
+    displacement = circulant(half_space, traction) + resolvent.shift * traction
+    chosen = list(components)
+    assert_same(resolvent.solve(displacement[chosen]), traction[chosen], 1e-11)
+    assert half_space.count == 1
+
+
+@every_small_grid
+def test_circulant_is_the_half_space_on_the_grid(grid):
+    """So that what the resolvent inverts is the operator, where the padding is free of traction."""
+    half_space = HalfSpace(grid, DISSIMILAR)
+    traction = np.zeros((3, *half_space.padded))
+    nx, ny = grid.shape
+    traction[:, :nx, :ny] = tractions(grid)[0]
+    found = circulant(half_space, traction)[:, :nx, :ny]
+    assert_same(found, half_space.displacement(traction[:, :nx, :ny]))
+
+
+@every_grid
+@pytest.mark.parametrize("components", COMPONENT_SETS)
+def test_resolvent_is_symmetric_and_positive(grid, components):
+    resolvent = HalfSpaceResolvent(HalfSpace(grid, STRONGEST), components)
+    shape = (2, len(components), *resolvent.padded)
+    first, second = np.random.default_rng(7).standard_normal(shape)
+    solved = resolvent.solve(second)
+    scale = np.linalg.norm(first) * np.linalg.norm(solved)
+    mutual = np.vdot(resolvent.solve(first), second)
+    assert np.vdot(first, solved) == pytest.approx(mutual, abs=1e-13 * scale)
+    assert np.vdot(second, solved) > 0.0
+    # Never stiffer than 1/ρ, which bounds the splitting's step.
+    assert np.linalg.norm(solved) <= np.linalg.norm(second) / resolvent.shift * (1.0 + ROUNDING)
+
+
+def test_repeated_half_spaces_give_the_same_bits():
+    grid = GRIDS["mixed"]
+    (traction,) = tractions(grid)
+    fields = [HalfSpace(grid, DISSIMILAR).displacement(traction) for _ in range(2)]
+    assert np.array_equal(*fields)
+
+
+def test_parts_share_transforms_without_disturbing_each_other():
+    """In any order of calls, as each leaves its spectra behind."""
+    grid = GRIDS["even"]
+    (traction,) = tractions(grid)
+    half_space, fresh = HalfSpace(grid, DISSIMILAR), HalfSpace(grid, DISSIMILAR)
+    expected = fresh.displacement(traction)
+    half_space.shear(traction[:Z])
+    half_space.normal_under_shear(traction[:Z])
+    half_space.displacement(2.0 * traction)
+    half_space.shear_under_pressure(traction[Z])
+    HalfSpaceResolvent(half_space, ALL).solve(np.ones((3, *half_space.padded)))
+    assert np.array_equal(half_space.displacement(traction), expected)

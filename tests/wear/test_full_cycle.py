@@ -1,0 +1,103 @@
+"""A cycle with the half-space's own friction: energies, closure, unlike bodies."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sa_solver.contact import FrictionalContact, Load
+from sa_solver.half_space import HalfSpace
+from sa_solver.types import ElasticPair, Grid, LoadHistory, Material
+from wear.full_cycle import full_cycle
+from wear.stepping import ContactFailure
+
+TITANIUM, STEEL = Material(115e3, 0.29), Material(200e3, 0.3)
+GRID = Grid.covering((11.0, 24.0), (22, 24))
+GAP = (
+    np.maximum(np.abs(GRID.x) - 4.0, 0.0) ** 2 / 200 + np.maximum(np.abs(GRID.y) - 9, 0) ** 2 / 400
+)
+FRICTION = 0.4
+P = np.array([8e3, 16e3, 12e3, 8e3, 4e3, 0.0])
+# Slides outwards while the load grows, sticks when it turns, slides back before the end.
+SHARE = np.array([-1.0, -1.0, -0.5, 0.3, 1.0, 0.0])
+ENERGY = np.array([2.0, 40.0, 0.1, 0.1, 15.0, 0.0])
+
+
+def mission(last: float = 0.0) -> LoadHistory:
+    """A flank's cycle; ``last`` is the load it ends with."""
+    load = P.copy()
+    load[-1] = last
+    zero = np.zeros(len(P))
+    return LoadHistory(
+        P=load,
+        Qx=SHARE * FRICTION * load,
+        Qy=zero,
+        Mx=zero,
+        My=zero,
+        Mz=zero,
+        Edx=ENERGY,
+        Edy=zero,
+        sliding=np.abs(SHARE) == 1.0,
+    )
+
+
+def contact(pair: ElasticPair) -> FrictionalContact:
+    return FrictionalContact(HalfSpace(GRID, pair), FRICTION)
+
+
+@pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["alike", "unlike"])
+def test_sliding_dissipates_what_the_structure_does(first):
+    """Pressing unlike bodies turns some of the shear of a sliding flank sideways."""
+    loads = mission()
+    states = full_cycle(contact(ElasticPair(first, TITANIUM)), GAP, loads)
+    assert [state.sliding for state in states] == loads.sliding.tolist()
+    for t in np.flatnonzero(loads.sliding):
+        state = states[t]
+        assert state.energy.sum() == pytest.approx(loads.Edx[t], rel=1e-5)
+        assert not state.sticking.any()
+        assert state.resultants[1] == pytest.approx(
+            loads.Qx[t], rel=2e-3 if first is TITANIUM else 5e-3
+        )
+        assert state.resultants[2] == pytest.approx(0.0, abs=1e-5 * loads.P[t])
+
+
+def test_what_sticks_carries_the_given_force():
+    loads = mission()
+    states = full_cycle(contact(ElasticPair(TITANIUM, TITANIUM)), GAP, loads)
+    for t in np.flatnonzero(~loads.sliding & (loads.P > 0.0)):
+        given = [getattr(loads, name)[t] for name in ("P", "Qx", "Qy", "Mx", "My", "Mz")]
+        np.testing.assert_allclose(states[t].resultants, given, atol=1e-7 * loads.P[t])
+        assert states[t].sticking.any()
+        assert states[t].energy.sum() >= -1e-8 * ENERGY.max()
+
+
+def test_a_cycle_that_ends_loaded_is_closed():
+    """One more increment repeats the first: what a sliding contact forgets, to 1e-3 of µp."""
+    pair = ElasticPair(TITANIUM, TITANIUM)
+    loads = mission(last=4e3)
+    states = full_cycle(contact(pair), GAP, loads)
+    values = np.array([loads.P[0], loads.Qx[0], 0.0, 0.0, 0.0, 0.0])
+    repeated = contact(pair).advance(
+        states[-1], GAP, Load(values, energy=np.array([loads.Edx[0], 0.0]))
+    )
+    np.testing.assert_allclose(
+        repeated.shear, states[0].shear, atol=1e-3 * FRICTION * states[0].pressure.max()
+    )
+
+
+def test_no_load_no_slip():
+    states = full_cycle(contact(ElasticPair(TITANIUM, TITANIUM)), GAP, mission())
+    assert not states[-1].traction.any()
+    assert not states[-1].slip.any()
+
+
+def test_an_increment_that_fails_is_named(monkeypatch):
+    own = contact(ElasticPair(TITANIUM, TITANIUM))
+    advance = own.advance
+
+    def fails(*arguments):
+        return replace(advance(*arguments), converged=False, message="circles; refine the grid")
+
+    monkeypatch.setattr(own, "advance", fails)
+    with pytest.raises(ContactFailure, match=r"increment 1: .*refine the grid"):
+        full_cycle(own, GAP, mission())

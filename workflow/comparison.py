@@ -1,0 +1,55 @@
+"""The half-space's own cycle beside the structure's, where the contact method is full."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sa_solver.contact import ContactState
+from sa_solver.types import LoadHistory
+from workflow.store import ResultsWriter
+
+# Increments shown, as shares of the way from the peak to the end of the cycle: 8, 12 and 15 of 22.
+SHOWN = 0.0, 2.0 / 7.0, 0.5
+
+
+def half_space_loads(cycle: tuple[ContactState, ...]) -> LoadHistory:
+    """Resultants and energies of a cycle of the half-space."""
+    P, Qx, Qy, Mx, My, Mz = np.stack([state.resultants for state in cycle], axis=1)
+    Edx, Edy = np.stack([state.energy for state in cycle], axis=1)
+    sliding = np.array([state.sliding for state in cycle])
+    return LoadHistory(P, Qx, Qy, Mx, My, Mz, Edx, Edy, sliding)
+
+
+def write_comparison(
+    writer: ResultsWriter, name: str, cycle: tuple[ContactState, ...], peak: int
+) -> None:
+    """Loads of the cycle, and its fields at the increments shown."""
+    group = f"comparison/{name}"
+    writer.put(f"{group}/load_history", **vars(half_space_loads(cycle)))
+    for share in SHOWN:
+        increment = min(peak + round(share * (len(cycle) - 1 - peak)), len(cycle) - 1)
+        state = cycle[increment]
+        writer.put(
+            f"{group}/{increment:05d}",
+            pressure=state.pressure,
+            shear=state.shear,
+            slip=state.slip,
+        )
+
+
+def comparison_summary(cycle: tuple[ContactState, ...], structure: LoadHistory) -> dict[str, Any]:
+    """By increment, what follows in the half-space and what the structure says."""
+    half_space = half_space_loads(cycle)
+    columns = ("Qx", "Qy", "Mz", "Edx", "Edy")
+    return {
+        "sliding": half_space.sliding.tolist(),
+        **{
+            name: {
+                "half_space": getattr(half_space, name).tolist(),
+                "structure": getattr(structure, name).tolist(),
+            }
+            for name in columns
+        },
+    }

@@ -1,0 +1,29 @@
+"""Figures of a run.
+
+Each figure reads ``results.h5`` and nothing else; numbers in the titles come from the data. A
+figure whose data a run does not have is left out. Images are 1200 pixels wide.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+
+from workflow.figures import contact, wear
+from workflow.figures.style import STYLE, save
+
+
+def write_figures(results: Path, folder: Path) -> list[Path]:
+    """Draw the figures of ``results`` (a ``results.h5``) as PNG files; returns their paths."""
+    import matplotlib
+
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    with h5py.File(results) as file, matplotlib.rc_context(STYLE):
+        kind = contact if "history" in file else wear
+        for name, draw in kind.figures_of(file).items():
+            path = folder / f"{name}.png"
+            save(draw(file), path)
+            written.append(path)
+    return written

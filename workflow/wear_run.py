@@ -1,0 +1,256 @@
+"""A wear case, the main road: structure, contact, wear, back to the structure, output."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import partial
+
+import numpy as np
+
+from fe_models.mesh import Interface, MeshError
+from fe_models.structure import CycleSolution
+from sa_solver.normal import NormalContactError
+from sa_solver.types import Array
+from wear.stepping import ContactFailure
+from workflow import checkpoint
+from workflow.case import WearCase
+from workflow.checkpoint import KINETICS, RunState
+from workflow.contact_stage import ContactStage, FirstContact, InterfaceState, StageSettings
+from workflow.errors import MethodFailed, UserError
+from workflow.folder import OutputFolder
+from workflow.memory import check_memory
+from workflow.output import Outcome, write_output
+from workflow.reporter import Reporter
+from workflow.store import write_arrays
+from workflow.structure_stage import SIDES, StructureStage
+from workflow.warnings import warn_of_contact, warn_of_growth, warn_of_structure
+from workflow.workers import Workers, contact_workers
+
+# Jumps that add up to the cycles of the run but for rounding leave no jump over.
+ROUNDING = 1e-9
+
+
+def run_wear(case: WearCase, folder: OutputFolder, reporter: Reporter, resume: bool) -> None:
+    """Run a wear case to its end, from its last whole jump if it is to ``resume``."""
+    try:
+        WearRun(case, folder, reporter).execute(resume)
+    except (ContactFailure, NormalContactError, MethodFailed) as error:
+        remedy = f"; the state is kept, see `fretscale resume {folder.root}`"
+        raise MethodFailed(f"{error}{remedy if folder.checkpoint.exists() else ''}") from error
+    except MeshError as error:
+        raise UserError(f"{folder.case}: structure: {error}") from error
+
+
+class WearRun:
+    """One run of a wear case."""
+
+    def __init__(self, case: WearCase, folder: OutputFolder, reporter: Reporter) -> None:
+        self._case = case
+        self._folder = folder
+        self._reporter = reporter
+        self._structure = StructureStage(case)
+
+    def execute(self, resume: bool) -> None:
+        """Run to the end and write everything."""
+        self._reporter.say(f"{'resume' if resume else 'run'}: {self._case.title}")
+        # Read first, so that a damaged one is told before anything is computed.
+        resumed = resume and self._folder.checkpoint.exists()
+        kept = checkpoint.load(self._folder.checkpoint) if resumed else None
+        with self._reporter.stage("mesh"):
+            mesh = self._structure.mesh
+        check_memory(self._case, self._structure.node_count())
+        settings = [self._stage_settings(interface) for interface in mesh.interfaces]
+        with contact_workers(settings) as workers:
+            with self._reporter.stage("condensation"):
+                self._structure.prepare()
+            with self._reporter.stage("structural friction"):
+                unworn = self._structure.unworn_cycle()
+            warn_of_structure(self._case, self._structure, unworn, self._reporter)
+            with self._reporter.stage("contact set-up"):
+                stages = [ContactStage(own) for own in settings]
+            loop = WearLoop(
+                self._case, self._folder, self._reporter, self._structure, stages, workers
+            )
+            state, first = loop.begin(unworn)
+            warn_of_contact(self._case, self._structure, stages, state, first, self._reporter)
+            if kept is None:
+                loop.keep(state)
+            state = loop.advance(kept or state, unworn)
+        pairs = zip(stages, state.interfaces, strict=True)
+        depths = [stage.nodal_depths(own) for stage, own in pairs]
+        with self._reporter.stage("structural friction"):
+            worn = self._structure.cycle([one + two for one, two in depths], unworn)
+        write_output(
+            Outcome(self._case, self._structure, stages, state, unworn, worn, first, depths),
+            self._folder,
+            self._reporter,
+        )
+
+    def _stage_settings(self, interface: Interface) -> StageSettings:
+        dovetail, side = self._structure.dovetail, SIDES[interface.name]
+        gap = partial(dovetail.flank_gap, side=side)
+        return StageSettings(self._case, interface, dovetail.flank_size(side), gap)
+
+
+class WearLoop:
+    """Jumps of all interfaces side by side, with a checkpoint after each."""
+
+    def __init__(
+        self,
+        case: WearCase,
+        folder: OutputFolder,
+        reporter: Reporter,
+        structure: StructureStage,
+        stages: list[ContactStage],
+        workers: Workers,
+    ) -> None:
+        self._case = case
+        self._folder = folder
+        self._reporter = reporter
+        self._structure = structure
+        self._stages = stages
+        self._workers = workers
+
+    def begin(self, unworn: CycleSolution) -> tuple[RunState, list[FirstContact]]:
+        """State before the first jump, and the contact of the first cycle."""
+        with self._reporter.stage("contact, first cycle"):
+            begun = self._workers.call("begin", unworn.histories)
+        interfaces = tuple(own for own, _ in begun)
+        count = len(self._stages)
+        state = RunState(
+            interfaces=interfaces,
+            cycles=np.empty(0),
+            kinetics=np.empty((0, count, len(KINETICS))),
+            drift=np.empty(0),
+            solved_resultants=self._probe(interfaces),
+            solutions=1,
+        )
+        return state.record(0.0, self._areas, 0.0), [first for _, first in begun]
+
+    def advance(self, state: RunState, unworn: CycleSolution) -> RunState:
+        """Jump until the cycles are over or a stop is reached."""
+        total = self._case.wear.cycles
+        with self._reporter.jumps(total, float(state.cycles[-1])) as progress:
+            while not self._ended(state):
+                state = self._jump(state, unworn)
+                progress.update(float(state.cycles[-1]), state.jump)
+        return state
+
+    def _jump(self, state: RunState, unworn: CycleSolution) -> RunState:
+        cycles = self._jump_cycles(state)
+        with self._reporter.stage("wear"):
+            jumped = self._workers.call("jump", state.interfaces, [cycles] * len(self._stages))
+        state = replace(state, interfaces=tuple(own for own, _ in jumped))
+        warn_of_growth(self._stages, state, self._reporter)
+        state, drift = self._follow_drift(state, unworn)
+        state = state.record(float(state.cycles[-1]) + cycles, self._areas, drift)
+        convolutions = sum(spent for _, spent in jumped)
+        self._reporter.log(
+            f"jump {state.jump}: {state.cycles[-1]:.6g} cycles, depths "
+            f"{np.array2string(state.kinetics[-1, :, :2] * 1e3, precision=3)} um, "
+            f"{convolutions} convolutions, drift {drift:.2%}"
+        )
+        self.keep(state)
+        return state
+
+    def _jump_cycles(self, state: RunState) -> float:
+        """Cycles of the next jump, by the case's measure at the present rates."""
+        step = self._case.wear.step
+        if step.cycles is not None:
+            cycles = step.cycles
+        elif step.depth is not None:
+            cycles = _quotient(step.depth, max(own.depth_rate for own in state.interfaces))
+        else:
+            assert step.volume is not None
+            cycles = _quotient(step.volume, sum(own.volume_rate for own in state.interfaces))
+        if step.kind == "explicit":
+            self._warn_of_instability(state, cycles)
+        left = self._case.wear.cycles - float(state.cycles[-1])
+        return left if cycles > left * (1.0 - ROUNDING) else cycles
+
+    def _warn_of_instability(self, state: RunState, cycles: float) -> None:
+        pairs = zip(self._stages, state.interfaces, strict=True)
+        stable = min(stage.stable_cycles(own) for stage, own in pairs)
+        if cycles > stable:
+            self._reporter.warn(
+                f"explicit wear steps above {stable:.3g} cycles amplify the grid's roughness "
+                "(wear.step): use implicit steps or smaller ones"
+            )
+
+    def _ended(self, state: RunState) -> bool:
+        wear = self._case.wear
+        depth = state.kinetics[-1, :, :2].max()
+        volume = state.kinetics[-1, :, 2:4].sum()
+        return bool(
+            state.cycles[-1] >= wear.cycles * (1.0 - ROUNDING)
+            or (wear.stop.depth is not None and depth >= wear.stop.depth)
+            or (wear.stop.volume is not None and volume >= wear.stop.volume)
+        )
+
+    def _follow_drift(self, state: RunState, unworn: CycleSolution) -> tuple[RunState, float]:
+        """Solve the structure again where its resultants have drifted too far."""
+        if self._case.coupling.resultants == "constant":
+            return state, 0.0
+        with self._reporter.stage("drift probe"):
+            probe = self._probe(state.interfaces)
+        heaviest = float(state.solved_resultants[:, 0].max())
+        drift = max(
+            _drift(now, then, heaviest, stage.grid.size)
+            for now, then, stage in zip(probe, state.solved_resultants, self._stages, strict=True)
+        )
+        if drift <= self._case.coupling.drift:
+            return state, drift
+        with self._reporter.stage("structural friction"):
+            solution = self._structure.cycle(self._total_depths(state.interfaces), unworn)
+        self._reporter.log(f"drift {drift:.2%}: resultants computed again")
+        pairs = zip(state.interfaces, solution.histories, strict=True)
+        return replace(
+            state,
+            interfaces=tuple(replace(own, loads=h.loads, slip=h.slip) for own, h in pairs),
+            solved_resultants=probe,
+            solutions=state.solutions + 1,
+        ), drift
+
+    def _probe(self, interfaces: tuple[InterfaceState, ...]) -> Array:
+        return self._structure.peak_resultants(self._total_depths(interfaces))
+
+    def _total_depths(self, interfaces: tuple[InterfaceState, ...]) -> list[Array]:
+        pairs = zip(self._stages, interfaces, strict=True)
+        return [np.sum(stage.nodal_depths(own), axis=0) for stage, own in pairs]
+
+    @property
+    def _areas(self) -> list[float]:
+        return [stage.grid.cell_area for stage in self._stages]
+
+    def keep(self, state: RunState) -> None:
+        """Write the fields of this jump, then the state that the next one starts from."""
+        with self._reporter.stage("checkpoints"):
+            peaks = [self._structure.peak] * len(self._stages)
+            recorded = self._workers.call("peak_fields", state.interfaces, peaks)
+            arrays: dict[str, Array] = {}
+            for stage, own, fields in zip(self._stages, state.interfaces, recorded, strict=True):
+                body_1, body_2 = own.surfaces.heights
+                arrays[f"surfaces/{stage.name}/body_1"] = body_1
+                arrays[f"surfaces/{stage.name}/body_2"] = body_2
+                arrays |= {f"contact/{stage.name}/{name}": field for name, field in fields.items()}
+            attributes = {"cycles": float(state.cycles[-1])}
+            write_arrays(self._folder.jump(state.jump), arrays, attributes)
+            checkpoint.save(self._folder.checkpoint, state)
+
+
+def _drift(now: Array, then: Array, heaviest: float, size: tuple[float, float]) -> float:
+    """Change of resultants relative to P, and to P times half the face for moments.
+
+    A face that was open is measured by the P of the ``heaviest`` loaded.
+    """
+    load = then[0] if then[0] > 0.0 else heaviest
+    if load <= 0.0:
+        return 0.0
+    half_x, half_y = 0.5 * size[0], 0.5 * size[1]
+    scales = load * np.array([1.0, 1.0, 1.0, half_y, half_x, max(half_x, half_y)])
+    return float(np.max(np.abs(now - then) / scales))
+
+
+def _quotient(limit: float, rate: float) -> float:
+    """Cycles to a limit; all that remain where nothing wears."""
+    return limit / rate if rate > 0.0 else np.inf
