@@ -272,7 +272,10 @@ class FrictionalContact:
             return False
         pressed = limit > 0.0
         shapes = modes.fields()[:, :, pressed]
-        return GROSS_SHARE * largest_share(limit[pressed], shapes, target) <= 1.0
+        enough = 1.0 / GROSS_SHARE
+        accuracy = 0.1 * (1.0 - GROSS_SHARE)
+        share = largest_share(limit[pressed], shapes, target, accuracy=accuracy, enough=enough)
+        return share <= enough
 
     def _state(
         self,

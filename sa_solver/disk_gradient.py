@@ -6,8 +6,8 @@ converge whatever the limits are; momentum makes the count grow only with the ro
 eigenvalues, about that of the cells across. Newton's method takes ten times fewer, but may stall
 where limits differ by orders of magnitude from cell to cell.
 
-Sources: Nesterov 1983, Sov. Math. Dokl. 27, 372 (momentum); O'Donoghue & Candès 2015, Found. Comput.
-Math. 15, 715, doi:10.1007/s10208-013-9150-3 (restarts).
+Sources: Nesterov 1983, Sov. Math. Dokl. 27, 372 (momentum); O'Donoghue & Candès 2015, Found.
+Comput. Math. 15, 715, doi:10.1007/s10208-013-9150-3 (restarts).
 """
 
 from __future__ import annotations

@@ -30,8 +30,8 @@ STEPS = 500
 CUTS = 100
 """Cap on the points that bound the rigid position; rough surfaces take up to 40."""
 
-TOUCHING = 1e-9
-"""Gap, over the range of heights, within the accuracy of the linear programme."""
+TOUCHING = 1e-6
+"""Gap, over the range of heights, within the accuracy of the linear programme (1e-7)."""
 
 DROPPED = 1e-12
 """A pressure below this share of the largest is rounding of the dense solve."""

@@ -2,8 +2,8 @@
 
 Both bodies together: ``u = u_2 - u_1`` is the displacement of body 2's surface relative to body
 1's under the tractions that body 1 exerts on body 2 (frames and signs: :mod:`sa_solver.types`).
-With the compliances of :class:`~sa_solver.types.ElasticPair` and ``r² = x² + y²``, a unit point force
-gives
+With the compliances of :class:`~sa_solver.types.ElasticPair` and ``r² = x² + y²``, a unit point
+force gives
 
     u_x = [(s - v)/r + v x²/r³] qx + v xy/r³ qy - c x/r² p      all over 2π
     u_y = v xy/r³ qx + [(s - v)/r + v y²/r³] qy - c y/r² p

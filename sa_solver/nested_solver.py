@@ -22,11 +22,14 @@ from sa_solver.rigid_modes import APPROACH, TILT_X, TILT_Y, RigidModes
 from sa_solver.types import Array, Grid
 
 GRADIENT_ITERATIONS = 200
-"""Conjugate gradients took at most 45 on every case tried; beyond this they are taken to circle
-between contact sets."""
+"""Conjugate gradients took at most 20 on smooth contacts and 125 on the roughest; beyond this they
+are taken to circle between contact sets."""
 
 COARSE_TOLERANCE = 1e-3
 """Of residuals on coarser grids, whose pressure is off by more than that at the contact's edge."""
+
+ENOUGH = 3.0
+"""Load over the moments' least, where the approach is imposed: a start that can be balanced."""
 
 BOXES = 4
 """Boxes whose transforms are kept, the last used: a wear run needs two or three."""
@@ -62,7 +65,8 @@ class NestedSolver:
         None where no pressure on this grid can be balanced or, if the approach is imposed, nothing
         presses on cells of this size.
         """
-        if APPROACH not in problem.modes.free and problem.height.min() >= 0.0:
+        imposed = APPROACH not in problem.modes.free and not problem.target.any()
+        if imposed and problem.height.min() >= 0.0:
             return None
         nested = self._from_coarser(problem)
         return nested if nested is not None else _uniform(problem)
@@ -191,10 +195,15 @@ def _uniform(problem: NormalProblem) -> Array | None:
     modes, target = problem.modes, problem.target
     if APPROACH not in modes.free:
         for cells in (problem.height < 0.0, np.ones(problem.height.shape, dtype=bool)):
+            if not cells.any():
+                continue
             pressure = cells.astype(np.float64)
             depth = max(-problem.height.min(), 1e-3 * np.ptp(problem.height))
             pressure *= depth / problem.displacement(pressure).max()
-            balanced = modes.balance(pressure, target)
+            # Balanced as if that load were imposed, or one that can carry the moments.
+            load = max(float(pressure.sum()), ENOUGH * float(np.abs(target).max(initial=0.0)))
+            loaded = replace(modes, free=(APPROACH, *modes.free))
+            balanced = loaded.balance(pressure, np.concatenate([[load], target]))
             if balanced is not None:
                 return balanced
         return None

@@ -34,7 +34,6 @@ TOLERANCE = 1e-8
 ITERATIONS = 300
 """Conjugate directions; 10 to 60 are usual, 100 for rough surfaces close to sliding."""
 
-NEST = lambda start: True
 FALLBACK_ITERATIONS = 3000
 """Projected gradients where Newton's method stalls; 100 to 1000 are usual."""
 
@@ -154,7 +153,7 @@ class TangentialContact:
         begin = np.zeros_like(problem.offset)
         if start is not None:
             begin += start[:, *window] * problem.pressed
-        shear = level.begin(problem, begin) if NEST(start) else problem.balanced(begin)
+        shear = problem.balanced(begin) if begin.any() else level.begin(problem, begin)
         if shear is None:
             raise self._beyond_friction(problem, forces)
         solution = newton_on_disks(problem, shear, tolerance, ITERATIONS)

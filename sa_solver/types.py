@@ -55,12 +55,6 @@ class Material:
         return self.young * self.poisson / ((1.0 + self.poisson) * (1.0 - 2.0 * self.poisson))
 
 
-def contact_modulus(body_1: Material, body_2: Material) -> float:
-    """E* [MPa], 1/E* = Σ (1-ν²)/E (Johnson 1985, eq. 4.20)."""
-    compliance = sum((1.0 - m.poisson**2) / m.young for m in (body_1, body_2))
-    return 1.0 / compliance
-
-
 @dataclass(frozen=True)
 class ElasticPair:
     """Two half-spaces in contact, as the compliances that their relative displacement depends on.

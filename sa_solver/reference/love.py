@@ -25,7 +25,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.integrate import quad_vec
 
-from sa_solver.types import Array, Material, contact_modulus
+from sa_solver.types import Array, ElasticPair, Material
 
 Kernel = Callable[[float, float], Array]
 """Displacement (3,) at ``(x, y)`` from a unit force at the origin, homogeneous of degree -1."""
@@ -73,7 +73,7 @@ class UniformRectangle:
 
     def pressed(self, x: float, y: float) -> Array:
         """Displacement per unit pressure at ``(x, y)`` [mm/MPa]."""
-        normal = 1.0 / (np.pi * contact_modulus(self.body_1, self.body_2))
+        normal = 1.0 / (np.pi * ElasticPair(self.body_1, self.body_2).contact_modulus)
         cross = _cross_compliance(self.body_1, self.body_2) / np.pi
 
         def kernel(x: float, y: float) -> Array:
@@ -121,7 +121,7 @@ class UniformStrip:
 
     def _logarithm(self, x: Array) -> Array:
         """-(2 / π E*) ∫ ln(|x - ξ| / L) dξ."""
-        compliance = 2.0 / (np.pi * contact_modulus(self.body_1, self.body_2))
+        compliance = 2.0 / (np.pi * ElasticPair(self.body_1, self.body_2).contact_modulus)
         ends = _x_log(x + self.half_width, self.datum) - _x_log(x - self.half_width, self.datum)
         return compliance * (2.0 * self.half_width - ends)
 

@@ -25,7 +25,7 @@ import numpy as np
 
 from sa_solver.reference.hertz import Sphere
 from sa_solver.reference.masing import superpose
-from sa_solver.types import Array, Material, contact_modulus
+from sa_solver.types import Array, ElasticPair, Material
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ class ShearedSphere:
     @cached_property
     def contact(self) -> Sphere:
         """The normal contact, which shear does not change."""
-        return Sphere(self.load, self.radius, contact_modulus(self.body_1, self.body_2))
+        return Sphere(self.load, self.radius, ElasticPair(self.body_1, self.body_2).contact_modulus)
 
     @property
     def sliding_force(self) -> float:

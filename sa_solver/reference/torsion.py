@@ -34,7 +34,7 @@ from scipy.special import ellipe, elliprd, elliprj
 
 from sa_solver.reference.hertz import Sphere
 from sa_solver.reference.masing import superpose
-from sa_solver.types import Array, Material, contact_modulus
+from sa_solver.types import Array, ElasticPair, Material
 
 ROUNDING = 1e-12
 """Moments this close to sliding, relative to it, slide: the quadrature is not better than that."""
@@ -57,7 +57,7 @@ class TwistedSphere:
     @cached_property
     def contact(self) -> Sphere:
         """The normal contact, which twist does not change."""
-        return Sphere(self.load, self.radius, contact_modulus(self.body_1, self.body_2))
+        return Sphere(self.load, self.radius, ElasticPair(self.body_1, self.body_2).contact_modulus)
 
     @property
     def sliding_moment(self) -> float:

@@ -6,10 +6,10 @@ from scipy.integrate import quad
 
 from sa_solver.reference.flat_rounded import FlatRounded
 from sa_solver.reference.hertz import Cylinder, Sphere
-from sa_solver.types import Material, contact_modulus
+from sa_solver.types import ElasticPair, Material
 
 TITANIUM = Material(115e3, 0.29)
-MODULUS = contact_modulus(TITANIUM, TITANIUM)
+MODULUS = ElasticPair(TITANIUM, TITANIUM).contact_modulus
 PRODUCTION = FlatRounded(4.0, 30.0, 1440.0, MODULUS)
 
 

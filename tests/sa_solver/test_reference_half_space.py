@@ -7,10 +7,10 @@ from scipy.integrate import dblquad, quad
 from sa_solver.reference.hertz import Cylinder
 from sa_solver.reference.love import UniformRectangle, UniformStrip, love_displacement
 from sa_solver.reference.waviness import ChebyshevPunch, WavySurface
-from sa_solver.types import Material, contact_modulus
+from sa_solver.types import ElasticPair, Material
 
 STEEL, RUBBERY = Material(210e3, 0.3), Material(5e3, 0.45)
-MODULUS = contact_modulus(STEEL, RUBBERY)
+MODULUS = ElasticPair(STEEL, RUBBERY).contact_modulus
 HALF_SIDES = (0.3, 0.2)
 PAIR = UniformRectangle(HALF_SIDES, STEEL, RUBBERY)
 PLACES = [(0.0, 0.0), (0.1, -0.15), (0.3, 0.05), (0.3, 0.2), (0.7, 0.2), (1e-9, 0.5), (-2.0, 3.0)]

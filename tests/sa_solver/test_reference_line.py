@@ -13,10 +13,10 @@ from sa_solver.reference.line_partial_slip import (
     ShearedCylinder,
     ciavarella_jaeger,
 )
-from sa_solver.types import Material, contact_modulus
+from sa_solver.types import ElasticPair, Material
 
 STEEL = Material(210e3, 0.3)
-MODULUS = contact_modulus(STEEL, STEEL)
+MODULUS = ElasticPair(STEEL, STEEL).contact_modulus
 LINE = Cylinder(200.0, 30.0, MODULUS)
 FRICTION = 0.6
 SLIDING = FRICTION * LINE.load

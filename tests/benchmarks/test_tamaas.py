@@ -1,0 +1,114 @@
+"""Side by side with Tamaas: Hertz contact, not periodic, one thread, equal residual.
+
+A sphere whose contact radius is 0.6 of the grid's half width. Tamaas (``pip install tamaas``, used
+here only) solves with Polonsky and Keer's conjugate gradients and its zero-padded operator. Both
+results are judged by our residuals, on our operator; Tamaas's tolerance is the loosest that meets
+the bound. Times are medians of processor seconds of several runs, set-up apart and reported; the
+record holds ratios.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from statistics import median
+
+import numpy as np
+import pytest
+
+from sa_solver.half_space import HalfSpace
+from sa_solver.normal import NormalContact
+from sa_solver.normal_problem import contact_residuals
+from sa_solver.reference.hertz import Sphere
+from sa_solver.types import Array, ElasticPair, Grid, Material
+
+RESIDUAL = 1e-6
+TITANIUM = Material(115e3, 0.29)
+PAIR = ElasticPair(TITANIUM, TITANIUM)
+SPHERE = Sphere(400.0, 10.0, PAIR.contact_modulus)
+CONTACT_SHARE = 0.6
+GOAL = 12.0
+
+
+def seconds(action: Callable[[], object], runs: int) -> float:
+    """Median processor time of ``action``."""
+    times = []
+    for _ in range(runs):
+        begin = time.process_time()
+        action()
+        times.append(time.process_time() - begin)
+    return median(times)
+
+
+def sphere(cells: int) -> tuple[Grid, Array]:
+    width = 2.0 * SPHERE.contact_radius / CONTACT_SHARE
+    grid = Grid.covering((width, width), (cells, cells))
+    return grid, SPHERE.gap(grid.x, grid.y)
+
+
+def residual_of(half_space: HalfSpace, height: Array, pressure: Array) -> float:
+    """Penetration or complementarity, with the approach that makes Σ p g vanish."""
+    moved = half_space.normal(pressure)
+    lifted = height + moved
+    approach = np.vdot(lifted, pressure) / pressure.sum()
+    return max(contact_residuals(pressure, moved, lifted - approach))
+
+
+def tamaas_solve(grid: Grid, height: Array, tolerance: float) -> Array:
+    tm = pytest.importorskip("tamaas", reason="pip install tamaas")
+    tm.initialize(1)
+    tm.set_log_level(tm.LogLevel.error)
+    model = tm.ModelFactory.createModel(tm.model_type.basic_2d, list(grid.size), list(grid.shape))
+    model.E, model.nu = PAIR.contact_modulus, 0.0
+    tm.ModelFactory.registerNonPeriodic(model, "dcfft")
+    method = tm.PolonskyKeerRey
+    solver = method(model, -height, tolerance, method.pressure, method.pressure)
+    solver.setIntegralOperator("dcfft")
+    solver.max_iter = 5000
+    solver.solve(SPHERE.load / (grid.size[0] * grid.size[1]))
+    return np.array(model.traction)
+
+
+@pytest.mark.parametrize(("cells", "runs"), [(256, 7), (512, 3), (1024, 3)])
+def test_faster_than_tamaas(cells: int, runs: int) -> None:
+    pytest.importorskip("tamaas", reason="pip install tamaas")
+    grid, height = sphere(cells)
+    contact = NormalContact(HalfSpace(grid, PAIR))
+
+    def solve() -> object:
+        return contact.solve(height, SPHERE.load, tolerance=RESIDUAL)
+
+    first = seconds(solve, 1)
+    cold = contact.solve(height, SPHERE.load, tolerance=RESIDUAL)
+    worn = height + 0.02 * cold.approach * cold.pressure / cold.pressure.max()
+    warm = contact.solve(worn, SPHERE.load, tolerance=RESIDUAL, start=cold.start)
+    assert residual_of(contact.half_space, height, cold.pressure) <= 1.5 * RESIDUAL
+    for tolerance in (4e-6, 2e-6, 1e-6, 5e-7):
+        theirs = tamaas_solve(grid, height, tolerance)
+        if residual_of(contact.half_space, height, theirs) <= RESIDUAL:
+            break
+    scale = cold.pressure.max()
+    np.testing.assert_allclose(theirs, cold.pressure, atol=0.02 * scale)
+    ours_time = seconds(solve, 2 * runs)
+    their_time = seconds(lambda: tamaas_solve(grid, height, tolerance), runs)
+    convolution = seconds(lambda: contact.half_space.normal(cold.pressure), 2 * runs)
+    ratio = their_time / ours_time
+    print(
+        f"\n{cells} x {cells}: {1e3 * ours_time:.0f} ms (set-up {1e3 * (first - ours_time):.0f} ms "
+        f"more, once), {ours_time / convolution:.1f} times a convolution; convolutions cold "
+        f"{cold.convolutions}, warm {warm.convolutions}; Tamaas {1e3 * their_time:.0f} ms at "
+        f"tolerance {tolerance:g}; ratio {ratio:.1f}, with set-up {their_time / first:.1f}"
+    )
+    assert ratio >= GOAL
+
+
+def test_convolutions_hardly_grow_with_the_grid() -> None:
+    """At most half as many again from 128² to 1024² cells, at 1e-8, coarser grids included."""
+    counts = []
+    for cells in (128, 256, 512, 1024):
+        grid, height = sphere(cells)
+        state = NormalContact(HalfSpace(grid, PAIR)).solve(height, SPHERE.load)
+        assert state.converged
+        counts.append(state.convolutions)
+    print(f"\nconvolutions from 128² to 1024²: {counts}")
+    assert max(counts) <= 1.5 * counts[0]

@@ -1,0 +1,136 @@
+"""Increments of a frictional contact: normal, tangential and sliding states, one from another."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from sa_solver.contact import FrictionalContact, FrictionError, Load
+from sa_solver.half_space import HalfSpace
+from sa_solver.tangential import FrictionLimitError
+from sa_solver.types import ElasticPair, Grid, Material
+
+TITANIUM = Material(115e3, 0.29)
+GRID = Grid.covering((1.0, 1.0), (32, 32))
+HEIGHT = (GRID.x**2 + GRID.y**2) / 20.0
+FRICTION = 0.6
+
+
+def contact(friction=FRICTION):
+    return FrictionalContact(HalfSpace(GRID, ElasticPair(TITANIUM, TITANIUM)), friction)
+
+
+def load(P, Qx=0.0, Qy=0.0, Mz=0.0, **more):
+    return Load(np.array([P, Qx, Qy, 0.0, 0.0, Mz]), **more)
+
+
+def test_resultants_motions_and_energy_add_up():
+    """Over increments with changing pressure: Σ Ed = Σ Q·Δδ + Mz Δφz - Σ q·Δu S each time."""
+    solver = contact()
+    state = solver.apart(HEIGHT)
+    for P, Qx, Qy, Mz in [
+        (100.0, 0.0, 0.0, 0.0),
+        (300.0, 80.0, 20.0, 3.0),
+        (400.0, 150.0, -60.0, -4.0),
+        (200.0, -60.0, 30.0, 2.0),
+    ]:
+        before = state
+        state = solver.advance(before, HEIGHT, load(P, Qx, Qy, Mz))
+        wanted = np.array([P, Qx, Qy, 0.0, 0.0, Mz])
+        assert state.converged
+        np.testing.assert_allclose(state.resultants, wanted, rtol=1e-9, atol=1e-9 * P)
+        moved = (state.rigid - before.rigid)[[1, 2, 5]]
+        change = state.displacement[:2] - before.displacement[:2]
+        elastic = np.sum(state.shear * change) * GRID.cell_area
+        expected = float(wanted[[1, 2, 5]] @ moved) - elastic
+        assert state.energy.sum() == pytest.approx(expected, rel=1e-7, abs=1e-9)
+        assert state.energy.sum() >= 0.0
+        assert np.all(np.hypot(*state.shear) <= FRICTION * state.pressure * (1.0 + 1e-12))
+
+
+def test_motions_bring_the_same_state_as_their_forces():
+    solver = contact()
+    pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0, 30.0))
+    forced = solver.advance(pressed, HEIGHT, load(250.0, 100.0, -20.0, 2.0))
+    motion = Load(forced.rigid, motion=(True,) * 6)
+    moved = solver.advance(pressed, HEIGHT, motion)
+    scale = forced.pressure.max()
+    np.testing.assert_allclose(moved.traction, forced.traction, atol=1e-5 * scale)
+    np.testing.assert_allclose(moved.resultants, forced.resultants, atol=1e-5 * 250.0)
+
+
+def test_bodies_that_part_forget_and_carry_nothing():
+    solver = contact()
+    pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0, 90.0))
+    apart = solver.advance(pressed, HEIGHT, load(0.0))
+    assert apart.converged
+    assert not apart.traction.any()
+    with pytest.raises(FrictionLimitError, match="give a normal load first"):
+        solver.advance(apart, HEIGHT, load(0.0, 1.0))
+
+
+def test_sliding_is_decided_by_force_and_energy():
+    solver = contact()
+    pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0))
+    limit = FRICTION * 300.0
+    energy = np.array([2.0, 0.0])
+    partial = solver.advance(pressed, HEIGHT, load(300.0, 0.9 * limit, energy=energy))
+    assert not partial.sliding
+    assert partial.resultants[1] == pytest.approx(0.9 * limit, rel=1e-9)
+    for force in (0.9999 * limit, 1.05 * limit):
+        sliding = solver.advance(pressed, HEIGHT, load(300.0, force, energy=energy))
+        assert sliding.sliding
+        assert sliding.energy.sum() == pytest.approx(2.0, rel=1e-5)
+        assert sliding.resultants[1] == pytest.approx(limit, rel=5e-3)
+        assert not sliding.sticking.any()
+    with pytest.raises(FrictionLimitError, match="the largest in this direction is Qx = 180"):
+        solver.advance(pressed, HEIGHT, load(300.0, 1.05 * limit))
+
+
+def test_without_friction_there_is_no_shear():
+    solver = contact(0.0)
+    state = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0))
+    assert state.converged
+    assert not state.shear.any()
+
+
+@pytest.mark.parametrize("friction", [-0.1, np.nan, np.inf])
+def test_friction_without_meaning(friction):
+    with pytest.raises(FrictionError, match="must be a number of 0 or more"):
+        contact(friction)
+
+
+def test_strain_is_that_of_body_2_over_body_1():
+    """Tension in body 2 alone: its surface would stretch, shear from body 1 holds it back."""
+    solver = contact()
+    pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0))
+    stretched = solver.advance(pressed, HEIGHT, load(300.0, strain=1e-4))
+    right = stretched.shear[0][GRID.x[:, 0] > 0.0].sum()
+    assert right < 0.0
+    assert stretched.shear[0].sum() == pytest.approx(0.0, abs=1e-8 * abs(right))
+    again = solver.advance(stretched, HEIGHT, load(300.0, strain=1e-4))
+    np.testing.assert_allclose(again.shear, stretched.shear, atol=1e-6 * abs(right))
+
+
+@settings(max_examples=15, deadline=None, derandomize=True)
+@given(st.integers(0, 2**32 - 1))
+def test_any_rough_history(seed):
+    """Equilibrium, cone and dissipation on rough surfaces, materials, frictions and histories."""
+    rng = np.random.default_rng(seed)
+    grid = Grid(tuple(rng.integers(6, 24, 2)), tuple(rng.uniform(0.02, 0.1, 2)))
+    material = Material(10.0 ** rng.uniform(3, 5.5), rng.uniform(0.0, 0.49))
+    friction = rng.uniform(0.05, 1.2)
+    solver = FrictionalContact(HalfSpace(grid, ElasticPair(material, material)), friction)
+    height = 2e-3 * rng.standard_normal(grid.shape) + (grid.x**2 + grid.y**2) / 30.0
+    state = solver.apart(height)
+    for _ in range(4):
+        P = material.young * 10.0 ** rng.uniform(-4.5, -3.0)
+        angle, share = rng.uniform(0.0, 2.0 * np.pi), 0.95 * friction * rng.random()
+        values = np.array([P, P * share * np.cos(angle), P * share * np.sin(angle), 0, 0, 0])
+        motion = (False, False, False, True, True, True)
+        state = solver.advance(state, height, Load(values, motion))
+        assert state.converged
+        np.testing.assert_allclose(state.resultants[:3], values[:3], atol=1e-7 * P)
+        assert np.all(np.hypot(*state.shear) <= friction * state.pressure * (1.0 + 1e-12))
+        moved = np.abs(state.shear * state.displacement[:2]).sum() * grid.cell_area
+        assert state.energy.sum() >= -1e-7 * moved

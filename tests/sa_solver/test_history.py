@@ -1,0 +1,198 @@
+"""Histories: what is chosen and why, legs in one step, errors measured and their rate."""
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from sa_solver.contact import FrictionalContact
+from sa_solver.half_space import HalfSpace
+from sa_solver.history import HistoryError, LoadPath, march, turning_points
+from sa_solver.normal import NormalContact
+from sa_solver.reference.line_partial_slip import ciavarella_jaeger
+from sa_solver.types import ElasticPair, Grid, Material
+
+FRICTION, LOAD = 0.6, 300.0
+SLIDING = FRICTION * LOAD
+
+
+def ball(poisson, cells=32):
+    material = Material(115e3, poisson)
+    grid = Grid.covering((0.9, 0.9), (cells, cells))
+    half_space = HalfSpace(grid, ElasticPair(material, material))
+    return half_space, (grid.x**2 + grid.y**2) / 20.0
+
+
+def cylinder(cells=128):
+    material = Material(115e3, 0.3)
+    grid = Grid.strips(2.0, cells)
+    return HalfSpace(grid, ElasticPair(material, material)), grid.x**2 / 60.0
+
+
+def path(shares, press=3, strain=None, turned=0.0):
+    """Pressing in a few increments, then shear forces."""
+    shares = np.array(shares)
+    values = np.zeros((press + len(shares), 6))
+    values[:press, 0] = LOAD * np.arange(1, press + 1) / press
+    values[press:, 0] = LOAD
+    values[press:, 1] = SLIDING * shares * np.cos(turned)
+    values[press:, 2] = SLIDING * shares * np.sin(turned)
+    if strain is not None:
+        strain = np.r_[np.zeros(press), strain * shares]
+    return LoadPath(values, strain=strain)
+
+
+def legs(*points, steps=6):
+    ends = [0.0, *points]
+    parts = [np.linspace(a, b, steps + 1)[1:] for a, b in pairwise(ends)]
+    return np.concatenate(parts)
+
+
+CYCLE = legs(0.8, -0.8, 0.5)
+
+
+def test_turning_points():
+    assert turning_points(path(CYCLE)) == [2, 8, 14, 20]
+    assert turning_points(path(legs(0.5))) == [2, 8]
+
+
+@pytest.mark.parametrize("contact", [cylinder(), ball(0.0)], ids=["line", "nu=0"])
+def test_legs_in_one_step_are_exact_where_slip_keeps_its_direction(contact):
+    half_space, height = contact
+    full = march(half_space, height, path(CYCLE), FRICTION, history="full", tolerance=1e-10)
+    auto = march(half_space, height, path(CYCLE), FRICTION, tolerance=1e-10)
+    assert auto.method == "reversals"
+    assert auto.reason == "similar bodies, pressure constant while the shear load turns"
+    assert auto.error is None
+    assert auto.indices == [2, 8, 14, 20]
+    for index, state in zip(auto.indices, auto.states, strict=True):
+        expected = full.states[index]
+        scale = FRICTION * expected.pressure.max()
+        np.testing.assert_allclose(state.shear, expected.shear, atol=1e-6 * scale)
+        np.testing.assert_allclose(state.rigid, expected.rigid, rtol=1e-6, atol=1e-12)
+    by_leg = [sum(full.states[k].energy.sum() for k in range(a, b)) for a, b in ((3, 9), (9, 15))]
+    assert [state.energy.sum() for state in auto.states[1:3]] == pytest.approx(by_leg, rel=1e-6)
+
+
+def test_legs_with_poisson_ratio_have_a_measured_error():
+    half_space, height = ball(0.45)
+    full = march(half_space, height, path(CYCLE), FRICTION, history="full")
+    auto = march(half_space, height, path(CYCLE), FRICTION)
+    scale = FRICTION * full.states[-1].pressure.max()
+    true = np.abs(auto.states[-1].shear - full.states[-1].shear).max() / scale
+    assert auto.method == "reversals"
+    assert auto.error is not None
+    assert auto.error_of == "the last leg in two steps"
+    assert 0.0 < auto.error < 0.1
+    assert 0.1 * true < auto.error + 1e-3
+
+
+def test_bulk_stress_in_proportion_is_a_leg_too():
+    half_space, height = cylinder()
+    loading = path(CYCLE, strain=2e-4)
+    full = march(half_space, height, loading, FRICTION, history="full", tolerance=1e-10)
+    auto = march(half_space, height, loading, FRICTION, tolerance=1e-10)
+    scale = FRICTION * full.states[-1].pressure.max()
+    assert auto.method == "reversals"
+    np.testing.assert_allclose(auto.states[-1].shear, full.states[-1].shear, atol=1e-5 * scale)
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ("pressure", "the normal load changes while shear is on"),
+        ("energy", "sliding is given by its energy"),
+        ("direction", "the shear load changes direction"),
+        ("dissimilar", "the bodies are dissimilar"),
+    ],
+)
+def test_auto_says_why_it_takes_every_increment(change, reason):
+    half_space, height = cylinder(32)
+    loading = path([0.2, 0.4, 0.1])
+    energy = None
+    if change == "pressure":
+        loading.values[-1, 0] *= 1.1
+    if change == "direction":
+        loading.values[-1, 2] = 3.0
+    if change == "energy":
+        energy = np.zeros((len(loading), 2))
+    if change == "dissimilar":
+        pair = ElasticPair(Material(115e3, 0.3), Material(70e3, 0.3))
+        half_space = HalfSpace(half_space.grid, pair)
+    loading = LoadPath(loading.values, energy=energy)
+    found = march(half_space, height, loading, FRICTION)
+    assert found.method == "full"
+    assert found.reason == reason
+    assert found.indices == list(range(6))
+    if change != "direction":
+        with pytest.raises(HistoryError, match="use full or auto"):
+            march(half_space, height, loading, FRICTION, history="reversals")
+
+
+def test_the_error_of_a_full_path_falls_with_its_increments():
+    """Load that turns in the plane: backward steps are of first order, and so is their estimate."""
+    half_space, height = ball(0.3, 24)
+    found = []
+    for steps in (8, 16, 32):
+        angle = np.linspace(0.0, 0.5 * np.pi, steps + 1)[1:]
+        values = np.zeros((steps + 2, 6))
+        values[:, 0] = LOAD
+        values[1:, 1] = 0.8 * SLIDING
+        values[2:, 1] = 0.8 * SLIDING * np.cos(angle)
+        values[2:, 2] = 0.8 * SLIDING * np.sin(angle)
+        found.append(march(half_space, height, LoadPath(values), FRICTION, estimate_error=True))
+    errors = [own.error for own in found]
+    scale = FRICTION * found[0].states[-1].pressure.max()
+    true = np.abs(found[1].states[-1].shear - found[2].states[-1].shear).max() / scale
+    assert found[0].error_of == "the same path with half the increments"
+    assert 1.4 < errors[0] / errors[1] < 3.0
+    assert 1.4 < errors[1] / errors[2] < 3.0
+    assert 0.3 * true < errors[1] < 4.0 * true
+
+
+def test_no_error_where_every_increment_turns_back():
+    half_space, height = cylinder(32)
+    zigzag = path([0.5, -0.5, 0.5, -0.5], press=1)
+    found = march(half_space, height, zigzag, FRICTION, history="full", estimate_error=True)
+    assert found.error is None
+
+
+def test_a_leg_is_two_normal_problems():
+    """Ciavarella and Jäger: q = µ [p(P) - p(P - Q/µ)], for a flat with rounded edges."""
+    half_space, _ = cylinder(256)
+    grid = half_space.grid
+    height = np.maximum(np.abs(grid.x) - 0.4, 0.0) ** 2 / 20.0
+    loading = path(legs(0.7))
+    end = march(half_space, height, loading, FRICTION, tolerance=1e-10).states[-1]
+    normal = NormalContact(half_space)
+
+    def pressure(load):
+        return normal.solve(height, load, tilt_y=0.0, tolerance=1e-10).pressure
+
+    expected = ciavarella_jaeger(pressure, LOAD, 0.7 * SLIDING, FRICTION)
+    np.testing.assert_allclose(end.shear[0], expected, atol=1e-6 * expected.max())
+
+
+def test_progress_and_failure(monkeypatch):
+    half_space, height = cylinder(32)
+    rows = []
+    march(
+        half_space,
+        height,
+        path([0.3, 0.6]),
+        FRICTION,
+        history="full",
+        progress=lambda row, state: rows.append((row, state.converged)),
+    )
+    assert rows == [(row, True) for row in range(5)]
+    advance = FrictionalContact.advance
+
+    def fails(self, before, height, load):
+        state = advance(self, before, height, load)
+        object.__setattr__(state, "converged", load.values[1] == 0.0)
+        return state
+
+    monkeypatch.setattr(FrictionalContact, "advance", fails)
+    stopped = march(half_space, height, path([0.3, 0.6]), FRICTION, history="full")
+    assert stopped.indices == [0, 1, 2, 3]
+    assert not stopped.states[-1].converged
