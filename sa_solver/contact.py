@@ -18,6 +18,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from sa_solver.ciavarella_jaeger import first_loading
 from sa_solver.coupled import CoupledContact, CoupledStart, CoupledState
 from sa_solver.friction_limit import largest_share
 from sa_solver.gross_slip import Direction, Sliding, State, gross_slip, sliding_direction
@@ -158,13 +159,24 @@ class FrictionalContact:
             return self._together(before, height, load)
         normal = self._press(before, height, load)
         limit = self.friction * normal.pressure
-        offset = self.offset(before, load)
+        offset, area = self.offset(before, load), self.grid.cell_area
         sliding = self._slides(limit, load)
         if sliding:
             tangential = self._slide(limit, offset, load)
+        elif self.two_normal_problems(before, load) and abs(load.values[1]) < limit.sum() * area:
+            tangential = first_loading(
+                self.normal, height, normal, self.friction, load.values[1], self.tolerance
+            )
         else:
             tangential = self._shear(before, limit, offset, load)
         return self._state(before, load, normal, tangential, sliding)
+
+    def two_normal_problems(self, before: ContactState, load: Load) -> bool:
+        """Whether the shear follows from two normal problems: first loading of a line contact."""
+        along_x = load.values[1] != 0.0 and load.values[2] == 0.0
+        by_force = not any(load.motion[k] for k in (0, 1, 2, 4))
+        fresh = not before.shear.any() and load.strain == before.strain
+        return self.grid.line and self.friction > 0.0 and along_x and by_force and fresh
 
     def offset(self, before: ContactState, load: Load) -> Array:
         """Tangential displacement ``(2, nx, ny)`` [mm] of the increment without its tractions."""

@@ -4,10 +4,8 @@ Friction remembers, so in general every increment is solved from the one before 
 the bodies are alike and pressure stays while the shear load moves back and forth along one line,
 the contact remembers only the turning points of the load, and legs are taken in one step
 (``reversals``): exact for line contacts and for ν = 0, where slip keeps its direction during a leg,
-and measured otherwise. A shear force that only grows is one leg. (In line contacts two normal
-problems would give its end too, after Ciavarella 1998, Int. J. Solids Struct. 35, 2349, and Jäger
-1997, J. Tribol. 119, 401. It is the same shear, and saves a hundredth of a second once per history:
-tests compare the two.)
+and measured otherwise. A shear force that only grows is one leg; in a line contact two normal
+problems give its end (``ciavarella_jaeger``: :mod:`sa_solver.ciavarella_jaeger`).
 
 Source: Spinu & Frunza 2015, J. Phys. Conf. Ser. (reversals).
 """
@@ -24,7 +22,7 @@ from sa_solver.contact import NORMAL, TANGENTIAL, ContactState, FrictionalContac
 from sa_solver.half_space import HalfSpace
 from sa_solver.types import Array
 
-Method = Literal["full", "reversals"]
+Method = Literal["full", "reversals", "ciavarella_jaeger"]
 
 STRAIGHT = 1e-9
 """How far two increments of the shear load may be from parallel: rounding of a straight leg."""
@@ -214,7 +212,8 @@ def _reversals(
     rows = turning_points(path)
     states = _solve(contact, height, path, rows, progress)
     reason = "similar bodies, pressure constant while the shear load turns"
-    history = History(states, rows[: len(states)], "reversals", reason)
+    method: Method = "ciavarella_jaeger" if _one_leg(contact, states, path, rows) else "reversals"
+    history = History(states, rows[: len(states)], method, reason)
     alike = contact.grid.line or contact.half_space.pair.poisson == 0.0
     exact = alike and _proportional(path.shear)
     if exact or len(states) < 2 or not states[-1].converged:
@@ -227,6 +226,15 @@ def _reversals(
     # One step against two: the error of the one is about twice the difference.
     error = 2.0 * _shear_difference(contact, states[-1], end)
     return replace(history, error=error, error_of="the last leg in two steps")
+
+
+def _one_leg(
+    contact: FrictionalContact, states: list[ContactState], path: LoadPath, rows: list[int]
+) -> bool:
+    """Whether the last leg is the first loading of a line contact."""
+    before = states[-2] if len(states) > 1 else states[-1]
+    begun = len(states) == len(rows) > 1
+    return begun and contact.two_normal_problems(before, path.load(rows[-1]))
 
 
 def _with_midpoint(path: LoadPath, first: int, last: int) -> Load:

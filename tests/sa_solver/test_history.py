@@ -157,20 +157,36 @@ def test_no_error_where_every_increment_turns_back():
     assert found.error is None
 
 
-def test_a_leg_is_two_normal_problems():
-    """Ciavarella and Jäger: q = µ [p(P) - p(P - Q/µ)], for a flat with rounded edges."""
+def test_first_loading_of_a_line_contact_is_two_normal_problems(monkeypatch):
+    """The same as Newton's method finds, and as the reference makes of any pressure solver."""
     half_space, _ = cylinder(256)
     grid = half_space.grid
     height = np.maximum(np.abs(grid.x) - 0.4, 0.0) ** 2 / 20.0
-    loading = path(legs(0.7))
-    end = march(half_space, height, loading, FRICTION, tolerance=1e-10).states[-1]
-    normal = NormalContact(half_space)
+    for sign in (1.0, -1.0):
+        loading = path(sign * np.asarray(legs(0.7)))
+        found = march(half_space, height, loading, FRICTION, tolerance=1e-10)
+        assert found.method == "ciavarella_jaeger"
+        two = found.states[-1]
+        with monkeypatch.context() as patch:
+            patch.setattr(FrictionalContact, "two_normal_problems", lambda *_: False)
+            newton = march(half_space, height, loading, FRICTION, tolerance=1e-10)
+        assert newton.method == "reversals"
+        one = newton.states[-1]
+        limit = FRICTION * one.pressure.max()
+        np.testing.assert_allclose(two.shear, one.shear, atol=1e-6 * limit)
+        np.testing.assert_allclose(two.slip, one.slip, atol=1e-7 * abs(one.rigid[1]))
+        np.testing.assert_allclose(two.displacement, one.displacement, atol=1e-7 * one.rigid[0])
+        assert two.rigid == pytest.approx(one.rigid, rel=1e-7, abs=1e-12)
+        assert two.energy == pytest.approx(one.energy, rel=1e-6, abs=1e-15)
+        assert two.resultants == pytest.approx(loading.values[-1], rel=1e-8, abs=1e-8 * LOAD)
+        np.testing.assert_array_equal(two.sticking, one.sticking)
+        assert two.convolutions < one.convolutions
 
     def pressure(load):
-        return normal.solve(height, load, tilt_y=0.0, tolerance=1e-10).pressure
+        return NormalContact(half_space).solve(height, load, tilt_y=0.0, tolerance=1e-10).pressure
 
-    expected = ciavarella_jaeger(pressure, LOAD, 0.7 * SLIDING, FRICTION)
-    np.testing.assert_allclose(end.shear[0], expected, atol=1e-6 * expected.max())
+    expected = ciavarella_jaeger(pressure, LOAD, -0.7 * SLIDING, FRICTION)
+    np.testing.assert_allclose(two.shear[0], expected, atol=1e-6 * np.abs(expected).max())
 
 
 def test_progress_and_failure(monkeypatch):
