@@ -19,7 +19,9 @@ test-full: check lint
 
 bench: check
 	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[test,bench]'
-	$(ONE_THREAD) $(BIN)/python -m pytest -q -s -m "slow or not slow" tests/benchmarks
+	$(ONE_THREAD) $(BIN)/python -m pytest -q -s tests/benchmarks/test_tamaas.py
+	$(ONE_THREAD) $(BIN)/python -m pytest -q -s -m "slow or not slow" tests/benchmarks \
+	    --ignore tests/benchmarks/test_tamaas.py
 
 lint: install
 	$(BIN)/ruff check .

@@ -171,7 +171,8 @@ class SpectralFilter:
     ) -> None:
         """``transform`` needs as many spectra as there are inputs or outputs."""
         self._transform = transform
-        self._symbols = symbols
+        # Spectra are multiplied as pairs of reals: numpy would make a real factor complex first.
+        self._symbols = [[np.repeat(own, 2, axis=1) for own in row] for row in symbols]
         self._inputs, self._outputs = imaginary
         rows = transform.padded[0]
         row_size = transform.spectra[0].size // rows
@@ -192,15 +193,17 @@ class SpectralFilter:
 
     def _multiply(self, spectra: list[Spectrum], block: slice) -> None:
         """Replace the inputs in ``spectra`` by the outputs."""
+        pairs = [spectrum.view(np.float64) for spectrum in spectra]
         if len(self._symbols) == len(self._symbols[0]) == 1 and not (self._inputs or self._outputs):
-            spectra[0] *= self._symbols[0][0][block]
+            pairs[0] *= self._symbols[0][0][block]
             return
-        inputs = [spectra[j].copy() for j in range(len(self._symbols[0]))]
         for j in self._inputs:
-            inputs[j] *= -1j
+            spectra[j] *= -1j
+        inputs = [pairs[j].copy() for j in range(len(self._symbols[0]))]
+        product = np.empty_like(inputs[0])
         for i, row in enumerate(self._symbols):
-            np.multiply(row[0][block], inputs[0], out=spectra[i])
+            np.multiply(row[0][block], inputs[0], out=pairs[i])
             for j in range(1, len(row)):
-                spectra[i] += row[j][block] * inputs[j]
+                pairs[i] += np.multiply(row[j][block], inputs[j], out=product)
             if i in self._outputs:
                 spectra[i] *= 1j

@@ -71,7 +71,7 @@ def test_on_a_periodic_half_space_it_is_the_inverse(compliance):
 def test_where_compliance_dominates_it_is_nearly_its_inverse():
     """1/D interpolated linearly in ln D between three levels: the chord of a convex function."""
     compliance = np.geomspace(1.0, 100.0, 84).reshape(GRID.shape)
-    preconditioner = NormalPreconditioner(HalfSpace(grid, PAIR))
+    preconditioner = NormalPreconditioner(HalfSpace(GRID, PAIR))
     preconditioner.include(compliance)
     ratio = compliance * preconditioner.apply(np.ones(GRID.shape))
     spacing = np.log(100.0) / 2.0
@@ -81,8 +81,8 @@ def test_where_compliance_dominates_it_is_nearly_its_inverse():
 
 
 def test_without_compliance_it_is_as_before_one_was_included():
-    displacement = np.random.default_rng(1).standard_normal(grid.shape)
-    preconditioner = NormalPreconditioner(HalfSpace(grid, PAIR))
+    displacement = np.random.default_rng(1).standard_normal(GRID.shape)
+    preconditioner = NormalPreconditioner(HalfSpace(GRID, PAIR))
     before = preconditioner.apply(displacement)
     preconditioner.include(ramp(GRID, 1e-2))
     assert not np.allclose(preconditioner.apply(displacement), before)
@@ -91,7 +91,7 @@ def test_without_compliance_it_is_as_before_one_was_included():
 
 
 def test_it_needs_no_zero_padded_convolution():
-    half_space = HalfSpace(grid, PAIR)
+    half_space = HalfSpace(GRID, PAIR)
     NormalPreconditioner(half_space).apply(np.ones(GRID.shape))
     assert half_space.count == 0
 
