@@ -128,7 +128,11 @@ class ContactStage:
         implicit = self._case.wear.step.kind == "implicit"
         step = wearing.implicit_step if implicit else wearing.explicit_step
         surfaces, result = step(state.surfaces, state.starts, cycles)
-        return self._after(state, surfaces, result, cycles), result.convolutions
+        after = self._after(state, surfaces, result, cycles)
+        # Friction of the half-space on the new surfaces: for the record now, to wear by next.
+        following = self._wearing(after).cycle
+        spent = result.convolutions + sum(own.convolutions for own in following)
+        return after, spent
 
     def stable_cycles(self, state: InterfaceState) -> float:
         """Largest stable explicit jump."""
