@@ -1,0 +1,101 @@
+"""Rates at which the grid reaches the closed forms that are not smooth at the contact's edge.
+
+Pressure and shear end like a square root, so that in the mean square they converge about as the
+pitch; what is an integral of them (approach, twist, shift) does about as its 3/2 power or better.
+"""
+
+import numpy as np
+import pytest
+
+from sa_solver.contact import FrictionalContact, Load
+from sa_solver.half_space import HalfSpace
+from sa_solver.normal import NormalContact
+from sa_solver.reference.flat_rounded import FlatRounded
+from sa_solver.reference.hertz import Cylinder, Ellipse
+from sa_solver.reference.line_partial_slip import BulkStressedCylinder
+from sa_solver.reference.torsion import TwistedSphere
+from sa_solver.reference.waviness import ChebyshevPunch
+from sa_solver.types import ElasticPair, Grid, Material
+
+STEEL = Material(200e3, 0.3)
+PAIR = ElasticPair(STEEL, STEEL)
+MODULUS = PAIR.contact_modulus
+FRICTION = 0.5
+
+
+def rate(errors):
+    """Order of convergence over all halvings of the pitch together."""
+    return np.log2(errors[0] / errors[-1]) / (len(errors) - 1)
+
+
+def mean_square(found, expected):
+    return np.linalg.norm(found - expected) / np.linalg.norm(expected)
+
+
+def test_elliptical_contact():
+    ellipse = Ellipse(400.0, 8.0, 30.0, MODULUS)
+    a, b = ellipse.semi_axes
+    pressures, approaches = [], []
+    for cells in (24, 48, 96, 192):
+        grid = Grid.covering((2.5 * a, 2.5 * b), (cells, cells))
+        state = NormalContact(HalfSpace(grid, PAIR)).solve(ellipse.gap(grid.x, grid.y), 400.0)
+        pressures.append(mean_square(state.pressure, ellipse.pressure(grid.x, grid.y)))
+        approaches.append(abs(state.approach / ellipse.approach - 1.0))
+    assert rate(pressures) > 0.8
+    assert pressures[-1] < 0.02
+    assert rate(approaches) > 1.3
+    assert approaches[-1] < 3e-4
+
+
+@pytest.mark.parametrize("share", [0.4, 0.9])
+def test_twisted_sphere(share):
+    sphere = TwistedSphere(400.0, 10.0, STEEL, STEEL, FRICTION)
+    moment, a = share * sphere.sliding_moment, sphere.contact.contact_radius
+    shears = []
+    for cells in (24, 48, 96, 192):
+        grid = Grid.covering((2.5 * a, 2.5 * a), (cells, cells))
+        contact = FrictionalContact(HalfSpace(grid, PAIR), FRICTION)
+        height = sphere.contact.gap(grid.x, grid.y)
+        load = Load(np.array([400.0, 0.0, 0.0, 0.0, 0.0, moment]))
+        state = contact.advance(contact.apart(height), height, load)
+        expected = sphere.shear(np.hypot(grid.x, grid.y), moment)
+        shears.append(mean_square(np.hypot(*state.shear), expected))
+        # The steps of the contact's edge give the error either sign: a bound, not a rate.
+        assert abs(state.rigid[5] / sphere.twist(moment) - 1.0) < 0.08 * (2.5 / cells) ** 1.5
+    assert rate(shears) > 0.7
+    assert shears[-1] < 0.03
+
+
+@pytest.mark.parametrize("body", [1, 2])
+def test_cylinder_with_bulk_stress(body):
+    cylinder = Cylinder(400.0, 50.0, MODULUS)
+    form = BulkStressedCylinder(cylinder, FRICTION, 100.0, 60.0, body)
+    shears = []
+    for strips in (64, 128, 256, 512):
+        grid = Grid.strips(2.4 * cylinder.half_width, strips)
+        contact = FrictionalContact(HalfSpace(grid, PAIR), FRICTION)
+        height = cylinder.gap(grid.x)
+        pressed = contact.advance(
+            contact.apart(height), height, Load(np.array([400.0, 0, 0, 0, 0, 0]))
+        )
+        load = Load(np.array([400.0, 100.0, 0, 0, 0, 0]), strain=form.mismatch_strain)
+        state = contact.advance(pressed, height, load)
+        shears.append(mean_square(state.shear[0], form.shear(grid.x)))
+    assert rate(shears) > 0.7
+    assert shears[-1] < 0.02
+
+
+@pytest.mark.parametrize(
+    "form",
+    [ChebyshevPunch(0.5, 400.0, 0.05, 8, MODULUS), FlatRounded(4.0, 30.0, 400.0, MODULUS)],
+    ids=["waves", "rounded flat"],
+)
+def test_line_contacts_without_friction(form):
+    half = getattr(form, "contact_half_width", None) or form.half_width
+    pressures = []
+    for strips in (128, 256, 512, 1024):
+        grid = Grid.strips(2.3 * half, strips)
+        state = NormalContact(HalfSpace(grid, PAIR)).solve(form.gap(grid.x), 400.0)
+        pressures.append(mean_square(state.pressure, form.pressure(grid.x)))
+    assert rate(pressures) > 0.7
+    assert pressures[-1] < 0.03
