@@ -35,6 +35,7 @@ from sa_solver.half_space import (
     spectral_filter,
 )
 from sa_solver.influence import Z
+from sa_solver.normal_problem import border_share
 from sa_solver.splitting import douglas_rachford
 from sa_solver.tangential import FrictionLimitError
 from sa_solver.types import Array
@@ -442,17 +443,6 @@ class _Splitting:
         on_grid = self._inverse.on_grid(trial).copy()
         on_grid[Z] *= self._yield
         return self._inverse.padded(coulomb(on_grid, self._problem.friction))
-
-
-def border_share(pressure: Array) -> float:
-    """Share of the load on the outermost cells, along each direction that has more than two."""
-    border = np.zeros(pressure.shape, dtype=bool)
-    if pressure.shape[0] > 2:
-        border[[0, -1], :] = True
-    if pressure.shape[1] > 2:
-        border[:, [0, -1]] = True
-    total = float(pressure.sum())
-    return float(pressure[border].sum()) / total if total > 0.0 else 0.0
 
 
 def _check_field(name: str, field: Array, shape: tuple[int, ...]) -> None:

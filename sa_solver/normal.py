@@ -21,7 +21,13 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.nested_solver import NestedSolver, Solution
 from sa_solver.normal_control import NormalContactError as NormalContactError
 from sa_solver.normal_control import NormalControl
-from sa_solver.normal_problem import NormalProblem, NormalResiduals, Work, residuals
+from sa_solver.normal_problem import (
+    NormalProblem,
+    NormalResiduals,
+    Work,
+    border_share,
+    residuals,
+)
 from sa_solver.rigid_modes import APPROACH, RigidModes, mode_lengths
 from sa_solver.separation import separating_tilt
 from sa_solver.types import Array
@@ -192,7 +198,7 @@ class NormalContact:
             iterations=solution.iterations,
             convolutions=_equivalents(problem.work, self.half_space),
             work=problem.work,
-            border_load=_border_share(iterate.pressure),
+            border_load=border_share(iterate.pressure),
         )
 
     def _unpressed(
@@ -282,16 +288,6 @@ def _check_field(name: str, field: Array, shape: tuple[int, int]) -> None:
         raise NormalContactError(f"{name} have shape {field.shape}: give {shape}, the grid's")
     if not np.all(np.isfinite(field)):
         raise NormalContactError(f"{name} hold NaN or infinity: fill or crop the missing points")
-
-
-def _border_share(pressure: Array) -> float:
-    """Share of the load on the outermost cells, along each direction that has more than two."""
-    border = np.zeros(pressure.shape, dtype=bool)
-    if pressure.shape[0] > 2:
-        border[[0, -1], :] = True
-    if pressure.shape[1] > 2:
-        border[:, [0, -1]] = True
-    return float(pressure[border].sum() / pressure.sum())
 
 
 def _failure(measured: NormalResiduals, tolerance: float) -> str:

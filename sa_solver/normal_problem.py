@@ -111,3 +111,14 @@ def residuals(problem: NormalProblem, iterate: Iterate) -> NormalResiduals:
         penetration,
         complementarity,
     )
+
+
+def border_share(pressure: Array) -> float:
+    """Share of the load on the outermost cells, along each direction that has more than two."""
+    border = np.zeros(pressure.shape, dtype=bool)
+    if pressure.shape[0] > 2:
+        border[[0, -1], :] = True
+    if pressure.shape[1] > 2:
+        border[:, [0, -1]] = True
+    total = float(pressure.sum())
+    return float(pressure[border].sum()) / total if total > 0.0 else 0.0

@@ -24,7 +24,7 @@ from sa_solver.types import Array, Grid
 Mask = NDArray[np.bool_]
 
 BALANCE_TOLERANCE = 1e-13
-"""Resultants left by :func:`balanced`, relative to the largest shear force: rounding of a sum."""
+"""Resultants left by a balance, relative to the largest shear force: rounding of a sum."""
 
 BALANCE_ITERATIONS = 200
 """Newton takes 2 to 10, more only within 1e-3 of the largest force."""
@@ -34,7 +34,7 @@ LONGEST_STEP = 3.0
 without bound, and so would a step that follows the tangent."""
 
 RIDGE = 1e-14
-"""Keeps the Hessian of :func:`balanced` regular where no cell can change its shear any more."""
+"""Keeps the Hessian of a balance regular where no cell can change its shear any more."""
 
 SOFTENING = 0.3
 """Compliance added to the preconditioner, in units of a cell's own, for what curvature adds on the

@@ -88,7 +88,6 @@ class ContactStage:
         blade, disk = case.materials.blade.elastic(), case.materials.disk.elastic()
         self.pair = ElasticPair(disk, blade)
         half_space = HalfSpace(self.grid, self.pair)
-        self._contact = NormalContact(half_space)
         self._frictional: FrictionalContact | None = None
         if case.contact.method == "full":
             self._frictional = FrictionalContact(
@@ -97,6 +96,8 @@ class ContactStage:
                 case.contact.tolerance,
                 case.contact.gross_slip,
             )
+        own = self._frictional
+        self._contact = NormalContact(half_space) if own is None else own.normal
         self._laws = _law(case, "disk"), _law(case, "blade")
         self._current: tuple[tuple[Array, ...], Wearing] | None = None
 

@@ -12,6 +12,7 @@ from rich.progress import (
     BarColumn,
     MofNCompleteColumn,
     Progress,
+    ProgressColumn,
     TextColumn,
     TimeElapsedColumn,
     TimeRemainingColumn,
@@ -72,13 +73,9 @@ class Reporter:
             TextColumn("left"),
             TimeRemainingColumn(),
         )
-        self._bar_shown = True
-        try:
-            with Progress(*columns, console=self._console, transient=True) as progress:
-                task = progress.add_task("contact", total=total)
-                yield lambda reached: progress.update(task, completed=reached)
-        finally:
-            self._bar_shown = False
+        with self._bar(*columns) as progress:
+            task = progress.add_task("contact", total=total)
+            yield lambda reached: progress.update(task, completed=reached)
 
     @contextmanager
     def jumps(self, total: float, done: float) -> Iterator[JumpProgress]:
@@ -91,10 +88,16 @@ class Reporter:
             TextColumn("left"),
             TimeRemainingColumn(),
         )
+        with self._bar(*columns) as progress:
+            yield JumpProgress(progress, total, done)
+
+    @contextmanager
+    def _bar(self, *columns: ProgressColumn) -> Iterator[Progress]:
+        """A bar on the screen, where no stage is shown beside it."""
         self._bar_shown = True
         try:
             with Progress(*columns, console=self._console, transient=True) as progress:
-                yield JumpProgress(progress, total, done)
+                yield progress
         finally:
             self._bar_shown = False
 

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.figures.fields import centres, middle
+from workflow.figures.fields import centres, middle, near_middle
 from workflow.figures.style import BLACK, BLUE, GREEN, ORANGE, new_figure
 from workflow.store import grid_of
 
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = BLUE, ORANGE, GREEN
-# Nodes this close to the nearest row count as on the line, as a share of the face.
-ROW_SHARE = 0.01
 FIELDS = (("pressure", "p [MPa]", 1.0), ("shear", "qx [MPa]", 1.0), ("slip", "slip x [µm]", 1e3))
 
 
@@ -76,8 +74,7 @@ def _nodes_across(
     """Places and values of a field's x component at the nodes nearest to y = 0."""
     group = file["structure"][interface]
     coordinates, field = group["coordinates"][()], group[name][increment]
-    distance = np.abs(coordinates[:, 1])
-    near = distance <= distance.min() + ROW_SHARE * np.ptp(coordinates[:, 1])
+    near = near_middle(coordinates, 0)
     along = field if field.ndim == 1 else field[0]
     return coordinates[near, 0], along[near]
 

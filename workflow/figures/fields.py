@@ -16,6 +16,9 @@ PRESSURE_COLOURS = "viridis"
 MAP_PERCENTILE = 99.5
 # More profiles than this overlap.
 MAX_PROFILES = 6
+# Nodes this close to the nearest row count as on the line, as a share of the face: less than half
+# the rows of a mesh of 34 nodes, enough for rows that are not quite straight.
+ROW_SHARE = 0.01
 
 
 def draw_map(axis: Axes, field: Array, grid: Grid, top: float) -> Any:
@@ -43,6 +46,13 @@ def map_top(fields: list[Array]) -> float:
 def middle(field: Array, direction: int) -> Array:
     """Values along x (0) or y (1) next to the other axis' middle."""
     return np.take(field, field.shape[1 - direction] // 2, axis=1 - direction)
+
+
+def near_middle(coordinates: Array, direction: int) -> Any:
+    """Which nodes ``(n, 2)`` are on the row along x (0) or y (1) nearest to the middle, ``(n,)``."""
+    across = coordinates[:, 1 - direction]
+    distance = np.abs(across)
+    return distance <= distance.min() + ROW_SHARE * np.ptp(across)
 
 
 def centres(grid: Grid, direction: int) -> Array:

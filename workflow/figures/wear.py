@@ -18,6 +18,7 @@ from workflow.figures.fields import (
     draw_map,
     map_top,
     middle,
+    near_middle,
     spread,
 )
 from workflow.figures.style import BLACK, BLUE, FONT_SIZE, GREEN, ORANGE, PURPLE, new_figure
@@ -32,9 +33,6 @@ CYCLE_COLOURS = "viridis"
 STRESS_COLOURS, CHANGE_COLOURS = "magma_r", "RdBu_r"
 CHANGE = "worn less unworn"
 
-# Nodes this close to the nearest row count as on the line, as a share of the face: less than half
-# the rows of a mesh of 34 nodes, enough for rows that are not quite straight.
-ROW_SHARE = 0.01
 # The rounding is many times deeper than young wear: heights are shown up to so many depths.
 HEIGHT_IN_DEPTHS = 2.0
 # How far the kinetics are extended, in computed numbers of cycles.
@@ -224,8 +222,7 @@ def _nodes_on_middle(file: h5py.File, interface: str, direction: int) -> tuple[A
     """Places and pressures at peak load of the FE nodes nearest to the middle line."""
     group = file["structure"][interface]
     coordinates, pressure = group["coordinates"][()], group["pressure"][_peak(file)]
-    distance = np.abs(coordinates[:, 1 - direction])
-    near = distance <= distance.min() + ROW_SHARE * np.ptp(coordinates[:, 1 - direction])
+    near = near_middle(coordinates, direction)
     return coordinates[near, direction], pressure[near]
 
 
