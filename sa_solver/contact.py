@@ -21,7 +21,14 @@ from numpy.typing import NDArray
 from sa_solver.ciavarella_jaeger import first_loading
 from sa_solver.coupled import CoupledContact, CoupledStart, CoupledState
 from sa_solver.friction_limit import largest_share
-from sa_solver.gross_slip import Direction, Sliding, State, gross_slip, sliding_direction
+from sa_solver.gross_slip import (
+    Direction,
+    GrossSlip,
+    Sliding,
+    State,
+    gross_slip,
+    sliding_direction,
+)
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalStart, NormalState
 from sa_solver.tangential import TangentialContact, TangentialState
@@ -249,8 +256,9 @@ class FrictionalContact:
             return Sliding(state, np.array([state.Qx, state.Qy]), energy)
 
         stored = float(np.vdot(start, moved))
-        state = self._by_energy(slide, float(limit.sum()) * area, load, stored)
-        return replace(state, convolutions=spent)
+        found = self._by_energy(slide, float(limit.sum()) * area, load, stored)
+        state, message = found.state, found.state.message or found.message
+        return replace(state, convolutions=spent, converged=not message, message=message)
 
     def _by_energy(
         self,
@@ -258,7 +266,7 @@ class FrictionalContact:
         carried: float,
         load: Load,
         stored: float,
-    ) -> State:
+    ) -> GrossSlip[State]:
         assert load.energy is not None
         return gross_slip(
             slide,
@@ -268,7 +276,7 @@ class FrictionalContact:
             self.tolerance,
             self._sliding,
             stored * self.grid.cell_area,
-        ).state
+        )
 
     def _slides(self, limit: Array, load: Load) -> bool:
         """Whether the energy is known and forces are within 1 % of the largest friction carries."""
@@ -393,5 +401,6 @@ class FrictionalContact:
             return Sliding(state, state.resultants[1:3], energy)
 
         carried = self.friction * float(load.values[0])
-        state = self._by_energy(slide, carried, load, float(np.vdot(shear, moved)))
-        return replace(state, convolutions=spent)
+        found = self._by_energy(slide, carried, load, float(np.vdot(shear, moved)))
+        state, message = found.state, found.state.message or found.message
+        return replace(state, convolutions=spent, converged=not message, message=message)

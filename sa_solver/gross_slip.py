@@ -48,12 +48,24 @@ class Sliding(Generic[State]):
 class GrossSlip(Generic[State]):
     """State of the sliding contact, and its error: see :data:`ACCURACY`.
 
-    Shear is coupled by Poisson's ratio, so no direction of sliding spares x or y all energy: then
-    the error of ``energies`` in direction stays, and the sum is met.
+    ``missing`` is the error of the energy alone. Shear is coupled by Poisson's ratio, so no
+    direction of sliding spares x or y all energy: then the error of ``energies`` in direction
+    stays, and the sum is met.
     """
 
     state: State
     error: float
+    missing: float
+
+    @property
+    def message(self) -> str:
+        """Empty when the energy is met, else what is wrong and what to try."""
+        if self.missing <= ACCURACY:
+            return ""
+        return (
+            f"the sliding contact dissipates an energy off by {self.missing:.1e} of that given: "
+            "check the energies of the load history, or take smaller increments"
+        )
 
 
 def gross_slip(
@@ -89,7 +101,8 @@ def gross_slip(
         inner = max(tolerance, LOOSER * min(change, inner))
         length = max(0.0, length + missing / carried)
         angle = turned
-    return GrossSlip(found.state, max(abs(missing) / total, abs(wanted - measured)))
+    lacking = abs(missing) / total
+    return GrossSlip(found.state, max(lacking, abs(wanted - measured)), lacking)
 
 
 def sliding_direction(force: Array, angle: float | None = None) -> Array:

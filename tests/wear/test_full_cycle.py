@@ -101,3 +101,11 @@ def test_an_increment_that_fails_is_named(monkeypatch):
     monkeypatch.setattr(own, "advance", fails)
     with pytest.raises(ContactFailure, match=r"increment 1: .*refine the grid"):
         full_cycle(own, GAP, mission())
+
+
+@pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["alike", "unlike"])
+def test_energy_that_is_not_met_is_told(monkeypatch, first):
+    """One contact problem is too few for the elastic part to be known."""
+    monkeypatch.setattr("sa_solver.gross_slip.ITERATIONS", 1)
+    with pytest.raises(ContactFailure, match=r"increment 1: .*energy off by .*smaller increments"):
+        full_cycle(contact(ElasticPair(first, TITANIUM)), GAP, mission())

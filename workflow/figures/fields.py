@@ -49,7 +49,7 @@ def middle(field: Array, direction: int) -> Array:
 
 
 def near_middle(coordinates: Array, direction: int) -> Any:
-    """Which nodes ``(n, 2)`` are on the row along x (0) or y (1) nearest to the middle, ``(n,)``."""
+    """Which nodes ``(n, 2)`` are on the row along x (0) or y (1) nearest to the middle."""
     across = coordinates[:, 1 - direction]
     distance = np.abs(across)
     return distance <= distance.min() + ROW_SHARE * np.ptp(across)
