@@ -10,8 +10,8 @@ from fe_models.constraints import Constraints
 from fe_models.elasticity import ElasticBody
 from fe_models.geometry.dovetail import Dovetail
 from fe_models.mesh import StructureMesh
-from fe_models.reduction import ConstrainedBody, interface_frames
 from fe_models.structure import Structure
+from fe_models.supported_body import SupportedBody, interface_frames
 from sa_solver.types import Array, Material
 
 
@@ -77,8 +77,8 @@ def dovetail_structure(
 
     return Structure(
         mesh=mesh,
-        body_1=ConstrainedBody(elastic_1, held, nodes_1, frames, loads_1),
-        body_2=ConstrainedBody(elastic_2, guided, nodes_2, frames, loads_2),
+        body_1=SupportedBody(elastic_1, held, nodes_1, frames, loads_1),
+        body_2=SupportedBody(elastic_2, guided, nodes_2, frames, loads_2),
         support_direction=dovetail.slot_direction,
         support_point=weights @ elastic_2.nodes[root] / weights.sum(),
     )

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.reduction import JointResolvent
+from fe_models.joint import JointResolvent
 from sa_solver.contact_law import coulomb
 from sa_solver.splitting import SplittingResult, douglas_rachford
 from sa_solver.types import Array

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.friction import FrictionalJoint, FrictionState
+from fe_models.joint import JointStiffness, join
 from fe_models.mesh import Interface, StructureMesh
-from fe_models.reduction import ConstrainedBody, JointStiffness, join
+from fe_models.supported_body import SupportedBody
 from sa_solver.types import Array, LoadHistory, resultants
 
 # A flank slides as a whole when nodes that stick carry less than this share of its load.
@@ -76,8 +77,8 @@ class Structure:
     """
 
     mesh: StructureMesh
-    body_1: ConstrainedBody
-    body_2: ConstrainedBody
+    body_1: SupportedBody
+    body_2: SupportedBody
     support_direction: Array
     support_point: Array
 

@@ -12,7 +12,7 @@ import numpy as np
 
 import fe_models
 import sa_solver
-from fe_models.reduction import JointResolvent
+from fe_models.joint import JointResolvent
 from fe_models.structure import FIELDS, CycleSolution, Structure
 from sa_solver.types import Array
 from workflow.store import read_arrays, write_arrays

@@ -12,8 +12,8 @@ from fe_models.dovetail import Mission, dovetail_structure
 from fe_models.elasticity import ElasticBody
 from fe_models.friction import FrictionalJoint
 from fe_models.geometry.dovetail import Dovetail
+from fe_models.joint import JointStiffness
 from fe_models.mesh import Body, StructureMesh
-from fe_models.reduction import JointStiffness
 from fe_models.structure import CycleSolution, Structure
 from sa_solver.types import Material
 

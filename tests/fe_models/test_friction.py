@@ -8,7 +8,7 @@ import pytest
 
 from fe_models import friction
 from fe_models.friction import FrictionalJoint
-from fe_models.reduction import JointStiffness
+from fe_models.joint import JointStiffness
 
 NODES = 4
 # What the solver imposes: TOLERANCE of the load, which these problems carry over to the forces.

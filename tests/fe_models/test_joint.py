@@ -5,7 +5,8 @@ import pytest
 
 from fe_models.constraints import Constraints
 from fe_models.dovetail import dovetail_structure
-from fe_models.reduction import ConstrainedBody, interface_frames, join
+from fe_models.joint import join
+from fe_models.supported_body import SupportedBody, interface_frames
 from sa_solver.types import Material
 
 ORDERS = [1, 2]
@@ -36,7 +37,7 @@ class Stacked:
         ]
         frames = np.tile(self.axes, (len(self.nodes_1), 1, 1))
         self.bodies = [
-            ConstrainedBody(elastic, constraints, nodes, frames, loads)
+            SupportedBody(elastic, constraints, nodes, frames, loads)
             for elastic, constraints, nodes, loads in zip(
                 (self.lower, self.upper),
                 self.constraints,
@@ -176,7 +177,7 @@ def test_uniform_pressure_crosses_the_interface(box, order):
         if elastic is stacked.upper:
             press = elastic.traction_load("z1", lambda x: np.full_like(x[0], -pressure), normal)
             load[:, 0] = press
-        bodies.append(ConstrainedBody(elastic, constraints, nodes, frames, load))
+        bodies.append(SupportedBody(elastic, constraints, nodes, frames, load))
     joint = join(*(body.condense() for body in bodies))
     force = joint.loads[:, 0].reshape(-1, 3)
     nodes, weights = box((2, 3, 3), (0.0, 0.0, 1.5), (2.0, 3.0, 4.0), TITANIUM, 1).boundary_weights(
@@ -191,7 +192,7 @@ def test_constrained_interface_node_is_refused(box):
     stacked = Stacked(box, 1)
     stacked.constraints[0].hold(stacked.nodes_1[:1])
     with pytest.raises(ValueError, match="interface node is constrained"):
-        ConstrainedBody(
+        SupportedBody(
             stacked.lower,
             stacked.constraints[0],
             stacked.nodes_1,

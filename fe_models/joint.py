@@ -1,0 +1,94 @@
+"""The joint that two condensed bodies form.
+
+Each body is condensed onto its interface nodes, S u = r + f, with f the contact forces on it. Two
+bodies that meet node to node then form one joint: with w = u_2 - u_1 the relative displacement and
+f the contact forces on body 2,
+
+    f = H w + f0,   H = S_2 - S_2 (S_1 + S_2)⁻¹ S_2,   f0 = S_2 (S_1 + S_2)⁻¹ (r_1 + r_2) - r_2.
+
+H is symmetric; the rigid motions of a body that is held by contact alone are its null space.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sl
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from sa_solver.types import Array
+
+# Eigenvalues below this share of the largest are rigid motions; elastic ones start near 1e-3.
+RIGID_LIMIT = 1e-7
+# Share of the largest eigenvalue that makes the singular joint invertible for the Lanczos search.
+SPECTRUM_SHIFT = 1e-5
+
+
+@dataclass(frozen=True)
+class JointStiffness:
+    """The joint ``f = H w + Σ_c amplitude_c loads_c`` in the interface frames.
+
+    ``stiffness`` ``(3 n, 3 n)`` [N/mm] and ``loads`` ``(3 n, cases)`` [N], numbered ``3 node +
+    component`` over all interfaces; ``rigid_modes`` counts H's null space; ``smallest`` and
+    ``largest`` are its extreme elastic eigenvalues.
+    """
+
+    stiffness: Array
+    loads: Array
+    rigid_modes: int
+    smallest: float
+    largest: float
+
+    def resolvent(self) -> JointResolvent:
+        """(H + ρ)⁻¹ with ρ the geometric mean of the extreme elastic eigenvalues."""
+        rho = float(np.sqrt(self.smallest * self.largest))
+        shifted = self.stiffness.copy()
+        shifted[np.diag_indices_from(shifted)] += rho
+        factor = sl.cholesky(shifted, lower=True, overwrite_a=True, check_finite=False)
+        inverse, _ = sl.lapack.dpotri(factor, lower=1, overwrite_c=1)
+        inverse = np.tril(inverse) + np.tril(inverse, -1).T
+        return JointResolvent(inverse, rho, self.loads, self.rigid_modes)
+
+
+@dataclass(frozen=True)
+class JointResolvent:
+    """What structural friction needs of a joint.
+
+    ``inverse`` ``(3 n, 3 n)`` is (H + ρ)⁻¹ [mm/N] with ``rho`` ρ [N/mm]; ``loads`` and
+    ``rigid_modes`` are the joint's.
+    """
+
+    inverse: Array
+    rho: float
+    loads: Array
+    rigid_modes: int
+
+
+def join(condensed_1: tuple[Array, Array], condensed_2: tuple[Array, Array]) -> JointStiffness:
+    """Join two condensed bodies; body 1 must be held, body 2 may float."""
+    (stiffness_1, loads_1), (stiffness_2, loads_2) = condensed_1, condensed_2
+    factor = sl.cholesky(stiffness_1 + stiffness_2, lower=True, overwrite_a=True)
+    # S_2 (S_1 + S_2)⁻¹ S_2 = XᵀX with X = L⁻¹ S_2: half the work of solving with both factors.
+    half = sl.solve_triangular(factor, stiffness_2, lower=True)
+    stiffness = stiffness_2 - half.T @ half
+    loads = half.T @ sl.solve_triangular(factor, loads_1 + loads_2, lower=True) - loads_2
+    rigid_modes, smallest, largest = _spectrum(stiffness)
+    return JointStiffness(stiffness, loads, rigid_modes, smallest, largest)
+
+
+def _spectrum(stiffness: Array) -> tuple[int, float, float]:
+    """Number of zero eigenvalues, smallest other one and largest one, by Lanczos iterations."""
+    start = np.random.default_rng(0).standard_normal(len(stiffness))
+    (largest,) = eigsh(stiffness, 1, v0=start, return_eigenvectors=False)
+    shift = SPECTRUM_SHIFT * largest
+    shifted = stiffness.copy()
+    shifted[np.diag_indices_from(shifted)] += shift
+    factors = sl.cho_factor(shifted, lower=True, overwrite_a=True)
+    inverse = LinearOperator(
+        stiffness.shape, matvec=lambda v: sl.cho_solve(factors, v), dtype=np.float64
+    )
+    # A free body has six rigid motions: the seventh eigenvalue is elastic.
+    lowest = 1.0 / eigsh(inverse, 7, v0=start, return_eigenvectors=False) - shift
+    elastic = lowest[lowest > RIGID_LIMIT * largest]
+    return len(lowest) - len(elastic), float(elastic.min()), float(largest)
