@@ -15,38 +15,44 @@ ALREADY_MET = 1e-9
 
 
 class Constraints:
-    """Collects constraints on ``3 n`` displacements, numbered ``3 node + component``.
+    """Collects constraints on displacements, numbered ``dimension node + component``.
 
     Where supports meet, each adds what the earlier ones leave free: a node that slides on two
     planes moves along their edge, one that is held stays held. Only displacements that nothing
     constrains yet can be averaged: tie nodes last.
     """
 
-    def __init__(self, nodes: int) -> None:
-        self._size = 3 * nodes
+    def __init__(self, nodes: int, dimension: int = 3) -> None:
+        self._dimension = dimension
+        self._size = dimension * nodes
         self._eliminated: dict[int, tuple[Indices, Array]] = {}
 
     def hold(self, nodes: Indices) -> None:
         """Set all displacements of the nodes to zero."""
-        for dof in (3 * nodes[:, None] + np.arange(3)).ravel():
+        for dof in self._dofs(nodes):
             self._eliminate(int(dof), np.empty(0, np.int64), np.empty(0))
 
     def slide(self, nodes: Indices, normals: Array) -> None:
-        """Let nodes move only across ``normals`` ``(n, 3)``: u·n = 0."""
-        for node, normal in zip(nodes, normals, strict=True):
-            self._equation(3 * int(node) + np.arange(3), normal)
+        """Let nodes move only across ``normals`` ``(n, dimension)``: u·n = 0."""
+        for dofs, normal in zip(self._dofs(nodes).reshape(normals.shape), normals, strict=True):
+            self._equation(dofs, normal)
 
     def zero_mean(self, nodes: Indices, weights: Array, direction: Array) -> None:
         """Hold the weighted mean displacement of the nodes along a unit ``direction``."""
-        dofs = (3 * nodes[:, None] + np.arange(3)).ravel()
-        self._equation(dofs, (weights[:, None] * direction).ravel())
+        self._equation(self._dofs(nodes), (weights[:, None] * direction).ravel())
 
     def average(self, nodes: Indices, parents: Indices) -> None:
         """Tie each node to the mean of its parents ``(n, k)``: a linear trace."""
         share = np.full(parents.shape[1], 1.0 / parents.shape[1])
         for node, row in zip(nodes, parents, strict=True):
-            for component in range(3):
-                self._eliminate(3 * int(node) + component, 3 * row + component, share)
+            for dof, masters in zip(
+                self._dofs(node), self._dofs(row).reshape(-1, self._dimension).T, strict=True
+            ):
+                self._eliminate(int(dof), masters, share)
+
+    def _dofs(self, nodes: Indices) -> Indices:
+        """Displacements of nodes, one node after the other."""
+        return (self._dimension * np.reshape(nodes, (-1, 1)) + np.arange(self._dimension)).ravel()
 
     def _equation(self, dofs: Indices, coefficients: Array) -> None:
         """Impose Σ c u = 0 by the free displacement that counts most in it, if there is one."""
@@ -75,20 +81,25 @@ class Constraints:
     def _eliminate(self, dof: int, masters: Indices, coefficients: Array) -> None:
         self._eliminated.setdefault(dof, (masters, coefficients))
 
+    @property
+    def free(self) -> Indices:
+        """The displacements that nothing eliminates, ascending: the columns of T."""
+        return np.setdiff1d(np.arange(self._size), np.fromiter(self._eliminated, np.int64))
+
     def transformation(self) -> sp.csr_matrix:
-        """T, ``(3 n, free)``; masters that are themselves eliminated are followed to the end."""
-        slaves = np.array(sorted(self._eliminated), dtype=np.int64)
+        """T, ``(displacements, free)``; eliminated masters are followed to the end."""
+        slaves = np.setdiff1d(np.arange(self._size), self.free)
         entries = [self._eliminated[dof] for dof in slaves.tolist()]
         counts = [len(masters) for masters, _ in entries]
         columns = np.concatenate([m for m, _ in entries]) if entries else np.empty(0, np.int64)
         values = np.concatenate([c for _, c in entries]) if entries else np.empty(0)
         shape = (self._size, self._size)
         relation = sp.csr_matrix((values, (np.repeat(slaves, counts), columns)), shape=shape)
-        kept = np.ones(self._size)
-        kept[slaves] = 0.0
+        kept = np.zeros(self._size)
+        kept[self.free] = 1.0
         step = sp.diags(kept) + relation
         transformation = step
         while len(transformation[:, slaves].data):
             transformation = (transformation @ step).tocsr()
             transformation.eliminate_zeros()
-        return transformation[:, np.flatnonzero(kept)].tocsr()
+        return transformation[:, self.free].tocsr()

@@ -53,43 +53,46 @@ def dovetail_structure(
     mission: Mission,
     order: int,
 ) -> Structure:
-    """The two supported, loaded bodies of a dovetail; ``order`` is that of the tetrahedra."""
+    """The two supported, loaded bodies of a dovetail; ``order`` is that of the elements.
+
+    In the plane everything is per length of the slot, whose middle section it is.
+    """
     elastic_1 = ElasticBody(mesh.body_1, disk, order)
     elastic_2 = ElasticBody(mesh.body_2, blade, order)
-    frames = interface_frames(mesh.interfaces)
     nodes_1 = np.concatenate([i.nodes_1 for i in mesh.interfaces])
     nodes_2 = np.concatenate([i.nodes_2 for i in mesh.interfaces])
 
-    held = Constraints(len(elastic_1.nodes))
+    held = Constraints(len(elastic_1.nodes), elastic_1.dimension)
     held.hold(elastic_1.boundary_nodes("inner"))
     held.slide(*elastic_1.boundary_normals("sides"))
     centrifugal = elastic_1.centrifugal_load()
     loads_1 = np.stack([centrifugal, np.zeros_like(centrifugal)], axis=1)
 
-    guided = Constraints(len(elastic_2.nodes))
-    root, weights = elastic_2.boundary_weights("root_bottom")
-    guided.zero_mean(root, weights, dovetail.slot_direction)
+    guided = Constraints(len(elastic_2.nodes), elastic_2.dimension)
+    if elastic_2.dimension == 3:
+        guided.zero_mean(*elastic_2.boundary_weights("root_bottom"), dovetail.slot_direction)
     loads_2 = _blade_loads(elastic_2, dovetail, mission)
 
     for constraints, elastic in ((held, elastic_1), (guided, elastic_2)):
         for interface in mesh.interfaces:
             constraints.average(*elastic.midsides(interface.name))
 
+    frames_1 = interface_frames(mesh.interfaces, 1, mesh.body_1)
+    frames_2 = interface_frames(mesh.interfaces, 2, mesh.body_2)
     return Structure(
         mesh=mesh,
-        body_1=SupportedBody(elastic_1, held, nodes_1, frames, loads_1),
-        body_2=SupportedBody(elastic_2, guided, nodes_2, frames, loads_2),
-        support_direction=dovetail.slot_direction,
-        support_point=weights @ elastic_2.nodes[root] / weights.sum(),
+        body_1=SupportedBody(elastic_1, held, nodes_1, frames_1, loads_1),
+        body_2=SupportedBody(elastic_2, guided, nodes_2, frames_2, loads_2),
     )
 
 
 def _blade_loads(blade: ElasticBody, dovetail: Dovetail, mission: Mission) -> Array:
-    """Load cases ``(3 n, 2)``: rotation at 1 rad/s with the airfoil's pull, and a unit moment."""
+    """Load cases ``(size, 2)``: rotation at 1 rad/s with the airfoil's pull, and a unit moment."""
     top = "shank_top"
     axis = dovetail.load_axis
-    area = blade.boundary_integral(top, lambda x: np.ones_like(x[0]))
-    lever = blade.boundary_integral(top, lambda x: _lever(x, dovetail) ** 2)
+    length = dovetail.slot_length if blade.dimension == 2 else 1.0
+    area = length * blade.boundary_integral(top, lambda x: np.ones_like(x[0]))
+    lever = length * blade.boundary_integral(top, lambda x: _lever(x, dovetail) ** 2)
     pull = mission.airfoil_mass * mission.airfoil_radius / area
     rotation = blade.traction_load(top, lambda x: np.full_like(x[0], pull), axis)
     # A moment about the slot, as a radial traction that is linear across the shank.

@@ -8,36 +8,58 @@ from functools import cached_property
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from skfem import Basis, BilinearForm, ElementTetP1, ElementTetP2, FacetBasis, LinearForm
+from skfem import (
+    Basis,
+    BilinearForm,
+    ElementTetP1,
+    ElementTetP2,
+    ElementTriP1,
+    ElementTriP2,
+    FacetBasis,
+    LinearForm,
+)
 from skfem.helpers import grad
 
-from fe_models.mesh import Body
+from fe_models.mesh import Body, in_space
 from sa_solver.types import Array, Material
 
-ELEMENTS = {1: ElementTetP1, 2: ElementTetP2}
+# By dimension and order.
+ELEMENTS = {
+    (3, 1): ElementTetP1,
+    (3, 2): ElementTetP2,
+    (2, 1): ElementTriP1,
+    (2, 2): ElementTriP2,
+}
 
 
 class ElasticBody:
-    """A body of one material, with displacements numbered ``3 node + component``.
+    """A body of one material, with displacements numbered ``dimension node + component``.
 
-    ``order`` is that of the tetrahedra, 1 or 2. Vertices are the first nodes; with order 2 the
-    midsides follow.
+    Triangles are in plane strain; their forces are per length. ``order`` is that of the elements,
+    1 or 2. Vertices are the first nodes; with order 2 the midsides follow.
     """
 
     def __init__(self, body: Body, material: Material, order: int = 1) -> None:
         self.body = body
         self.material = material
         self.order = order
-        self._basis = Basis(body.mesh, ELEMENTS[order]())
+        self.dimension = body.mesh.dim()
+        self._element = ELEMENTS[self.dimension, order]
+        self._basis = Basis(body.mesh, self._element())
 
     @property
     def nodes(self) -> Array:
-        """Node coordinates ``(n, 3)`` [mm]."""
-        return self._basis.doflocs.T
+        """Node coordinates in space ``(n, 3)`` [mm]; Y is 0 in the plane."""
+        return in_space(self._basis.doflocs.T)
+
+    @property
+    def size(self) -> int:
+        """Number of displacements."""
+        return int(self.dimension * self._basis.N)
 
     @cached_property
     def stiffness(self) -> sp.csr_matrix:
-        """Stiffness matrix ``(3 n, 3 n)`` [N/mm].
+        """Stiffness matrix ``(size, size)`` [N/mm].
 
         Built from the scalar forms ∫ ∂a φi ∂b φj, which do not depend on the material: ten times
         faster than the vector form.
@@ -46,44 +68,60 @@ class ElasticBody:
             (a, b): BilinearForm(lambda u, v, w, a=a, b=b: grad(v)[a] * grad(u)[b])
             .assemble(self._basis)
             .tocsr()
-            for a in range(3)
-            for b in range(a, 3)
+            for a in range(self.dimension)
+            for b in range(a, self.dimension)
         }
         forms |= {(b, a): form.T.tocsr() for (a, b), form in forms.items() if a != b}
-        laplace = forms[0, 0] + forms[1, 1] + forms[2, 2]
+        laplace = sum(forms[a, a] for a in range(self.dimension))
         lame, shear = self.material.lame, self.material.shear_modulus
-        stiffness = sp.csr_matrix((3 * len(self.nodes),) * 2)
+        stiffness = sp.csr_matrix((self.size, self.size))
         for (a, b), form in forms.items():
             block = lame * form + shear * form.T
             if a == b:
                 block += shear * laplace
-            place = sp.csr_matrix(([1.0], ([a], [b])), shape=(3, 3))
+            place = sp.csr_matrix(([1.0], ([a], [b])), shape=(self.dimension,) * 2)
             stiffness += sp.kron(block, place, format="csr")
         return stiffness
 
+    @cached_property
+    def mass(self) -> sp.csr_matrix:
+        """Consistent mass matrix ``(size, size)`` [t]."""
+        scalar = BilinearForm(lambda u, v, w: u * v).assemble(self._basis)
+        identity = sp.identity(self.dimension)
+        return sp.kron(self.material.density * scalar, identity, format="csr")
+
+    def body_load(self, force: Callable[[Array], Array]) -> Array:
+        """Forces ``(size,)`` of a force per volume ``(3, ...)`` at points ``(3, ...)`` [N/mm³]."""
+        points = _spatial(np.asarray(self._basis.global_coordinates()))
+        density = force(points)
+        forms = [
+            LinearForm(lambda v, w: w.f * v).assemble(self._basis, f=density[axis])
+            for axis in self.body.axes
+        ]
+        return np.stack(forms, axis=1).ravel()
+
     def centrifugal_load(self) -> Array:
-        """Forces ``(3 n,)`` of a rotation at 1 rad/s about the global Y axis [N s²]."""
-        density = self.material.density
-        load = np.zeros((len(self.nodes), 3))
-        for axis in (0, 2):
-            form = LinearForm(lambda v, w, axis=axis: density * w.x[axis] * v)
-            load[:, axis] = form.assemble(self._basis)
-        return load.ravel()
+        """Forces ``(size,)`` of a rotation at 1 rad/s about the global Y axis [N s²]."""
+        radial = self.material.density * np.array([1.0, 0.0, 1.0])
+        return self.body_load(lambda x: radial[:, None, None] * x)
 
     def traction_load(
         self, boundary: str, traction: Callable[[Array], Array], direction: Array
     ) -> Array:
-        """Forces ``(3 n,)`` of a traction on a named boundary.
+        """Forces ``(size,)`` of a traction on a named boundary.
 
         ``traction`` gives its size at points ``(3, ...)`` [MPa], ``direction`` ``(3,)`` its sense.
         """
-        form = LinearForm(lambda v, w: traction(w.x) * v)
-        return np.outer(form.assemble(self._facet_basis(boundary)), direction).ravel()
+        basis = self._facet_basis(boundary)
+        size = traction(_spatial(np.asarray(basis.global_coordinates())))
+        load = LinearForm(lambda v, w: w.f * v).assemble(basis, f=size)
+        return np.outer(load, direction[list(self.body.axes)]).ravel()
 
     def boundary_integral(self, boundary: str, integrand: Callable[[Array], Array]) -> float:
         """Integral over a named boundary of a function of points ``(3, ...)``."""
         basis = self._facet_basis(boundary)
-        return float(np.sum(integrand(np.asarray(basis.global_coordinates())) * basis.dx))
+        points = _spatial(np.asarray(basis.global_coordinates()))
+        return float(np.sum(integrand(points) * basis.dx))
 
     def boundary_weights(self, boundary: str) -> tuple[NDArray[np.int64], Array]:
         """Nodes of a boundary and the area each stands for, so that Σ w u = ∫ u dA."""
@@ -96,11 +134,12 @@ class ElasticBody:
         return self._basis.get_dofs(boundary).all()
 
     def boundary_normals(self, boundary: str) -> tuple[NDArray[np.int64], Array]:
-        """Nodes of a boundary and the outward unit normal at each, ``(n, 3)``."""
+        """Nodes of a boundary and the outward unit normal at each, ``(n, dimension)``."""
         mesh = self.body.mesh
-        basis = FacetBasis(mesh, ElementTetP1(), facets=mesh.boundaries[boundary])
-        normals = np.zeros((len(self.nodes), 3))
-        for axis in range(3):
+        linear = ELEMENTS[self.dimension, 1]()
+        basis = FacetBasis(mesh, linear, facets=mesh.boundaries[boundary])
+        normals = np.zeros((len(self.nodes), self.dimension))
+        for axis in range(self.dimension):
             form = LinearForm(lambda v, w, axis=axis: w.n[axis] * v)
             normals[: mesh.nvertices, axis] = form.assemble(basis)
         middle, parents = self.midsides(boundary)
@@ -113,18 +152,22 @@ class ElasticBody:
         if self.order == 1:
             return np.empty(0, np.int64), np.empty((0, 2), np.int64)
         mesh = self.body.mesh
-        edges = np.unique(mesh.f2e[:, mesh.boundaries[boundary]])
+        facets = mesh.boundaries[boundary]
+        if self.dimension == 2:
+            return self._basis.facet_dofs[0, facets], mesh.facets[:, facets].T
+        edges = np.unique(mesh.f2e[:, facets])
         return self._basis.edge_dofs[0, edges], mesh.edges[:, edges].T
 
     def stress(self, displacement: Array) -> Array:
-        """Cauchy stress of displacements ``(3 n,)``, element means, ``(6, elements)`` [MPa].
+        """Cauchy stress of displacements ``(size,)``, element means, ``(6, elements)`` [MPa].
 
-        Ordered xx, yy, zz, xy, yz, zx.
+        Ordered xx, yy, zz, xy, yz, zx of the global axes.
         """
-        components = displacement.reshape(-1, 3).T
-        fields = [np.asarray(self._basis.interpolate(u).grad) for u in components]
         weights = self._basis.dx / self._basis.dx.sum(axis=1, keepdims=True)
-        gradient = np.array([np.einsum("aeq,eq->ae", field, weights) for field in fields])
+        gradient = np.zeros((3, 3, weights.shape[0]))
+        for u, axis in zip(displacement.reshape(-1, self.dimension).T, self.body.axes, strict=True):
+            field = np.asarray(self._basis.interpolate(u).grad)
+            gradient[axis, list(self.body.axes)] = np.einsum("aeq,eq->ae", field, weights)
         strain = 0.5 * (gradient + gradient.transpose(1, 0, 2))
         trace = strain[0, 0] + strain[1, 1] + strain[2, 2]
         lame, shear = self.material.lame, self.material.shear_modulus
@@ -134,15 +177,20 @@ class ElasticBody:
     def at_vertices(self, element_values: Array) -> Array:
         """Volume-weighted means at the vertices of element values ``(..., elements)``."""
         volume = self._basis.dx.sum(axis=1)
-        corners = self.body.mesh.t.ravel()
-        total = np.bincount(corners, np.tile(volume, 4))
+        count, corners = len(self.body.mesh.t), self.body.mesh.t.ravel()
+        total = np.bincount(corners, np.tile(volume, count))
         rows = np.atleast_2d(element_values)
-        means = [np.bincount(corners, np.tile(row * volume, 4)) / total for row in rows]
+        means = [np.bincount(corners, np.tile(row * volume, count)) / total for row in rows]
         return np.array(means).reshape(*element_values.shape[:-1], -1)
 
     def _facet_basis(self, boundary: str) -> FacetBasis:
         mesh = self.body.mesh
-        return FacetBasis(mesh, ELEMENTS[self.order](), facets=mesh.boundaries[boundary])
+        return FacetBasis(mesh, self._element(), facets=mesh.boundaries[boundary])
+
+
+def _spatial(points: Array) -> Array:
+    """Points ``(3, ...)`` from those ``(dimension, ...)`` of scikit-fem."""
+    return np.moveaxis(in_space(np.moveaxis(points, 0, -1)), -1, 0)
 
 
 def von_mises(stress: Array) -> Array:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.joint import JointResolvent
+from fe_models.mesh import AXES, in_space
 from sa_solver.contact_law import coulomb
 from sa_solver.splitting import SplittingResult, douglas_rachford
 from sa_solver.types import Array
@@ -32,7 +33,8 @@ class FrictionState:
 
     ``force`` ``(3, n)`` on body 2 [N]; ``displacement`` ``(3, n)`` of body 2 relative to body 1 and
     ``slip`` ``(2, n)`` its tangential part since the previous increment [mm]; ``state``
-    ``(3 n,)`` is the splitting's, to start from again.
+    ``(d n,)`` is the splitting's, to start from again. In plane strain forces are per length and
+    have no y component.
     """
 
     force: Array
@@ -93,6 +95,7 @@ class _Problem:
     ) -> None:
         self._inverse, self._rho, self._friction = inverse, rho, friction
         self._gap, self._previous = gap, previous
+        self._axes = AXES[len(load) // len(gap)]
         self._offset = inverse @ load
 
     def solve(self, starts: list[Array], scale: float) -> FrictionState:
@@ -116,8 +119,13 @@ class _Problem:
         return self._rho * (self._inverse @ state) - self._offset
 
     def _law(self, trial: Array) -> Array:
-        nodal = trial.reshape(-1, 3).T
-        return (nodal + self._force(nodal) / self._rho).T.ravel()
+        nodal = self._nodal(trial)
+        admissible = nodal + self._force(nodal) / self._rho
+        return admissible[self._axes, :].T.ravel()
+
+    def _nodal(self, values: Array) -> Array:
+        """Components x, y, z at each node ``(3, n)``."""
+        return in_space(values.reshape(len(self._gap), -1)).T
 
     def _force(self, trial: Array) -> Array:
         """Force that brings a trial displacement ``(3, n)`` back to the law, at stiffness ρ."""
@@ -131,9 +139,9 @@ class _Problem:
         return float(np.linalg.norm(self._law(2.0 * elastic - start) - elastic))
 
     def _state(self, split: SplittingResult, iterations: int) -> FrictionState:
-        displacement = split.solution.reshape(-1, 3).T
+        displacement = self._nodal(split.solution)
         return FrictionState(
-            force=self._force((2.0 * split.elastic - split.state).reshape(-1, 3).T),
+            force=self._force(self._nodal(2.0 * split.elastic - split.state)),
             displacement=displacement,
             slip=displacement[:2] - self._previous[:2],
             state=split.state,

@@ -1,12 +1,13 @@
 """The joint that two condensed bodies form.
 
-Each body is condensed onto its interface nodes, S u = r + f, with f the contact forces on it. Two
-bodies that meet node to node then form one joint: with w = u_2 - u_1 the relative displacement and
-f the contact forces on body 2,
+Each body is condensed onto its interface nodes, S u = r + f, with f the contact forces on it. With
+N the projection of body 1's displacements onto body 2's nodes, w = u_2 - N u_1 is the relative
+displacement and forces f on body 2 are -Nᵀf on body 1. Both bodies then form one joint
 
-    f = H w + f0,   H = S_2 - S_2 (S_1 + S_2)⁻¹ S_2,   f0 = S_2 (S_1 + S_2)⁻¹ (r_1 + r_2) - r_2.
+    f = H w + f0,   H = S_2 - S_2 N C⁻¹ NᵀS_2,   f0 = S_2 N C⁻¹ (r_1 + Nᵀr_2) - r_2,
 
-H is symmetric; the rigid motions of a body that is held by contact alone are its null space.
+with C = S_1 + NᵀS_2 N. N is the identity where the bodies meet node to node. H is symmetric; the
+rigid motions of a body that is held by contact alone are its null space.
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.linalg as sl
+import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from sa_solver.types import Array
@@ -65,14 +67,26 @@ class JointResolvent:
     rigid_modes: int
 
 
-def join(condensed_1: tuple[Array, Array], condensed_2: tuple[Array, Array]) -> JointStiffness:
-    """Join two condensed bodies; body 1 must be held, body 2 may float."""
+def join(
+    condensed_1: tuple[Array, Array],
+    condensed_2: tuple[Array, Array],
+    projection: sp.csr_matrix | None = None,
+) -> JointStiffness:
+    """Join two condensed bodies; body 1 must be held, body 2 may float.
+
+    ``projection`` ``(3 n, 3 n_1)`` is N on displacements, None where the bodies meet node to node.
+    """
     (stiffness_1, loads_1), (stiffness_2, loads_2) = condensed_1, condensed_2
-    factor = sl.cholesky(stiffness_1 + stiffness_2, lower=True, overwrite_a=True)
-    # S_2 (S_1 + S_2)⁻¹ S_2 = XᵀX with X = L⁻¹ S_2: half the work of solving with both factors.
-    half = sl.solve_triangular(factor, stiffness_2, lower=True)
+    if projection is None:
+        coupling, carried, handed = stiffness_2, stiffness_2, loads_2
+    else:
+        coupling, handed = projection.T @ stiffness_2, projection.T @ loads_2
+        carried = coupling @ projection
+    factor = sl.cholesky(stiffness_1 + carried, lower=True, overwrite_a=True)
+    # S_2 N C⁻¹ NᵀS_2 = XᵀX with X = L⁻¹ NᵀS_2: half the work of solving with both factors.
+    half = sl.solve_triangular(factor, coupling, lower=True)
     stiffness = stiffness_2 - half.T @ half
-    loads = half.T @ sl.solve_triangular(factor, loads_1 + loads_2, lower=True) - loads_2
+    loads = half.T @ sl.solve_triangular(factor, loads_1 + handed, lower=True) - loads_2
     rigid_modes, smallest, largest = _spectrum(stiffness)
     return JointStiffness(stiffness, loads, rigid_modes, smallest, largest)
 

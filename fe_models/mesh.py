@@ -6,15 +6,22 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
-from skfem import MeshTet
+from skfem import MeshTet, MeshTri
 
 from fe_models.gmsh_session import gmsh_model
 from sa_solver.types import Array, Frame
 
 # Two nodes are the same point when they are closer than this share of the interface's size.
 MATCHING_TOLERANCE = 1e-9
+# Global axes that the coordinates and displacements of a mesh of each dimension run along.
+AXES = {2: (0, 2), 3: (0, 1, 2)}
+# gmsh's numbers for first-order cells and their facets, by dimension.
+GMSH_CELL, GMSH_FACET = {2: 2, 3: 4}, {2: 1, 3: 2}
+
+Indices = NDArray[np.int64]
 
 
 class MeshError(ValueError):
@@ -23,50 +30,90 @@ class MeshError(ValueError):
 
 @dataclass(frozen=True)
 class Body:
-    """One meshed body. Its named boundaries are those of the mesh."""
+    """One meshed body: tetrahedra, or triangles in the plane (X, Z) for plane strain.
+
+    Its named boundaries are those of the mesh.
+    """
 
     name: str
-    mesh: MeshTet
+    mesh: MeshTet | MeshTri
 
-    def facets(self, boundary: str) -> NDArray[np.int64]:
-        """Vertices of the triangles of a named boundary, ``(n, 3)``."""
+    @property
+    def axes(self) -> tuple[int, ...]:
+        """Global axes of its coordinates and displacements: three, or X and Z in the plane."""
+        return AXES[self.mesh.dim()]
+
+    @property
+    def points(self) -> Array:
+        """Vertices in space ``(n, 3)`` [mm]; Y is 0 in the plane."""
+        return in_space(self.mesh.p.T)
+
+    def facets(self, boundary: str) -> Indices:
+        """Vertices of the triangles (in the plane: edges) of a named boundary, ``(n, dim)``."""
         return self.mesh.facets[:, self.mesh.boundaries[boundary]].T
 
-    def vertices(self, boundary: str) -> NDArray[np.int64]:
+    def vertices(self, boundary: str) -> Indices:
         """Vertices on a named boundary, sorted, ``(n,)``."""
         return np.unique(self.facets(boundary))
 
 
 @dataclass(frozen=True)
-class Interface:
-    """Two faces that meet node to node.
+class Face:
+    """A contact face: ``coordinates`` ``(n, 2)`` of its nodes in the frame [mm] and their facets.
 
-    ``nodes_1`` and ``nodes_2`` ``(n,)`` are vertices of body 1 and body 2; ``coordinates``
-    ``(n, 2)`` their place in the interface frame [mm]; ``facets`` ``(m, 3)`` the triangles of body
-    2's face, numbered within the interface; ``gap`` ``(n,)`` the distance of the unloaded, unworn
-    faces [mm].
+    ``facets`` are triangles ``(m, 3)``, or segments ``(m, 2)`` of a line contact, whose nodes have
+    y = 0.
     """
 
     name: str
     frame: Frame
-    nodes_1: NDArray[np.int64]
-    nodes_2: NDArray[np.int64]
     coordinates: Array
-    facets: NDArray[np.int64]
-    gap: Array
+    facets: Indices
 
     def __len__(self) -> int:
-        return len(self.nodes_1)
+        return len(self.coordinates)
+
+    @property
+    def line(self) -> bool:
+        """Whether the face is that of a line contact, and all it carries is per length."""
+        return self.facets.shape[1] == 2
 
     @property
     def nodal_areas(self) -> Array:
-        """Area that belongs to each node, a third of each of its triangles, ``(n,)`` [mm²]."""
-        a, b, c = (self.coordinates[self.facets[:, k]] for k in range(3))
-        u, v = b - a, c - a
-        area = 0.5 * np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0])
+        """Area that belongs to each node, an equal share of its facets', ``(n,)`` [mm²].
+
+        In a line contact the length [mm].
+        """
+        corners = self.coordinates[self.facets]
+        edges = corners[:, 1:] - corners[:, :1]
+        if self.line:
+            size = np.hypot(*edges[:, 0].T)
+        else:
+            size = 0.5 * np.abs(np.linalg.det(edges))
         total = np.zeros(len(self))
-        np.add.at(total, self.facets, area[:, None] / 3.0)
+        np.add.at(total, self.facets, size[:, None] / self.facets.shape[1])
         return total
+
+
+@dataclass(frozen=True)
+class Interface(Face):
+    """Two faces that meet; as a face it is body 2's.
+
+    ``nodes_1`` and ``nodes_2`` are vertices of body 1 and body 2; ``gap`` ``(n,)`` the distance of
+    the unloaded, unworn faces [mm]. Faces that meet node to node list their nodes in the same
+    order. Otherwise ``projection`` ``(n, n_1)`` gives a field of body 1's nodes at those of body 2,
+    and ``face_1`` is body 1's own face.
+    """
+
+    nodes_1: Indices
+    nodes_2: Indices
+    gap: Array
+    projection: sp.csr_matrix | None = None
+    face_1: Face | None = None
+
+    def face(self, number: int) -> Face:
+        """The face of body ``number``, 1 or 2, with its own nodes."""
+        return self.face_1 if number == 1 and self.face_1 is not None else self
 
 
 @dataclass(frozen=True)
@@ -78,20 +125,29 @@ class StructureMesh:
     interfaces: tuple[Interface, ...]
 
 
-def named_mesh(
-    points: Array, tets: NDArray[np.int64], boundaries: dict[str, NDArray[np.int64]]
-) -> MeshTet:
-    """A tetrahedral mesh whose boundaries are given by the vertices of their triangles.
+def in_space(components: Array) -> Array:
+    """Vectors ``(..., 3)`` from ones ``(..., dim)``: those of the plane (X, Z) have no Y."""
+    if components.shape[-1] == 3:
+        return components
+    spatial = np.zeros((*components.shape[:-1], 3))
+    spatial[..., AXES[2]] = components
+    return spatial
 
-    ``points`` ``(n, 3)``, ``tets`` ``(m, 4)``, each boundary ``(k, 3)``.
+
+def named_mesh(points: Array, cells: Indices, boundaries: dict[str, Indices]) -> MeshTet | MeshTri:
+    """A mesh whose boundaries are given by the vertices of their facets.
+
+    Tetrahedra: ``points`` ``(n, 3)``, ``cells`` ``(m, 4)``, each boundary ``(k, 3)``; triangles in
+    the plane (X, Z): ``(n, 2)``, ``(m, 3)`` and ``(k, 2)``.
     """
-    mesh = MeshTet(np.ascontiguousarray(points.T), np.ascontiguousarray(tets.T))
+    kind = MeshTet if points.shape[1] == 3 else MeshTri
+    mesh = kind(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
     lookup = cKDTree(np.sort(mesh.facets, axis=0).T)
     named = {}
-    for name, triangles in boundaries.items():
-        distance, index = lookup.query(np.sort(triangles, axis=1))
+    for name, facets in boundaries.items():
+        distance, index = lookup.query(np.sort(facets, axis=1))
         if np.any(distance > 0):
-            raise MeshError(f"boundary {name} has triangles that are no faces of the mesh")
+            raise MeshError(f"boundary {name} has facets that are no faces of the mesh")
         named[name] = index
     return mesh.with_boundaries(named)
 
@@ -105,8 +161,8 @@ def matched_interface(
     """
     nodes_2 = body_2.vertices(boundary)
     nodes_1 = body_1.vertices(boundary)
-    points_2 = body_2.mesh.p[:, nodes_2].T
-    distance, partner = cKDTree(body_1.mesh.p[:, nodes_1].T).query(points_2)
+    points_2 = body_2.points[nodes_2]
+    distance, partner = cKDTree(body_1.points[nodes_1]).query(points_2)
     size = np.ptp(points_2, axis=0).max()
     if len(nodes_1) != len(nodes_2) or distance.max() > MATCHING_TOLERANCE * size:
         raise MeshError(
@@ -130,16 +186,17 @@ def write_msh(path: Path, structure: StructureMesh) -> None:
     with gmsh_model("structure") as gmsh:
         offset = 0
         for tag, body in enumerate((structure.body_1, structure.body_2), start=1):
-            gmsh.model.addDiscreteEntity(3, tag)
-            gmsh.model.addPhysicalGroup(3, [tag], name=body.name)
+            dim = body.mesh.dim()
+            gmsh.model.addDiscreteEntity(dim, tag)
+            gmsh.model.addPhysicalGroup(dim, [tag], name=body.name)
             node_tags = offset + 1 + np.arange(body.mesh.nvertices)
-            gmsh.model.mesh.addNodes(3, tag, node_tags, body.mesh.p.T.ravel())
-            gmsh.model.mesh.addElementsByType(tag, 4, [], node_tags[body.mesh.t.T].ravel())
+            gmsh.model.mesh.addNodes(dim, tag, node_tags, body.points.ravel())
+            cells = node_tags[body.mesh.t.T].ravel()
+            gmsh.model.mesh.addElementsByType(tag, GMSH_CELL[dim], [], cells)
             for name in body.mesh.boundaries:
-                surface = gmsh.model.addDiscreteEntity(2)
-                gmsh.model.addPhysicalGroup(2, [surface], name=f"{body.name}_{name}")
-                gmsh.model.mesh.addElementsByType(
-                    surface, 2, [], node_tags[body.facets(name)].ravel()
-                )
+                face = gmsh.model.addDiscreteEntity(dim - 1)
+                gmsh.model.addPhysicalGroup(dim - 1, [face], name=f"{body.name}_{name}")
+                facets = node_tags[body.facets(name)].ravel()
+                gmsh.model.mesh.addElementsByType(face, GMSH_FACET[dim], [], facets)
             offset += body.mesh.nvertices
         gmsh.write(str(path))

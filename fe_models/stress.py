@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.elasticity import maximum_principal, von_mises
+from fe_models.mesh import in_space
 from fe_models.structure import Structure
 from sa_solver.types import Array
 
@@ -29,13 +30,19 @@ def stress_state(
     their frames; ``amplitudes`` of the load cases. Body 1 carries the forces, body 2 follows it at
     the relative displacements.
     """
-    forces, gaps = force.T.ravel(), relative.T.ravel()
-    displacement_1, interface_1 = structure.body_1.respond(-forces, amplitudes)
+    axes = structure.mesh.body_1.axes
+    forces, gaps = force[axes, :].T.ravel(), relative[axes, :].T.ravel()
+    projection = structure.projection
+    on_body_1 = forces if projection is None else projection.T @ forces
+    displacement_1, interface_1 = structure.body_1.respond(-on_body_1, amplitudes)
+    if projection is not None:
+        interface_1 = projection @ interface_1
     displacement_2 = structure.body_2.recover(interface_1 + gaps, amplitudes)
     pairs = ((structure.body_1, displacement_1), (structure.body_2, displacement_2))
     fields = []
     for body, displacement in pairs:
         stress = body.elastic.at_vertices(body.elastic.stress(displacement))
-        vertices = displacement.reshape(-1, 3)[: body.elastic.body.mesh.nvertices]
+        nodal = displacement.reshape(-1, body.elastic.dimension)
+        vertices = in_space(nodal[: body.elastic.body.mesh.nvertices])
         fields.append(StressField(np.array(vertices), von_mises(stress), maximum_principal(stress)))
     return fields[0], fields[1]

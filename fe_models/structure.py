@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
-from fe_models.friction import FrictionalJoint, FrictionState
+from fe_models.friction import LOAD_FLOOR, FrictionalJoint, FrictionState
 from fe_models.joint import JointStiffness, join
-from fe_models.mesh import Interface, StructureMesh
+from fe_models.mesh import Face, Interface, StructureMesh
 from fe_models.supported_body import SupportedBody
 from sa_solver.types import Array, LoadHistory, resultants
 
@@ -28,9 +30,10 @@ class InterfaceHistory:
 
     ``loads`` are the resultants; ``force`` ``(t, 3, n)`` on body 2 [N], ``displacement`` ``(t, 3,
     n)`` relative [mm], ``slip`` ``(t, 2, n)`` of each increment [mm], zero where a node sticks.
+    Loads and forces of a line contact are per length.
     """
 
-    interface: Interface
+    interface: Face
     loads: LoadHistory
     force: Array
     displacement: Array
@@ -49,7 +52,7 @@ class CycleSolution:
     ``states`` are the splitting's, by increment, and ``last_displacement`` ``(3, n)`` the one that
     the next cycle starts from. ``closure`` is the largest difference of contact forces between the
     first and the second cycle, relative to the largest force (0 for a cycle that follows another);
-    ``equilibrium`` ``(t, 2)`` the relative error of forces and moments.
+    ``equilibrium`` ``(t,)`` the relative error of the balance of body 2.
     """
 
     histories: tuple[InterfaceHistory, ...]
@@ -71,20 +74,28 @@ class CycleSolution:
 
 @dataclass(frozen=True)
 class Structure:
-    """Body 1 is held, body 2 is held by contact and by one support along ``support_direction``.
-
-    The support acts at ``support_point`` on the mean displacement of a boundary.
-    """
+    """Body 1 is held by its supports, body 2 by contact and what supports it has."""
 
     mesh: StructureMesh
     body_1: SupportedBody
     body_2: SupportedBody
-    support_direction: Array
-    support_point: Array
 
     def condense(self) -> JointStiffness:
         """Stiffness and loads of the joint on its interface displacements."""
         return join(self.body_1.condense(), self.body_2.condense())
+
+    @property
+    def projection(self) -> sp.csr_matrix | None:
+        """Displacements of body 1's nodes to those at body 2's, in the interface frames.
+
+        None where all interfaces meet node to node.
+        """
+        interfaces = self.mesh.interfaces
+        if all(i.projection is None for i in interfaces):
+            return None
+        blocks = [sp.identity(len(i)) if i.projection is None else i.projection for i in interfaces]
+        components = sp.identity(self.body_1.elastic.dimension)
+        return sp.kron(sp.block_diag(blocks), components, format="csr")
 
     def gap(self) -> Array:
         """Gaps of all interfaces one after the other, unworn ``(n,)`` [mm]."""
@@ -119,9 +130,7 @@ class Structure:
             residual=max(s.residual for s in states),
             converged=all(s.converged for s in states),
             closure=max(change, default=0.0) / largest if largest > 0.0 else 0.0,
-            equilibrium=np.array(
-                [self.equilibrium_error(s, a) for s, a in zip(last, amplitudes, strict=True)]
-            ),
+            equilibrium=self.equilibrium_errors(last, amplitudes),
         )
 
     def histories(
@@ -144,29 +153,29 @@ class Structure:
             ]
         )
 
-    def equilibrium_error(self, state: FrictionState, amplitudes: Array) -> tuple[float, float]:
-        """Relative error of forces and of moments on body 2, support included.
+    def equilibrium_errors(self, states: Sequence[FrictionState], amplitudes: Array) -> Array:
+        """Forces and moments on body 2 that neither contact nor supports balance, ``(t,)``.
 
-        Moments are taken about the support and measured against applied force x joint size where
-        no moment is applied.
+        Relative to what is applied and what the nodes carry, or to ``LOAD_FLOOR`` of the largest of
+        all increments where there is hardly a load. Moments are taken about the middle of the
+        contacts and divided by their size.
         """
-        contact = np.zeros((2, 3))
-        points = []
-        for interface, own in self._shares():
-            forces = interface.frame.to_global(state.force[:, own].T)
-            at = self.mesh.body_2.mesh.p[:, interface.nodes_2].T - self.support_point
-            contact += forces.sum(axis=0), np.cross(at, forces).sum(axis=0)
-            points.append(at)
-        applied = self.body_2.load_resultants(amplitudes, self.support_point)
-        balance = contact + applied
-        balance[0] -= (balance[0] @ self.support_direction) * self.support_direction
-        force = float(np.linalg.norm(applied[0]))
-        if force == 0.0:
-            return 0.0, 0.0
-        size = float(np.linalg.norm(np.ptp(np.concatenate(points), axis=0)))
-        moment = max(float(np.linalg.norm(applied[1])), force * size)
-        errors = np.linalg.norm(balance, axis=1) / (force, moment)
-        return float(errors[0]), float(errors[1])
+        points = np.concatenate([self.mesh.body_2.points[i.nodes_2] for i in self.mesh.interfaces])
+        middle = points.mean(axis=0)
+        size = float(np.linalg.norm(np.ptp(points, axis=0)))
+        free = self.body_2.free_motions(middle, size)
+        errors, scales = np.empty((2, len(states)))
+        for t, state in enumerate(states):
+            forces = np.concatenate(
+                [i.frame.to_global(state.force[:, own].T) for i, own in self._shares()]
+            )
+            moments = np.cross(points - middle, forces).sum(axis=0)
+            applied = self.body_2.load_resultants(amplitudes[t], middle)
+            force, moment = applied + np.array([forces.sum(axis=0), moments])
+            errors[t] = np.linalg.norm(free @ np.append(force, moment / size))
+            scales[t] = np.linalg.norm(applied[0]) + np.abs(state.force).sum()
+        floor = LOAD_FLOOR * scales.max()
+        return errors / np.maximum(scales, floor) if floor > 0.0 else errors
 
     def _shares(self) -> list[tuple[Interface, slice]]:
         """Every interface and its nodes' place among those of all of them."""
@@ -177,7 +186,7 @@ class Structure:
         ]
 
 
-def load_history(interface: Interface, force: Array, slip: Array, friction: float) -> LoadHistory:
+def load_history(interface: Face, force: Array, slip: Array, friction: float) -> LoadHistory:
     """Resultants and energies of nodal ``force`` ``(t, 3, n)`` and ``slip`` ``(t, 2, n)``."""
     x, y = interface.coordinates.T
     columns = np.array([resultants(f, x, y) for f in force]).T

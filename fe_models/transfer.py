@@ -1,9 +1,10 @@
 """Fields between the nodes of a contact face and the cells of a grid over it.
 
-The face carries a piecewise linear field on its triangles. With W the share of each cell's area
+The face carries a piecewise linear field on its facets. With W the share of each cell's area
 that belongs to each node's shape function, a cell takes the mean W s / ΣW over the part of it that
 the face covers, and a node the mean Wᵀ h / ΣWᵀ of the cells around it. Both keep constants and
-integrals: rows of W add up to the covered areas exactly, columns to the nodal areas to 1e-5.
+integrals: rows of W add up to the covered areas exactly, columns to the nodal areas to 1e-5 (in a
+line contact, exactly).
 """
 
 from __future__ import annotations
@@ -14,7 +15,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
-from fe_models.mesh import Interface
+from fe_models.mesh import Face
 from sa_solver.types import Array, Grid
 
 # Sample points per cell and direction for the areas that cells and triangles share.
@@ -38,12 +39,13 @@ class FaceTransfer:
     nearest: Array
 
     @classmethod
-    def between(cls, interface: Interface, grid: Grid) -> FaceTransfer:
-        """Measure the shared areas of an interface's triangles and a grid in the same frame."""
+    def between(cls, face: Face, grid: Grid) -> FaceTransfer:
+        """Measure the shared areas of a face's facets and a grid in the same frame."""
         x, y = np.broadcast_arrays(grid.x, grid.y)
-        _, nearest = cKDTree(interface.coordinates).query(np.stack([x.ravel(), y.ravel()], 1))
-        sampled = _sampled_areas(interface, grid)
-        return cls(grid, _balanced(sampled, interface.nodal_areas), nearest)
+        _, nearest = cKDTree(face.coordinates).query(np.stack([x.ravel(), y.ravel()], 1))
+        if face.line:
+            return cls(grid, _shared_lengths(face, grid), nearest)
+        return cls(grid, _balanced(_sampled_areas(face, grid), face.nodal_areas), nearest)
 
     def to_cells(self, nodal: Array) -> Array:
         """Cell means ``(..., nx, ny)`` of nodal values ``(..., n)``."""
@@ -61,7 +63,21 @@ class FaceTransfer:
         return (self.shared.T @ cells.ravel()) / areas
 
 
-def _sampled_areas(interface: Interface, grid: Grid) -> sp.csr_matrix:
+def _shared_lengths(face: Face, grid: Grid) -> sp.csr_matrix:
+    """Integrals of the nodes' shape functions over the strips of a line contact, exact."""
+    borders = np.append(grid.x.ravel() - 0.5 * grid.pitch[0], grid.x.max() + 0.5 * grid.pitch[0])
+    shared = np.zeros((grid.shape[0], len(face)))
+    for first, second in face.facets:
+        start, end = face.coordinates[[first, second], 0]
+        # Share of the segment passed at each border; its shape function integrates to t²/2.
+        passed = np.clip((borders - start) / (end - start), 0.0, 1.0)
+        rising = 0.5 * (end - start) * np.diff(passed**2)
+        shared[:, second] += rising
+        shared[:, first] += (end - start) * np.diff(passed) - rising
+    return sp.csr_matrix(np.abs(shared))
+
+
+def _sampled_areas(face: Face, grid: Grid) -> sp.csr_matrix:
     """Shared areas from midpoints of SAMPLES x SAMPLES parts of each cell."""
     fine = Grid(
         (grid.shape[0] * SAMPLES, grid.shape[1] * SAMPLES),
@@ -70,8 +86,8 @@ def _sampled_areas(interface: Interface, grid: Grid) -> sp.csr_matrix:
     x, y = fine.x.ravel(), fine.y.ravel()
     free = np.ones(fine.shape, dtype=bool)
     rows, columns, values = [], [], []
-    for triangle in interface.facets:
-        corners = interface.coordinates[triangle]
+    for triangle in face.facets:
+        corners = face.coordinates[triangle]
         low, high = corners.min(axis=0), corners.max(axis=0)
         i = slice(*np.searchsorted(x, (low[0], high[0])))
         j = slice(*np.searchsorted(y, (low[1], high[1])))
@@ -85,7 +101,7 @@ def _sampled_areas(interface: Interface, grid: Grid) -> sp.csr_matrix:
             columns.append(np.full(len(cell), node))
             values.append(shape[corner][inside] * fine.cell_area)
     place = np.concatenate(rows), np.concatenate(columns)
-    shape_2d = (grid.shape[0] * grid.shape[1], len(interface))
+    shape_2d = (grid.shape[0] * grid.shape[1], len(face))
     areas = sp.csr_matrix((np.maximum(np.concatenate(values), 0.0), place), shape=shape_2d)
     areas.eliminate_zeros()
     return areas

@@ -159,12 +159,13 @@ class ResultsWriter:
         """What the structure gives for one interface over a cycle."""
         face = history.interface
         loads = history.loads
+        if isinstance(face, Interface):
+            self.put(group, gap=face.gap)
         self.put(f"{group}/load_history", **vars(loads))
         self.put(
             group,
             coordinates=face.coordinates,
             facets=face.facets,
-            gap=face.gap,
             pressure=history.pressure,
             shear=history.force[:, :2] / face.nodal_areas,
             slip=history.slip,

@@ -9,13 +9,22 @@ a symmetric load gives a symmetric answer to rounding.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from fe_models.gmsh_session import gmsh_model
-from fe_models.mesh import Body, MeshError, StructureMesh, matched_interface, named_mesh
+from fe_models.mesh import (
+    AXES,
+    GMSH_CELL,
+    GMSH_FACET,
+    Body,
+    Indices,
+    MeshError,
+    StructureMesh,
+    matched_interface,
+    named_mesh,
+)
 from sa_solver.types import Array, Frame
 
 # How fast the mesh size grows with the distance from the flanks.
@@ -24,8 +33,6 @@ SIZE_GROWTH = 0.25
 ELEMENTS_PER_CIRCLE = 24
 # Slope at which the faces part beyond their rounded edges, where fillets and corners begin.
 PARTING_SLOPE = 1.0
-# gmsh's numbers for first-order elements.
-GMSH_TRIANGLE, GMSH_TETRAHEDRON = 2, 4
 
 Curve = tuple[str, list[tuple[float, float]]]
 
@@ -154,15 +161,21 @@ class Dovetail:
         ):
             raise MeshError("neck_fillet is taller than the shank: increase shank_height")
 
-    def mesh(self, flank_nodes: tuple[int, int], size: float) -> StructureMesh:
+    def mesh(
+        self, flank_nodes: tuple[int, int], size: float, dimension: Literal[2, 3] = 3
+    ) -> StructureMesh:
         """Mesh both bodies: ``flank_nodes`` across and along each flank, ``size`` [mm] far away.
 
-        The disk is body 1, the blade body 2. Boundaries: ``intrados`` (X > 0) and ``extrados`` on
-        both; ``inner``, ``sides`` of the disk; ``root_bottom``, ``shank_top`` of the blade.
+        In two ``dimension``s it is the section in the middle of the slot, which must not be skewed;
+        nodes along the flank then count for nothing. The disk is body 1, the blade body 2.
+        Boundaries: ``intrados`` (X > 0) and ``extrados`` on both; ``inner``, ``sides`` of the disk;
+        ``root_bottom``, ``shank_top`` of the blade.
         """
         self.check()
-        disk = _mesh_body("disk", self.disk_section(), self, flank_nodes, size)
-        blade = _mesh_body("blade", self.blade_section(), self, flank_nodes, size)
+        if dimension == 2 and self.skew != 0.0:
+            raise MeshError("a skewed slot is not the same all along: model it in 3 dimensions")
+        disk = _mesh_body("disk", self.disk_section(), self, flank_nodes, size, dimension)
+        blade = _mesh_body("blade", self.blade_section(), self, flank_nodes, size, dimension)
         interfaces = []
         for name, side in (("intrados", 1), ("extrados", -1)):
             face = matched_interface(name, disk, blade, name, self.flank_frame(side))
@@ -232,14 +245,19 @@ def _chain(corners: list[Any]) -> list[Curve]:
 
 
 def _mesh_body(
-    name: str, section: list[Curve], dovetail: Dovetail, flank_nodes: tuple[int, int], size: float
+    name: str,
+    section: list[Curve],
+    dovetail: Dovetail,
+    flank_nodes: tuple[int, int],
+    size: float,
+    dimension: int,
 ) -> Body:
     """Mesh one body in a gmsh model of its own.
 
     Two bodies in one model would share the nodes of their flanks: gmsh finds the nodes of an
     extruded mesh by their place.
     """
-    slot = dovetail.slot_length * dovetail.slot_direction
+    slot = dovetail.slot_length * dovetail.slot_direction if dimension == 3 else np.zeros(3)
     with gmsh_model(name) as gmsh:
         model = gmsh.model
         surfaces, named = _draw_halves(model.occ, section, -0.5 * slot)
@@ -248,12 +266,16 @@ def _mesh_body(
             model.mesh.setTransfiniteCurve(curve, flank_nodes[0])
         _set_sizes(gmsh, named["flank"], dovetail.flank_width / (flank_nodes[0] - 1), size)
         _mirror_mesh(model, surfaces, -0.5 * slot[0])
-        halves = [(2, surface) for surface in surfaces]
-        extruded = model.occ.extrude(halves, *slot, numElements=[flank_nodes[1] - 1])
-        model.occ.synchronize()
-        _name_groups(model, name, [tag for dim, tag in extruded if dim == 3], named, surfaces)
-        model.mesh.generate(3)
-        return _read_body(gmsh, name)
+        halves, cells = [(2, surface) for surface in surfaces], surfaces
+        swept = {label: curves for label, curves in named.items() if label not in ("", "middle")}
+        if dimension == 3:
+            extruded = model.occ.extrude(halves, *slot, numElements=[flank_nodes[1] - 1])
+            model.occ.synchronize()
+            cells = [tag for dim, tag in extruded if dim == 3]
+            swept = {label: _swept(model, curves, surfaces) for label, curves in swept.items()}
+        _name_groups(model, name, dimension, cells, swept)
+        model.mesh.generate(dimension)
+        return _read_body(gmsh, name, dimension)
 
 
 def _draw_halves(
@@ -305,43 +327,49 @@ def _mirror_mesh(model: Any, surfaces: list[int], middle: float) -> None:
     model.mesh.setPeriodic(2, [surfaces[1]], [surfaces[0]], mirror.ravel().tolist())
 
 
+def _swept(model: Any, curves: list[int], sections: list[int]) -> list[int]:
+    """The faces that section curves have swept, curve after curve."""
+    return [
+        int(surface)
+        for curve in curves
+        for surface in np.setdiff1d(model.getAdjacencies(1, curve)[0], sections)
+    ]
+
+
 def _name_groups(
-    model: Any, body: str, volumes: list[int], named: dict[str, list[int]], sections: list[int]
+    model: Any, body: str, dimension: int, cells: list[int], named: dict[str, list[int]]
 ) -> None:
-    """Name the body and the faces that its named section curves have swept."""
-    model.addPhysicalGroup(3, volumes, name=body)
+    """Name the body and its boundaries; the first flank is the right one."""
+    model.addPhysicalGroup(dimension, cells, name=body)
     right, left = named["flank"]
-    groups = {"intrados": [right], "extrados": [left]}
-    groups |= {
-        name: curves for name, curves in named.items() if name not in ("", "middle", "flank")
-    }
-    for name, curves in groups.items():
-        beside = np.concatenate([model.getAdjacencies(1, curve)[0] for curve in curves])
-        swept = np.setdiff1d(beside, sections)
-        model.addPhysicalGroup(2, swept.tolist(), name=f"{body}_{name}")
+    boundaries = {label: tags for label, tags in named.items() if label != "flank"}
+    for label, tags in ({"intrados": [right], "extrados": [left]} | boundaries).items():
+        model.addPhysicalGroup(dimension - 1, tags, name=f"{body}_{label}")
 
 
-def _read_body(gmsh: Any, name: str) -> Body:
+def _read_body(gmsh: Any, name: str, dimension: int) -> Body:
     """The body of that name with its named boundaries, its vertices numbered from zero."""
     model = gmsh.model
     names = {model.getPhysicalName(dim, tag): (dim, tag) for dim, tag in model.getPhysicalGroups()}
 
-    def elements(group: str, element_type: int, corners: int) -> NDArray[np.int64]:
+    def elements(group: str, element_type: int) -> Indices:
         dim, tag = names[group]
         nodes = [
             model.mesh.getElementsByType(element_type, entity)[1]
             for entity in model.getEntitiesForPhysicalGroup(dim, tag)
         ]
-        return np.concatenate(nodes).reshape(-1, corners).astype(np.int64)
+        return np.concatenate(nodes).reshape(-1, dim + 1).astype(np.int64)
 
-    tets = elements(name, GMSH_TETRAHEDRON, 4)
+    cells = elements(name, GMSH_CELL[dimension])
     boundaries = {
-        group.removeprefix(f"{name}_"): elements(group, GMSH_TRIANGLE, 3)
+        group.removeprefix(f"{name}_"): elements(group, GMSH_FACET[dimension])
         for group in names
         if group.startswith(f"{name}_")
     }
-    used = np.unique(tets)
+    used = np.unique(cells)
     tags, points, _ = model.mesh.getNodes()
     points = points.reshape(-1, 3)[np.argsort(tags)[np.searchsorted(np.sort(tags), used)]]
     numbered = {group: np.searchsorted(used, nodes) for group, nodes in boundaries.items()}
-    return Body(name, named_mesh(points, np.searchsorted(used, tets), numbered))
+    return Body(
+        name, named_mesh(points[:, AXES[dimension]], np.searchsorted(used, cells), numbered)
+    )
