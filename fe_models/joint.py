@@ -31,9 +31,9 @@ SPECTRUM_SHIFT = 1e-5
 class JointStiffness:
     """The joint ``f = H w + Σ_c amplitude_c loads_c`` in the interface frames.
 
-    ``stiffness`` ``(3 n, 3 n)`` [N/mm] and ``loads`` ``(3 n, cases)`` [N], numbered ``3 node +
-    component`` over all interfaces; ``rigid_modes`` counts H's null space; ``smallest`` and
-    ``largest`` are its extreme elastic eigenvalues.
+    ``stiffness`` ``(d n, d n)`` [N/mm] and ``loads`` ``(d n, cases)`` [N], numbered ``d node +
+    component`` over all interfaces in d dimensions, per length in the plane; ``rigid_modes`` counts
+    H's null space; ``smallest`` and ``largest`` are its extreme elastic eigenvalues.
     """
 
     stiffness: Array
@@ -57,7 +57,7 @@ class JointStiffness:
 class JointResolvent:
     """What structural friction needs of a joint.
 
-    ``inverse`` ``(3 n, 3 n)`` is (H + ρ)⁻¹ [mm/N] with ``rho`` ρ [N/mm]; ``loads`` and
+    ``inverse`` ``(d n, d n)`` is (H + ρ)⁻¹ [mm/N] with ``rho`` ρ [N/mm]; ``loads`` and
     ``rigid_modes`` are the joint's.
     """
 
@@ -74,7 +74,7 @@ def join(
 ) -> JointStiffness:
     """Join two condensed bodies; body 1 must be held, body 2 may float.
 
-    ``projection`` ``(3 n, 3 n_1)`` is N on displacements, None where the bodies meet node to node.
+    ``projection`` ``(d n, d n_1)`` is N on displacements, None where the bodies meet node to node.
     """
     (stiffness_1, loads_1), (stiffness_2, loads_2) = condensed_1, condensed_2
     if projection is None:
@@ -102,7 +102,8 @@ def _spectrum(stiffness: Array) -> tuple[int, float, float]:
     inverse = LinearOperator(
         stiffness.shape, matvec=lambda v: sl.cho_solve(factors, v), dtype=np.float64
     )
-    # A free body has six rigid motions: the seventh eigenvalue is elastic.
-    lowest = 1.0 / eigsh(inverse, 7, v0=start, return_eigenvectors=False) - shift
+    # A free body has at most six rigid motions: the seventh eigenvalue is elastic.
+    count = min(7, len(stiffness) - 1)
+    lowest = 1.0 / eigsh(inverse, count, v0=start, return_eigenvectors=False) - shift
     elastic = lowest[lowest > RIGID_LIMIT * largest]
     return len(lowest) - len(elastic), float(elastic.min()), float(largest)

@@ -80,10 +80,12 @@ class Face:
 
     @property
     def nodal_areas(self) -> Array:
-        """Area that belongs to each node, an equal share of its facets', ``(n,)`` [mm²].
+        """Area of contact that belongs to each node ``(n,)`` [mm²]; in a line contact [mm]."""
+        return self.facet_shares
 
-        In a line contact the length [mm].
-        """
+    @property
+    def facet_shares(self) -> Array:
+        """Each node's equal share of its facets ``(n,)`` [mm²]; in a line contact [mm]."""
         corners = self.coordinates[self.facets]
         edges = corners[:, 1:] - corners[:, :1]
         if self.line:
@@ -102,7 +104,7 @@ class Interface(Face):
     ``nodes_1`` and ``nodes_2`` are vertices of body 1 and body 2; ``gap`` ``(n,)`` the distance of
     the unloaded, unworn faces [mm]. Faces that meet node to node list their nodes in the same
     order. Otherwise ``projection`` ``(n, n_1)`` gives a field of body 1's nodes at those of body 2,
-    and ``face_1`` is body 1's own face.
+    ``face_1`` is body 1's own face and ``areas`` ``(n,)`` what it covers of each node's area [mm²].
     """
 
     nodes_1: Indices
@@ -110,6 +112,11 @@ class Interface(Face):
     gap: Array
     projection: sp.csr_matrix | None = None
     face_1: Face | None = None
+    areas: Array | None = None
+
+    @property
+    def nodal_areas(self) -> Array:
+        return self.facet_shares if self.areas is None else self.areas
 
     def face(self, number: int) -> Face:
         """The face of body ``number``, 1 or 2, with its own nodes."""

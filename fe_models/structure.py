@@ -82,7 +82,7 @@ class Structure:
 
     def condense(self) -> JointStiffness:
         """Stiffness and loads of the joint on its interface displacements."""
-        return join(self.body_1.condense(), self.body_2.condense())
+        return join(self.body_1.condense(), self.body_2.condense(), self.projection)
 
     @property
     def projection(self) -> sp.csr_matrix | None:

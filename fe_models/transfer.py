@@ -2,9 +2,8 @@
 
 The face carries a piecewise linear field on its facets. With W the share of each cell's area
 that belongs to each node's shape function, a cell takes the mean W s / ΣW over the part of it that
-the face covers, and a node the mean Wᵀ h / ΣWᵀ of the cells around it. Both keep constants and
-integrals: rows of W add up to the covered areas exactly, columns to the nodal areas to 1e-5 (in a
-line contact, exactly).
+the face covers, and a node the mean Wᵀ h / A of the cells over its area A. Both keep constants and
+integrals where the grid covers the face.
 """
 
 from __future__ import annotations
@@ -18,25 +17,25 @@ from scipy.spatial import cKDTree
 from fe_models.mesh import Face
 from sa_solver.types import Array, Grid
 
-# Sample points per cell and direction for the areas that cells and triangles share.
-SAMPLES = 4
-# Sampling leaves 1e-2 in the areas of the columns, these sweeps 1e-6; 20 left 7e-5 on skewed faces.
-BALANCING_SWEEPS = 100
-# Barycentric coordinates above this are inside: a point on an edge belongs to either triangle.
-INSIDE = -1e-9
+# Two points integrate the quadratics under a straight edge exactly (Gauss).
+GAUSS = np.sqrt(1.0 / 3.0)
+# Differences leave rounding in cells that a triangle does not meet: below this share of its area.
+ROUNDING = 1e-12
 
 
 @dataclass(frozen=True)
 class FaceTransfer:
     """Transfer between the ``n`` nodes of a face and a grid's ``(nx, ny)`` cells.
 
-    ``shared`` ``(nx ny, n)`` holds the areas W [mm²]; ``nearest`` ``(nx ny,)`` the node next to
-    each cell, which stands in where the face does not cover the cell.
+    ``shared`` ``(nx ny, n)`` holds the areas W and ``areas`` ``(n,)`` those of the nodes [mm²];
+    ``nearest`` ``(nx ny,)`` is the node next to each cell, which stands in where the face does not
+    cover the cell.
     """
 
     grid: Grid
     shared: sp.csr_matrix
     nearest: Array
+    areas: Array
 
     @classmethod
     def between(cls, face: Face, grid: Grid) -> FaceTransfer:
@@ -44,8 +43,8 @@ class FaceTransfer:
         x, y = np.broadcast_arrays(grid.x, grid.y)
         _, nearest = cKDTree(face.coordinates).query(np.stack([x.ravel(), y.ravel()], 1))
         if face.line:
-            return cls(grid, _shared_lengths(face, grid), nearest)
-        return cls(grid, _balanced(_sampled_areas(face, grid), face.nodal_areas), nearest)
+            return cls(grid, _shared_lengths(face, grid), nearest, face.facet_shares)
+        return cls(grid, _shared_areas(face, grid), nearest, face.facet_shares)
 
     def to_cells(self, nodal: Array) -> Array:
         """Cell means ``(..., nx, ny)`` of nodal values ``(..., n)``."""
@@ -58,9 +57,8 @@ class FaceTransfer:
         return cells.reshape(*nodal.shape[:-1], *self.grid.shape)
 
     def to_nodes(self, cells: Array) -> Array:
-        """Nodal values ``(n,)`` of cell values ``(nx, ny)``."""
-        areas = np.asarray(self.shared.sum(axis=0)).ravel()
-        return (self.shared.T @ cells.ravel()) / areas
+        """Nodal values ``(n,)`` of cell values ``(nx, ny)``, zero beyond the grid."""
+        return (self.shared.T @ cells.ravel()) / self.areas
 
 
 def _shared_lengths(face: Face, grid: Grid) -> sp.csr_matrix:
@@ -77,52 +75,66 @@ def _shared_lengths(face: Face, grid: Grid) -> sp.csr_matrix:
     return sp.csr_matrix(np.abs(shared))
 
 
-def _sampled_areas(face: Face, grid: Grid) -> sp.csr_matrix:
-    """Shared areas from midpoints of SAMPLES x SAMPLES parts of each cell."""
-    fine = Grid(
-        (grid.shape[0] * SAMPLES, grid.shape[1] * SAMPLES),
-        (grid.pitch[0] / SAMPLES, grid.pitch[1] / SAMPLES),
-    )
-    x, y = fine.x.ravel(), fine.y.ravel()
-    free = np.ones(fine.shape, dtype=bool)
-    rows, columns, values = [], [], []
-    for triangle in face.facets:
-        corners = face.coordinates[triangle]
-        low, high = corners.min(axis=0), corners.max(axis=0)
-        i = slice(*np.searchsorted(x, (low[0], high[0])))
-        j = slice(*np.searchsorted(y, (low[1], high[1])))
-        shape = _barycentric(corners, x[i, None], y[None, j])
-        inside = np.all(shape > INSIDE, axis=0) & free[i, j]
-        free[i, j] &= ~inside
-        at_x, at_y = np.nonzero(inside)
-        cell = ((at_x + i.start) // SAMPLES) * grid.shape[1] + (at_y + j.start) // SAMPLES
-        for corner, node in enumerate(triangle):
-            rows.append(cell)
-            columns.append(np.full(len(cell), node))
-            values.append(shape[corner][inside] * fine.cell_area)
-    place = np.concatenate(rows), np.concatenate(columns)
-    shape_2d = (grid.shape[0] * grid.shape[1], len(face))
-    areas = sp.csr_matrix((np.maximum(np.concatenate(values), 0.0), place), shape=shape_2d)
-    areas.eliminate_zeros()
-    return areas
+def _shared_areas(face: Face, grid: Grid) -> sp.csr_matrix:
+    """Integrals of the nodes' shape functions over the cells, exact.
+
+    Over the part of a triangle left of a line x = X and below a line y = Y the integrals of 1, x
+    and y are sums over its edges of what lies under each (Green's theorem); those over cells are
+    their differences.
+    """
+    borders = [
+        np.append(c.ravel() - 0.5 * d, c.max() + 0.5 * d)
+        for c, d in zip((grid.x, grid.y), grid.pitch, strict=True)
+    ]
+    parts = [_triangle(face, triangle, borders, grid.shape[1]) for triangle in face.facets]
+    values, cells, nodes = (np.concatenate(own) for own in zip(*parts, strict=True))
+    shape = grid.shape[0] * grid.shape[1], len(face)
+    return sp.csr_matrix((values, (cells, nodes)), shape=shape)
 
 
-def _barycentric(corners: Array, x: Array, y: Array) -> Array:
-    """Barycentric coordinates ``(3, ...)`` of points in a triangle ``(3, 2)``."""
-    (ax, ay), (bx, by), (cx, cy) = corners
-    twice = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-    second = ((x - ax) * (cy - ay) - (y - ay) * (cx - ax)) / twice
-    third = ((bx - ax) * (y - ay) - (by - ay) * (x - ax)) / twice
-    return np.stack([1.0 - second - third, second, third])
+def _triangle(
+    face: Face, triangle: Array, borders: list[Array], columns: int
+) -> tuple[Array, Array, Array]:
+    """Shared areas of one triangle's corners, with their cells and nodes."""
+    corners = face.coordinates[triangle]
+    middle = corners.mean(axis=0)
+    near = [
+        slice(max(np.searchsorted(lines, low) - 1, 0), np.searchsorted(lines, high) + 1)
+        for lines, low, high in zip(borders, corners.min(axis=0), corners.max(axis=0), strict=True)
+    ]
+    x, y = (lines[own] - c for lines, own, c in zip(borders, near, middle, strict=True))
+    local = corners - middle
+    moments = _left_and_below(local, x, y)
+    shapes = np.linalg.inv(np.column_stack([np.ones(3), local]))
+    twice = float(np.linalg.det(local[1:] - local[0]))
+    # The upper edges of a counter-clockwise triangle run backwards.
+    integrals = -np.sign(twice) * np.diff(np.diff(moments, axis=1), axis=2)
+    met = integrals[0] > ROUNDING * abs(twice)
+    i, j = np.nonzero(met)
+    shares = shapes.T @ integrals[:, met]
+    cells = (i + near[0].start) * columns + j + near[1].start
+    return shares.ravel(), np.tile(cells, 3), np.repeat(triangle, len(cells))
 
 
-def _balanced(areas: sp.csr_matrix, nodal_areas: Array) -> sp.csr_matrix:
-    """Scale rows and columns in turn until both add up (Sinkhorn & Knopp 1967)."""
-    covered = np.asarray(areas.sum(axis=1)).ravel()
-    covered *= nodal_areas.sum() / covered.sum()
-    for _ in range(BALANCING_SWEEPS):
-        columns = np.asarray(areas.sum(axis=0)).ravel()
-        areas = areas @ sp.diags(nodal_areas / columns)
-        rows = np.asarray(areas.sum(axis=1)).ravel()
-        areas = sp.diags(np.divide(covered, rows, out=np.zeros_like(rows), where=rows > 0)) @ areas
-    return areas.tocsr()
+def _left_and_below(corners: Array, x: Array, y: Array) -> Array:
+    """Integrals of 1, x and y ``(3, nx, ny)`` over a triangle, left of each x and below each y.
+
+    Counted negative where it is counter-clockwise, and from y = 0, which cancels in differences.
+    """
+    start, end = corners.T[..., None, None], np.roll(corners, -1, axis=0).T[..., None, None]
+    width, height = end - start
+    upright = width == 0.0  # nothing lies under it
+    rise = np.divide(height, width, out=np.zeros_like(width), where=~upright)
+    left, right = np.minimum(start[0], end[0]), np.maximum(start[0], end[0])
+    stop = np.clip(x[:, None], left, right)
+    # Where the edge passes y: on one side of it the edge is the upper limit, on the other y is.
+    above = y[None, :] - start[1]
+    level = np.broadcast_to(rise == 0.0, above.shape)
+    passing = start[0] + np.divide(above, rise, out=np.zeros_like(above), where=~level)
+    cross = np.clip(passing, left, stop)
+    ends = np.stack(np.broadcast_arrays(left, cross, stop))
+    half, middle = 0.5 * np.diff(ends, axis=0), 0.5 * (ends[1:] + ends[:-1])
+    at = np.stack([middle - GAUSS * half, middle + GAUSS * half])
+    top = np.minimum(start[1] + rise * (at - start[0]), y)
+    weights = np.sign(width) * half
+    return np.stack([np.sum(weights * f, axis=(0, 1, 2)) for f in (top, at * top, 0.5 * top**2)])

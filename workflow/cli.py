@@ -171,11 +171,9 @@ def _outline(case: Case) -> list[tuple[str, str]]:
 
 
 def _wear_outline(case: WearCase) -> list[tuple[str, str]]:
-    path, mesh, grid, wear = case.load_path, case.mesh, case.contact.grid, case.wear
-    nodes = mesh.flank_nodes
+    grid, wear = case.contact.grid, case.wear
     return [
-        ("structure", f"{case.structure.kind}, {nodes[0]} x {nodes[1]} nodes on a flank"),
-        ("load path", f"{path.increments} increments, peak at {path.peak_at}"),
+        *case.outline(),
         ("contact", f"{grid[0]} x {grid[1]} cells, {case.contact.method}"),
         ("wear", f"{wear.law}, {wear.cycles:g} cycles, {wear.step.kind} steps of {_step(case)}"),
     ]

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from fe_models.mesh import Interface
-from fe_models.structure import InterfaceHistory
 from fe_models.transfer import FaceTransfer
 from sa_solver.contact import ContactState, FrictionalContact
 from sa_solver.half_space import HalfSpace
@@ -19,6 +17,8 @@ from wear.laws import Archard, Energy, EnergyAmplitude, WearLaw
 from wear.stepping import CycleResult, Starts, WearingContact
 from wear.surfaces import Surfaces
 from workflow.case import WearCase
+from workflow.case.wear_sections import ArchardBody, EnergyAmplitudeLaw
+from workflow.load_source import ContactFace, FaceLoads
 
 
 @dataclass(frozen=True)
@@ -41,15 +41,10 @@ class InterfaceState:
 
 @dataclass(frozen=True)
 class StageSettings:
-    """What a contact stage is made from.
-
-    ``size`` of the face (mm, mm) and ``gap`` the unworn gap [mm] at x and y of the face.
-    """
+    """What a contact stage is made from."""
 
     case: WearCase
-    interface: Interface
-    size: tuple[float, float]
-    gap: Callable[[Array, Array], Array]
+    contact: ContactFace
 
 
 @dataclass(frozen=True)
@@ -81,12 +76,11 @@ class ContactStage:
 
     def __init__(self, settings: StageSettings) -> None:
         self._case = case = settings.case
-        self._gap = settings.gap
-        self.interface = settings.interface
-        self.grid = Grid.covering(settings.size, case.contact.grid)
-        self.transfer = FaceTransfer.between(settings.interface, self.grid)
-        blade, disk = case.materials.blade.elastic(), case.materials.disk.elastic()
-        self.pair = ElasticPair(disk, blade)
+        self._contact_face = settings.contact
+        self.face = settings.contact.face
+        self.grid = self._covering(case.contact.grid)
+        self.transfer = FaceTransfer.between(self.face, self.grid)
+        self.pair = ElasticPair(case.material(1), case.material(2))
         half_space = HalfSpace(self.grid, self.pair)
         self._frictional: FrictionalContact | None = None
         if case.contact.method == "full":
@@ -98,16 +92,29 @@ class ContactStage:
             )
         own = self._frictional
         self._contact = NormalContact(half_space) if own is None else own.normal
-        self._laws = _law(case, "disk"), _law(case, "blade")
+        self._laws = _law(case, 1), _law(case, 2)
         self._current: tuple[tuple[Array, ...], Wearing] | None = None
 
     @property
     def name(self) -> str:
-        return self.interface.name
+        return self.face.name
 
-    def begin(self, history: InterfaceHistory) -> tuple[InterfaceState, FirstContact]:
+    @property
+    def coarse_grid(self) -> Grid:
+        """A grid with as many cells as the face has nodes."""
+        return self._covering(self._contact_face.coarse)
+
+    def _covering(self, cells: tuple[int, int]) -> Grid:
+        size = self._contact_face.size
+        return Grid.strips(size[0], cells[0]) if self.face.line else Grid.covering(size, cells)
+
+    def _gap(self, grid: Grid) -> Array:
+        gap = self._contact_face.gap(grid.x, grid.y)
+        return np.ascontiguousarray(np.broadcast_to(gap, grid.shape))
+
+    def begin(self, history: FaceLoads) -> tuple[InterfaceState, FirstContact]:
         """The unworn state, and the contact at every loaded increment of the first cycle."""
-        surfaces = Surfaces.unworn(self._gap(self.grid.x, self.grid.y))
+        surfaces = Surfaces.unworn(self._gap(self.grid))
         state = InterfaceState(surfaces, history.loads, history.slip, 0.0, 0.0, 0.0, {})
         loaded = np.flatnonzero(history.loads.P > 0.0).tolist()
         wearing = self._wearing(state)
@@ -157,17 +164,18 @@ class ContactStage:
         grid = self.coarse_grid
         at_peak = (float(column[peak]) for column in (loads.P, loads.Mx, loads.My))
         contact = NormalContact(HalfSpace(grid, self.pair))
-        return contact.solve(self._gap(grid.x, grid.y), *at_peak).pressure
+        return contact.solve(self._gap(grid), *at_peak).pressure
 
-    @property
-    def coarse_grid(self) -> Grid:
-        """A grid with as many cells as the flank has nodes."""
-        return Grid.covering(self.grid.size, self._case.mesh.flank_nodes)
+    def nodal_depth(self, state: InterfaceState) -> Array:
+        """Worn depth of both bodies together at the nodes of the face, volume kept."""
+        return self.transfer.to_nodes(state.surfaces.depth_1 + state.surfaces.depth_2)
 
-    def nodal_depths(self, state: InterfaceState) -> tuple[Array, Array]:
-        """Worn depths of body 1 and body 2 at the nodes of the face, volumes kept."""
+    def depths_of_bodies(self, state: InterfaceState) -> tuple[Array, Array]:
+        """Worn depths of body 1 and body 2 at the nodes of their own faces, volumes kept."""
+        face_1 = self.face.face(1) if isinstance(self.face, Interface) else self.face
+        own = self.transfer if face_1 is self.face else FaceTransfer.between(face_1, self.grid)
         surfaces = state.surfaces
-        return self.transfer.to_nodes(surfaces.depth_1), self.transfer.to_nodes(surfaces.depth_2)
+        return own.to_nodes(surfaces.depth_1), self.transfer.to_nodes(surfaces.depth_2)
 
     def _wearing(self, state: InterfaceState) -> Wearing:
         """The contact under the state's loads and slips, kept until these change.
@@ -219,10 +227,10 @@ class ContactStage:
         )
 
 
-def _law(case: WearCase, body: str) -> WearLaw:
-    own = getattr(case.wear, body)
-    if case.wear.law == "archard":
+def _law(case: WearCase, body: int) -> WearLaw:
+    own = case.wear_of(body)
+    if isinstance(own, ArchardBody):
         return Archard(own.coefficient, own.hardness)
-    if case.wear.law == "energy_amplitude":
+    if isinstance(case.wear, EnergyAmplitudeLaw):
         return EnergyAmplitude(own.coefficient, case.wear.reference_amplitude)
     return Energy(own.coefficient)

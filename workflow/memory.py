@@ -6,7 +6,7 @@ import os
 from math import prod
 from pathlib import Path
 
-from workflow.case import Case, LineContactCase, WearCase
+from workflow.case import Case, DovetailCase, LineContactCase, WearCase
 from workflow.errors import OutOfMemory
 
 # Dense interface matrices alive at once while the joint is condensed.
@@ -22,21 +22,21 @@ REST = 1.2e9
 BYTES = 8
 
 
-def required_bytes(case: Case, structure_nodes: int = 0) -> float:
+def required_bytes(case: WearCase | Case, structure_nodes: int = 0) -> float:
     """Upper estimate of the memory a run takes, with the nodes of both bodies once known."""
     if not isinstance(case, WearCase):
         cells = case.contact.grid if isinstance(case, LineContactCase) else prod(case.contact.grid)
         increments = len(case.load_path.table())
         return BYTES * cells * (SPECTRA + STATE_FIELDS * increments) + REST
-    nodes = case.mesh.flank_nodes[0] * case.mesh.flank_nodes[1]
-    unknowns = 3 * 2 * nodes
-    cells = case.contact.grid[0] * case.contact.grid[1]
-    contact = 2 * cells * case.load_path.increments * FIELDS
+    if not isinstance(case, DovetailCase) or case.structure.dimension == 2:
+        return BYTES * prod(case.contact.grid) * SPECTRA + REST
+    unknowns = 3 * 2 * prod(case.mesh.flank_nodes)
+    contact = 2 * prod(case.contact.grid) * case.load_path.increments * FIELDS
     factors = FACTOR_BYTES * (structure_nodes / FACTOR_NODES) ** FACTOR_POWER
     return BYTES * (DENSE_MATRICES * unknowns**2 + contact) + factors + REST
 
 
-def check_memory(case: Case, structure_nodes: int = 0) -> None:
+def check_memory(case: WearCase | Case, structure_nodes: int = 0) -> None:
     """Raise :class:`OutOfMemory` if the machine has less than the case needs."""
     required, available = required_bytes(case, structure_nodes), _available_bytes()
     if available is not None and required > available:

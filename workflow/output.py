@@ -1,9 +1,10 @@
-"""What a finished run leaves: results, summary, ParaView files, figures, the worn mesh."""
+"""What a finished wear run leaves: results, summary, ParaView files, figures."""
 
 from __future__ import annotations
 
 import json
 import shutil
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -11,11 +12,6 @@ from typing import Any
 import h5py
 import numpy as np
 
-from fe_models.mesh import StructureMesh, write_msh
-from fe_models.remesh import worn_mesh, worn_volume
-from fe_models.stress import StressField
-from fe_models.structure import CycleSolution
-from sa_solver.types import Array
 from wear.kinetics import LinearRegime, linear_regime
 from workflow.case import WearCase, dump_case
 from workflow.checkpoint import KINETICS, RunState
@@ -23,33 +19,30 @@ from workflow.comparison import comparison_summary, write_comparison
 from workflow.contact_stage import ContactStage, FirstContact
 from workflow.figures import write_figures
 from workflow.folder import OutputFolder
+from workflow.load_source import FaceLoads, LoadSource
 from workflow.paraview import write_paraview
 from workflow.reporter import Reporter
-from workflow.store import BODY_NAMES, ResultsWriter, read_arrays, replacing
+from workflow.store import ResultsWriter, read_arrays, replacing
+from workflow.structure_output import WornStructure, resultants_at, worn_structure
 from workflow.structure_stage import StructureStage
 from workflow.versions import versions
 from workflow.workers import side_by_side
-
-RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
 
 
 @dataclass(frozen=True)
 class Outcome:
     """Everything a wear run found.
 
-    ``unworn`` and ``worn`` are the structure's cycles with the first and the last gaps, ``first``
-    the contact of the unworn cycle and ``depths`` the nodal depths (body 1, body 2) at the end, by
+    ``unworn`` are the loads of the faces before wear and ``first`` the contact of that cycle, by
     interface.
     """
 
     case: WearCase
-    structure: StructureStage
+    source: LoadSource
     stages: list[ContactStage]
     state: RunState
-    unworn: CycleSolution
-    worn: CycleSolution
+    unworn: Sequence[FaceLoads]
     first: list[FirstContact]
-    depths: list[tuple[Array, Array]]
 
     @cached_property
     def regimes(self) -> dict[str, dict[str, LinearRegime | None]]:
@@ -65,29 +58,16 @@ class Outcome:
         }
 
 
-Stress = tuple[StressField, StressField]
-
-
 def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
-    structure = outcome.structure
-    with reporter.stage("re-meshing"):
-        mesh = worn_mesh(structure.mesh, outcome.depths)
-        with replacing(folder.root / "worn.msh") as partial:
-            # gmsh goes by the ending; the name stays one that a resumed run clears away.
-            path = partial.with_name(f"{partial.name}.msh")
-            write_msh(path, mesh)
-            path.replace(partial)
-    with reporter.stage("stress"):
-        stresses = {
-            "unworn": structure.stress(outcome.unworn),
-            "worn": structure.worn_stress(mesh, outcome.worn),
-        }
+    structure = None
+    if isinstance(outcome.source, StructureStage):
+        structure = worn_structure(outcome.source, outcome.stages, outcome.state, folder, reporter)
     with reporter.stage("results"):
-        _write_results(outcome, mesh, stresses, folder)
+        _write_results(outcome, structure, folder)
     with reporter.stage("paraview and figures"):
         _write_pictures(outcome.case, folder)
-    summary = _summary(outcome, mesh, stresses, _peak_pressures(outcome, folder), reporter)
+    summary = _summary(outcome, structure, _peak_pressures(outcome, folder), reporter)
     with replacing(folder.summary) as partial:
         partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     shutil.rmtree(folder.jumps)
@@ -105,41 +85,33 @@ def _write_pictures(case: WearCase, folder: OutputFolder) -> None:
     )
 
 
-def _write_results(
-    outcome: Outcome, mesh: StructureMesh, stresses: dict[str, Stress], folder: OutputFolder
-) -> None:
-    structure, peak = outcome.structure, outcome.structure.peak
+def _write_results(outcome: Outcome, structure: WornStructure | None, folder: OutputFolder) -> None:
+    source = outcome.source
     with replacing(folder.results) as partial, h5py.File(partial, "w") as file:
-        writer = ResultsWriter(file)
+        writer = ResultsWriter(file, per_length=source.line)
         file.attrs.update(
             {
                 "title": outcome.case.title,
                 "friction": outcome.case.friction.coefficient,
-                "peak_increment": peak,
+                "peak_increment": source.peak,
+                "bodies": list(outcome.case.bodies),
             }
         )
         file.create_group("case").attrs.update({"text": dump_case(outcome.case)} | versions())
-        for group, solution in (("structure", outcome.unworn), ("structure_worn", outcome.worn)):
-            for history in solution.histories:
-                writer.put_structure(f"{group}/{history.interface.name}", history)
-        for stage, result, history in zip(
-            outcome.stages, outcome.first, outcome.unworn.histories, strict=True
-        ):
-            writer.put_grid(stage.name, stage.grid, stage.interface.frame)
+        for stage, result, loads in zip(outcome.stages, outcome.first, outcome.unworn, strict=True):
+            writer.put_grid(stage.name, stage.grid, stage.face.frame)
+            writer.put_face(f"structure/{stage.name}", stage.face, loads)
             coarse = f"contact/{stage.name}/coarse"
-            writer.put(coarse, pressure=stage.coarse_pressure(history.loads, peak))
             grid = stage.coarse_grid
-            file[coarse].attrs.update({"shape": grid.shape, "pitch": grid.pitch})
+            writer.put(coarse, pressure=stage.coarse_pressure(loads.loads, source.peak))
+            file[coarse].attrs.update({"shape": grid.shape, "pitch": grid.pitch, "line": grid.line})
             writer.put(f"contact/{stage.name}", energy_half_space=result.energy)
             if result.cycle:
-                write_comparison(writer, stage.name, result.cycle, peak)
+                write_comparison(writer, stage.name, result.cycle, source.peak)
         _write_jumps(writer, outcome, folder)
         _write_kinetics(writer, outcome)
-        for moment, shape in (("unworn", structure.mesh), ("worn", mesh)):
-            for name, body, field in zip(
-                BODY_NAMES.values(), (shape.body_1, shape.body_2), stresses[moment], strict=True
-            ):
-                writer.put_body(f"bodies/{name}/{moment}", body.mesh.p.T, body.mesh.t.T, field)
+        if structure is not None:
+            structure.write(writer)
 
 
 def _write_jumps(writer: ResultsWriter, outcome: Outcome, folder: OutputFolder) -> None:
@@ -186,40 +158,21 @@ def _peak_pressures(outcome: Outcome, folder: OutputFolder) -> dict[str, dict[st
 
 def _summary(
     outcome: Outcome,
-    mesh: StructureMesh,
-    stresses: dict[str, Stress],
+    structure: WornStructure | None,
     pressures: dict[str, dict[str, float]],
     reporter: Reporter,
 ) -> dict[str, Any]:
-    state, structure = outcome.state, outcome.structure
+    state = outcome.state
     return {
         "title": outcome.case.title,
         "assumed": list(outcome.case.assumed),
+        "per_length": outcome.source.line,
         "cycles": float(state.cycles[-1]),
         "jumps": state.jump,
-        "structure": {
-            "from_cache": structure.from_cache,
-            "nodes": {b.name: int(b.mesh.nvertices) for b in (mesh.body_1, mesh.body_2)},
-            "rigid_modes": structure.rigid_modes,
-            "solutions": state.solutions,
-            "iterations": outcome.unworn.iterations,
-            "residual": outcome.unworn.residual,
-            "equilibrium_error": float(outcome.unworn.equilibrium.max()),
-            "closure": outcome.unworn.closure,
-            "drift": [float(value) for value in state.drift],
-            "peak_stress": {
-                moment: {
-                    name: {
-                        "von_mises": float(field.von_mises.max()),
-                        "maximum_principal": float(field.maximum_principal.max()),
-                    }
-                    for name, field in zip(BODY_NAMES.values(), stresses[moment], strict=True)
-                }
-                for moment in stresses
-            },
-        },
+        **({"structure": structure.summary(state)} if structure else {}),
         **{
-            stage.name: _interface_summary(outcome, number, mesh)
+            stage.name: _interface_summary(outcome, number)
+            | (structure.interface_summary(number) if structure else {})
             | {"peak_pressure": pressures[stage.name]}
             for number, stage in enumerate(outcome.stages)
         },
@@ -236,32 +189,20 @@ def _summary(
     }
 
 
-def _interface_summary(outcome: Outcome, number: int, mesh: StructureMesh) -> dict[str, Any]:
-    stage, structure = outcome.stages[number], outcome.structure
-    first = outcome.first[number]
-    peak = structure.peak
-    unworn, worn = (s.histories[number].loads for s in (outcome.unworn, outcome.worn))
-    bodies = (
-        (structure.mesh.body_1, mesh.body_1),
-        (structure.mesh.body_2, mesh.body_2),
-    )
+def _interface_summary(outcome: Outcome, number: int) -> dict[str, Any]:
+    stage, first = outcome.stages[number], outcome.first[number]
+    unworn = outcome.unworn[number]
+    loads = unworn.loads
     last = dict(zip(KINETICS, outcome.state.kinetics[-1, number].tolist(), strict=True))
     return {
         **last,
-        "mesh_volume_1": worn_volume(*bodies[0], stage.interface, 1),
-        "mesh_volume_2": worn_volume(*bodies[1], stage.interface, 2),
-        "peak_load": {
-            "unworn": {name: float(getattr(unworn, name)[peak]) for name in RESULTANTS},
-            "worn": {name: float(getattr(worn, name)[peak]) for name in RESULTANTS},
-        },
-        "slip_per_cycle": float(
-            np.hypot(*np.moveaxis(outcome.unworn.histories[number].slip, 1, 0)).sum(axis=0).max()
-        ),
+        "peak_load": {"unworn": resultants_at(loads, outcome.source.peak)},
+        "slip_per_cycle": float(np.hypot(*np.moveaxis(unworn.slip, 1, 0)).sum(axis=0).max()),
         "energy_per_cycle": {
             "half_space": float(first.energy.sum()),
-            "structure": float((unworn.Edx + unworn.Edy).sum()),
+            "structure": float((loads.Edx + loads.Edy).sum()),
         },
-        **({"by_increment": comparison_summary(first.cycle, unworn)} if first.cycle else {}),
+        **({"by_increment": comparison_summary(first.cycle, loads)} if first.cycle else {}),
         "contact_residual": first.largest_residual,
         "convolutions": first.convolutions,
         "linear_regime": {
@@ -274,13 +215,15 @@ def _interface_summary(outcome: Outcome, number: int, mesh: StructureMesh) -> di
 def _say(outcome: Outcome, summary: dict[str, Any], reporter: Reporter) -> None:
     """The end of the run in a few lines."""
     reporter.say(f"{summary['cycles']:.6g} cycles in {summary['jumps']} jumps")
+    name_1, name_2 = outcome.case.bodies
+    unit = "mm^3/mm" if outcome.source.line else "mm^3"
     for stage in outcome.stages:
         own = summary[stage.name]
         peaks = own["peak_pressure"]
         reporter.say(
-            f"  {stage.name}: worn {own['depth_1'] * 1e3:.3g} um (disk), "
-            f"{own['depth_2'] * 1e3:.3g} um (blade); {own['volume_1']:.3g}, "
-            f"{own['volume_2']:.3g} mm^3; peak pressure {peaks['unworn']:.0f} -> "
+            f"  {stage.name}: worn {own['depth_1'] * 1e3:.3g} um ({name_1}), "
+            f"{own['depth_2'] * 1e3:.3g} um ({name_2}); {own['volume_1']:.3g}, "
+            f"{own['volume_2']:.3g} {unit}; peak pressure {peaks['unworn']:.0f} -> "
             f"{peaks['worn']:.0f} MPa"
         )
     reporter.say(f"  seconds: {', '.join(f'{k} {v:.1f}' for k, v in summary['seconds'].items())}")

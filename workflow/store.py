@@ -17,16 +17,14 @@ import numpy as np
 from sa_solver.types import Array, Frame, Grid
 
 if TYPE_CHECKING:
-    from fe_models.structure import InterfaceHistory
-
-# Names of body 1 and body 2 (sa_solver.types).
-BODY_NAMES = {1: "disk", 2: "blade"}
+    from fe_models.mesh import Face
+    from workflow.load_source import FaceLoads
 
 # Name of the only interface of a contact case.
 BODIES = "bodies"
 
 # Units of the forces and moments of a line contact, by those of a contact over an area.
-PER_LENGTH = {"N": "N/mm", "N mm": "N mm/mm"}
+PER_LENGTH = {"N": "N/mm", "N mm": "N mm/mm", "mm^3": "mm^3/mm"}
 
 # Ending of files that are being written.
 PARTIAL = ".part"
@@ -43,8 +41,8 @@ DATASETS = {
     "Edy": ("N mm", "energy dissipated in the increment by slip along y"),
     "sliding": ("1", "whether the whole face slides"),
     "coordinates": ("mm", "nodes in the interface frame"),
-    "facets": ("1", "corner nodes of the triangles"),
-    "gap": ("mm", "distance of the unloaded faces"),
+    "facets": ("1", "corner nodes of the triangles, or of the segments of a line contact"),
+    "gap": ("mm", "distance of the deformed faces"),
     "pressure": ("MPa", "contact pressure"),
     "shear": (
         "MPa",
@@ -72,7 +70,7 @@ DATASETS = {
     "volume_2": ("mm^3", "worn volume of body 2"),
     "energy": ("N mm", "energy dissipated so far"),
     "points": ("mm", "vertices"),
-    "tets": ("1", "corner vertices of the tetrahedra"),
+    "elements": ("1", "corner vertices of the tetrahedra, or of the triangles in the plane"),
     "displacement": ("mm", "displacement at peak load"),
     "von_mises": ("MPa", "von Mises stress at peak load"),
     "maximum_principal": ("MPa", "largest principal stress at peak load"),
@@ -124,6 +122,12 @@ def frame_of(group: h5py.Group) -> Frame:
     return Frame(np.array(group.attrs["origin"]), np.array(group.attrs["axes"]))
 
 
+def body_names(file: h5py.File) -> dict[int, str]:
+    """Names of body 1 and body 2 in a wear run."""
+    name_1, name_2 = file.attrs["bodies"]
+    return {1: str(name_1), 2: str(name_2)}
+
+
 def jump_names(file: h5py.File, interface: str) -> list[str]:
     """Names of the jumps that have both surfaces and a contact solution, ascending."""
     return sorted(set(file["surfaces"][interface]) & set(file["contact"][interface]))
@@ -155,22 +159,15 @@ class ResultsWriter:
         if grid.line:
             group.attrs["line"] = True
 
-    def put_structure(self, group: str, history: InterfaceHistory) -> None:
-        """What the structure gives for one interface over a cycle."""
-        face = history.interface
-        loads = history.loads
-        if isinstance(face, Interface):
-            self.put(group, gap=face.gap)
-        self.put(f"{group}/load_history", **vars(loads))
-        self.put(
-            group,
-            coordinates=face.coordinates,
-            facets=face.facets,
-            pressure=history.pressure,
-            shear=history.force[:, :2] / face.nodal_areas,
-            slip=history.slip,
-        )
+    def put_face(self, group: str, face: Face, loads: FaceLoads) -> None:
+        """A contact face over a cycle; nodal pressure and shear where a structure gives them."""
+        self.put(f"{group}/load_history", **vars(loads.loads))
+        self.put(group, coordinates=face.coordinates, facets=face.facets, slip=loads.slip)
+        force = getattr(loads, "force", None)
+        if force is not None:
+            pressure, shear = force[:, 2] / face.nodal_areas, force[:, :2] / face.nodal_areas
+            self.put(group, pressure=pressure, shear=shear)
 
-    def put_body(self, group: str, points: Array, tets: Any, field: Any) -> None:
+    def put_body(self, group: str, points: Array, elements: Any, field: Any) -> None:
         """Mesh and stress of one body."""
-        self.put(group, points=points, tets=tets, **vars(field))
+        self.put(group, points=points, elements=elements, **vars(field))

@@ -2,11 +2,8 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from fe_models.structure import CycleSolution
 from sa_solver.reference.flat_rounded import FlatRounded
-from workflow.case import WearCase
+from workflow.case import DovetailCase, WearCase
 from workflow.checkpoint import RunState
 from workflow.contact_stage import ContactStage, FirstContact
 from workflow.reporter import Reporter
@@ -18,29 +15,23 @@ OPEN_CYCLE = 0.02
 PEAK_ERROR = 0.05
 
 
-def warn_of_structure(
-    case: WearCase, structure: StructureStage, unworn: CycleSolution, reporter: Reporter
-) -> None:
-    """Self-locking joints, cycles that do not close, faces that lose their contact."""
-    if structure.self_locking():
-        reporter.warn(
-            f"friction.coefficient {case.friction.coefficient:g} exceeds the tangent of the flank "
-            f"angle, {np.tan(case.structure.flank_angle):.3g}: the joint locks itself and the "
-            "blade does not come back when the load falls"
-        )
+def warn_of_structure(stage: StructureStage, reporter: Reporter) -> None:
+    """What the model knows, cycles that do not close, faces that lose their contact."""
+    stage.model.warn(reporter)
+    unworn = stage.unworn_cycle
     if unworn.closure > OPEN_CYCLE:
         reporter.warn(
-            f"the second mission differs from the first by {unworn.closure:.1%} of the largest "
+            f"the second cycle differs from the first by {unworn.closure:.1%} of the largest "
             "contact force: the cycle that feeds the wear is not closed"
         )
     for history in unworn.histories:
-        if history.loads.P[structure.peak] <= 0.0:
+        if history.loads.P[stage.peak] <= 0.0:
             reporter.warn(f"{history.interface.name} is open at peak load: it does not wear")
 
 
 def warn_of_contact(
     case: WearCase,
-    structure: StructureStage,
+    peak: int,
     stages: list[ContactStage],
     state: RunState,
     first: list[FirstContact],
@@ -53,9 +44,7 @@ def warn_of_contact(
             f"the materials differ (Dundurs' beta {pair.dundurs_beta:.2g}): shear then moves the "
             "surfaces normally, which contact.method: normal leaves out; use full"
         )
-    yield_stress = min(
-        m.elastic().yield_stress for m in (case.materials.blade, case.materials.disk)
-    )
+    yield_stress = min(case.material(number).yield_stress for number in (1, 2))
     for stage, own, result in zip(stages, state.interfaces, first, strict=True):
         highest = result.highest_pressure
         if highest > yield_stress:
@@ -65,7 +54,9 @@ def warn_of_contact(
             )
         if result.touches_border:
             warn_of_border(stage, reporter)
-        load = float(own.loads.P[structure.peak])
+        if not isinstance(case, DovetailCase):
+            continue
+        load = float(own.loads.P[peak])
         for edge, error in edge_peak_errors(case, stage, load).items():
             if abs(error) > PEAK_ERROR:
                 reporter.warn(
@@ -78,7 +69,7 @@ def warn_of_growth(stages: list[ContactStage], state: RunState, reporter: Report
     """Contacts that have grown to the border of their grid: they have worn there."""
     for stage, own in zip(stages, state.interfaces, strict=True):
         worn = own.surfaces.depth_1 + own.surfaces.depth_2
-        if worn[[0, -1], :].any() or worn[:, [0, -1]].any():
+        if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):
             warn_of_border(stage, reporter)
 
 
@@ -90,7 +81,7 @@ def warn_of_border(stage: ContactStage, reporter: Reporter) -> None:
     )
 
 
-def edge_peak_errors(case: WearCase, stage: ContactStage, load: float) -> dict[str, float]:
+def edge_peak_errors(case: DovetailCase, stage: ContactStage, load: float) -> dict[str, float]:
     """What the grid makes of the closed form's edge peaks, relative, under a centred ``load``.
 
     The plane strain profile across the flank stands for both: the peak at the slot ends is set by
@@ -100,11 +91,13 @@ def edge_peak_errors(case: WearCase, stage: ContactStage, load: float) -> dict[s
         return {}
     dovetail = case.structure
     half_width = 0.5 * dovetail.flank_length
-    per_length = load / (dovetail.slot_length - 2.0 * dovetail.end_width)
-    radii = {"edge": dovetail.edge_radius, "end": dovetail.end_radius}
+    per_length, radii = load, {"edge": dovetail.edge_radius}
+    if not stage.grid.line:
+        per_length = load / (dovetail.slot_length - 2.0 * dovetail.end_width)
+        radii["end"] = dovetail.end_radius
     return {
         edge: FlatRounded(half_width, radius, per_length, stage.pair.contact_modulus).peak_error(
             pitch
         )
-        for (edge, radius), pitch in zip(radii.items(), stage.grid.pitch, strict=True)
+        for (edge, radius), pitch in zip(radii.items(), stage.grid.pitch, strict=False)
     }

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
-from functools import partial
 
 import numpy as np
 
-from fe_models.mesh import Interface, MeshError
-from fe_models.structure import CycleSolution
+from fe_models.mesh import MeshError
 from sa_solver.normal import NormalContactError
 from sa_solver.types import Array
 from wear.stepping import ContactFailure
@@ -18,11 +17,13 @@ from workflow.checkpoint import KINETICS, RunState
 from workflow.contact_stage import ContactStage, FirstContact, InterfaceState, StageSettings
 from workflow.errors import MethodFailed, UserError
 from workflow.folder import OutputFolder
+from workflow.load_source import FaceLoads, LoadSource
 from workflow.memory import check_memory
 from workflow.output import Outcome, write_output
 from workflow.reporter import Reporter
+from workflow.sources import load_source
 from workflow.store import write_arrays
-from workflow.structure_stage import SIDES, StructureStage
+from workflow.structure_stage import StructureStage
 from workflow.warnings import warn_of_contact, warn_of_growth, warn_of_structure
 from workflow.workers import Workers, contact_workers
 
@@ -48,7 +49,7 @@ class WearRun:
         self._case = case
         self._folder = folder
         self._reporter = reporter
-        self._structure = StructureStage(case)
+        self._source = load_source(case)
 
     def execute(self, resume: bool) -> None:
         """Run to the end and write everything."""
@@ -56,40 +57,29 @@ class WearRun:
         # Read first, so that a damaged one is told before anything is computed.
         resumed = resume and self._folder.checkpoint.exists()
         kept = checkpoint.load(self._folder.checkpoint) if resumed else None
+        source = self._source
         with self._reporter.stage("mesh"):
-            mesh = self._structure.mesh
-        check_memory(self._case, self._structure.node_count())
-        settings = [self._stage_settings(interface) for interface in mesh.interfaces]
+            faces = source.faces
+        if isinstance(source, StructureStage):
+            check_memory(self._case, source.node_count())
+        settings = [StageSettings(self._case, face) for face in faces]
         with contact_workers(settings) as workers:
             with self._reporter.stage("condensation"):
-                self._structure.prepare()
+                source.prepare()
             with self._reporter.stage("structural friction"):
-                unworn = self._structure.unworn_cycle()
-            warn_of_structure(self._case, self._structure, unworn, self._reporter)
+                unworn = source.unworn()
+            if isinstance(source, StructureStage):
+                warn_of_structure(source, self._reporter)
             with self._reporter.stage("contact set-up"):
                 stages = [ContactStage(own) for own in settings]
-            loop = WearLoop(
-                self._case, self._folder, self._reporter, self._structure, stages, workers
-            )
+            loop = WearLoop(self._case, self._folder, self._reporter, source, stages, workers)
             state, first = loop.begin(unworn)
-            warn_of_contact(self._case, self._structure, stages, state, first, self._reporter)
+            warn_of_contact(self._case, source.peak, stages, state, first, self._reporter)
             if kept is None:
                 loop.keep(state)
-            state = loop.advance(kept or state, unworn)
-        pairs = zip(stages, state.interfaces, strict=True)
-        depths = [stage.nodal_depths(own) for stage, own in pairs]
-        with self._reporter.stage("structural friction"):
-            worn = self._structure.cycle([one + two for one, two in depths], unworn)
-        write_output(
-            Outcome(self._case, self._structure, stages, state, unworn, worn, first, depths),
-            self._folder,
-            self._reporter,
-        )
-
-    def _stage_settings(self, interface: Interface) -> StageSettings:
-        dovetail, side = self._structure.dovetail, SIDES[interface.name]
-        gap = partial(dovetail.flank_gap, side=side)
-        return StageSettings(self._case, interface, dovetail.flank_size(side), gap)
+            state = loop.advance(kept or state)
+        outcome = Outcome(self._case, source, stages, state, unworn, first)
+        write_output(outcome, self._folder, self._reporter)
 
 
 class WearLoop:
@@ -100,21 +90,21 @@ class WearLoop:
         case: WearCase,
         folder: OutputFolder,
         reporter: Reporter,
-        structure: StructureStage,
+        source: LoadSource,
         stages: list[ContactStage],
         workers: Workers,
     ) -> None:
         self._case = case
         self._folder = folder
         self._reporter = reporter
-        self._structure = structure
+        self._source = source
         self._stages = stages
         self._workers = workers
 
-    def begin(self, unworn: CycleSolution) -> tuple[RunState, list[FirstContact]]:
+    def begin(self, unworn: Sequence[FaceLoads]) -> tuple[RunState, list[FirstContact]]:
         """State before the first jump, and the contact of the first cycle."""
         with self._reporter.stage("contact, first cycle"):
-            begun = self._workers.call("begin", unworn.histories)
+            begun = self._workers.call("begin", unworn)
         interfaces = tuple(own for own, _ in begun)
         count = len(self._stages)
         state = RunState(
@@ -127,22 +117,22 @@ class WearLoop:
         )
         return state.record(0.0, self._areas, 0.0), [first for _, first in begun]
 
-    def advance(self, state: RunState, unworn: CycleSolution) -> RunState:
+    def advance(self, state: RunState) -> RunState:
         """Jump until the cycles are over or a stop is reached."""
         total = self._case.wear.cycles
         with self._reporter.jumps(total, float(state.cycles[-1])) as progress:
             while not self._ended(state):
-                state = self._jump(state, unworn)
+                state = self._jump(state)
                 progress.update(float(state.cycles[-1]), state.jump)
         return state
 
-    def _jump(self, state: RunState, unworn: CycleSolution) -> RunState:
+    def _jump(self, state: RunState) -> RunState:
         cycles = self._jump_cycles(state)
         with self._reporter.stage("wear"):
             jumped = self._workers.call("jump", state.interfaces, [cycles] * len(self._stages))
         state = replace(state, interfaces=tuple(own for own, _ in jumped))
         warn_of_growth(self._stages, state, self._reporter)
-        state, drift = self._follow_drift(state, unworn)
+        state, drift = self._follow_drift(state)
         state = state.record(float(state.cycles[-1]) + cycles, self._areas, drift)
         convolutions = sum(spent for _, spent in jumped)
         self._reporter.log(
@@ -187,9 +177,10 @@ class WearLoop:
             or (wear.stop.volume is not None and volume >= wear.stop.volume)
         )
 
-    def _follow_drift(self, state: RunState, unworn: CycleSolution) -> tuple[RunState, float]:
+    def _follow_drift(self, state: RunState) -> tuple[RunState, float]:
         """Solve the structure again where its resultants have drifted too far."""
-        if self._case.coupling.resultants == "constant":
+        coupling = self._case.recoupling
+        if coupling.resultants == "constant":
             return state, 0.0
         with self._reporter.stage("drift probe"):
             probe = self._probe(state.interfaces)
@@ -198,12 +189,12 @@ class WearLoop:
             _drift(now, then, heaviest, stage.grid.size)
             for now, then, stage in zip(probe, state.solved_resultants, self._stages, strict=True)
         )
-        if drift <= self._case.coupling.drift:
+        if drift <= coupling.drift:
             return state, drift
         with self._reporter.stage("structural friction"):
-            solution = self._structure.cycle(self._total_depths(state.interfaces), unworn)
+            histories = self._source.worn(self._depths(state.interfaces))
         self._reporter.log(f"drift {drift:.2%}: resultants computed again")
-        pairs = zip(state.interfaces, solution.histories, strict=True)
+        pairs = zip(state.interfaces, histories, strict=True)
         return replace(
             state,
             interfaces=tuple(replace(own, loads=h.loads, slip=h.slip) for own, h in pairs),
@@ -212,11 +203,10 @@ class WearLoop:
         ), drift
 
     def _probe(self, interfaces: tuple[InterfaceState, ...]) -> Array:
-        return self._structure.peak_resultants(self._total_depths(interfaces))
+        return self._source.probe(self._depths(interfaces))
 
-    def _total_depths(self, interfaces: tuple[InterfaceState, ...]) -> list[Array]:
-        pairs = zip(self._stages, interfaces, strict=True)
-        return [np.sum(stage.nodal_depths(own), axis=0) for stage, own in pairs]
+    def _depths(self, interfaces: tuple[InterfaceState, ...]) -> list[Array]:
+        return [s.nodal_depth(own) for s, own in zip(self._stages, interfaces, strict=True)]
 
     @property
     def _areas(self) -> list[float]:
@@ -225,7 +215,7 @@ class WearLoop:
     def keep(self, state: RunState) -> None:
         """Write the fields of this jump, then the state that the next one starts from."""
         with self._reporter.stage("checkpoints"):
-            peaks = [self._structure.peak] * len(self._stages)
+            peaks = [self._source.peak] * len(self._stages)
             recorded = self._workers.call("peak_fields", state.interfaces, peaks)
             arrays: dict[str, Array] = {}
             for stage, own, fields in zip(self._stages, state.interfaces, recorded, strict=True):

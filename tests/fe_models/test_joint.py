@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+import scipy.sparse as sp
 
 from fe_models.constraints import Constraints
 from fe_models.dovetail import dovetail_structure
@@ -112,6 +113,43 @@ def test_joint_is_the_direct_solution(stacked, apart):
     upper = stacked.bodies[1].recover(interface + relative.ravel(), amplitudes)
     for found, exact in zip((lower, upper), displacements, strict=True):
         np.testing.assert_allclose(found, exact, atol=1e-9 * np.abs(exact).max())
+
+
+def condensed(rng, size, rank):
+    """A stiffness of that rank and two load cases that a floating body can be in balance with."""
+    root = rng.standard_normal((size, rank))
+    return root @ root.T, root @ rng.standard_normal((rank, 2))
+
+
+def test_projected_joint_is_the_direct_solution():
+    """Body 1 with fewer nodes than body 2: equilibrium of both with u_2 = N u_1 + w."""
+    rng = np.random.default_rng(0)
+    first, second = condensed(rng, 18, 18), condensed(rng, 24, 18)
+    projection = sp.random(24, 18, 0.3, "csr", random_state=rng)
+    joint = join(first, second, projection)
+    relative, amplitudes = rng.standard_normal(24), np.array([2.0, -3.0])
+    n = projection.toarray()
+    system = np.block(
+        [
+            [first[0], np.zeros((18, 24)), n.T],
+            [np.zeros((24, 18)), second[0], -np.eye(24)],
+            [-n, np.eye(24), np.zeros((24, 24))],
+        ]
+    )
+    right = np.concatenate([first[1] @ amplitudes, second[1] @ amplitudes, relative])
+    expected = np.linalg.solve(system, right)[-24:]
+    found = joint.stiffness @ relative + joint.loads @ amplitudes
+    np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+    assert joint.rigid_modes == 6
+
+
+def test_identity_projects_as_none_does(stacked):
+    pair = [body.condense() for body in stacked.bodies]
+    identity = sp.identity(3 * len(stacked.nodes_2), format="csr")
+    plain, projected = join(*pair), join(*pair, identity)
+    scale = np.abs(plain.stiffness).max()
+    np.testing.assert_allclose(projected.stiffness, plain.stiffness, atol=1e-12 * scale)
+    np.testing.assert_allclose(projected.loads, plain.loads, atol=1e-12 * np.abs(plain.loads).max())
 
 
 def test_floating_body_has_six_rigid_modes(stacked):

@@ -137,7 +137,7 @@ def put_bodies(file: h5py.File) -> None:
             stress = scale * 10.0 * np.linalg.norm(points - [15.0, 0.0, 245.0], axis=1)
             shift = 1e-3 * scale * points * [0.0, 0.0, 1.0]
             group = file.create_group(f"bodies/{body}/{state}")
-            put(group, points=points, tets=mesh.cells.reshape(-1, 5)[:, 1:], displacement=shift)
+            put(group, points=points, elements=mesh.cells.reshape(-1, 5)[:, 1:], displacement=shift)
             put(group, von_mises=stress, maximum_principal=0.8 * stress)
 
 
@@ -146,6 +146,7 @@ def fabricate(path: Path, shape: tuple[int, int] = (24, 40)) -> Path:
     grid = Grid.covering((10.8, 63.0), shape)
     with h5py.File(path, "w") as file:
         file.attrs.update(title="Synthetic dovetail", friction=FRICTION, peak_increment=PEAK)
+        file.attrs["bodies"] = ["disk", "blade"]
         for (name, load), side in zip(INTERFACES.items(), (1.0, -1.0), strict=True):
             frame, group = flank_frame(side), file.create_group(f"grid/{name}")
             group.attrs.update(shape=grid.shape, pitch=grid.pitch)

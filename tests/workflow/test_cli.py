@@ -87,7 +87,7 @@ def test_new_writes_a_case_that_checks(tmp_path, kind, words):
 def test_schema_is_json_with_descriptions():
     schema = json.loads(invoke("schema").stdout)
     kinds = [kind["$ref"].rpartition("/")[2] for kind in schema["anyOf"]]
-    assert kinds == ["WearCase", "ContactCase", "LineContactCase"]
+    assert kinds == ["DovetailCase", "ContactCase", "LineContactCase"]
     for name, section in schema["$defs"].items():
         assert section["additionalProperties"] is False, name
         for key, entry in section["properties"].items():

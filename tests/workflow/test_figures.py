@@ -160,7 +160,7 @@ def test_change_of_stress_is_shown_where_the_meshes_agree(changed: Path) -> None
             figures._sections(file, "unworn"), figures._sections(file, figures.CHANGE), strict=True
         ):
             np.testing.assert_allclose(change.stress, -0.1 * before.stress, rtol=1e-4)
-        file["bodies/disk/worn/tets"][0] = file["bodies/disk/worn/tets"][1]
+        file["bodies/disk/worn/elements"][0] = file["bodies/disk/worn/elements"][1]
         assert figures._states(file) == ["unworn", "worn"]
 
 

@@ -141,10 +141,10 @@ def test_method_that_fails_later_says_how_to_go_on(start, resume, whole, monkeyp
 
     jump = workflow.wear_run.WearLoop._jump
 
-    def failing(loop, state, unworn):
+    def failing(loop, state):
         if state.jump == 1:
             raise ContactFailure("increment 3: residual 1e-3 after 500 iterations")
-        return jump(loop, state, unworn)
+        return jump(loop, state)
 
     with monkeypatch.context() as patch:
         patch.setattr(workflow.wear_run.WearLoop, "_jump", failing)

@@ -98,7 +98,9 @@ def test_structure_is_unworn_then_worn(results: Path, folder: Path) -> None:
             for part, body in zip(parts, file["bodies"], strict=True):
                 stored = file["bodies"][body][state]
                 np.testing.assert_array_equal(part.points, stored["points"])
-                np.testing.assert_array_equal(part.cells_dict[pv.CellType.TETRA], stored["tets"])
+                np.testing.assert_array_equal(
+                    part.cells_dict[pv.CellType.TETRA], stored["elements"]
+                )
                 for key in ("displacement", "von_mises", "maximum_principal"):
                     np.testing.assert_allclose(part.point_data[key], stored[key], rtol=SINGLE)
 

@@ -1,6 +1,7 @@
 """The case file: YAML with units in, a frozen ``Case`` in base units out, or why not."""
 
 from workflow.case.contact_case import ContactCase, LineContactCase
+from workflow.case.dovetail_case import DovetailCase
 from workflow.case.loading import load_case, parse_case
 from workflow.case.schema import Case, json_schema
 from workflow.case.template import KINDS, template
@@ -13,6 +14,7 @@ __all__ = [
     "Case",
     "CaseError",
     "ContactCase",
+    "DovetailCase",
     "LineContactCase",
     "WearCase",
     "dump_case",

@@ -14,11 +14,11 @@ from workflow.case.contact_case import (
     ContactCase,
     LineContactCase,
 )
+from workflow.case.dovetail_case import DovetailCase
 from workflow.case.explain import lines_about
 from workflow.case.fields import shown
 from workflow.case.schema import Case
 from workflow.case.source import KeyPath, Source, dotted, read_text
-from workflow.case.wear_case import WearCase
 from workflow.errors import CaseError
 
 
@@ -44,10 +44,14 @@ def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
         raise CaseError("\n".join(lines_about(source, kind, error.errors()))) from None
 
 
-def _kind_of_case(source: Source) -> type[WearCase] | type[ContactCase] | type[LineContactCase]:
-    """The kind that the source means by its analysis and shape, whatever else is wrong."""
+# Wear cases by their kind of structure.
+WEAR_CASES: dict[str, type[Case]] = {"dovetail": DovetailCase}
+
+
+def _kind_of_case(source: Source) -> type[Case]:
+    """The kind that the source means by its analysis and structure, whatever else is wrong."""
     if _choice(source, ("analysis",), ("wear", "contact")) == "wear":
-        return WearCase
+        return WEAR_CASES[_choice(source, ("structure", "kind"), tuple(WEAR_CASES))]
     _choice(source, ("structure", "kind"), ("bodies",))
     shapes = (*AREA_SHAPES, *LINE_SHAPES, HEIGHTS)
     shape = _choice(source, ("structure", "shape"), shapes)

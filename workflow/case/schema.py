@@ -7,9 +7,9 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from workflow.case.contact_case import ContactCase, LineContactCase
-from workflow.case.wear_case import WearCase
+from workflow.case.dovetail_case import DovetailCase
 
-Case = WearCase | ContactCase | LineContactCase
+Case = DovetailCase | ContactCase | LineContactCase
 
 
 def json_schema() -> dict[str, Any]:

@@ -80,6 +80,13 @@ class Expectation(Section):
     source: Title = entry("where the value comes from", "closed form")
 
 
+# The sections of a case, of whatever kind, in the order in which they are written.
+SCENE_ORDER = (
+    *("title", "analysis", "structure", "materials", "friction", "load_path", "mesh", "contact"),
+    *("wear", "coupling", "stress", "output", "assumed", "expect"),
+)
+
+
 class Scene(Section):
     """Base of all kinds of case."""
 
@@ -112,6 +119,14 @@ def sections_of(annotation: object) -> Iterator[type[Section]]:
         yield annotation
     for argument in get_args(annotation):
         yield from sections_of(argument)
+
+
+def entries_of(model: type[BaseModel]) -> dict[str, FieldInfo]:
+    """The fields of a model, in the order in which they are written."""
+    fields = model.model_fields
+    if not issubclass(model, Scene):
+        return dict(fields)
+    return {name: fields[name] for name in SCENE_ORDER if name in fields}
 
 
 def entry_of(field: FieldInfo) -> Entry | None:

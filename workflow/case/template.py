@@ -8,13 +8,13 @@ from typing import Any
 from pydantic.fields import FieldInfo
 
 from workflow.case.contact_case import ContactCase, LineContactCase
-from workflow.case.sections import Section, sections_of
-from workflow.case.wear_case import WearCase
+from workflow.case.dovetail_case import DovetailCase
+from workflow.case.sections import Section, entries_of, sections_of
 from workflow.case.writing import Row, render
 
 # What `fretscale new` can write.
 KINDS: dict[str, type[Section]] = {
-    "dovetail": WearCase,
+    "dovetail": DovetailCase,
     "bodies": ContactCase,
     "line": LineContactCase,
 }
@@ -36,7 +36,7 @@ def template(kind: str) -> str:
 
 
 def _rows(model: type[Section]) -> list[Row]:
-    return [_row(name, field) for name, field in model.model_fields.items()]
+    return [_row(name, field) for name, field in entries_of(model).items()]
 
 
 def _row(name: str, field: FieldInfo) -> Row:

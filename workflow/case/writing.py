@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from workflow.case.schema import Case
+from workflow.case.sections import Scene, entries_of
 
 HEADER = """\
 # The case as run, every default written out. Base units: mm, N, s, MPa, tonne (t), rad.
@@ -34,18 +34,18 @@ class Row:
     off: bool = False
 
 
-def dump_case(case: Case) -> str:
+def dump_case(case: Scene) -> str:
     """``case`` in base units; ``parse_case`` of the result is equal to ``case``."""
     return HEADER + render(rows_of(case))
 
 
 def rows_of(section: BaseModel) -> list[Row]:
     """The entries of ``section`` that are set."""
-    values = ((name, getattr(section, name)) for name in type(section).model_fields)
+    fields = entries_of(type(section))
     return [
-        Row(name, _value(value), type(section).model_fields[name].description or "")
-        for name, value in values
-        if value is not None
+        Row(name, _value(getattr(section, name)), field.description or "")
+        for name, field in fields.items()
+        if getattr(section, name) is not None
     ]
 
 

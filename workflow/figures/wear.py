@@ -10,6 +10,7 @@ import numpy as np
 
 from sa_solver.types import Array, Grid
 from wear.kinetics import LinearRegime
+from workflow.body_mesh import body_mesh
 from workflow.figures.comparison import half_space_and_structure
 from workflow.figures.fields import (
     MAP_PERCENTILE,
@@ -22,7 +23,7 @@ from workflow.figures.fields import (
     spread,
 )
 from workflow.figures.style import BLACK, BLUE, FONT_SIZE, GREEN, ORANGE, PURPLE, new_figure
-from workflow.store import BODY_NAMES, grid_of, jump_names
+from workflow.store import body_names, grid_of, jump_names
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -37,6 +38,8 @@ CHANGE = "worn less unworn"
 HEIGHT_IN_DEPTHS = 2.0
 # How far the kinetics are extended, in computed numbers of cycles.
 EXTRAPOLATION = 2.0
+# What a profile along x and one along y show.
+ALONG = "across the flank at y = 0", "along the slot at x = 0"
 # Around the flanks, how far the section shows the bodies: as a share of the flanks' distance.
 SECTION_MARGIN = 0.4
 
@@ -70,9 +73,9 @@ def resultants(file: h5py.File) -> Figure:
         half_space = file.get(f"contact/{interface}/energy_half_space")
         _draw_energy(column[2], increments, history["Edx"] + history["Edy"], half_space)
         column[2].set_xlabel("increment")
-    for axis, label in zip(
-        axes[:, 0], ("P [kN]", "Qx [kN]", "energy per increment [N mm]"), strict=True
-    ):
+    per = _per_length(file)
+    labels = f"P [kN{per}]", f"Qx [kN{per}]", f"energy per increment [N mm{per}]"
+    for axis, label in zip(axes[:, 0], labels, strict=True):
         axis.set_ylabel(label)
     axes[0, 0].set_ylim(bottom=0.0)
     return figure
@@ -186,13 +189,13 @@ def _peak_change(file: h5py.File) -> str:
 def pressure_profiles(file: h5py.File) -> Figure:
     """Peak-load pressure across and along the middle of each flank, with the coarse answers."""
     interfaces = list(file["contact"])
-    figure = new_figure(_edge_peak(file), 9.0)
-    axes = figure.subplots(2, len(interfaces), sharey="row", sharex="row", squeeze=False)
+    directions = 1 if _line(file) else 2
+    figure = new_figure(_edge_peak(file), 4.5 * directions)
+    axes = figure.subplots(directions, len(interfaces), sharey="row", sharex="row", squeeze=False)
     for column, interface in zip(axes.T, interfaces, strict=True):
         for direction, axis in enumerate(column):
             _draw_profile(axis, file, interface, direction)
-        column[0].set_title(f"{interface}, across the flank at y = 0")
-        column[1].set_title(f"{interface}, along the slot at x = 0")
+            axis.set_title(f"{interface}, {ALONG[direction]}")
     axes[0, 0].legend(loc="upper center")
     for axis in axes[:, 0]:
         axis.set_ylabel("pressure [MPa]")
@@ -286,14 +289,15 @@ def _draw_wear(axes: Iterable[Axes], file: h5py.File, interface: str) -> float:
 
 def _middle_heights(surfaces: h5py.Group) -> Array:
     """Heights of both bodies along x at y = 0, ``(2, nx)`` [µm]."""
-    return 1e3 * np.stack([middle(surfaces[f"body_{body}"][()], 0) for body in BODY_NAMES])
+    return 1e3 * np.stack([middle(surfaces[f"body_{body}"][()], 0) for body in (1, 2)])
 
 
 def kinetics(file: h5py.File) -> Figure:
     """Largest depth and volume over the cycles, with the linear regime and its extrapolation."""
     interfaces = [name for name in file["kinetics"] if name != "cycles"]
     cycles = file["kinetics/cycles"][()]
-    totals = (f"{name} {_worn_volume(file, name):.3g} mm³" for name in interfaces)
+    unit = f"mm³{_per_length(file)}"
+    totals = (f"{name} {_worn_volume(file, name):.3g} {unit}" for name in interfaces)
     title = f"Worn off in {cycles[-1]:,.0f} cycles: {', '.join(totals)}"
     figure = new_figure(title, 9.0)
     axes = figure.subplots(2, len(interfaces), sharex=True, sharey="row", squeeze=False)
@@ -307,7 +311,7 @@ def kinetics(file: h5py.File) -> Figure:
         column[1].xaxis.set_major_formatter("{x:,.0f}")
         column[1].locator_params(axis="x", nbins=5)
     axes[0, 0].set_ylabel("largest depth [µm]")
-    axes[1, 0].set_ylabel("volume [mm³]")
+    axes[1, 0].set_ylabel(f"volume [mm³{_per_length(file)}]")
     # Not every panel has a linear regime: the legend takes each name where it is found.
     named: dict[str, Any] = {}
     for axis in axes.flat:
@@ -321,13 +325,20 @@ def _draw_kinetics(
     axis: Axes, cycles: Array, group: h5py.Group, quantity: str, scale: float
 ) -> None:
     """Both bodies and their sum; dashed beyond the computed cycles."""
-    worn = {body: scale * group[f"{quantity}_{body}"][()] for body in BODY_NAMES}
+    names = body_names(group.file)
+    worn = {body: scale * group[f"{quantity}_{body}"][()] for body in (1, 2)}
     for body, (colour, marker) in BODY_STYLES.items():
         # Bodies of one material wear alike: the second must not hide the first.
         size = 9 if body == 1 else 5
         fill = "none" if body == 1 else colour
         axis.plot(
-            cycles, worn[body], marker, color=colour, mfc=fill, ms=size, label=BODY_NAMES[body]
+            cycles,
+            worn[body],
+            marker,
+            color=colour,
+            mfc=fill,
+            ms=size,
+            label=names[body],
         )
     total = np.sum(list(worn.values()), axis=0)
     axis.plot(cycles, total, "-", color=BLACK, label="both")
@@ -344,7 +355,7 @@ def _draw_kinetics(
 def _worn_volume(file: h5py.File, interface: str) -> float:
     """Volume worn off both bodies in the end [mm³]."""
     group = file["kinetics"][interface]
-    return float(sum(group[f"volume_{body}"][-1] for body in BODY_NAMES))
+    return float(sum(group[f"volume_{body}"][-1] for body in (1, 2)))
 
 
 def _rate(group: h5py.Group) -> str:
@@ -392,7 +403,7 @@ def _states(file: h5py.File) -> list[str]:
     bodies = list(file["bodies"].values())
     states = [state for state in ("unworn", "worn") if all(state in body for body in bodies)]
     if len(states) == 2 and all(
-        np.array_equal(body["unworn/tets"], body["worn/tets"]) for body in bodies
+        np.array_equal(body["unworn/elements"], body["worn/elements"]) for body in bodies
     ):
         states.append(CHANGE)
     return states
@@ -419,14 +430,15 @@ def _sections(file: h5py.File, state: str) -> list[_Section]:
 
 
 def _cut(file: h5py.File, body: h5py.Group, stress: Array) -> _Section:
-    """One body and a nodal stress cut by the plane across the slot."""
-    import pyvista
-
+    """One body and a nodal stress cut by the plane across the slot; a plane body whole."""
     shown = list(_plane(file)[1:])
     flank = next(iter(file["grid"].values())).attrs
-    mesh = pyvista.UnstructuredGrid({pyvista.CellType.TETRA: body["tets"][()]}, body["points"][()])
+    mesh = body_mesh(body)
     mesh.point_data["stress"] = stress
-    cut = mesh.slice(normal=flank["axes"][1], origin=flank["origin"]).triangulate()
+    if body["elements"].shape[1] == 4:
+        cut = mesh.slice(normal=flank["axes"][1], origin=flank["origin"]).triangulate()
+    else:
+        cut = mesh.extract_surface(algorithm="dataset_surface")
     border = cut.extract_feature_edges(
         feature_edges=False, non_manifold_edges=False, manifold_edges=False
     )
@@ -501,6 +513,16 @@ def _peak(file: h5py.File) -> int:
     return int(file.attrs["peak_increment"])
 
 
+def _line(file: h5py.File) -> bool:
+    """Whether the contacts are line contacts."""
+    return grid_of(next(iter(file["grid"].values()))).line
+
+
+def _per_length(file: h5py.File) -> str:
+    """What units of forces and volumes end in."""
+    return "/mm" if _line(file) else ""
+
+
 def _grid(file: h5py.File, interface: str) -> Grid:
     return grid_of(file["grid"][interface])
 
@@ -510,14 +532,14 @@ def figures_of(file: h5py.File) -> dict[str, Callable[[h5py.File], Figure]]:
     return {
         name: draw
         for name, (draw, needed) in FIGURES.items()
-        if all(group in file for group in needed)
+        if all(group in file for group in needed) and not (draw is pressure_maps and _line(file))
     }
 
 
 CONTACT = ("grid", "contact", "surfaces")
 # What each figure is called, and the groups it needs.
 FIGURES: dict[str, tuple[Callable[[h5py.File], Figure], tuple[str, ...]]] = {
-    "resultants": (resultants, ("structure",)),
+    "resultants": (resultants, ("structure", "grid")),
     "pressure_maps": (pressure_maps, CONTACT),
     "pressure_profiles": (pressure_profiles, CONTACT),
     "worn_profiles": (worn_profiles, CONTACT),

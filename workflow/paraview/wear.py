@@ -6,7 +6,8 @@ Written into one folder:
   (``<interface>/<jump>.vti``), turned and moved to the flank's place in the structure;
 - ``structure.pvd``: all bodies at peak load, unworn at 0 and worn at the last computed number of
   cycles (``structure/<body>_<state>.vtu``); Warp By Vector on ``displacement`` deforms them;
-- ``flank_<interface>_<body>.stl``: the worn surfaces at true scale in global coordinates.
+- ``flank_<interface>_<body>.stl``: the worn surfaces at true scale in global coordinates, but for
+  line contacts.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Frame, Grid
+from workflow.body_mesh import body_mesh
 from workflow.paraview.files import (
     Fields,
     Step,
@@ -28,7 +30,7 @@ from workflow.paraview.files import (
     write_stl,
     write_xml,
 )
-from workflow.store import BODY_NAMES, frame_of, grid_of, jump_names
+from workflow.store import body_names, frame_of, grid_of, jump_names
 
 if TYPE_CHECKING:
     import pyvista
@@ -41,7 +43,8 @@ def write_wear(file: h5py.File, folder: Path) -> list[Path]:
     written: list[Path] = []
     for interface in file["grid"]:
         written += _write_flank(file, interface, folder)
-        written += _write_worn_surfaces(file, interface, folder)
+        if not grid_of(file["grid"][interface]).line:
+            written += _write_worn_surfaces(file, interface, folder)
     if "bodies" in file:
         written += _write_structure(file, folder)
     return written
@@ -77,12 +80,12 @@ def _flank_fields(file: h5py.File, interface: str, jump: str, frame: Frame) -> F
 def _surface_fields(surfaces: h5py.Group, jump: str) -> Fields:
     """Heights and wear depths of both bodies, and the depths' sum."""
     fields: Fields = {}
-    for body in BODY_NAMES:
+    for body in (1, 2):
         height = cells(surfaces[jump][f"body_{body}"])
         unworn = cells(surfaces[UNWORN][f"body_{body}"])
         fields[f"height_{body}"] = height, "mm"
         fields[f"wear_depth_{body}"] = np.abs(height - unworn), "mm"
-    total = sum(fields[f"wear_depth_{body}"][0] for body in BODY_NAMES)
+    total = sum(fields[f"wear_depth_{body}"][0] for body in (1, 2))
     return fields | {"wear_depth": (np.asarray(total), "mm")}
 
 
@@ -108,7 +111,7 @@ def _write_worn_surfaces(file: h5py.File, interface: str, folder: Path) -> list[
     rows, columns = _flank_window(file, interface, grid)
     last = jump_names(file, interface)[-1]
     written = []
-    for body, name in BODY_NAMES.items():
+    for body, name in body_names(file).items():
         height = file["surfaces"][interface][last][f"body_{body}"][()]
         x, y, z = np.broadcast_arrays(grid.x, grid.y, height)
         local = np.stack([field[rows, columns] for field in (x, y, z)], axis=-1)
@@ -154,17 +157,14 @@ def _write_structure(file: h5py.File, folder: Path) -> list[Path]:
         for body, states in file["bodies"].items():
             if state in states:
                 path = folder / "structure" / f"{body}_{state}.vtu"
-                write_xml(_body_mesh(states[state]), path)
+                write_xml(_stressed_body(states[state]), path)
                 steps.append((time, body, path))
     return write_series(folder / "structure.pvd", steps)
 
 
-def _body_mesh(group: h5py.Group) -> pyvista.UnstructuredGrid:
-    """One body as tetrahedra with nodal displacement and stresses."""
-    import pyvista
-
-    cells = {pyvista.CellType.TETRA: group["tets"][()]}
-    mesh = pyvista.UnstructuredGrid(cells, group["points"][()])
+def _stressed_body(group: h5py.Group) -> pyvista.UnstructuredGrid:
+    """One body with nodal displacement and stresses."""
+    mesh = body_mesh(group)
     units = {"displacement": "mm", "von_mises": "MPa", "maximum_principal": "MPa"}
     attach(mesh.point_data, {name: (group[name][()], unit) for name, unit in units.items()})
     return mesh

@@ -1,0 +1,65 @@
+"""A dovetail case as a structure."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from fe_models.dovetail import Mission, dovetail_structure
+from fe_models.mesh import Interface, StructureMesh
+from fe_models.structure import Structure
+from sa_solver.types import Array
+from workflow.case import DovetailCase
+from workflow.load_source import ContactFace
+from workflow.reporter import Reporter
+
+# The flank at X > 0 and the one at X < 0.
+SIDES = {"intrados": 1, "extrados": -1}
+
+
+class DovetailModel:
+    """The joint, its mission and its mesh as the case gives them."""
+
+    def __init__(self, case: DovetailCase) -> None:
+        self._case = case
+        self.dovetail = case.structure.geometry()
+        self._mission = Mission(**case.load_path.model_dump())
+        self.friction = case.friction.coefficient
+        self.peak = case.load_path.peak_at - 1
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        case, mission = self._case, self._mission
+        pull = mission.airfoil_mass, mission.airfoil_radius
+        return self.dovetail, case.structure.dimension, case.mesh, case.materials, pull
+
+    @property
+    def amplitudes(self) -> Array:
+        return self._mission.amplitudes()
+
+    def mesh(self) -> StructureMesh:
+        mesh = self._case.mesh
+        return self.dovetail.mesh(mesh.flank_nodes, mesh.size, self._case.structure.dimension)
+
+    def structure(self, mesh: StructureMesh) -> Structure:
+        disk, blade = self._case.material(1), self._case.material(2)
+        return dovetail_structure(
+            self.dovetail, mesh, disk, blade, self._mission, self._case.mesh.order
+        )
+
+    def contact_face(self, interface: Interface) -> ContactFace:
+        side = SIDES[interface.name]
+        gap = partial(self.dovetail.flank_gap, side=side)
+        nodes = self._case.mesh.flank_nodes
+        return ContactFace(interface, self.dovetail.flank_size(side), gap, nodes)
+
+    def warn(self, reporter: Reporter) -> None:
+        """Self-locking joints."""
+        slope = np.tan(self.dovetail.flank_angle)
+        if self.friction > slope:
+            reporter.warn(
+                f"friction.coefficient {self.friction:g} exceeds the tangent of the flank angle, "
+                f"{slope:.3g}: the joint locks itself and the blade does not come back when the "
+                "load falls"
+            )

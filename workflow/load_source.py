@@ -1,0 +1,69 @@
+"""Where a wear run gets the loads of its contacts from: a structure of ours, or a file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from fe_models.mesh import Face
+from sa_solver.types import Array, LoadHistory
+
+
+@dataclass(frozen=True)
+class ContactFace:
+    """A nominal contact face and the gap of the unloaded, unworn bodies over it.
+
+    ``size`` (x, y) [mm] is what the contact grid covers, ``gap`` gives the distance [mm] at x and y
+    of the face, and ``coarse`` as many cells as the face has nodes.
+    """
+
+    face: Face
+    size: tuple[float, float]
+    gap: Callable[[Array, Array], Array]
+    coarse: tuple[int, int]
+
+
+class FaceLoads(Protocol):
+    """What one face carries over a cycle: ``slip`` ``(t, 2, n)`` [mm] is that of its nodes."""
+
+    @property
+    def loads(self) -> LoadHistory: ...
+    @property
+    def slip(self) -> Array: ...
+
+
+class LoadSource(Protocol):
+    """Loads and slips of every contact face over one closed cycle.
+
+    Worn depths are nodal, ``(n,)`` per face, of both bodies together [mm].
+    """
+
+    @property
+    def faces(self) -> tuple[ContactFace, ...]: ...
+
+    @property
+    def peak(self) -> int:
+        """Index of the increment of peak load."""
+        ...
+
+    @property
+    def line(self) -> bool:
+        """Whether the contacts are line contacts, all forces per length."""
+        ...
+
+    def prepare(self) -> None:
+        """Do the costly part now."""
+        ...
+
+    def unworn(self) -> Sequence[FaceLoads]:
+        """The closed cycle with unworn faces."""
+        ...
+
+    def worn(self, depths: list[Array]) -> Sequence[FaceLoads]:
+        """The closed cycle with worn faces."""
+        ...
+
+    def probe(self, depths: list[Array]) -> Array:
+        """Resultants ``(faces, 6)`` that wear moves as it moves those of the cycle, but cheap."""
+        ...

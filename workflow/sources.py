@@ -1,0 +1,14 @@
+"""The load source that a wear case asks for."""
+
+from __future__ import annotations
+
+from workflow.case import DovetailCase, WearCase
+from workflow.dovetail_model import DovetailModel
+from workflow.load_source import LoadSource
+from workflow.structure_stage import StructureStage
+
+
+def load_source(case: WearCase) -> LoadSource:
+    """Where the loads of the case's contacts come from."""
+    assert isinstance(case, DovetailCase)
+    return StructureStage(DovetailModel(case), case.mesh.order)
