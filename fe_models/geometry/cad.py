@@ -1,0 +1,95 @@
+"""CAD files through gmsh's OpenCASCADE kernel: every solid a body, every face a boundary."""
+
+from __future__ import annotations
+
+from collections import Counter
+from pathlib import Path
+from typing import Any
+
+from fe_models.geometry.gmsh_file import Group, grouped_entities, one_line
+from fe_models.geometry.grouped import GroupedMesh
+from fe_models.gmsh_session import gmsh_model
+from fe_models.mesh import MeshError
+
+# How files of each kind begin; without this OpenCASCADE writes its complaints to the terminal.
+BEGINNINGS = {
+    ".step": (b"ISO-10303-21",),
+    ".stp": (b"ISO-10303-21",),
+    ".brep": (b"DBRep_DrawableShape", b"CASCADE Topology"),
+}
+# The name that OpenCASCADE writes for a shape without one.
+NO_NAME = "Open CASCADE STEP translator"
+# Enough to find the beginning after blank lines.
+HEAD_BYTES = 200
+
+
+def read_cad(path: Path, size: float) -> GroupedMesh:
+    """Mesh the solids of a STEP or BREP file with tetrahedra of edge length ``size`` [mm].
+
+    A STEP file is converted to mm from the unit it states; BREP has no unit and is taken as mm. A
+    solid goes by its name in the file (``solid_1``, ... without one; ``name_1``, ... if several
+    have it). Its faces are ``solid_1.face_1``, ... in the order of the file, and go by their own
+    names too where the file gives any. Solids that touch have their own nodes unless the file makes
+    them share a face. Raises :class:`MeshError`.
+    """
+    if not size > 0.0:
+        raise MeshError(f"{path}: the mesh size is {size:g} mm; allowed: more than 0")
+    with path.open("rb") as file:
+        if not file.read(HEAD_BYTES).lstrip().startswith(BEGINNINGS[path.suffix.lower()]):
+            raise MeshError(f"{path}: is no {path.suffix.lower()} file")
+    with gmsh_model(path.stem) as gmsh:
+        gmsh.option.setString("Geometry.OCCTargetUnit", "MM")
+        # Both ends: by itself gmsh takes no more than a tenth of the model.
+        gmsh.option.setNumber("Mesh.MeshSizeMin", size)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", size)
+        try:
+            gmsh.model.occ.importShapes(str(path))
+            gmsh.model.occ.synchronize()
+        except Exception as error:  # gmsh raises nothing more specific
+            raise MeshError(f"{path}: gmsh cannot read it: {one_line(error)}") from None
+        groups = _groups(gmsh.model)
+        if not groups:
+            raise MeshError(f"{path}: has no solids; allowed: closed solids, not loose faces")
+        try:
+            gmsh.model.mesh.generate(3)
+        except Exception as error:
+            raise MeshError(
+                f"{path}: gmsh cannot mesh it at size {size:g} mm: {one_line(error)}; take a "
+                "smaller size or repair the solids"
+            ) from None
+        return grouped_entities(gmsh, groups)
+
+
+def _groups(model: Any) -> list[Group]:
+    """Solids and their faces, by name."""
+    groups: list[Group] = []
+    labelled: dict[str, list[int]] = {}
+    solids = [tag for _, tag in model.getEntities(3)]
+    for name, solid in zip(_solid_names(model, solids), solids, strict=True):
+        groups.append(Group(name, 3, [solid]))
+        faces = model.getBoundary([(3, solid)], combined=False, oriented=False)
+        for number, (_, face) in enumerate(faces, start=1):
+            groups.append(Group(f"{name}.face_{number}", 2, [face]))
+            if label := _label(model, 2, face):
+                labelled.setdefault(label, []).append(face)
+    return groups + [Group(label, 2, faces) for label, faces in labelled.items()]
+
+
+def _solid_names(model: Any, solids: list[int]) -> list[str]:
+    """A name for every solid, each once."""
+    labels = [_label(model, 3, solid) for solid in solids]
+    count, used = Counter(labels), Counter[str]()
+    names = []
+    for number, label in enumerate(labels, start=1):
+        used[label] += 1
+        if not label:
+            names.append(f"solid_{number}")
+        else:
+            names.append(label if count[label] == 1 else f"{label}_{used[label]}")
+    return names
+
+
+def _label(model: Any, dimension: int, tag: int) -> str:
+    """The file's own name of an entity, without the assemblies above it; empty if it has none."""
+    label = model.getEntityName(dimension, tag).rpartition("/")[2]
+    return "" if label.startswith(NO_NAME) else label

@@ -1,0 +1,128 @@
+"""Gmsh's meshes, from a ``.msh`` file or just generated: groups of entities become named groups."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fe_models.geometry.grouped import Blocks, GroupedMesh
+from fe_models.gmsh_session import gmsh_model
+from fe_models.mesh import Indices, MeshError
+
+# First word of gmsh's name of an element and the shape it is; corner nodes come first in all.
+SHAPES = {
+    "Point": "vertex", "Line": "line", "Triangle": "triangle", "Quadrilateral": "quad",
+    "Tetrahedron": "tetra", "Pyramid": "pyramid", "Prism": "wedge", "Hexahedron": "hexahedron",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Group:
+    """A named group of entities of one dimension."""
+
+    name: str
+    dimension: int
+    entities: list[int]
+
+
+def read_msh(path: Path) -> GroupedMesh:
+    """Read a gmsh file (2.2 or 4.1, text or binary).
+
+    Physical volumes are bodies, physical surfaces their boundaries, lower groups node sets; in a
+    plane mesh surfaces and curves. A group without a name goes by its number, and in a file without
+    physical groups every entity does. Raises :class:`MeshError`.
+    """
+    with path.open("rb") as file:
+        # Anything else would be run as a script in gmsh's own language.
+        if not file.read(1) == b"$":
+            raise MeshError(f"{path}: is no gmsh mesh; allowed: .msh files of format 2.2 or 4.1")
+    with gmsh_model(path.stem) as gmsh:
+        try:
+            gmsh.merge(str(path))
+        except Exception as error:  # gmsh raises nothing more specific
+            raise MeshError(f"{path}: gmsh cannot read it: {one_line(error)}") from None
+        try:
+            return grouped_entities(gmsh, _groups(gmsh.model))
+        except MeshError as error:
+            raise MeshError(f"{path}: {error}") from None
+
+
+def grouped_entities(gmsh: Any, groups: list[Group]) -> GroupedMesh:
+    """The mesh of the open gmsh model; ``groups`` of its highest dimension are the bodies."""
+    model = gmsh.model
+    tags, coordinates, _ = model.mesh.getNodes()
+    numbers = np.asarray(tags, dtype=np.int64)
+    order = np.argsort(numbers)
+    top = max(
+        (dim for dim, _ in model.getEntities() if len(model.mesh.getElements(dim)[0])), default=0
+    )
+    _refuse_ungrouped(model, top, groups)
+    named: list[dict[str, Blocks]] = [{}, {}, {}, {}]
+    for group in groups:
+        if group.name in named[group.dimension]:
+            raise MeshError(
+                f"two groups of dimension {group.dimension} are named {group.name}: rename one"
+            )
+        blocks = _blocks(model, group, numbers[order])
+        if blocks:
+            named[group.dimension][group.name] = blocks
+    return GroupedMesh(
+        points=np.asarray(coordinates).reshape(-1, 3)[order],
+        numbers=numbers[order],
+        bodies=named[top],
+        surfaces=named[top - 1] if top > 0 else {},
+        node_sets={
+            name: np.unique(np.concatenate([cells.ravel() for _, cells in blocks]))
+            for lower in named[: max(top - 1, 0)]
+            for name, blocks in lower.items()
+        },
+    )
+
+
+def _groups(model: Any) -> list[Group]:
+    """The physical groups; without any, every entity by its number."""
+    physical = [
+        Group(
+            model.getPhysicalName(dim, tag) or str(tag),
+            dim,
+            list(model.getEntitiesForPhysicalGroup(dim, tag)),
+        )
+        for dim, tag in model.getPhysicalGroups()
+    ]
+    return physical or [Group(str(tag), dim, [tag]) for dim, tag in model.getEntities() if dim > 0]
+
+
+def _refuse_ungrouped(model: Any, top: int, groups: list[Group]) -> None:
+    """No element of the highest dimension is left out."""
+    grouped = {tag for group in groups if group.dimension == top for tag in group.entities}
+    for dim, tag in model.getEntities(top):
+        if tag not in grouped and len(model.mesh.getElements(dim, tag)[0]):
+            raise MeshError(
+                f"the elements of {'volume' if top == 3 else 'surface'} {tag} are in no physical "
+                f"group: put them into one"
+            )
+
+
+def _blocks(model: Any, group: Group, numbers: Indices) -> Blocks:
+    """Elements of a group; their nodes are rows of the sorted ``numbers``."""
+    blocks = []
+    for entity in group.entities:
+        types, _, nodes = model.mesh.getElements(group.dimension, entity)
+        for kind, tags in zip(types, nodes, strict=True):
+            name, _, _, count, _, corners = model.mesh.getElementProperties(kind)
+            shape = SHAPES.get(name.split()[0])
+            if shape is None:
+                raise MeshError(
+                    f"group {group.name} has elements {name}; allowed: {', '.join(SHAPES)}"
+                )
+            cells = np.asarray(tags, dtype=np.int64).reshape(-1, count)[:, :corners]
+            blocks.append((shape, np.searchsorted(numbers, cells)))
+    return blocks
+
+
+def one_line(error: Exception) -> str:
+    """The first line of a message."""
+    return (str(error).splitlines() or [type(error).__name__])[0]

@@ -1,0 +1,129 @@
+"""A mesh as a file gives it: nodes, elements of any shape, and their named groups.
+
+The elements of a shape are split into triangles or tetrahedra so that neighbours agree on the
+diagonals of the quadrilaterals between them, whatever they are split from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import connected_components
+
+from fe_models.mesh import Indices
+from sa_solver.types import Array
+
+# Corner nodes of every shape that is read, and its dimension.
+CORNERS = {
+    "vertex": 1, "line": 2, "triangle": 3, "quad": 4, "tetra": 4, "pyramid": 5, "wedge": 6,
+    "hexahedron": 8,
+}  # fmt: skip
+DIMENSION = {
+    "vertex": 0, "line": 1, "triangle": 2, "quad": 2, "tetra": 3, "pyramid": 3, "wedge": 3,
+    "hexahedron": 3,
+}  # fmt: skip
+# Shape of a face with that many corners.
+FACE_SHAPES = {2: "line", 3: "triangle", 4: "quad"}
+# Corners of the faces S1, S2, ... of every shape, in the order of the Abaqus manual (Elements:
+# two-dimensional and three-dimensional solid element libraries), counted from zero.
+FACES: dict[str, tuple[tuple[int, ...], ...]] = {
+    "triangle": ((0, 1), (1, 2), (2, 0)),
+    "quad": ((0, 1), (1, 2), (2, 3), (3, 0)),
+    "tetra": ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0)),
+    "pyramid": ((0, 1, 2, 3), (0, 4, 1), (1, 4, 2), (2, 4, 3), (3, 4, 0)),
+    "wedge": ((0, 1, 2), (3, 5, 4), (0, 3, 4, 1), (1, 4, 5, 2), (2, 5, 3, 0)),
+    "hexahedron": (
+        (0, 1, 2, 3), (4, 7, 6, 5), (0, 4, 5, 1), (1, 5, 6, 2), (2, 6, 7, 3), (3, 7, 4, 0),
+    ),
+}  # fmt: skip
+
+# Elements of one shape and their corner nodes ``(m, corners)``, as rows of the file's points.
+Blocks = list[tuple[str, Indices]]
+
+
+@dataclass(frozen=True)
+class GroupedMesh:
+    """Nodes and named groups of a file; nothing of it is checked.
+
+    ``points`` ``(n, 3)`` [mm] and ``numbers`` ``(n,)``, the file's own node numbers; per name the
+    elements of a body, the facets of a surface and the rows of a node set.
+    """
+
+    points: Array
+    numbers: Indices
+    bodies: dict[str, Blocks]
+    surfaces: dict[str, Blocks]
+    node_sets: dict[str, Indices]
+
+
+def simplices(shape: str, cells: Indices) -> Indices:
+    """Split elements of a shape ``(m, corners)`` into lines, triangles or tetrahedra.
+
+    Every quadrilateral is cut by the diagonal from its lowest node, so that the two elements beside
+    it agree, and every element is a fan of tetrahedra round its lowest node: 2 in a pyramid, 3 in a
+    wedge, 6 in a hexahedron (Dompierre, Labbé, Vallet and Camarero, 8th International Meshing
+    Roundtable, 1999).
+    """
+    if shape == "quad":
+        return _halved(cells)
+    if shape not in ("pyramid", "wedge", "hexahedron"):
+        return cells
+    lowest = np.argmin(cells, axis=1)
+    return np.concatenate(
+        [_fan(shape, cells[lowest == apex], apex) for apex in range(CORNERS[shape])]
+    )
+
+
+def _halved(quads: Indices) -> Indices:
+    """Two triangles of each quadrilateral, beside the diagonal from its lowest node."""
+    turned = (np.argmin(quads, axis=1)[:, None] + np.arange(4)) % 4
+    quads = np.take_along_axis(quads, turned, axis=1)
+    return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
+
+
+def _fan(shape: str, cells: Indices, apex: int) -> Indices:
+    """Tetrahedra from the corner ``apex`` to all faces that do not touch it."""
+    fan = []
+    for face in FACES[shape]:
+        if apex not in face:
+            triangles = simplices(FACE_SHAPES[len(face)], cells[:, face])
+            tip = np.tile(cells[:, apex], len(triangles) // max(len(cells), 1))
+            fan.append(np.column_stack([tip, triangles]))
+    return np.concatenate(fan)
+
+
+def pieces(blocks: Blocks) -> list[Indices]:
+    """Number of the piece that each element of each block belongs to, ``(m,)`` per block.
+
+    Elements that share a node are in one piece; pieces are numbered as the blocks name them first.
+    """
+    count = 1 + max(int(cells.max()) for _, cells in blocks)
+    links = np.concatenate([edge for _, cells in blocks for edge in _links(cells)])
+    graph = sp.coo_matrix((np.ones(len(links)), links.T), shape=(count, count))
+    _, label = connected_components(graph, directed=False)
+    found = np.concatenate([label[cells[:, 0]] for _, cells in blocks])
+    _, first, piece = np.unique(found, return_index=True, return_inverse=True)
+    ordered = np.argsort(np.argsort(first))[piece]
+    return np.split(ordered, np.cumsum([len(cells) for _, cells in blocks])[:-1])
+
+
+def _links(cells: Indices) -> Iterator[Indices]:
+    """Pairs of nodes that connect every element's corners with its first."""
+    for corner in range(cells.shape[1]):
+        yield cells[:, [0, corner]]
+
+
+def piece_blocks(blocks: Blocks) -> list[Blocks]:
+    """The elements of each piece: see :func:`pieces`."""
+    labels = pieces(blocks)
+    return [
+        [
+            (shape, cells[label == piece])
+            for (shape, cells), label in zip(blocks, labels, strict=True)
+            if np.any(label == piece)
+        ]
+        for piece in range(1 + max(int(label.max()) for label in labels))
+    ]

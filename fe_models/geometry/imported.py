@@ -1,0 +1,231 @@
+"""Bodies from a mesh or a CAD file of the user's."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from fe_models.geometry.abaqus import read_abaqus
+from fe_models.geometry.cad import BEGINNINGS, read_cad
+from fe_models.geometry.checked import checked_body, opposite, vector
+from fe_models.geometry.gmsh_file import read_msh
+from fe_models.geometry.grouped import DIMENSION, Blocks, GroupedMesh, simplices
+from fe_models.geometry.meshio_file import read_meshio
+from fe_models.mesh import Body, Indices, MeshError, in_space
+from fe_models.remesh import element_volumes
+from sa_solver.types import Array
+
+# A mesh is plane when it is thinner than this share of its size.
+PLANE = 1e-9
+# Closed surfaces have no mean normal: theirs is rounding, below this share of the area.
+CLOSED = 1e-9
+READERS: dict[str, Callable[[Path], GroupedMesh]] = {".inp": read_abaqus, ".msh": read_msh}
+# Files of programs whose own formats nothing here reads.
+EXPORTABLE = {
+    ".cdb": "Ansys", ".db": "Ansys", ".odb": "Abaqus", ".cae": "Abaqus", ".mph": "COMSOL",
+    ".sldprt": "SolidWorks", ".iges": "CAD", ".igs": "CAD",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ImportedMesh:
+    """Bodies by name, each with its own nodes and named boundaries.
+
+    ``node_numbers`` ``(n,)`` are the file's own numbers of each body's vertices; ``points`` the
+    vertices in each named node set of the file that has any on that body.
+    """
+
+    bodies: dict[str, Body]
+    node_numbers: dict[str, Indices]
+    points: dict[str, dict[str, Indices]]
+
+
+@dataclass(frozen=True)
+class Patch:
+    """Size and place of a boundary: area [mm²], centroid ``(3,)`` [mm] and normal ``(3,)``.
+
+    The normal is the outward one, averaged over the area and of length 1, or zero if the boundary
+    is closed. In the plane the area is a length [mm].
+    """
+
+    area: float
+    centroid: Array
+    normal: Array
+
+
+def read_bodies(path: Path, size: float | None = None) -> ImportedMesh:
+    """Read the bodies of a mesh file, or mesh those of a CAD file at ``size`` [mm].
+
+    Reads gmsh's ``.msh`` (:func:`read_msh`), Abaqus ``.inp`` (:func:`read_abaqus`), ``.step``,
+    ``.stp`` and ``.brep`` (:func:`read_cad`) and what meshio reads (:func:`read_meshio`); lengths
+    are taken as mm. Midside nodes are dropped, which straightens curved elements; quadrilaterals,
+    pyramids, wedges and hexahedra are split into triangles or tetrahedra. A plane mesh keeps the
+    two coordinates that vary, in their order, as X and Z; whether its elements are of plane strain
+    or stress is not read.
+
+    Raises :class:`MeshError` if the file cannot be read; a body has flat, folded or duplicate
+    elements or falls into pieces; bodies share nodes; or a boundary is not on the surface of one.
+    """
+    path = Path(path)
+    grouped = _grouped(path, size)
+    try:
+        return _separated(grouped)
+    except MeshError as error:
+        raise MeshError(f"{path}: {error}") from None
+
+
+def _grouped(path: Path, size: float | None) -> GroupedMesh:
+    suffix = path.suffix.lower()
+    if not path.is_file():
+        raise MeshError(f"{path}: no such file")
+    if suffix in EXPORTABLE:
+        raise MeshError(
+            f"{path}: {EXPORTABLE[suffix]}'s {suffix} is not read; export it as .inp, .msh, .vtu "
+            "or .step"
+        )
+    if suffix in BEGINNINGS:
+        if size is None:
+            raise MeshError(f"{path}: a CAD file needs a mesh size [mm]")
+        return read_cad(path, size)
+    if size is not None:
+        raise MeshError(f"{path}: is a mesh already; a mesh size is for {', '.join(BEGINNINGS)}")
+    return READERS.get(suffix, read_meshio)(path)
+
+
+def describe(imported: ImportedMesh) -> list[str]:
+    """Lines that list bodies, boundaries and node sets with their size and place."""
+    lines = []
+    for name, body in imported.bodies.items():
+        volume = float(np.abs(element_volumes(body.mesh)).sum())
+        solid = body.mesh.dim() == 3
+        element, facet = ("tetrahedra", "triangles") if solid else ("triangles", "edges")
+        measure, unit = ("area", "mm²") if solid else ("length", "mm")
+        lines.append(
+            f"body {name}: {body.mesh.nvertices} nodes, {body.mesh.nelements} {element}, "
+            + (f"volume {volume:.6g} mm³" if solid else f"area {volume:.6g} mm²")
+        )
+        for boundary in body.mesh.boundaries or {}:
+            found = patch(body, boundary)
+            lines.append(
+                f"  boundary {boundary}: {len(body.facets(boundary))} {facet}, {measure} "
+                f"{found.area:.6g} {unit}, centroid {vector(found.centroid)} mm, "
+                + (f"normal {vector(found.normal)}" if np.any(found.normal) else "closed")
+            )
+        for points, vertices in imported.points[name].items():
+            centre = body.points[vertices].mean(axis=0)
+            lines.append(
+                f"  node set {points}: {len(vertices)} nodes, centroid {vector(centre)} mm"
+            )
+    return lines
+
+
+def patch(body: Body, boundary: str) -> Patch:
+    """Area, centroid and mean outward normal of a named boundary."""
+    mesh = body.mesh
+    index = mesh.boundaries[boundary]
+    corners = mesh.p.T[mesh.facets[:, index].T]
+    edges = corners[:, 1:] - corners[:, :1]
+    if mesh.dim() == 3:
+        normals = 0.5 * np.cross(edges[:, 0], edges[:, 1])
+    else:
+        normals = np.column_stack([edges[:, 0, 1], -edges[:, 0, 0]])
+    inside = mesh.p.T[opposite(body, index, 0)] - corners[:, 0]
+    normals *= -np.sign(np.sum(normals * inside, axis=1))[:, None]
+    areas = np.linalg.norm(normals, axis=1)
+    area, total = float(areas.sum()), normals.sum(axis=0)
+    length = np.linalg.norm(total)
+    return Patch(
+        area=area,
+        centroid=in_space(areas @ corners.mean(axis=1) / area),
+        normal=in_space(total / length if length > CLOSED * area else np.zeros_like(total)),
+    )
+
+
+def _separated(grouped: GroupedMesh) -> ImportedMesh:
+    """Give every body its own nodes, boundaries and node sets."""
+    coordinates = _coordinates(grouped)
+    cells = {name: _split(blocks) for name, blocks in grouped.bodies.items()}
+    owner = _owners(cells, len(coordinates))
+    names = list(cells)
+    surfaces = {
+        name: _facets(name, blocks, owner) for name, blocks in grouped.surfaces.items() if blocks
+    }
+    bodies, numbers, points = {}, {}, {}
+    for number, name in enumerate(names):
+        used = np.flatnonzero(owner == number)
+        vertex = np.full(len(owner), -1)
+        vertex[used] = np.arange(len(used))
+        boundaries = {
+            surface: vertex[facets[owner[facets[:, 0]] == number]]
+            for surface, facets in surfaces.items()
+            if np.any(owner[facets[:, 0]] == number)
+        }
+        bodies[name] = checked_body(name, coordinates[used], vertex[cells[name]], boundaries)
+        numbers[name] = grouped.numbers[used]
+        points[name] = {
+            points_name: vertex[rows[owner[rows] == number]]
+            for points_name, rows in grouped.node_sets.items()
+            if np.any(owner[rows] == number)
+        }
+    return ImportedMesh(bodies, numbers, points)
+
+
+def _coordinates(grouped: GroupedMesh) -> Array:
+    """Coordinates of all nodes: three, or the two of a plane mesh that vary."""
+    dimensions = {DIMENSION[shape] for blocks in grouped.bodies.values() for shape, _ in blocks}
+    if dimensions not in ({2}, {3}):
+        raise MeshError(
+            "has no bodies of solid or plane elements"
+            if not dimensions or dimensions & {0, 1}
+            else "mixes solid and plane bodies; allowed: either"
+        )
+    used = np.unique(
+        np.concatenate([cells.ravel() for blocks in grouped.bodies.values() for _, cells in blocks])
+    )
+    if not np.all(np.isfinite(grouped.points[used])):
+        raise MeshError("has nodes whose coordinates are no numbers")
+    if dimensions == {3}:
+        return grouped.points
+    extent = np.ptp(grouped.points[used], axis=0)
+    varying = np.flatnonzero(extent > PLANE * extent.max())
+    if len(varying) != 2:
+        raise MeshError(
+            "has surface elements only, and they are not in one plane x, y or z = constant; "
+            "allowed: a plane mesh in such a plane, or solid elements"
+        )
+    return grouped.points[:, varying]
+
+
+def _split(blocks: Blocks) -> Indices:
+    return np.concatenate([simplices(shape, cells) for shape, cells in blocks])
+
+
+def _owners(cells: dict[str, Indices], count: int) -> Indices:
+    """Number of the body that each node belongs to ``(n,)``, -1 of those that none uses."""
+    owner = np.full(count, -1)
+    names = list(cells)
+    for number, (name, body) in enumerate(cells.items()):
+        nodes = np.unique(body)
+        taken = owner[nodes]
+        if np.any(taken >= 0):
+            other = taken[taken >= 0][0]
+            raise MeshError(
+                f"bodies {names[other]} and {name} share {np.sum(taken == other)} nodes: they are "
+                "bonded, not in contact; put them into one group if they are one body, or give "
+                "each its own nodes"
+            )
+        owner[nodes] = number
+    return owner
+
+
+def _facets(name: str, blocks: Blocks, owner: Indices) -> Indices:
+    """Distinct facets of a surface; each is on one body."""
+    facets = np.unique(np.sort(_split(blocks), axis=1), axis=0)
+    owners = owner[facets]
+    loose = np.sum((owners != owners[:, :1]).any(axis=1) | (owners[:, 0] < 0))
+    if loose:
+        raise MeshError(f"{loose} of the {len(facets)} facets of boundary {name} are on no body")
+    return facets

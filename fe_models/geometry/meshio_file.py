@@ -1,0 +1,166 @@
+"""Meshes in the formats that meshio reads."""
+
+from __future__ import annotations
+
+import io
+import re
+import warnings
+from contextlib import redirect_stderr, redirect_stdout
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fe_models.geometry.grouped import CORNERS, DIMENSION, Blocks, GroupedMesh, piece_blocks
+from fe_models.mesh import Indices, MeshError
+
+# Cell data that number groups, by the format they come from; taken before any other integers.
+TAG_FIELDS = ("gmsh:physical", "medit:ref", "cell_tags", "nastran:ref", "tetgen:ref", "su2:tag")
+# Of these the number 0 means no group.
+ZERO_IS_NO_GROUP = ("gmsh:physical", "cell_tags")
+
+# Names of the groups that each element of a block is in, and its rows.
+Members = dict[str, Indices]
+
+
+def read_meshio(path: Path, file_format: str | None = None) -> GroupedMesh:
+    """Read a mesh through meshio.
+
+    Groups are the file's cell sets, or the values of one field of integers on its cells, by their
+    names or else as ``1``, ``2``, ...; without either the connected pieces are bodies ``body_1``,
+    ... with no boundaries. Nodes are numbered from zero as they stand in the file. Raises
+    :class:`MeshError`.
+    """
+    mesh = _read(path, file_format)
+    shapes = [_shape(path, block.type) for block in mesh.cells]
+    cells = [
+        np.asarray(block.data, dtype=np.int64)[:, : CORNERS[shape]]
+        for block, shape in zip(mesh.cells, shapes, strict=True)
+    ]
+    members = _members(path, mesh, [DIMENSION[shape] for shape in shapes])
+    top = max((DIMENSION[shape] for shape in shapes), default=0)
+    named: list[dict[str, Blocks]] = [{}, {}, {}, {}]
+    for shape, block, groups in zip(shapes, cells, members, strict=True):
+        if DIMENSION[shape] == top and any(groups):
+            _refuse_ungrouped(path, len(block), groups)
+        for name, rows in groups.items():
+            named[DIMENSION[shape]].setdefault(name, []).append((shape, block[rows]))
+    if not named[top] and top > 0:
+        whole = [
+            (shape, block)
+            for shape, block in zip(shapes, cells, strict=True)
+            if DIMENSION[shape] == top
+        ]
+        parts = piece_blocks(whole)
+        named[top] = {f"body_{number}": part for number, part in enumerate(parts, start=1)}
+    points = np.zeros((len(mesh.points), 3))
+    points[:, : mesh.points.shape[1]] = mesh.points
+    return GroupedMesh(
+        points=points,
+        numbers=np.arange(len(points)),
+        bodies=named[top],
+        surfaces=named[top - 1] if top > 0 else {},
+        node_sets=_node_sets(mesh, named[: max(top - 1, 0)]),
+    )
+
+
+def _read(path: Path, file_format: str | None) -> Any:
+    """The file as meshio sees it; what meshio says meanwhile becomes the error or a warning."""
+    import meshio
+
+    said = io.StringIO()
+    try:
+        with redirect_stdout(said), redirect_stderr(said):
+            mesh = meshio.read(path, file_format)
+    # Its readers let anything through, and its dispatch ends the process.
+    except (Exception, SystemExit) as error:
+        reason = said.getvalue() if isinstance(error, SystemExit) else str(error)
+        reason = " ".join(reason.split()) or type(error).__name__
+        raise MeshError(f"{path}: meshio cannot read it: {reason}") from None
+    if said.getvalue().strip():
+        warnings.warn(f"{path}: meshio: {' '.join(said.getvalue().split())}", stacklevel=3)
+    return mesh
+
+
+def _shape(path: Path, kind: str) -> str:
+    """The shape of meshio's kind of element, whose corners come first in all it has."""
+    match = re.fullmatch(r"([a-z]+)\d*", kind)
+    if match is None or match[1] not in CORNERS:
+        raise MeshError(f"{path}: has elements {kind}; allowed: {', '.join(CORNERS)}")
+    return match[1]
+
+
+def _members(path: Path, mesh: Any, dimensions: list[int]) -> list[Members]:
+    """The groups of every block of cells."""
+    sets = {name: rows for name, rows in mesh.cell_sets.items() if not name.startswith("gmsh:")}
+    if sets:
+        return [
+            {
+                name: np.asarray(rows[block], dtype=np.int64)
+                for name, rows in sets.items()
+                if rows[block] is not None and len(rows[block])
+            }
+            for block in range(len(dimensions))
+        ]
+    field = _tag_field(path, mesh)
+    if field is None:
+        return [{} for _ in dimensions]
+    members = []
+    for tags, dimension in zip(mesh.cell_data[field], dimensions, strict=True):
+        groups: Members = {}
+        values, first = np.unique(tags, return_index=True)
+        for tag in values[np.argsort(first)]:
+            if tag == 0 and field in ZERO_IS_NO_GROUP:
+                continue
+            for name in _names(mesh, int(tag), dimension):
+                rows = np.flatnonzero(tags == tag)
+                groups[name] = np.concatenate([groups.get(name, rows[:0]), rows])
+        members.append(groups)
+    return members
+
+
+def _tag_field(path: Path, mesh: Any) -> str | None:
+    """The cell data that number the groups."""
+    integers = [
+        name
+        for name, data in mesh.cell_data.items()
+        if all(values.ndim == 1 and values.dtype.kind in "iu" for values in data)
+    ]
+    known = [name for name in TAG_FIELDS if name in integers]
+    if len(integers) > 1 and not known:
+        raise MeshError(
+            f"{path}: has several fields of integers on its cells, {', '.join(integers)}; allowed: "
+            "one, which numbers bodies and boundaries"
+        )
+    return (known or integers or [None])[0]
+
+
+def _names(mesh: Any, tag: int, dimension: int) -> list[str]:
+    """Names of a group: a MED family has several, other formats one or a number."""
+    families = getattr(mesh, "cell_tags", {})
+    if tag in families:
+        return list(families[tag])
+    names = [name for name, pair in mesh.field_data.items() if tuple(pair) == (tag, dimension)]
+    return names or [str(tag)]
+
+
+def _refuse_ungrouped(path: Path, count: int, groups: Members) -> None:
+    """All elements of a body's block are in a group."""
+    left = count - len(np.unique(np.concatenate(list(groups.values()))))
+    if left:
+        raise MeshError(f"{path}: {left} elements are in no group; put them into one")
+
+
+def _node_sets(mesh: Any, lower: list[dict[str, Blocks]]) -> dict[str, Indices]:
+    """The file's point sets and the nodes of groups below the boundaries."""
+    found: dict[str, list[Indices]] = {}
+    for groups in lower:
+        for name, blocks in groups.items():
+            found.setdefault(name, []).extend(cells.ravel() for _, cells in blocks)
+    for name, rows in mesh.point_sets.items():
+        found.setdefault(name, []).append(np.asarray(rows, dtype=np.int64))
+    tags = mesh.point_data.get("point_tags")
+    for tag, names in getattr(mesh, "point_tags", {}).items():
+        for name in names:
+            found.setdefault(name, []).append(np.flatnonzero(tags == tag))
+    return {name: np.unique(np.concatenate(rows)) for name, rows in found.items()}

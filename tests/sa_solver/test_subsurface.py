@@ -1,0 +1,384 @@
+"""Stress inside the bodies against closed forms, point forces, equilibrium and symmetry."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from sa_solver.reference.hertz import Cylinder, Sphere
+from sa_solver.reference.subsurface import (
+    cylinder_stress,
+    point_force_stress,
+    sphere_axis_stress,
+    sphere_surface_stress,
+)
+from sa_solver.subsurface import SubsurfaceError, SubsurfaceStress
+from sa_solver.subsurface_influence import (
+    INDICES,
+    XX,
+    XY,
+    YY,
+    YZ,
+    ZX,
+    ZZ,
+    rectangle_stress,
+    strip_stress,
+)
+from sa_solver.types import Grid, Material
+
+STEEL = Material(200e3, 0.3)
+MODULUS = 1.1e5
+SPHERE = Sphere(400.0, 10.0, MODULUS)
+CYLINDER = Cylinder(500.0, 10.0, MODULUS)
+FRICTION = 0.4
+SIZE = (0.8, 0.5)
+RATIOS = [0.0, 0.3, 0.5]
+POINTS = [
+    (0.1, -0.05, 0.4),
+    (0.4, 0.25, 0.3),  # below a corner
+    (0.4, 0.1, 0.25),  # below an edge
+    (0.9, 0.25, 0.1),
+    (-1.3, 0.7, 0.0),
+    (3.0, -4.0, 2.0),
+]
+
+
+def rectangle(x, y, z, poisson, size=SIZE):
+    """All coefficients (6, 3) at a point from the centre of a rectangle."""
+    edges = [np.array([c - 0.5 * s, c + 0.5 * s]) for c, s in zip((x, y), size, strict=True)]
+    return rectangle_stress(edges[0], edges[1], z, poisson)[..., 0, 0]
+
+
+def as_tensor(stress):
+    """(6, ...) → (3, 3, ...)."""
+    tensor = np.empty((3, 3, *stress.shape[1:]))
+    for own, (i, j) in zip(stress, INDICES, strict=True):
+        tensor[i, j] = tensor[j, i] = own
+    return tensor
+
+
+@pytest.mark.parametrize("poisson", RATIOS)
+@pytest.mark.parametrize("point", POINTS)
+def test_a_rectangle_is_the_integral_of_point_forces(point, poisson):
+    """Gauss points, 60 each way, converge to rounding at these depths and distances."""
+    x, y, z = point
+    nodes, weights = np.polynomial.legendre.leggauss(60)
+    sources = [c - 0.5 * s * nodes for c, s in zip((x, y), SIZE, strict=True)]
+    distance = np.meshgrid(*sources, indexing="ij")
+    kernel = point_force_stress(*distance, np.full((60, 60), z), poisson)
+    expected = 0.25 * np.prod(SIZE) * np.einsum("ijxy,x,y->ij", kernel, weights, weights)
+    accuracy = 1e-8 * np.abs(expected).max()
+    np.testing.assert_allclose(rectangle(x, y, z, poisson), expected, rtol=0, atol=accuracy)
+
+
+@pytest.mark.parametrize("point", POINTS[:4])
+def test_a_rectangle_is_in_equilibrium_and_compatible(point):
+    """Divergence 0, and Beltrami and Michell's ∇²σ_ij + σ_kk,ij / (1+ν) = 0, by differences.
+
+    Central differences over a step h leave O(h²), divided by it twice rounding: 1e-4 of σ/size².
+    """
+    step, poisson = 2e-3, 0.3
+
+    def tensor(*shift):
+        moved = np.array(point) + step * np.array(shift)
+        return as_tensor(rectangle(*moved, poisson))
+
+    unit = np.eye(3)
+    first = np.array([tensor(*u) - tensor(*-u) for u in unit]) / (2.0 * step)
+    np.testing.assert_allclose(np.einsum("iijk->jk", first), 0.0, atol=1e-3)
+    second = np.empty((3, 3, 3, 3, 3))
+    for i, j in itertools.product(range(3), repeat=2):
+        a, b = unit[i], unit[j]
+        both = tensor(*(a + b)) - tensor(*(a - b)) - tensor(*(b - a)) + tensor(*(-a - b))
+        second[i, j] = both / (4.0 * step**2)
+    laplacian = np.einsum("iijkl->jkl", second)
+    trace = np.einsum("ijkkl->ijl", second)
+    size = np.abs(second).max()
+    np.testing.assert_allclose(laplacian + trace / (1.0 + poisson), 0.0, atol=1e-3 * size)
+
+
+def test_an_endless_rectangle_carries_its_traction_everywhere():
+    """Equilibrium: the sum of zz, yz and zx over any plane is minus the load (Betti)."""
+    found = rectangle(0.0, 0.0, 3.0, 0.3, (1e9, 1e9))
+    np.testing.assert_allclose(found[[ZX, YZ, ZZ]], -np.eye(3), atol=1e-7)
+
+
+@pytest.mark.parametrize("place", [(0.01, 0.01), (0.4 - 1e-9, 0.25 - 1e-9), (0.4 + 1e-9, 0.1)])
+@pytest.mark.parametrize("depth", [1e-15, 1e-12])
+def test_the_surface_is_the_limit_of_the_depth(place, depth):
+    """Even 1e-9 from an edge or a corner, at 1e-3 of that distance below."""
+    deep, surface = rectangle(*place, depth, 0.3), rectangle(*place, 0.0, 0.3)
+    np.testing.assert_allclose(deep, surface, atol=2e-3 * depth / 1e-12 + 1e-12)
+
+
+def test_below_a_corner_nothing_is_infinite():
+    for depth in (1e-100, 1e-12, 1e-3):
+        assert np.all(np.isfinite(rectangle(0.4, 0.25, depth, 0.3)))
+
+
+def test_far_below_rounding_stays_small():
+    """Differences between corners of a cell 1000 cells away against a point force."""
+    depth = 10.0
+    found = rectangle(3.0, -2.0, depth, 0.3, (0.01, 0.01))
+    expected = 1e-4 * point_force_stress(3.0, -2.0, depth, 0.3)
+    np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("depth", [0.0, 0.2])
+@pytest.mark.parametrize("poisson", RATIOS)
+def test_a_strip_is_a_long_rectangle_in_plane_strain(depth, poisson):
+    edges = np.array([-0.7, -0.2, 0.3, 0.8])
+    strip = strip_stress(edges, depth, poisson)
+    long = rectangle_stress(edges, np.array([-1e9, 1e9]), depth, poisson)[..., 0]
+    np.testing.assert_allclose(strip, long, atol=1e-9)
+    plane = poisson * (strip[XX] + strip[ZZ])
+    np.testing.assert_allclose(strip[YY], plane, atol=1e-14)
+
+
+def sheared(pressure, friction=FRICTION):
+    return np.stack([friction * pressure, np.zeros_like(pressure), pressure])
+
+
+def cylinder_error(count, depths):
+    """Largest error of a section over p0, at each depth."""
+    grid = Grid.strips(4.0 * CYLINDER.half_width, count)
+    traction = sheared(cell_means(grid))
+    found = SubsurfaceStress(grid, STEEL, 2).section(traction, "x", 0.0, depths)
+    expected = cylinder_stress(CYLINDER, FRICTION, grid.x, depths, STEEL.poisson)
+    return np.abs(found - expected).max(axis=(0, 1)) / CYLINDER.peak_pressure
+
+
+def cell_means(grid):
+    """Hertz's line pressure, averaged over each cell."""
+    a = CYLINDER.half_width
+    edges = (np.arange(grid.shape[0] + 1) - 0.5 * grid.shape[0]) * grid.pitch[0]
+    t = np.clip(edges / a, -1.0, 1.0)
+    integral = 0.5 * CYLINDER.peak_pressure * a * (t * np.sqrt(1.0 - t**2) + np.arcsin(t))
+    return np.diff(integral)[:, None] / grid.pitch[0]
+
+
+def test_sliding_cylinder_converges_all_over_a_section():
+    """McEwen and Johnson 7.8: second order inside, order 1/2 at the edges of the surface."""
+    depths = np.array([0.0, 0.1, 0.5, 1.0, 2.0]) * CYLINDER.half_width
+    coarse, fine = cylinder_error(256, depths), cylinder_error(1024, depths)
+    assert np.all(fine[2:] < 5e-6)
+    assert np.all(coarse[1:] / fine[1:] > 4.0**1.9)
+    assert fine[0] < 0.02
+    assert coarse[0] / fine[0] == pytest.approx(2.0, rel=0.05)
+
+
+@pytest.mark.parametrize(("body", "side"), [(1, 1.0), (2, -1.0)])
+@pytest.mark.parametrize("sense", [1.0, -1.0])
+def test_the_trailing_edge_is_in_tension(body, side, sense):
+    """xx = 2 µ p0 at x = -a of body 2 under shear towards +x, at x = a of body 1.
+
+    It falls off as a square root outside: the grid finds it to O(sqrt(h)), 6 % at h = a / 256.
+    """
+    a, p0 = CYLINDER.half_width, CYLINDER.peak_pressure
+    values = []
+    for count in (256, 1024):
+        grid = Grid.strips(4.0 * a, count)
+        stress = SubsurfaceStress(grid, STEEL, body).surface(sheared(cell_means(grid), sense * 0.4))
+        edge = int(np.argmax(stress[XX]))
+        assert grid.x[edge, 0] == pytest.approx(side * sense * a, abs=grid.pitch[0])
+        values.append(1.0 - stress[XX, edge, 0] / (2.0 * FRICTION * p0))
+    assert 0.0 < values[1] < 0.06
+    assert values[0] / values[1] == pytest.approx(2.0, rel=0.05)
+
+
+def sphere_grid(count, size=3.0):
+    width = size * SPHERE.contact_radius
+    grid = Grid.covering((width, width), (count, count))
+    return grid, SPHERE.pressure(grid.x, grid.y)
+
+
+@pytest.mark.parametrize("poisson", RATIOS)
+def test_sphere_on_its_axis(poisson):
+    """Johnson 3.45 from 0.2 a down."""
+    grid, pressure = sphere_grid(95)
+    depths = np.linspace(0.2, 2.0, 10) * SPHERE.contact_radius
+    solver = SubsurfaceStress(grid, Material(1.0, poisson), 2)
+    found = solver.section(sheared(pressure, 0.0), "x", 0.0, depths)[:, 47]
+    expected = sphere_axis_stress(SPHERE, depths, poisson)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-3 * SPHERE.peak_pressure)
+
+
+def test_yield_starts_below_the_sphere():
+    """Largest shear 0.310 p0 at a depth of 0.481 a for ν = 0.3 (Johnson 3.46)."""
+    a = SPHERE.contact_radius
+    grid, pressure = sphere_grid(95)
+    depths = np.linspace(0.4, 0.56, 17) * a
+    section = SubsurfaceStress(grid, STEEL, 1).section(sheared(pressure, 0.0), "y", 0.0, depths)
+    shear = 0.5 * (section[XX, 47] - section[ZZ, 47])
+    assert shear.max() / SPHERE.peak_pressure == pytest.approx(0.310, abs=5e-4)
+    assert depths[np.argmax(shear)] / a == pytest.approx(0.481, abs=0.01)
+
+
+def surface_error(count):
+    """Mean error at the surface over p0, inside the contact."""
+    grid, pressure = sphere_grid(count)
+    found = SubsurfaceStress(grid, STEEL, 2).surface(sheared(pressure))
+    expected = sphere_surface_stress(SPHERE, FRICTION, grid.x, grid.y, STEEL.poisson)
+    inside = np.hypot(grid.x, grid.y) < SPHERE.contact_radius
+    return np.abs(found - expected)[:, inside].mean(axis=1) / SPHERE.peak_pressure
+
+
+def test_surface_of_a_sliding_sphere():
+    """Johnson 3.42 and 3.91: first order in the mean, for the edge runs through cells."""
+    coarse, fine = surface_error(64), surface_error(256)
+    convolved = [XX, YY, XY]
+    assert np.all(fine[convolved] < 2.5e-3)
+    np.testing.assert_allclose(coarse[convolved] / fine[convolved], 4.0, rtol=0.1)
+    np.testing.assert_allclose(fine[[ZZ, YZ, ZX]], 0.0, atol=1e-15)
+
+
+def test_pressure_pulls_radially_at_the_edge():
+    """(1-2ν) p0 / 3 at r = a (Johnson 3.44), from outside, where it falls as a²/r².
+
+    How the edge runs through the cells makes the error jump: first order over a wide range only.
+    """
+    coarse, fine = edge_error(32), edge_error(256)
+    assert fine < 0.004
+    assert coarse / fine > 8.0
+
+
+def edge_error(count):
+    """Largest relative error of the radial stress outside the contact, in one row."""
+    grid, pressure = sphere_grid(count + 1)
+    stress = SubsurfaceStress(grid, STEEL, 2).surface(sheared(pressure, 0.0))
+    r = np.abs(grid.x[:, 0]) / SPHERE.contact_radius
+    expected = 0.4 / 3.0 * SPHERE.peak_pressure
+    return np.abs(stress[XX, :, count // 2] * r**2 / expected - 1.0)[r > 1.0].max()
+
+
+def random_traction(grid, seed=3):
+    """Random tractions on the middle of the grid."""
+    rng = np.random.default_rng(seed)
+    traction = np.zeros((3, *grid.shape))
+    middle = tuple(slice(n // 4, n - n // 4) for n in grid.shape)
+    traction[(slice(None), *middle)] = rng.standard_normal(traction[(slice(None), *middle)].shape)
+    return traction
+
+
+@pytest.mark.parametrize("body", [1, 2])
+@pytest.mark.parametrize("depth", [0.0, 0.13])
+@pytest.mark.parametrize("shape", [(5, 7), (4, 3), (1, 6)])
+def test_convolution_is_the_sum_over_cells(body, depth, shape):
+    grid = Grid(shape, (0.2, 0.15))
+    traction = np.random.default_rng(1).standard_normal((3, *shape))
+    sign = -1.0 if body == 1 else 1.0
+    felt = traction * np.array([sign, sign, 1.0])[:, None, None]
+    expected = np.zeros((6, *shape))
+    for i, j in np.ndindex(shape):
+        for k, m in np.ndindex(shape):
+            offset = grid.x[i, 0] - grid.x[k, 0], grid.y[0, j] - grid.y[0, m]
+            one = rectangle(*offset, depth, 0.3, grid.pitch)
+            expected[:, i, j] += one @ felt[:, k, m]
+    expected[[YZ, ZX]] *= sign
+    found = SubsurfaceStress(grid, STEEL, body).at_depth(traction, depth)
+    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("body", [1, 2])
+@pytest.mark.parametrize("axis", ["x", "y"])
+def test_a_section_is_cut_from_planes(body, axis):
+    grid = Grid((12, 17), (0.2, 0.15))
+    traction, depths = random_traction(grid), np.array([0.0, 0.05, 0.4])
+    solver = SubsurfaceStress(grid, STEEL, body)
+    found = solver.section(traction, axis, 0.33, depths)
+    for column, depth in enumerate(depths):
+        plane = solver.at_depth(traction, depth)
+        row = np.argmin(np.abs((grid.y[0] if axis == "x" else grid.x[:, 0]) - 0.33))
+        expected = plane[:, :, row] if axis == "x" else plane[:, row]
+        np.testing.assert_allclose(found[:, :, column], expected, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("body", [1, 2])
+def test_both_bodies_are_in_equilibrium(body):
+    """Differences over the grid, O(h²): the divergence is 4 times less on half the pitch."""
+    worst = [divergence(body, count) for count in (24, 48)]
+    assert worst[1] < 0.015
+    assert worst[0] / worst[1] > 3.5
+
+
+def divergence(body, count):
+    """Largest divergence at a depth over the largest derivative of stress there."""
+    grid = Grid.covering((4.0, 4.0), (count, count))
+    bump = np.maximum(0.0, 1.0 - grid.x**2 - (grid.y - 0.2) ** 2) ** 2
+    traction = np.stack([0.5 * bump * (1.0 + grid.x), -0.3 * bump, bump])
+    solver, h = SubsurfaceStress(grid, STEEL, body), grid.pitch[0]
+    above, here, below = (as_tensor(solver.at_depth(traction, 0.8 + s * h)) for s in (-1, 0, 1))
+    down = 1.0 if body == 2 else -1.0
+    inner = slice(1, -1)
+    gradient = [
+        (here[0, :, 2:, inner] - here[0, :, :-2, inner]) / (2.0 * h),
+        (here[1, :, inner, 2:] - here[1, :, inner, :-2]) / (2.0 * h),
+        down * (below[2] - above[2])[:, inner, inner] / (2.0 * h),
+    ]
+    return np.abs(sum(gradient)).max() / max(np.abs(own).max() for own in gradient)
+
+
+def test_a_plane_below_carries_the_load():
+    """Line load on the middle cells: what passes between ±R at depth z, from Flamant's stress."""
+    grid, depth = Grid.strips(20.0, 2001), 0.5
+    traction = np.zeros((3, 2001, 1))
+    traction[:, 1000] = np.array([20.0, 0.0, 50.0])[:, None]
+    stress = SubsurfaceStress(grid, STEEL, 2).at_depth(traction, depth)
+    forces = stress.sum(axis=(1, 2)) * grid.pitch[0]
+    angle, dip = np.arctan(10.0 / depth), 10.0 * depth / (100.0 + depth**2)
+    passed = 2.0 / np.pi * np.array([angle + dip, angle - dip])
+    load = traction[:, 1000, 0] * grid.pitch[0]
+    np.testing.assert_allclose(forces[[ZZ, ZX]], -load[[2, 0]] * passed, rtol=1e-3)
+
+
+def test_body_1_is_body_2_turned_over():
+    """Half a turn about x takes one onto the other's place, with xy and zx changing sign."""
+    grid = Grid((12, 17), (0.2, 0.15))
+    traction = random_traction(grid)
+    turned = traction[:, :, ::-1] * np.array([-1.0, 1.0, 1.0])[:, None, None]
+    for depth in (0.0, 0.3):
+        first = SubsurfaceStress(grid, STEEL, 1).at_depth(traction, depth)
+        second = SubsurfaceStress(grid, STEEL, 2).at_depth(turned, depth)[:, :, ::-1]
+        second[[XY, ZX]] *= -1.0
+        np.testing.assert_allclose(first, second, rtol=0, atol=1e-12)
+
+
+def test_exchange_of_the_axes():
+    grid, other = Grid((12, 17), (0.2, 0.15)), Grid((17, 12), (0.15, 0.2))
+    traction = random_traction(grid)
+    exchanged = traction[[1, 0, 2]].swapaxes(1, 2)
+    found = SubsurfaceStress(grid, STEEL, 2).at_depth(traction, 0.2)
+    expected = SubsurfaceStress(other, STEEL, 2).at_depth(exchanged, 0.2).swapaxes(1, 2)
+    np.testing.assert_allclose(found, expected[[YY, XX, ZZ, XY, ZX, YZ]], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("body", [1, 2])
+def test_the_surface_carries_the_tractions(body):
+    grid = Grid((12, 17), (0.2, 0.15))
+    traction = random_traction(grid)
+    surface = SubsurfaceStress(grid, STEEL, body).surface(traction)
+    np.testing.assert_array_equal(surface[[ZX, YZ, ZZ]], -traction)
+    below = SubsurfaceStress(grid, STEEL, body).at_depth(traction, 1e-12)
+    np.testing.assert_allclose(below, surface, rtol=0, atol=1e-9)
+
+
+def test_no_load_no_stress():
+    grid = Grid((4, 5), (0.1, 0.1))
+    solver = SubsurfaceStress(grid, STEEL, 2)
+    assert not solver.section(np.zeros((3, 4, 5)), "x", 0.0, np.array([0.1])).any()
+
+
+def test_what_does_not_fit_is_refused():
+    line, plane = Grid.strips(1.0, 8), Grid((4, 5), (0.1, 0.1))
+    with pytest.raises(SubsurfaceError, match="bodies 1 and 2"):
+        SubsurfaceStress(line, STEEL, 3)
+    with pytest.raises(SubsurfaceError, match="Poisson"):
+        SubsurfaceStress(line, Material(1.0, 0.6), 1)
+    with pytest.raises(SubsurfaceError, match="section along y"):
+        SubsurfaceStress(line, STEEL, 1).section(np.ones((3, 8, 1)), "y", 0.0, np.ones(1))
+    with pytest.raises(SubsurfaceError, match="grid ends"):
+        SubsurfaceStress(plane, STEEL, 1).section(np.ones((3, 4, 5)), "x", 0.3, np.ones(1))
+    with pytest.raises(SubsurfaceError, match="shape"):
+        SubsurfaceStress(plane, STEEL, 1).surface(np.ones((3, 5, 4)))
+    with pytest.raises(SubsurfaceError, match="depth"):
+        SubsurfaceStress(plane, STEEL, 1).at_depth(np.ones((3, 4, 5)), -0.1)

@@ -1,0 +1,315 @@
+"""Fretting and fatigue parameters against closed forms, brute force and invariance."""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from sa_solver.types import Material
+from wear.life import (
+    PlaneSearch,
+    StressHistoryError,
+    findley,
+    ruiz,
+    smith_watson_topper,
+)
+from wear.smallest_circle import smallest_circle
+
+STEEL = Material(200e3, 0.3)
+FINE = PlaneSearch(100, 20)
+"""Steps small enough for tests of values that are exact."""
+
+SENSITIVITY = 0.3
+INDICES = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
+
+
+def history(**components):
+    """(t, 6) from histories of some components."""
+    names = ("xx", "yy", "zz", "xy", "yz", "zx")
+    count = len(next(iter(components.values())))
+    return np.stack([components.get(name, np.zeros(count)) for name in names], axis=1)
+
+
+def as_tensor(stress):
+    """(t, 6) → (t, 3, 3)."""
+    tensor = np.empty((len(stress), 3, 3))
+    for own, (i, j) in zip(stress.T, INDICES, strict=True):
+        tensor[:, i, j] = tensor[:, j, i] = own
+    return tensor
+
+
+def rotated(stress, rotation):
+    tensor = rotation @ as_tensor(stress) @ rotation.T
+    return np.stack([tensor[:, i, j] for i, j in INDICES], axis=1)
+
+
+def rotation(seed):
+    return np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))[0]
+
+
+# --- Smallest circle
+
+
+def smallest_by_trial(x, y):
+    """The best of all circles on two or three of the points."""
+    points = np.stack([x, y], axis=1)
+    centres = [0.5 * (a + b) for a, b in itertools.combinations(points, 2)]
+    for a, b, c in itertools.combinations(points, 3):
+        sides = 2.0 * np.array([b - a, c - a])
+        if abs(np.linalg.det(sides)) > 1e-12:
+            centres.append(np.linalg.solve(sides, [b @ b - a @ a, c @ c - a @ a]))
+    return min(np.linalg.norm(points - c, axis=1).max() for c in centres)
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 9])
+def test_smallest_circle_is_the_best_of_all(count):
+    """Points at random, on lines, on a lattice and the same."""
+    rng = np.random.default_rng(count)
+    x, y = rng.standard_normal((2, count, 60))
+    y[:, :15] = 2.0 * x[:, :15]
+    x[:, 15:30], y[:, 15:30] = np.round(x[:, 15:30]), np.round(y[:, 15:30])
+    x[:, 30], y[:, 30] = 1.0, -3.0
+    expected = [smallest_by_trial(*points) for points in zip(x.T, y.T, strict=True)]
+    np.testing.assert_allclose(smallest_circle(x, y), expected, rtol=1e-9, atol=1e-12)
+
+
+def test_smallest_circle_of_many_points_on_one():
+    """22 points all on the circle or all on a line, but for 1e-13; one point alone."""
+    angle = 2.0 * np.pi * np.arange(22) / 22
+    noise = 1e-13 * np.random.default_rng(0).standard_normal((22, 100))
+    circles = smallest_circle(np.cos(angle)[:, None] + noise, np.sin(angle)[:, None] + noise)
+    np.testing.assert_allclose(circles, 1.0, rtol=1e-9)
+    lines = smallest_circle(np.cos(angle)[:, None] + noise, np.cos(angle)[:, None] - noise)
+    np.testing.assert_allclose(lines, np.sqrt(2.0), rtol=1e-9)
+    assert not smallest_circle(np.ones((1, 4)), np.ones((1, 4))).any()
+
+
+# --- Findley
+
+
+@pytest.mark.parametrize("k", [0.0, 0.3, 1.0])
+@pytest.mark.parametrize(("low", "high"), [(-200.0, 200.0), (0.0, 300.0), (-300.0, 100.0)])
+def test_findley_uniaxial(low, high, k):
+    """[k σ_max + sqrt(σ_a² + k² σ_max²)] / 2, on planes where tan 2θ = σ_a / k σ_max."""
+    found = findley(history(xx=np.array([low, high])), k, FINE)
+    amplitude = 0.5 * (high - low)
+    expected = 0.5 * (k * high + np.hypot(amplitude, k * high))
+    assert found.value == pytest.approx(expected, rel=1e-6)
+    # The value is flat at its maximum: angles are found to the square root of its accuracy.
+    double = np.arctan2(amplitude, k * high)
+    assert abs(found.normal[0]) == pytest.approx(np.cos(0.5 * double), abs=2e-3)
+    assert found.amplitude == pytest.approx(0.5 * amplitude * np.sin(double), rel=4e-3)
+    assert found.amplitude + k * found.normal_stress == pytest.approx(found.value, rel=1e-12)
+
+
+@pytest.mark.parametrize("k", [0.0, 0.3])
+def test_findley_torsion(k):
+    """T sqrt(1 + k²)."""
+    found = findley(history(xy=np.array([-150.0, 150.0])), k, FINE)
+    assert found.value == pytest.approx(150.0 * np.sqrt(1.0 + k**2), rel=1e-6)
+
+
+@pytest.mark.parametrize("ratio", [0.2, 0.5, 2.0])
+def test_findley_proportional_tension_torsion(ratio):
+    """Mohr's circle of centre σ/2 and radius r, reversed: k σ/2 + r sqrt(1 + k²)."""
+    tension, torsion = 200.0, 200.0 * ratio
+    cycle = np.sin(2.0 * np.pi * np.arange(8) / 8)
+    found = findley(history(xx=tension * cycle, xy=torsion * cycle), SENSITIVITY, FINE)
+    radius = np.hypot(0.5 * tension, torsion)
+    expected = SENSITIVITY * 0.5 * tension + radius * np.sqrt(1.0 + SENSITIVITY**2)
+    assert found.value == pytest.approx(expected, rel=1e-6)
+
+
+def by_brute_force(stress_amplitudes, k):
+    """Findley and SWT of harmonic stress, the real part of amplitudes (3, 3), over planes 1° apart.
+
+    On a plane the shear vector goes round an ellipse whose larger semi-axis is the shear amplitude.
+    """
+    theta, phi = np.radians(np.meshgrid(np.arange(91), np.arange(360), indexing="ij"))
+    normal = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)])
+    vector = np.einsum("ij,j...->i...", stress_amplitudes, normal)
+    along = np.einsum("i...,i...->...", normal, vector)
+    shear = vector - normal * along
+    squares = np.sum(np.abs(shear) ** 2, axis=0)
+    larger = np.sqrt(0.5 * (squares + np.abs(np.sum(shear**2, axis=0))))
+    trace = np.trace(stress_amplitudes)
+    strain = np.abs((1.0 + STEEL.poisson) * along - STEEL.poisson * trace) / STEEL.young
+    return np.max(larger + k * np.abs(along)), np.max(np.abs(along) * strain)
+
+
+@pytest.mark.parametrize("phase", [0.0, 45.0, 90.0])
+@pytest.mark.parametrize("ratio", [0.3, 1.0 / np.sqrt(3.0), 1.0])
+def test_out_of_phase_against_brute_force(phase, ratio):
+    """360 states leave 4e-5 of a harmonic's amplitude, planes 1° apart 2e-4 at most."""
+    angle = 2.0 * np.pi * np.arange(360) / 360
+    turn = np.exp(1j * np.radians(phase))
+    amplitudes = np.zeros((3, 3), dtype=complex)
+    amplitudes[0, 0] = 200.0
+    amplitudes[0, 1] = amplitudes[1, 0] = 200.0 * ratio * turn
+    stress = history(xx=200.0 * np.cos(angle), xy=200.0 * ratio * np.cos(angle + np.radians(phase)))
+    expected = by_brute_force(amplitudes, SENSITIVITY)
+    assert findley(stress, SENSITIVITY, FINE).value == pytest.approx(expected[0], rel=4e-4)
+    assert smith_watson_topper(stress, STEEL, FINE).value == pytest.approx(expected[1], rel=4e-4)
+
+
+def test_findley_by_dense_planes_on_random_histories():
+    """Another way to the same: projections of tensors, chords, every state against every other.
+
+    The circle is between half the longest chord and 2/sqrt(3) of that (Jung).
+    """
+    stress = np.random.default_rng(4).standard_normal((6, 6, 3))
+    found = findley(stress, 0.0, FINE)
+    normal = PlaneSearch(5000, 0).normals
+    for point in range(3):
+        vector = np.einsum("tij,pj->tpi", as_tensor(stress[..., point]), normal)
+        shear = vector - normal * np.einsum("tpi,pi->tp", vector, normal)[..., None]
+        chords = np.linalg.norm(shear[:, None] - shear[None], axis=-1).max(axis=(0, 1))
+        half = 0.5 * chords.max()
+        assert half * (1.0 - 1e-3) <= found.value[point] <= half * 2.0 / np.sqrt(3.0)
+
+
+# --- Smith, Watson and Topper
+
+
+@pytest.mark.parametrize(("low", "high"), [(-200.0, 200.0), (0.0, 300.0), (-300.0, 100.0)])
+def test_swt_uniaxial(low, high):
+    """σ_max σ_a / E on the plane across."""
+    found = smith_watson_topper(history(xx=np.array([low, high])), STEEL, FINE)
+    assert found.value == pytest.approx(high * 0.5 * (high - low) / STEEL.young, rel=1e-6)
+    assert abs(found.normal[0]) == pytest.approx(1.0, abs=1e-5)
+    assert found.normal_stress == pytest.approx(high, rel=1e-5)
+
+
+def test_swt_torsion():
+    """T² (1+ν) / E at 45°."""
+    found = smith_watson_topper(history(xy=np.array([-150.0, 150.0])), STEEL, FINE)
+    assert found.value == pytest.approx(150.0**2 * 1.3 / STEEL.young, rel=1e-6)
+
+
+def test_swt_proportional_tension_torsion():
+    """σ1 (σ1 - ν σ2) / E of the principal stresses of the reversed state."""
+    found = smith_watson_topper(
+        history(xx=np.array([-200.0, 200.0]), xy=np.array([-80.0, 80.0])), STEEL, FINE
+    )
+    first, second = 100.0 + np.hypot(100.0, 80.0), 100.0 - np.hypot(100.0, 80.0)
+    assert found.value == pytest.approx(first * (first - 0.3 * second) / STEEL.young, rel=1e-6)
+
+
+def test_swt_is_0_where_nothing_is_pulled():
+    """Pressure on all planes; alternating, so that strain does have an amplitude."""
+    pressure = -100.0 - 50.0 * np.sin(np.arange(6.0))
+    stress = history(xx=pressure, yy=pressure, zz=pressure)
+    assert smith_watson_topper(stress, STEEL).value == 0.0
+
+
+# --- Both
+
+
+PARAMETERS = {
+    "findley": lambda stress, search: findley(stress, SENSITIVITY, search),
+    "swt": lambda stress, search: smith_watson_topper(stress, STEEL, search),
+}
+
+
+@pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=PARAMETERS)
+@pytest.mark.parametrize("seed", range(3))
+def test_turning_the_body_turns_the_plane(parameter, seed):
+    """Exactly only with all planes: many samples, and what the refinement leaves."""
+    stress = 100.0 * np.random.default_rng(seed).standard_normal((7, 6))
+    turn = rotation(seed + 10)
+    search = PlaneSearch(300, 20)
+    before, after = parameter(stress, search), parameter(rotated(stress, turn), search)
+    assert after.value == pytest.approx(before.value, rel=1e-4)
+    assert abs(after.normal @ turn @ before.normal) == pytest.approx(1.0, abs=1e-4)
+
+
+@pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=PARAMETERS)
+def test_constant_stress_has_no_amplitude(parameter):
+    stress = np.tile(100.0 * np.random.default_rng(1).standard_normal((1, 6, 5)), (9, 1, 1))
+    np.testing.assert_allclose(parameter(stress, FINE).amplitude, 0.0, atol=1e-12)
+
+
+def test_constant_stress_is_worth_its_largest_principal_to_findley():
+    stress = 100.0 * np.random.default_rng(1).standard_normal((1, 6))
+    found = findley(stress, SENSITIVITY, FINE)
+    largest = np.linalg.eigvalsh(as_tensor(stress)[0])[-1]
+    assert found.value == pytest.approx(SENSITIVITY * largest, rel=1e-5)
+
+
+@pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=PARAMETERS)
+def test_order_of_states_does_not_matter(parameter):
+    stress = np.random.default_rng(2).standard_normal((8, 6, 4))
+    found, other = parameter(stress, PlaneSearch()), parameter(stress[::-1], PlaneSearch())
+    np.testing.assert_allclose(found.value, other.value, rtol=1e-9)
+
+
+@pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=PARAMETERS)
+def test_maps_are_their_points(parameter):
+    """More points than are searched at once, in any shape."""
+    stress = np.random.default_rng(3).standard_normal((3, 6, 70, 61))
+    search = PlaneSearch(10, 1)
+    found = parameter(stress, search)
+    assert found.value.shape == (70, 61)
+    assert found.normal.shape == (3, 70, 61)
+    alone = parameter(stress[:, :, 69, 60], search)
+    assert found.value[69, 60] == pytest.approx(float(alone.value), rel=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(found.normal, axis=0), 1.0, rtol=1e-12)
+
+
+@pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=PARAMETERS)
+def test_the_search_loses_what_it_says(parameter):
+    """As PlaneSearch documents, on fewer histories."""
+    stress = np.random.default_rng(5).standard_normal((8, 6, 50))
+    best = parameter(stress, PlaneSearch(600, 10)).value
+    coarse, fine = (
+        1.0 - parameter(stress, PlaneSearch(100, refinements)).value / best
+        for refinements in (0, 6)
+    )
+    assert 0.005 < coarse.mean() < 0.04
+    assert coarse.max() < 0.1
+    assert fine.mean() < 1e-3
+    assert fine.max() < 0.02
+
+
+# --- Ruiz
+
+
+def test_ruiz_by_hand():
+    """±0.02 mm under 80 MPa: τδ = 1.6 N/mm, work 4 τδ; tension 300 MPa along the flank."""
+    slip, shear = np.zeros((2, 2, 1, 1)), np.zeros((2, 2, 1, 1))
+    slip[:, 0, 0, 0], shear[:, 0, 0, 0] = (0.04, -0.04), (-80.0, 80.0)
+    stress = history(xx=np.array([300.0, -200.0]), zz=np.array([-900.0, 0.0]))[..., None, None]
+    found = ruiz(stress, shear, slip)
+    assert found.work.item() == pytest.approx(6.4, rel=1e-12)
+    assert found.friction_parameter.item() == pytest.approx(1.6, rel=1e-12)
+    assert found.cracking_parameter.item() == pytest.approx(480.0, rel=1e-12)
+
+
+def test_ruiz_does_not_depend_on_axes_in_the_surface():
+    rng = np.random.default_rng(6)
+    stress, shear, slip = rng.standard_normal((5, 6)), *rng.standard_normal((2, 5, 2))
+    turn = np.eye(3)
+    turn[:2, :2] = [[np.cos(0.7), -np.sin(0.7)], [np.sin(0.7), np.cos(0.7)]]
+    before = ruiz(stress, shear, slip)
+    after = ruiz(rotated(stress, turn), shear @ turn[:2, :2].T, slip @ turn[:2, :2].T)
+    assert after.cracking_parameter == pytest.approx(before.cracking_parameter, rel=1e-12)
+
+
+def test_nothing_pulled_no_cracks():
+    stress = history(xx=np.array([-300.0, -10.0]), yy=np.array([-20.0, -5.0]))
+    found = ruiz(stress, -np.ones((2, 2)), np.ones((2, 2)))
+    assert found.friction_parameter > 0.0
+    assert found.cracking_parameter == 0.0
+
+
+def test_what_has_no_meaning_is_refused():
+    with pytest.raises(StressHistoryError, match="shape"):
+        findley(np.ones((6, 4)), 0.3)
+    with pytest.raises(StressHistoryError, match="finite"):
+        findley(np.full((4, 6), np.nan), 0.3)
+    with pytest.raises(StressHistoryError, match="sensitivity"):
+        findley(np.ones((4, 6)), -0.3)
+    with pytest.raises(StressHistoryError, match="planes"):
+        PlaneSearch(0)
+    with pytest.raises(StressHistoryError, match="as many"):
+        ruiz(np.ones((4, 6)), np.ones((3, 2)), np.ones((4, 2)))
