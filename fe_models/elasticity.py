@@ -117,6 +117,15 @@ class ElasticBody:
         load = LinearForm(lambda v, w: w.f * v).assemble(basis, f=size)
         return np.outer(load, direction[list(self.body.axes)]).ravel()
 
+    def pressure_load(self, boundary: str) -> Array:
+        """Forces ``(size,)`` of a pressure of 1 MPa on a named boundary, into the body."""
+        basis = self._facet_basis(boundary)
+        forms = [
+            LinearForm(lambda v, w, axis=axis: -w.n[axis] * v).assemble(basis)
+            for axis in range(self.dimension)
+        ]
+        return np.stack(forms, axis=1).ravel()
+
     def boundary_integral(self, boundary: str, integrand: Callable[[Array], Array]) -> float:
         """Integral over a named boundary of a function of points ``(3, ...)``."""
         basis = self._facet_basis(boundary)

@@ -159,6 +159,14 @@ def named_mesh(points: Array, cells: Indices, boundaries: dict[str, Indices]) ->
     return mesh.with_boundaries(named)
 
 
+def meet_node_to_node(body_1: Body, body_2: Body, boundary: str) -> bool:
+    """Whether the vertices of the boundary of that name on both bodies lie on each other."""
+    points_1, points_2 = (b.points[b.vertices(boundary)] for b in (body_1, body_2))
+    distance, _ = cKDTree(points_1).query(points_2)
+    size = np.ptp(points_2, axis=0).max()
+    return len(points_1) == len(points_2) and bool(distance.max() <= MATCHING_TOLERANCE * size)
+
+
 def matched_interface(
     name: str, body_1: Body, body_2: Body, boundary: str, frame: Frame
 ) -> Interface:

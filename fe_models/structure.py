@@ -108,10 +108,16 @@ class Structure:
         gap: Array,
         friction: float,
         after: CycleSolution | None = None,
+        preload: Array | None = None,
     ) -> CycleSolution:
-        """Solve one closed cycle: the second from rest, or the one that follows ``after``."""
+        """Solve one closed cycle of ``amplitudes`` ``(t, cases)``.
+
+        The second from rest and ``preload`` ``(s, cases)``, which is passed once; or the one that
+        follows ``after``.
+        """
         if after is None:
-            first = list(joint.march(amplitudes, gap))
+            once = amplitudes[:0] if preload is None else preload
+            first = list(joint.march(np.concatenate([once, amplitudes]), gap))[len(once) :]
             displacement, guess = first[-1].displacement, [s.state for s in first]
         else:
             first = []

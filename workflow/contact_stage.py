@@ -100,6 +100,11 @@ class ContactStage:
         return self.face.name
 
     @property
+    def remedy(self) -> str:
+        """What to do where the contact reaches the border of the grid."""
+        return self._contact_face.remedy
+
+    @property
     def coarse_grid(self) -> Grid:
         """A grid with as many cells as the face has nodes."""
         return self._covering(self._contact_face.coarse)

@@ -35,6 +35,10 @@ class DovetailModel:
         return self.dovetail, case.structure.dimension, case.mesh, case.materials, pull
 
     @property
+    def preload(self) -> Array:
+        return self.amplitudes[:0]
+
+    @property
     def amplitudes(self) -> Array:
         return self._mission.amplitudes()
 
@@ -52,7 +56,8 @@ class DovetailModel:
         side = SIDES[interface.name]
         gap = partial(self.dovetail.flank_gap, side=side)
         nodes = self._case.mesh.flank_nodes
-        return ContactFace(interface, self.dovetail.flank_size(side), gap, nodes)
+        widen = "widen structure.edge_width or structure.end_width"
+        return ContactFace(interface, self.dovetail.flank_size(side), gap, nodes, widen)
 
     def warn(self, reporter: Reporter) -> None:
         """Self-locking joints."""

@@ -15,13 +15,15 @@ class ContactFace:
     """A nominal contact face and the gap of the unloaded, unworn bodies over it.
 
     ``size`` (x, y) [mm] is what the contact grid covers, ``gap`` gives the distance [mm] at x and y
-    of the face, and ``coarse`` as many cells as the face has nodes.
+    of the face, and ``coarse`` as many cells as the face has nodes. ``remedy`` is what to do where
+    the contact reaches the end of the face.
     """
 
     face: Face
     size: tuple[float, float]
     gap: Callable[[Array, Array], Array]
     coarse: tuple[int, int]
+    remedy: str = "make the face larger or round its edges"
 
 
 class FaceLoads(Protocol):

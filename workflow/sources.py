@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from workflow.case import DovetailCase, WearCase
+from workflow.case import DovetailCase, MeshCase, WearCase
 from workflow.dovetail_model import DovetailModel
 from workflow.load_source import LoadSource
+from workflow.mesh_model import MeshModel
 from workflow.structure_stage import StructureStage
 
 
 def load_source(case: WearCase) -> LoadSource:
     """Where the loads of the case's contacts come from."""
-    assert isinstance(case, DovetailCase)
-    return StructureStage(DovetailModel(case), case.mesh.order)
+    if isinstance(case, DovetailCase):
+        return StructureStage(DovetailModel(case), case.mesh.order)
+    assert isinstance(case, MeshCase)
+    return StructureStage(MeshModel(case), case.structure.order)

@@ -23,11 +23,14 @@ class StructureModel(Protocol):
     """A structure as a case describes it.
 
     ``key`` is everything that its condensed joint depends on, ``amplitudes`` ``(t, cases)`` those
-    of its load cases over a cycle, ``peak`` the increment of peak load, counted from 0.
+    of its load cases over a cycle and ``preload`` ``(s, cases)`` those before the first one;
+    ``peak`` is the increment of peak load, counted from 0.
     """
 
     @property
     def key(self) -> tuple[object, ...]: ...
+    @property
+    def preload(self) -> Array: ...
     @property
     def amplitudes(self) -> Array: ...
     @property
@@ -110,7 +113,8 @@ class StructureStage:
     def unworn_cycle(self) -> CycleSolution:
         """The closed cycle from rest with unworn faces, from the cache if it is there."""
         friction = self.model.friction
-        key = content_key(*self.model.key, self.model.amplitudes.tobytes(), friction)
+        loads = [path.tolist() for path in (self.model.preload, self.model.amplitudes)]
+        key = content_key(*self.model.key, *loads, friction)
         cycle = load_cycle(key, self.structure, friction)
         if cycle is None:
             cycle = self._cycle([np.zeros(len(i)) for i in self.mesh.interfaces], None)
@@ -128,8 +132,9 @@ class StructureStage:
         return self.worn_cycle(depths).histories
 
     def _cycle(self, depths: list[Array], after: CycleSolution | None) -> CycleSolution:
+        model = self.model
         solution = self.structure.solve_cycle(
-            self.joint, self.model.amplitudes, self._gap(depths), self.model.friction, after
+            self.joint, model.amplitudes, self._gap(depths), model.friction, after, model.preload
         )
         if not solution.converged:
             raise MethodFailed(

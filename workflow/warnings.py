@@ -76,8 +76,8 @@ def warn_of_growth(stages: list[ContactStage], state: RunState, reporter: Report
 def warn_of_border(stage: ContactStage, reporter: Reporter) -> None:
     """A contact cut off by the end of its grid."""
     reporter.warn(
-        f"{stage.name}: the contact touches the border of its grid, where it is cut off: widen "
-        "structure.edge_width or structure.end_width"
+        f"{stage.name}: the contact touches the border of its grid, where it is cut off: "
+        f"{stage.remedy}"
     )
 
 

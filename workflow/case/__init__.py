@@ -3,6 +3,7 @@
 from workflow.case.contact_case import ContactCase, LineContactCase
 from workflow.case.dovetail_case import DovetailCase
 from workflow.case.loading import load_case, parse_case
+from workflow.case.mesh_case import MeshCase
 from workflow.case.schema import Case, json_schema
 from workflow.case.template import KINDS, template
 from workflow.case.wear_case import WearCase
@@ -16,6 +17,7 @@ __all__ = [
     "ContactCase",
     "DovetailCase",
     "LineContactCase",
+    "MeshCase",
     "WearCase",
     "dump_case",
     "json_schema",

@@ -17,6 +17,7 @@ from workflow.case.contact_case import (
 from workflow.case.dovetail_case import DovetailCase
 from workflow.case.explain import lines_about
 from workflow.case.fields import shown
+from workflow.case.mesh_case import MeshCase
 from workflow.case.schema import Case
 from workflow.case.source import KeyPath, Source, dotted, read_text
 from workflow.errors import CaseError
@@ -45,7 +46,7 @@ def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
 
 
 # Wear cases by their kind of structure.
-WEAR_CASES: dict[str, type[Case]] = {"dovetail": DovetailCase}
+WEAR_CASES: dict[str, type[Case]] = {"dovetail": DovetailCase, "mesh": MeshCase}
 
 
 def _kind_of_case(source: Source) -> type[Case]:

@@ -8,8 +8,9 @@ from pydantic import TypeAdapter
 
 from workflow.case.contact_case import ContactCase, LineContactCase
 from workflow.case.dovetail_case import DovetailCase
+from workflow.case.mesh_case import MeshCase
 
-Case = DovetailCase | ContactCase | LineContactCase
+Case = DovetailCase | MeshCase | ContactCase | LineContactCase
 
 
 def json_schema() -> dict[str, Any]:

@@ -9,12 +9,14 @@ from pydantic.fields import FieldInfo
 
 from workflow.case.contact_case import ContactCase, LineContactCase
 from workflow.case.dovetail_case import DovetailCase
+from workflow.case.mesh_case import MeshCase
 from workflow.case.sections import Section, entries_of, sections_of
 from workflow.case.writing import Row, render
 
 # What `fretscale new` can write.
 KINDS: dict[str, type[Section]] = {
     "dovetail": DovetailCase,
+    "mesh": MeshCase,
     "bodies": ContactCase,
     "line": LineContactCase,
 }

@@ -40,7 +40,7 @@ HEIGHT_IN_DEPTHS = 2.0
 EXTRAPOLATION = 2.0
 # What a profile along x and one along y show.
 ALONG = "across the flank at y = 0", "along the slot at x = 0"
-# Around the flanks, how far the section shows the bodies: as a share of the flanks' distance.
+# Around the faces, how far the section shows the bodies: as a share of what the faces span.
 SECTION_MARGIN = 0.4
 
 
@@ -472,9 +472,12 @@ def _draw_sections(axis: Axes, sections: list[_Section], top: float, signed: boo
 
 def _window(file: h5py.File) -> tuple[Array, Array]:
     """Lower left and upper right corner of the view, ``(2,)`` each [mm]."""
-    _, right, top = _plane(file)
-    origins = np.array([group.attrs["origin"][[right, top]] for group in file["grid"].values()])
-    low, high = origins.min(axis=0), origins.max(axis=0)
+    shown = list(_plane(file)[1:])
+    ends = []
+    for group in file["grid"].values():
+        half = 0.5 * grid_of(group).size[0] * group.attrs["axes"][0]
+        ends += [(group.attrs["origin"] + sign * half)[shown] for sign in (-1.0, 1.0)]
+    low, high = np.min(ends, axis=0), np.max(ends, axis=0)
     margin = SECTION_MARGIN * np.max(high - low)
     return low - margin, high + margin
 
