@@ -1,21 +1,25 @@
-"""Sparse direct solves with symmetric positive definite matrices.
+"""Sparse symmetric linear systems: factorised, condensed, or solved by multigrid.
 
-MKL PARDISO (pypardiso) when it is installed, SuperLU otherwise. PARDISO is never trusted blindly:
-every solution's residual is checked and a bad one is solved again with SuperLU.
+Direct: MKL PARDISO (pypardiso) where it is installed, SuperLU otherwise. PARDISO is never trusted
+blindly: every solution's residual is checked and a bad one is solved again with SuperLU. The
+memory of a factorisation is estimated before it begins. Iterative, for a few right-hand sides of a
+system whose factors do not fit: conjugate gradients with multigrid.
 """
 
 from __future__ import annotations
 
-import ctypes
-import os
-import weakref
-from typing import Any, Protocol
+from dataclasses import dataclass
+from math import inf
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
-from scipy.sparse.linalg import splu
 
+from fe_models import superlu
+from fe_models.memory import available_bytes
+from fe_models.multigrid import MultigridSolver, softness
+from fe_models.pardiso import Kind, Pardiso, PardisoError
 from sa_solver.types import Array
 
 # A backward-stable factorisation leaves about 1e-13; anything above this is a wrong answer.
@@ -24,22 +28,38 @@ RESIDUAL_LIMIT = 1e-9
 GROWTH_LIMIT = 1e12
 # Interface unknowns condensed at once without PARDISO: enough to amortise, little memory.
 COLUMNS_AT_ONCE = 256
-
-PARDISO_SPD = 2
-PARDISO_ANALYSE_FACTORISE = 12
-
+BYTES = 8
 
 Indices = NDArray[np.int64]
 
-
-SINGULAR = (
-    "the stiffness matrix is close to singular: a body is not held, or the mesh has a degenerate "
-    "element"
-)
+SINGULAR = {
+    Kind.POSITIVE_DEFINITE: (
+        "the stiffness matrix is close to singular: a body is not held, or the mesh has a "
+        "degenerate element"
+    ),
+    Kind.INDEFINITE: (
+        "the shifted matrix is close to singular: move the shift away from the eigenvalue it hits"
+    ),
+}
 
 
 class SolverError(RuntimeError):
     """A linear system could not be solved; the message says what is likely wrong with it."""
+
+
+class FactorMemoryError(SolverError, MemoryError):
+    """A factorisation needs more memory than there is; nothing was allocated.
+
+    ``needed`` and ``available`` are in bytes.
+    """
+
+    def __init__(self, task: str, needed: float, available: float) -> None:
+        super().__init__(
+            f"{task} needs about {needed / 1e9:.2g} GB of memory, {available / 1e9:.2g} GB are "
+            "free: take a coarser mesh or fewer interface nodes; a few right-hand sides, but no "
+            "condensation, can be solved iteratively"
+        )
+        self.needed, self.available = needed, available
 
 
 class Factorisation(Protocol):
@@ -48,139 +68,188 @@ class Factorisation(Protocol):
     def __call__(self, rhs: Array) -> Array: ...
 
 
-def factorise(matrix: sp.csr_matrix) -> Factorisation:
+@dataclass(frozen=True)
+class LinearSolver:
+    """How a system with a few right-hand sides is solved.
+
+    ``kind`` "direct" factorises, "iterative" runs conjugate gradients with multigrid, "auto"
+    factorises if the factors fit into ``memory`` [bytes], by default all that is free, and
+    iterates if not. Iterations end at a residual of ``tolerance`` times the load; more than
+    ``iterations`` are an error.
+    """
+
+    kind: Literal["auto", "direct", "iterative"] = "auto"
+    memory: float | None = None
+    tolerance: float = 1e-10
+    iterations: int = 500
+
+
+DEFAULT = LinearSolver()
+
+
+def factorise(matrix: sp.csr_matrix, memory: float | None = None) -> Factorisation:
     """Factorise a sparse symmetric positive definite matrix.
 
-    Raises :class:`SolverError` if it is singular, which one random load shows.
+    ``memory`` is what it may take [bytes]; None stands for all that is free. Raises
+    :class:`FactorMemoryError` before anything large is allocated, and :class:`SolverError` if the
+    matrix is singular, which one random load shows.
     """
-    solve = _Checked(matrix, _pardiso(matrix) or _superlu(matrix))
+    return _factorised(matrix, Kind.POSITIVE_DEFINITE, memory)
+
+
+def factorise_symmetric(matrix: sp.csr_matrix, memory: float | None = None) -> Factorisation:
+    """Factorise a sparse symmetric matrix that may be indefinite, such as K - σ M.
+
+    As :func:`factorise` otherwise; it raises :class:`SolverError` if σ is an eigenvalue.
+    """
+    return _factorised(matrix, Kind.INDEFINITE, memory)
+
+
+def _factorised(matrix: sp.csr_matrix, kind: Kind, memory: float | None) -> Factorisation:
+    solve = _Checked(matrix, kind, _limit(memory))
     load = np.random.default_rng(0).standard_normal(matrix.shape[0])
     if np.abs(matrix).max() * np.abs(solve(load)).max() > GROWTH_LIMIT * np.abs(load).max():
-        raise SolverError(SINGULAR)
+        raise SolverError(SINGULAR[kind])
     return solve
 
 
+def prepare(
+    matrix: sp.csr_matrix,
+    near_nullspace: Array | None = None,
+    choice: LinearSolver = DEFAULT,
+) -> Factorisation:
+    """Solver of a sparse symmetric positive definite matrix for a few right-hand sides.
+
+    ``near_nullspace`` ``(n, k)`` are motions of little energy, for the iterative solver: those of
+    :func:`fe_models.multigrid.rigid_body_modes` if the matrix is an elastic body's. Raises
+    :class:`SolverError`, here if the matrix is singular, or when called if the iterations do not
+    converge; and :class:`FactorMemoryError` if ``choice`` is direct and does not fit.
+    """
+    if choice.kind != "iterative":
+        try:
+            return factorise(matrix, choice.memory)
+        except FactorMemoryError:
+            if choice.kind == "direct":
+                raise
+    return _Iterative(matrix, near_nullspace, choice)
+
+
 def schur_complement(
-    matrix: sp.csr_matrix, kept: Indices, inner: Indices, solve_inner: Factorisation
+    matrix: sp.csr_matrix,
+    kept: Indices,
+    inner: Indices,
+    solve_inner: Factorisation,
+    memory: float | None = None,
 ) -> Array:
     """Condense a symmetric matrix onto the unknowns ``kept``: K_cc - K_ci K_ii⁻¹ K_ic, dense.
 
     Rows and columns follow the order of ``kept``; ``inner`` are all others and ``solve_inner`` the
-    factorised K_ii, which must be positive definite, as K need not be.
+    factorised K_ii, which must be positive definite, as K need not be. Raises
+    :class:`FactorMemoryError` if it needs more than ``memory`` [bytes], by default all that is
+    free: no iteration replaces it.
     """
-    condensed = _pardiso_schur(matrix, kept)
+    limit = _limit(memory)
+    condensed = _pardiso_schur(matrix, kept, limit)
     if condensed is None or not _is_schur(matrix, kept, inner, solve_inner, condensed):
-        condensed = _schur_by_columns(matrix, kept, inner, solve_inner)
+        condensed = _schur_by_columns(matrix, kept, inner, solve_inner, limit)
     return condensed
 
 
-def _load_pardiso() -> Any | None:
-    try:
-        import pypardiso
-    except ImportError:
-        return None
-    # Every solver object would search the whole environment for the library again.
-    os.environ.setdefault("PYPARDISO_MKL_RT", pypardiso.ps.libmkl._name)
-    return pypardiso
+class _Iterative:
+    """Conjugate gradients whose end is looked at."""
+
+    def __init__(
+        self, matrix: sp.csr_matrix, near_nullspace: Array | None, choice: LinearSolver
+    ) -> None:
+        soft = np.ones((matrix.shape[0], 1)) if near_nullspace is None else near_nullspace
+        if not softness(matrix, soft) * GROWTH_LIMIT > 1.0:
+            raise SolverError(SINGULAR[Kind.POSITIVE_DEFINITE])
+        self._grids, self._choice = MultigridSolver(matrix, soft), choice
+
+    def __call__(self, rhs: Array) -> Array:
+        columns = rhs.reshape(len(rhs), -1).T
+        return np.stack([self._column(column) for column in columns], axis=1).reshape(rhs.shape)
+
+    def _column(self, rhs: Array) -> Array:
+        found = self._grids.solve(rhs, self._choice.tolerance, self._choice.iterations)
+        if not found.converged:
+            raise SolverError(
+                f"conjugate gradients did not converge: residual {found.residual:.1e} of the load "
+                f"after {found.iterations} iterations; factorise, allow more iterations, or see "
+                "that all bodies are held and no element is degenerate"
+            )
+        return found.solution
+
+
+def _limit(memory: float | None) -> float:
+    """The memory allowed; no limit where the system does not tell."""
+    found = available_bytes() if memory is None else memory
+    return inf if found is None else found
 
 
 class _Checked:
     """Solutions whose residual has been looked at."""
 
-    def __init__(self, matrix: sp.csr_matrix, solve: Any) -> None:
-        self._matrix = matrix
-        self._solve = solve
+    def __init__(self, matrix: sp.csr_matrix, kind: Kind, limit: float) -> None:
+        self._matrix, self._kind, self._limit = matrix, kind, limit
+        self._largest = np.abs(matrix).max()
+        self._solve = _pardiso(matrix, kind, limit) or _superlu(matrix, kind, limit)
 
     def __call__(self, rhs: Array) -> Array:
-        solution = self._solve(rhs)
+        try:
+            solution = self._solve(rhs)
+        except PardisoError:
+            solution = np.full(rhs.shape, np.nan)
         if not self._is_good(rhs, solution):
-            self._solve = _superlu(self._matrix)
+            self._solve = None  # gives its memory back
+            self._solve = _superlu(self._matrix, self._kind, self._limit)
             solution = self._solve(rhs)
             if not self._is_good(rhs, solution):
-                raise SolverError(SINGULAR)
+                raise SolverError(SINGULAR[self._kind])
         return solution
 
     def _is_good(self, rhs: Array, solution: Array) -> bool:
-        """Whether the residual is that of rounding; NaN is not."""
-        scale = np.abs(self._matrix).max() * np.abs(solution).max(initial=0.0)
-        error = np.abs(self._matrix @ solution - rhs).max(initial=0.0)
-        return bool(error <= RESIDUAL_LIMIT * max(scale, np.abs(rhs).max(initial=0.0)))
+        """Whether the residual of every column is that of rounding; NaN is not."""
+        scale = self._largest * np.abs(solution).max(axis=0, initial=0.0)
+        error = np.abs(self._matrix @ solution - rhs).max(axis=0, initial=0.0)
+        load = np.abs(rhs).max(axis=0, initial=0.0)
+        return bool(np.all(error <= RESIDUAL_LIMIT * np.maximum(scale, load)))
 
 
-def _superlu(matrix: sp.csr_matrix) -> Any:
-    options = {"SymmetricMode": True}
+def _superlu(matrix: sp.csr_matrix, kind: Kind, limit: float) -> Any:
+    _require(superlu.factor_bytes(matrix), limit, f"factorising {matrix.shape[0]} unknowns")
     try:
-        factors = splu(
-            matrix.tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0, options=options
-        )
+        return superlu.factors(matrix, kind is Kind.POSITIVE_DEFINITE).solve
     except RuntimeError as error:
-        raise SolverError(SINGULAR) from error
-    return factors.solve
+        raise SolverError(SINGULAR[kind]) from error
 
 
-class _Pardiso:
-    """A factorisation of PARDISO's; its memory is given back with the object."""
-
-    def __init__(self, pypardiso: Any, upper: sp.csr_matrix) -> None:
-        self._upper = upper
-        self._solver = pypardiso.PyPardisoSolver(mtype=PARDISO_SPD)
-        # Unlike __del__ this also comes in time when the interpreter ends.
-        weakref.finalize(self, self._solver.free_memory, everything=True)
-        self._solver.factorize(upper)
-
-    def __call__(self, rhs: Array) -> Array:
-        return self._solver.solve(self._upper, np.asfortranarray(rhs)).reshape(rhs.shape)
-
-
-def _pardiso(matrix: sp.csr_matrix) -> _Pardiso | None:
-    pypardiso = _load_pardiso()
-    if pypardiso is None:
-        return None
+def _pardiso(matrix: sp.csr_matrix, kind: Kind, limit: float) -> Pardiso | None:
+    """PARDISO's factors; None where it is not installed, or refuses the matrix."""
     try:
-        return _Pardiso(pypardiso, sp.triu(matrix, format="csr"))
-    except (pypardiso.pardiso_wrapper.PyPardisoError, ValueError):
-        # A matrix that is not positive definite, or has an empty row.
+        analysed = Pardiso(matrix, kind)
+        _require(analysed.factor_bytes, limit, f"factorising {matrix.shape[0]} unknowns")
+        analysed.factorise()
+    except PardisoError:
+        return None
+    return analysed
+
+
+def _pardiso_schur(matrix: sp.csr_matrix, kept: Indices, limit: float) -> Array | None:
+    """PARDISO's own Schur complement; None where it is not installed, or fails."""
+    try:
+        analysed = Pardiso(matrix, Kind.POSITIVE_DEFINITE, kept)
+        # Its result and the same in the order asked for.
+        needed = analysed.factor_bytes + 2 * BYTES * len(kept) ** 2
+        _require(needed, limit, f"condensing {matrix.shape[0]} unknowns onto {len(kept)}")
+        return analysed.schur()
+    except PardisoError:
         return None
 
 
-def _pardiso_schur(matrix: sp.csr_matrix, kept: Indices) -> Array | None:
-    """PARDISO's own Schur complement (iparm 36); None where PARDISO is not installed or fails."""
-    pypardiso = _load_pardiso()
-    if pypardiso is None:
-        return None
-    upper = sp.triu(matrix, format="csr")
-    upper.sort_indices()
-    solver = pypardiso.PyPardisoSolver(mtype=PARDISO_SPD)
-    for parameter, value in ((1, 1), (2, 2), (36, 1)):
-        solver.set_iparm(parameter, value)
-    size = matrix.shape[0]
-    marked = np.zeros(size, np.int32)
-    marked[kept] = 1
-    condensed = np.zeros((len(kept), len(kept)))
-    pointers, columns = ((part + 1).astype(np.int32) for part in (upper.indptr, upper.indices))
-    unused, error = np.zeros(size), ctypes.c_int32(0)
-
-    def integer(value: int) -> Any:
-        return ctypes.byref(ctypes.c_int32(value))
-
-    def address(array: NDArray[Any]) -> Any:
-        return array.ctypes.data_as(ctypes.c_void_p)
-
-    # pypardiso wraps the routine without argument types: every argument is passed by address.
-    routine = solver._mkl_pardiso
-    routine.argtypes = None
-    routine(
-        address(solver.pt), integer(1), integer(1), integer(PARDISO_SPD),
-        integer(PARDISO_ANALYSE_FACTORISE), integer(size), address(upper.data), address(pointers),
-        address(columns), address(marked), integer(1), address(solver.iparm), integer(0),
-        address(unused), address(condensed), ctypes.byref(error),
-    )  # fmt: skip
-    solver.free_memory(everything=True)
-    if error.value != 0:
-        return None
-    # PARDISO orders the marked unknowns by their number, not as they were given.
-    place = np.argsort(np.argsort(kept))
-    return condensed[np.ix_(place, place)]
+def _require(needed: float, limit: float, task: str) -> None:
+    if needed > limit:
+        raise FactorMemoryError(task, needed, limit)
 
 
 def _is_schur(
@@ -194,8 +263,11 @@ def _is_schur(
 
 
 def _schur_by_columns(
-    matrix: sp.csr_matrix, kept: Indices, inner: Indices, solve: Factorisation
+    matrix: sp.csr_matrix, kept: Indices, inner: Indices, solve: Factorisation, limit: float
 ) -> Array:
+    # The result and its symmetric part; right-hand sides and solutions of one block.
+    dense = 2 * len(kept) ** 2 + 3 * len(inner) * min(COLUMNS_AT_ONCE, len(kept))
+    _require(BYTES * dense, limit, f"condensing {matrix.shape[0]} unknowns onto {len(kept)}")
     coupling = matrix[inner][:, kept].tocsc()
     condensed = matrix[kept][:, kept].toarray()
     for start in range(0, len(kept), COLUMNS_AT_ONCE):

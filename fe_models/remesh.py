@@ -10,7 +10,7 @@ from skfem import Basis, BilinearForm, MeshTet, MeshTri
 from skfem.helpers import dot, grad
 
 from fe_models.elasticity import ELEMENTS
-from fe_models.linear_solver import factorise
+from fe_models.linear_solver import prepare
 from fe_models.mesh import Body, Interface, MeshError, StructureMesh
 from sa_solver.types import Array
 
@@ -65,7 +65,7 @@ def _moved(body: Body, prescribed: Array) -> Body:
     )
     displacement = prescribed.copy()
     load = -(laplace[inner][:, boundary] @ prescribed[boundary])
-    displacement[inner] = factorise(laplace[inner][:, inner].tocsr())(load)
+    displacement[inner] = prepare(laplace[inner][:, inner].tocsr())(load)
     moved = replace(mesh, doflocs=mesh.p + displacement.T)
     if np.min(element_volumes(moved) / element_volumes(mesh)) < SMALLEST_VOLUME_SHARE:
         raise MeshError(

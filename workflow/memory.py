@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import os
 from math import prod
-from pathlib import Path
 
-from workflow.case import Case, DovetailCase, LineContactCase, WearCase
+from fe_models.memory import available_bytes as _available_bytes
+from workflow.case import Case, DovetailCase, LineContactCase, SpecimensCase, WearCase
 from workflow.errors import OutOfMemory
 
 # Dense interface matrices alive at once while the joint is condensed.
@@ -24,6 +23,12 @@ BYTES = 8
 
 def required_bytes(case: WearCase | Case, structure_nodes: int = 0) -> float:
     """Upper estimate of the memory a run takes, with the nodes of both bodies once known."""
+    if isinstance(case, SpecimensCase):
+        pad = 3 * (case.mesh.pad_elements + 1) ** 2
+        factors = FACTOR_BYTES * (structure_nodes / FACTOR_NODES) ** FACTOR_POWER
+        fields = prod(case.contact.grid) * SPECTRA + DENSE_MATRICES * pad**2
+        shapes = 2 * pad * structure_nodes
+        return BYTES * (fields + shapes) + factors + REST
     if not isinstance(case, WearCase):
         cells = case.contact.grid if isinstance(case, LineContactCase) else prod(case.contact.grid)
         increments = len(case.load_path.table())
@@ -40,26 +45,16 @@ def check_memory(case: WearCase | Case, structure_nodes: int = 0) -> None:
     """Raise :class:`OutOfMemory` if the machine has less than the case needs."""
     required, available = required_bytes(case, structure_nodes), _available_bytes()
     if available is not None and required > available:
-        remedy = (
-            "lower mesh.flank_nodes, mesh.order or contact.grid, or raise mesh.size"
-            if isinstance(case, WearCase)
-            else "lower contact.grid or the increments of load_path"
-        )
         raise OutOfMemory(
             f"this case needs about {required / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB "
-            f"are free: {remedy}"
+            f"are free: {_remedy(case)}"
         )
 
 
-def _available_bytes() -> float | None:
-    """Free memory, reclaimable caches included; None where the system does not tell."""
-    try:
-        with Path("/proc/meminfo").open(encoding="ascii") as file:
-            lines = dict(line.split(":") for line in file)
-        return 1024.0 * float(lines["MemAvailable"].split()[0])
-    except (OSError, KeyError):
-        pass
-    try:
-        return float(os.sysconf("SC_PHYS_PAGES") * os.sysconf("SC_PAGE_SIZE"))
-    except (ValueError, AttributeError):
-        return None
+def _remedy(case: WearCase | Case) -> str:
+    """What makes a case smaller."""
+    if isinstance(case, SpecimensCase):
+        return "lower mesh.pad_elements, mesh.order or contact.grid, or raise mesh.size"
+    if isinstance(case, WearCase):
+        return "lower mesh.flank_nodes, mesh.order or contact.grid, or raise mesh.size"
+    return "lower contact.grid or the increments of load_path"

@@ -1,11 +1,26 @@
-"""Sparse solves and Schur complements, with PARDISO, without it, and when it errs."""
+"""Sparse solves and Schur complements, with PARDISO, without it, when it errs, and iterated."""
+
+import gc
+import os
+from pathlib import Path
 
 import numpy as np
 import pytest
 import scipy.sparse as sp
 
-from fe_models import linear_solver
-from fe_models.linear_solver import SolverError, factorise, schur_complement
+from fe_models import linear_solver, memory, pardiso, superlu
+from fe_models.constraints import Constraints
+from fe_models.linear_solver import (
+    FactorMemoryError,
+    LinearSolver,
+    SolverError,
+    factorise,
+    factorise_symmetric,
+    prepare,
+    schur_complement,
+)
+from fe_models.multigrid import MultigridSolver, rigid_body_modes, softness
+from fe_models.pardiso import Kind, Pardiso
 
 SIZE = 120
 
@@ -32,10 +47,26 @@ def split(rng):
 @pytest.fixture(params=["pardiso", "superlu"])
 def solver(request, monkeypatch):
     if request.param == "superlu":
-        monkeypatch.setattr(linear_solver, "_load_pardiso", lambda: None)
-    elif linear_solver._load_pardiso() is None:
-        pytest.skip("pypardiso is not installed here")
+        monkeypatch.setattr(pardiso, "library", lambda: None)
+    else:
+        need_pardiso()
     return request.param
+
+
+def need_pardiso():
+    if pardiso.library() is None:
+        pytest.skip("pypardiso is not installed here")
+
+
+def held_box(box, titanium, counts, size):
+    """Stiffness and rigid motions of a box clamped at z0, and a load."""
+    elastic = box(counts, (0, 0, 0), size, titanium, 1)
+    constraints = Constraints(len(elastic.nodes))
+    constraints.hold(elastic.boundary_nodes("z0"))
+    t = constraints.transformation()
+    matrix = (t.T @ elastic.stiffness @ t).tocsr()
+    load = np.random.default_rng(0).standard_normal(matrix.shape[0])
+    return matrix, rigid_body_modes(elastic.nodes, t), load
 
 
 def dense_schur(matrix, kept, inner):
@@ -79,8 +110,7 @@ def test_schur_complement_of_a_singular_matrix(rng, split, solver):
 
 
 def test_pardiso_does_the_work_where_it_is_installed(matrix, split, monkeypatch):
-    if linear_solver._load_pardiso() is None:
-        pytest.skip("pypardiso is not installed here")
+    need_pardiso()
 
     def never(*_):
         raise AssertionError("fell back")
@@ -95,9 +125,35 @@ def test_wrong_solution_of_pardiso_is_caught(matrix, rng, monkeypatch, wrong):
     rhs = rng.standard_normal(SIZE)
     exact = np.linalg.solve(matrix.toarray(), rhs)
     monkeypatch.setattr(
-        linear_solver, "_pardiso", lambda _: lambda b: wrong * np.linalg.solve(matrix.toarray(), b)
+        Pardiso, "__call__", lambda _, b: wrong * np.linalg.solve(matrix.toarray(), b)
     )
+    need_pardiso()
     np.testing.assert_allclose(factorise(matrix)(rhs), exact, rtol=1e-9)
+    np.testing.assert_allclose(factorise_symmetric(matrix)(rhs), exact, rtol=1e-9)
+
+
+def test_pardiso_that_fails_while_solving_is_replaced(matrix, rng, monkeypatch):
+    need_pardiso()
+
+    def fail(*_):
+        raise pardiso.PardisoError
+
+    monkeypatch.setattr(Pardiso, "__call__", fail)
+    rhs = rng.standard_normal(SIZE)
+    exact = np.linalg.solve(matrix.toarray(), rhs)
+    np.testing.assert_allclose(factorise(matrix)(rhs), exact, rtol=1e-9)
+
+
+def test_a_wrong_column_is_caught_beside_a_large_one(matrix, rng, monkeypatch):
+    """The residual of each right-hand side is judged by that column alone."""
+    need_pardiso()
+    rhs = rng.standard_normal((SIZE, 2)) * [1.0, 1e12]
+    exact = np.linalg.solve(matrix.toarray(), rhs)
+    monkeypatch.setattr(
+        Pardiso, "__call__", lambda _, b: np.linalg.solve(matrix.toarray(), b) + 1e-3
+    )
+    solution = factorise(matrix)(rhs)
+    np.testing.assert_allclose(solution[:, 0], exact[:, 0], rtol=1e-9)
 
 
 @pytest.mark.parametrize("wrong", [1.0 + 1e-6, 0.0, np.nan])
@@ -128,3 +184,221 @@ def test_body_that_is_not_held(box, titanium, solver):
 def test_singular_matrix(rows, solver):
     with pytest.raises(SolverError, match="close to singular"):
         factorise(sp.csr_matrix(np.array(rows)))
+
+
+@pytest.mark.parametrize("columns", [None, 3])
+def test_shifted_matrix(matrix, rng, solver, columns):
+    """K - σ M between two eigenvalues, as shift-invert wants it."""
+    mass = sp.diags(0.5 + rng.random(SIZE), format="csr")
+    shift = 2.0
+    shifted = (matrix - shift * mass).tocsr()
+    values = np.linalg.eigvalsh(shifted.toarray())
+    assert values[0] < 0.0 < values[-1]
+    rhs = rng.standard_normal((SIZE,) if columns is None else (SIZE, columns))
+    exact = np.linalg.solve(shifted.toarray(), rhs)
+    np.testing.assert_allclose(
+        factorise_symmetric(shifted)(rhs), exact, rtol=1e-8, atol=1e-9 * np.abs(exact).max()
+    )
+
+
+def test_shifted_matrix_with_no_stored_diagonal(solver):
+    """PARDISO wants every diagonal entry, zeros too; pivots off the diagonal are needed here."""
+    matrix = sp.csr_matrix(np.array([[0.0, 2.0], [2.0, 0.0]]))
+    np.testing.assert_allclose(factorise_symmetric(matrix)(np.array([2.0, 4.0])), [2.0, 1.0])
+
+
+def test_shift_on_an_eigenvalue(matrix, solver):
+    value = np.linalg.eigvalsh(matrix.toarray())[SIZE // 2]
+    with pytest.raises(SolverError, match="move the shift"):
+        factorise_symmetric((matrix - value * sp.eye(SIZE)).tocsr())
+
+
+def test_too_little_memory_is_said_before_factorising(box, titanium, solver, monkeypatch):
+    matrix, _, _ = held_box(box, titanium, (4, 4, 4), (1, 1, 1))
+
+    def never(*_):
+        raise AssertionError("factorised")
+
+    monkeypatch.setattr(Pardiso, "factorise", never)
+    monkeypatch.setattr(Pardiso, "schur", never)
+    monkeypatch.setattr(superlu, "factors", never)
+    for action in (factorise, factorise_symmetric):
+        with pytest.raises(FactorMemoryError, match="coarser mesh") as caught:
+            action(matrix, memory=1e4)
+        assert caught.value.available == 1e4
+        assert caught.value.needed > 1e4
+    with pytest.raises(MemoryError, match="onto 30"):
+        schur_complement(matrix, np.arange(30), np.arange(30, 300), lambda b: b, memory=1e4)
+
+
+def test_fallback_that_does_not_fit_is_refused_as_well(matrix, rng, monkeypatch):
+    """PARDISO errs, and SuperLU would need more than is allowed."""
+    need_pardiso()
+    solve = factorise(matrix, memory=1e8)
+    monkeypatch.setattr(Pardiso, "__call__", lambda _, b: 0.0 * b)
+    monkeypatch.setattr(superlu, "factor_bytes", lambda _: 2e8)
+    with pytest.raises(FactorMemoryError):
+        solve(rng.standard_normal(SIZE))
+
+
+def test_free_memory_is_what_a_factorisation_may_take(matrix, monkeypatch):
+    monkeypatch.setattr(linear_solver, "available_bytes", lambda: 10.0)
+    with pytest.raises(FactorMemoryError):
+        factorise(matrix)
+    monkeypatch.setattr(linear_solver, "available_bytes", lambda: None)
+    factorise(matrix)
+
+
+def test_a_container_leaves_less_than_its_machine(monkeypatch, tmp_path):
+    table = tmp_path / "meminfo"
+    table.write_text("MemTotal: 2000 kB\nMemAvailable: 1000 kB\n", encoding="ascii")
+    monkeypatch.setattr(memory, "MEMORY_TABLE", table)
+    monkeypatch.setattr(memory, "CONTAINER", tmp_path)
+    assert memory.available_bytes() == 1000 * 1024
+    (tmp_path / "memory.max").write_text("max\n", encoding="ascii")
+    (tmp_path / "memory.current").write_text("500000\n", encoding="ascii")
+    (tmp_path / "memory.stat").write_text("anon 1\ninactive_file 100000\n", encoding="ascii")
+    assert memory.available_bytes() == 1000 * 1024
+    (tmp_path / "memory.max").write_text("800000\n", encoding="ascii")
+    assert memory.available_bytes() == 400000
+
+
+@pytest.mark.slow
+def test_factors_on_two_threads_are_the_same_bit_for_bit(box, titanium):
+    need_pardiso()
+    mkl = pardiso.library()
+    matrix, _, load = held_box(box, titanium, (20, 20, 20), (1, 1, 1))
+    threads = mkl.MKL_Get_Max_Threads()
+    mkl.MKL_Set_Num_Threads(2)
+    try:
+        solutions = {factorise(matrix)(load).tobytes() for _ in range(4)}
+    finally:
+        mkl.MKL_Set_Num_Threads(threads)
+    assert len(solutions) == 1
+
+
+def test_memory_that_pardiso_announces(box, titanium):
+    """Against what the process grows by; MKL keeps some of what earlier tests gave back."""
+    need_pardiso()
+    matrix, _, _ = held_box(box, titanium, (18, 18, 18), (1, 1, 1))
+    before = resident_bytes()
+    analysed = Pardiso(matrix, Kind.POSITIVE_DEFINITE)
+    announced = analysed.factor_bytes
+    analysed.factorise()
+    assert resident_bytes() - before == pytest.approx(announced, rel=0.25)
+
+
+def resident_bytes():
+    """Memory of this process that is really there."""
+    gc.collect()
+    try:
+        pages = int(Path("/proc/self/statm").read_text(encoding="ascii").split()[1])
+    except OSError:
+        pytest.skip("the system does not tell")
+    return pages * os.sysconf("SC_PAGE_SIZE")
+
+
+@pytest.mark.parametrize("counts", [(8, 8, 8), (4, 4, 40), (2, 16, 16)])
+def test_memory_estimated_for_superlu(box, titanium, counts):
+    """Cube, bar and plate, whose factors differ tenfold: within half to three times."""
+    matrix, _, _ = held_box(box, titanium, counts, counts)
+    actual = superlu.BYTES_PER_ENTRY * superlu.factors(matrix, positive=True).nnz
+    assert 0.5 < superlu.factor_bytes(matrix) / actual < 3.0
+
+
+def test_envelope_of_a_band_is_exact():
+    """A tridiagonal matrix fills nothing: two entries per row and factor."""
+    matrix = sp.diags([-1.0, 2.0, -1.0], [-1, 0, 1], shape=(SIZE, SIZE), format="csr")
+    order = np.random.default_rng(0).permutation(SIZE)
+    entries = superlu.factor_bytes(matrix[order][:, order].tocsr()) / superlu.BYTES_PER_ENTRY
+    assert entries == 2 * (2 * SIZE - 1)
+
+
+def test_iterations_hardly_grow_with_rigid_motions(box, titanium):
+    """A slender box, three meshes: constant within three, four to eight times as many without."""
+    with_motions, without = [], []
+    for cells in (4, 6, 9):
+        matrix, modes, load = held_box(box, titanium, (cells, cells, 3 * cells), (1, 1, 3))
+        for counts, soft in ((with_motions, modes), (without, None)):
+            found = MultigridSolver(matrix, soft).solve(load, 1e-10, 500)
+            assert found.converged
+            assert found.residual < 1e-9
+            counts.append(found.iterations)
+    assert max(with_motions) <= 20
+    assert max(with_motions) - min(with_motions) <= 3
+    assert without[-1] > 1.5 * without[0]
+    assert without[-1] > 4 * with_motions[-1]
+
+
+@pytest.mark.parametrize("columns", [None, 2])
+def test_iterated_solution_is_the_direct_one(box, titanium, columns):
+    matrix, modes, load = held_box(box, titanium, (4, 4, 8), (1, 1, 2))
+    rhs = load if columns is None else np.stack([load, load[::-1]], axis=1)
+    exact = factorise(matrix)(rhs)
+    solution = prepare(matrix, modes, LinearSolver("iterative", tolerance=1e-12))(rhs)
+    assert solution.shape == rhs.shape
+    np.testing.assert_allclose(solution, exact, atol=1e-9 * np.abs(exact).max())
+
+
+def test_iterations_are_the_same_bit_for_bit(box, titanium):
+    matrix, modes, load = held_box(box, titanium, (3, 3, 6), (1, 1, 2))
+    np.random.seed(3)  # noqa: NPY002
+    expected = np.random.random()  # noqa: NPY002
+    np.random.seed(3)  # noqa: NPY002
+    first = MultigridSolver(matrix, modes).solve(load, 1e-10, 100).solution
+    assert np.random.random() == expected  # noqa: NPY002
+    second = MultigridSolver(matrix, modes).solve(load, 1e-10, 100).solution
+    np.testing.assert_array_equal(first, second)
+
+
+def test_auto_iterates_when_factors_do_not_fit(box, titanium, monkeypatch):
+    matrix, modes, load = held_box(box, titanium, (3, 3, 6), (1, 1, 2))
+    exact = np.linalg.solve(matrix.toarray(), load)
+    solution = prepare(matrix, modes, LinearSolver(memory=1e4))(load)
+    np.testing.assert_allclose(solution, exact, atol=1e-7 * np.abs(exact).max())
+    with pytest.raises(FactorMemoryError):
+        prepare(matrix, modes, LinearSolver("direct", memory=1e4))
+
+    def never(*_):
+        raise AssertionError("iterated")
+
+    monkeypatch.setattr(linear_solver, "MultigridSolver", never)
+    prepare(matrix, modes)(load)
+
+
+def test_iterations_that_do_not_converge_are_an_error(box, titanium):
+    matrix, modes, load = held_box(box, titanium, (3, 3, 6), (1, 1, 2))
+    solve = prepare(matrix, modes, LinearSolver("iterative", iterations=2))
+    with pytest.raises(SolverError, match="after 2 iterations"):
+        solve(load)
+
+
+def test_nothing_loads_the_body(box, titanium):
+    matrix, modes, load = held_box(box, titanium, (2, 2, 2), (1, 1, 1))
+    solution = prepare(matrix, modes, LinearSolver("iterative"))(0.0 * load)
+    np.testing.assert_array_equal(solution, 0.0)
+
+
+@pytest.mark.parametrize("kind", ["auto", "direct", "iterative"])
+def test_floating_body_whichever_way_it_is_solved(box, titanium, kind):
+    elastic = box((2, 2, 2), (0, 0, 0), (1, 1, 1), titanium, 1)
+    with pytest.raises(SolverError, match="a body is not held"):
+        prepare(elastic.stiffness, rigid_body_modes(elastic.nodes), LinearSolver(kind))
+
+
+def test_rigid_motions_take_no_energy_and_follow_the_constraints(box, titanium):
+    elastic = box((2, 2, 3), (5, 6, 7), (8, 7, 9), titanium, 1)
+    modes = rigid_body_modes(elastic.nodes)
+    scale = np.abs(elastic.stiffness).max()
+    assert np.abs(elastic.stiffness @ modes).max() < 1e-12 * scale
+    assert np.linalg.matrix_rank(modes) == 6
+    assert abs(softness(elastic.stiffness, modes)) < 1e-14
+    # On a slide with a slanted normal the motions along it remain, exactly.
+    constraints = Constraints(len(elastic.nodes))
+    slanted = np.array([0.6, 0.0, 0.8])
+    nodes = elastic.boundary_nodes("z0")
+    constraints.slide(nodes, np.tile(slanted, (len(nodes), 1)))
+    t = constraints.transformation()
+    along = modes[:, :3] @ np.array([0.8, 0.0, -0.6])
+    reduced = rigid_body_modes(elastic.nodes, t)
+    np.testing.assert_allclose(t @ (reduced[:, :3] @ [0.8, 0.0, -0.6]), along, atol=1e-10)

@@ -1,0 +1,167 @@
+"""MKL PARDISO for sparse symmetric matrices: analysis, factors, solutions, Schur complement.
+
+pypardiso finds the library. Its own solver compares the whole matrix before every solve, and gives
+neither the memory PARDISO announces nor the Schur complement, so the routine is called here.
+Source: Schenk and Gärtner 2004, doi:10.1016/j.future.2003.07.011; oneMKL's reference, "pardiso".
+"""
+
+from __future__ import annotations
+
+import ctypes
+import weakref
+from enum import IntEnum
+from functools import cache
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from sa_solver.types import Array
+
+ANALYSE, FACTORISE, SOLVE, RELEASE = 11, 22, 33, -1
+# Places in PARDISO's table of parameters, counted from zero; the last three are answers.
+OWN_VALUES, ORDERING, ZERO_BASED, SCHUR = 0, 1, 34, 35
+ANALYSIS_PEAK, ANALYSIS_KEPT, FACTORS = 14, 15, 16
+NESTED_DISSECTION = 2
+# MKL's mode of reproducible results with its fastest kernels: two solutions with two threads
+# differ in the last bits otherwise.
+REPRODUCIBLE = 2
+KILOBYTE = 1024
+OUT_OF_MEMORY = -2
+
+
+class Kind(IntEnum):
+    """PARDISO's types of matrix that are used here."""
+
+    POSITIVE_DEFINITE = 2
+    INDEFINITE = -2
+
+
+class PardisoError(RuntimeError):
+    """PARDISO is not installed or refuses a matrix: not of its kind, an empty row, no memory."""
+
+
+@cache
+def library() -> Any | None:
+    """The loaded MKL, or None where it is not installed."""
+    try:
+        import pypardiso
+    except ImportError:
+        return None
+    mkl = pypardiso.ps.libmkl
+    mkl.MKL_CBWR_Set(REPRODUCIBLE)
+    return mkl
+
+
+class Pardiso:
+    """A symmetric matrix analysed by PARDISO; its memory is given back with the object.
+
+    After :meth:`factorise` call it with right-hand sides. With ``kept`` unknowns, their Schur
+    complement is what :meth:`schur` gives, and there are no factors to solve with.
+    """
+
+    def __init__(
+        self, matrix: sp.csr_matrix, kind: Kind, kept: NDArray[np.int64] | None = None
+    ) -> None:
+        mkl = library()
+        if mkl is None:
+            raise PardisoError("PARDISO is not installed")
+        if not np.diff(matrix.indptr).all():
+            raise PardisoError("the matrix has an empty row")  # PARDISO would crash
+        upper = _upper(matrix)
+        self._size = matrix.shape[0]
+        self._values = upper.data.astype(float)
+        self._pointers, self._columns = upper.indptr.astype("i4"), upper.indices.astype("i4")
+        self._marked = np.zeros(self._size, np.int32)
+        parameters = np.zeros(64, np.int32)
+        parameters[[OWN_VALUES, ORDERING, ZERO_BASED]] = 1, NESTED_DISSECTION, 1
+        if kept is not None:
+            parameters[SCHUR] = 1
+            self._marked[kept] = 1
+        self._kept, self._parameters = kept, parameters
+        # Looked up by item: the attribute is pypardiso's, with its types of arguments.
+        self._state = (mkl["pardiso"], np.zeros(64, np.int64), int(kind), parameters)
+        # Unlike __del__ this also comes in time when the interpreter ends.
+        weakref.finalize(self, _release, self._state)
+        self._call(ANALYSE)
+
+    @property
+    def factor_bytes(self) -> int:
+        """Peak memory of the numerical factorisation, known before it [bytes].
+
+        With ``kept`` unknowns the dense Schur complement is included.
+        """
+        analysis, kept, factors = (
+            KILOBYTE * int(self._parameters[place])
+            for place in (ANALYSIS_PEAK, ANALYSIS_KEPT, FACTORS)
+        )
+        return max(analysis, kept + factors)
+
+    def factorise(self) -> None:
+        """Compute the factors. Raises :class:`PardisoError`, if not positive definite say."""
+        self._call(FACTORISE)
+
+    def __call__(self, rhs: Array) -> Array:
+        """Solve for ``(n,)`` or ``(n, m)``."""
+        columns = np.asfortranarray(rhs, dtype=float).reshape(self._size, -1, order="F")
+        solution = np.zeros_like(columns)
+        self._call(SOLVE, columns, solution)
+        return np.ascontiguousarray(solution).reshape(rhs.shape)
+
+    def schur(self) -> Array:
+        """Factorise, and the Schur complement of the ``kept`` unknowns in their order, dense."""
+        assert self._kept is not None
+        condensed = np.zeros((len(self._kept),) * 2)
+        self._call(FACTORISE, np.zeros((self._size, 1)), condensed)
+        # PARDISO orders the marked unknowns by their number, not as they were given.
+        place = np.argsort(np.argsort(self._kept))
+        return condensed[np.ix_(place, place)]
+
+    def _call(self, phase: int, rhs: Array | None = None, result: Array | None = None) -> None:
+        matrix = self._values, self._pointers, self._columns, self._marked
+        _pardiso(self._state, phase, self._size, matrix, rhs, result)
+
+
+def _upper(matrix: sp.csr_matrix) -> sp.csr_matrix:
+    """Upper triangle with sorted rows and every diagonal entry stored, as PARDISO expects."""
+    upper = sp.triu(matrix, format="coo")
+    diagonal = np.arange(matrix.shape[0])
+    rows, columns = np.append(upper.row, diagonal), np.append(upper.col, diagonal)
+    values = np.append(upper.data, np.zeros(len(diagonal)))
+    full = sp.csr_matrix((values, (rows, columns)), shape=matrix.shape)
+    full.sort_indices()
+    return full
+
+
+def _pardiso(
+    state: tuple[Any, NDArray, int, NDArray],
+    phase: int,
+    size: int,
+    matrix: tuple[NDArray | None, ...],
+    rhs: Array | None = None,
+    result: Array | None = None,
+) -> None:
+    """One call of the routine, which takes every argument by its address."""
+    routine, handle, kind, parameters = state
+    error = ctypes.c_int32(0)
+    columns = 1 if rhs is None else rhs.shape[1]
+    routine(
+        _address(handle), _integer(1), _integer(1), _integer(kind), _integer(phase),
+        _integer(size), *map(_address, matrix), _integer(columns), _address(parameters),
+        _integer(0), _address(rhs), _address(result), ctypes.byref(error),
+    )  # fmt: skip
+    if error.value != 0:
+        raise PardisoError(f"PARDISO's error {error.value} in phase {phase}")
+
+
+def _release(state: tuple[Any, NDArray, int, NDArray]) -> None:
+    _pardiso(state, RELEASE, 0, (None,) * 4)
+
+
+def _integer(value: int) -> Any:
+    return ctypes.byref(ctypes.c_int32(value))
+
+
+def _address(array: NDArray | None) -> Any:
+    return None if array is None else array.ctypes.data_as(ctypes.c_void_p)

@@ -1,0 +1,47 @@
+"""SuperLU for sparse symmetric matrices: where PARDISO is not installed, or errs."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.csgraph import reverse_cuthill_mckee
+from scipy.sparse.linalg import splu
+
+# An entry of a factor with its share of the indices: 9.7 to 10.8 bytes measured.
+BYTES_PER_ENTRY = 10.3
+# The diagonal is the pivot, as the ordering for little fill wants, unless it is below this share
+# of its column; that happens in indefinite matrices alone.
+PIVOT_SHARE = {True: 0.0, False: 0.1}
+
+
+def factors(matrix: sp.csr_matrix, positive: bool) -> Any:
+    """Factors of a symmetric matrix, ``positive`` definite or not.
+
+    Raises :class:`RuntimeError` if the matrix is exactly singular.
+    """
+    return splu(
+        matrix.tocsc(),
+        permc_spec="MMD_AT_PLUS_A",
+        diag_pivot_thresh=PIVOT_SHARE[positive],
+        options={"SymmetricMode": True},
+    )
+
+
+def factor_bytes(matrix: sp.csr_matrix) -> float:
+    """Memory of the factors, from the pattern alone [bytes].
+
+    SuperLU gives no count before it factorises. What is counted here is the envelope in reverse
+    Cuthill-McKee order, which shows whether a body is slender or compact. Minimum degree leaves
+    less in it on irregular meshes and more on regular ones: the estimate was 0.5 to 3.2 times the
+    truth for 26 matrices of boxes, bars, plates and dovetails (900 to 57 000 unknowns).
+    """
+    order = reverse_cuthill_mckee(matrix, symmetric_mode=True)
+    place = np.empty(len(order), np.int64)
+    place[order] = np.arange(len(order))
+    entries = matrix.tocoo()
+    first = np.arange(len(order))
+    np.minimum.at(first, place[entries.row], place[entries.col])
+    envelope = np.sum(np.arange(len(order)) - first)
+    return BYTES_PER_ENTRY * float(2 * envelope + 2 * len(order))
