@@ -5,11 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
 
 from fe_models.constraints import Constraints
 from fe_models.elasticity import ElasticBody
 from fe_models.geometry.dovetail import Dovetail
 from fe_models.mesh import StructureMesh
+from fe_models.spin_softening import CarriedMass, spin_softening
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_frames
 from sa_solver.types import Array, Material
@@ -84,6 +86,21 @@ def dovetail_structure(
         body_1=SupportedBody(elastic_1, held, nodes_1, frames_1, loads_1),
         body_2=SupportedBody(elastic_2, guided, nodes_2, frames_2, loads_2),
     )
+
+
+def dovetail_softening(
+    structure: Structure, dovetail: Dovetail, mission: Mission
+) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Spin softening of disk and blade at peak speed, ``(size, size)`` [N/mm].
+
+    The airfoil is rigid and moves with the top of the shank.
+    """
+    disk, blade = structure.body_1.elastic, structure.body_2.elastic
+    length = dovetail.slot_length if blade.dimension == 2 else 1.0
+    centre = mission.airfoil_radius * dovetail.load_axis
+    airfoil = CarriedMass("shank_top", mission.airfoil_mass / length, centre)
+    speed = mission.rotation_speed
+    return spin_softening(disk, speed), spin_softening(blade, speed, [airfoil])
 
 
 def _blade_loads(blade: ElasticBody, dovetail: Dovetail, mission: Mission) -> Array:

@@ -73,7 +73,7 @@ class FrictionalJoint:
         found: list[Array] = []
         for increment, load in enumerate(loads):
             scale = max(float(np.linalg.norm(load)), floor)
-            starts = _starts(found, guess, loads[: increment + 1])
+            starts = _starts(found, guess, loads[: increment + 1], gap)
             problem = _Problem(self._inverse, self._rho, self._friction, load, gap, displacement)
             state = problem.solve(starts, scale)
             found.append(state.state)
@@ -151,15 +151,19 @@ class _Problem:
         )
 
 
-def _starts(found: list[Array], guess: Sequence[Array], loads: Array) -> list[Array]:
+def _starts(found: list[Array], guess: Sequence[Array], loads: Array, gap: Array) -> list[Array]:
     """Where the next increment, whose load is the last of ``loads``, may start from.
 
     The previous state; the change that the guess makes there; and the change in proportion to the
-    load, as long as that goes on in the same sense.
+    load, as long as that goes on in the same sense. The first one from rest or, where no node
+    touches, from where all do: a body that floats would be long on its way there.
     """
     increment = len(found)
     if not found:
-        return [*guess[:1], *guess[-1:], np.zeros(loads.shape[1])]
+        rest = np.zeros((len(gap), loads.shape[1] // len(gap)))
+        if gap.min() > 0.0:
+            rest[:, -1] = -gap
+        return [*guess[:1], *guess[-1:], rest.ravel()]
     starts = [found[-1]]
     if increment < len(guess):
         starts.append(guess[increment] + found[-1] - guess[increment - 1])

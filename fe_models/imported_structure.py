@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import scipy.sparse as sp
+from scipy.spatial import cKDTree
 
 from fe_models.constraints import Constraints
 from fe_models.elasticity import ElasticBody
@@ -19,6 +21,7 @@ from fe_models.mesh import (
     meet_node_to_node,
 )
 from fe_models.mortar import frame_of_faces, mortar_interface
+from fe_models.spin_softening import spin_softening
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_frames
 from sa_solver.types import Array, Material
@@ -102,20 +105,18 @@ def imported_mesh(
     The contact faces become boundaries named as their interface, whose nodes need not match.
     Raises :class:`MeshError` for names that are not in the file or faces that do not meet.
     """
-    bodies = [_body(imported, name) for name in names]
-    faces = [[pair.face_1 for pair in pairs], [pair.face_2 for pair in pairs]]
-    for number, own in enumerate(faces):
-        bodies[number] = _with_interfaces(bodies[number], own, [pair.name for pair in pairs])
-    body_1, body_2 = bodies
+    body_1, body_2 = (named_body(imported, name) for name in names)
+    own = [pair.name for pair in pairs]
+    body_1 = _with_interfaces(imported, body_1, [pair.face_1 for pair in pairs], own)
+    body_2 = _with_interfaces(imported, body_2, [pair.face_2 for pair in pairs], own)
     interfaces = []
     for pair in pairs:
-        frame, _ = frame_of_faces(body_1, pair.name, body_2, pair.name, pair.x_direction)
+        faces = (body_1, pair.face_1, body_2, pair.face_2)
+        frame, _ = frame_of_faces(*faces, pair.x_direction)
         if meet_node_to_node(body_1, body_2, pair.name):
             interfaces.append(matched_interface(pair.name, body_1, body_2, pair.name, frame))
         else:
-            interfaces.append(
-                mortar_interface(pair.name, body_1, pair.name, body_2, pair.name, frame)
-            )
+            interfaces.append(mortar_interface(pair.name, *faces, frame))
     return StructureMesh(body_1, body_2, tuple(interfaces))
 
 
@@ -129,45 +130,157 @@ def imported_structure(
 ) -> Structure:
     """Both bodies with their supports and a load case for each of the ``loads``.
 
-    Raises :class:`MeshError` for a group that neither body has, and if contact faces are supported.
+    Raises :class:`MeshError` for groups that neither body has, supports that let body 1 move as a
+    rigid body, and ones on a contact face that no plane of symmetry explains.
     """
-    groups = {group for body in (mesh.body_1, mesh.body_2) for group in _groups(imported, body)}
-    for group in [s.group for s in supports] + [b for b in map(_boundary, loads) if b]:
-        if group not in groups:
-            raise MeshError(
-                f"no boundary or node set {group} on either body; there are "
-                f"{', '.join(sorted(groups))}"
-            )
+    pair = mesh.body_1, mesh.body_2
+    for support in supports:
+        check_support(imported, pair, support)
+    for load in loads:
+        check_load(imported, pair, load)
     bodies = [
         _supported(number, mesh, imported, material, supports, loads, order)
         for number, material in enumerate(materials, start=1)
     ]
-    return Structure(mesh, *bodies)
+    structure = Structure(mesh, *bodies)
+    _check_held(structure)
+    _check_rest(structure.body_1)
+    return structure
 
 
-def _body(imported: ImportedMesh, name: str) -> Body:
+def named_body(imported: ImportedMesh, name: str) -> Body:
+    """The body of that name. Raises :class:`MeshError` if there is none."""
     if name not in imported.bodies:
-        raise MeshError(f"no body {name}; there are {', '.join(imported.bodies)}")
+        raise MeshError(f"no body {name}; allowed: {', '.join(imported.bodies)}")
     return imported.bodies[name]
 
 
-def _with_interfaces(body: Body, faces: Sequence[str], names: Sequence[str]) -> Body:
+def contact_facets(imported: ImportedMesh, body: Body, boundary: str) -> Indices:
+    """Facets of a boundary of a body. Raises :class:`MeshError` if it is not on that body."""
+    own = body.mesh.boundaries or {}
+    if boundary in own:
+        return np.asarray(own[boundary])
+    known = ", ".join(own) or "none"
+    others = [b.name for b in imported.bodies.values() if boundary in (b.mesh.boundaries or {})]
+    if others:
+        wrong = f"boundary {boundary} is on body {', '.join(others)}, not on {body.name}"
+    elif boundary in imported.points[body.name]:
+        wrong = f"{boundary} is a node set, which has no facets"
+    else:
+        wrong = f"no boundary {boundary} on body {body.name}"
+    raise MeshError(f"{wrong}; allowed: {known}")
+
+
+def check_support(imported: ImportedMesh, bodies: tuple[Body, Body], support: Support) -> None:
+    """Raise :class:`MeshError` if neither body has the group, or it cannot be held like that."""
+    boundaries, node_sets = _groups(imported, bodies)
+    group, hold = support.group, support.hold
+    if group not in boundaries | node_sets:
+        raise MeshError(
+            f"no boundary or node set {group} on {bodies[0].name} or {bodies[1].name}; allowed: "
+            f"{', '.join(sorted(boundaries | node_sets)) or 'none'}"
+        )
+    if group not in boundaries and (hold == "normal" or hold.startswith("mean_")):
+        raise MeshError(
+            f"node set {group} has no area to hold {hold}; allowed: axes such as xz, or a boundary"
+        )
+
+
+def check_load(imported: ImportedMesh, bodies: tuple[Body, Body], load: Load) -> None:
+    """Raise :class:`MeshError` if neither body has the boundary, or the plane not the direction."""
+    boundaries, node_sets = _groups(imported, bodies)
+    group = _boundary(load)
+    if group is not None and group not in boundaries:
+        wrong = (
+            f"{group} is a node set, which has no area"
+            if group in node_sets
+            else f"no boundary {group} on {bodies[0].name} or {bodies[1].name}"
+        )
+        raise MeshError(f"{wrong}; allowed: {', '.join(sorted(boundaries)) or 'none'}")
+    vector = _vector(load)
+    if vector is not None and bodies[0].mesh.dim() == 2 and vector[1] != 0.0:
+        raise MeshError("a load along y, across the plane; allowed: x and z")
+
+
+def _with_interfaces(
+    imported: ImportedMesh, body: Body, faces: Sequence[str], names: Sequence[str]
+) -> Body:
     """The body with its contact faces as boundaries of the interfaces' names as well."""
-    boundaries = body.mesh.boundaries or {}
-    for face in faces:
-        if face not in boundaries:
-            known = ", ".join(boundaries) or "none"
-            raise MeshError(f"body {body.name} has no boundary {face}; it has {known}")
-    named = {name: boundaries[face] for name, face in zip(names, faces, strict=True)}
+    pairs = zip(names, faces, strict=True)
+    named = {name: contact_facets(imported, body, face) for name, face in pairs}
     return Body(body.name, body.mesh.with_boundaries(named))
 
 
-def _groups(imported: ImportedMesh, body: Body) -> set[str]:
-    return {*body.mesh.boundaries, *imported.points[body.name]}
+def _check_held(structure: Structure) -> None:
+    """Raise unless what is held of body 2's contact faces is held of body 1's there as well.
+
+    Meshes that do not match hold it at other nodes, at most a facet away.
+    """
+    body_1, body_2 = structure.body_1, structure.body_2
+    d = body_1.elastic.dimension
+    ends_1 = np.cumsum([len(i.face(1)) for i in structure.mesh.interfaces])
+    ends_2 = np.cumsum([len(i) for i in structure.mesh.interfaces])
+    held_1 = np.split(body_1.held.reshape(-1, d), ends_1[:-1])
+    held_2 = np.split(body_2.held.reshape(-1, d), ends_2[:-1])
+    for interface, one, two in zip(structure.mesh.interfaces, held_1, held_2, strict=True):
+        name_1, name_2 = body_1.elastic.body.name, body_2.elastic.body.name
+        if two[:, -1].any():
+            raise MeshError(
+                f"nodes of {interface.name} on body {name_2} are held along the contact's normal: "
+                "they cannot press; leave them out of the support or of the face"
+            )
+        face = interface.face(1)
+        corners = face.coordinates[face.facets]
+        reach = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max()
+        for axis in range(d - 1):
+            places = face.coordinates[one[:, axis]], interface.coordinates[two[:, axis]]
+            if not _are_near(*places, reach):
+                raise MeshError(
+                    f"nodes of {interface.name} are held along the face on body {name_2} and not "
+                    f"on {name_1}; hold both alike, as on a plane of symmetry, or neither"
+                )
+
+
+def _are_near(places: Array, points: Array, reach: float) -> bool:
+    """Whether each of the points ``(n, 2)`` has one of the places ``(m, 2)`` within reach."""
+    if not len(points):
+        return True
+    return len(places) > 0 and bool(cKDTree(places).query(points)[0].max() <= reach)
+
+
+def _check_rest(body: SupportedBody) -> None:
+    """Raise if a body can move as a rigid one."""
+    points = body.elastic.nodes
+    motions = body.free_motions(points.mean(axis=0), float(np.ptp(points, axis=0).max()))
+    if len(motions):
+        motion = int(np.argmax(np.abs(motions[0])))
+        freely = f"{'shift along' if motion < 3 else 'turn about'} {AXIS_NAMES[motion % 3]}"
+        raise MeshError(
+            f"the supports let body {body.elastic.body.name} {freely}, which must be held by them "
+            "alone; hold more, or let body 1 be the body that is held"
+        )
+
+
+def _groups(imported: ImportedMesh, bodies: Sequence[Body]) -> tuple[set[str], set[str]]:
+    """Names of the boundaries and of the node sets of the bodies."""
+    boundaries = {name for body in bodies for name in imported.bodies[body.name].mesh.boundaries}
+    return boundaries, {name for body in bodies for name in imported.points[body.name]}
 
 
 def _boundary(load: Load) -> str | None:
     return getattr(load, "boundary", None)
+
+
+def _vector(load: Load) -> Array | None:
+    """The direction of a load that has one."""
+    match load:
+        case Force():
+            return load.force
+        case Displacement():
+            return load.displacement
+        case Acceleration():
+            return load.acceleration
+    return None
 
 
 def _supported(
@@ -182,7 +295,7 @@ def _supported(
     body = (mesh.body_1, mesh.body_2)[number - 1]
     elastic = ElasticBody(body, material, order)
     constraints = Constraints(len(elastic.nodes), elastic.dimension)
-    own = _groups(imported, body)
+    own = set[str]().union(*_groups(imported, [body]))
     for support in supports:
         if support.group in own:
             _hold(constraints, elastic, imported.points[body.name], support)
@@ -204,9 +317,7 @@ def _supported(
             imposed if imposed.any() else None,
         )  # fmt: skip
     except ValueError as error:
-        raise MeshError(
-            f"body {body.name}: a support or an imposed displacement holds nodes of a contact face"
-        ) from error
+        raise MeshError(f"body {body.name}: {error}") from error
 
 
 def _hold(
@@ -215,8 +326,6 @@ def _hold(
     """Add one support to a body's constraints."""
     group, hold = support.group, support.hold
     is_boundary = group in elastic.body.mesh.boundaries
-    if not is_boundary and (hold == "normal" or hold.startswith("mean_")):
-        raise MeshError(f"node set {group} has no area to hold {hold}; name a boundary")
     if hold == "normal":
         constraints.slide(*elastic.boundary_normals(group))
         return
@@ -274,3 +383,18 @@ def _centrifugal(load: Rotation, density: float) -> Callable[[Array], Array]:
         return density * load.speed**2 * radial
 
     return force
+
+
+def imported_softening(
+    structure: Structure, loads: Sequence[Load], amplitudes: Array
+) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+    """Spin softening of both bodies ``(size, size)`` [N/mm] at ``amplitudes`` of the loads."""
+    softening = []
+    for body in (structure.body_1.elastic, structure.body_2.elastic):
+        total = sp.csr_matrix((body.size, body.size))
+        for load, amplitude in zip(loads, amplitudes, strict=True):
+            if isinstance(load, Rotation):
+                axis = load.axis / np.linalg.norm(load.axis)
+                total = total + amplitude * spin_softening(body, load.speed, axis=axis)
+        softening.append(total.tocsr())
+    return softening[0], softening[1]

@@ -8,6 +8,9 @@ displacement and forces f on body 2 are -Nᵀf on body 1. Both bodies then form 
 
 with C = S_1 + NᵀS_2 N. N is the identity where the bodies meet node to node. H is symmetric; the
 rigid motions of a body that is held by contact alone are its null space.
+
+A plane of symmetry through a contact holds displacements u_1 and u_2 of its nodes at zero. They are
+left out of S and N, and so is their w, which no force acts on: supports carry it.
 """
 
 from __future__ import annotations
@@ -17,8 +20,10 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
+from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from fe_models.mesh import Indices
 from sa_solver.types import Array
 
 # Eigenvalues below this share of the largest are rigid motions; elastic ones start near 1e-3.
@@ -33,7 +38,8 @@ class JointStiffness:
 
     ``stiffness`` ``(d n, d n)`` [N/mm] and ``loads`` ``(d n, cases)`` [N], numbered ``d node +
     component`` over all interfaces in d dimensions, per length in the plane; ``rigid_modes`` counts
-    H's null space; ``smallest`` and ``largest`` are its extreme elastic eigenvalues.
+    H's null space; ``smallest`` and ``largest`` are its extreme elastic eigenvalues. Of the
+    displacements that ``held`` ``(d n,)`` marks, which stay zero, there are no rows and columns.
     """
 
     stiffness: Array
@@ -41,16 +47,25 @@ class JointStiffness:
     rigid_modes: int
     smallest: float
     largest: float
+    held: NDArray[np.bool_] | None = None
 
     def resolvent(self) -> JointResolvent:
-        """(H + ρ)⁻¹ with ρ the geometric mean of the extreme elastic eigenvalues."""
+        """(H + ρ)⁻¹ with ρ the geometric mean of the extreme elastic eigenvalues.
+
+        It is zero for displacements that are held, as if H were infinite there.
+        """
         rho = float(np.sqrt(self.smallest * self.largest))
         shifted = self.stiffness.copy()
         shifted[np.diag_indices_from(shifted)] += rho
         factor = sl.cholesky(shifted, lower=True, overwrite_a=True, check_finite=False)
         inverse, _ = sl.lapack.dpotri(factor, lower=1, overwrite_c=1)
         inverse = np.tril(inverse) + np.tril(inverse, -1).T
-        return JointResolvent(inverse, rho, self.loads, self.rigid_modes)
+        loads = self.loads
+        if self.held is not None and self.held.any():
+            free = np.flatnonzero(~self.held)
+            inverse = _spread(_spread(inverse, free, len(self.held)).T, free, len(self.held)).T
+            loads = _spread(loads, free, len(self.held))
+        return JointResolvent(inverse, rho, loads, self.rigid_modes)
 
 
 @dataclass(frozen=True)
@@ -71,10 +86,15 @@ def join(
     condensed_1: tuple[Array, Array],
     condensed_2: tuple[Array, Array],
     projection: sp.csr_matrix | None = None,
+    held: NDArray[np.bool_] | None = None,
+    like: JointResolvent | None = None,
 ) -> JointStiffness:
     """Join two condensed bodies; body 1 must be held, body 2 may float.
 
-    ``projection`` ``(d n, d n_1)`` is N on displacements, None where the bodies meet node to node.
+    ``projection`` ``(d n, d n_1)`` is N on displacements, None where the bodies meet node to node;
+    of those that ``held`` ``(d n,)`` marks neither it nor body 2 has rows. A joint that differs
+    little from ``like`` may take its ρ as extreme eigenvalues: the search for its own fails where
+    contact alone holds a body in a centrifugal field, which makes H slightly indefinite.
     """
     (stiffness_1, loads_1), (stiffness_2, loads_2) = condensed_1, condensed_2
     if projection is None:
@@ -87,8 +107,18 @@ def join(
     half = sl.solve_triangular(factor, coupling, lower=True)
     stiffness = stiffness_2 - half.T @ half
     loads = half.T @ sl.solve_triangular(factor, loads_1 + handed, lower=True) - loads_2
-    rigid_modes, smallest, largest = _spectrum(stiffness)
-    return JointStiffness(stiffness, loads, rigid_modes, smallest, largest)
+    if like is None:
+        rigid_modes, smallest, largest = _spectrum(stiffness)
+    else:
+        rigid_modes, smallest, largest = like.rigid_modes, like.rho, like.rho
+    return JointStiffness(stiffness, loads, rigid_modes, smallest, largest, held)
+
+
+def _spread(rows: Array, places: Indices, count: int) -> Array:
+    """Rows at their places among ``count``, the others zero."""
+    spread = np.zeros((count, *rows.shape[1:]))
+    spread[places] = rows
+    return spread
 
 
 def _spectrum(stiffness: Array) -> tuple[int, float, float]:

@@ -27,8 +27,24 @@ def stress_state(
     """Stress fields of body 1 and body 2.
 
     ``force`` ``(3, n)`` on body 2 and ``relative`` displacement ``(3, n)`` over all interfaces, in
-    their frames; ``amplitudes`` of the load cases. Body 1 carries the forces, body 2 follows it at
-    the relative displacements.
+    their frames; ``amplitudes`` of the load cases.
+    """
+    displacements = deformation(structure, force, relative, amplitudes)
+    fields = []
+    for body, displacement in zip((structure.body_1, structure.body_2), displacements, strict=True):
+        stress = body.elastic.at_vertices(body.elastic.stress(displacement))
+        nodal = displacement.reshape(-1, body.elastic.dimension)
+        vertices = in_space(nodal[: body.elastic.body.mesh.nvertices])
+        fields.append(StressField(np.array(vertices), von_mises(stress), maximum_principal(stress)))
+    return fields[0], fields[1]
+
+
+def deformation(
+    structure: Structure, force: Array, relative: Array, amplitudes: Array
+) -> tuple[Array, Array]:
+    """All displacements of body 1 and body 2, each ``(size,)`` [mm].
+
+    Body 1 carries the forces, body 2 follows it at the relative displacements.
     """
     axes = structure.mesh.body_1.axes
     forces, gaps = force[axes, :].T.ravel(), relative[axes, :].T.ravel()
@@ -37,12 +53,4 @@ def stress_state(
     displacement_1, interface_1 = structure.body_1.respond(-on_body_1, amplitudes)
     if projection is not None:
         interface_1 = projection @ interface_1
-    displacement_2 = structure.body_2.recover(interface_1 + gaps, amplitudes)
-    pairs = ((structure.body_1, displacement_1), (structure.body_2, displacement_2))
-    fields = []
-    for body, displacement in pairs:
-        stress = body.elastic.at_vertices(body.elastic.stress(displacement))
-        nodal = displacement.reshape(-1, body.elastic.dimension)
-        vertices = in_space(nodal[: body.elastic.body.mesh.nvertices])
-        fields.append(StressField(np.array(vertices), von_mises(stress), maximum_principal(stress)))
-    return fields[0], fields[1]
+    return displacement_1, structure.body_2.recover(interface_1 + gaps, amplitudes)

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.friction import LOAD_FLOOR, FrictionalJoint, FrictionState
-from fe_models.joint import JointStiffness, join
+from fe_models.joint import JointResolvent, JointStiffness, join
 from fe_models.mesh import Face, Interface, StructureMesh
 from fe_models.supported_body import SupportedBody
 from sa_solver.types import Array, LoadHistory, resultants
@@ -18,6 +18,13 @@ from sa_solver.types import Array, LoadHistory, resultants
 STICKING_SHARE = 1e-2
 # Below this share of the cycle's largest P the resultants are the friction solver's remainder.
 UNLOADED_SHARE = 1e-6
+# A cycle is closed when its contact forces are those of the one before within this share of the
+# largest: a tenth of what discretisation leaves of them, and a hundred times what friction's own
+# tolerance leaves. Dovetails close to 1e-5 in two cycles.
+CLOSED = 1e-3
+# Slip that shakes down does so by a steady share in each cycle: a crowned pad took 12. One that
+# walks never closes.
+MOST_CYCLES = 20
 # What a history holds of each increment, over the nodes of its interface.
 FIELDS = ("force", "displacement", "slip")
 # A node slips when its shear reaches this share of Coulomb's limit.
@@ -51,7 +58,7 @@ class CycleSolution:
 
     ``states`` are the splitting's, by increment, and ``last_displacement`` ``(3, n)`` the one that
     the next cycle starts from. ``closure`` is the largest difference of contact forces between the
-    first and the second cycle, relative to the largest force (0 for a cycle that follows another);
+    last two of the ``cycles`` that were marched, relative to the largest force (0 if one was);
     ``equilibrium`` ``(t,)`` the relative error of the balance of body 2.
     """
 
@@ -63,6 +70,7 @@ class CycleSolution:
     converged: bool
     closure: float
     equilibrium: Array
+    cycles: int = 2
 
     def fields(self) -> dict[str, Array]:
         """Force, displacement and slip over all interfaces, to keep and to restore from."""
@@ -80,9 +88,17 @@ class Structure:
     body_1: SupportedBody
     body_2: SupportedBody
 
-    def condense(self) -> JointStiffness:
-        """Stiffness and loads of the joint on its interface displacements."""
-        return join(self.body_1.condense(), self.body_2.condense(), self.projection)
+    def condense(self, like: JointResolvent | None = None) -> JointStiffness:
+        """Stiffness and loads of the joint on its interface displacements.
+
+        ``like`` is a joint that differs little from this one and lends it its ρ.
+        """
+        held_1, held_2 = self.body_1.held, self.body_2.held
+        projection = self.projection
+        if held_1.any() or held_2.any():
+            every = sp.identity(len(held_2), format="csr") if projection is None else projection
+            projection = every[~held_2][:, ~held_1]
+        return join(self.body_1.condense(), self.body_2.condense(), projection, held_2, like)
 
     @property
     def projection(self) -> sp.csr_matrix | None:
@@ -96,6 +112,12 @@ class Structure:
         blocks = [sp.identity(len(i)) if i.projection is None else i.projection for i in interfaces]
         components = sp.identity(self.body_1.elastic.dimension)
         return sp.kron(sp.block_diag(blocks), components, format="csr")
+
+    @property
+    def held_faces(self) -> tuple[str, ...]:
+        """Interfaces of which supports hold displacements, as planes of symmetry do."""
+        held = self.body_2.held.reshape(-1, self.body_2.elastic.dimension)
+        return tuple(interface.name for interface, own in self._shares() if held[own].any())
 
     def gap(self) -> Array:
         """Gaps of all interfaces one after the other, unworn ``(n,)`` [mm]."""
@@ -112,31 +134,39 @@ class Structure:
     ) -> CycleSolution:
         """Solve one closed cycle of ``amplitudes`` ``(t, cases)``.
 
-        The second from rest and ``preload`` ``(s, cases)``, which is passed once; or the one that
-        follows ``after``.
+        From rest and ``preload`` ``(s, cases)``, which is passed once, the first that repeats the
+        one before it; or one that follows ``after``, as many cycles on as that one had repeated.
+        Not closed after ``MOST_CYCLES``, it says so by its closure.
         """
         if after is None:
             once = amplitudes[:0] if preload is None else preload
-            first = list(joint.march(np.concatenate([once, amplitudes]), gap))[len(once) :]
-            displacement, guess = first[-1].displacement, [s.state for s in first]
+            marched = [list(joint.march(np.concatenate([once, amplitudes]), gap))[len(once) :]]
+            displacement, guess = marched[0][-1].displacement, [s.state for s in marched[0]]
+            most = MOST_CYCLES
         else:
-            first = []
+            marched = []
             displacement, guess = after.last_displacement, list(after.states)
-        last = list(joint.march(amplitudes, gap, displacement, guess))
-        pairs = zip(first, last, strict=False)
-        change = [float(np.abs(one.force - two.force).max()) for one, two in pairs]
-        largest = max(float(np.abs(s.force).max()) for s in last)
-        states = first + last
+            most = after.cycles - 1
+        closure = np.inf
+        while len(marched) < most and closure > CLOSED:
+            if marched and not marched[-1][-1].converged:
+                break
+            marched.append(list(joint.march(amplitudes, gap, displacement, guess)))
+            displacement, guess = marched[-1][-1].displacement, [s.state for s in marched[-1]]
+            if len(marched) > 1:
+                closure = _closure(*marched[-2:])
+        states, last = [state for cycle in marched for state in cycle], marched[-1]
         fields = {name: np.stack([getattr(s, name) for s in last]) for name in FIELDS}
         return CycleSolution(
             histories=self.histories(**fields, friction=friction),
             states=tuple(s.state for s in last),
-            last_displacement=last[-1].displacement,
+            last_displacement=displacement,
             iterations=sum(s.iterations for s in states),
             residual=max(s.residual for s in states),
             converged=all(s.converged for s in states),
-            closure=max(change, default=0.0) / largest if largest > 0.0 else 0.0,
+            closure=closure if len(marched) > 1 else 0.0,
             equilibrium=self.equilibrium_errors(last, amplitudes),
+            cycles=len(marched),
         )
 
     def histories(
@@ -190,6 +220,14 @@ class Structure:
             (interface, slice(end - len(interface), end))
             for interface, end in zip(self.mesh.interfaces, ends, strict=True)
         ]
+
+
+def _closure(one: Sequence[FrictionState], two: Sequence[FrictionState]) -> float:
+    """Largest difference of the contact forces of two cycles, relative to the largest force."""
+    largest = max(float(np.abs(state.force).max()) for state in two)
+    pairs = zip(one, two, strict=True)
+    change = max(float(np.abs(first.force - second.force).max()) for first, second in pairs)
+    return change / largest if largest > 0.0 else 0.0
 
 
 def load_history(interface: Face, force: Array, slip: Array, friction: float) -> LoadHistory:

@@ -2,17 +2,29 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 
 from fe_models.constraints import Constraints
 from fe_models.elasticity import ElasticBody
-from fe_models.linear_solver import factorise, schur_complement
+from fe_models.linear_solver import prepare
 from fe_models.mesh import Body, Indices, Interface
+from fe_models.multigrid import rigid_body_modes, rigid_motions
+from fe_models.reduction import reduce_body
 from sa_solver.types import Array
 
 # A rigid motion that supports change by less than this share of itself is free.
 FREE_MOTION = 1e-9
+# A direction this close to an axis of the interface frame [rad] is along it: mesh files keep six
+# digits, and normals are differences of them.
+ALONG_AXIS = 1e-3
+TIED = (
+    "a support ties nodes of a contact face to others, as a mean over a boundary that meets the "
+    "face does; name a boundary away from it"
+)
 
 
 class SupportedBody:
@@ -20,8 +32,9 @@ class SupportedBody:
 
     ``nodes`` ``(n,)`` are its interface vertices and ``frames`` ``(n, d, d)`` the axes at each, d
     the dimension; ``loads`` ``(d all, cases)`` its load cases, and ``imposed`` ``(d all, cases)``
-    displacements that each imposes on nodes that ``constraints`` hold. Raises ValueError if an
-    interface node is constrained.
+    displacements that each imposes on nodes that ``constraints`` hold. ``held`` ``(d n,)`` marks
+    the interface displacements that are held at zero, as on a plane of symmetry. Raises ValueError
+    if those of an interface node are constrained in any other way.
     """
 
     def __init__(
@@ -34,46 +47,54 @@ class SupportedBody:
         imposed: Array | None = None,
     ) -> None:
         self.elastic = elastic
-        self._loads = loads
-        self._imposed = imposed
-        self._constraints = constraints
+        self.loads = loads
+        self.imposed = imposed
+        self.constraints = constraints
+        if imposed is not None and imposed[self._dofs(nodes)].any():
+            raise ValueError("a displacement is imposed on nodes of a contact face")
         transformation = constraints.transformation()
-        self._interface = _free_columns(transformation, nodes, elastic.dimension)
-        rotation = _rotation(transformation.shape[1], self._interface, frames)
+        rows = transformation[self._dofs(nodes)]
+        self.held, self._interface, blocks = _interface_displacements(rows, frames)
+        self._free = np.flatnonzero(~self.held)
+        rotation = _rotation(transformation.shape[1], self._interface, blocks)
         self._transformation = (transformation @ rotation).tocsr()
 
     def condense(self) -> tuple[Array, Array]:
-        """Stiffness ``(d n, d n)`` and loads ``(d n, cases)`` on the interface displacements."""
+        """Stiffness ``(k, k)`` and loads ``(k, cases)`` on the interface displacements not held."""
         stiffness, loads = self._reduced()
-        inner = self._inner(stiffness)
-        solve = factorise(stiffness[inner][:, inner].tocsr())
-        condensed = schur_complement(stiffness, self._interface, inner, solve)
-        coupling = stiffness[self._interface][:, inner]
-        return condensed, loads[self._interface] - coupling @ solve(loads[inner])
+        model = reduce_body(stiffness, None, self._interface, loads=loads)
+        return model.static_stiffness, model.loads
 
     def recover(self, interface_displacement: Array, amplitudes: Array) -> Array:
-        """All displacements ``(d all,)`` for given interface displacements ``(d n, )``."""
+        """All displacements ``(d all,)`` for given interface displacements ``(d n,)``.
+
+        Those that are held stay at zero, whatever is given.
+        """
+        interface_displacement = interface_displacement[self._free]
         stiffness, loads = self._reduced()
         inner = self._inner(stiffness)
         rhs = loads[inner] @ amplitudes
         rhs -= stiffness[inner][:, self._interface] @ interface_displacement
         displacement = np.empty(stiffness.shape[0])
         displacement[self._interface] = interface_displacement
-        displacement[inner] = factorise(stiffness[inner][:, inner].tocsr())(rhs)
+        solve = prepare(stiffness[inner][:, inner].tocsr(), self._soft_motions()[inner])
+        displacement[inner] = solve(rhs)
         return self._all(displacement, amplitudes)
 
     def respond(self, interface_forces: Array, amplitudes: Array) -> tuple[Array, Array]:
         """All displacements and the interface's, of a held body under interface forces."""
         stiffness, loads = self._reduced()
         rhs = loads @ amplitudes
-        rhs[self._interface] += interface_forces
-        displacement = factorise(stiffness)(rhs)
-        return self._all(displacement, amplitudes), displacement[self._interface]
+        rhs[self._interface] += interface_forces[self._free]
+        displacement = prepare(stiffness, self._soft_motions())(rhs)
+        interface = np.zeros(len(self.held))
+        interface[self._free] = displacement[self._interface]
+        return self._all(displacement, amplitudes), interface
 
     def load_resultants(self, amplitudes: Array, about: Array) -> Array:
         """Force and moment ``(2, 3)`` of the applied loads about a point."""
         forces = np.zeros((len(self.elastic.nodes), 3))
-        forces[:, self.elastic.body.axes] = self._nodal(self._loads @ amplitudes)
+        forces[:, self.elastic.body.axes] = self._nodal(self.loads @ amplitudes)
         arms = self.elastic.nodes - about
         return np.array([forces.sum(axis=0), np.cross(arms, forces).sum(axis=0)])
 
@@ -83,8 +104,8 @@ class SupportedBody:
         Columns: displacement of the point ``about`` [mm] and rotation times ``size`` [mm], along
         the global axes.
         """
-        motions = _rigid_motions((self.elastic.nodes - about) / size, self.elastic.body)
-        held = motions - self._constraints.transformation() @ motions[self._constraints.free]
+        motions = rigid_motions((self.elastic.nodes - about) / size, self.elastic.body.axes)
+        held = motions - self.constraints.transformation() @ motions[self.constraints.free]
         gram = motions.T @ motions
         # Motions along the plane of a plane body are the only ones it knows.
         known = np.flatnonzero(np.diag(gram) > 0.0)
@@ -93,18 +114,28 @@ class SupportedBody:
         free[:, known] = vectors[:, : len(free)].T
         return free
 
+    def _soft_motions(self) -> Array:
+        """What is left of the rigid motions ``(free, k)``: motions of little energy."""
+        elastic = self.elastic
+        return rigid_body_modes(elastic.nodes, elastic.body.axes, self._transformation)
+
     def _reduced(self) -> tuple[sp.csr_matrix, Array]:
-        t, loads = self._transformation, self._loads
-        if self._imposed is not None:
-            loads = loads - self.elastic.stiffness @ self._imposed
+        t, loads = self._transformation, self.loads
+        if self.imposed is not None:
+            loads = loads - self.elastic.stiffness @ self.imposed
         return (t.T @ self.elastic.stiffness @ t).tocsr(), t.T @ loads
 
     def _all(self, free: Array, amplitudes: Array) -> Array:
         displacement = self._transformation @ free
-        return displacement if self._imposed is None else displacement + self._imposed @ amplitudes
+        return displacement if self.imposed is None else displacement + self.imposed @ amplitudes
 
     def _nodal(self, values: Array) -> Array:
         return values.reshape(-1, self.elastic.dimension)
+
+    def _dofs(self, nodes: Indices) -> Indices:
+        """Displacements of nodes, one node after the other."""
+        d = self.elastic.dimension
+        return np.asarray((d * nodes[:, None] + np.arange(d)).ravel())
 
     def _inner(self, stiffness: sp.csr_matrix) -> Indices:
         return np.setdiff1d(np.arange(stiffness.shape[0]), self._interface)
@@ -118,28 +149,50 @@ def interface_frames(interfaces: tuple[Interface, ...], number: int, body: Body)
     )
 
 
-def _rigid_motions(arms: Array, body: Body) -> Array:
-    """Displacements ``(d n, 6)`` of unit translations and of unit rotations about the origin."""
-    turned = np.cross(np.eye(3)[:, None, :], arms)
-    shifted = np.broadcast_to(np.eye(3)[:, None, :], turned.shape)
-    motions = np.concatenate([shifted, turned])[..., body.axes]
-    return motions.reshape(6, -1).T
+def _interface_displacements(
+    rows: sp.csr_matrix, frames: Array
+) -> tuple[NDArray[np.bool_], Indices, list[Array]]:
+    """Which displacements in the frames are held, and what the others are, from their rows of T.
+
+    The others of a node are a square matrix times as many free displacements: that list of
+    matrices, and all these free displacements one node after the other. Raises ValueError if an
+    interface node has a displacement that is neither free nor zero.
+    """
+    d = frames.shape[1]
+    counts = np.diff(rows.indptr).reshape(-1, d)
+    held, used, blocks = [], [], []
+    for node, frame in enumerate(frames):
+        entries = slice(rows.indptr[d * node], rows.indptr[d * (node + 1)])
+        columns, place = np.unique(rows.indices[entries], return_inverse=True)
+        own = np.zeros((d, len(columns)))
+        own[np.repeat(np.arange(d), counts[node]), place] = rows.data[entries]
+        own = frame @ own
+        zero = np.linalg.norm(own, axis=1) <= ALONG_AXIS
+        if len(columns) > np.sum(~zero):
+            raise ValueError(TIED)
+        if len(columns) < np.sum(~zero):
+            raise ValueError(
+                "nodes of a contact face are held along a direction that is no axis of the "
+                "contact's frame; turn its x along or across that direction"
+            )
+        held.append(zero)
+        used.append(columns)
+        blocks.append(own[~zero])
+    interface = np.concatenate(used).astype(np.int64)
+    if len(np.unique(interface)) < len(interface):
+        raise ValueError(TIED)
+    return np.concatenate(held), interface, blocks
 
 
-def _rotation(size: int, interface: Indices, frames: Array) -> sp.csr_matrix:
-    """Free displacements from ones that are in ``frames`` ``(n, d, d)`` at the interface nodes."""
+def _rotation(size: int, interface: Indices, blocks: Sequence[Array] | Array) -> sp.csr_matrix:
+    """Free displacements from ones that are ``blocks`` ``(k, k)`` times them at each node.
+
+    ``interface`` are those of all the nodes, one after the other; frames are such blocks.
+    """
     others = np.setdiff1d(np.arange(size), interface)
-    nodal = interface.reshape(frames.shape[:2])
-    rows = np.broadcast_to(nodal[:, :, None], frames.shape).ravel()
-    columns = np.broadcast_to(nodal[:, None, :], frames.shape).ravel()
-    values = np.append(frames.transpose(0, 2, 1).ravel(), np.ones(len(others)))
-    places = np.append(rows, others), np.append(columns, others)
-    return sp.csr_matrix((values, places), shape=(size, size))
-
-
-def _free_columns(transformation: sp.csr_matrix, nodes: Indices, dimension: int) -> Indices:
-    """Columns of T that are the displacements of the given nodes."""
-    rows = transformation[(dimension * nodes[:, None] + np.arange(dimension)).ravel()]
-    if not np.all(np.diff(rows.indptr) == 1):
-        raise ValueError("a displacement of an interface node is constrained")
-    return rows.indices.astype(np.int64)
+    own = np.split(interface, np.cumsum([len(block) for block in blocks])[:-1])
+    rows = np.concatenate([np.repeat(dofs, len(dofs)) for dofs in own] + [others])
+    columns = np.concatenate([np.tile(dofs, len(dofs)) for dofs in own] + [others])
+    inverses = [np.linalg.inv(block).ravel() for block in blocks]
+    values = np.concatenate([*inverses, np.ones(len(others))])
+    return sp.csr_matrix((values, (rows, columns)), shape=(size, size))

@@ -40,6 +40,10 @@ GRAM_CUTOFF = 1e-13
 """Eigenvalues of the scaled Gram matrix below this are rounding, since it squares the differences:
 their directions are left out of the least-squares problem."""
 
+AT_REST = 1e-9
+"""A residual that changes by less than this share of itself is a body in free motion, at constant
+speed until it meets something: what differences say then is rounding, and would throw it far off."""
+
 TINY = np.finfo(float).tiny
 """Keeps divisions by a vanishing size finite."""
 
@@ -139,6 +143,10 @@ class AndersonMemory:
         self._keep(self._residuals[slot], residual, self._last_residual)
         self._keep(self._images[slot], image, self._last_image)
         remembered = self._residuals[:used]
+        moved = np.linalg.norm(self._residuals[slot]) * self._unit
+        if moved <= AT_REST * self._last_norm:
+            self._seen = 0
+            return image
         self._gram[slot, :used] = self._gram[:used, slot] = remembered @ self._residuals[slot]
         scaled = (residual / self._unit).astype(np.float32)
         products = (remembered @ scaled).astype(np.float64)

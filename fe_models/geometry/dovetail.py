@@ -25,14 +25,13 @@ from fe_models.mesh import (
     matched_interface,
     named_mesh,
 )
+from sa_solver.shapes import rounded_edge
 from sa_solver.types import Array, Frame
 
 # How fast the mesh size grows with the distance from the flanks.
 SIZE_GROWTH = 0.25
 # Elements round a full circle of a fillet, whose stress is asked for.
 ELEMENTS_PER_CIRCLE = 24
-# Slope at which the faces part beyond their rounded edges, where fillets and corners begin.
-PARTING_SLOPE = 1.0
 
 Curve = tuple[str, list[tuple[float, float]]]
 
@@ -124,10 +123,10 @@ class Dovetail:
         up = frame.components(self._uphill(side))
         # Oblique coordinates: along the section and along the slot.
         across, along = x / up[0], y - x * up[1] / up[0]
-        return _rounding(
+        return rounded_edge(
             np.abs(across) * abs(up[0]), 0.5 * self.flank_width * abs(up[0]), self.edge_width,
             self.edge_radius,
-        ) + _rounding(
+        ) + rounded_edge(
             np.abs(along) * abs(up[0]), 0.5 * self.slot_length * abs(up[0]), self.end_width,
             self.end_radius,
         )  # fmt: skip
@@ -226,13 +225,6 @@ class Dovetail:
                 ("middle", (0.0, inner)),
             ]
         )
-
-
-def _rounding(distance: Array, half: float, width: float, radius: float) -> Array:
-    """Drop of a circular arc that begins ``width`` before ``half``, and of the slope beyond it."""
-    into = np.clip(distance - (half - width), 0.0, width)
-    beyond = np.maximum(distance - half, 0.0)
-    return into**2 / (radius + np.sqrt(radius**2 - into**2)) + PARTING_SLOPE * beyond
 
 
 def _chain(corners: list[Any]) -> list[Curve]:

@@ -266,3 +266,20 @@ def test_free_shape_of_the_joint_does_not_matter(joint):
     (one,) = FrictionalJoint(joint.resolvent(), 0.4).march(amplitudes, gap)
     (two,) = FrictionalJoint(doubled.resolvent(), 0.4).march(amplitudes, gap)
     np.testing.assert_allclose(two.force, 2.0 * one.force, atol=1e-5 * np.abs(two.force).max())
+
+
+@pytest.mark.parametrize("distance", [1e-4, 1e-3, 1e-2, 1.0])
+def test_floating_body_that_starts_apart_arrives(distance):
+    """Held by nothing along z but the contact, and pushed towards it: the path does not matter."""
+    joint = small_joint(np.random.default_rng(4))
+    up = np.tile([0.0, 0.0, 1.0], NODES)
+    pushed = joint.stiffness @ up
+    floating = joint.stiffness - np.outer(pushed, pushed) / (up @ pushed)
+    values = np.linalg.eigvalsh(floating)
+    loads = (pushed / (up @ pushed))[:, None]
+    free = JointStiffness(floating, loads, 1, float(values[1]), float(values[-1]))
+    gap = distance + 1e-4 * np.random.default_rng(5).random(NODES)
+    (state,) = FrictionalJoint(free.resolvent(), 0.5).march(np.array([[17.0]]), gap)
+    assert state.converged
+    assert state.force[2].sum() == pytest.approx(17.0, rel=1e-6)
+    assert np.all(gap + state.displacement[2] > -1e-9 * distance)

@@ -226,10 +226,10 @@ def test_uniform_pressure_crosses_the_interface(box, order):
     np.testing.assert_allclose(force[:, :2], 0.0, atol=1e-8 * pressure)
 
 
-def test_constrained_interface_node_is_refused(box):
+def test_tied_interface_node_is_refused(box):
     stacked = Stacked(box, 1)
-    stacked.constraints[0].hold(stacked.nodes_1[:1])
-    with pytest.raises(ValueError, match="interface node is constrained"):
+    stacked.constraints[0].average(stacked.nodes_1[:1], stacked.nodes_1[None, 1:3])
+    with pytest.raises(ValueError, match="ties nodes of a contact face"):
         SupportedBody(
             stacked.lower,
             stacked.constraints[0],

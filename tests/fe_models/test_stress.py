@@ -42,7 +42,7 @@ def test_contact_forces_are_recovered(structure, peak):
     supports = ({"inner", "sides"}, {"root_bottom"})
     for number, (body, field) in enumerate(zip(bodies, fields, strict=True)):
         elastic = body.elastic
-        residual = elastic.stiffness @ field.displacement.ravel() - body._loads @ amplitudes
+        residual = elastic.stiffness @ field.displacement.ravel() - body.loads @ amplitudes
         residual = residual.reshape(-1, 3)
         start, faces = 0, []
         for face in structure.mesh.interfaces:

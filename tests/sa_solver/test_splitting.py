@@ -100,3 +100,12 @@ def test_failure_is_said():
     assert not result.converged
     assert result.residual > 1e-8
     assert result.iterations == 3
+
+
+def test_free_motion_is_no_solution():
+    """A residual that stays the same moves the state on, and is never taken for small."""
+    push = np.full(5, 1e-3)
+    found = douglas_rachford(lambda s: s - push, lambda trial: trial + 1.3 * push, np.zeros(5))
+    assert not found.converged
+    assert found.residual > 0.0
+    assert np.abs(found.state).max() < 1.0

@@ -1,0 +1,255 @@
+"""The two cylindrical specimens of a friction rig, end to end with crossed strips.
+
+Each specimen is a cylinder whose end face narrows, by a chamfer on either side, to a flat strip.
+The specimens stand end to end along Z and are turned 90° to each other, so that the strips touch
+over a square, the pad. Body 1 is below (Z < 0) with its strip along X; body 2 is body 1 turned by
+180° about the line X = Y in the contact plane, which swaps X with Y and up with down: pads and
+their triangles match node to node. A quarter is meshed and mirrored twice, so that symmetric loads
+give symmetric answers to rounding.
+
+The form of the strips is a gap of the interface and not in the mesh.
+
+Source: the specimens of the friction rig at Imperial College, "Dynamics simulations of fretting
+wear for aero-engine applications" (thesis), section 4.2; Fantetti et al. 2019, Tribology
+International 138, 111.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from fe_models.gmsh_session import gmsh_model
+from fe_models.mesh import Body, MeshError, StructureMesh, matched_interface, named_mesh
+from sa_solver.types import Array, Frame
+
+# Name of the interface, and of the boundary of both bodies that it joins.
+CONTACT = "contact"
+# Largest elements [mm]. With quadratic tetrahedra of 1.5, 1.0, 0.8 and 0.6 mm the first free-free
+# frequency is 29465, 29592, 29631 and 29656 Hz: what is left is the circle drawn as a polygon.
+SIZE = 1.0
+# How fast the mesh size grows with the distance from the pad. With quadratic tetrahedra 0.25 and
+# 0.5 give frequencies within 2e-4 and a tangential stiffness within 3e-3 of each other.
+SIZE_GROWTH = 0.5
+# Two points are one node when they are closer than this share of the diameter.
+SAME_POINT = 1e-9
+# A bounding box of gmsh's is 1e-7 mm too wide; no two entities are as close as this [mm].
+BOX_MARGIN = 1e-5
+# gmsh's numbers for first-order elements.
+GMSH_TRIANGLE, GMSH_TETRAHEDRON = 2, 4
+
+Elements = NDArray[np.int64]
+
+
+@dataclass(frozen=True)
+class Specimen:
+    """Dimensions of one specimen [mm]; both are alike.
+
+    ``strip_width`` is the width of the flat strip and the side of the pad; the chamfers fall
+    ``chamfer_depth`` from the strip's edge to the cylinder's side (not printed: assumed).
+    ``ring_nodes`` points are kept on the circumference where the holder ends, ``ring_distance``
+    from the contact plane. The pad has ``pad_elements`` squares along each side. ``radii`` are
+    those of the strip's form along and across the strip, None if it is flat.
+    """
+
+    diameter: float = 8.0
+    length: float = 33.0
+    strip_width: float = 1.0
+    chamfer_depth: float = 1.0
+    ring_distance: float = 2.0
+    ring_nodes: int = 16
+    pad_elements: int = 10
+    radii: tuple[float, float] | None = None
+
+    def check(self) -> None:
+        """Raise :class:`MeshError` if the specimen cannot be drawn or meshed."""
+        if not 0.0 < self.strip_width < self.diameter / np.sqrt(2.0):
+            raise MeshError(
+                f"strip_width {self.strip_width:g} mm: the pad must be wider than 0 and lie within "
+                f"the diameter, below {self.diameter / np.sqrt(2.0):.4g} mm"
+            )
+        if not 0.0 <= self.chamfer_depth < self.ring_distance < self.length:
+            raise MeshError(
+                f"chamfer_depth {self.chamfer_depth:g}, ring_distance {self.ring_distance:g} and "
+                f"length {self.length:g} mm must be at least 0 and grow in this order"
+            )
+        if self.pad_elements < 2 or self.pad_elements % 2:
+            raise MeshError(f"pad_elements {self.pad_elements}: give an even number, at least 2")
+        if self.ring_nodes < 4 or self.ring_nodes % 4:
+            raise MeshError(f"ring_nodes {self.ring_nodes}: give a multiple of 4")
+        if self.radii is not None and min(self.radii) <= 0.5 * self.strip_width:
+            raise MeshError(f"radii {self.radii}: each must exceed half of strip_width")
+
+    def gap(self, x: Array, y: Array) -> Array:
+        """Distance of the unloaded faces at points of the contact plane [mm].
+
+        Body 1's strip lies along x, body 2's along y: with radii R_1 along and R_2 across the
+        crossed strips touch like spheres, at the relative radius R_1 R_2/(R_1 + R_2).
+        """
+        gap = np.zeros(np.broadcast(x, y).shape)
+        for radius in self.radii or ():
+            gap += _sagitta(x, radius) + _sagitta(y, radius)
+        return gap
+
+    def mesh(self, size: float = SIZE, growth: float = SIZE_GROWTH) -> StructureMesh:
+        """Mesh both specimens, elements growing from the pad's to ``size`` [mm].
+
+        Boundaries of both bodies: ``contact`` (the pad), ``gripped`` (the far end), ``holder`` (the
+        side from there to the ring). The interface is ``contact``.
+        """
+        self.check()
+        body_1 = Body("specimen_1", self._mesh(size, growth))
+        turned = np.array([[0.0, 1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, -1.0]])
+        body_2 = Body("specimen_2", replace(body_1.mesh, doflocs=turned @ body_1.mesh.p))
+        frame = Frame(np.zeros(3), np.eye(3))
+        face = matched_interface(CONTACT, body_1, body_2, CONTACT, frame)
+        return StructureMesh(body_1, body_2, (replace(face, gap=self.gap(*face.coordinates.T)),))
+
+    def ring(self, body: Body) -> NDArray[np.int64]:
+        """Vertices of the ring, ``(ring_nodes,)``, by angle from the X axis."""
+        angle = 2.0 * np.pi * np.arange(self.ring_nodes) / self.ring_nodes
+        side = np.sign(body.mesh.p[2].mean())
+        points = 0.5 * self.diameter * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
+        points[:, 2] = side * self.ring_distance
+        distance, nodes = cKDTree(body.mesh.p.T).query(points)
+        if distance.max() > SAME_POINT * self.diameter:
+            raise MeshError(f"{body.name} has no nodes on the ring: mesh it with Specimen.mesh")
+        return nodes.astype(np.int64)
+
+    def _mesh(self, size: float, growth: float) -> Any:
+        """Mesh of body 1: a quarter, mirrored about X = 0 and Y = 0."""
+        with gmsh_model("specimen") as gmsh:
+            surfaces = _draw_quarter(gmsh.model, self)
+            half = 0.5 * self.strip_width
+            _mesh_pad(gmsh.model, surfaces[CONTACT], half, self.pad_elements // 2)
+            _mesh_ring(gmsh.model, self)
+            _set_sizes(gmsh, surfaces[CONTACT], self.strip_width / self.pad_elements, size, growth)
+            gmsh.model.mesh.generate(3)
+            points, tets, faces = _read(gmsh, surfaces)
+        for axis in (0, 1):
+            points, tets, faces = _mirrored(points, tets, faces, axis, SAME_POINT * self.diameter)
+        return named_mesh(points, tets, faces)
+
+
+def _sagitta(distance: Array, radius: float) -> Array:
+    """Drop of a circular arc at a distance from its top, without cancellation."""
+    return distance**2 / (radius + np.sqrt(radius**2 - distance**2))
+
+
+def _draw_quarter(model: Any, specimen: Specimen) -> dict[str, int]:
+    """Draw the quarter X >= 0, Y >= 0 of body 1; return its named surfaces."""
+    occ = model.occ
+    radius, half = 0.5 * specimen.diameter, 0.5 * specimen.strip_width
+    length, ring = specimen.length, specimen.ring_distance
+    quarter = 0.5 * np.pi
+    inside = occ.addCylinder(0, 0, -length, 0, 0, length - ring, radius, -1, quarter)
+    outside = occ.addCylinder(0, 0, -ring, 0, 0, ring, radius, -1, quarter)
+    end = [(3, outside)]
+    if specimen.chamfer_depth > 0.0:
+        end = occ.cut(end, _chamfer(occ, specimen))[0]
+    occ.fragment([(3, inside), *end], [(2, occ.addRectangle(0, 0, 0, half, half))])
+    occ.synchronize()
+    boxes = {
+        CONTACT: ((0.0, 0.0, 0.0), (half, half, 0.0)),
+        "gripped": ((0.0, 0.0, -length), (radius, radius, -length)),
+        "holder": ((0.0, 0.0, -length), (radius, radius, -ring)),
+    }
+    return {name: _entity(model, 2, *box) for name, box in boxes.items()}
+
+
+def _chamfer(occ: Any, specimen: Specimen) -> list[tuple[int, int]]:
+    """The wedge that a chamfer removes; it reaches beyond the cylinder."""
+    half, radius = 0.5 * specimen.strip_width, 0.5 * specimen.diameter
+    # Twice as far from the strip's edge as the side of the cylinder, and twice as deep there.
+    far, deep = 2.0 * radius - half, -2.0 * specimen.chamfer_depth
+    corners = ((half, 0.0), (far, deep), (far, radius), (half, radius))
+    points = [occ.addPoint(-radius, y, z) for y, z in corners]
+    lines = [occ.addLine(*pair) for pair in pairwise([*points, points[0]])]
+    section = occ.addPlaneSurface([occ.addCurveLoop(lines)])
+    swept = occ.extrude([(2, section)], 3.0 * radius, 0.0, 0.0)
+    return [(dim, tag) for dim, tag in swept if dim == 3]
+
+
+def _entity(model: Any, dim: int, low: Sequence[float], high: Sequence[float]) -> int:
+    """The only entity of that dimension with the bounding box ``low``, ``high``."""
+    box = np.array([*low, *high])
+    found = [
+        tag
+        for _, tag in model.getEntities(dim)
+        if np.abs(np.array(model.getBoundingBox(dim, tag)) - box).max() < BOX_MARGIN
+    ]
+    if len(found) != 1:
+        raise MeshError(f"the specimen has {len(found)} faces or edges in the box {low}, {high}")
+    return int(found[0])
+
+
+def _mesh_pad(model: Any, pad: int, half: float, squares: int) -> None:
+    """Squares on a quarter of the pad, split along diagonals towards the pad's centre.
+
+    Mirrored, the pattern is the same after a swap of X and Y.
+    """
+    corners = [(0.0, 0.0), (half, 0.0), (half, half), (0.0, half)]
+    for start, end in pairwise([*corners, corners[0]]):
+        low, high = np.minimum(start, end), np.maximum(start, end)
+        edge = _entity(model, 1, (*low, 0.0), (*high, 0.0))
+        model.mesh.setTransfiniteCurve(edge, squares + 1)
+    points = [_entity(model, 0, (*corner, 0.0), (*corner, 0.0)) for corner in corners]
+    model.mesh.setTransfiniteSurface(pad, "Right", points)
+
+
+def _mesh_ring(model: Any, specimen: Specimen) -> None:
+    """One element round the ring from each kept node to the next."""
+    radius, level = 0.5 * specimen.diameter, -specimen.ring_distance
+    arc = _entity(model, 1, (0.0, 0.0, level), (radius, radius, level))
+    model.mesh.setTransfiniteCurve(arc, specimen.ring_nodes // 4 + 1)
+
+
+def _set_sizes(gmsh: Any, pad: int, fine: float, coarse: float, growth: float) -> None:
+    """Mesh size: ``fine`` on the pad, growing with the distance from it up to ``coarse``."""
+    field = gmsh.model.mesh.field
+    distance = field.add("Distance")
+    field.setNumbers(distance, "SurfacesList", [pad])
+    growing = field.add("MathEval")
+    field.setString(growing, "F", f"{fine!r} + {growth!r} * F{distance}")
+    field.setAsBackgroundMesh(growing)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", coarse)
+    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+    gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
+
+
+def _read(gmsh: Any, surfaces: dict[str, int]) -> tuple[Array, Elements, dict[str, Elements]]:
+    """Points, tetrahedra and named triangles of the mesh, numbered from zero."""
+    tags, points, _ = gmsh.model.mesh.getNodes()
+    order = np.argsort(tags)
+
+    def elements(element_type: int, corners: int, entity: int = -1) -> Elements:
+        nodes = gmsh.model.mesh.getElementsByType(element_type, entity)[1]
+        return np.searchsorted(tags[order], nodes.reshape(-1, corners)).astype(np.int64)
+
+    faces = {name: elements(GMSH_TRIANGLE, 3, surface) for name, surface in surfaces.items()}
+    return points.reshape(-1, 3)[order], elements(GMSH_TETRAHEDRON, 4), faces
+
+
+def _mirrored(
+    points: Array, tets: Elements, faces: dict[str, Elements], axis: int, same: float
+) -> tuple[Array, Elements, dict[str, Elements]]:
+    """A mesh and its mirror image about the plane through zero across an axis, as one."""
+    on_plane = np.abs(points[:, axis]) < same
+    points = points.copy()
+    points[on_plane, axis] = 0.0
+    image = np.where(on_plane, np.arange(len(points)), 0)
+    image[~on_plane] = len(points) + np.arange(np.sum(~on_plane))
+    mirror = np.ones(3)
+    mirror[axis] = -1.0
+
+    def both(elements: Elements) -> Elements:
+        return np.concatenate([elements, image[elements]])
+
+    named = {name: both(triangles) for name, triangles in faces.items()}
+    return np.concatenate([points, mirror * points[~on_plane]]), both(tets), named

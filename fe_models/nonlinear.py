@@ -1,0 +1,206 @@
+"""How far geometric nonlinearity moves the contact forces and slips of a loaded structure.
+
+The linear model balances forces on the undeformed shape. Here both bodies are St. Venant-Kirchhoff
+in total Lagrangian form, the centrifugal force acts where the deformed mass is, and the contact
+faces are those of the deformed body 1: their frames turn by its mean rotation. Loads other than the
+centrifugal keep their direction. Sliding stays small: nodes keep their partners and gaps. Newton's
+method makes every iteration a linear structure with the same contact:
+
+    (K_T(u_k) - Ω² M) u = f + K_T(u_k) u_k - F(u_k) + contact forces.
+
+The frames are those of u_k too: they follow one iteration behind.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.friction import FrictionalJoint, FrictionState
+from fe_models.joint import JointResolvent
+from fe_models.relinearised import (
+    Displacements,
+    Softening,
+    relinearised,
+    turned_interface,
+)
+from fe_models.stress import deformation
+from fe_models.structure import Structure
+from fe_models.total_lagrangian import TotalLagrangian, rotation_angle
+from sa_solver.types import Array
+
+# Nodal forces left out of balance relative to all, and turn of the frames left [rad]: ten times
+# what friction.TOLERANCE leaves, a thousandth of the changes that are reported.
+TOLERANCE = 1e-6
+# Two or three iterations lead from the linear solution; one that takes more has lost its way.
+MAX_ITERATIONS = 12
+
+
+@dataclass(frozen=True)
+class NonlinearCheck:
+    """A load reached in one increment from rest, by the linear and the total Lagrangian model.
+
+    ``linear`` and ``nonlinear`` ``(interfaces, 6)`` are the resultants ``(P, Qx, Qy, Mx, My, Mz)``
+    in the frames of the undeformed and of the deformed faces [N, N mm], and ``change`` that of
+    :func:`resultant_change`. ``slip`` ``(2, n)`` over all interfaces [mm] is nonlinear,
+    ``slip_change`` the largest change of a slip relative to the largest slip. ``slide`` is the
+    largest slip relative to half the width of its face: the order of what small sliding leaves out
+    of the lever arms. ``displacements`` of both bodies are nonlinear; ``largest_strain`` (principal
+    of Green's tensor, in size), ``largest_rotation`` and ``face_rotation`` [rad] tell how large
+    they are. ``residual`` is what Newton's method leaves out of balance relative to the nodal
+    forces, or to turn [rad].
+    """
+
+    linear: Array
+    nonlinear: Array
+    change: Array
+    slip: Array
+    slip_change: float
+    slide: float
+    displacements: Displacements
+    largest_strain: float
+    largest_rotation: float
+    face_rotation: float
+    iterations: int
+    residual: float
+    converged: bool
+
+
+def check_nonlinearity(
+    structure: Structure,
+    like: JointResolvent,
+    friction: float,
+    amplitudes: Array,
+    gap: Array,
+    softening: Softening,
+) -> NonlinearCheck:
+    """Compare the linear structure with the total Lagrangian one at the loads ``amplitudes``.
+
+    ``like`` is the linear structure's condensed joint, ``softening`` the bodies' spin softening at
+    that load (:mod:`fe_models.spin_softening`). Raises ValueError if there is no load.
+    """
+    (linear,) = FrictionalJoint(like, friction).march(amplitudes[None], gap)
+    newton = _newton(structure, linear, like, friction, amplitudes, gap, softening)
+    first, last = (structure.interface_resultants(s) for s in (linear, newton.state))
+    finite = [TotalLagrangian(body.elastic) for body in (structure.body_1, structure.body_2)]
+    pairs = list(zip(finite, newton.displacements, strict=True))
+    return NonlinearCheck(
+        linear=first,
+        nonlinear=last,
+        change=resultant_change(structure, last, first),
+        slip=newton.state.slip,
+        slip_change=slip_change(newton.state.slip, linear.slip),
+        slide=_slide(structure, newton.state.slip),
+        displacements=newton.displacements,
+        largest_strain=max(own.largest_strain(u) for own, u in pairs),
+        largest_rotation=max(own.largest_rotation(u) for own, u in pairs),
+        face_rotation=_turn(structure, structure, newton.displacements),
+        iterations=newton.iterations,
+        residual=newton.residual,
+        converged=linear.converged and newton.converged,
+    )
+
+
+def resultant_change(structure: Structure, now: Array, then: Array) -> Array:
+    """Change of resultants ``(interfaces, 6)``: of forces by P, of moments by P and half a face.
+
+    A face that was open is measured by the P of the heaviest loaded.
+    """
+    loads = np.where(then[:, 0] > 0.0, then[:, 0], then[:, 0].max())
+    faces = _half_faces(structure)
+    longest = faces.max(axis=1)
+    # A line contact has no width along y, and no moment about x.
+    half_x, half_y = np.where(faces > 0.0, faces, longest[:, None]).T
+    one = np.ones_like(longest)
+    scales = loads * np.array([one, one, one, half_y, half_x, longest])
+    return np.asarray((now - then) / scales.T)
+
+
+def slip_change(now: Array, then: Array) -> float:
+    """Largest change of a slip ``(2, n)`` relative to the largest slip."""
+    largest = float(np.linalg.norm(then, axis=0).max())
+    change = float(np.linalg.norm(now - then, axis=0).max())
+    return change / largest if largest > 0.0 else change
+
+
+def _half_faces(structure: Structure) -> Array:
+    """Half the extent of every interface along x and y, ``(interfaces, 2)`` [mm]."""
+    return np.array([0.5 * np.ptp(i.coordinates, axis=0) for i in structure.mesh.interfaces])
+
+
+def _slide(structure: Structure, slip: Array) -> float:
+    """Largest slip relative to half the narrower extent of its face."""
+    interfaces = structure.mesh.interfaces
+    parts = np.split(np.linalg.norm(slip, axis=0), np.cumsum([len(i) for i in interfaces])[:-1])
+    widths = [half[half > 0.0].min() for half in _half_faces(structure)]
+    return max(float(part.max() / width) for part, width in zip(parts, widths, strict=True))
+
+
+@dataclass(frozen=True)
+class _Newton:
+    """Where Newton's method ended."""
+
+    state: FrictionState
+    displacements: Displacements
+    iterations: int
+    residual: float
+    converged: bool
+
+
+def _newton(
+    structure: Structure,
+    linear: FrictionState,
+    like: JointResolvent,
+    friction: float,
+    amplitudes: Array,
+    gap: Array,
+    softening: Softening,
+) -> _Newton:
+    """Re-linearise and solve the contact until the next linear structure would be the same."""
+    state, displacements = (
+        linear,
+        deformation(structure, linear.force, linear.displacement, amplitudes),
+    )
+    iterations, converged = 0, False
+    while not converged and iterations < MAX_ITERATIONS:
+        iterations += 1
+        tangent = relinearised(structure, displacements, amplitudes, softening)
+        joint = FrictionalJoint(tangent.condense(like).resolvent(), friction)
+        (state,) = joint.march(amplitudes[None], gap, guess=[state.state])
+        before, displacements = (
+            displacements,
+            deformation(tangent, state.force, state.displacement, amplitudes),
+        )
+        residual = max(
+            _remainder(tangent, before, displacements, softening),
+            _turn(structure, tangent, displacements),
+        )
+        converged = state.converged and residual < TOLERANCE
+    return _Newton(state, displacements, iterations, residual, converged)
+
+
+def _remainder(
+    tangent: Structure, before: Displacements, after: Displacements, softening: Softening
+) -> float:
+    """Nodal forces that a linear step from ``before`` to ``after`` leaves out, by all of them."""
+    shares = []
+    bodies = tangent.body_1, tangent.body_2
+    for body, u, v, soft in zip(bodies, before, after, softening, strict=True):
+        finite = TotalLagrangian(body.elastic)
+        force = finite.internal_force(v)
+        step = (body.elastic.stiffness + soft) @ (v - u)
+        left = force - finite.internal_force(u) - step
+        shares.append(float(np.linalg.norm(left) / np.linalg.norm(force)))
+    return max(shares)
+
+
+def _turn(undeformed: Structure, framed: Structure, displacements: Displacements) -> float:
+    """Largest angle from the frames of ``framed`` to body 1's displaced faces [rad]."""
+    body_1 = undeformed.mesh.body_1
+    pairs = zip(undeformed.mesh.interfaces, framed.mesh.interfaces, strict=True)
+    turns = [
+        turned_interface(own, body_1, displacements[0]).frame.axes @ other.frame.axes.T
+        for own, other in pairs
+    ]
+    return float(rotation_angle(np.array(turns)).max())

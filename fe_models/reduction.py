@@ -1,0 +1,257 @@
+"""Static condensation (Guyan) and Craig-Bampton reduction of one elastic body.
+
+The displacements are split into kept ones c and inner ones i, and u = T q with
+
+    T = [ I  0 ]     Ψ = -K_ii⁻¹ K_ic,     K_ii Φ = M_ii Φ Λ,  Φᵀ M_ii Φ = I:
+        [ Ψ  Φ ]
+
+the kept displacements with what they do to the rest statically, and the lowest modes with the kept
+displacements fixed. The reduced stiffness is block diagonal, the Schur complement and Λ; without
+modes it is the static condensation, exact as long as nothing moves.
+
+Sources: Guyan 1965, AIAA J. 3, 380, doi:10.2514/3.2874; Craig & Bampton 1968, AIAA J. 6, 1313,
+doi:10.2514/3.4741.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import scipy.linalg as sl
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.sparse.linalg import LinearOperator, eigsh
+
+from fe_models.linear_solver import Factorisation, factorise, schur_complement
+from sa_solver.types import Array
+
+# Kept displacements whose static shapes are computed at once: enough to amortise, little memory.
+COLUMNS_AT_ONCE = 256
+# The shift of a free body's search over the median of K_jj/M_jj, which no choice of coordinates
+# changes: small enough to separate rigid motions, and large enough that K - σ M is not singular.
+SHIFT_SHARE = 1e-7
+
+Indices = NDArray[np.int64]
+
+# Unit and description of every dataset of a stored model.
+DATASETS = {
+    "kept": ("1", "displacements of the full model that are kept, in this order"),
+    "stiffness": ("N/mm", "stiffness on kept displacements, then modes (modes: 1/s^2)"),
+    "mass": ("t", "mass on kept displacements, then modes (modes: 1, mixed: t^0.5)"),
+    "loads": ("N", "load cases on kept displacements, then modes (modes: N/t^0.5)"),
+    "mode_shapes": ("1/t^0.5", "fixed-interface modes over all displacements of the full model"),
+    "frequencies": ("Hz", "natural frequencies of the fixed-interface modes"),
+}
+
+
+@dataclass(frozen=True)
+class ReducedModel:
+    """A body on its ``kept`` displacements ``(c,)`` and its ``m`` lowest fixed-interface modes.
+
+    ``stiffness`` and ``mass`` ``(c + m, c + m)`` (no mass: None), ``loads`` ``(c + m, cases)``;
+    ``mode_shapes`` ``(n, m)`` of unit modal mass, zero where kept; their ``frequencies`` [Hz]. With
+    mm, N, s and t a modal coordinate has the unit t^0.5 mm.
+    """
+
+    kept: Indices
+    stiffness: Array
+    mass: Array | None
+    loads: Array
+    mode_shapes: Array
+    frequencies: Array
+
+    @property
+    def static_stiffness(self) -> Array:
+        """The Schur complement ``(c, c)``: stiffness on the kept displacements [N/mm]."""
+        return self.stiffness[: len(self.kept), : len(self.kept)]
+
+    def recover(self, stiffness: sp.csr_matrix, coordinates: Array) -> Array:
+        """Displacements ``(n, ...)`` of the full model of ``coordinates`` ``(c + m, ...)``.
+
+        ``stiffness`` is the full one; loads between the kept displacements act through the modes
+        only.
+        """
+        static, modal = np.split(coordinates, [len(self.kept)])
+        inner = _others(stiffness.shape[0], self.kept)
+        displacement = self.mode_shapes @ modal
+        displacement[self.kept] = static
+        coupling = stiffness[inner][:, self.kept] @ static
+        displacement[inner] -= factorise(stiffness[inner][:, inner].tocsr())(coupling)
+        return displacement
+
+
+def reduce_body(
+    stiffness: sp.csr_matrix,
+    mass: sp.csr_matrix | None,
+    kept: Indices,
+    modes: int = 0,
+    loads: Array | None = None,
+) -> ReducedModel:
+    """Reduce a body to its ``kept`` displacements and ``modes`` fixed-interface modes.
+
+    ``stiffness`` and ``mass`` ``(n, n)`` are symmetric; the mass may be left out where there are no
+    modes. ``loads`` ``(n, cases)``. The order of ``kept`` is that of the result. Raises
+    ``ValueError`` if modes are asked for that the body does not have, or without mass, and
+    :class:`~fe_models.linear_solver.SolverError` if the body can move while they are held.
+    """
+    size = stiffness.shape[0]
+    inner = _others(size, kept)
+    if modes > 0 and mass is None:
+        raise ValueError("fixed-interface modes need a mass matrix")
+    if modes >= len(inner) > 0 or modes < 0:
+        raise ValueError(f"{modes} modes of {len(inner)} inner displacements: take 0 to fewer")
+    solve = factorise(stiffness[inner][:, inner].tocsr())
+    static = schur_complement(stiffness, kept, inner, solve)
+    full_loads = np.zeros((size, 0)) if loads is None else loads
+    values, shapes = np.empty(0), np.zeros((size, modes))
+    if mass is not None and modes > 0:
+        values, shapes[inner] = _lowest_modes(stiffness, mass, inner, modes, solve)
+    return ReducedModel(
+        kept=kept,
+        stiffness=_block_diagonal(static, np.diag(values)),
+        mass=None if mass is None else _reduced_mass(stiffness, mass, kept, inner, shapes, solve),
+        loads=_reduced_loads(stiffness, full_loads, kept, inner, shapes, solve),
+        mode_shapes=shapes,
+        frequencies=np.sqrt(values) / (2.0 * np.pi),
+    )
+
+
+def free_frequencies(
+    stiffness: sp.csr_matrix | Array, mass: sp.csr_matrix | Array, count: int
+) -> Array:
+    """The ``count`` lowest natural frequencies ``(count,)`` [Hz], rigid motions included.
+
+    The body may be free. Dense matrices are those of a reduced model. What rounding leaves of a
+    rigid motion is the root of its |ω²|. Raises ``ValueError`` if there are not as many.
+    """
+    size = stiffness.shape[0]
+    if not 0 < count < size:
+        raise ValueError(f"{count} frequencies of {size} displacements: take 1 to fewer than those")
+    # A shift below zero makes a free body's K - σ M definite, and keeps rigid motions exact beside
+    # frequencies that are higher by many orders.
+    shift = -SHIFT_SHARE * float(np.median(stiffness.diagonal() / mass.diagonal()))
+    shifted = stiffness - shift * mass
+    if isinstance(shifted, np.ndarray):
+        wanted = size - count, size - 1
+        inverses = sl.eigh(mass, shifted, eigvals_only=True, subset_by_index=wanted)
+        squares = 1.0 / inverses + shift
+    else:
+        inverse = LinearOperator(shifted.shape, matvec=factorise(shifted.tocsr()), dtype=np.float64)
+        squares = eigsh(
+            stiffness, count, mass, sigma=shift, OPinv=inverse, v0=_start(size),
+            return_eigenvectors=False,
+        )  # fmt: skip
+    return np.sqrt(np.abs(np.sort(squares))) / (2.0 * np.pi)
+
+
+def save_reduced(path: Path, model: ReducedModel) -> None:
+    """Write a model to HDF5: beside its place and renamed, so that no file is half written."""
+    with _replacing(path) as partial, h5py.File(partial, "w") as file:
+        for name, (unit, description) in DATASETS.items():
+            values = getattr(model, name)
+            if values is not None:
+                file.create_dataset(name, data=values).attrs.update(
+                    unit=unit, description=description
+                )
+
+
+def load_reduced(path: Path) -> ReducedModel:
+    """Read a model that :func:`save_reduced` has written."""
+    with h5py.File(path, "r") as file:
+        found: dict[str, Any] = {name: file[name][()] for name in DATASETS if name in file}
+    return ReducedModel(**({"mass": None} | found))
+
+
+@contextmanager
+def _replacing(path: Path) -> Iterator[Path]:
+    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        yield partial
+        partial.replace(path)
+    finally:
+        partial.unlink(missing_ok=True)
+
+
+def _others(size: int, kept: Indices) -> Indices:
+    return np.setdiff1d(np.arange(size), kept)
+
+
+def _start(size: int) -> Array:
+    """The same start for every Lanczos search, without a symmetry that would hide modes."""
+    return np.random.default_rng(0).standard_normal(size)
+
+
+def _lowest_modes(
+    stiffness: sp.csr_matrix,
+    mass: sp.csr_matrix,
+    inner: Indices,
+    modes: int,
+    solve: Factorisation,
+) -> tuple[Array, Array]:
+    """The lowest ω² ``(m,)`` and modes ``(i, m)`` of unit modal mass, kept displacements fixed.
+
+    Each mode's sign is that of its product with one fixed random vector: the largest entry would
+    not do, since a symmetric body has it several times, with either sign.
+    """
+    K, M = (matrix[inner][:, inner].tocsr() for matrix in (stiffness, mass))
+    inverse = LinearOperator(K.shape, matvec=solve, dtype=np.float64)
+    start = _start(len(inner))
+    values, shapes = eigsh(K, modes, M, sigma=0.0, OPinv=inverse, v0=start)
+    order = np.argsort(values)
+    values, shapes = values[order], shapes[:, order]
+    shapes *= np.where(start @ shapes < 0.0, -1.0, 1.0)
+    return values, shapes / np.sqrt(np.einsum("im,im->m", shapes, M @ shapes))
+
+
+def _reduced_mass(
+    stiffness: sp.csr_matrix,
+    mass: sp.csr_matrix,
+    kept: Indices,
+    inner: Indices,
+    shapes: Array,
+    solve: Factorisation,
+) -> Array:
+    """Tᵀ M T, the static shapes Ψ held in full: ``(i, c)``."""
+    coupling = stiffness[inner][:, kept].tocsc()
+    static = np.empty((len(inner), len(kept)))
+    for start in range(0, len(kept), COLUMNS_AT_ONCE):
+        block = slice(start, start + COLUMNS_AT_ONCE)
+        static[:, block] = -solve(coupling[:, block].toarray())
+    inner_mass, coupling_mass = mass[inner][:, inner], mass[inner][:, kept]
+    half = coupling_mass.T @ static
+    kept_mass = mass[kept][:, kept].toarray() + half + half.T + static.T @ (inner_mass @ static)
+    modal = shapes[inner]
+    mixed = static.T @ (inner_mass @ modal) + coupling_mass.T @ modal
+    reduced = _block_diagonal(0.5 * (kept_mass + kept_mass.T), np.eye(modal.shape[1]))
+    reduced[: len(kept), len(kept) :] = mixed
+    reduced[len(kept) :, : len(kept)] = mixed.T
+    return reduced
+
+
+def _reduced_loads(
+    stiffness: sp.csr_matrix,
+    loads: Array,
+    kept: Indices,
+    inner: Indices,
+    shapes: Array,
+    solve: Factorisation,
+) -> Array:
+    """Tᵀ f of load cases ``(n, cases)``."""
+    static = loads[kept]
+    if loads.shape[1] > 0:
+        static = static - stiffness[kept][:, inner] @ solve(loads[inner])
+    return np.concatenate([static, shapes.T @ loads])
+
+
+def _block_diagonal(first: Array, second: Array) -> Array:
+    size = len(first)
+    both = np.zeros((size + len(second),) * 2)
+    both[:size, :size], both[size:, size:] = first, second
+    return both

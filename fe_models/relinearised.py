@@ -1,0 +1,204 @@
+"""Linear structures that know their load: stress-stiffened, spin-softened, re-linearised.
+
+Both keep every load of the linear structure in proportion, and the stiffness of one load, the peak,
+at all loads: approximations of the nonlinear structure that cost one more condensation. At a share
+a of the peak load nonlinearity moves the contact forces by a² of what it moves them at peak; here
+it moves them by a.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from dataclasses import dataclass, replace
+
+import numpy as np
+import scipy.sparse as sp
+
+from fe_models.friction import FrictionState
+from fe_models.joint import JointResolvent
+from fe_models.mesh import Body, Interface, in_space
+from fe_models.structure import Structure
+from fe_models.supported_body import SupportedBody, interface_frames
+from fe_models.total_lagrangian import TotalLagrangian
+from sa_solver.types import Array, Frame
+
+# Displacements, or spin softening matrices, of body 1 and body 2.
+Displacements = tuple[Array, Array]
+Softening = tuple[sp.csr_matrix, sp.csr_matrix]
+
+
+@dataclass(frozen=True)
+class PrestressedStructure(Structure):
+    """A structure with the stiffness that it has at one load.
+
+    ``displacements`` of both bodies and ``amplitudes`` ``(cases,)`` are those of that load.
+    """
+
+    displacements: Displacements
+    amplitudes: Array
+
+    def condense_path(self, like: JointResolvent) -> JointResolvent:
+        """The joint for a whole load path, ``like`` that of the linear structure.
+
+        What contact alone holds in a centrifugal field has a negative stiffness to rigid motions,
+        which would throw it out where nothing presses any more, though by then nothing spins. Here
+        they are free, as in the linear structure, under the forces that they bear at
+        ``amplitudes``, in proportion to the load.
+        """
+        joint = self.condense(like)
+        free = ~self.body_2.held
+        stiffness = _deflated(joint.stiffness, self._rigid_motions()[free])
+        relative = self._relative()[free]
+        taken = joint.stiffness @ relative - stiffness @ relative
+        loads = joint.loads + np.outer(taken, _share(self.amplitudes))
+        return replace(joint, stiffness=stiffness, loads=loads).resolvent()
+
+    def equilibrium_errors(self, states: Sequence[FrictionState], amplitudes: Array) -> Array:
+        """As of any structure, with what the stiffness takes from rigid motions among the loads.
+
+        The forces -K u of the one load, in proportion, as in :meth:`condense_path`. They balance as
+        well as ``displacements`` are those of this structure.
+        """
+        forces = -self.body_2.elastic.stiffness @ self.displacements[1]
+        body_2 = copy(self.body_2)
+        body_2.loads = self.body_2.loads + np.outer(forces, _share(self.amplitudes))
+        plain = Structure(self.mesh, self.body_1, body_2)
+        return plain.equilibrium_errors(states, amplitudes)
+
+    def _relative(self) -> Array:
+        """Displacements of body 2 relative to body 1 ``(d n,)`` at the load, in the frames."""
+        axes = self.mesh.body_1.axes
+        nodal_1, nodal_2 = (in_space(u.reshape(-1, len(axes))) for u in self.displacements)
+        relative = []
+        for face in self.mesh.interfaces:
+            below = nodal_1[face.nodes_1]
+            if face.projection is not None:
+                below = face.projection @ below
+            relative.append(face.frame.components(nodal_2[face.nodes_2] - below))
+        return np.concatenate(relative)[:, axes].ravel()
+
+    def _rigid_motions(self) -> Array:
+        """Orthonormal motions ``(d n, k)`` of the interfaces that body 2's supports leave free."""
+        faces = self.mesh.interfaces
+        points = [self.mesh.body_2.points[face.nodes_2] for face in faces]
+        middle = np.concatenate(points).mean(axis=0)
+        size = float(np.linalg.norm(np.ptp(np.concatenate(points), axis=0)))
+        axes = self.mesh.body_2.axes
+        free = self.body_2.free_motions(middle, size)
+        motions = np.empty((len(free), len(axes) * sum(len(own) for own in points)))
+        for row, motion in zip(motions, free, strict=True):
+            moved = [motion[:3] + np.cross(motion[3:], (own - middle) / size) for own in points]
+            pairs = zip(faces, moved, strict=True)
+            local = np.concatenate([face.frame.components(own) for face, own in pairs])
+            row[:] = local[:, axes].ravel()
+        return np.asarray(np.linalg.qr(motions.T)[0])
+
+
+def stress_stiffened(
+    structure: Structure, displacements: Displacements, amplitudes: Array, softening: Softening
+) -> PrestressedStructure:
+    """K + K_σ - Ω² M: stressed as by the linear ``displacements``, spinning, but not displaced.
+
+    The classical linear perturbation. Loads, shape and frames are those of the linear structure: it
+    has the second-order effect of the stress on displacements across it, and leaves out what the
+    displacements themselves change, which :func:`relinearised` does not.
+    """
+    bodies = []
+    pairs = zip((structure.body_1, structure.body_2), displacements, softening, strict=True)
+    for number, (body, displacement, soft) in enumerate(pairs, start=1):
+        stiffness = TotalLagrangian(body.elastic).stress_stiffened(displacement) - soft
+        bodies.append(_changed(body, number, structure.mesh.interfaces, stiffness, body.loads))
+    return PrestressedStructure(structure.mesh, bodies[0], bodies[1], displacements, amplitudes)
+
+
+def relinearised(
+    structure: Structure, displacements: Displacements, amplitudes: Array, softening: Softening
+) -> PrestressedStructure:
+    """The linear structure that is tangent to the nonlinear one at given displacements.
+
+    Both bodies take the total Lagrangian tangent stiffness less the spin softening, and loads that
+    are exact for ``displacements`` at the load ``amplitudes`` ``(cases,)``; at other loads they are
+    in proportion, so that the unloaded structure stays unloaded. The interface frames are turned
+    with body 1's faces. Raises ValueError if there is no load.
+    """
+    body_1 = structure.mesh.body_1
+    interfaces = tuple(
+        turned_interface(i, body_1, displacements[0]) for i in structure.mesh.interfaces
+    )
+    share = _share(amplitudes)
+    bodies = []
+    pairs = zip((structure.body_1, structure.body_2), displacements, softening, strict=True)
+    for number, (body, displacement, soft) in enumerate(pairs, start=1):
+        finite = TotalLagrangian(body.elastic)
+        tangent = finite.tangent(displacement)
+        offset = tangent @ displacement - finite.internal_force(displacement)
+        loads = body.loads + np.outer(offset, share)
+        bodies.append(_changed(body, number, interfaces, tangent - soft, loads))
+    mesh = replace(structure.mesh, interfaces=interfaces)
+    return PrestressedStructure(mesh, bodies[0], bodies[1], displacements, amplitudes)
+
+
+def turned_interface(interface: Interface, body_1: Body, displacement: Array) -> Interface:
+    """The interface with its frame turned by the mean rotation of body 1's face."""
+    axes = body_1.axes
+    points = body_1.points[interface.nodes_1][:, axes]
+    nodal = displacement.reshape(-1, len(axes))[interface.nodes_1]
+    rotation = np.eye(3)
+    rotation[np.ix_(axes, axes)] = mean_rotation(
+        points, points + nodal, interface.face(1).nodal_areas
+    )
+    turned = replace(interface, frame=_turned(interface.frame, rotation))
+    if interface.face_1 is None:
+        return turned
+    own = replace(interface.face_1, frame=_turned(interface.face_1.frame, rotation))
+    return replace(turned, face_1=own)
+
+
+def mean_rotation(before: Array, after: Array, weights: Array) -> Array:
+    """Rotation ``(d, d)`` that turns points ``(n, d)`` closest to where they are after.
+
+    Weighted least squares (Kabsch 1976, doi:10.1107/S0567739476001873).
+    """
+    centred = [points - weights @ points / weights.sum() for points in (before, after)]
+    left, _, right = np.linalg.svd((weights[:, None] * centred[1]).T @ centred[0])
+    signs = np.ones(before.shape[1])
+    signs[-1] = np.sign(np.linalg.det(left @ right))
+    return np.asarray((left * signs) @ right)
+
+
+def _turned(frame: Frame, rotation: Array) -> Frame:
+    return Frame(frame.origin, frame.axes @ rotation.T)
+
+
+def _deflated(stiffness: Array, motions: Array) -> Array:
+    """P H P, P taking the part in orthonormal ``motions`` ``(n, k)`` away."""
+    forces = stiffness @ motions
+    inner = motions.T @ forces
+    half = (forces - 0.5 * motions @ inner) @ motions.T
+    return np.asarray(stiffness - half - half.T)
+
+
+def _share(amplitudes: Array) -> Array:
+    """Weights ``(cases,)`` whose sum is one at the amplitudes and falls with them."""
+    largest = int(np.argmax(np.abs(amplitudes)))
+    if amplitudes[largest] == 0.0:
+        raise ValueError("a structure is re-linearised at a load: its amplitudes are all zero")
+    share = np.zeros_like(amplitudes)
+    share[largest] = 1.0 / amplitudes[largest]
+    return share
+
+
+def _changed(
+    body: SupportedBody,
+    number: int,
+    interfaces: tuple[Interface, ...],
+    stiffness: sp.csr_matrix,
+    loads: Array,
+) -> SupportedBody:
+    """Body ``number``, supported as it is, with another stiffness, other loads and frames."""
+    elastic = copy(body.elastic)
+    elastic.stiffness = stiffness
+    nodes = np.concatenate([(i.nodes_1, i.nodes_2)[number - 1] for i in interfaces])
+    frames = interface_frames(interfaces, number, elastic.body)
+    return SupportedBody(elastic, body.constraints, nodes, frames, loads, body.imposed)

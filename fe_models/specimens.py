@@ -1,0 +1,94 @@
+"""Craig-Bampton models of the two specimens of a friction rig, on their pads and rings."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from fe_models.constraints import Constraints
+from fe_models.elasticity import ElasticBody
+from fe_models.geometry.specimens import CONTACT, Specimen
+from fe_models.mesh import Body, StructureMesh
+from fe_models.reduction import ReducedModel, reduce_body
+from sa_solver.types import Array, Material
+
+# Fixed-interface modes of each specimen ("Dynamics simulations of fretting wear for aero-engine
+# applications", thesis, section 4.2).
+MODES = 20
+
+
+@dataclass(frozen=True)
+class SpecimenMatrices:
+    """The free specimen with a linear trace on its pad, and on its ring if that is tied.
+
+    ``stiffness`` and ``mass`` ``(n, n)`` on the displacements that are left, ``transformation``
+    ``(all, n)`` to those of all nodes; ``kept`` are the three displacements of each pad node, in
+    the interface's order, and then of each ring node.
+    """
+
+    stiffness: sp.csr_matrix
+    mass: sp.csr_matrix
+    transformation: sp.csr_matrix
+    kept: NDArray[np.int64]
+
+
+def specimen_matrices(
+    specimen: Specimen,
+    body: Body,
+    pad: NDArray[np.int64],
+    material: Material,
+    order: int = 2,
+    tied_ring: bool = True,
+) -> SpecimenMatrices:
+    """Matrices of one free specimen, ``pad`` its vertices in the interface's order.
+
+    With ``tied_ring`` the circumference moves linearly from each ring node to the next, so that
+    held ring nodes hold a line. Held points would give way the more the finer the mesh is: 90, 86
+    and 84 N/µm for the pair with elements of 1.5, 1 and 0.6 mm, against 98.1, 97.2 and 96.7.
+    """
+    elastic = ElasticBody(body, material, order)
+    ring = specimen.ring(body)
+    constraints = Constraints(len(elastic.nodes))
+    constraints.average(*elastic.midsides(CONTACT))
+    if tied_ring and order == 2:
+        edges = np.stack([ring, np.roll(ring, -1)], axis=1)
+        middle = elastic.nodes[edges].mean(axis=1)
+        constraints.average(cKDTree(elastic.nodes).query(middle)[1].astype(np.int64), edges)
+    nodes = np.concatenate([pad, ring])
+    t = constraints.transformation()
+    return SpecimenMatrices(
+        stiffness=(t.T @ elastic.stiffness @ t).tocsr(),
+        mass=(t.T @ elastic.mass @ t).tocsr(),
+        transformation=t,
+        kept=np.searchsorted(constraints.free, (3 * nodes[:, None] + np.arange(3)).ravel()),
+    )
+
+
+def reduced_specimens(
+    specimen: Specimen,
+    mesh: StructureMesh,
+    materials: tuple[Material, Material],
+    order: int = 2,
+    tied_ring: bool = True,
+    modes: int = MODES,
+) -> tuple[ReducedModel, ReducedModel]:
+    """Both specimens on pad and ring, body 1 first."""
+    (face,) = mesh.interfaces
+    models = []
+    for body, pad, material in zip(
+        (mesh.body_1, mesh.body_2), (face.nodes_1, face.nodes_2), materials, strict=True
+    ):
+        full = specimen_matrices(specimen, body, pad, material, order, tied_ring)
+        mass = full.mass if modes > 0 else None
+        models.append(reduce_body(full.stiffness, mass, full.kept, modes))
+    return models[0], models[1]
+
+
+def pad_stiffness(model: ReducedModel, specimen: Specimen) -> Array:
+    """Stiffness ``(3 n, 3 n)`` [N/mm] of the pad's nodes with the ring held."""
+    count = len(model.kept) - 3 * specimen.ring_nodes
+    return model.static_stiffness[:count, :count]

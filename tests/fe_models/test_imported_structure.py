@@ -1,0 +1,412 @@
+"""Bodies of a user's mesh: supports, loads and contacts, symmetry planes, closed cycles."""
+
+import numpy as np
+import pytest
+from skfem import MeshTet, MeshTri
+
+from fe_models import friction, structure
+from fe_models.friction import FrictionalJoint
+from fe_models.geometry.imported import ImportedMesh
+from fe_models.imported_structure import (
+    Acceleration,
+    ContactPair,
+    Displacement,
+    Force,
+    Pressure,
+    Rotation,
+    Support,
+    imported_mesh,
+    imported_structure,
+)
+from fe_models.mesh import Body, MeshError
+from fe_models.remesh import element_volumes
+from fe_models.stress import stress_state
+from fe_models.structure import CLOSED, MOST_CYCLES
+from sa_solver.types import Material
+
+STEEL = Material(200e3, 0.3, 7.8e-9)
+PAIR = ContactPair("foot", "top", "bottom", np.array([1.0, 0.0, 0.0]))
+MU = 0.5
+
+
+def along(*counts):
+    """Node coordinates of pieces ``(from, to, elements)`` one after the other."""
+    return np.unique(np.concatenate([np.linspace(a, b, n + 1) for a, b, n in counts]))
+
+
+def with_faces(mesh, faces):
+    """Name boundaries by the axis and value of their planes."""
+    return mesh.with_boundaries(
+        {
+            name: (lambda x, axis=axis, value=value: np.isclose(x[axis], value))
+            for name, (axis, value) in faces.items()
+        }
+    )
+
+
+def mirrored(mesh, axis):
+    """The mesh with its mirror image at coordinate 0, nodes there shared."""
+    points, count = mesh.p, mesh.p.shape[1]
+    image = points.copy()
+    image[axis] *= -1.0
+    place = np.arange(count) + count
+    plane = np.isclose(points[axis], 0.0)
+    place[plane] = np.flatnonzero(plane)
+    kept, numbers = np.unique(np.concatenate([mesh.t, place[mesh.t]], axis=1), return_inverse=True)
+    return type(mesh)(np.hstack([points, image])[:, kept], numbers.reshape(mesh.t.shape[0], -1))
+
+
+def imported(lower, upper, points=None):
+    bodies = {"lower": Body("lower", lower), "upper": Body("upper", upper)}
+    numbers = {name: np.arange(body.mesh.nvertices) for name, body in bodies.items()}
+    return ImportedMesh(bodies, numbers, {"lower": {}, "upper": {}} | (points or {}))
+
+
+def built(mesh, supports, loads, order=1, pair=PAIR):
+    interfaces = imported_mesh(mesh, ("lower", "upper"), [pair])
+    return imported_structure(interfaces, mesh, (STEEL, STEEL), supports, loads, order)
+
+
+def solved(joined, amplitudes, preload=None, mu=MU):
+    joint = FrictionalJoint(joined.condense().resolvent(), mu)
+    return joined.solve_cycle(joint, amplitudes, joined.gap(), mu, preload=preload)
+
+
+@pytest.fixture
+def precise(monkeypatch):
+    """Solved to the last digits, and always three cycles: those of any two models compare."""
+    monkeypatch.setattr(friction, "TOLERANCE", 1e-12)
+    monkeypatch.setattr(structure, "CLOSED", -1.0)
+    monkeypatch.setattr(structure, "MOST_CYCLES", 3)
+
+
+# --- supports on a contact face -------------------------------------------------------------------
+
+PRESSED = [Pressure("lid", 50.0), Force("lid", np.array([60.0, 0.0, 0.0]))]
+PATH = np.array([[1.0, 0.0], [1.0, 1.0], [1.0, -1.0]])
+
+
+def block_and_pad(full, match):
+    """A pad on a wider block, half of it (y > 0) or all; meshes match on the face or do not."""
+    x, z = along((-2, -1, 1), (-1, 1, 4), (1, 2, 1)), along((-2, 0, 2))
+    lower = MeshTet.init_tensor(x, along((0, 1, 2), (1, 2, 1)), z)
+    across = along((-1, 1, 4)) if match else along((-1, 1, 3))
+    deep = along((0, 1, 2)) if match else along((0, 1, 3))
+    upper = MeshTet.init_tensor(across, deep, along((0, 1, 2)))
+    if full:
+        lower, upper = mirrored(lower, 1), mirrored(upper, 1)
+    top = lower.facets_satisfying(
+        lambda p: np.isclose(p[2], 0.0) & (np.abs(p[0]) < 1.0) & (np.abs(p[1]) < 1.0)
+    )
+    lower = with_faces(lower, {"base": (2, -2.0), "plane": (1, 0.0)}).with_boundaries({"top": top})
+    upper = with_faces(upper, {"bottom": (2, 0.0), "lid": (2, 1.0), "plane": (1, 0.0)})
+    return imported(lower, upper)
+
+
+@pytest.mark.parametrize("match", [True, False])
+@pytest.mark.parametrize("order", [1, 2])
+def test_half_model_equals_the_full_one(order, match, precise):
+    """A plane of symmetry through the contact, along the frame's x: loads are halved."""
+    base, plane = Support("base", "xyz"), Support("plane", "normal")
+    shares = PATH * [1.0, 0.5]  # half the force on half the lid
+    half = built(block_and_pad(False, match), [base, plane], PRESSED, order)
+    full = built(block_and_pad(True, match), [base], PRESSED, order)
+    one, two = solved(half, shares, mu=0.35), solved(full, PATH, mu=0.35)
+    assert one.converged
+    assert two.converged
+    (own,), (whole,) = one.histories, two.histories
+    load = whole.loads.P.max()
+    work = load * np.abs(whole.displacement).max()
+    for name, scale in (("P", load), ("Qx", load), ("Edx", work)):
+        values = getattr(own.loads, name), getattr(whole.loads, name)
+        np.testing.assert_allclose(2.0 * values[0], values[1], atol=1e-8 * scale)
+    assert whole.loads.Edx.sum() > 1e-6 * work
+    places = half.mesh.body_2.points[own.interface.nodes_2]
+    there = full.mesh.body_2.points[whole.interface.nodes_2]
+    match_of = [int(np.argmin(np.linalg.norm(there - place, axis=1))) for place in places]
+    twice = np.where(np.isclose(places[:, 1], 0.0), 2.0, 1.0)
+    largest = whole.force.max()
+    np.testing.assert_allclose(twice * own.force, whole.force[..., match_of], atol=1e-8 * largest)
+    assert not own.force[:, 1][:, twice > 1.0].any()
+    assert not own.displacement[:, 1][:, twice > 1.0].any()
+    assert max(one.equilibrium.max(), two.equilibrium.max()) < 1e-9
+    # Displacements and stresses of both bodies, recovered from the interface.
+    fields = [
+        stress_state(s, h.force[1], h.displacement[1], a)
+        for s, h, a in ((half, own, shares[1]), (full, whole, PATH[1]))
+    ]
+    for body, mine, theirs in zip((1, 2), *fields, strict=True):
+        places = getattr(half.mesh, f"body_{body}").points
+        there = getattr(full.mesh, f"body_{body}").points
+        found = [int(np.argmin(np.linalg.norm(there - place, axis=1))) for place in places]
+        largest = np.abs(theirs.displacement).max()
+        np.testing.assert_allclose(
+            mine.displacement, theirs.displacement[found], atol=1e-7 * largest
+        )
+
+
+def plane_block_and_pad(full):
+    """The section of such a joint, half (X > 0) or all of it."""
+    lower = MeshTri.init_tensor(along((0, 1, 4), (1, 2, 2)), along((-2, 0, 3)))
+    upper = MeshTri.init_tensor(along((0, 1, 5)), along((0, 1, 3)))
+    if full:
+        lower, upper = mirrored(lower, 0), mirrored(upper, 0)
+    lower = with_faces(lower, {"base": (1, -2.0), "top": (1, 0.0), "plane": (0, 0.0)})
+    upper = with_faces(upper, {"bottom": (1, 0.0), "lid": (1, 1.0), "plane": (0, 0.0)})
+    return imported(lower, upper)
+
+
+def test_half_section_equals_the_full_one(precise):
+    """The plane of symmetry is across the frame's x: friction acts towards it on both sides."""
+    base, plane = Support("base", "xz"), Support("plane", "x")
+    loads, path = [Pressure("lid", 50.0)], np.array([[0.5], [1.0], [0.2]])
+    half = built(plane_block_and_pad(False), [base, plane], loads)
+    full = built(plane_block_and_pad(True), [base], loads)
+    one, two = solved(half, path, mu=0.1), solved(full, path, mu=0.1)
+    (own,), (whole,) = one.histories, two.histories
+    np.testing.assert_allclose(2.0 * own.loads.P, whole.loads.P, rtol=1e-8)
+    assert own.loads.Edx.sum() > 0.0
+    np.testing.assert_allclose(
+        2.0 * own.loads.Edx, whole.loads.Edx, atol=1e-8 * whole.loads.Edx.max()
+    )
+
+
+def test_slice_in_plane_strain(precise):
+    """Held along y everywhere it never leaves the plane, and is the section but for its mesh."""
+    x = along((-2, -1, 2), (-1, 1, 12), (1, 2, 2))
+    lower = MeshTet.init_tensor(x, np.array([0.0, 0.1]), along((-2, 0, 5)))
+    upper = MeshTet.init_tensor(along((-1, 1, 12)), np.array([0.0, 0.1]), along((0, 1, 4)))
+    ends = {"front": (1, 0.0), "back": (1, 0.1)}
+    lower = with_faces(lower, {"base": (2, -2.0), "top": (2, 0.0)} | ends)
+    upper = with_faces(upper, {"bottom": (2, 0.0), "lid": (2, 1.0)} | ends)
+    held = [Support("base", "xyz"), Support("front", "y"), Support("back", "y")]
+    path = np.array([[1.0, 0.0], [1.0, 1.0]])
+    tall = [Pressure("lid", 50.0), Force("lid", np.array([3.0, 0.0, 0.0]))]
+    slice_ = solved(built(imported(lower, upper), held, tall), path)
+    (history,) = slice_.histories
+    assert not history.force[:, 1].any()
+    assert not history.displacement[:, 1].any()
+    np.testing.assert_allclose(history.loads.P, 10.0, rtol=1e-9)
+    np.testing.assert_allclose(history.loads.Qx, [0.0, -3.0], atol=1e-8)
+    section = imported(
+        with_faces(MeshTri.init_tensor(x, along((-2, 0, 5))), {"base": (1, -2.0), "top": (1, 0.0)}),
+        with_faces(
+            MeshTri.init_tensor(along((-1, 1, 12)), along((0, 1, 4))),
+            {"bottom": (1, 0.0), "lid": (1, 1.0)},
+        ),
+    )
+    loads = [Pressure("lid", 50.0), Force("lid", np.array([30.0, 0.0, 0.0]))]
+    (flat,) = solved(built(section, [Support("base", "xz")], loads), path).histories
+    # Energy has the rate of the mesh squared; these two differ in their diagonals only.
+    approach = [h.displacement[1, 0].mean() for h in (history, flat)]
+    assert history.loads.P[1] / 0.1 == pytest.approx(flat.loads.P[1], rel=1e-8)
+    np.testing.assert_allclose(approach[0], approach[1], atol=2e-5)
+
+
+@pytest.mark.parametrize(
+    ("supports", "wrong"),
+    [
+        (
+            [Support("base", "xyz"), Support("upper_plane", "y")],
+            "held along the face on body upper",
+        ),
+        ([Support("base", "xyz"), Support("bottom", "z")], "held along the contact's normal"),
+        ([Support("base", "xyz"), Support("bottom", "mean_x")], "a mean over a boundary"),
+        ([Support("base", "xy")], "let body lower"),
+        ([Support("base", "xyz"), Support("nowhere", "x")], "no boundary or node set nowhere"),
+    ],
+)
+def test_supports_that_cannot_be_are_refused(supports, wrong):
+    mesh = block_and_pad(False, True)
+    upper = mesh.bodies["upper"].mesh
+    renamed = upper.with_boundaries({"upper_plane": upper.boundaries["plane"]})
+    mesh.bodies["upper"] = Body("upper", renamed)
+    with pytest.raises(MeshError, match=wrong):
+        built(mesh, supports, PRESSED)
+
+
+def test_plane_askew_to_the_frame_is_refused():
+    askew = ContactPair("foot", "top", "bottom", np.array([1.0, 1.0, 0.0]))
+    held = [Support("base", "xyz"), Support("plane", "y")]
+    with pytest.raises(MeshError, match="no axis of the contact's frame"):
+        built(block_and_pad(False, True), held, PRESSED, pair=askew)
+
+
+def test_displacement_imposed_on_a_contact_face_is_refused():
+    moved = [Displacement("plane", np.array([0.0, 1e-3, 0.0]))]
+    with pytest.raises(MeshError, match="imposed on nodes of a contact face"):
+        built(block_and_pad(False, True), [Support("base", "xyz")], moved)
+
+
+def test_body_1_alone_may_be_held_at_the_face(precise):
+    """Its nodes at rest where they meet the support; body 2 still slides over them."""
+    mesh = block_and_pad(False, True)
+    lower = mesh.bodies["lower"].mesh
+    mesh.bodies["lower"] = Body("lower", lower.with_boundaries({"wall": lower.boundaries["plane"]}))
+    joined = built(mesh, [Support("base", "xyz"), Support("wall", "y")], PRESSED)
+    cycle = solved(joined, PATH * [1.0, 0.5])
+    assert cycle.converged
+    assert cycle.equilibrium.max() < 1e-9
+    assert joined.held_faces == ()
+
+
+# --- loads ----------------------------------------------------------------------------------------
+
+
+def domed():
+    """A box whose top bulges over its flat rim, 2 x 1 x 1 below it; and a block under it."""
+    upper = MeshTet.init_tensor(along((0, 2, 6)), along((0, 1, 4)), along((0, 1, 3)))
+    x, y, z = upper.p
+    points = upper.p.copy()
+    points[2] += 0.3 * z * x * (2.0 - x) * y * (1.0 - y)
+    faces = upper.facets_satisfying(lambda p: np.isclose(p[2], 1.0))
+    upper = with_faces(upper, {"bottom": (2, 0.0), "side": (0, 2.0)}).with_boundaries(
+        {"dome": faces}
+    )
+    upper = MeshTet(points, upper.t, _boundaries=upper.boundaries)
+    lower = MeshTet.init_tensor(along((0, 2, 2)), along((0, 1, 2)), along((-1, 0, 2)))
+    return imported(with_faces(lower, {"top": (2, 0.0), "base": (2, -1.0)}), upper)
+
+
+def resultants(load, about=(0.0, 0.0, 0.0)):
+    mesh = domed()
+    joined = built(mesh, [Support("base", "xyz")], [load])
+    force, moment = joined.body_2.load_resultants(np.ones(1), np.array(about))
+    upper = mesh.bodies["upper"].mesh
+    volumes = np.abs(element_volumes(upper))
+    centre = volumes @ upper.p[:, upper.t].mean(axis=1).T / volumes.sum()
+    return force, moment, volumes.sum(), centre
+
+
+def test_pressure_on_a_dome_is_that_on_its_rim():
+    """Pressure on any surface over a flat rim: -p A, whatever the surface."""
+    force, _, _, _ = resultants(Pressure("dome", 3.0))
+    np.testing.assert_allclose(force, [0.0, 0.0, -6.0], atol=1e-12)
+
+
+def test_force_is_spread_about_the_centroid():
+    force, moment, _, _ = resultants(Force("side", np.array([5.0, -7.0, 11.0])), (2.0, 0.5, 0.5))
+    np.testing.assert_allclose(force, [5.0, -7.0, 11.0], rtol=1e-12)
+    np.testing.assert_allclose(moment, 0.0, atol=1e-12)
+
+
+def test_rotation_about_a_shifted_axis():
+    """ρ V Ω² times the arm of the centre of mass, and no moment about the axis itself."""
+    axis, through, speed = np.array([1.0, 2.0, 2.0]) / 3.0, np.array([5.0, -3.0, 7.0]), 600.0
+    load = Rotation(3.0 * axis, through, speed)
+    force, moment, volume, centre = resultants(load, through)
+    arm = centre - through
+    radial = arm - axis * (axis @ arm)
+    expected = STEEL.density * volume * speed**2 * radial
+    np.testing.assert_allclose(force, expected, rtol=1e-10)
+    assert moment @ axis == pytest.approx(0.0, abs=1e-10 * np.abs(moment).max())
+
+
+def test_acceleration_pulls_backwards():
+    pull = np.array([1e4, -2e4, 3e4])
+    force, _, volume, _ = resultants(Acceleration(pull))
+    np.testing.assert_allclose(force, -STEEL.density * volume * pull, rtol=1e-10)
+
+
+def test_load_across_the_plane_is_refused():
+    with pytest.raises(MeshError, match="across the plane"):
+        built(
+            plane_block_and_pad(True),
+            [Support("base", "xz")],
+            [Force("lid", np.array([0.0, 1.0, -1.0]))],
+        )
+
+
+@pytest.mark.parametrize("order", [1, 2])
+def test_bar_in_two_pieces_is_strained(order, precise):
+    """P = E A d / L: the pieces widen alike, so that nothing rubs; node sets hold the base."""
+    lower = MeshTet.init_tensor(along((0, 2, 2)), along((0, 1, 2)), along((0, 3, 3)))
+    upper = MeshTet.init_tensor(along((0, 2, 3)), along((0, 1, 2)), along((3, 4, 2)))
+    edge = (lower.p[1] == 0.0) & (lower.p[2] == 0.0)
+    sets = {
+        "corner": np.flatnonzero(edge & (lower.p[0] == 0.0)),
+        "other": np.flatnonzero(edge & (lower.p[0] == 2.0)),
+    }
+    mesh = imported(
+        with_faces(lower, {"top": (2, 3.0), "base": (2, 0.0)}),
+        with_faces(upper, {"bottom": (2, 3.0), "lid": (2, 4.0)}),
+        {"lower": sets},
+    )
+    supports = [Support("base", "z"), Support("corner", "xy"), Support("other", "y")]
+    down = Displacement("lid", np.array([0.0, 0.0, -4e-3]))
+    joined = built(mesh, supports, [down], order)
+    cycle = solved(joined, np.array([[0.5], [1.0]]))
+    (history,) = cycle.histories
+    np.testing.assert_allclose(history.loads.P, [200.0, 400.0], rtol=1e-9)
+    np.testing.assert_allclose(history.pressure[1], 200.0, rtol=1e-8)
+    fields = stress_state(joined, history.force[1], history.displacement[1], np.ones(1))
+    for field in fields:
+        np.testing.assert_allclose(field.von_mises, 200.0, rtol=1e-8)
+    top = upper.p[2] == 4.0
+    np.testing.assert_allclose(fields[1].displacement[top, 2], -4e-3, rtol=1e-12)
+    # The edge of the pad is nearly free to slide: the widths agree.
+    width = [np.ptp(field.displacement[:, 0]) for field in fields]
+    np.testing.assert_allclose(width, 0.3 * 1e-3 * 2.0, rtol=1e-8)
+
+
+# --- meshes that do not match, and cycles that close slowly ---------------------------------------
+
+
+def rounded_pad(cells, own):
+    """A plane pad with a cylindrical foot on a block, of the block's nodes or its ``own``."""
+    x = along((-2, -1, 2), (-1, 1, cells), (1, 2, 2))
+    lower = MeshTri.init_tensor(x, along((-2, 0, cells)))
+    count = cells if not own else 3 * cells // 4
+    upper = MeshTri.init_tensor(along((-1, 1, count)), along((0, 1, cells // 2)))
+    points = upper.p.copy()
+    points[1] += (1.0 - upper.p[1]) * upper.p[0] ** 2 / 400.0
+    bottom, lid = (upper.facets_satisfying(lambda p, v=v: np.isclose(p[1], v)) for v in (0.0, 1.0))
+    upper = MeshTri(points, upper.t, _boundaries={"bottom": bottom, "lid": lid})
+    return imported(with_faces(lower, {"base": (1, -2.0), "top": (1, 0.0)}), upper)
+
+
+def rubbed(cells, own):
+    """Partial slip over most of the foot; it settles slowly, by about 0.8 in each cycle."""
+    loads = [Pressure("lid", 20.0), Displacement("lid", np.array([2e-3, 0.0, 0.0]))]
+    preload = np.array([[0.5, 0.0], [1.0, 0.0], [1.0, 0.5], [1.0, 1.0]])
+    shift = np.array([0.5, 0.0, -0.5, -1.0, -0.5, 0.0, 0.5, 1.0])
+    path = np.stack([np.ones(8), shift], axis=1)
+    joined = built(rounded_pad(cells, own), [Support("base", "xz")], loads)
+    return solved(joined, path, preload)
+
+
+def test_meshes_that_do_not_match_agree_with_those_that_do():
+    """Q and energy of a partial slip, to discretisation; P is equilibrium."""
+    differences = []
+    for cells in (16, 32):
+        one, two = (rubbed(cells, own).histories[0].loads for own in (False, True))
+        np.testing.assert_allclose(two.P, one.P, rtol=1e-6)
+        energies = [own.Edx.sum() for own in (one, two)]
+        force = np.abs(two.Qx - one.Qx).max() / np.abs(one.Qx).max()
+        differences.append((force, abs(energies[1] / energies[0] - 1.0)))
+    # Better than first order in the size of elements.
+    assert differences[1][0] < min(0.01, 0.5 * differences[0][0])
+    assert differences[1][1] < min(0.02, 0.5 * differences[0][1])
+
+
+def test_cycles_are_marched_until_they_close():
+    cycle = rubbed(16, True)
+    assert cycle.converged
+    assert cycle.closure <= CLOSED
+    assert 2 < cycle.cycles <= MOST_CYCLES
+    assert cycle.equilibrium.max() < 1e-6
+
+
+def test_cycle_that_follows_goes_as_far():
+    """From the closed cycle with the same gap nothing changes."""
+    loads = [Pressure("lid", 20.0), Displacement("lid", np.array([1e-3, 0.0, 0.0]))]
+    joined = built(rounded_pad(16, True), [Support("base", "xz")], loads)
+    joint = FrictionalJoint(joined.condense().resolvent(), MU)
+    path = np.stack([np.ones(8), np.sin(np.pi * np.arange(1, 9) / 4.0)], axis=1)
+    first = joined.solve_cycle(joint, path, joined.gap(), MU)
+    second = joined.solve_cycle(joint, path, joined.gap(), MU, after=first)
+    assert 1 <= second.cycles < first.cycles
+    largest = first.histories[0].force.max()
+    np.testing.assert_allclose(
+        second.histories[0].force, first.histories[0].force, atol=2.0 * CLOSED * largest
+    )
