@@ -309,15 +309,35 @@ def _supported(
             forces[:, case] = _forces(elastic, load)
     for interface in mesh.interfaces:
         constraints.average(*elastic.midsides(interface.name))
-    nodes = [(i.nodes_1, i.nodes_2)[number - 1] for i in mesh.interfaces]
+    nodes = _interface_nodes(mesh, number)
     frames = interface_frames(mesh.interfaces, number, body)
     try:
-        return SupportedBody(
-            elastic, constraints, np.concatenate(nodes), frames, forces,
+        supported = SupportedBody(
+            elastic, constraints, nodes, frames, forces,
             imposed if imposed.any() else None,
         )  # fmt: skip
     except ValueError as error:
         raise MeshError(f"body {body.name}: {error}") from error
+    if len(constraints.free) <= np.sum(~supported.held):
+        raise MeshError(
+            f"body {body.name}: all its nodes are held or on contact faces; refine its mesh"
+        )
+    return supported
+
+
+def _interface_nodes(mesh: StructureMesh, number: int) -> Indices:
+    """Nodes of all contact faces of body ``number``, no node on two of them."""
+    nodes: list[Indices] = []
+    for index, interface in enumerate(mesh.interfaces):
+        nodes.append((interface.nodes_1, interface.nodes_2)[number - 1])
+        for earlier, before in zip(mesh.interfaces[:index], nodes, strict=False):
+            if len(np.intersect1d(nodes[-1], before)):
+                raise MeshError(
+                    f"contacts {earlier.name} and {interface.name} share nodes of body "
+                    f"{(mesh.body_1, mesh.body_2)[number - 1].name}; divide the face between them, "
+                    "or make them one contact"
+                )
+    return np.concatenate(nodes)
 
 
 def _hold(

@@ -114,10 +114,14 @@ class Structure:
         return sp.kron(sp.block_diag(blocks), components, format="csr")
 
     @property
-    def held_faces(self) -> tuple[str, ...]:
-        """Interfaces of which supports hold displacements, as planes of symmetry do."""
+    def held_faces(self) -> dict[str, float]:
+        """Interfaces that supports hold along one direction, with the share of nodes they hold.
+
+        A plane of symmetry holds some of them, a slice in plane strain all.
+        """
         held = self.body_2.held.reshape(-1, self.body_2.elastic.dimension)
-        return tuple(interface.name for interface, own in self._shares() if held[own].any())
+        shares = {i.name: float(held[own].mean(axis=0).max()) for i, own in self._shares()}
+        return {name: share for name, share in shares.items() if share > 0.0}
 
     def gap(self) -> Array:
         """Gaps of all interfaces one after the other, unworn ``(n,)`` [mm]."""
@@ -156,7 +160,11 @@ class Structure:
             if len(marched) > 1:
                 closure = _closure(*marched[-2:])
         states, last = [state for cycle in marched for state in cycle], marched[-1]
-        fields = {name: np.stack([getattr(s, name) for s in last]) for name in FIELDS}
+        # As fields from the cache lie in memory: sums over them must have the same rounding.
+        fields = {
+            name: np.ascontiguousarray(np.stack([getattr(s, name) for s in last]))
+            for name in FIELDS
+        }
         return CycleSolution(
             histories=self.histories(**fields, friction=friction),
             states=tuple(s.state for s in last),

@@ -41,8 +41,8 @@ GRAM_CUTOFF = 1e-13
 their directions are left out of the least-squares problem."""
 
 AT_REST = 1e-9
-"""A residual that changes by less than this share of itself is a body in free motion, at constant
-speed until it meets something: what differences say then is rounding, and would throw it far off."""
+"""A residual that changes by less than this share of itself is that of a body in free motion, at
+constant speed until it meets something: differences are rounding, and would throw it far off."""
 
 TINY = np.finfo(float).tiny
 """Keeps divisions by a vanishing size finite."""

@@ -85,6 +85,17 @@ def save_cycle(key: str, cycle: CycleSolution) -> None:
     _save(f"cycle-{key}", cycle.fields() | arrays, attributes)
 
 
+def load_arrays(name: str) -> dict[str, Any] | None:
+    """Named arrays kept under that name, or None."""
+    found = _load(name)
+    return None if found is None else found[0]
+
+
+def save_arrays(name: str, arrays: dict[str, Array]) -> None:
+    """Keep named arrays."""
+    _save(name, arrays, {})
+
+
 def _load(name: str) -> tuple[dict[str, Any], dict[str, Any]] | None:
     path = cache_folder() / f"{name}.h5"
     try:

@@ -135,10 +135,40 @@ def check(case: str, overrides: tuple[str, ...]) -> None:
 
 
 @cli.command()
+@click.argument("case")
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
+@click.option("--force", is_flag=True, help="Overwrite what is there.")
+def resultants(case: str, out: Path, overrides: tuple[str, ...], force: bool) -> None:
+    """Solve the structure of CASE alone and write the loads of its contacts."""
+    from workflow.case import load_case
+
+    loaded = load_case(case, overrides)
+    from workflow.resultants.export import export_resultants
+
+    for line in export_resultants(loaded, case, out, force):
+        click.echo(line)
+
+
+@cli.command()
+@click.argument("file", type=click.Path(path_type=Path))
+@click.option("--size", metavar="LENGTH", help="Of the elements, for a CAD file, such as '2 mm'.")
+def describe(file: Path, size: str | None) -> None:
+    """List bodies, boundaries and node sets of a mesh or CAD FILE, as a case may name them."""
+    from workflow.case.mesh_case import described_file
+
+    for line in described_file(file, size):
+        click.echo(line)
+
+
+@cli.command()
 @click.argument("kind")
 @click.argument("file", required=False, type=click.Path(path_type=Path))
 def new(kind: str, file: Path | None) -> None:
-    """Write a commented case of KIND (dovetail, bodies, line) to FILE, or print it."""
+    """Write a commented case of KIND to FILE, or print it.
+
+    KIND is dovetail, mesh, resultants, specimens, bodies or line.
+    """
     from workflow.case import KINDS, template
 
     if kind not in KINDS:
@@ -165,16 +195,20 @@ def schema() -> None:
 
 def _outline(case: Case) -> list[tuple[str, str]]:
     """What would run, in a few rows."""
-    from workflow.case import WearCase
+    from workflow.case import SpecimensCase, WearCase
 
+    if isinstance(case, SpecimensCase):
+        return case.outline()
     return _wear_outline(case) if isinstance(case, WearCase) else _contact_outline(case)
 
 
 def _wear_outline(case: WearCase) -> list[tuple[str, str]]:
     grid, wear = case.contact.grid, case.wear
+    plane = getattr(case.structure, "dimension", 3) == 2
+    cells = f"{grid[0]} strips" if plane else f"{grid[0]} x {grid[1]} cells"
     return [
         *case.outline(),
-        ("contact", f"{grid[0]} x {grid[1]} cells, {case.contact.method}"),
+        ("contact", f"{cells}, {case.contact.method}"),
         ("wear", f"{wear.law}, {wear.cycles:g} cycles, {wear.step.kind} steps of {_step(case)}"),
     ]
 

@@ -28,8 +28,9 @@ def write_comparison(
     """Loads of the cycle, and its fields at the increments shown."""
     group = f"comparison/{name}"
     writer.put(f"{group}/load_history", **vars(half_space_loads(cycle)))
-    for share in SHOWN:
-        increment = min(peak + round(share * (len(cycle) - 1 - peak)), len(cycle) - 1)
+    left = len(cycle) - 1 - peak
+    # A set: in a short cycle two of them may be the same.
+    for increment in sorted({peak + round(share * left) for share in SHOWN}):
         state = cycle[increment]
         writer.put(
             f"{group}/{increment:05d}",

@@ -17,8 +17,12 @@ from wear.laws import Archard, Energy, EnergyAmplitude, WearLaw
 from wear.stepping import CycleResult, Starts, WearingContact
 from wear.surfaces import Surfaces
 from workflow.case import WearCase
-from workflow.case.wear_sections import ArchardBody, EnergyAmplitudeLaw
+from workflow.case.wear_sections import ArchardBody, ContactStress, EnergyAmplitudeLaw
+from workflow.errors import UserError
 from workflow.load_source import ContactFace, FaceLoads
+
+# Slip of a sticking node is rounding, 1e-15 of the largest and less: it has no direction.
+SLIP_NOISE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -48,19 +52,40 @@ class StageSettings:
 
 
 @dataclass(frozen=True)
+class CycleTractions:
+    """Tractions and slip of one contact over the increments of a closed cycle.
+
+    ``pressure`` ``(t, nx, ny)`` and ``shear`` ``(t, 2, nx, ny)`` on body 2 [MPa] are those at the
+    end of an increment, ``slip`` ``(t, 2, nx, ny)`` [mm] that during it. Where slip is the
+    structure's (method normal), shear is µp against it and, unknown where nothing slips, 0 there:
+    ``unknown`` ``(t,)`` is the share of the normal force on such cells.
+    """
+
+    pressure: Array
+    shear: Array
+    slip: Array
+    unknown: Array
+
+
+@dataclass(frozen=True)
 class FirstContact:
     """What the contact of the unworn cycle says: see :class:`wear.stepping.CycleResult`.
 
-    ``energy`` ``(t,)`` [N mm]; ``highest_pressure`` [MPa] of all increments; ``cycle`` the states
-    at its increments where the half-space has its own friction (method full), else empty.
+    ``energy`` ``(t,)`` [N mm]; ``pressure`` ``(t, nx, ny)`` [MPa]; ``cycle`` the states at its
+    increments where the half-space has its own friction (method full), else empty.
     """
 
     energy: Array
-    highest_pressure: float
+    pressure: Array
     touches_border: bool
     largest_residual: float
     convolutions: int
     cycle: tuple[ContactState, ...]
+
+    @property
+    def highest_pressure(self) -> float:
+        """Largest pressure of all increments [MPa]."""
+        return float(self.pressure.max())
 
 
 @dataclass(frozen=True)
@@ -93,6 +118,7 @@ class ContactStage:
         own = self._frictional
         self._contact = NormalContact(half_space) if own is None else own.normal
         self._laws = _law(case, 1), _law(case, 2)
+        _check_section(case.stress, self.grid)
         self._current: tuple[tuple[Array, ...], Wearing] | None = None
 
     @property
@@ -127,13 +153,20 @@ class ContactStage:
         states = result.states.values()
         first = FirstContact(
             energy=result.energy,
-            highest_pressure=max((float(s.pressure.max()) for s in states), default=0.0),
+            pressure=self._pressure(result),
             touches_border=any(s.touches_border for s in states),
             largest_residual=max((s.residuals.largest for s in states), default=0.0),
             convolutions=result.convolutions + sum(s.convolutions for s in wearing.cycle),
             cycle=wearing.cycle,
         )
         return self._after(state, surfaces, result, 0.0), first
+
+    def _pressure(self, result: CycleResult) -> Array:
+        """Pressure of every increment of a cycle ``(t, nx, ny)``."""
+        pressure = np.zeros((len(result.energy), *self.grid.shape))
+        for t, state in result.states.items():
+            pressure[t] = state.pressure
+        return pressure
 
     def jump(self, state: InterfaceState, cycles: float) -> tuple[InterfaceState, int]:
         """Wear ``cycles`` cycles in one step; also the convolutions it took."""
@@ -157,12 +190,41 @@ class ContactStage:
         if wearing.cycle:
             own = wearing.cycle[peak]
             return {"pressure": own.pressure, "shear": own.shear, "slip": own.slip}
-        slip = self.transfer.to_cells(state.slip[peak])
+        slip = self.transfer.to_cells(_true_slip(state.slip)[peak])
+        pressure = wearing.contact.solve(state.surfaces, peak, state.starts.get(peak)).pressure
+        return {"pressure": pressure, "shear": self._sliding_shear(pressure, slip), "slip": slip}
+
+    def unworn_tractions(self, history: FaceLoads, first: FirstContact) -> CycleTractions:
+        """Tractions of the first cycle, solved already."""
+        if first.cycle:
+            return _own_tractions(first.cycle)
+        return self._structures_tractions(history.slip, first.pressure)
+
+    def tractions(self, state: InterfaceState) -> CycleTractions:
+        """Tractions of a cycle on the present surfaces."""
+        wearing = self._wearing(state)
+        if wearing.cycle:
+            return _own_tractions(wearing.cycle)
+        loaded = np.flatnonzero(state.loads.P > 0.0).tolist()
+        result = wearing.contact.cycle(state.surfaces, state.starts, loaded)
+        return self._structures_tractions(state.slip, self._pressure(result))
+
+    def _structures_tractions(self, nodal_slip: Array, pressure: Array) -> CycleTractions:
+        """Those where slip is the structure's."""
+        slip = self.transfer.to_cells(_true_slip(nodal_slip))
+        stuck = ~slip.any(axis=1)
+        force = pressure.sum(axis=(1, 2))
+        held = np.where(stuck, pressure, 0.0).sum(axis=(1, 2))
+        unknown = np.divide(held, force, out=np.zeros_like(force), where=force > 0.0)
+        shear = np.stack([self._sliding_shear(p, s) for p, s in zip(pressure, slip, strict=True)])
+        return CycleTractions(pressure, shear, slip, unknown)
+
+    def _sliding_shear(self, pressure: Array, slip: Array) -> Array:
+        """µp against ``slip`` ``(2, nx, ny)``; 0 where nothing slips."""
         size = np.hypot(*slip)
         opposing = np.divide(-slip, size, out=np.zeros_like(slip), where=size > 0.0)
-        pressure = wearing.contact.solve(state.surfaces, peak, state.starts.get(peak)).pressure
-        shear = self._case.friction.coefficient * pressure * opposing
-        return {"pressure": pressure, "shear": shear, "slip": slip}
+        shear: Array = self._case.friction.coefficient * pressure * opposing
+        return shear
 
     def coarse_pressure(self, loads: LoadHistory, peak: int) -> Array:
         """Unworn peak pressure on a grid as coarse as the mesh of the structure."""
@@ -230,6 +292,34 @@ class ContactStage:
             volume_rate=volume_rate,
             starts=state.starts | starts,
         )
+
+
+def _check_section(stress: ContactStress, grid: Grid) -> None:
+    """Refuse at once a section that could not be drawn at the end."""
+    if stress.section == "none":
+        return
+    if stress.section == "y" and grid.line:
+        raise UserError("stress.section: y: a line contact has no length along y; allowed: x, none")
+    reach = 0.5 * grid.size[1 if stress.section == "x" else 0]
+    if abs(stress.at) > reach:
+        raise UserError(
+            f"stress.at: {stress.at:g} mm is off the contact's grid; "
+            f"allowed: {-reach:.4g} to {reach:.4g} mm"
+        )
+
+
+def _true_slip(slip: Array) -> Array:
+    """Slips ``(t, 2, n)`` of nodes, 0 where they are but rounding."""
+    size = np.hypot(slip[:, 0], slip[:, 1])[:, None]
+    return np.where(size > SLIP_NOISE * size.max(), slip, 0.0)
+
+
+def _own_tractions(cycle: tuple[ContactState, ...]) -> CycleTractions:
+    """Tractions where the half-space has its own friction: known everywhere."""
+    pressure, shear, slip = (
+        np.stack([getattr(own, name) for own in cycle]) for name in ("pressure", "shear", "slip")
+    )
+    return CycleTractions(pressure, shear, slip, np.zeros(len(cycle)))
 
 
 def _law(case: WearCase, body: int) -> WearLaw:

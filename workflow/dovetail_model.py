@@ -6,8 +6,9 @@ from functools import partial
 
 import numpy as np
 
-from fe_models.dovetail import Mission, dovetail_structure
+from fe_models.dovetail import Mission, dovetail_softening, dovetail_structure
 from fe_models.mesh import Interface, StructureMesh
+from fe_models.relinearised import Softening
 from fe_models.structure import Structure
 from sa_solver.types import Array
 from workflow.case import DovetailCase
@@ -27,6 +28,7 @@ class DovetailModel:
         self._mission = Mission(**case.load_path.model_dump())
         self.friction = case.friction.coefficient
         self.peak = case.load_path.peak_at - 1
+        self.nonlinearity = case.nonlinearity
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -51,6 +53,9 @@ class DovetailModel:
         return dovetail_structure(
             self.dovetail, mesh, disk, blade, self._mission, self._case.mesh.order
         )
+
+    def softening(self, structure: Structure) -> Softening:
+        return dovetail_softening(structure, self.dovetail, self._mission)
 
     def contact_face(self, interface: Interface) -> ContactFace:
         side = SIDES[interface.name]

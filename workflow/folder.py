@@ -10,7 +10,9 @@ from workflow.errors import UserError
 from workflow.store import PARTIAL, replacing
 
 FILES = ("case.yaml", "summary.json", "results.h5", "worn.msh", "checkpoint.h5", "run.log")
-FOLDERS = ("jumps", "paraview", "figures")
+# Worn surfaces at the nodes of another code, by interface and body.
+WORN_NODES = "worn_nodes_*.csv"
+FOLDERS = ("jumps", "reduced", "paraview", "figures")
 
 
 class OutputFolder:
@@ -24,6 +26,7 @@ class OutputFolder:
         self.checkpoint = root / "checkpoint.h5"
         self.log = root / "run.log"
         self.jumps = root / "jumps"
+        self.reduced = root / "reduced"
         self.paraview = root / "paraview"
         self.figures = root / "figures"
 
@@ -44,6 +47,8 @@ class OutputFolder:
         self.root.mkdir(parents=True, exist_ok=True)
         for name in FILES:
             (self.root / name).unlink(missing_ok=True)
+        for path in self.root.glob(WORN_NODES):
+            path.unlink()
         for name in FOLDERS:
             shutil.rmtree(self.root / name, ignore_errors=True)
         self.clear_partial()

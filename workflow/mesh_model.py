@@ -2,40 +2,23 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fe_models.geometry.imported import ImportedMesh, read_bodies
-from fe_models.imported_structure import (
-    Acceleration,
-    ContactPair,
-    Displacement,
-    Force,
-    Load,
-    Pressure,
-    Rotation,
-    Support,
-    imported_mesh,
-    imported_structure,
-)
+from fe_models.imported_structure import imported_softening, imported_structure
 from fe_models.mesh import Interface, StructureMesh
+from fe_models.relinearised import Softening
 from fe_models.structure import Structure
-from sa_solver.types import Array
+from sa_solver.types import Array, Grid
 from workflow.case import MeshCase
-from workflow.case.mesh_case import (
-    AccelerationLoad,
-    DisplacementLoad,
-    ForceLoad,
-    PressureLoad,
-    RotationLoad,
-)
+from workflow.case.mesh_case import RotationLoad, face_size
 from workflow.load_source import ContactFace
 from workflow.reporter import Reporter
-
-CaseLoad = PressureLoad | ForceLoad | DisplacementLoad | RotationLoad | AccelerationLoad
+from workflow.resultants.gaps import GapFunction, gap_over
 
 # Slope at which the bodies part beyond their common face.
 PARTING_SLOPE = 1.0
@@ -49,15 +32,11 @@ class MeshModel:
     def __init__(self, case: MeshCase) -> None:
         self._case = case
         self.friction = case.friction.coefficient
+        self.nonlinearity = case.nonlinearity
         path = case.load_path
+        self._cut: tuple[str, ...] = ()
         self._begun = sum(path.increments[: path.cycle_from - 1])
         self.peak = sum(path.increments[: path.peak_leg]) - 1 - self._begun
-
-    @cached_property
-    def imported(self) -> ImportedMesh:
-        """Everything in the file."""
-        structure = self._case.structure
-        return read_bodies(Path(structure.file), structure.size)
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -65,7 +44,8 @@ class MeshModel:
         contents = Path(structure.file).read_bytes()
         loads = [load.model_dump(exclude={"path"}) for load in structure.loads]
         described = structure.model_dump(exclude={"file", "loads"})
-        return contents, described, loads, self._case.materials
+        gaps = [interface.gap.tobytes() for interface in self._mesh.interfaces]
+        return contents, described, loads, gaps, self._case.materials
 
     @property
     def preload(self) -> Array:
@@ -85,38 +65,84 @@ class MeshModel:
         return np.stack([c**2 if s else c for c, s in zip(columns, squared, strict=True)], axis=1)
 
     def mesh(self) -> StructureMesh:
-        structure = self._case.structure
-        pairs = [
-            ContactPair(pair.name, pair.face_1, pair.face_2, np.array(pair.x))
-            for pair in structure.contacts
-        ]
-        return imported_mesh(self.imported, (structure.body_1, structure.body_2), pairs)
+        return self._mesh
+
+    @cached_property
+    def _mesh(self) -> StructureMesh:
+        mesh = self._case.structure.mesh()
+        return replace(mesh, interfaces=tuple(map(self._with_gap, mesh.interfaces)))
+
+    def _with_gap(self, interface: Interface) -> Interface:
+        """The interface with the case's own gap on top of the meshes'."""
+        return replace(interface, gap=interface.gap + self._given_at_nodes(interface))
+
+    def _given_at_nodes(self, interface: Interface) -> Array:
+        given = self._given(interface)
+        if given is None:
+            return np.zeros(len(interface))
+        points = interface.coordinates[:, :, None, None]
+        return np.array([float(given(x, y)[0, 0]) for x, y in points])
+
+    def _given(self, interface: Interface) -> GapFunction | None:
+        """The gap that the case gives an interface, if it does."""
+        (pair,) = (p for p in self._case.structure.contacts if p.name == interface.name)
+        if pair.gap is None:
+            return None
+        size, cells = face_size(interface), self._case.contact.grid
+        line = interface.line
+        grid = Grid.strips(size[0], cells[0]) if line else Grid.covering(size, cells)
+        return gap_over(pair.gap, None, grid)
 
     def structure(self, mesh: StructureMesh) -> Structure:
-        case = self._case
-        supports = [
-            Support(s.group, "xyz" if s.hold == "all" else s.hold) for s in case.structure.supports
-        ]
-        materials = case.material(1), case.material(2)
-        loads = [_load(load) for load in case.structure.loads]
-        return imported_structure(
-            mesh, self.imported, materials, supports, loads, case.structure.order
+        case, described = self._case, self._case.structure
+        structure = imported_structure(
+            mesh,
+            described.read(),
+            (case.material(1), case.material(2)),
+            [support.described() for support in described.supports],
+            [load.described() for load in described.loads],
+            described.order,
         )
+        self._cut = tuple(structure.held_faces)
+        return structure
+
+    def softening(self, structure: Structure) -> Softening:
+        loads = [load.described() for load in self._case.structure.loads]
+        return imported_softening(structure, loads, self.amplitudes[self.peak])
 
     def contact_face(self, interface: Interface) -> ContactFace:
-        reach = np.abs(interface.coordinates).max(axis=0)
-        size = 2.0 * float(reach[0]), 2.0 * float(reach[1])
-        return ContactFace(interface, size, _MeshGap(interface), _coarse(interface, size))
+        size, given = face_size(interface), self._given(interface)
+        meshed = _MeshGap(interface, interface.gap - self._given_at_nodes(interface))
+        gap = meshed if given is None else _Sum(meshed, given)
+        return ContactFace(interface, size, gap, _coarse(interface, size))
 
     def warn(self, reporter: Reporter) -> None:
-        """Nothing that the solver would not say."""
+        """Planes of symmetry that cut a contact, of which its half-space knows nothing."""
+        for name in self._cut:
+            reporter.warn(
+                f"{name}: supports hold some of its nodes, as on a plane of symmetry: the structure "
+                "knows of it, the half-space of the contact does not, whose pressure is that of a "
+                "face that ends there; mesh the whole face"
+            )
+
+
+@dataclass(frozen=True)
+class _Sum:
+    """Two gaps, one on the other."""
+
+    one: GapFunction
+    other: GapFunction
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """Gap ``(nx, ny)`` [mm] at ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``."""
+        return self.one(x, y) + self.other(x, y)
 
 
 class _MeshGap:
     """Gap of the meshed faces, linear between nodes; the bodies part beyond them."""
 
-    def __init__(self, interface: Interface) -> None:
-        self._face, self._gap = interface, interface.gap
+    def __init__(self, interface: Interface, gap: Array) -> None:
+        self._face, self._gap = interface, gap
 
     def __call__(self, x: Array, y: Array) -> Array:
         """Gap ``(nx, ny)`` [mm] at ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``."""
@@ -158,17 +184,3 @@ def _coarse(interface: Interface, size: tuple[float, float]) -> tuple[int, int]:
         return len(interface), 1
     across = max(int(np.sqrt(len(interface) * size[0] / size[1])), 1)
     return across, max(len(interface) // across, 1)
-
-
-def _load(load: CaseLoad) -> Load:
-    match load:
-        case PressureLoad():
-            return Pressure(load.group, load.pressure)
-        case ForceLoad():
-            return Force(load.group, np.array(load.force))
-        case DisplacementLoad():
-            return Displacement(load.group, np.array(load.displacement))
-        case RotationLoad():
-            return Rotation(np.array(load.axis), np.array(load.through), load.speed)
-        case AccelerationLoad():
-            return Acceleration(np.array(load.acceleration))

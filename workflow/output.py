@@ -13,18 +13,23 @@ import h5py
 import numpy as np
 
 from wear.kinetics import LinearRegime, linear_regime
-from workflow.case import WearCase, dump_case
+from workflow.case import ResultantsCase, WearCase, dump_case
 from workflow.checkpoint import KINETICS, RunState
 from workflow.comparison import comparison_summary, write_comparison
 from workflow.contact_stage import ContactStage, FirstContact
+from workflow.fidelity import kept
 from workflow.figures import write_figures
 from workflow.folder import OutputFolder
 from workflow.load_source import FaceLoads, LoadSource
 from workflow.paraview import write_paraview
 from workflow.reporter import Reporter
+from workflow.resultants.source import ResultantsSource
+from workflow.resultants.worn_faces import write_worn_faces
 from workflow.store import ResultsWriter, read_arrays, replacing
+from workflow.stress_stage import InterfaceStress, contact_stresses
 from workflow.structure_output import WornStructure, resultants_at, worn_structure
 from workflow.structure_stage import StructureStage
+from workflow.uniformity import uniformities
 from workflow.versions import versions
 from workflow.workers import side_by_side
 
@@ -63,15 +68,46 @@ def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> 
     structure = None
     if isinstance(outcome.source, StructureStage):
         structure = worn_structure(outcome.source, outcome.stages, outcome.state, folder, reporter)
+    with reporter.stage("stress under the contacts"):
+        stresses = contact_stresses(
+            outcome.case,
+            outcome.source.peak,
+            outcome.stages,
+            list(zip(outcome.unworn, outcome.first, strict=True)),
+            outcome.state.interfaces,
+            reporter,
+        )
     with reporter.stage("results"):
-        _write_results(outcome, structure, folder)
+        _write_results(outcome, structure, stresses, folder)
     with reporter.stage("paraview and figures"):
         _write_pictures(outcome.case, folder)
-    summary = _summary(outcome, structure, _peak_pressures(outcome, folder), reporter)
+    worn_nodes = _write_worn_nodes(outcome, folder, reporter)
+    pressures = _peak_pressures(outcome, folder)
+    summary = _summary(outcome, structure, stresses, pressures, reporter)
+    for name, written in worn_nodes.items():
+        summary[name]["worn_nodes"] = written
+    if chosen := kept(folder):
+        summary["fidelity"] = chosen
+    uniform = uniformities(outcome.source, outcome.stages, outcome.state.interfaces)
+    for name, own in uniform.items():
+        summary[name]["uniformity"] = vars(own)
     with replacing(folder.summary) as partial:
         partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
     shutil.rmtree(folder.jumps)
     _say(outcome, summary, reporter)
+    for name, own in uniform.items():
+        reporter.say(f"  {own.sentence(name)}")
+
+
+def _write_worn_nodes(
+    outcome: Outcome, folder: OutputFolder, reporter: Reporter
+) -> dict[str, dict[str, Any]]:
+    """Worn surfaces at the user's own nodes, where the loads are those of another code."""
+    case, source = outcome.case, outcome.source
+    if not (isinstance(case, ResultantsCase) and isinstance(source, ResultantsSource)):
+        return {}
+    states = outcome.state.interfaces
+    return write_worn_faces(case, source, outcome.stages, states, folder.root, reporter)
 
 
 def _write_pictures(case: WearCase, folder: OutputFolder) -> None:
@@ -85,7 +121,12 @@ def _write_pictures(case: WearCase, folder: OutputFolder) -> None:
     )
 
 
-def _write_results(outcome: Outcome, structure: WornStructure | None, folder: OutputFolder) -> None:
+def _write_results(
+    outcome: Outcome,
+    structure: WornStructure | None,
+    stresses: list[InterfaceStress],
+    folder: OutputFolder,
+) -> None:
     source = outcome.source
     with replacing(folder.results) as partial, h5py.File(partial, "w") as file:
         writer = ResultsWriter(file, per_length=source.line)
@@ -112,6 +153,8 @@ def _write_results(outcome: Outcome, structure: WornStructure | None, folder: Ou
         _write_kinetics(writer, outcome)
         if structure is not None:
             structure.write(writer)
+        for stress in stresses:
+            stress.write(writer)
 
 
 def _write_jumps(writer: ResultsWriter, outcome: Outcome, folder: OutputFolder) -> None:
@@ -159,10 +202,12 @@ def _peak_pressures(outcome: Outcome, folder: OutputFolder) -> dict[str, dict[st
 def _summary(
     outcome: Outcome,
     structure: WornStructure | None,
+    stresses: list[InterfaceStress],
     pressures: dict[str, dict[str, float]],
     reporter: Reporter,
 ) -> dict[str, Any]:
     state = outcome.state
+    stress = {own.name: {"stress": own.summary()} for own in stresses}
     return {
         "title": outcome.case.title,
         "assumed": list(outcome.case.assumed),
@@ -174,6 +219,7 @@ def _summary(
             stage.name: _interface_summary(outcome, number)
             | (structure.interface_summary(number) if structure else {})
             | {"peak_pressure": pressures[stage.name]}
+            | stress.get(stage.name, {})
             for number, stage in enumerate(outcome.stages)
         },
         "kinetics": {
@@ -197,7 +243,7 @@ def _interface_summary(outcome: Outcome, number: int) -> dict[str, Any]:
     return {
         **last,
         "peak_load": {"unworn": resultants_at(loads, outcome.source.peak)},
-        "slip_per_cycle": float(np.hypot(*np.moveaxis(unworn.slip, 1, 0)).sum(axis=0).max()),
+        "slip_per_cycle": _slip_per_cycle(unworn, first),
         "energy_per_cycle": {
             "half_space": float(first.energy.sum()),
             "structure": float((loads.Edx + loads.Edy).sum()),
@@ -210,6 +256,14 @@ def _interface_summary(outcome: Outcome, number: int) -> dict[str, Any]:
             for name, regime in outcome.regimes[stage.name].items()
         },
     }
+
+
+def _slip_per_cycle(unworn: FaceLoads, first: FirstContact) -> float:
+    """Largest path of slip [mm] in the unworn cycle: of the half-space where loads have no slip."""
+    slip = unworn.slip
+    if first.cycle and not slip.any():
+        slip = np.stack([state.slip for state in first.cycle])
+    return float(np.hypot(slip[:, 0], slip[:, 1]).sum(axis=0).max())
 
 
 def _say(outcome: Outcome, summary: dict[str, Any], reporter: Reporter) -> None:

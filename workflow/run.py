@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from workflow.case import Case, WearCase
+from workflow import fidelity
+from workflow.case import Case, SpecimensCase, WearCase
 from workflow.errors import UserError
 from workflow.folder import OutputFolder
 from workflow.memory import check_memory
@@ -12,10 +13,12 @@ from workflow.reporter import Reporter
 
 
 def run_case(case: Case, out: Path, force: bool) -> None:
-    """Run a case from the start into a folder."""
+    """Run a case from the start into a folder, by the cheapest model if it leaves that open."""
+    case, chosen = fidelity.choose(case)
     check_memory(case)
     folder = OutputFolder(out)
     folder.claim(case, force)
+    fidelity.keep(folder, chosen)
     _run(case, folder, resume=False)
 
 
@@ -27,7 +30,7 @@ def resume_run(out: Path) -> bool:
         return False
     if not isinstance(case, WearCase):
         raise UserError(
-            f"{out}: a contact case takes up no run half done; start it again with "
+            f"{out}: a case of this kind takes up no run half done; start it again with "
             f"`fretscale run {folder.case} --out {out}`"
         )
     check_memory(case)
@@ -44,7 +47,12 @@ def _run(case: Case, folder: OutputFolder, resume: bool) -> None:
         if isinstance(case, WearCase):
             from workflow.wear_run import run_wear
 
+            fidelity.say(fidelity.kept(folder), reporter)
             run_wear(case, folder, reporter, resume)
+        elif isinstance(case, SpecimensCase):
+            from workflow.specimens_run import run_specimens
+
+            run_specimens(case, folder, reporter)
         else:
             from workflow.contact_run import run_contact
 

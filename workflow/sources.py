@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from workflow.case import DovetailCase, MeshCase, WearCase
+from workflow.case import DovetailCase, MeshCase, ResultantsCase, WearCase
 from workflow.dovetail_model import DovetailModel
 from workflow.load_source import LoadSource
 from workflow.mesh_model import MeshModel
+from workflow.resultants.source import ResultantsSource
 from workflow.structure_stage import StructureStage
 
 
@@ -13,5 +14,7 @@ def load_source(case: WearCase) -> LoadSource:
     """Where the loads of the case's contacts come from."""
     if isinstance(case, DovetailCase):
         return StructureStage(DovetailModel(case), case.mesh.order)
+    if isinstance(case, ResultantsCase):
+        return ResultantsSource(case)
     assert isinstance(case, MeshCase)
     return StructureStage(MeshModel(case), case.structure.order)

@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from fe_models.mesh import StructureMesh, write_msh
+from fe_models.nonlinear import NonlinearCheck
 from fe_models.remesh import worn_mesh, worn_volume
 from fe_models.stress import StressField
 from fe_models.structure import CycleSolution
@@ -54,7 +57,9 @@ class WornStructure:
             "iterations": unworn.iterations,
             "residual": unworn.residual,
             "equilibrium_error": float(unworn.equilibrium.max()),
+            "cycles": unworn.cycles,
             "closure": unworn.closure,
+            "nonlinearity": nonlinearity_summary(stage),
             "drift": [float(value) for value in state.drift],
             "peak_stress": {
                 moment: {
@@ -112,3 +117,34 @@ def worn_structure(
 def resultants_at(loads: LoadHistory, increment: int) -> dict[str, float]:
     """Forces and moments of one increment."""
     return {name: float(getattr(loads, name)[increment]) for name in RESULTANTS}
+
+
+def nonlinearity_sentence(check: NonlinearCheck) -> str:
+    """How far geometric nonlinearity moves the contact at peak load."""
+    force, moment = (float(np.abs(part).max()) for part in np.split(check.change, [3], axis=1))
+    return (
+        f"geometric nonlinearity at peak load moves P and Q by {force:.2%} of P, moments by "
+        f"{moment:.2%} of P x half a face, slips by {check.slip_change:.1%} of the largest"
+    )
+
+
+def nonlinearity_summary(stage: StructureStage) -> dict[str, Any]:
+    """The stiffness used and, where it was asked for, what the total Lagrangian check found."""
+    chosen = stage.model.nonlinearity
+    if not chosen.check:
+        return {"stiffness": chosen.stiffness}
+    check = stage.nonlinear_check
+    names = [interface.name for interface in stage.mesh.interfaces]
+    return {
+        "stiffness": chosen.stiffness,
+        "change": {
+            name: dict(zip(RESULTANTS, row.tolist(), strict=True))
+            for name, row in zip(names, check.change, strict=True)
+        },
+        **{
+            name: float(getattr(check, name))
+            for name in ("slip_change", "slide", "largest_strain", "largest_rotation")
+        },
+        "iterations": check.iterations,
+        "residual": check.residual,
+    }

@@ -9,11 +9,20 @@ from typing import Protocol
 import numpy as np
 
 from fe_models.friction import FrictionalJoint, FrictionState
+from fe_models.joint import JointResolvent
 from fe_models.mesh import Interface, StructureMesh
-from fe_models.stress import StressField, stress_state
+from fe_models.nonlinear import NonlinearCheck, check_nonlinearity
+from fe_models.relinearised import (
+    PrestressedStructure,
+    Softening,
+    relinearised,
+    stress_stiffened,
+)
+from fe_models.stress import StressField, deformation, stress_state
 from fe_models.structure import CycleSolution, InterfaceHistory, Structure
 from sa_solver.types import Array
 from workflow.cache import content_key, load_cycle, load_joint, save_cycle, save_joint
+from workflow.case.wear_sections import Nonlinearity
 from workflow.errors import MethodFailed
 from workflow.load_source import ContactFace
 from workflow.reporter import Reporter
@@ -37,6 +46,12 @@ class StructureModel(Protocol):
     def peak(self) -> int: ...
     @property
     def friction(self) -> float: ...
+    @property
+    def nonlinearity(self) -> Nonlinearity: ...
+
+    def softening(self, structure: Structure) -> Softening:
+        """Spin softening of both bodies at peak load."""
+        ...
 
     def mesh(self) -> StructureMesh:
         """The unworn mesh."""
@@ -83,19 +98,69 @@ class StructureStage:
     @cached_property
     def joint(self) -> FrictionalJoint:
         """The condensed joint, from the cache when it is there."""
+        resolvent = self._linear_resolvent
+        if isinstance(self.structure, PrestressedStructure):
+            resolvent = self.structure.condense_path(resolvent)
+        self.rigid_modes = resolvent.rigid_modes
+        return FrictionalJoint(resolvent, self.model.friction)
+
+    @cached_property
+    def _linear_resolvent(self) -> JointResolvent:
         key = content_key(*self.model.key)
         joint = load_joint(key)
         self.from_cache = joint is not None
         if joint is None:
-            joint = self.structure.condense().resolvent()
+            joint = self._linear.condense().resolvent()
             save_joint(key, joint)
-        self.rigid_modes = joint.rigid_modes
-        return FrictionalJoint(joint, self.model.friction)
+        return joint
+
+    @cached_property
+    def _linear(self) -> Structure:
+        return self.model.structure(self.mesh)
 
     @cached_property
     def structure(self) -> Structure:
-        """Both bodies with supports and loads, unworn."""
-        return self.model.structure(self.mesh)
+        """Both bodies with supports and loads, unworn, as stiff as the case asks for."""
+        return self._prestressed(self._linear)
+
+    def _prestressed(self, structure: Structure) -> Structure:
+        """The structure with the stiffness that the case asks for."""
+        kind = self.model.nonlinearity.stiffness
+        if kind == "linear":
+            return structure
+        amplitudes = self.model.amplitudes[self.peak]
+        softening = self.model.softening(structure)
+        how = {"stress_stiffened": stress_stiffened, "relinearised": relinearised}
+        return how[self.model.nonlinearity.stiffness](
+            structure, self._linear_peak, amplitudes, softening
+        )
+
+    @cached_property
+    def _linear_peak(self) -> tuple[Array, Array]:
+        """Displacements of both bodies of the linear structure at peak load."""
+        amplitudes = self.model.amplitudes[self.peak]
+        linear = FrictionalJoint(self._linear_resolvent, self.model.friction)
+        (state,) = linear.march(amplitudes[None], self._linear.gap())
+        return deformation(self._linear, state.force, state.displacement, amplitudes)
+
+    @cached_property
+    def nonlinear_check(self) -> NonlinearCheck:
+        """The linear structure at peak load beside the total Lagrangian one."""
+        linear = self._linear
+        check = check_nonlinearity(
+            linear,
+            self._linear_resolvent,
+            self.model.friction,
+            self.model.amplitudes[self.peak],
+            linear.gap(),
+            self.model.softening(linear),
+        )
+        if not check.converged:
+            raise MethodFailed(
+                f"the total Lagrangian check left a residual of {check.residual:.1e} after "
+                f"{check.iterations} iterations: run without nonlinearity.check, or lower the load"
+            )
+        return check
 
     def node_count(self) -> int:
         """Nodes of both bodies, midsides included."""
@@ -114,7 +179,7 @@ class StructureStage:
         """The closed cycle from rest with unworn faces, from the cache if it is there."""
         friction = self.model.friction
         loads = [path.tolist() for path in (self.model.preload, self.model.amplitudes)]
-        key = content_key(*self.model.key, *loads, friction)
+        key = content_key(*self.model.key, *loads, self.model.nonlinearity.stiffness, friction)
         cycle = load_cycle(key, self.structure, friction)
         if cycle is None:
             cycle = self._cycle([np.zeros(len(i)) for i in self.mesh.interfaces], None)
@@ -163,7 +228,8 @@ class StructureStage:
 
     def stress(self, mesh: StructureMesh, solution: CycleSolution) -> tuple[StressField, ...]:
         """Stress of both bodies at peak load, on the unworn or the worn mesh."""
-        structure = self.structure if mesh is self.mesh else self.model.structure(mesh)
+        worn = mesh is not self.mesh
+        structure = self._prestressed(self.model.structure(mesh)) if worn else self.structure
         fields = {name: values[self.peak] for name, values in solution.fields().items()}
         amplitudes = self.model.amplitudes[self.peak]
         return stress_state(structure, fields["force"], fields["displacement"], amplitudes)

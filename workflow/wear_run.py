@@ -23,6 +23,7 @@ from workflow.output import Outcome, write_output
 from workflow.reporter import Reporter
 from workflow.sources import load_source
 from workflow.store import write_arrays
+from workflow.structure_output import nonlinearity_sentence
 from workflow.structure_stage import StructureStage
 from workflow.warnings import warn_of_contact, warn_of_growth, warn_of_structure
 from workflow.workers import Workers, contact_workers
@@ -70,6 +71,7 @@ class WearRun:
                 unworn = source.unworn()
             if isinstance(source, StructureStage):
                 warn_of_structure(source, self._reporter)
+                self._check_nonlinearity(source)
             with self._reporter.stage("contact set-up"):
                 stages = [ContactStage(own) for own in settings]
             loop = WearLoop(self._case, self._folder, self._reporter, source, stages, workers)
@@ -80,6 +82,13 @@ class WearRun:
             state = loop.advance(kept or state)
         outcome = Outcome(self._case, source, stages, state, unworn, first)
         write_output(outcome, self._folder, self._reporter)
+
+    def _check_nonlinearity(self, source: StructureStage) -> None:
+        if not source.model.nonlinearity.check:
+            return
+        with self._reporter.stage("nonlinearity check"):
+            check = source.nonlinear_check
+        self._reporter.say(nonlinearity_sentence(check))
 
 
 class WearLoop:

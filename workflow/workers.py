@@ -14,10 +14,12 @@ from contextlib import ExitStack, contextmanager
 from multiprocessing import resource_tracker
 from multiprocessing.connection import Connection, wait
 from multiprocessing.context import SpawnProcess
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
-from workflow.contact_stage import ContactStage, StageSettings
 from workflow.errors import MethodFailed
+
+if TYPE_CHECKING:
+    from workflow.contact_stage import StageSettings
 
 # The workers share the cores among themselves; threads inside each would fight over them.
 THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
@@ -108,6 +110,9 @@ def _end_with_parent() -> None:
 
 def _serve(connection: Connection, settings: StageSettings) -> None:
     """Answer calls until the other end of the pipe closes."""
+    # Imported here: a process that writes pictures needs no solvers, which take a second to load.
+    from workflow.contact_stage import ContactStage
+
     stage = _attempt(ContactStage, (settings,))
     while True:
         method, arguments = connection.recv()

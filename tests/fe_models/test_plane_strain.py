@@ -214,6 +214,24 @@ def test_gross_slip_in_closed_form(plane_cycle, symmetric, angle, mu):
         np.testing.assert_allclose(loads.P[whole], expected[whole], rtol=1e-5)
 
 
+@pytest.mark.parametrize("play", [1e-4, 3e-3, 1e-1])
+def test_blade_crosses_the_play_of_worn_flanks(plane_cycle, symmetric, play):
+    """Worn all over, flanks are apart until the load takes the blade across: then all is as before.
+
+    On its way nothing holds the blade, and the solver's residual stays the same.
+    """
+    structure, unworn = plane_cycle(symmetric)
+    joint = FrictionalJoint(structure.condense().resolvent(), 0.4)
+    cycle = structure.solve_cycle(joint, symmetric.amplitudes(), structure.gap() + play, 0.4)
+    assert cycle.converged
+    for before, after in zip(unworn.histories, cycle.histories, strict=True):
+        largest = before.loads.P.max()
+        np.testing.assert_allclose(after.loads.P, before.loads.P, atol=1e-5 * largest)
+        np.testing.assert_allclose(after.loads.Qx, before.loads.Qx, atol=1e-5 * largest)
+        energy = before.loads.Edx.max()
+        np.testing.assert_allclose(after.loads.Edx, before.loads.Edx, atol=1e-4 * energy)
+
+
 def test_skewed_slot_is_refused(dovetail):
     with pytest.raises(MeshError, match="skewed slot"):
         replace(dovetail, skew=0.1).mesh((NODES, 2), SIZE, 2)

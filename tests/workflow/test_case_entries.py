@@ -32,6 +32,21 @@ AMPLITUDE = {
     "blade": {"coefficient": "1e4 um^3/J"},
     "disk": {"coefficient": "1e4 um^3/J"},
 }
+LOADS = "P,Qx,Qy,Mx,My,Mz,Edx,Edy\n1,0,0,0,0,0,0,0\n"
+NODES = "node,X,Y,Z\n1,15,0,245\n2,14,0,246\n3,15,1,245\n"
+ROUNDED = {"shape": "rounded", "edge_width": 1, "edge_radius": 30, "end_width": 1, "end_radius": 30}
+GAPS = {
+    "rounded": ROUNDED,
+    "paraboloid": {"shape": "paraboloid", "radius_x": "1 m", "radius_y": "1 m"},
+    "heights": {"shape": "heights", "file": "gap.npy"},
+}
+INTERFACE = {
+    "name": "interface",
+    "size": [11, 60],
+    "gap": ROUNDED,
+    "frame": {"origin": [15, 0, 245], "x": [-1, 0, 1], "normal": [-1, 0, -1]},
+    "nodes": {"body_1": "nodes_1.csv", "body_2": "nodes_2.csv"},
+}
 EXPECT = [{"quantity": "a.b", "value": "3 um", "tolerance": "1 %", "source": "a test"}]
 # Sections that the templates do not have, by the law or shape they need.
 WITH = {
@@ -47,7 +62,7 @@ WITH = {
     "heights": ["structure={kind: bodies, shape: heights, file: gap.npy}"],
 }
 # Each kind's own cells, for the files that the cases name.
-CELLS = {"dovetail": (8, 8), "bodies": (128, 128), "line": (512,)}
+CELLS = {"dovetail": (8, 8), "resultants": (128, 256), "bodies": (128, 128), "line": (512,)}
 
 
 @dataclass(frozen=True)
@@ -67,6 +82,10 @@ class Leaf:
     def is_list(self) -> bool:
         return "tuple" in str(self.field.annotation)
 
+    def listed(self, first, last):
+        """A list as long as the example, its last value another than those before."""
+        return f"[{', '.join([first] * (len(self.field.examples[0]) - 1) + [last])}]"
+
 
 def leaves(model, path=(), tags=()):
     """``(path, tags, field)`` of every leaf; list entries and unions are entered."""
@@ -85,12 +104,25 @@ def leaves(model, path=(), tags=()):
 def all_leaves():
     for kind, model in KINDS.items():
         for path, tags, field in leaves(model):
-            needed = [entry for tag in tags for entry in WITH[tag]]
+            needed = needed_by(kind, path, tags)
             if path[0] == "expect":
                 needed = [*needed, f"expect={EXPECT}"]
             if path[:2] == ("wear", "stop") and tags == ():
                 needed = [*needed, *WITH["energy"][1:]]
             yield Leaf(kind, ".".join(map(str, path)), needed, field)
+
+
+def needed_by(kind, path, tags):
+    """Overrides that give a case of ``kind`` the sections that ``tags`` name."""
+    if kind != "resultants":
+        return [entry for tag in tags for entry in WITH.get(tag, [])]
+    gap = next((GAPS[tag] for tag in tags if tag in GAPS), ROUNDED)
+    if path[:2] == ("structure", "interfaces"):
+        return [f"structure.interfaces={[INTERFACE | {'gap': gap}]}"]
+    # Its bodies have no names of their own.
+    wear = str({"archard": ARCHARD, "energy_amplitude": AMPLITUDE}.get("".join(tags), ""))
+    wear = wear.replace("'blade'", "'body_2'").replace("'disk'", "'body_1'")
+    return [f"wear={wear}"] if wear else [f"structure.gap={gap}"]
 
 
 PARSED = functools.cache(source.parse_yaml)
@@ -117,6 +149,9 @@ def folders(tmp_path_factory) -> dict[str, Folder]:
     for kind, cells in CELLS.items():
         made[kind] = tmp_path_factory.mktemp(kind)
         np.save(made[kind] / "gap.npy", np.zeros(cells))
+        (made[kind] / "loads.csv").write_text(LOADS, encoding="utf-8")
+        for body in (1, 2):
+            (made[kind] / f"nodes_{body}.csv").write_text(NODES, encoding="utf-8")
         (made[kind] / "history.csv").write_text("P,Qx\n1,0\n1,0.1\n", encoding="utf-8")
     return made
 
@@ -164,7 +199,7 @@ def test_wrong_type_is_refused(leaf, folders):
 
 @each_quantity
 def test_wrong_unit_is_refused(leaf, folders):
-    wrong = "[1, {}]" if leaf.is_list else "{}"
+    wrong = leaf.listed("1", "{}") if leaf.is_list else "{}"
     assert "unknown unit" in refused(leaf, folders, wrong.format("1 furlongs_per_bushel"))
     if entry_of(leaf.field).unit is not None:
         assert "cannot be converted" in refused(leaf, folders, wrong.format("1 K^3/mol"))
@@ -185,8 +220,8 @@ def test_value_out_of_range_is_refused(leaf, folders):
         assert len(limits) >= 2, "a quantity needs two limits, or says nothing about its unit"
     for limit in limits:
         inside = getattr(entry, "at_least", 0)
-        value = [inside if isinstance(entry, Whole) else 1.0, limit] if leaf.is_list else limit
-        refused(leaf, folders, repr(value))
+        first = repr(inside if isinstance(entry, Whole) else 1.0)
+        refused(leaf, folders, leaf.listed(first, repr(limit)) if leaf.is_list else repr(limit))
 
 
 @each_leaf

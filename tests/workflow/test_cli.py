@@ -68,11 +68,13 @@ def test_check_says_what_would_run(dovetail_path):
     ("kind", "words"),
     [
         ("dovetail", "10 jumps"),
+        ("resultants", "loads in 3-D from loads.csv, without slip"),
         ("bodies", "128 x 128 cells of 0.007812 x 0.007812 mm, history auto"),
         ("line", "512 strips of 0.003906 mm"),
     ],
 )
 def test_new_writes_a_case_that_checks(tmp_path, kind, words):
+    (tmp_path / "loads.csv").write_text("P,Qx,Qy,Mx,My,Mz,Edx,Edy\n1,0,0,0,0,0,0,0\n", "utf-8")
     path = tmp_path / "mine.yaml"
     assert invoke("new", kind, path).exit_code == 0
     checked = invoke("check", path)

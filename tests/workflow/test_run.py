@@ -108,7 +108,7 @@ def test_two_runs_are_bitwise_equal(start, whole, tmp_path):
 def test_pictures_are_written(start, tmp_path):
     run = start(tmp_path / "out", "output.paraview=true", "output.figures=true", *QUICK)
     assert run.ending.exit_code == 0, run.ending.stderr
-    assert len(list((run.folder / "figures").glob("*.png"))) == 6
+    assert len(list((run.folder / "figures").glob("*.png"))) == 8
     assert (run.folder / "paraview" / "structure.pvd").exists()
     assert not list(run.folder.rglob("*.part"))
 

@@ -4,7 +4,9 @@ from workflow.case.contact_case import ContactCase, LineContactCase
 from workflow.case.dovetail_case import DovetailCase
 from workflow.case.loading import load_case, parse_case
 from workflow.case.mesh_case import MeshCase
+from workflow.case.resultants_case import ResultantsCase
 from workflow.case.schema import Case, json_schema
+from workflow.case.specimens_case import SpecimensCase
 from workflow.case.template import KINDS, template
 from workflow.case.wear_case import WearCase
 from workflow.case.writing import dump_case
@@ -18,6 +20,8 @@ __all__ = [
     "DovetailCase",
     "LineContactCase",
     "MeshCase",
+    "ResultantsCase",
+    "SpecimensCase",
     "WearCase",
     "dump_case",
     "json_schema",

@@ -16,7 +16,13 @@ from workflow.case.sections import (
     entry,
 )
 from workflow.case.wear_case import WearCase
-from workflow.case.wear_sections import BladeAndDiskMaterials, Coupling, DovetailWear
+from workflow.case.wear_sections import (
+    BladeAndDiskMaterials,
+    Coupling,
+    DovetailWear,
+    Nonlinearity,
+    Ratio,
+)
 
 if TYPE_CHECKING:
     from fe_models.geometry.dovetail import Dovetail as Geometry
@@ -206,16 +212,27 @@ class DovetailCase(WearCase):
     materials: BladeAndDiskMaterials = entry("the two bodies in contact")
     load_path: LoadPath = entry("one cycle")
     mesh: Mesh = entry("finite elements of the structure", default=Mesh())
+    nonlinearity: Nonlinearity = entry("geometric, of the structure", default=Nonlinearity())
     wear: DovetailWear = entry("law, length of the run and step")
     coupling: Coupling = entry("worn surfaces back to the structure", default=Coupling())
+    accuracy: Ratio = entry("of mid-slot values, when fidelity is auto [1]", "5 %", default=0.05)
+    fidelity: Literal["fixed", "auto"] = entry(
+        "fixed: as written; auto: structure.dimension 2 where a coarse probe shows it meets the "
+        "accuracy, else 3",
+        "fixed",
+        default="fixed",
+    )
 
     def outline(self) -> list[tuple[str, str]]:
         path, (across, along) = self.load_path, self.mesh.flank_nodes
         nodes = f"{across} x {along}" if self.structure.dimension == 3 else f"{across}"
-        return [
+        rows = [
             ("structure", f"dovetail in {self.structure.dimension}-D, {nodes} nodes on a flank"),
             ("load path", f"{path.increments} increments, peak at {path.peak_at}"),
         ]
+        if self.fidelity == "auto":
+            rows.append(("fidelity", f"2-D or 3-D, by a probe: {100 * self.accuracy:g} %"))
+        return rows
 
     @property
     def recoupling(self) -> Coupling:

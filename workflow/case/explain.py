@@ -22,6 +22,7 @@ SENTENCES = {
     "model_attributes_type": "not a section; allowed: entries below it, as key: value",
     "tuple_type": "not a list; allowed: such as [a, b]",
     "too_long": "too long; allowed: a list of {max_length}",
+    "too_short": "too short; allowed: a list of at least {min_length}",
 }
 
 
@@ -130,7 +131,8 @@ class _Explanation:
         node: Any = self.source.data
         tag_seen = False
         loc = details["loc"]
-        named = details["type"] in ("missing", "extra_forbidden")  # then the last part is a key
+        # Then the last part is a key, even where it reads like a kind.
+        named = details["type"] in ("missing", "extra_forbidden", "entry")
         for index, key in enumerate(loc):
             is_kind = key in [child(node, name) for name in KINDS_ARE_NAMED_BY]
             if is_kind and not tag_seen and not (named and index == len(loc) - 1):

@@ -18,8 +18,10 @@ from workflow.case.dovetail_case import DovetailCase
 from workflow.case.explain import lines_about
 from workflow.case.fields import shown
 from workflow.case.mesh_case import MeshCase
+from workflow.case.resultants_case import ResultantsCase
 from workflow.case.schema import Case
 from workflow.case.source import KeyPath, Source, dotted, read_text
+from workflow.case.specimens_case import SpecimensCase
 from workflow.errors import CaseError
 
 
@@ -46,7 +48,12 @@ def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
 
 
 # Wear cases by their kind of structure.
-WEAR_CASES: dict[str, type[Case]] = {"dovetail": DovetailCase, "mesh": MeshCase}
+WEAR_CASES: dict[str, type[Case]] = {
+    "dovetail": DovetailCase,
+    "mesh": MeshCase,
+    "resultants": ResultantsCase,
+    "specimens": SpecimensCase,
+}
 
 
 def _kind_of_case(source: Source) -> type[Case]:

@@ -2,15 +2,32 @@
 
 from __future__ import annotations
 
-from typing import Annotated, ClassVar, Literal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
-from pydantic import Field, model_validator
+import numpy as np
+from pydantic import Field, TypeAdapter, ValidationError, model_validator
 
 from workflow.case.fields import File, Quantity, Text, Whole
+from workflow.case.input_files import InputFileError, height_shape
+from workflow.case.resultants_case import Gap, HeightsGap, ParaboloidGap, RoundedGap
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 from workflow.case.wear_case import WearCase
-from workflow.case.wear_sections import Coupling, TwoMaterials, Wear
+from workflow.case.wear_sections import Coupling, Nonlinearity, TwoMaterials, Wear
+from workflow.errors import UserError
 
+if TYPE_CHECKING:
+    from fe_models import imported_structure as fe
+    from fe_models.geometry.imported import ImportedMesh
+    from fe_models.mesh import Interface, StructureMesh
+
+# Share of a face's size that is rounding.
+ROUNDING = 1e-9
+# Files that hold shapes and no mesh.
+CAD = (".step", ".stp", ".brep")
 # What the readers take; other endings are refused with advice.
 ENDINGS = (
     ".msh", ".inp", ".step", ".stp", ".brep", ".vtu", ".vtk", ".xdmf", ".med", ".bdf", ".mesh",
@@ -21,38 +38,54 @@ Name = Annotated[str, Text()]
 Factor = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
 Coordinate = Annotated[float, Quantity("mm", at_least=-1e6, at_most=1e6)]
 Component = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
+Stamp = tuple[int, int]
 Pull = Annotated[float, Quantity("N", at_least=-1e9, at_most=1e9)]
 Push = Annotated[float, Quantity("MPa", at_least=-1e5, at_most=1e5)]
 Travel = Annotated[float, Quantity("mm", at_least=-1e3, at_most=1e3)]
 Speed = Annotated[float, Quantity("rad/s", above=0.0, at_most=1e5)]
 Pace = Annotated[float, Quantity("mm/s^2", at_least=-1e12, at_most=1e12)]
 
-HOLDS = (
-    "all", "normal", "x", "y", "z", "xy", "xz", "yz", "mean_x", "mean_y", "mean_z",
-)  # fmt: skip
-
 
 class ContactPair(Section):
     """Two faces that meet; their meshes need not match."""
 
     name: Name = entry("of the interface in all results", "pad")
-    face_1: Name = entry("boundary of body 1", "top")
-    face_2: Name = entry("boundary of body 2", "bottom")
+    face_1: Name = entry("boundary of body 1", "disk_top")
+    face_2: Name = entry("boundary of body 2", "blade_foot")
     x: tuple[Component, Component, Component] = entry(
-        "direction in which body 2 would slide under the load; x of the interface frame",
+        "direction in which body 2 would slide under the load; x of the interface frame [1]",
         [1.0, 0.0, 0.0],
     )
+    gap: Gap | None = entry("of the unloaded bodies, beside that of their meshes", default=None)
+
+    @model_validator(mode="after")
+    def _has_direction(self) -> ContactPair:
+        if not any(self.x):
+            raise disagreement("no direction; allowed: one that is not zero", "x")
+        return self
+
+    def described(self) -> fe.ContactPair:
+        """As the structure takes it."""
+        from fe_models.imported_structure import ContactPair as Pair
+
+        return Pair(self.name, self.face_1, self.face_2, np.array(self.x))
 
 
 class Support(Section):
     """Displacements held at a boundary or a node set, of whichever body has it."""
 
-    group: Name = entry("boundary or node set", "base")
+    group: Name = entry("boundary or node set", "disk_base")
     hold: Literal[
         "all", "normal", "x", "y", "z", "xy", "xz", "yz", "mean_x", "mean_y", "mean_z"
     ] = entry(
         "all, normal, global axes such as xz, or mean_x: only the mean of a boundary along x", "all"
     )
+
+    def described(self) -> fe.Support:
+        """As the structure takes it."""
+        from fe_models.imported_structure import Support as Held
+
+        return Held(self.group, "xyz" if self.hold == "all" else self.hold)
 
 
 class _Load(Section):
@@ -60,7 +93,7 @@ class _Load(Section):
 
     kind: str  # named first; each load narrows it to its own name
     path: tuple[Factor, ...] = entry(
-        "factor of the load at the end of each leg of load_path; from 0, linearly", [1.0, 0.0]
+        "factor of the load at the end of each leg of load_path; from 0, linearly [1]", [1.0, 0.0]
     )
 
 
@@ -70,8 +103,14 @@ class PressureLoad(_Load):
     kind: Literal["pressure"] = entry(
         "pressure, force, displacement, rotation or acceleration", "pressure"
     )
-    group: Name = entry("boundary", "top")
+    group: Name = entry("boundary", "blade_top")
     pressure: Push = entry("into the body [MPa]", "10 MPa")
+
+    def described(self) -> fe.Pressure:
+        """As the structure takes it."""
+        from fe_models.imported_structure import Pressure
+
+        return Pressure(self.group, self.pressure)
 
 
 class ForceLoad(_Load):
@@ -80,10 +119,16 @@ class ForceLoad(_Load):
     kind: Literal["force"] = entry(
         "pressure, force, displacement, rotation or acceleration", "force"
     )
-    group: Name = entry("boundary", "top")
+    group: Name = entry("boundary", "blade_top")
     force: tuple[Pull, Pull, Pull] = entry(
-        "along the global axes [N]; per length in the plane, as if in N", [0.0, 0.0, "-1 kN"]
+        "along the global axes; in the plane per length, N/mm [N]", [0.0, 0.0, "-1 kN"]
     )
+
+    def described(self) -> fe.Force:
+        """As the structure takes it."""
+        from fe_models.imported_structure import Force
+
+        return Force(self.group, np.array(self.force))
 
 
 class DisplacementLoad(_Load):
@@ -92,7 +137,7 @@ class DisplacementLoad(_Load):
     kind: Literal["displacement"] = entry(
         "pressure, force, displacement, rotation or acceleration", "displacement"
     )
-    group: Name = entry("boundary", "top")
+    group: Name = entry("boundary", "blade_top")
     displacement: tuple[Travel, Travel, Travel] = entry(
         "along the global axes [mm]", ["10 um", 0.0, 0.0]
     )
@@ -103,6 +148,12 @@ class DisplacementLoad(_Load):
             raise disagreement("no displacement; allowed: one that is not zero", "displacement")
         return self
 
+    def described(self) -> fe.Displacement:
+        """As the structure takes it."""
+        from fe_models.imported_structure import Displacement
+
+        return Displacement(self.group, np.array(self.displacement))
+
 
 class RotationLoad(_Load):
     """Rotation of both bodies; its path is that of the speed, whose square the forces follow."""
@@ -110,7 +161,9 @@ class RotationLoad(_Load):
     kind: Literal["rotation"] = entry(
         "pressure, force, displacement, rotation or acceleration", "rotation"
     )
-    axis: tuple[Component, Component, Component] = entry("direction of the axis", [0.0, 1.0, 0.0])
+    axis: tuple[Component, Component, Component] = entry(
+        "direction of the axis [1]", [0.0, 1.0, 0.0]
+    )
     through: tuple[Coordinate, Coordinate, Coordinate] = entry(
         "a point on the axis [mm]", [0.0, 0.0, 0.0]
     )
@@ -122,6 +175,12 @@ class RotationLoad(_Load):
             raise disagreement("no direction; allowed: one that is not zero", "axis")
         return self
 
+    def described(self) -> fe.Rotation:
+        """As the structure takes it."""
+        from fe_models.imported_structure import Rotation
+
+        return Rotation(np.array(self.axis), np.array(self.through), self.speed)
+
 
 class AccelerationLoad(_Load):
     """Acceleration of the frame of reference: both bodies are pulled against it."""
@@ -132,6 +191,12 @@ class AccelerationLoad(_Load):
     acceleration: tuple[Pace, Pace, Pace] = entry(
         "along the global axes [mm/s^2]", [0.0, 0.0, "9.81 m/s^2"]
     )
+
+    def described(self) -> fe.Acceleration:
+        """As the structure takes it."""
+        from fe_models.imported_structure import Acceleration
+
+        return Acceleration(np.array(self.acceleration))
 
 
 Load = Annotated[
@@ -155,9 +220,29 @@ class ImportedStructure(Section):
     order: Literal[1, 2] = entry("of the elements, 1 or 2", 1, default=1)
     body_1: Name = entry("name in the file of the lower, fixed body", "disk")
     body_2: Name = entry("name in the file of the upper, moving body", "blade")
-    contacts: Annotated[tuple[ContactPair, ...], Field(min_length=1)] = entry("faces that meet")
-    supports: Annotated[tuple[Support, ...], Field(min_length=1)] = entry("what is held")
-    loads: Annotated[tuple[Load, ...], Field(min_length=1)] = entry("what is applied")
+    contacts: tuple[ContactPair, ...] = entry("faces that meet")
+    supports: tuple[Support, ...] = entry("what is held")
+    loads: tuple[Load, ...] = entry("what is applied")
+
+    @model_validator(mode="after")
+    def _has_some(self) -> ImportedStructure:
+        for name in ("contacts", "supports", "loads"):
+            if not getattr(self, name):
+                raise disagreement("none; allowed: one or more", name)
+        return self
+
+    @model_validator(mode="after")
+    def _size_is_for_cad(self) -> ImportedStructure:
+        shapes = Path(self.file).suffix.lower() in CAD
+        if shapes and self.size is None:
+            raise disagreement("missing; allowed: a size, to mesh a CAD file with", "size")
+        if not shapes and self.size is not None:
+            raise disagreement(
+                f"{self.size:g} mm: the file is a mesh already; allowed: none, or a file of "
+                f"{', '.join(CAD)}",
+                "size",
+            )
+        return self
 
     @model_validator(mode="after")
     def _names_differ(self) -> ImportedStructure:
@@ -168,13 +253,63 @@ class ImportedStructure(Section):
             raise disagreement("the same body twice; allowed: two bodies", "body_2", "body_1")
         return self
 
+    def read(self) -> ImportedMesh:
+        """Everything in the file, read once. Raises MeshError."""
+        return _read(self.file, self.size, _stamp(self.file))
+
+    def mesh(self) -> StructureMesh:
+        """The two bodies and their interfaces, made once. Raises MeshError."""
+        return _joined(self, _stamp(self.file))
+
+
+# Reading or meshing takes seconds for every 100 000 elements: a check and the run that follows it
+# share what they find.
+@lru_cache(maxsize=1)
+def _read(file: str, size: float | None, stamp: Stamp) -> ImportedMesh:
+    from fe_models.geometry.imported import read_bodies
+
+    return read_bodies(Path(file), size)
+
+
+@lru_cache(maxsize=1)
+def _joined(structure: ImportedStructure, stamp: Stamp) -> StructureMesh:
+    from fe_models.imported_structure import imported_mesh
+
+    pairs = [pair.described() for pair in structure.contacts]
+    return imported_mesh(structure.read(), (structure.body_1, structure.body_2), pairs)
+
+
+def _stamp(file: str) -> Stamp:
+    """Time and size by which a file that has changed is known."""
+    state = Path(file).stat()
+    return state.st_mtime_ns, state.st_size
+
+
+def described_file(file: Path, size: str | None) -> list[str]:
+    """Lines that list what a mesh or CAD file has; ``size`` with its unit. Raises UserError."""
+    from fe_models.geometry.imported import describe, read_bodies
+    from fe_models.mesh import MeshError
+
+    try:
+        return describe(read_bodies(file, None if size is None else _length(size)))
+    except MeshError as error:
+        raise UserError(str(error)) from error
+
+
+def _length(text: str) -> float:
+    """A length in mm. Raises UserError."""
+    value = float(text) if text.replace(".", "", 1).isdecimal() else text
+    try:
+        length: float = TypeAdapter(Length).validate_python(value)
+    except ValidationError as error:
+        raise UserError(f"--size: {error.errors()[0]['msg']}") from error
+    return length
+
 
 class Legs(Section):
     """Every load goes linearly from leg to leg; the last legs are one cycle."""
 
-    increments: Annotated[tuple[Annotated[int, Whole(1, 10_000)], ...], Field(min_length=1)] = (
-        entry("of each leg", [8, 14])
-    )
+    increments: tuple[Annotated[int, Whole(1, 10_000)], ...] = entry("of each leg", [8, 14])
     cycle_from: Annotated[int, Whole(1, 1000)] = entry(
         "first leg of the cycle; those before it are passed once", 1, default=1
     )
@@ -184,6 +319,8 @@ class Legs(Section):
 
     @model_validator(mode="after")
     def _peak_is_a_leg(self) -> Legs:
+        if not self.increments:
+            raise disagreement("none; allowed: one or more", "increments")
         if not self.cycle_from <= self.peak_leg <= len(self.increments):
             raise disagreement(
                 f"{self.peak_leg}: no leg of the cycle; "
@@ -202,6 +339,7 @@ class MeshCase(WearCase):
     structure: ImportedStructure = entry("bodies, contacts, supports and loads, named by groups")
     materials: TwoMaterials = entry("the two bodies in contact")
     load_path: Legs = entry("one cycle")
+    nonlinearity: Nonlinearity = entry("geometric, of the structure", default=Nonlinearity())
     wear: Wear = entry("law, length of the run and step")
     coupling: Coupling = entry("worn surfaces back to the structure", default=Coupling())
 
@@ -211,9 +349,11 @@ class MeshCase(WearCase):
 
     def outline(self) -> list[tuple[str, str]]:
         structure, legs = self.structure, self.load_path.increments
-        names = ", ".join(pair.name for pair in structure.contacts)
+        mesh = structure.mesh()
+        bodies = [f"{b.name} of {b.mesh.nvertices} nodes" for b in (mesh.body_1, mesh.body_2)]
         return [
-            ("structure", f"{structure.file}: {structure.body_1} and {structure.body_2}, {names}"),
+            ("structure", f"{Path(structure.file).name}: {' and '.join(bodies)}"),
+            *(("face", _outline_of(interface)) for interface in mesh.interfaces),
             ("load path", f"{sum(legs)} increments in {len(legs)} legs"),
         ]
 
@@ -228,3 +368,135 @@ class MeshCase(WearCase):
                     f"structure.loads.{index}.path",
                 )
         return self
+
+    @model_validator(mode="after")
+    def _fits_the_file(self) -> MeshCase:
+        """Every name is in the file, the faces meet and body 1 is held."""
+        structure = self.structure
+        with _pointing_at("structure.file"):
+            imported = structure.read()
+        self._check_names(imported)
+        self._check_contacts()
+        self._check_supports(imported)
+        return self
+
+    def _check_names(self, imported: ImportedMesh) -> None:
+        from fe_models.imported_structure import (
+            check_load,
+            check_support,
+            contact_facets,
+            named_body,
+        )
+
+        structure = self.structure
+        with _pointing_at("structure.body_1"):
+            body_1 = named_body(imported, structure.body_1)
+        with _pointing_at("structure.body_2"):
+            body_2 = named_body(imported, structure.body_2)
+        for index, pair in enumerate(structure.contacts):
+            with _pointing_at(f"structure.contacts.{index}.face_1"):
+                contact_facets(imported, body_1, pair.face_1)
+            with _pointing_at(f"structure.contacts.{index}.face_2"):
+                contact_facets(imported, body_2, pair.face_2)
+        for index, support in enumerate(structure.supports):
+            with _pointing_at(f"structure.supports.{index}.group"):
+                check_support(imported, (body_1, body_2), support.described())
+        for index, load in enumerate(structure.loads):
+            own = ".group" if hasattr(load, "group") else ""
+            with _pointing_at(f"structure.loads.{index}{own}"):
+                check_load(imported, (body_1, body_2), load.described())
+
+    def _check_contacts(self) -> None:
+        """Make the interfaces; where they cannot be, find the pair that is at fault."""
+        from fe_models.mesh import MeshError
+
+        structure = self.structure
+        try:
+            interfaces = structure.mesh().interfaces
+        except MeshError:
+            for index, pair in enumerate(structure.contacts):
+                with _pointing_at(f"structure.contacts.{index}"):
+                    structure.model_copy(update={"contacts": (pair,)}).mesh()
+            raise
+        for index, (pair, face) in enumerate(zip(structure.contacts, interfaces, strict=True)):
+            self._check_gap(pair.gap, face, f"structure.contacts.{index}.gap")
+
+    def _check_gap(
+        self,
+        gap: RoundedGap | ParaboloidGap | HeightsGap | None,
+        face: Interface,
+        key: str,
+    ) -> None:
+        size, line = face_size(face), face.line
+        if isinstance(gap, RoundedGap):
+            widths = [("edge_width", gap.edge_width, size[0])]
+            widths += [] if line else [("end_width", gap.end_width or 0.0, size[1])]
+            for name, width, extent in widths:
+                if width > 0.5 * extent * (1.0 + ROUNDING):
+                    raise disagreement(
+                        f"{width:g} mm: too large; allowed: up to half the face, "
+                        f"{0.5 * extent:.6g} mm",
+                        f"{key}.{name}",
+                    )
+        elif isinstance(gap, ParaboloidGap) and line and gap.radius_x is None:
+            raise disagreement("no radius_x; allowed: one, in 2 dimensions", key)
+        elif isinstance(gap, HeightsGap):
+            try:
+                shape = height_shape(gap.file)
+            except InputFileError as error:
+                raise disagreement(str(error), f"{key}.file") from error
+            cells = self.contact.grid[0], 1 if line else self.contact.grid[1]
+            if shape != cells:
+                raise disagreement(
+                    f"{cells[0]} x {cells[1]} cells: the heights of {gap.file} are "
+                    f"{shape[0]} x {shape[1]}; allowed: [{shape[0]}, {shape[1]}]",
+                    "contact.grid",
+                )
+
+    def _check_supports(self, imported: ImportedMesh) -> None:
+        """Build what holds the bodies, on elements of order 1 and without forces."""
+        from fe_models.imported_structure import imported_structure
+
+        structure = self.structure
+        supports = [support.described() for support in structure.supports]
+        imposed = [o.described() for o in structure.loads if isinstance(o, DisplacementLoad)]
+        materials = self.material(1), self.material(2)
+        with _pointing_at("structure.supports"):
+            made = imported_structure(structure.mesh(), imported, materials, supports, imposed, 1)
+        slices = [name for name, share in made.held_faces.items() if share == 1.0]
+        if slices and made.body_1.elastic.dimension == 3:
+            raise disagreement(
+                f"all nodes of {slices[0]} are held along it, as in a slice in plane strain, and "
+                "its half-space would be a strip as wide as the slice; allowed: the section as a "
+                "plane mesh",
+                "structure.supports",
+            )
+
+
+def face_size(face: Interface) -> tuple[float, float]:
+    """Extent of a face along x and y about its origin [mm]; of a line contact a slice of 1 mm."""
+    reach = 2.0 * np.abs(face.coordinates).max(axis=0)
+    return float(reach[0]), 1.0 if face.line else float(reach[1])
+
+
+def _outline_of(interface: Interface) -> str:
+    """What a user should see of an interface before running it."""
+    meet = "meet node to node" if interface.projection is None else "do not match"
+    area = f"{interface.nodal_areas.sum():.4g} {'mm' if interface.line else 'mm²'}"
+    # Rounded, as planes of a mesh file are off by its last digits.
+    low, high = (round(float(gap), 9) + 0.0 for gap in (interface.gap.min(), interface.gap.max()))
+    return (
+        f"{interface.name}, {len(interface)} nodes that {meet}, {area}, gap of the meshes "
+        f"{low:.3g} to {high:.3g} mm"
+    )
+
+
+@contextmanager
+def _pointing_at(key: str) -> Iterator[None]:
+    """Say of a mesh that cannot be used which entry asks for it."""
+    from fe_models.mesh import MeshError
+
+    try:
+        yield
+    except MeshError as error:
+        raise disagreement(str(error), key) from error

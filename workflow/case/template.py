@@ -10,13 +10,17 @@ from pydantic.fields import FieldInfo
 from workflow.case.contact_case import ContactCase, LineContactCase
 from workflow.case.dovetail_case import DovetailCase
 from workflow.case.mesh_case import MeshCase
+from workflow.case.resultants_case import ResultantsCase
 from workflow.case.sections import Section, entries_of, sections_of
+from workflow.case.specimens_case import SpecimensCase
 from workflow.case.writing import Row, render
 
 # What `fretscale new` can write.
 KINDS: dict[str, type[Section]] = {
     "dovetail": DovetailCase,
     "mesh": MeshCase,
+    "resultants": ResultantsCase,
+    "specimens": SpecimensCase,
     "bodies": ContactCase,
     "line": LineContactCase,
 }
@@ -25,9 +29,9 @@ HEADER = """\
 # A number without a unit is in the base unit, given in brackets. `fretscale check` tells what is
 # wrong with a case, `fretscale run` runs it. Entries behind a # are optional.
 """
-# Optional entries the template fills in: a material that can yield, the one size a step needs, and
-# legs that press.
-FILLED_IN = ("yield_stress", "cycles", "legs", "P")
+# Optional entries the template fills in: a material that can yield, the one size a step needs,
+# legs that press, and a face that is rounded all round.
+FILLED_IN = ("yield_stress", "cycles", "legs", "P", "gap", "end_width", "end_radius")
 
 
 def template(kind: str) -> str:

@@ -20,6 +20,7 @@ from workflow.case.sections import (
 from workflow.case.wear_sections import (
     ArchardBody,
     Contact,
+    ContactStress,
     Coupling,
     Duration,
     EnergyBody,
@@ -42,6 +43,7 @@ class WearCase(Scene):
     friction: Friction = entry("Coulomb's law on every contact face")
     contact: Contact = entry("half-space grid over each contact face", default=Contact())
     wear: Duration = entry("law, length of the run and step")
+    stress: ContactStress = entry("under the contacts, unworn and worn", default=ContactStress())
     output: Output = entry("files beside summary and results", default=Output())
     assumed: tuple[DottedPath, ...] = entry(
         "inputs that are ours because the source does not print them",

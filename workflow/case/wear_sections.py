@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from typing import Annotated, Generic, Literal, TypeVar
 
-from pydantic import Field, model_validator
+from pydantic import Field, StrictBool, model_validator
 
-from workflow.case.fields import Quantity
+from workflow.case.fields import Quantity, Whole
 from workflow.case.sections import (
     ElasticBody,
     GridCells,
@@ -31,6 +31,7 @@ VolumePerEnergy = Annotated[
     float, Quantity("1/MPa", at_least=0.0, at_most=1e-3, range_text="0 to 1e9 um^3/J")
 ]
 Ratio = Annotated[float, Quantity("1", above=0.0, at_most=1.0)]
+Place = Annotated[float, Quantity("mm", at_least=-1e4, at_most=1e4)]
 
 Part = TypeVar("Part", bound=Section)
 
@@ -193,6 +194,22 @@ DovetailWear = Annotated[
 Wear = Annotated[EnergyWear | EnergyAmplitudeWear | ArchardWear, Field(discriminator="law")]
 
 
+class Nonlinearity(Section):
+    """What large displacements change: small for stiff joints, and measured by the check."""
+
+    stiffness: Literal["linear", "stress_stiffened", "relinearised"] = entry(
+        "linear; stress_stiffened: with the stress and spin of peak load; relinearised: tangent to "
+        "the nonlinear structure there",
+        "linear",
+        default="linear",
+    )
+    check: StrictBool = entry(
+        "compare with a total Lagrangian model at peak load (two more condensations)",
+        False,
+        default=False,
+    )
+
+
 class Coupling(Section):
     """How often the worn surfaces go back to the structure."""
 
@@ -204,3 +221,55 @@ class Coupling(Section):
     drift: Ratio = entry(
         "change that asks for new resultants, when they may drift [1]", "2 %", default=0.02
     )
+
+
+class Life(Section):
+    """Map of a fretting parameter over each contact face."""
+
+    parameter: Literal["ruiz", "smith_watson_topper", "findley", "none"] = entry(
+        "ruiz: friction work times tension; smith_watson_topper, findley: worst plane, tens of "
+        "times slower; or none",
+        "ruiz",
+        default="ruiz",
+    )
+    depth: Length = entry(
+        "critical distance below the surface, where the map lies and the section begins [mm]",
+        "20 um",
+        default=0.02,
+    )
+    sensitivity: Annotated[float, Quantity("1", at_least=0.0, at_most=10.0)] = entry(
+        "k of findley, to normal stress [1]", 0.3, default=0.3
+    )
+
+
+class ContactStress(Section):
+    """Stress of both bodies under each contact face, unworn and worn."""
+
+    section: Literal["x", "y", "none"] = entry(
+        "plane at peak load: x, across the face; y, along it (not for line contacts); or none",
+        "x",
+        default="x",
+    )
+    at: Place = entry(
+        "where the plane cuts the other axis, 0 being the middle [mm]", "0 mm", default=0.0
+    )
+    depth: Length = entry("of the plane [mm]", "2 mm", default=2.0)
+    points: Annotated[int, Whole(2, 1000)] = entry(
+        "over the depth, denser towards the surface", 24, default=24
+    )
+    life: Life = entry("where fretting cracks would start", default=Life())
+
+    @model_validator(mode="after")
+    def _section_has_depth(self) -> ContactStress:
+        if self.depth <= self.life.depth:
+            raise disagreement(
+                f"{self.depth:g} mm: not below the critical distance; "
+                f"allowed: above life.depth, {self.life.depth:g} mm",
+                *("depth", "life.depth"),
+            )
+        return self
+
+    @property
+    def wanted(self) -> bool:
+        """Whether there is anything to compute."""
+        return self.section != "none" or self.life.parameter != "none"

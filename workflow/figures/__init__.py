@@ -7,10 +7,11 @@ figure whose data a run does not have is left out. Images are 1200 pixels wide.
 from __future__ import annotations
 
 from pathlib import Path
+from types import ModuleType
 
 import h5py
 
-from workflow.figures import contact, wear
+from workflow.figures import contact, specimens, wear
 from workflow.figures.style import STYLE, save
 
 
@@ -21,9 +22,16 @@ def write_figures(results: Path, folder: Path) -> list[Path]:
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     with h5py.File(results) as file, matplotlib.rc_context(STYLE):
-        kind = contact if "history" in file else wear
+        kind = _kind(file)
         for name, draw in kind.figures_of(file).items():
             path = folder / f"{name}.png"
             save(draw(file), path)
             written.append(path)
     return written
+
+
+def _kind(file: h5py.File) -> ModuleType:
+    """The module that draws this kind of results."""
+    if "specimens" in file:
+        return specimens
+    return contact if "history" in file else wear

@@ -17,30 +17,36 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLOURS = BLUE, ORANGE, GREEN
+# Resultants shown, with the unit of a thousand; a line contact has no Mz.
+LOADS = ("Qx", "kN"), ("Mz", "N m")
 FIELDS = (("pressure", "p [MPa]", 1.0), ("shear", "qx [MPa]", 1.0), ("slip", "slip x [µm]", 1e3))
 
 
 def half_space_and_structure(file: h5py.File) -> Figure:
     """Qx and Mz by increment, then p, qx and slip across the flank at some of them."""
     interfaces = list(file["comparison"])
-    figure = new_figure(_largest_difference(file), 16.0)
-    axes = figure.subplots(5, len(interfaces), sharey="row", squeeze=False)
+    line = grid_of(next(iter(file["grid"].values()))).line
+    place, per = ("", "/mm") if line else (" at y = 0", "")
+    loads = LOADS[:1] if line else LOADS
+    rows = len(loads) + len(FIELDS)
+    figure = new_figure(_largest_difference(file), 3.2 * rows)
+    axes = figure.subplots(rows, len(interfaces), sharey="row", squeeze=False)
     for column, interface in zip(axes.T, interfaces, strict=True):
-        _draw_loads(column[0], file, interface, "Qx", "kN")
-        _draw_loads(column[1], file, interface, "Mz", "N m")
-        for axis, (name, _, scale) in zip(column[2:], FIELDS, strict=True):
+        for axis, (name, _) in zip(column, loads, strict=False):
+            _draw_loads(axis, file, interface, name)
+        for axis, (name, _, scale) in zip(column[len(loads) :], FIELDS, strict=True):
             _draw_profiles(axis, file, interface, name, scale)
         column[0].set_title(f"{interface}: resultants of the unworn cycle")
-        column[2].set_title(f"{interface}: across the flank at y = 0; x: finite elements")
-    labels = ("Qx [kN]", "Mz [N m]", *(label for _, label, _ in FIELDS))
+        column[len(loads)].set_title(f"{interface}: across the flank{place}; x: finite elements")
+    labels = [f"{name} [{unit}{per}]" for name, unit in loads] + [label for _, label, _ in FIELDS]
     for axis, label in zip(axes[:, 0], labels, strict=True):
         axis.set_ylabel(label)
     axes[0, 0].legend(loc="lower right")
-    axes[2, 0].legend(loc="upper center")
+    axes[len(loads), 0].legend(loc="upper center")
     return figure
 
 
-def _draw_loads(axis: Axes, file: h5py.File, interface: str, name: str, unit: str) -> None:
+def _draw_loads(axis: Axes, file: h5py.File, interface: str, name: str) -> None:
     structure = file[f"structure/{interface}/load_history"]
     half_space = file[f"comparison/{interface}/load_history"]
     increments = np.arange(1, len(structure["P"]) + 1)
@@ -63,9 +69,16 @@ def _draw_profiles(axis: Axes, file: h5py.File, interface: str, name: str, scale
         along = field if field.ndim == 2 else field[0]
         label = f"increment {int(key) + 1}"
         axis.plot(centres(grid, 0), scale * middle(along, 0), color=colour, label=label)
-        place, values = _nodes_across(file, interface, name, int(key))
-        axis.plot(place, scale * values, "x", color=colour, mew=2)
+        if _given(file, interface, name):
+            place, values = _nodes_across(file, interface, name, int(key))
+            axis.plot(place, scale * values, "x", color=colour, mew=2)
     axis.set_xlabel("x [mm]")
+
+
+def _given(file: h5py.File, interface: str, name: str) -> bool:
+    """Whether the loads came with a field: those of another code may be resultants alone."""
+    field = file["structure"][interface].get(name)
+    return field is not None and bool(np.any(field[()]))
 
 
 def _nodes_across(

@@ -23,6 +23,7 @@ from workflow.figures.fields import (
     spread,
 )
 from workflow.figures.style import BLACK, BLUE, FONT_SIZE, GREEN, ORANGE, PURPLE, new_figure
+from workflow.figures.subsurface import STRESS_FIGURES
 from workflow.store import body_names, grid_of, jump_names
 
 if TYPE_CHECKING:
@@ -38,8 +39,11 @@ CHANGE = "worn less unworn"
 HEIGHT_IN_DEPTHS = 2.0
 # How far the kinetics are extended, in computed numbers of cycles.
 EXTRAPOLATION = 2.0
-# What a profile along x and one along y show.
+# What a profile along x and one along y show; a line contact has no y.
 ALONG = "across the flank at y = 0", "along the slot at x = 0"
+ALONG_LINE = ("across the flank",)
+# How far from the middle the section is, as a share of the body's diagonal.
+BESIDE = 1e-5
 # Around the faces, how far the section shows the bodies: as a share of what the faces span.
 SECTION_MARGIN = 0.4
 
@@ -65,16 +69,16 @@ def resultants(file: h5py.File) -> Figure:
     interfaces = list(file["structure"])
     figure = new_figure(f"Resultants over one cycle: {_who_slides(file)}", 9.0)
     axes = figure.subplots(3, len(interfaces), sharex=True, sharey="row", squeeze=False)
+    per = _per_length(file)
     for column, interface in zip(axes.T, interfaces, strict=True):
         history = {k: v[()] for k, v in file["structure"][interface]["load_history"].items()}
         increments = np.arange(1.0, len(history["P"]) + 1.0)
-        _draw_normal_force(column[0], increments, history, interface)
+        _draw_normal_force(column[0], increments, history, interface, per)
         _draw_tangential_force(column[1], increments, history, float(file.attrs["friction"]))
         half_space = file.get(f"contact/{interface}/energy_half_space")
-        _draw_energy(column[2], increments, history["Edx"] + history["Edy"], half_space)
+        _draw_energy(column[2], increments, history["Edx"] + history["Edy"], half_space, per)
         column[2].set_xlabel("increment")
-    per = _per_length(file)
-    labels = f"P [kN{per}]", f"Qx [kN{per}]", f"energy per increment [N mm{per}]"
+    labels = f"P [kN{per}]", f"Qx [kN{per}]", f"energy per\nincrement [N mm{per}]"
     for axis, label in zip(axes[:, 0], labels, strict=True):
         axis.set_ylabel(label)
     axes[0, 0].set_ylim(bottom=0.0)
@@ -91,12 +95,12 @@ def _who_slides(file: h5py.File) -> str:
 
 
 def _draw_normal_force(
-    axis: Axes, increments: Array, history: dict[str, Array], interface: str
+    axis: Axes, increments: Array, history: dict[str, Array], interface: str, per: str
 ) -> None:
     force = history["P"] / 1e3
     axis.plot(increments, force, "o-", color=BLUE, markersize=4)
     peak = int(np.argmax(force))
-    axis.set_title(f"{interface}: P peaks at {force[peak]:.3g} kN, increment {peak + 1}")
+    axis.set_title(f"{interface}: P peaks at {force[peak]:.3g} kN{per}, increment {peak + 1}")
 
 
 def _draw_tangential_force(
@@ -130,14 +134,14 @@ def _ranges(numbers: Iterable[Any]) -> str:
 
 
 def _draw_energy(
-    axis: Axes, increments: Array, structure: Array, half_space: h5py.Dataset | None
+    axis: Axes, increments: Array, structure: Array, half_space: h5py.Dataset | None, per: str
 ) -> None:
-    total = f"{structure.sum():.4g} N mm"
+    total = f"{structure.sum():.4g} N mm{per}"
     axis.bar(increments, structure, width=0.8, color="#9DC3DE", label=f"finite elements: {total}")
     title = f"{total} by finite elements"
     if half_space is not None:
         fine = half_space[()]
-        name = f"half-space: {fine.sum():.4g} N mm"
+        name = f"half-space: {fine.sum():.4g} N mm{per}"
         axis.plot(increments, fine, "D", color=ORANGE, markersize=5, label=name)
         title = f"half-space {_change(structure.sum(), fine.sum())} against FE"
     axis.set_title(f"energy over the cycle: {title}")
@@ -189,13 +193,14 @@ def _peak_change(file: h5py.File) -> str:
 def pressure_profiles(file: h5py.File) -> Figure:
     """Peak-load pressure across and along the middle of each flank, with the coarse answers."""
     interfaces = list(file["contact"])
-    directions = 1 if _line(file) else 2
+    along = ALONG_LINE if _line(file) else ALONG
+    directions = len(along)
     figure = new_figure(_edge_peak(file), 4.5 * directions)
     axes = figure.subplots(directions, len(interfaces), sharey="row", sharex="row", squeeze=False)
     for column, interface in zip(axes.T, interfaces, strict=True):
         for direction, axis in enumerate(column):
             _draw_profile(axis, file, interface, direction)
-            axis.set_title(f"{interface}, {ALONG[direction]}")
+            axis.set_title(f"{interface}, {along[direction]}")
     axes[0, 0].legend(loc="upper center")
     for axis in axes[:, 0]:
         axis.set_ylabel("pressure [MPa]")
@@ -207,13 +212,13 @@ def _draw_profile(axis: Axes, file: h5py.File, interface: str, direction: int) -
     """Pressure along x (``direction`` 0) or y (1) through the middle."""
     contact, grid = file["contact"][interface], _grid(file, interface)
     for jump, colour in zip(_ends(file, interface), (BLUE, ORANGE), strict=False):
-        label = f"half-space {grid.shape[0]} x {grid.shape[1]}, {_cycles(file, interface, jump)}"
+        label = f"half-space {_cells(grid)}, {_cycles(file, interface, jump)}"
         profile = middle(contact[jump]["pressure"][()], direction)
         axis.plot(centres(grid, direction), profile, color=colour, label=label)
     if "coarse" in contact:
         coarse = grid_of(contact["coarse"])
         profile = middle(contact["coarse"]["pressure"][()], direction)
-        label = f"half-space {coarse.shape[0]} x {coarse.shape[1]}, unworn"
+        label = f"half-space {_cells(coarse)}, unworn"
         axis.plot(centres(coarse, direction), profile, "o", color=BLACK, mfc="none", label=label)
     if f"structure/{interface}/pressure" in file:
         place, pressure = _nodes_on_middle(file, interface, direction)
@@ -236,9 +241,9 @@ def _edge_peak(file: h5py.File) -> str:
     name = max(peaks, key=lambda name: peaks[name])
     text = f"Edge peak on the {name}: {peaks[name]:.0f} MPa"
     if coarse := file["contact"][name].get("coarse"):
-        shape = grid_of(coarse).shape
         peak = middle(coarse["pressure"][()], 0).max()
-        text += f"; {shape[0]} x {shape[1]} cells see {peak:.0f} MPa"
+        cells = "" if _line(file) else " cells"
+        text += f"; {_cells(grid_of(coarse))}{cells} see {peak:.0f} MPa"
     if f"structure/{name}/pressure" in file:
         text += f", finite elements {_nodes_on_middle(file, name, 0)[1].max():.0f} MPa"
     return text
@@ -259,7 +264,8 @@ def worn_profiles(file: h5py.File) -> Figure:
         column[1].set_title(f"{interface}: depth worn off both bodies")
         column[1].set_xlabel("x, across the flank [mm]")
     texts = (f"{name} {depth:.3g} µm" for name, depth in zip(interfaces, deepest, strict=True))
-    figure.suptitle(f"Depth worn off at y = 0, at most: {', '.join(texts)}", fontweight="bold")
+    place = "" if _line(file) else " at y = 0"
+    figure.suptitle(f"Depth worn off{place}, at most: {', '.join(texts)}", fontweight="bold")
     low, high = axes[0, 0].get_ylim()
     axes[0, 0].set_ylim(low, min(high, HEIGHT_IN_DEPTHS * max(deepest)) if any(deepest) else high)
     axes[1, 0].invert_yaxis()
@@ -363,7 +369,8 @@ def _rate(group: h5py.Group) -> str:
     rate = float(group.attrs["volume_rate"])
     if not np.isfinite(rate):
         return "no linear regime, no extrapolation"
-    return f"{1e6 * rate:.3g} mm³ per million cycles at the end"
+    unit = f"mm³{_per_length(group.file)}"
+    return f"{1e6 * rate:.3g} {unit} per million cycles at the end"
 
 
 def _regime(group: h5py.Group, cycles: Array) -> str:
@@ -383,7 +390,8 @@ def structure_stress(file: h5py.File) -> Figure:
     ranges = {state: _range_in_view(file, sections) for state, sections in panels.items()}
     top = max(ranges[state][1] for state in panels if state != CHANGE)
     texts = (f"{ranges[state][1]:.0f} MPa {state}" for state in panels if state != CHANGE)
-    title = f"Von Mises stress in mid-slot at peak load: at most {', '.join(texts)}"
+    place = "in plane strain" if _line(file) else "in mid-slot"
+    title = f"Von Mises stress {place} at peak load: at most {', '.join(texts)}"
     figure = new_figure(title, 1.0 + 4.2 * len(panels))
     axes = figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for axis, (state, sections) in zip(axes, panels.items(), strict=True):
@@ -436,7 +444,9 @@ def _cut(file: h5py.File, body: h5py.Group, stress: Array) -> _Section:
     mesh = body_mesh(body)
     mesh.point_data["stress"] = stress
     if body["elements"].shape[1] == 4:
-        cut = mesh.slice(normal=flank["axes"][1], origin=flank["origin"]).triangulate()
+        # Beside the middle: a plane through nodes of the mesh leaves holes between its elements.
+        beside = flank["origin"] + BESIDE * mesh.length * flank["axes"][1]
+        cut = mesh.slice(normal=flank["axes"][1], origin=beside).triangulate()
     else:
         cut = mesh.extract_surface(algorithm="dataset_surface")
     border = cut.extract_feature_edges(
@@ -526,6 +536,11 @@ def _per_length(file: h5py.File) -> str:
     return "/mm" if _line(file) else ""
 
 
+def _cells(grid: Grid) -> str:
+    """The grid's size in words."""
+    return f"{grid.shape[0]} strips" if grid.line else f"{grid.shape[0]} x {grid.shape[1]}"
+
+
 def _grid(file: h5py.File, interface: str) -> Grid:
     return grid_of(file["grid"][interface])
 
@@ -534,7 +549,7 @@ def figures_of(file: h5py.File) -> dict[str, Callable[[h5py.File], Figure]]:
     """The figures there are data for, by name."""
     return {
         name: draw
-        for name, (draw, needed) in FIGURES.items()
+        for name, (draw, needed) in (FIGURES | STRESS_FIGURES).items()
         if all(group in file for group in needed) and not (draw is pressure_maps and _line(file))
     }
 

@@ -13,6 +13,7 @@ from pathlib import Path
 import h5py
 
 from workflow.paraview.contact import write_contact
+from workflow.paraview.specimens import write_specimens
 from workflow.paraview.wear import write_wear
 
 
@@ -23,5 +24,7 @@ def write_paraview(results: Path, folder: Path) -> list[Path]:
     """
     folder.mkdir(parents=True, exist_ok=True)
     with h5py.File(results) as file:
+        if "specimens" in file:
+            return write_specimens(file, folder)
         write = write_contact if "history" in file else write_wear
         return write(file, folder)

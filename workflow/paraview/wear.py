@@ -4,6 +4,8 @@ Written into one folder:
 
 - ``<interface>.pvd``: time series over the cycles; every step is an image on the contact grid
   (``<interface>/<jump>.vti``), turned and moved to the flank's place in the structure;
+- ``section_<interface>.pvd``: stress in a plane through both bodies under the contact, unworn and
+  worn (``section/<interface>_<state>_<body>.vts``);
 - ``structure.pvd``: all bodies at peak load, unworn at 0 and worn at the last computed number of
   cycles (``structure/<body>_<state>.vtu``); Warp By Vector on ``displacement`` deforms them;
 - ``flank_<interface>_<body>.stl``: the worn surfaces at true scale in global coordinates, but for
@@ -30,6 +32,7 @@ from workflow.paraview.files import (
     write_stl,
     write_xml,
 )
+from workflow.paraview.subsurface import life_fields, write_sections
 from workflow.store import body_names, frame_of, grid_of, jump_names
 
 if TYPE_CHECKING:
@@ -43,6 +46,7 @@ def write_wear(file: h5py.File, folder: Path) -> list[Path]:
     written: list[Path] = []
     for interface in file["grid"]:
         written += _write_flank(file, interface, folder)
+        written += write_sections(file, interface, _placement(file, interface)[1], folder)
         if not grid_of(file["grid"][interface]).line:
             written += _write_worn_surfaces(file, interface, folder)
     if "bodies" in file:
@@ -74,7 +78,8 @@ def _flank_fields(file: h5py.File, interface: str, jump: str, frame: Frame) -> F
         x, y = (cells(component) for component in contact[name][()])
         fields[name] = frame.to_global(np.stack([x, y, np.zeros_like(x)], axis=1)), unit
         fields[f"{name}_x"], fields[f"{name}_y"] = (x, unit), (y, unit)
-    return fields | _surface_fields(file["surfaces"][interface], jump)
+    fields |= _surface_fields(file["surfaces"][interface], jump)
+    return fields | life_fields(file, interface, jump)
 
 
 def _surface_fields(surfaces: h5py.Group, jump: str) -> Fields:

@@ -1,0 +1,504 @@
+"""Mesh cases through the whole road: against our own dovetail, files of all kinds, refusals."""
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+from ruamel.yaml import YAML
+
+from fe_models import friction
+from fe_models.geometry.imported import patch, read_bodies
+from fe_models.gmsh_session import gmsh_model
+from fe_models.mesh import write_msh
+from fe_models.structure import CLOSED
+from workflow.case import load_case, template
+from workflow.cli import cli
+from workflow.dovetail_model import DovetailModel
+from workflow.mesh_model import MeshModel
+from workflow.structure_stage import StructureStage
+
+STEEL = {"young": "200 GPa", "poisson": 0.3, "density": "7800 kg/m^3"}
+WEAR = {
+    "law": "energy",
+    "body_1": {"coefficient": "1e3 um^3/J"},
+    "body_2": {"coefficient": "1e3 um^3/J"},
+    "cycles": 1e3,
+    "step": {"kind": "implicit", "cycles": 500},
+}
+# Corners of the faces S1 to S4 of Abaqus' tetrahedron.
+ABAQUS_FACES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
+
+
+def write_case(path, structure, legs, mu=0.5, grid=(16, 16), **changes):
+    """A case file of the given structure, steel on steel."""
+    case = {
+        "title": "Bodies of a mesh file",
+        "analysis": "wear",
+        "structure": {"kind": "mesh", **structure},
+        "materials": {"body_1": STEEL, "body_2": STEEL},
+        "friction": {"coefficient": mu},
+        "load_path": legs,
+        "contact": {"grid": list(grid)},
+        "wear": WEAR,
+        "stress": {"section": "none", "life": {"parameter": "none"}},
+        "output": {"paraview": False, "figures": False},
+        **changes,
+    }
+    with path.open("w", encoding="utf-8") as stream:
+        YAML().dump(json.loads(json.dumps(case)), stream)
+    return path
+
+
+def invoke(*arguments):
+    """The command in this process; anything but an exit is raised."""
+    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result
+
+
+def settings(overrides):
+    return [part for entry in overrides for part in ("--set", entry)]
+
+
+def refused(path, *overrides):
+    """The one line that refuses a case, after its ``fretscale: ``."""
+    ending = invoke("check", path, *settings(overrides))
+    assert ending.exit_code == 2, ending.output
+    (line,) = ending.stderr.splitlines()
+    return line.removeprefix("fretscale: ")
+
+
+def run(case, out, *overrides):
+    """The summary of a run."""
+    ending = invoke("run", case, "--out", out, *settings(overrides))
+    assert ending.exit_code == 0, ending.stderr
+    return json.loads((out / "summary.json").read_text("utf-8"))
+
+
+# --- our own dovetail, as a file ------------------------------------------------------------------
+
+
+def write_inp(path: Path, mesh) -> None:
+    """Both bodies in a flat Abaqus file, with element sets and element surfaces."""
+    nodes, cells, surfaces = ["*NODE"], [], []
+    node, element = 1, 1
+    for body in (mesh.body_1, mesh.body_2):
+        corners = body.mesh.t.T
+        for number, (x, y, z) in enumerate(body.points.tolist(), node):
+            nodes.append(f"{number}, {x!r}, {y!r}, {z!r}")
+        cells.append(f"*ELEMENT, TYPE=C3D4, ELSET={body.name}")
+        for number, own in enumerate(corners + node, element):
+            cells.append(f"{number}, {', '.join(map(str, own))}")
+        for name, index in body.mesh.boundaries.items():
+            surfaces.append(f"*SURFACE, TYPE=ELEMENT, NAME={body.name}_{name}")
+            for facet in index:
+                cell = body.mesh.f2t[0, facet]
+                places = [corners[cell].tolist().index(v) for v in body.mesh.facets[:, facet]]
+                side = [set(face) for face in ABAQUS_FACES].index(set(places))
+                surfaces.append(f"{element + cell}, S{side + 1}")
+        node, element = node + len(body.points), element + len(corners)
+    path.write_text("\n".join([*nodes, *cells, *surfaces, ""]), encoding="utf-8")
+
+
+def dovetail_as_mesh(folder, dovetail, ending):
+    """The dovetail's own mesh in a file, and the case that describes it.
+
+    Every increment is a leg of its own: the pull follows the square of the speed.
+    """
+    model = DovetailModel(dovetail)
+    mesh = model.mesh()
+    file = folder / f"joint{ending}"
+    (write_msh if ending == ".msh" else write_inp)(file, mesh)
+    path, shape = dovetail.load_path, dovetail.structure
+    speeds = np.sqrt(model.amplitudes[:, 0]) / path.rotation_speed
+    pull = path.airfoil_mass * path.airfoil_radius * path.rotation_speed**2
+    widths = ("edge_width", "edge_radius", "end_width", "end_radius")
+    rounded = {"shape": "rounded"} | {name: getattr(shape, name) for name in widths}
+    contacts = [
+        {
+            "name": own.name,
+            "face_1": f"disk_{own.name}",
+            "face_2": f"blade_{own.name}",
+            "x": own.frame.axes[0].tolist(),
+            "gap": rounded,
+        }
+        for own in mesh.interfaces
+    ]
+    spin = {"kind": "rotation", "axis": [0.0, 1.0, 0.0], "through": [0.0, 0.0, 0.0]}
+    spin |= {"speed": path.rotation_speed, "path": speeds.tolist()}
+    airfoil = {"kind": "force", "group": "blade_shank_top", "force": [0.0, 0.0, pull]}
+    structure = {
+        "file": file.name,
+        "body_1": "disk",
+        "body_2": "blade",
+        "contacts": contacts,
+        "supports": [
+            {"group": "disk_inner", "hold": "all"},
+            {"group": "disk_sides", "hold": "normal"},
+            {"group": "blade_root_bottom", "hold": "mean_y"},
+        ],
+        "loads": [spin, airfoil | {"path": (speeds**2).tolist()}],
+    }
+    materials = {
+        f"body_{n}": {"young": m.young, "poisson": m.poisson, "density": m.density}
+        for n, m in ((1, dovetail.material(1)), (2, dovetail.material(2)))
+    }
+    legs = {"increments": [1] * len(speeds), "peak_leg": path.peak_at}
+    mu = dovetail.friction.coefficient
+    return write_case(folder / "joint.yaml", structure, legs, mu, materials=materials)
+
+
+@pytest.mark.parametrize("ending", [".msh", ".inp"])
+def test_dovetail_as_a_mesh_is_the_dovetail(tmp_path, small_path, ending, monkeypatch):
+    """Loads, slips and energies of every increment, to the solver's accuracy."""
+    monkeypatch.setattr(friction, "TOLERANCE", 1e-11)
+    monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path / "cache"))
+    dovetail = load_case(small_path)
+    ours = StructureStage(DovetailModel(dovetail), 1)
+    theirs = StructureStage(MeshModel(load_case(dovetail_as_mesh(tmp_path, dovetail, ending))), 1)
+    assert theirs.peak == ours.peak
+    for one, two in zip(ours.unworn(), theirs.unworn(), strict=True):
+        assert one.interface.name == two.interface.name
+        here, there = one.interface.coordinates, two.interface.coordinates
+        order = [int(np.argmin(np.linalg.norm(there - place, axis=1))) for place in here]
+        np.testing.assert_allclose(there[order], here, atol=1e-9)
+        np.testing.assert_allclose(two.interface.gap[order], one.interface.gap, atol=1e-12)
+        load, size = one.loads.P.max(), np.abs(here).max()
+        work = one.loads.Edx.max()
+        scales = {"P": load, "Qx": load, "Qy": load, "Edx": work, "Edy": work}
+        for name, scale in (scales | dict.fromkeys(("Mx", "My", "Mz"), load * size)).items():
+            values = getattr(one.loads, name), getattr(two.loads, name)
+            np.testing.assert_allclose(values[1], values[0], atol=1e-6 * scale, err_msg=name)
+        np.testing.assert_array_equal(two.loads.sliding, one.loads.sliding)
+        np.testing.assert_allclose(
+            two.slip[..., order], one.slip, atol=1e-6 * np.abs(one.slip).max()
+        )
+    face, own = theirs.faces[0], ours.faces[0]
+    np.testing.assert_allclose(face.size, own.size, rtol=1e-9)
+    x, y = np.linspace(-5.0, 5.0, 7)[:, None], np.linspace(-28.0, 28.0, 5)[None, :]
+    np.testing.assert_allclose(face.gap(x, y), own.gap(x, y), atol=1e-9)
+
+
+# --- files of all kinds, run ----------------------------------------------------------------------
+
+
+def cube(name, size):
+    """A part: a cube of 2 x 2 x 2 elements, with surfaces below, above and at y = 0."""
+    axis = np.linspace(0.0, size, 3).tolist()
+    places = [(x, y, z) for z in axis for y in axis for x in axis]
+    lines = [f"*Part, name={name}", "*Node"]
+    lines += [f"{n}, {x}, {y}, {z}" for n, (x, y, z) in enumerate(places, 1)]
+    lines.append("*Element, type=C3D8R")
+    firsts = [1 + i + 3 * j + 9 * k for k in (0, 1) for j in (0, 1) for i in (0, 1)]
+    for n, first in enumerate(firsts, 1):
+        below = [first, first + 1, first + 4, first + 3]
+        lines.append(f"{n}, {', '.join(str(m) for m in [*below, *(m + 9 for m in below)])}")
+    for side, face, own in (
+        ("low", "S1", (1, 2, 3, 4)),
+        ("high", "S2", (5, 6, 7, 8)),
+        ("cut", "S3", (1, 2, 5, 6)),
+    ):
+        lines.append(f"*Surface, type=ELEMENT, name={name}_{side}")
+        lines += [f"{n}, {face}" for n in own]
+    return "\n".join([*lines, "*End Part", ""])
+
+
+ASSEMBLY = """\
+*Assembly, name=Assembly
+*Instance, name=Base-1, part=base
+*End Instance
+*Instance, name=Foot-1, part=foot
+0.5, 0.5, 2.
+*End Instance
+*End Assembly
+*Step
+*Static
+*End Step
+"""
+# Two blocks, pressed together and then pushed to and fro without sliding off.
+BLOCKS = {
+    "body_1": "Base-1",
+    "body_2": "Foot-1",
+    "contacts": [{"name": "foot", "face_1": "base_high", "face_2": "foot_low", "x": [1, 0, 0]}],
+    "supports": [{"group": "base_low", "hold": "all"}],
+    "loads": [
+        {"kind": "pressure", "group": "foot_high", "pressure": "40 MPa", "path": [1, 1, 1, 1]},
+        {"kind": "force", "group": "foot_high", "force": ["4 N", 0, 0], "path": [0, 1, -1, 1]},
+    ],
+}
+TO_AND_FRO = {"increments": [1, 2, 2, 2], "cycle_from": 3, "peak_leg": 4}
+
+
+@pytest.fixture
+def blocks(tmp_path):
+    """A cube of 1 mm on one of 2 mm, as CAE would write them."""
+    text = cube("base", 2.0) + cube("foot", 1.0) + ASSEMBLY
+    (tmp_path / "blocks.inp").write_text(text, encoding="utf-8")
+    return write_case(tmp_path / "blocks.yaml", {"file": "blocks.inp", **BLOCKS}, TO_AND_FRO)
+
+
+def edit(path, old, new):
+    """Replace text in a file and give its lines."""
+    text = path.read_text("utf-8")
+    assert old in text
+    path.write_text(text.replace(old, new), encoding="utf-8")
+    return path.read_text("utf-8").splitlines()
+
+
+def test_parts_and_instances_run(blocks, tmp_path):
+    summary = run(blocks, tmp_path / "out")
+    peak = summary["foot"]["peak_load"]["unworn"]
+    assert peak["P"] == pytest.approx(40.0, rel=1e-6)
+    # Forces are those on body 2: they hold it against its load.
+    assert peak["Qx"] == pytest.approx(-4.0, rel=1e-5)
+    assert summary["structure"]["equilibrium_error"] < 1e-6
+    assert summary["structure"]["closure"] <= CLOSED
+
+
+def test_keyword_that_is_not_read_is_refused_with_its_line(blocks):
+    file = blocks.with_name("blocks.inp")
+    lines = edit(file, "*Step\n", "*Tie, name=T\na, b\n*Step\n")
+    message = refused(blocks)
+    assert "structure.file: " in message
+    assert f"blocks.inp:{lines.index('*Tie, name=T') + 1}: " in message
+
+
+def face_at(imported, body, height, normal):
+    """The boundary of a body at a height that looks along z."""
+    for name in imported.bodies[body].mesh.boundaries:
+        found = patch(imported.bodies[body], name)
+        if np.allclose(found.normal, [0, 0, normal]) and np.isclose(found.centroid[2], height):
+            return name
+    raise AssertionError((body, height, normal))
+
+
+@pytest.fixture
+def cad(tmp_path):
+    """Boxes of 4 and 2 mm in a STEP file, its faces found by where they are."""
+    file = tmp_path / "boxes.step"
+    with gmsh_model("boxes") as gmsh:
+        gmsh.model.occ.addBox(-2, -2, -2, 4, 4, 2)
+        gmsh.model.occ.addBox(-1, -1, 0, 2, 2, 1)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(file))
+    imported = read_bodies(file, 1.0)
+    lower, upper = imported.bodies
+    text = json.dumps(BLOCKS)
+    for group, place in {
+        "base_low": (lower, -2.0, -1.0),
+        "base_high": (lower, 0.0, 1.0),
+        "foot_low": (upper, 0.0, -1.0),
+        "foot_high": (upper, 1.0, 1.0),
+    }.items():
+        text = text.replace(json.dumps(group), json.dumps(face_at(imported, *place)))
+    structure = json.loads(text) | {"body_1": lower, "body_2": upper, "file": file.name}
+    return write_case(tmp_path / "cad.yaml", structure | {"size": "0.5 mm"}, TO_AND_FRO)
+
+
+def test_cad_file_runs(cad, tmp_path):
+    summary = run(cad, tmp_path / "out")
+    peak = summary["foot"]["peak_load"]["unworn"]
+    assert peak["P"] == pytest.approx(160.0, rel=1e-6)
+    assert peak["Qx"] == pytest.approx(-4.0, rel=1e-5)
+
+
+def test_describe_lists_what_a_case_may_name(cad):
+    listed = invoke("describe", cad.with_name("boxes.step"), "--size", "1 mm")
+    assert listed.exit_code == 0
+    structure = load_case(cad).structure
+    for name in (structure.body_1, structure.body_2):
+        assert f"body {name}: " in listed.stdout
+    for support in structure.supports:
+        assert f"boundary {support.group}: " in listed.stdout
+
+
+@pytest.mark.parametrize(
+    ("file", "size", "wrong"),
+    [
+        ("boxes.step", [], "needs a mesh size"),
+        ("boxes.step", ["--size", "thick"], "--size: 'thick': not a number with a unit"),
+        ("nix.msh", [], "no such file"),
+    ],
+)
+def test_describe_refuses_in_one_line(cad, file, size, wrong):
+    ending = invoke("describe", cad.with_name(file), *size)
+    assert ending.exit_code == 2
+    (line,) = ending.stderr.splitlines()
+    assert wrong in line
+
+
+def test_size_is_for_cad_files_alone(cad, blocks):
+    assert "structure.size=0.5: 0.5 mm: the file is a mesh" in refused(blocks, "structure.size=0.5")
+    edit(cad, "  size: 0.5 mm\n", "")
+    assert "structure.size: missing" in refused(cad)
+
+
+# --- in the plane ---------------------------------------------------------------------------------
+
+RADIUS, FINE = 400.0, 0.1
+SECTION = {
+    "file": "section.msh",
+    "body_1": "block",
+    "body_2": "pad",
+    "contacts": [{"name": "foot", "face_1": "top", "face_2": "foot", "x": [1, 0, 0]}],
+    "supports": [{"group": "base", "hold": "all"}, {"group": "lid", "hold": "x"}],
+    "loads": [{"kind": "pressure", "group": "lid", "pressure": "20 MPa", "path": [1, 0.5]}],
+}
+
+
+@pytest.fixture
+def section(tmp_path):
+    """A pad 8 mm wide with a round foot over a block, in the plane (X, Z), fine where they meet."""
+    with gmsh_model("section") as gmsh:
+        occ, sag = gmsh.model.occ, RADIUS - np.sqrt(RADIUS**2 - 16.0)
+        corners = [occ.addPoint(x, 0, z) for x, z in ((-8, -8), (8, -8), (8, 0), (-8, 0))]
+        lines = [occ.addLine(corners[k], corners[(k + 1) % 4]) for k in range(4)]
+        block = occ.addPlaneSurface([occ.addCurveLoop(lines)])
+        ends = [occ.addPoint(x, 0, z) for x, z in ((-4, sag), (4, sag), (4, 8), (-4, 8))]
+        arc = occ.addCircleArc(ends[0], occ.addPoint(0, 0, RADIUS), ends[1])
+        sides = [occ.addLine(ends[k], ends[(k + 1) % 4]) for k in (1, 2, 3)]
+        pad = occ.addPlaneSurface([occ.addCurveLoop([arc, *sides])])
+        occ.synchronize()
+        groups = {"block": (2, block), "pad": (2, pad), "base": (1, lines[0]), "top": (1, lines[2])}
+        groups |= {"foot": (1, arc), "lid": (1, sides[1])}
+        for name, (dimension, tag) in groups.items():
+            gmsh.model.addPhysicalGroup(dimension, [tag], name=name)
+        field = gmsh.model.mesh.field
+        box = {"VIn": FINE, "VOut": 1.0, "Thickness": 3.0, "XMin": -1.5, "XMax": 1.5}
+        number = field.add("Box")
+        for name, value in (box | {"YMin": -1, "YMax": 1, "ZMin": -0.5, "ZMax": 0.5}).items():
+            field.setNumber(number, name, value)
+        field.setAsBackgroundMesh(number)
+        gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+        gmsh.option.setNumber("Mesh.MeshSizeMax", 1.0)
+        gmsh.model.mesh.generate(2)
+        gmsh.write(str(tmp_path / "section.msh"))
+    legs = {"increments": [1, 1]}
+    return write_case(tmp_path / "section.yaml", SECTION, legs, mu=0.0, grid=(128, 8))
+
+
+def test_round_foot_in_the_plane_presses_as_hertz_says(section, tmp_path):
+    """P per length, and the peak pressure of nodes and strips: bodies 8 mm high are nearly
+    half-spaces to a contact of half-width 1.1 mm, and nodes 0.1 mm apart round its peak off."""
+    summary = run(section, tmp_path / "out")
+    load = 20.0 * 8.0
+    assert summary["foot"]["peak_load"]["unworn"]["P"] == pytest.approx(load, rel=1e-6)
+    modulus = 200e3 / (2.0 * (1.0 - 0.3**2))
+    half = np.sqrt(4.0 * load * RADIUS / (np.pi * modulus))
+    hertz = 2.0 * load / (np.pi * half)
+    (history,) = StructureStage(MeshModel(load_case(section)), 1).unworn()
+    assert history.pressure[0].max() == pytest.approx(hertz, rel=0.05)
+    assert summary["foot"]["peak_pressure"]["unworn"] == pytest.approx(hertz, rel=0.02)
+
+
+# --- refusals -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("key", "name", "wrong"),
+    [
+        ("body_1", "Nix", "no body Nix; allowed: Base-1, Foot-1"),
+        ("body_2", "Nix", "no body Nix; allowed: Base-1, Foot-1"),
+        ("contacts.0.face_1", "foot_low",
+         "boundary foot_low is on body Foot-1, not on Base-1; allowed: base_low, base_high, "),
+        ("contacts.0.face_2", "nix",
+         "no boundary nix on body Foot-1; allowed: foot_low, foot_high, "),
+        ("supports.0.group", "nix", "no boundary or node set nix on Base-1 or Foot-1; allowed: "),
+        ("loads.1.group", "nix", "no boundary nix on Base-1 or Foot-1; allowed: base_cut, "),
+    ],
+)  # fmt: skip
+def test_names_that_are_not_there(blocks, key, name, wrong):
+    """The line says which names there are."""
+    message = refused(blocks, f"structure.{key}={name}")
+    assert message.startswith(f"--set structure.{key}={name}: ")
+    assert wrong in message
+
+
+def test_place_in_the_file_is_named(blocks):
+    lines = edit(blocks, "group: base_low", "group: nix")
+    number = next(n for n, line in enumerate(lines, 1) if "group: nix" in line)
+    assert refused(blocks).startswith(f"{blocks}:{number}: structure.supports.0.group: ")
+
+
+def test_faces_that_miss_each_other(blocks):
+    edit(blocks.with_name("blocks.inp"), "0.5, 0.5, 2.", "9.5, 0.5, 2.")
+    message = refused(blocks)
+    assert "structure.contacts.0: the two contact faces do not lie on each other" in message
+
+
+def test_faces_that_look_the_same_way(blocks):
+    message = refused(blocks, "structure.contacts.0.face_2=foot_high")
+    assert "faces base_high and foot_high do not face each other" in message
+
+
+def test_body_1_that_is_not_held(blocks):
+    message = refused(blocks, "structure.supports.0.hold=xy")
+    assert "structure.supports: the supports let body Base-1 " in message
+
+
+def test_node_sets_take_no_force_and_no_normal(blocks):
+    part = "*End Part\n*Assembly"
+    edit(blocks.with_name("blocks.inp"), part, f"*Nset, nset=tip\n5\n{part}")
+    assert "tip is a node set" in refused(blocks, "structure.loads.1.group=tip")
+    assert "tip is a node set" in refused(blocks, "structure.contacts.0.face_2=tip")
+    overrides = "structure.supports.0.group=tip", "structure.supports.0.hold=normal"
+    assert "node set tip has no area to hold normal" in refused(blocks, *overrides)
+
+
+@pytest.mark.parametrize(
+    ("gap", "wrong"),
+    [
+        ("{shape: rounded, edge_width: 0.6, edge_radius: 30}", "0.6 mm: too large; allowed: up to"),
+        ("{shape: heights, file: gap.npy}", "allowed: [3, 4]"),
+        ("{shape: heights, file: nix.npy}", "no such file"),
+    ],
+)
+def test_gap_that_does_not_fit_the_face(blocks, gap, wrong):
+    np.save(blocks.with_name("gap.npy"), np.zeros((3, 4)))
+    assert wrong in refused(blocks, f"structure.contacts.0.gap={gap}")
+
+
+def test_heights_are_those_of_the_paraboloid(blocks):
+    """Two ways to say the same gap, at the nodes of the face of 1 mm."""
+    axis = (np.arange(16) + 0.5) / 16.0 - 0.5
+    np.save(blocks.with_name("gap.npy"), np.tile(axis[:, None] ** 2 / 20.0, 16))
+    gaps = ("{shape: paraboloid, radius_x: 10}", "{shape: heights, file: gap.npy}")
+    cases = [load_case(blocks, [f"structure.contacts.0.gap={gap}"]) for gap in gaps]
+    one, two = (MeshModel(case).mesh().interfaces[0] for case in cases)
+    np.testing.assert_allclose(one.gap, one.coordinates[:, 0] ** 2 / 20.0, atol=1e-15)
+    # Linear between the centres of cells, and straight on beyond the last, half a cell inside.
+    np.testing.assert_allclose(two.gap, one.gap, atol=(1.0 / 16.0) ** 2 / 20.0)
+
+
+def test_contact_cut_by_a_plane_of_symmetry_is_warned_of(tmp_path):
+    """Half of the blocks: the structure halves its loads, the contact stage cannot."""
+    text = cube("base", 2.0) + cube("foot", 1.0) + ASSEMBLY.replace("0.5, 0.5, 2.", "0.5, 0., 2.")
+    (tmp_path / "half.inp").write_text(text, encoding="utf-8")
+    planes = [{"group": f"{name}_cut", "hold": "normal"} for name in ("base", "foot")]
+    structure = BLOCKS | {"file": "half.inp", "supports": [*BLOCKS["supports"], *planes]}
+    case = write_case(tmp_path / "half.yaml", structure, TO_AND_FRO)
+    summary = run(case, tmp_path / "out")
+    assert summary["foot"]["peak_load"]["unworn"]["P"] == pytest.approx(40.0, rel=1e-6)
+    assert any("plane of symmetry" in line for line in summary["warnings"])
+
+
+def test_slice_in_plane_strain_is_refused(blocks):
+    """Its contact would be a narrow strip: the plane says what is meant."""
+    held = [{"group": group, "hold": "y"} for group in ("base_high", "foot_low", "foot_high")]
+    supports = json.dumps([*BLOCKS["supports"], *held])
+    assert "as in a slice in plane strain" in refused(blocks, f"structure.supports={supports}")
+
+
+def test_template_lacks_its_file(tmp_path):
+    path = tmp_path / "mesh.yaml"
+    path.write_text(template("mesh"), encoding="utf-8")
+    ending = invoke("check", path)
+    assert ending.exit_code == 2
+    assert "structure.file: 'joint.msh': no such file" in ending.stderr
+
+
+def test_lists_hold_something(blocks):
+    for name in ("contacts", "supports", "loads"):
+        assert f"structure.{name}=[]: none; allowed: one" in refused(blocks, f"structure.{name}=[]")

@@ -1,0 +1,409 @@
+"""Cases of rig specimens: what a run leaves, closed forms and balances, and how it refuses."""
+
+import json
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from fe_models.mesh import Face
+from fe_models.reduction import free_frequencies, load_reduced
+from sa_solver.reference.hertz import Sphere
+from sa_solver.types import ElasticPair, Frame, Material
+from workflow.case import CaseError, SpecimensCase, dump_case, load_case, parse_case, template
+from workflow.cli import cli
+from workflow.specimens_half_space import NodeGrid, PadHalfSpace
+
+CASES = Path(__file__).parents[2] / "cases"
+STEEL = Material(200e3, 0.3)
+ALPHA = 1.5e-9
+# What the solver and its bookkeeping leave.
+SOLVER = 1e-9
+SMALL = """\
+title: Small pair
+analysis: wear
+structure:
+  kind: specimens
+  diameter: 8 mm
+  length: 33 mm
+  strip_width: 1 mm
+  chamfer_depth: 1 mm
+  ring_distance: 2 mm
+  form: {along: 1000 mm, across: 50 mm}
+materials:
+  body_1: {young: 200 GPa, poisson: 0.3, density: 7800 kg/m^3}
+  body_2: {young: 200 GPa, poisson: 0.3, density: 7800 kg/m^3}
+friction: {coefficient: 0.88}
+load_path: {normal_forces: [87 N, 250 N], stroke: 14 um}
+mesh: {pad_elements: 4, size: 3 mm}
+reduction: {modes: 8}
+contact: {grid: [24, 24]}
+wear:
+  law: energy
+  body_1: {coefficient: 1500 um^3/J}
+  body_2: {coefficient: 3000 um^3/J}
+  energy: 1.2 kJ
+  reported:
+    - {normal_force: 87 N, steady: stiffness, cycles: 1e5}
+"""
+
+
+def invoke(*arguments):
+    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """Small cases and their runs; reduced models are shared through a cache of their own."""
+    folder = tmp_path_factory.mktemp("specimens")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("FRETSCALE_CACHE", str(folder / "cache"))
+        (folder / "small.yaml").write_text(SMALL, encoding="utf-8")
+        yield folder
+
+
+def run(folder, name, *overrides):
+    """The folder of a run with overrides."""
+    quiet = () if name == "curved" else ("output.paraview=false", "output.figures=false")
+    settings = [part for entry in (*quiet, *overrides) for part in ("--set", entry)]
+    result = invoke("run", folder / "small.yaml", "--out", folder / name, *settings)
+    assert result.exit_code == 0, result.stderr
+    return folder / name
+
+
+def summary_of(folder):
+    text = (folder / "summary.json").read_text(encoding="utf-8")
+    assert "NaN" not in text
+    assert "Infinity" not in text
+    return json.loads(text)
+
+
+@pytest.fixture(scope="module")
+def curved(folder):
+    return run(folder, "curved")
+
+
+@pytest.fixture(scope="module")
+def summary(curved):
+    return summary_of(curved)
+
+
+@pytest.fixture(scope="module")
+def flat(folder, curved):
+    """Flat, worn for a number of cycles, with the reduced models of the curved pair."""
+    overrides = "structure.form=null", "wear.energy=null", "wear.cycles=3e5"
+    return run(folder, "flat", *overrides)
+
+
+class TestSummary:
+    def test_reduced_frequencies_come_from_above(self, summary):
+        own = summary["frequencies"]["body_1"]
+        full, reduced = np.array(own["full"]), np.array(own["reduced"])
+        assert np.all(reduced >= full * (1.0 - SOLVER))
+        np.testing.assert_allclose(reduced, full, rtol=0.02)
+        # Both specimens are one turned about.
+        turned = summary["frequencies"]["body_2"]["reduced"]
+        np.testing.assert_allclose(turned, reduced, rtol=1e-6)
+
+    def test_volumes_are_coefficients_times_energy(self, summary):
+        for load in summary["loads"]:
+            expected = np.array([ALPHA, 2.0 * ALPHA]) * load["energy"]
+            np.testing.assert_allclose(load["volumes"], expected, rtol=SOLVER)
+            # The last stint is a whole one.
+            assert 1.2e6 <= load["energy"] < 1.3e6
+
+    def test_curved_pads_wear_into_full_contact(self, summary):
+        for load in summary["loads"]:
+            assert load["unworn"]["area"] < 0.7
+            assert load["worn"]["area"] == pytest.approx(1.0)
+            assert load["worn"]["stick_stiffness"] > 1.3 * load["unworn"]["stick_stiffness"]
+            assert load["worn"]["pressure_deviation"] < 0.2 * load["unworn"]["pressure_deviation"]
+        stiff, stiffer = (load["unworn"]["stick_stiffness"] for load in summary["loads"])
+        assert stiff < stiffer
+        one, other = (load["worn"]["stick_stiffness"] for load in summary["loads"])
+        assert one == pytest.approx(other, rel=SOLVER)
+
+    def test_cycles_spread_more_than_energies(self, summary):
+        spread = summary["collapse"]
+        assert spread["cycles"] > 2.0 > spread["energy"] > 1.0
+
+    def test_half_space_corrected_is_the_tied_pair(self, summary):
+        """Worn into full contact both stick all over the pad: the correction is then exact."""
+        worn = summary["loads"][0]["worn"]
+        assert worn["half_space"]["area"] == pytest.approx(1.0)
+        exact = worn["stick_stiffness"]
+        assert worn["half_space"]["corrected_stiffness"] == pytest.approx(exact, rel=1e-6)
+        assert worn["half_space"]["stick_stiffness"] == pytest.approx(exact, rel=0.1)
+
+    def test_half_space_beside_the_unworn_pair_is_hertzs(self, summary):
+        hertz = Sphere(87.0, 1000.0 * 50.0 / 1050.0, ElasticPair(STEEL, STEEL).contact_modulus)
+        own = summary["loads"][0]["unworn"]["half_space"]
+        # First order in a cell over the contact radius, 1/7.
+        assert own["approach"] == pytest.approx(hertz.approach, rel=5e-3)
+        assert own["peak_pressure"] == pytest.approx(hertz.peak_pressure, rel=3e-2)
+        area = np.pi * hertz.contact_radius**2
+        assert own["area"] == pytest.approx(area, rel=0.1)
+
+    def test_uncoupled_cycle_is_close_to_the_coupled_one(self, summary):
+        for load in summary["loads"]:
+            assert abs(load["coupled_cycle"]["energy_difference"]) < 5e-3
+            assert abs(load["coupled_cycle"]["secant_stiffness_difference"]) < 1e-2
+
+    def test_coefficient_that_a_source_would_have_had(self, folder, curved, summary):
+        """Run with it, the pair is steady after the cycles that the source reports."""
+        (reported,) = summary["reported"]
+        one, other = reported["coefficients"]
+        again = summary_of(
+            run(
+                folder,
+                "reported",
+                f"wear.body_1.coefficient={one}",
+                f"wear.body_2.coefficient={other}",
+                "load_path.normal_forces=[87 N]",
+            )
+        )
+        (load,) = again["loads"]
+        assert load["steady"]["stiffness"]["cycles"] == pytest.approx(1e5, rel=1e-6)
+        first = summary["loads"][0]["steady"]["stiffness"]["energy"]
+        assert load["steady"]["stiffness"]["energy"] == pytest.approx(first, rel=1e-6)
+
+    def test_flat_pads_stay_in_full_contact(self, flat):
+        for load in summary_of(flat)["loads"]:
+            assert load["cycles"] == 3e5
+            unworn, worn = load["unworn"], load["worn"]
+            assert unworn["area"] == worn["area"] == pytest.approx(1.0)
+            assert worn["pressure_deviation"] < 0.15 * unworn["pressure_deviation"]
+            # Stuck it stays as stiff; pressure that is even lets the edges slip earlier.
+            assert worn["stick_stiffness"] == pytest.approx(unworn["stick_stiffness"], rel=SOLVER)
+            assert 0.9 < worn["secant_stiffness"] / unworn["secant_stiffness"] < 0.999
+        # Steady from the start: no coefficient changes that.
+        assert summary_of(flat)["reported"][0]["coefficients"] is None
+        assert summary_of(flat)["collapse"] is None
+
+    def test_reduced_models_are_found_again(self, folder, curved, flat):
+        assert "from the cache" in (flat / "run.log").read_text(encoding="utf-8")
+        own, other = (summary_of(path)["frequencies"] for path in (curved, flat))
+        assert own == other
+
+
+class TestResults:
+    def test_every_dataset_has_a_unit_and_a_description(self, curved):
+        seen = []
+
+        def look(name, item):
+            if isinstance(item, h5py.Dataset):
+                assert item.attrs["unit"]
+                assert item.attrs["description"]
+                seen.append(name)
+
+        with h5py.File(curved / "results.h5") as file:
+            file.visititems(look)
+        assert len(seen) > 50
+
+    def test_energy_is_that_of_the_cycles(self, curved):
+        with h5py.File(curved / "results.h5") as file:
+            history = file["loads/0/kinetics"]
+            steps = np.diff(history["cycles"]) * history["energy_per_cycle"][:-1]
+            np.testing.assert_allclose(np.diff(history["energy"]), steps, rtol=SOLVER)
+
+    def test_area_of_the_loop_is_the_energy_of_a_cycle(self, curved):
+        with h5py.File(curved / "results.h5") as file:
+            load = file["loads/1"]
+            for place, state in ((0, "00000"), (-1, list(load["states"])[-1])):
+                loop = load["states"][state]["loop"]
+                area = abs(np.trapezoid(loop["ring_force"], loop["ring_displacement"]))
+                # Second order in the points of first loading.
+                energy = load["kinetics/energy_per_cycle"][place]
+                assert area == pytest.approx(energy, rel=2e-3)
+
+    def test_worn_depth_wears_where_energy_is(self, curved):
+        """Body 2 has twice the coefficient of body 1, everywhere."""
+        with h5py.File(curved / "results.h5") as file:
+            *_, last = file["loads/0/states"].values()
+            np.testing.assert_allclose(last["worn_2"], 2.0 * last["worn_1"][()], rtol=1e-12)
+
+    def test_reduced_models_are_kept(self, curved, summary):
+        model = load_reduced(curved / "reduced" / "body_2.h5")
+        frequencies = free_frequencies(model.stiffness, model.mass, 12)[6:]
+        expected = summary["frequencies"]["body_2"]["reduced"]
+        np.testing.assert_allclose(frequencies, expected, rtol=1e-9)
+
+    def test_figures(self, curved):
+        from matplotlib import rc_context
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+        from matplotlib.image import imread
+
+        from workflow.figures import specimens
+        from workflow.figures.style import STYLE
+
+        names = {"pad", "loops", "kinetics", "half_space"}
+        assert {path.stem for path in (curved / "figures").iterdir()} == names
+        for path in (curved / "figures").iterdir():
+            image = imread(path)
+            assert 1000 <= image.shape[1] <= 1400
+            assert np.any(image[..., :3] < 0.95, axis=-1).mean() > 0.02
+        with h5py.File(curved / "results.h5") as file, rc_context(STYLE):
+            for draw in specimens.figures_of(file).values():
+                figure = draw(file)
+                FigureCanvasAgg(figure).draw()
+                for text in [*(axis._left_title for axis in figure.axes), figure._suptitle]:
+                    box = text.get_window_extent()
+                    assert box.x0 >= 0.0, text.get_text()
+                    assert box.x1 <= figure.bbox.x1, text.get_text()
+
+    def test_paraview(self, curved):
+        import pyvista
+
+        reader = pyvista.get_reader(curved / "paraview" / "load_1.pvd")
+        with h5py.File(curved / "results.h5") as file:
+            load, pad = file["loads/1"], file["specimens/pad/coordinates"][()]
+            cycles = [state.attrs["cycles"] for state in load["states"].values()]
+            np.testing.assert_allclose(reader.time_values, cycles)
+            reader.set_active_time_value(reader.time_values[-1])
+            mesh = reader.read()[0]
+            np.testing.assert_allclose(mesh.points[:, :2], pad, atol=1e-6)
+            *_, last = load["states"].values()
+            np.testing.assert_allclose(mesh["pressure"], last["pressure"], rtol=1e-6)
+            assert mesh.area == pytest.approx(1.0)
+
+
+@pytest.fixture(scope="module")
+def face():
+    line = np.linspace(-0.5, 0.5, 11)
+    x, y = (part.ravel() for part in np.meshgrid(line, line, indexing="ij"))
+    place = np.arange(121).reshape(11, 11)
+    a, b, c, d = (p.ravel() for p in (place[:-1, :-1], place[1:, :-1], place[:-1, 1:],
+                                      place[1:, 1:]))  # fmt: skip
+    facets = np.concatenate([np.stack([a, b, d], axis=1), np.stack([a, d, c], axis=1)])
+    # Any order of the nodes will do.
+    order = np.random.default_rng(0).permutation(121)
+    points = np.stack([x, y], axis=1)[order]
+    return Face("pad", Frame(np.zeros(3), np.eye(3)), points, np.argsort(order)[facets])
+
+
+class TestPadHalfSpace:
+    """The half-space alone, on a pad of nodes in rows and columns."""
+
+    def test_smooth_shape_keeps_a_form(self, face):
+        form = (face.coordinates**2).sum(axis=1)
+        at = np.array([-0.43, 0.0, 0.27])
+        smooth = NodeGrid.of(face).smooth(form)(at, at)
+        np.testing.assert_allclose(smooth, at[:, None] ** 2 + at**2, atol=1e-14)
+
+    def test_form_given_as_depth_is_the_same_as_height(self, face):
+        beside = PadHalfSpace(face, (20, 20), ElasticPair(STEEL, STEEL), 0.5, 1e-10)
+        grid = beside.grid
+        assert grid.size == pytest.approx((1.0, 1.0))
+        height = (grid.x**2 + grid.y**2) / 100.0
+        depth = (face.coordinates**2).sum(axis=1) / 100.0
+        path = np.array([1e-5, 1e-2])
+        one = beside.rub(height, 0.0 * depth, 50.0, path)
+        other = beside.rub(0.0 * height, depth, 50.0, path)
+        np.testing.assert_allclose(one.pressure, other.pressure, atol=1e-6)
+        # Stuck at first, sliding at last, against the motion.
+        assert one.force[0] == pytest.approx(1e-5 * one.stick_stiffness, rel=0.1)
+        # All but what the shear across the motion takes.
+        assert one.force[-1] == pytest.approx(0.5 * 50.0, rel=1e-5)
+        assert np.all(one.shear <= 0.0)
+        nodal = one.nodal_pressure @ face.nodal_areas
+        assert nodal == pytest.approx(50.0, rel=1e-8)
+
+    def test_tied_square(self, face):
+        """A rigid square punch: 1.153 times the circular one of the same area, 2 E* a.
+
+        Source: Johnson 1985, section 5.9 has 1.13 to 1.15 from several authors; here 2.30 b E* of
+        half the side b.
+        """
+        pair = ElasticPair(STEEL, STEEL)
+        stiffness = []
+        for cells in (20, 40):
+            beside = PadHalfSpace(face, (cells, cells), pair, 0.5, 1e-10)
+            stiffness.append(beside.tied()[0])
+        coarse, fine = stiffness
+        # First order in the cells, whose edge peaks are too low.
+        exact = 2.0 * fine - coarse
+        assert exact == pytest.approx(2.30 * 0.5 * pair.contact_modulus, rel=5e-3)
+
+
+class TestCase:
+    def test_template_runs_through(self):
+        case = parse_case(template("specimens"), "specimens.yaml")
+        assert isinstance(case, SpecimensCase)
+        assert parse_case(dump_case(case), "again.yaml") == case
+        assert [name for name, _ in case.outline()] == [
+            *("structure", "load path", "contact", "wear"),
+        ]
+
+    @pytest.mark.parametrize("name", ["specimens_flat", "specimens_curved"])
+    def test_shipped_cases_are_checked(self, name):
+        result = invoke("check", CASES / f"{name}.yaml")
+        assert result.exit_code == 0
+        assert "pad 1 x 1 mm of 121 nodes" in result.stdout
+
+    @pytest.mark.parametrize(
+        ("override", "message"),
+        [
+            ("load_path.normal_forces=[]", "too short; allowed: a list of at least 1"),
+            ("load_path.normal_forces=[17, 17]", "17 N: given twice"),
+            ("load_path.stroke=0 um", "allowed: above 0 mm"),
+            ("structure.strip_width=6 mm", "must be wider than 0 and lie within the diameter"),
+            ("structure.chamfer_depth=3 mm", "grow in this order"),
+            ("structure.ring_nodes=15", "give a multiple of 4"),
+            ("structure.form.across=0.1 mm", "must exceed half of strip_width"),
+            ("mesh.pad_elements=9", "odd; allowed: even numbers"),
+            ("reduction.modes=0", "from 1 to 500"),
+            ("wear.law=archard", "allowed: 'energy'"),
+            ("wear.cycles=1e5", "both given; allowed: either cycles or energy"),
+            ("wear.energy=null", "neither given"),
+            ("wear.energy=0", "--set wear.energy=0: 0: out of range"),
+            ("wear.stint.share=150 %", "above 0 and at most 1"),
+            ("wear.reported.0.normal_force=18 N", "not run; allowed: 87, 250 N"),
+            ("contact.method=full", "unknown key; allowed: grid, tolerance"),
+        ],
+    )
+    def test_nonsense_is_one_line(self, override, message):
+        with pytest.raises(CaseError) as error:
+            parse_case(SMALL, "small.yaml", [override])
+        assert message in str(error.value)
+        assert "\n" not in str(error.value)
+
+    @pytest.mark.parametrize(
+        ("overrides", "message"),
+        [
+            (["wear.stint.length=1e7"], "wear.stint.length: a stint of 1e+07 cycles"),
+            (["wear.stint.length=1"], "more than 20000 stints"),
+            (["load_path.stroke=1e-9 mm"], "nothing slides at 87 N"),
+            (["load_path.normal_forces.1=1e-6 N"], "a single node of the pad touches"),
+        ],
+    )
+    def test_wear_that_cannot_be_is_one_line(self, folder, curved, overrides, message):
+        settings = [part for entry in overrides for part in ("--set", entry)]
+        out = folder / "refused"
+        result = invoke("run", folder / "small.yaml", "--out", out, "--force", *settings)
+        assert result.exit_code == 2
+        assert message in result.stderr
+        assert not (out / "summary.json").exists()
+
+    def test_no_friction_does_not_wear(self, folder, curved):
+        out = run(folder, "smooth", "friction.coefficient=0", "wear.energy=null", "wear.cycles=1e5")
+        for load in summary_of(out)["loads"]:
+            assert load["energy"] == 0.0
+            assert load["volumes"] == [0.0, 0.0]
+            assert load["cycles"] == 1e5
+
+    def test_half_done_run_is_started_again(self, folder, curved, tmp_path):
+        (tmp_path / "case.yaml").write_text((curved / "case.yaml").read_text(), encoding="utf-8")
+        result = invoke("resume", tmp_path)
+        assert result.exit_code == 2
+        assert "takes up no run half done" in result.stderr
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["specimens_flat", "specimens_curved"])
+def test_shipped_cases_meet_their_expectations(name, tmp_path):
+    assert load_case(CASES / f"{name}.yaml").expect
+    assert invoke("verify", CASES / f"{name}.yaml", "--out", tmp_path).exit_code == 0

@@ -1,0 +1,187 @@
+"""The contact of two specimens on a half-space, beside their reduced models.
+
+Same shape, loads, friction and motions: normal force imposed, no tilt, then body 2 moved along x
+and nothing else. The half-space goes on beyond the pad and below it without end; the specimens are
+finite and held at the ring. What that changes is one compliance for normal and one for tangential
+motion, positive or negative, measured on the tied pad:
+
+    c_bulk = 1/k_specimens(tied pad) - 1/k_half-space(tied pad),
+
+and 1/(1/k_half-space + c_bulk) is what the half-space then predicts for the specimens.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import RectBivariateSpline
+
+from fe_models.mesh import Face
+from fe_models.reduced_contact import ReducedPair, X, Z
+from fe_models.transfer import FaceTransfer
+from sa_solver.half_space import HalfSpace
+from sa_solver.normal import NormalContact, NormalState
+from sa_solver.tangential import TangentialContact, TangentialState
+from sa_solver.types import Array, ElasticPair, Grid
+from workflow.errors import MethodFailed
+
+# A tied pad: any motion does, and a limit that no shear comes near.
+UNIT_MOTION, NO_LIMIT = 1e-3, 1e9
+# Coordinates of nodes in one row or column differ by rounding only [mm].
+SAME_PLACE = 1e-9
+
+State = TypeVar("State", NormalState, TangentialState)
+
+
+@dataclass(frozen=True)
+class HalfSpaceState:
+    """One cycle on one shape, as :class:`~fe_models.reduced_contact.RubbedContact` has it.
+
+    Fields ``(nx, ny)``: ``pressure`` [MPa], ``shear`` along x at the end of first loading [MPa] and
+    ``slip`` of body 2 there [mm]; ``nodal_pressure`` and ``nodal_shear`` ``(n,)`` are their means
+    over the nodes of the pad. ``displacement`` [mm] and ``force`` [N] are first loading ``(k,)``,
+    ``stick_stiffness`` [N/mm] with all that touches stuck, ``energy`` of a cycle [N mm].
+    """
+
+    pressure: Array
+    shear: Array
+    slip: Array
+    nodal_pressure: Array
+    nodal_shear: Array
+    area: float
+    approach: float
+    stick_stiffness: float
+    displacement: Array
+    force: Array
+    energy: float
+
+
+@dataclass(frozen=True)
+class BulkCompliance:
+    """Stiffness of the tied pad of the specimens and of the half-space [N/mm], z and x."""
+
+    specimens: tuple[float, float]
+    half_space: tuple[float, float]
+
+    @property
+    def normal(self) -> float:
+        """c_bulk along z [mm/N]."""
+        return 1.0 / self.specimens[0] - 1.0 / self.half_space[0]
+
+    @property
+    def tangential(self) -> float:
+        """c_bulk along x [mm/N]."""
+        return 1.0 / self.specimens[1] - 1.0 / self.half_space[1]
+
+
+@dataclass(frozen=True)
+class NodeGrid:
+    """Nodes of a pad in rows and columns: numbers ``order`` ``(nx, ny)``, at ``x`` and ``y``."""
+
+    x: Array
+    y: Array
+    order: NDArray[np.int64]
+
+    @classmethod
+    def of(cls, face: Face) -> NodeGrid:
+        """Rows and columns of a face that is meshed in squares."""
+        digits = np.round(face.coordinates / SAME_PLACE).astype(np.int64)
+        (x, row), (y, column) = (np.unique(own, return_inverse=True) for own in digits.T)
+        order = np.full((len(x), len(y)), -1)
+        order[row, column] = np.arange(len(face))
+        assert order.min() >= 0, "the pad is not meshed in rows and columns"
+        return cls(SAME_PLACE * x, SAME_PLACE * y, order)
+
+    def smooth(self, nodal: Array) -> RectBivariateSpline:
+        """A smooth field through nodal values: straight pieces would leave ridges on a form."""
+        power = min(3, len(self.x) - 1, len(self.y) - 1)
+        return RectBivariateSpline(self.x, self.y, nodal[self.order], kx=power, ky=power)
+
+
+class PadHalfSpace:
+    """A half-space on a grid over exactly the pad."""
+
+    def __init__(
+        self,
+        face: Face,
+        cells: tuple[int, int],
+        pair: ElasticPair,
+        friction: float,
+        tolerance: float,
+    ) -> None:
+        low, high = face.coordinates.min(axis=0), face.coordinates.max(axis=0)
+        size = float(high[0] - low[0]), float(high[1] - low[1])
+        self.grid = Grid.covering(size, cells)
+        self._to_nodes = FaceTransfer.between(face, self.grid).to_nodes
+        self._nodes = NodeGrid.of(face)
+        half_space = HalfSpace(self.grid, pair)
+        self._normal, self._tangential = NormalContact(half_space), TangentialContact(half_space)
+        self._friction, self._tolerance = friction, tolerance
+
+    def rub(self, height: Array, depth: Array, force: float, path: Array) -> HalfSpaceState:
+        """Press the shape ``height`` ``(nx, ny)`` with ``force`` [N] and move along ``path``.
+
+        ``depth`` ``(n,)`` is worn off both bodies at the nodes [mm], ``path`` ``(k,)`` rising
+        displacements of body 2 along x [mm]. Raises :class:`MethodFailed` if a solve does not
+        converge.
+        """
+        worn = self._nodes.smooth(depth)(self.grid.x.ravel(), self.grid.y.ravel())
+        normal = self._press(height + worn, force)
+        states = [self._move(self._friction * normal.pressure, d) for d in path]
+        last, area = states[-1], self.grid.cell_area
+        # Body 1's shift against body 2 in sa_solver is body 2's here, backwards.
+        shear, slip = last.shear[0], last.slip[0]
+        return HalfSpaceState(
+            pressure=normal.pressure,
+            shear=shear,
+            slip=slip,
+            nodal_pressure=self._to_nodes(normal.pressure),
+            nodal_shear=self._to_nodes(shear),
+            area=float(np.count_nonzero(normal.pressure > 0.0)) * area,
+            approach=normal.approach,
+            stick_stiffness=self._stuck(normal.pressure > 0.0),
+            displacement=path,
+            force=np.array([-state.Qx for state in states]),
+            energy=-4.0 * float(np.sum(last.shear * last.slip)) * area,
+        )
+
+    def tied(self) -> tuple[float, float]:
+        """Stiffness of the tied pad along z and x [N/mm]."""
+        flat = np.zeros(self.grid.shape)
+        pressed = self._normal.solve(
+            flat, approach=UNIT_MOTION, tilt_x=0.0, tilt_y=0.0, tolerance=self._tolerance
+        )
+        return pressed.P / UNIT_MOTION, self._stuck(np.ones(self.grid.shape, dtype=np.bool_))
+
+    def _press(self, height: Array, force: float) -> NormalState:
+        state = self._normal.solve(height, force, tilt_x=0.0, tilt_y=0.0, tolerance=self._tolerance)
+        return _converged(state)
+
+    def _move(self, limit: Array, displacement: float) -> TangentialState:
+        state = self._tangential.solve(
+            limit, shift_x=-displacement, shift_y=0.0, twist=0.0, tolerance=self._tolerance
+        )
+        return _converged(state)
+
+    def _stuck(self, pressed: NDArray[np.bool_]) -> float:
+        """Stiffness along x of the cells ``pressed``, stuck [N/mm]."""
+        return -self._move(np.where(pressed, NO_LIMIT, 0.0), UNIT_MOTION).Qx / UNIT_MOTION
+
+
+def bulk_compliance(pair: ReducedPair, half_space: PadHalfSpace) -> BulkCompliance:
+    """What the specimens give way beyond a half-space."""
+    count = len(pair.face)
+    specimens = []
+    for axis in (Z, X):
+        forces = np.linalg.solve(pair.block(axis), np.ones(count))
+        specimens.append(float(forces.sum()))
+    return BulkCompliance((specimens[0], specimens[1]), half_space.tied())
+
+
+def _converged(state: State) -> State:
+    if not state.converged:
+        raise MethodFailed(f"the half-space beside the specimens: {state.message}")
+    return state
