@@ -64,8 +64,9 @@ def _moved(body: Body, prescribed: Array) -> Body:
         Basis(mesh, ELEMENTS[mesh.dim(), 1]())
     )
     displacement = prescribed.copy()
-    load = -(laplace[inner][:, boundary] @ prescribed[boundary])
-    displacement[inner] = prepare(laplace[inner][:, inner].tocsr())(load)
+    if len(inner) > 0:
+        load = -(laplace[inner][:, boundary] @ prescribed[boundary])
+        displacement[inner] = prepare(laplace[inner][:, inner].tocsr())(load)
     moved = replace(mesh, doflocs=mesh.p + displacement.T)
     if np.min(element_volumes(moved) / element_volumes(mesh)) < SMALLEST_VOLUME_SHARE:
         raise MeshError(

@@ -150,10 +150,10 @@ class Structure:
         else:
             marched = []
             displacement, guess = after.last_displacement, list(after.states)
-            most = after.cycles - 1
+            most = max(after.cycles - 1, 1)
         closure = np.inf
         while len(marched) < most and closure > CLOSED:
-            if marched and not marched[-1][-1].converged:
+            if marched and not all(state.converged for state in marched[-1]):
                 break
             marched.append(list(joint.march(amplitudes, gap, displacement, guess)))
             displacement, guess = marched[-1][-1].displacement, [s.state for s in marched[-1]]

@@ -74,6 +74,7 @@ def load_cycle(key: str, structure: Structure, friction: float) -> CycleSolution
         residual=float(attributes["residual"]),
         converged=True,
         closure=float(attributes["closure"]),
+        cycles=int(attributes["cycles"]),
         equilibrium=arrays["equilibrium"],
     )
 
@@ -81,7 +82,8 @@ def load_cycle(key: str, structure: Structure, friction: float) -> CycleSolution
 def save_cycle(key: str, cycle: CycleSolution) -> None:
     """Keep a solved, converged cycle."""
     arrays = {"states": np.stack(cycle.states), "equilibrium": cycle.equilibrium}
-    attributes = {name: getattr(cycle, name) for name in ("iterations", "residual", "closure")}
+    names = ("iterations", "residual", "closure", "cycles")
+    attributes = {name: getattr(cycle, name) for name in names}
     _save(f"cycle-{key}", cycle.fields() | arrays, attributes)
 
 

@@ -120,9 +120,9 @@ class MeshModel:
         """Planes of symmetry that cut a contact, of which its half-space knows nothing."""
         for name in self._cut:
             reporter.warn(
-                f"{name}: supports hold some of its nodes, as on a plane of symmetry: the structure "
-                "knows of it, the half-space of the contact does not, whose pressure is that of a "
-                "face that ends there; mesh the whole face"
+                f"{name}: supports hold some of its nodes, as on a plane of symmetry: the "
+                "structure knows of it, the half-space of the contact does not, whose pressure is "
+                "that of a face that ends there; mesh the whole face"
             )
 
 

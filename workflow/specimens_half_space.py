@@ -1,9 +1,10 @@
 """The contact of two specimens on a half-space, beside their reduced models.
 
 Same shape, loads, friction and motions: normal force imposed, no tilt, then body 2 moved along x
-and nothing else. The half-space goes on beyond the pad and below it without end; the specimens are
-finite and held at the ring. What that changes is one compliance for normal and one for tangential
-motion, positive or negative, measured on the tied pad:
+and nothing else; pressure and shear one after the other, as if both materials were alike. The
+half-space goes on beyond the pad and below it without end; the specimens are finite and held at the
+ring. What that changes is one compliance for normal and one for tangential motion, positive or
+negative, measured on the tied pad:
 
     c_bulk = 1/k_specimens(tied pad) - 1/k_half-space(tied pad),
 

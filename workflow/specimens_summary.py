@@ -42,18 +42,24 @@ def explanation(outcome: SpecimensOutcome) -> list[str]:
     ring = outcome.case.structure.ring_distance
     unworn, beside = first.kept[0].stint.contact.normal, first.half_space[0]
     shares = [edge_share(outcome.pair, p) for p in (unworn.pressure, beside.nodal_pressure)]
-    return [
-        f"Tied along x the pad of the specimens has {1e-3 * stiff_x:.4g} N/um and a half-space "
-        f"{1e-3 * half_x:.4g}: a difference of {1e6 * bulk.tangential:.3g} nm/N, for the specimens "
-        "lack what a half-space has beside the strips",
-        f"Tied along z they have {1e-3 * stiff_z:.4g} and {1e-3 * half_z:.4g} N/um, a difference "
-        f"of {1e6 * bulk.normal:.3g} nm/N: the specimens lack that material too, but are held "
-        f"{ring:g} mm from the pad, where a half-space still gives way",
-        f"At {first.force:g} N unworn the border of the pad bears {shares[0]:.3g} times the mean "
-        f"pressure on the specimens and {shares[1]:.3g} times on the half-space",
-        f"There {unworn.area:.3g} mm^2 touch on the specimens, in whole nodes, and "
-        f"{beside.area:.3g} mm^2 on the half-space, in whole cells",
+    softer = ": they lack what a half-space has beside the strips" if bulk.tangential > 0.0 else ""
+    held = f": held {ring:g} mm from the pad, where a half-space gives way"
+    stiffer = held if bulk.normal < 0.0 else ""
+    sentences = [
+        f"tied along x the pad of the specimens has {1e-3 * stiff_x:.4g} N/um and a half-space "
+        f"{1e-3 * half_x:.4g}, so that the specimens' compliance differs by "
+        f"{1e6 * bulk.tangential:.3g} nm/N{softer}",
+        f"tied along z they have {1e-3 * stiff_z:.4g} and {1e-3 * half_z:.4g} N/um, a difference "
+        f"of {1e6 * bulk.normal:.3g} nm/N{stiffer}",
+        f"at {first.force:g} N unworn {unworn.area:.3g} mm^2 touch on the specimens, in whole "
+        f"nodes, and {beside.area:.3g} mm^2 on the half-space, in whole cells",
     ]
+    if max(shares) > 0.0:
+        sentences.append(
+            f"there the border of the pad bears {shares[0]:.3g} times the mean pressure on the "
+            f"specimens and {shares[1]:.3g} times on the half-space"
+        )
+    return sentences
 
 
 def tied_pad(bulk: BulkCompliance) -> dict[str, Any]:

@@ -21,7 +21,7 @@ def warn_of_structure(stage: StructureStage, reporter: Reporter) -> None:
     unworn = stage.unworn_cycle
     if unworn.closure > OPEN_CYCLE:
         reporter.warn(
-            f"the second cycle differs from the first by {unworn.closure:.1%} of the largest "
+            f"the last two of {unworn.cycles} cycles differ by {unworn.closure:.1%} of the largest "
             "contact force: the cycle that feeds the wear is not closed"
         )
     for history in unworn.histories:

@@ -427,3 +427,5 @@ def test_cycle_that_follows_goes_as_far():
     np.testing.assert_allclose(
         second.histories[0].force, first.histories[0].force, atol=2.0 * CLOSED * largest
     )
+    third = joined.solve_cycle(joint, path, joined.gap(), MU, after=second)
+    assert third.cycles == max(second.cycles - 1, 1)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, get_origin
 
 from pydantic.fields import FieldInfo
 
@@ -53,6 +53,6 @@ def _row(name: str, field: FieldInfo) -> Row:
     if sections and all(row.off for row in value):
         # A section of nothing but optional entries is optional as a whole.
         value, off = [replace(row, off=False) for row in value], True
-    if sections and field.default == ():
+    if sections and get_origin(field.annotation) is tuple:
         value = [value]
     return Row(name, value, field.description or "", off)
