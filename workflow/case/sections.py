@@ -82,9 +82,9 @@ class Expectation(Section):
 
 # The sections of a case, of whatever kind, in the order in which they are written.
 SCENE_ORDER = (
-    *("title", "analysis", "structure", "materials", "friction", "load_path", "mesh", "reduction"),
-    *("contact", "wear", "coupling", "accuracy", "fidelity", "stress"),
-    *("output", "assumed", "expect"),
+    *("title", "analysis", "structure", "materials", "friction", "load_path", "mesh"),
+    *("nonlinearity", "reduction", "contact", "wear", "coupling", "accuracy", "fidelity"),
+    *("stress", "output", "assumed", "expect"),
 )
 
 

@@ -43,7 +43,7 @@ EXTRAPOLATION = 2.0
 ALONG = "across the flank at y = 0", "along the slot at x = 0"
 ALONG_LINE = ("across the flank",)
 # How far from the middle the section is, as a share of the body's diagonal.
-BESIDE = 1e-5
+BESIDE = 1e-7
 # Around the faces, how far the section shows the bodies: as a share of what the faces span.
 SECTION_MARGIN = 0.4
 
