@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
+from fe_models.gmsh_session import gmsh_model
 from sa_solver.types import Array, Frame, Grid
 from workflow.cli import cli
 
@@ -165,6 +166,47 @@ def fabricate(path: Path, shape: tuple[int, int] = (24, 40)) -> Path:
 def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Synthetic results, not to be changed."""
     return fabricate(tmp_path_factory.mktemp("run") / "results.h5")
+
+
+# --- files of the templates ----------------------------------------------------------------------
+
+LOADS = "P,Qx,Qy,Mx,My,Mz,Edx,Edy\n1,0,0,0,0,0,0,0\n"
+NODES = "node,X,Y,Z\n1,15,0,245\n2,14,0,246\n3,15,1,245\n"
+# Corner and size of the two boxes of the joint [mm], and the heights of their named faces.
+BOXES: dict[str, tuple[tuple[float, ...], dict[str, float]]] = {
+    "disk": ((-5, -5, -4, 10, 10, 4), {"disk_base": -4.0, "disk_top": 0.0}),
+    "blade": ((-4, -4, 0, 8, 8, 4), {"blade_foot": 0.0, "blade_top": 4.0}),
+}
+
+
+def write_joint(folder: Path) -> None:
+    """A small box on a larger one as ``joint.msh``, of few elements, and as ``joint.step``."""
+    with gmsh_model("joint") as gmsh:
+        occ = gmsh.model.occ
+        for body, (box, heights) in BOXES.items():
+            solid = occ.addBox(*box)
+            occ.synchronize()
+            gmsh.model.addPhysicalGroup(3, [solid], name=body)
+            faces = [face for _, face in gmsh.model.getBoundary([(3, solid)], oriented=False)]
+            middle = {face: occ.getCenterOfMass(2, face)[2] for face in faces}
+            for name, height in heights.items():
+                (face,) = (face for face in faces if abs(middle[face] - height) < 1e-9)
+                gmsh.model.addPhysicalGroup(2, [face], name=name)
+        gmsh.write(str(folder / "joint.step"))
+        gmsh.option.setNumber("Mesh.MeshSizeMin", 4.0)
+        gmsh.model.mesh.generate(3)
+        gmsh.write(str(folder / "joint.msh"))
+
+
+@pytest.fixture(scope="session")
+def template_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the files that the templates name, not to be changed."""
+    folder = tmp_path_factory.mktemp("template")
+    write_joint(folder)
+    (folder / "loads.csv").write_text(LOADS, encoding="utf-8")
+    for body in (1, 2):
+        (folder / f"nodes_{body}.csv").write_text(NODES, encoding="utf-8")
+    return folder
 
 
 # --- runs of the small case ---------------------------------------------------------------------

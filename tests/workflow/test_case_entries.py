@@ -5,9 +5,10 @@ The entries are found by walking the schema, so that a new one cannot be forgott
 
 import functools
 import math
+import shutil
 from dataclasses import dataclass
 from pathlib import Path as Folder
-from typing import Any, get_args
+from typing import Any, get_args, get_origin
 
 import numpy as np
 import pytest
@@ -18,25 +19,11 @@ from workflow.case.fields import File, Path, Quantity, Text, Whole
 from workflow.case.load_table import FORCES, MOTIONS
 from workflow.case.sections import entry_of, sections_of
 
-ARCHARD = {
-    "law": "archard",
-    "cycles": 1e5,
-    "step": {"kind": "implicit", "cycles": 5000},
-    "blade": {"coefficient": 1e-4, "hardness": "3.5 GPa"},
-    "disk": {"coefficient": 1e-4, "hardness": "3.5 GPa"},
-}
-AMPLITUDE = {
-    **ARCHARD,
-    "law": "energy_amplitude",
-    "reference_amplitude": "75 um",
-    "blade": {"coefficient": "1e4 um^3/J"},
-    "disk": {"coefficient": "1e4 um^3/J"},
-}
-LOADS = "P,Qx,Qy,Mx,My,Mz,Edx,Edy\n1,0,0,0,0,0,0,0\n"
-NODES = "node,X,Y,Z\n1,15,0,245\n2,14,0,246\n3,15,1,245\n"
+LENGTHS = {"cycles": 1e5, "step": {"kind": "implicit", "cycles": 5000}}
+ARCHARD_BODY = {"coefficient": 1e-4, "hardness": "3.5 GPa"}
+ENERGY_BODY = {"coefficient": "1e4 um^3/J"}
 ROUNDED = {"shape": "rounded", "edge_width": 1, "edge_radius": 30, "end_width": 1, "end_radius": 30}
 GAPS = {
-    "rounded": ROUNDED,
     "paraboloid": {"shape": "paraboloid", "radius_x": "1 m", "radius_y": "1 m"},
     "heights": {"shape": "heights", "file": "gap.npy"},
 }
@@ -48,35 +35,110 @@ INTERFACE = {
     "nodes": {"body_1": "nodes_1.csv", "body_2": "nodes_2.csv"},
 }
 EXPECT = [{"quantity": "a.b", "value": "3 um", "tolerance": "1 %", "source": "a test"}]
-# Sections that the templates do not have, by the law or shape they need.
-WITH = {
-    "energy": [f"expect={EXPECT}", "wear.stop={depth: 1 mm, volume: 1 mm^3}"],
-    "energy_amplitude": [f"wear={AMPLITUDE}"],
-    "archard": [f"wear={ARCHARD}"],
-    "sphere": [],
-    "ellipsoid": ["structure={kind: bodies, shape: ellipsoid, radius_x: 1 mm, radius_y: 2 mm}"],
-    "cylinder": [],
-    "flat_rounded": [
-        "structure={kind: bodies, shape: flat_rounded, half_width: 1 mm, edge_radius: 2 mm}"
-    ],
-    "heights": ["structure={kind: bodies, shape: heights, file: gap.npy}"],
+REPORTED = [{"normal_force": "17 N", "steady": "stiffness", "cycles": 1e6}]
+ALWAYS = ""  # in place of a kind: for sections of one kind alone
+
+
+def laws(*bodies):
+    """The wear laws that the templates do not have, for bodies of these names."""
+    return {
+        "archard": {"law": "archard", **LENGTHS, **dict.fromkeys(bodies, ARCHARD_BODY)},
+        "energy_amplitude": {
+            "law": "energy_amplitude",
+            "reference_amplitude": "75 um",
+            **LENGTHS,
+            **dict.fromkeys(bodies, ENERGY_BODY),
+        },
+    }
+
+
+def with_path(**loads):
+    """Loads of a mesh by kind, each pulled once and let go."""
+    return {kind: {"kind": kind, "path": [1, 0], **load} for kind, load in loads.items()}
+
+
+# Sections that the templates do not have: kind of case, key of the section, its own kinds.
+GIVEN = {
+    "dovetail": {"wear": laws("blade", "disk")},
+    "mesh": {
+        "structure.contacts.0.gap": GAPS,
+        "structure.loads.0": with_path(
+            force={"group": "blade_top", "force": [0, 0, -100]},
+            displacement={"group": "blade_top", "displacement": [0.01, 0, 0]},
+            rotation={"axis": [0, 1, 0], "through": [0, 0, 0], "speed": "6000 rpm"},
+            acceleration={"acceleration": [0, 0, 9810]},
+        ),
+        "wear": laws("body_1", "body_2"),
+    },
+    "resultants": {
+        "structure.gap": GAPS,
+        "structure.interfaces": {
+            **{shape: [{**INTERFACE, "gap": gap}] for shape, gap in GAPS.items()},
+            ALWAYS: [INTERFACE],
+        },
+        "wear": laws("body_1", "body_2"),
+    },
+    "specimens": {
+        "structure.form": {ALWAYS: {"along": "1 m", "across": "50 mm"}},
+        "wear.reported": {ALWAYS: REPORTED},
+    },
+    "bodies": {
+        "structure": {
+            "ellipsoid": {"kind": "bodies", "shape": "ellipsoid", "radius_x": 1, "radius_y": 2},
+            "heights": {"kind": "bodies", "shape": "heights", "file": "gap.npy"},
+        }
+    },
+    "line": {
+        "structure": {
+            "flat_rounded": {
+                "kind": "bodies",
+                "shape": "flat_rounded",
+                "half_width": 1,
+                "edge_radius": 2,
+            },
+            "heights": {"kind": "bodies", "shape": "heights", "file": "gap.npy"},
+        }
+    },
 }
-# Each kind's own cells, for the files that the cases name.
-CELLS = {"dovetail": (8, 8), "resultants": (128, 256), "bodies": (128, 128), "line": (512,)}
+# A CAD file in the place of the template's mesh; gmsh writes no names into it.
+CAD = [
+    "structure.file=joint.step",
+    "structure.body_1=solid_1",
+    "structure.body_2=solid_2",
+    "structure.contacts.0.face_1=solid_1.face_6",
+    "structure.contacts.0.face_2=solid_2.face_5",
+    "structure.supports.0.group=solid_1.face_5",
+    "structure.loads.0.group=solid_2.face_6",
+]
+# Cells of the templates that may take heights.
+CELLS = {"mesh": (128, 256), "resultants": (128, 256), "bodies": (128, 128), "line": (512,)}
 
 
 @dataclass(frozen=True)
 class Leaf:
-    """An entry of a kind of case: its dotted key, and the overrides that make the case have it."""
+    """An entry of a kind of case: its dotted key, and the kinds of the sections it is in."""
 
     kind: str
     key: str
-    needed: list[str]
+    tags: tuple[str, ...]
     field: Any
+
+    def __str__(self) -> str:
+        return ":".join((self.kind, self.key, *self.tags))
 
     @property
     def name(self) -> str:
         return self.key.rpartition(".")[2]
+
+    @property
+    def needed(self) -> list[str]:
+        """Overrides that make the template have it."""
+        found = []
+        for section, kinds in ({"expect": {ALWAYS: EXPECT}} | GIVEN[self.kind]).items():
+            if self.key.startswith(f"{section}."):
+                chosen = [kinds[tag] for tag in (*self.tags, ALWAYS) if tag in kinds]
+                found += [f"{section}={value}" for value in chosen[:1]]
+        return found
 
     @property
     def is_list(self) -> bool:
@@ -88,14 +150,14 @@ class Leaf:
 
 
 def leaves(model, path=(), tags=()):
-    """``(path, tags, field)`` of every leaf; list entries and unions are entered."""
+    """``(path, tags, field)`` of every leaf; lists are entered at 0, unions at all their kinds."""
     for name, field in model.model_fields.items():
         sections = list(sections_of(field.annotation))
-        index = (0,) if field.default == () and sections else ()
+        index = (0,) if get_origin(field.annotation) is tuple and sections else ()
         for section in sections:
-            choices = [section.model_fields[key] for key in ("law", "shape")
-                       if key in section.model_fields]  # fmt: skip
-            tag = [get_args(choice.annotation)[0] for choice in choices]
+            choices = [section.model_fields[key] for key in ("law", "shape", "kind")
+                       if key in section.model_fields and len(sections) > 1]  # fmt: skip
+            tag = [get_args(choice.annotation)[0] for choice in choices[:1]]
             yield from leaves(section, (*path, name, *index), (*tags, *tag))
         if not sections:
             yield (*path, name), tags, field
@@ -104,36 +166,16 @@ def leaves(model, path=(), tags=()):
 def all_leaves():
     for kind, model in KINDS.items():
         for path, tags, field in leaves(model):
-            needed = needed_by(kind, path, tags)
-            if path[0] == "expect":
-                needed = [*needed, f"expect={EXPECT}"]
-            if path[:2] == ("wear", "stop") and tags == ():
-                needed = [*needed, *WITH["energy"][1:]]
-            yield Leaf(kind, ".".join(map(str, path)), needed, field)
-
-
-def needed_by(kind, path, tags):
-    """Overrides that give a case of ``kind`` the sections that ``tags`` name."""
-    if kind != "resultants":
-        return [entry for tag in tags for entry in WITH.get(tag, [])]
-    gap = next((GAPS[tag] for tag in tags if tag in GAPS), ROUNDED)
-    if path[:2] == ("structure", "interfaces"):
-        return [f"structure.interfaces={[INTERFACE | {'gap': gap}]}"]
-    # Its bodies have no names of their own.
-    wear = str({"archard": ARCHARD, "energy_amplitude": AMPLITUDE}.get("".join(tags), ""))
-    wear = wear.replace("'blade'", "'body_2'").replace("'disk'", "'body_1'")
-    return [f"wear={wear}"] if wear else [f"structure.gap={gap}"]
+            yield Leaf(kind, ".".join(map(str, path)), tags, field)
 
 
 PARSED = functools.cache(source.parse_yaml)
 LEAVES = list(all_leaves())
 QUANTITIES = [leaf for leaf in LEAVES if isinstance(entry_of(leaf.field), Quantity)]
-each_leaf = pytest.mark.parametrize(
-    "leaf", LEAVES, ids=lambda leaf: f"{leaf.kind}:{leaf.key}:{len(''.join(leaf.needed))}"
-)
-each_quantity = pytest.mark.parametrize(
-    "leaf", QUANTITIES, ids=lambda leaf: f"{leaf.kind}:{leaf.key}:{len(''.join(leaf.needed))}"
-)
+each_leaf = pytest.mark.parametrize("leaf", LEAVES, ids=str)
+each_quantity = pytest.mark.parametrize("leaf", QUANTITIES, ids=str)
+# Every set of sections that some entry needs.
+VARIANTS = {(leaf.kind, *leaf.needed): leaf for leaf in LEAVES}
 
 
 @pytest.fixture(autouse=True)
@@ -143,15 +185,13 @@ def _parse_once(monkeypatch):
 
 
 @pytest.fixture(scope="module")
-def folders(tmp_path_factory) -> dict[str, Folder]:
+def folders(tmp_path_factory, template_files) -> dict[str, Folder]:
     """A folder for the template of each kind, with the files that its examples name."""
     made = {}
-    for kind, cells in CELLS.items():
+    for kind in KINDS:
         made[kind] = tmp_path_factory.mktemp(kind)
-        np.save(made[kind] / "gap.npy", np.zeros(cells))
-        (made[kind] / "loads.csv").write_text(LOADS, encoding="utf-8")
-        for body in (1, 2):
-            (made[kind] / f"nodes_{body}.csv").write_text(NODES, encoding="utf-8")
+        shutil.copytree(template_files, made[kind], dirs_exist_ok=True)
+        np.save(made[kind] / "gap.npy", np.zeros(CELLS.get(kind, (0, 0))))
         (made[kind] / "history.csv").write_text("P,Qx\n1,0\n1,0.1\n", encoding="utf-8")
     return made
 
@@ -176,7 +216,10 @@ def test_walk_finds_the_leaves():
     found = {leaf.key for leaf in LEAVES}
     assert {"wear.blade.hardness", "wear.reference_amplitude", "expect.0.tolerance"} <= found
     assert {"load_path.legs.0.approach", "structure.radius_y", "contact.datum"} <= found
-    assert len(LEAVES) > 160
+    assert {"structure.contacts.0.gap.file", "structure.loads.0.speed"} <= found
+    assert {"wear.reported.0.steady", "structure.form.across", "nonlinearity.check"} <= found
+    assert len(LEAVES) > 400
+    assert len(set(map(str, LEAVES))) == len(LEAVES)
 
 
 @each_leaf
@@ -190,9 +233,6 @@ def test_wrong_type_is_refused(leaf, folders):
         values += ["3", "true", "' '", r'"a\nb"', "[a]"]
     elif leaf.field.annotation is bool:
         values += ["1", "yes", "[true]"]
-    # A grid of one size is that of a line contact: these make another kind of case of it.
-    if leaf.key == "contact.size" and "shape: heights" in str(leaf.needed):
-        values = ["{a: 1}"]
     for value in values:
         refused(leaf, folders, value)
 
@@ -232,26 +272,39 @@ def test_entry_is_described(leaf):
         assert leaf.field.description.endswith(f"[{entry.unit}]")
 
 
-@each_leaf
-def test_example_is_accepted(leaf, folders):
+def stated(leaf):
+    """Overrides that give an entry its example; what it takes the place of goes."""
     (example,) = leaf.field.examples
     example = str(example).lower() if isinstance(example, bool) else example
-    key = leaf.key
-    if key in ("wear.step.depth", "wear.step.volume"):  # take the place of the cycles
-        key, example = "wear.step", f"{{kind: explicit, {leaf.name}: {example}}}"
-    if key == "load_path.file":  # takes the place of the legs
-        key, example = "load_path", f"{{file: {example}}}"
+    plain = f"{leaf.key}={example}"
+    match leaf.key:
+        case "wear.step.depth" | "wear.step.volume":
+            return [f"wear.step={{kind: explicit, {leaf.name}: {example}}}"]
+        case "wear.energy":
+            return ["wear.cycles=", plain]
+        case "load_path.file":
+            return [f"load_path={{file: {example}}}"]
+        case "structure.size" if leaf.kind == "mesh":
+            return [*CAD, plain]
     if leaf.name in MOTIONS:  # take the place of the forces
         force = {"P": 1.0} if leaf.name != "approach" else {}
         assert len(FORCES) == len(MOTIONS)
-        key, example = "load_path.legs", f"[{force | {leaf.name: example}}]".replace("'", "")
-    load(leaf, folders, f"{key}={example}")
+        return [f"load_path.legs={[force | {leaf.name: example}]}".replace("'", "")]
+    return [plain]
 
 
-@pytest.mark.parametrize("law", ["energy", "energy_amplitude", "archard"])
-def test_unknown_key_is_refused_in_every_section(law, dovetail_path):
-    case = load_case(dovetail_path, WITH[law])
+@each_leaf
+def test_example_is_accepted(leaf, folders):
+    case = load(leaf, folders, *stated(leaf))
+    assert isinstance(case, KINDS[leaf.kind])
+    node = case
+    for key in leaf.key.split("."):
+        node = node[int(key)] if key.isdecimal() else getattr(node, key)
+    assert node is not None
 
+
+@pytest.mark.parametrize("leaf", VARIANTS.values(), ids=str)
+def test_unknown_key_is_refused_in_every_section(leaf, folders):
     def sections(node, path=()):
         if isinstance(node, BaseModel):
             yield path
@@ -261,10 +314,10 @@ def test_unknown_key_is_refused_in_every_section(law, dovetail_path):
             for index, item in enumerate(node):
                 yield from sections(item, (*path, str(index)))
 
-    for path in sections(case):
+    for path in sections(load(leaf, folders)):
         key = ".".join((*path, "zzz"))
-        with pytest.raises(CaseError, match=f"--set {key}=1: unknown key; allowed: "):
-            load_case(dovetail_path, [*WITH[law], f"{key}=1"])
+        with pytest.raises(CaseError, match=rf"^--set {key}=1: unknown key; allowed: .*$"):
+            load(leaf, folders, f"{key}=1")
 
 
 @pytest.mark.parametrize(

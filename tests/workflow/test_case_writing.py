@@ -1,6 +1,7 @@
 """What is written reads back the same; the template is the default case."""
 
 import json
+import re
 
 import pytest
 from ruamel.yaml import YAML
@@ -17,6 +18,7 @@ AWKWARD = ["yes", "null", "1e5", "12:30", "a: b", "# no", "- x", "ü µ", "'", '
         [],
         ["materials.blade.yield_stress=", "wear.stop={depth: 0.1 mm}", "assumed=[]"],
         ["wear.step={kind: explicit, volume: 1e-7 mm^3}", "structure.skew=-29.999 deg"],
+        ["nonlinearity={stiffness: relinearised, check: true}", "fidelity=auto"],
         ["expect=[{quantity: a.b-1.0, value: -1.23456789e-7, tolerance: 0.1 %, source: a}]"],
         *([f"title={json.dumps(title)}"] for title in AWKWARD),
     ],
@@ -56,11 +58,12 @@ def test_dovetail_template_is_the_default_case(dovetail_path):
 
 
 @pytest.mark.parametrize("kind", KINDS)
-def test_template_reads_back_equal(kind, tmp_path):
-    (tmp_path / "loads.csv").write_text("P,Qx,Qy,Mx,My,Mz,Edx,Edy\n1,0,0,0,0,0,0,0\n", "utf-8")
-    case = parse_case(template(kind), str(tmp_path / kind))
+def test_template_reads_back_equal(kind, template_files):
+    case = parse_case(template(kind), str(template_files / kind))
     assert isinstance(case, KINDS[kind])
-    assert parse_case(dump_case(case), "dump") == case
+    text = dump_case(case)
+    assert parse_case(text, "dump") == case
+    assert set(YAML(typ="safe").load(text)) == set(KINDS[kind].model_fields)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -76,10 +79,45 @@ def test_template_has_every_entry(kind):
     assert set(names(KINDS[kind])) <= set(lines)
 
 
-def test_template_works_without_its_comment_signs(dovetail_path):
+def uncommented(text, *sections):
+    """``text`` with the optional ``sections`` filled in, each with the lines below it."""
+    for section in sections:
+        found = re.search(rf"^( *)# {section}:.*\n(?:\1#   .*\n)*", text, re.MULTILINE)
+        opened = re.sub(rf"^{found[1]}# ", found[1], found[0], flags=re.MULTILINE)
+        text = text[: found.start()] + opened + text[found.end() :]
+    return text
+
+
+@pytest.mark.parametrize(
+    ("kind", "sections", "values"),
+    [
+        ("dovetail", ["stop"], {"wear.stop.depth": 0.5}),
+        ("mesh", ["stop"], {"wear.stop.volume": 10.0}),
+        (
+            "resultants",
+            ["interfaces", "frame", "nodes", "stop"],
+            {
+                "structure.interfaces.0.gap.end_radius": 150.0,
+                "structure.interfaces.0.frame.x": (-1.0, 0.0, 1.0),
+            },
+        ),
+        (
+            "specimens",
+            ["form", "reported"],
+            {"structure.form.along": 1000.0, "wear.reported.0.normal_force": 17.0},
+        ),
+        ("bodies", [], {}),
+        ("line", [], {}),
+    ],
+)
+def test_template_works_without_its_comment_signs(kind, sections, values, template_files):
     """Entries left in as comments are right as well."""
-    text = template("dovetail").replace("# stop", "stop").replace("# expect", "expect")
-    text = text.replace("  #   ", "    ").replace("\n#   ", "\n  ")
-    case = parse_case(text, "template")
-    assert case.wear.stop.depth == 0.5
-    assert case.expect[0].tolerance == 0.01
+    text = uncommented(template(kind), *sections, "assumed", "expect")
+    case = parse_case(text, str(template_files / kind))
+    for key, value in (values | {"expect.0.tolerance": 0.01}).items():
+        node = case
+        for part in key.split("."):
+            node = node[int(part)] if part.isdecimal() else getattr(node, part)
+        assert node == value, key
+    assert case.assumed
+    assert parse_case(dump_case(case), "dump") == case

@@ -1,17 +1,20 @@
 """The command: what it prints, how fast it answers, and how each ending leaves it."""
 
 import json
+import shutil
 import subprocess
 import sys
 import types
+from pathlib import Path
 
 import pytest
 from click.testing import CliRunner
 
 from workflow import errors, system_check
-from workflow.case import load_case
+from workflow.case import KINDS, load_case
 from workflow.cli import cli
 
+CASES = Path(__file__).parents[2] / "cases"
 # Only these outside the standard library may be imported to print the help.
 LIGHT = {"click", "workflow"}
 
@@ -53,6 +56,13 @@ assert "pint" not in sys.modules
     subprocess.run([sys.executable, "-c", code], check=True)
 
 
+@pytest.mark.parametrize("path", sorted(CASES.glob("*.yaml")), ids=lambda path: path.stem)
+def test_cases_of_the_repository_check(path):
+    result = invoke("check", path)
+    assert (result.exit_code, result.stderr) == (0, "")
+    assert result.stdout.startswith(f"OK {path}: ")
+
+
 def test_check_says_what_would_run(dovetail_path):
     result = invoke("check", dovetail_path)
     assert result.exit_code == 0
@@ -68,13 +78,15 @@ def test_check_says_what_would_run(dovetail_path):
     ("kind", "words"),
     [
         ("dovetail", "10 jumps"),
+        ("mesh", "22 increments in 2 legs"),
         ("resultants", "loads in 3-D from loads.csv, without slip"),
+        ("specimens", "pad 1 x 1 mm of 121 nodes, flat"),
         ("bodies", "128 x 128 cells of 0.007812 x 0.007812 mm, history auto"),
         ("line", "512 strips of 0.003906 mm"),
     ],
 )
-def test_new_writes_a_case_that_checks(tmp_path, kind, words):
-    (tmp_path / "loads.csv").write_text("P,Qx,Qy,Mx,My,Mz,Edx,Edy\n1,0,0,0,0,0,0,0\n", "utf-8")
+def test_new_writes_a_case_that_checks(tmp_path, template_files, kind, words):
+    shutil.copytree(template_files, tmp_path, dirs_exist_ok=True)
     path = tmp_path / "mine.yaml"
     assert invoke("new", kind, path).exit_code == 0
     checked = invoke("check", path)
@@ -89,7 +101,7 @@ def test_new_writes_a_case_that_checks(tmp_path, kind, words):
 def test_schema_is_json_with_descriptions():
     schema = json.loads(invoke("schema").stdout)
     kinds = [kind["$ref"].rpartition("/")[2] for kind in schema["anyOf"]]
-    assert kinds == ["DovetailCase", "ContactCase", "LineContactCase"]
+    assert kinds == [model.__name__ for model in KINDS.values()]
     for name, section in schema["$defs"].items():
         assert section["additionalProperties"] is False, name
         for key, entry in section["properties"].items():
