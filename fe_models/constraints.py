@@ -4,11 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
-from sa_solver.types import Array
-
-Indices = NDArray[np.int64]
+from sa_solver.types import Array, Indices
 
 # An equation whose coefficients shrink to this share, once others are put in, says nothing new.
 ALREADY_MET = 1e-9

@@ -7,7 +7,6 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from skfem import (
     Basis,
     BilinearForm,
@@ -21,7 +20,7 @@ from skfem import (
 from skfem.helpers import grad
 
 from fe_models.mesh import Body, in_space
-from sa_solver.types import Array, Material
+from sa_solver.types import Array, Indices, Material
 
 # By dimension and order.
 ELEMENTS = {
@@ -132,17 +131,17 @@ class ElasticBody:
         points = _spatial(np.asarray(basis.global_coordinates()))
         return float(np.sum(integrand(points) * basis.dx))
 
-    def boundary_weights(self, boundary: str) -> tuple[NDArray[np.int64], Array]:
+    def boundary_weights(self, boundary: str) -> tuple[Indices, Array]:
         """Nodes of a boundary and the area each stands for, so that Σ w u = ∫ u dA."""
         weights = LinearForm(lambda v, w: 1.0 * v).assemble(self._facet_basis(boundary))
         nodes = self.boundary_nodes(boundary)
         return nodes, weights[nodes]
 
-    def boundary_nodes(self, boundary: str) -> NDArray[np.int64]:
+    def boundary_nodes(self, boundary: str) -> Indices:
         """Nodes on a named boundary, midsides included."""
         return self._basis.get_dofs(boundary).all()
 
-    def boundary_normals(self, boundary: str) -> tuple[NDArray[np.int64], Array]:
+    def boundary_normals(self, boundary: str) -> tuple[Indices, Array]:
         """Nodes of a boundary and the outward unit normal at each, ``(n, dimension)``."""
         mesh = self.body.mesh
         linear = ELEMENTS[self.dimension, 1]()
@@ -156,7 +155,7 @@ class ElasticBody:
         nodes = self.boundary_nodes(boundary)
         return nodes, normals[nodes] / np.linalg.norm(normals[nodes], axis=1, keepdims=True)
 
-    def midsides(self, boundary: str) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def midsides(self, boundary: str) -> tuple[Indices, Indices]:
         """Midside nodes of a boundary ``(n,)`` and the vertices beside each, ``(n, 2)``."""
         if self.order == 1:
             return np.empty(0, np.int64), np.empty((0, 2), np.int64)

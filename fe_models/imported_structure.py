@@ -12,21 +12,16 @@ from scipy.spatial import cKDTree
 from fe_models.constraints import Constraints
 from fe_models.elasticity import ElasticBody
 from fe_models.geometry.imported import ImportedMesh
-from fe_models.mesh import (
-    Body,
-    Indices,
-    MeshError,
-    StructureMesh,
-    matched_interface,
-    meet_node_to_node,
-)
+from fe_models.mesh import Body, MeshError, StructureMesh, matched_interface, meet_node_to_node
 from fe_models.mortar import frame_of_faces, mortar_interface
 from fe_models.spin_softening import spin_softening
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_frames
-from sa_solver.types import Array, Material
+from sa_solver.types import Array, Indices, Material
 
 AXIS_NAMES = "xyz"
+# Displacements that differ by this share of themselves are the same: the rest is rounding.
+HELD_SHARE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -299,14 +294,19 @@ def _supported(
     for support in supports:
         if support.group in own:
             _hold(constraints, elastic, imported.points[body.name], support)
+    free, supported_motions = constraints.free, constraints.transformation()
     imposed = np.zeros((elastic.size, len(loads)))
     forces = np.zeros((elastic.size, len(loads)))
+    moved = []
     for case, load in enumerate(loads):
         if isinstance(load, Displacement):
             if load.boundary in own:
+                moved.append(load)
                 imposed[:, case] = _impose(constraints, elastic, load)
         elif _boundary(load) is None or _boundary(load) in own:
             forces[:, case] = _forces(elastic, load)
+    _check_against_supports(loads, imposed, supported_motions @ imposed[free])
+    _check_against_each_other(elastic, moved)
     for interface in mesh.interfaces:
         constraints.average(*elastic.midsides(interface.name))
     nodes = _interface_nodes(mesh, number)
@@ -373,6 +373,36 @@ def _impose(constraints: Constraints, elastic: ElasticBody, load: Displacement) 
     imposed = np.zeros((len(elastic.nodes), elastic.dimension))
     imposed[nodes] = displacement
     return imposed.ravel()
+
+
+def _check_against_supports(loads: Sequence[Load], imposed: Array, allowed: Array) -> None:
+    """Raise unless supports leave the ``imposed`` displacements ``(size, loads)`` as they are."""
+    for load, own, left in zip(loads, imposed.T, allowed.T, strict=True):
+        if np.abs(left - own).max() > HELD_SHARE * np.abs(own).max():
+            raise MeshError(
+                f"a displacement is imposed on {_boundary(load)} along what a support holds of its "
+                "nodes; hold them across it alone, such as xy for one along z"
+            )
+
+
+def _check_against_each_other(elastic: ElasticBody, imposed: Sequence[Displacement]) -> None:
+    """Raise if displacements of two boundaries would add up where these meet.
+
+    Those of one boundary are meant to.
+    """
+    for index, one in enumerate(imposed):
+        for other in imposed[:index]:
+            along = np.linalg.norm(one.displacement) * np.linalg.norm(other.displacement)
+            across = abs(one.displacement @ other.displacement) <= HELD_SHARE * along
+            if across or one.boundary == other.boundary:
+                continue
+            nodes = elastic.boundary_nodes(one.boundary)
+            if np.isin(nodes, elastic.boundary_nodes(other.boundary)).any():
+                raise MeshError(
+                    f"{other.boundary} and {one.boundary} share nodes, on which the displacements "
+                    "imposed on both would add up; impose them on one boundary, or across each "
+                    "other"
+                )
 
 
 def _forces(elastic: ElasticBody, load: Load) -> Array:

@@ -23,8 +23,7 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from fe_models.mesh import Indices
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 
 # Eigenvalues below this share of the largest are rigid motions; elastic ones start near 1e-3.
 RIGID_LIMIT = 1e-7

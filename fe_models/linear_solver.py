@@ -14,23 +14,20 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 
 from fe_models import superlu
 from fe_models.memory import available_bytes
 from fe_models.multigrid import MultigridSolver, softness
 from fe_models.pardiso import Kind, Pardiso, PardisoError
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 
 # A backward-stable factorisation leaves about 1e-13; anything above this is a wrong answer.
 RESIDUAL_LIMIT = 1e-9
 # |K| |u| / |f|, at most the condition number: 1e2 to 1e4 if a body is held, 1e16 if it is not.
 GROWTH_LIMIT = 1e12
-# Interface unknowns condensed at once without PARDISO: enough to amortise, little memory.
+# Right-hand sides solved at once, where there may be thousands: enough to amortise, little memory.
 COLUMNS_AT_ONCE = 256
 BYTES = 8
-
-Indices = NDArray[np.int64]
 
 SINGULAR = {
     Kind.POSITIVE_DEFINITE: (

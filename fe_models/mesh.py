@@ -7,12 +7,11 @@ from pathlib import Path
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 from skfem import MeshTet, MeshTri
 
 from fe_models.gmsh_session import gmsh_model
-from sa_solver.types import Array, Frame
+from sa_solver.types import Array, Frame, Indices
 
 # Two nodes are the same point when they are closer than this share of the interface's size.
 MATCHING_TOLERANCE = 1e-9
@@ -20,8 +19,6 @@ MATCHING_TOLERANCE = 1e-9
 AXES = {2: (0, 2), 3: (0, 1, 2)}
 # gmsh's numbers for first-order cells and their facets, by dimension.
 GMSH_CELL, GMSH_FACET = {2: 2, 3: 4}, {2: 1, 3: 2}
-
-Indices = NDArray[np.int64]
 
 
 class MeshError(ValueError):
@@ -130,6 +127,14 @@ class StructureMesh:
     body_1: Body
     body_2: Body
     interfaces: tuple[Interface, ...]
+
+    def node_count(self, order: int) -> int:
+        """Nodes of both bodies, with elements of order 2 midsides included."""
+        count = 0
+        for mesh in (self.body_1.mesh, self.body_2.mesh):
+            edges = mesh.nedges if mesh.dim() == 3 else mesh.nfacets
+            count += mesh.nvertices + (edges if order == 2 else 0)
+        return int(count)
 
 
 def in_space(components: Array) -> Array:

@@ -28,8 +28,8 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
-from fe_models.mesh import Body, Face, Indices, Interface, MeshError
-from sa_solver.types import Array, Frame
+from fe_models.mesh import Body, Face, Interface, MeshError
+from sa_solver.types import Array, Frame, Indices
 
 # Share of a facet's area below which an overlap is rounding: neighbours that only share an edge.
 ROUNDING_AREA = 1e-12

@@ -28,7 +28,7 @@ from fe_models.relinearised import (
 from fe_models.stress import deformation
 from fe_models.structure import Structure
 from fe_models.total_lagrangian import TotalLagrangian, rotation_angle
-from sa_solver.types import Array
+from sa_solver.types import Array, resultant_change
 
 # Nodal forces left out of balance relative to all, and turn of the frames left [rad]: ten times
 # what friction.TOLERANCE leaves, a thousandth of the changes that are reported.
@@ -43,13 +43,13 @@ class NonlinearCheck:
 
     ``linear`` and ``nonlinear`` ``(interfaces, 6)`` are the resultants ``(P, Qx, Qy, Mx, My, Mz)``
     in the frames of the undeformed and of the deformed faces [N, N mm], and ``change`` that of
-    :func:`resultant_change`. ``slip`` ``(2, n)`` over all interfaces [mm] is nonlinear,
-    ``slip_change`` the largest change of a slip relative to the largest slip. ``slide`` is the
-    largest slip relative to half the width of its face: the order of what small sliding leaves out
-    of the lever arms. ``displacements`` of both bodies are nonlinear; ``largest_strain`` (principal
-    of Green's tensor, in size), ``largest_rotation`` and ``face_rotation`` [rad] tell how large
-    they are. ``residual`` is what Newton's method leaves out of balance relative to the nodal
-    forces, or to turn [rad].
+    :func:`~sa_solver.types.resultant_change`. ``slip`` ``(2, n)`` over all interfaces [mm] is
+    nonlinear, ``slip_change`` the largest change of a slip relative to the largest slip. ``slide``
+    is the largest slip relative to half the width of its face: the order of what small sliding
+    leaves out of the lever arms. ``displacements`` of both bodies are nonlinear; ``largest_strain``
+    (principal of Green's tensor, in size), ``largest_rotation`` and ``face_rotation`` [rad] tell
+    how large they are. ``residual`` is what Newton's method leaves out of balance relative to the
+    nodal forces, or to turn [rad].
     """
 
     linear: Array
@@ -88,7 +88,7 @@ def check_nonlinearity(
     return NonlinearCheck(
         linear=first,
         nonlinear=last,
-        change=resultant_change(structure, last, first),
+        change=resultant_change(last, first, face_sizes(structure)),
         slip=newton.state.slip,
         slip_change=slip_change(newton.state.slip, linear.slip),
         slide=_slide(structure, newton.state.slip),
@@ -102,21 +102,6 @@ def check_nonlinearity(
     )
 
 
-def resultant_change(structure: Structure, now: Array, then: Array) -> Array:
-    """Change of resultants ``(interfaces, 6)``: of forces by P, of moments by P and half a face.
-
-    A face that was open is measured by the P of the heaviest loaded.
-    """
-    loads = np.where(then[:, 0] > 0.0, then[:, 0], then[:, 0].max())
-    faces = _half_faces(structure)
-    longest = faces.max(axis=1)
-    # A line contact has no width along y, and no moment about x.
-    half_x, half_y = np.where(faces > 0.0, faces, longest[:, None]).T
-    one = np.ones_like(longest)
-    scales = loads * np.array([one, one, one, half_y, half_x, longest])
-    return np.asarray((now - then) / scales.T)
-
-
 def slip_change(now: Array, then: Array) -> float:
     """Largest change of a slip ``(2, n)`` relative to the largest slip."""
     largest = float(np.linalg.norm(then, axis=0).max())
@@ -124,16 +109,16 @@ def slip_change(now: Array, then: Array) -> float:
     return change / largest if largest > 0.0 else change
 
 
-def _half_faces(structure: Structure) -> Array:
-    """Half the extent of every interface along x and y, ``(interfaces, 2)`` [mm]."""
-    return np.array([0.5 * np.ptp(i.coordinates, axis=0) for i in structure.mesh.interfaces])
+def face_sizes(structure: Structure) -> Array:
+    """Extent of every interface along x and y, ``(interfaces, 2)`` [mm]."""
+    return np.array([np.ptp(i.coordinates, axis=0) for i in structure.mesh.interfaces])
 
 
 def _slide(structure: Structure, slip: Array) -> float:
     """Largest slip relative to half the narrower extent of its face."""
     interfaces = structure.mesh.interfaces
     parts = np.split(np.linalg.norm(slip, axis=0), np.cumsum([len(i) for i in interfaces])[:-1])
-    widths = [half[half > 0.0].min() for half in _half_faces(structure)]
+    widths = [0.5 * size[size > 0.0].min() for size in face_sizes(structure)]
     return max(float(part.max() / width) for part, width in zip(parts, widths, strict=True))
 
 

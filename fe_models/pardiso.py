@@ -17,7 +17,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 
 ANALYSE, FACTORISE, SOLVE, RELEASE = 11, 22, 33, -1
 # Places in PARDISO's table of parameters, counted from zero; the last three are answers.
@@ -28,7 +28,6 @@ NESTED_DISSECTION = 2
 # differ in the last bits otherwise.
 REPRODUCIBLE = 2
 KILOBYTE = 1024
-OUT_OF_MEMORY = -2
 
 
 class Kind(IntEnum):
@@ -61,9 +60,7 @@ class Pardiso:
     complement is what :meth:`schur` gives, and there are no factors to solve with.
     """
 
-    def __init__(
-        self, matrix: sp.csr_matrix, kind: Kind, kept: NDArray[np.int64] | None = None
-    ) -> None:
+    def __init__(self, matrix: sp.csr_matrix, kind: Kind, kept: Indices | None = None) -> None:
         mkl = library()
         if mkl is None:
             raise PardisoError("PARDISO is not installed")

@@ -19,46 +19,20 @@ applications" (thesis), section 4.1, eqs. 18 to 30, whose distant nodes are the 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 import scipy.linalg as sl
-from numpy.typing import NDArray
 
+from fe_models.complementarity import ROUNDING, Flags, complementary
 from fe_models.friction import FrictionalJoint, FrictionState
 from fe_models.joint import JointStiffness
 from fe_models.mesh import Face
 from sa_solver.reference.masing import superpose
 from sa_solver.types import Array
 
-Flags = NDArray[np.bool_]
-
 X, Y, Z = range(3)
-# Forces and gaps below this share of the largest are rounding, whose sign says nothing.
-ROUNDING = 1e-12
-# Exchanges of all wrong nodes at once that may fail to lower their number, before one at a time.
-PATIENCE = 3
-# Exchanges that a contact needs are a few, one at a time at most some per node.
-EXCHANGES_PER_NODE = 20
-# Share of the stability limit that a stint takes: 0.5 damps the stiffest error without overshoot.
-STINT_SHARE = 0.5
-
-
-class StintError(ValueError):
-    """A stint of constant geometry would be unstable; the message says which length is not."""
-
-
-@dataclass(frozen=True)
-class Complementary:
-    """``force >= 0``, ``gap = offset + A force - level >= 0`` and ``force · gap = 0``, ``(n,)``."""
-
-    force: Array
-    gap: Array
-    level: float
-    iterations: int
-    converged: bool
 
 
 @dataclass(frozen=True)
@@ -177,34 +151,21 @@ class RubbedContact:
 
 
 @dataclass(frozen=True)
-class StintState:
-    """A worn pair after ``cycles``.
-
-    ``gap`` ``(n,)`` of the unloaded faces and ``depths`` ``(2, n)`` worn off each body [mm],
-    ``energy`` dissipated since the start [N mm] and the ``contact`` at this shape.
-    """
-
-    cycles: float
-    gap: Array
-    depths: Array
-    energy: float
-    contact: RubbedContact
-
-
-@dataclass(frozen=True)
 class CoupledCycle:
     """A closed cycle, marched with pressure and both shears together.
 
-    ``states`` at each point of the ``loop``; ``energy`` ``(n,)`` that each node dissipates [N mm].
+    ``loading`` are the states on the way to it, from rest; ``states`` those at each point of the
+    ``loop``; ``energy`` ``(n,)`` is what each node dissipates in the cycle [N mm].
     """
 
     loop: Loop
+    loading: tuple[FrictionState, ...]
     states: tuple[FrictionState, ...]
     energy: Array
 
     @property
     def converged(self) -> bool:
-        return all(state.converged for state in self.states)
+        return all(state.converged for state in self.loading + self.states)
 
 
 @dataclass(frozen=True)
@@ -340,20 +301,29 @@ class ReducedPair:
         largest = float(sl.eigvalsh(root[:, None] * K * root)[-1])
         return 2.0 / largest if largest > 0.0 else np.inf
 
-    def coupled_cycle(self, gap: Array, rubbing: Rubbing, steps: int) -> CoupledCycle:
-        """The cycle after first loading, ``steps`` increments to each quarter of the stroke."""
+    def coupled_cycle(
+        self, gap: Array, rubbing: Rubbing, steps: int, first: float | None = None
+    ) -> CoupledCycle:
+        """The cycle after first loading, ``steps`` increments to each quarter of the stroke.
+
+        ``first`` [mm] is a motion within the first of them at which loading halts as well.
+        """
         amplitude = 0.5 * rubbing.stroke
         rise = amplitude * np.arange(steps + 1) / steps
+        if first is not None:
+            rise = np.insert(rise, 1, first)
         fall = np.linspace(amplitude, -amplitude, 2 * steps + 1)[1:]
         path = np.concatenate([rise, fall, -fall])
         amplitudes = np.stack([np.full(len(path), rubbing.force), path, 0.0 * path], axis=1)
         # The ring is free along z, so the gap's datum is too: from here it is closed already.
         closed = gap - self.normal(gap, rubbing.force).approach
-        marched = FrictionalJoint(self.joint().resolvent(), rubbing.friction)
-        states = tuple(marched.march(amplitudes, closed))[steps:]
+        joint = FrictionalJoint(self.joint().resolvent(), rubbing.friction)
+        marched = tuple(joint.march(amplitudes, closed))
+        begin = len(rise) - 1
+        loading, states = marched[:begin], marched[begin:]
         force = np.array([-state.force[0].sum() for state in states])
         energy = -sum(np.sum(state.force[:2] * state.slip, axis=0) for state in states[1:])
-        return CoupledCycle(Loop(path[steps:], force), states, np.asarray(energy))
+        return CoupledCycle(Loop(path[begin:], force), loading, states, np.asarray(energy))
 
     def joint(self) -> JointStiffness:
         """The coupled joint, to march along amplitudes ``(F, D_x, D_y)`` [N, mm, mm].
@@ -373,59 +343,6 @@ class ReducedPair:
         return JointStiffness(H, loads, 1, float(values[1]), float(values[-1]))
 
 
-def complementary(
-    compliance: Array, offset: Array, total: float | None = None, guess: Flags | None = None
-) -> Complementary:
-    """Solve 0 <= f ⊥ offset + A f - level >= 0, with Σ f = ``total`` if it is given, else level 0.
-
-    ``compliance`` A ``(n, n)`` is symmetric positive definite. Status iteration: all nodes whose
-    force or gap is negative change their status, as long as their number falls; after that the last
-    of them alone, which ends for any A if the level is given (block principal pivoting: Júdice &
-    Pires 1994, Computers & Operations Research 21, 587). A result that has not converged says so.
-    """
-    active = np.ones(len(offset), dtype=np.bool_) if guess is None else guess.copy()
-    fewest, patience = len(offset) + 1, PATIENCE
-    wrong, iterations = np.arange(len(offset)), 0
-    while len(wrong) and iterations < EXCHANGES_PER_NODE * len(offset):
-        iterations += 1
-        if total is not None and not active.any():
-            active[np.argmin(offset)] = True
-        force, gap, level = _at_status(compliance, offset, total, active)
-        wrong = _wrong_nodes(force, gap, active, np.abs(offset).max() + abs(level))
-        if len(wrong) < fewest:
-            fewest, patience = len(wrong), PATIENCE
-        elif patience > 0:
-            patience -= 1
-        else:
-            wrong = wrong[-1:]
-        active[wrong] = ~active[wrong]
-    forces, gaps = np.maximum(force, 0.0), np.maximum(gap, 0.0)
-    return Complementary(forces, gaps, level, iterations, len(wrong) == 0)
-
-
-def _wrong_nodes(force: Array, gap: Array, active: Flags, size: float) -> NDArray[np.int64]:
-    """Active nodes that pull, others that overlap, by more than rounding; gaps are of ``size``."""
-    pulls = force < -ROUNDING * np.abs(force).max(initial=0.0)
-    return np.flatnonzero(np.where(active, pulls, gap < -ROUNDING * size))
-
-
-def _at_status(
-    compliance: Array, offset: Array, total: float | None, active: Flags
-) -> tuple[Array, Array, float]:
-    """Forces on the active nodes that close their gaps, the gaps of the others, and the level."""
-    force, level = np.zeros(len(offset)), 0.0
-    nodes = np.flatnonzero(active)
-    if len(nodes):
-        sides = np.stack([-offset[nodes], np.ones(len(nodes))], axis=1)
-        closing, unit = sl.solve(compliance[np.ix_(nodes, nodes)], sides, assume_a="pos").T
-        if total is not None:
-            level = float((total - closing.sum()) / unit.sum())
-        force[nodes] = closing + level * unit
-    gap = offset + compliance[:, nodes] @ force[nodes] - level
-    gap[nodes] = 0.0
-    return force, gap, level
-
-
 def masing_loop(curve: VirginCurve) -> Loop:
     """The loop between ± the curve's last displacement (the source's eq. 30).
 
@@ -441,43 +358,6 @@ def masing_loop(curve: VirginCurve) -> Loop:
     down = amplitude - 2.0 * curve.displacement
     unloading = np.array([superpose(first_loading, [amplitude, float(d)]) for d in down])
     return Loop(np.append(down, -down[1:]), np.append(unloading, -unloading[1:]))
-
-
-def wear_in_stints(
-    pair: ReducedPair,
-    gap: Array,
-    rubbing: Rubbing,
-    cycles: float,
-    share: float = STINT_SHARE,
-    stint: float | None = None,
-) -> Iterator[StintState]:
-    """States of a contact of unworn ``gap`` ``(n,)`` that is rubbed up to ``cycles``.
-
-    Energy law: every node of each body loses α times the energy it dissipates per area, Σ|q||Δs|.
-    Shape, forces and slip are those at the start of each stint (explicit), which lasts ``share`` <=
-    1 of its stability limit, or ``stint`` cycles if they are given. The last state is the one at
-    ``cycles``. Raises :class:`StintError` where a stint would be beyond its limit.
-    """
-    if not 0.0 < share <= 1.0:
-        raise StintError(f"stints of {share:g} of their stability limit: take above 0 and up to 1")
-    done, energy, depths = 0.0, 0.0, np.zeros((2, len(gap)))
-    touching = None
-    while True:
-        worn = gap + depths.sum(axis=0)
-        contact = pair.rub(worn, rubbing, touching)
-        yield StintState(done, worn, depths, energy, contact)
-        if done >= cycles:
-            return
-        step = share * contact.stint_limit if stint is None else stint
-        if not 0.0 < step <= contact.stint_limit:
-            raise StintError(
-                f"a stint of {step:g} cycles: take at most {contact.stint_limit:.4g} cycles"
-            )
-        step = min(step, cycles - done)
-        depths = depths + step * contact.wear
-        energy += step * contact.energy
-        done += step
-        touching = contact.normal.touching
 
 
 def _inverse(matrix: Array) -> Array:

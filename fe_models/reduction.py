@@ -15,9 +15,6 @@ doi:10.2514/3.4741.
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -26,19 +23,14 @@ import h5py
 import numpy as np
 import scipy.linalg as sl
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from fe_models.linear_solver import Factorisation, factorise, schur_complement
-from sa_solver.types import Array
+from fe_models.linear_solver import COLUMNS_AT_ONCE, Factorisation, factorise, schur_complement
+from sa_solver.types import Array, Indices
 
-# Kept displacements whose static shapes are computed at once: enough to amortise, little memory.
-COLUMNS_AT_ONCE = 256
 # The shift of a free body's search over the median of K_jj/M_jj, which no choice of coordinates
 # changes: small enough to separate rigid motions, and large enough that K - σ M is not singular.
 SHIFT_SHARE = 1e-7
-
-Indices = NDArray[np.int64]
 
 # Unit and description of every dataset of a stored model.
 DATASETS = {
@@ -152,8 +144,8 @@ def free_frequencies(
 
 
 def save_reduced(path: Path, model: ReducedModel) -> None:
-    """Write a model to HDF5: beside its place and renamed, so that no file is half written."""
-    with _replacing(path) as partial, h5py.File(partial, "w") as file:
+    """Write a model to HDF5, with the unit and description of every dataset."""
+    with h5py.File(path, "w") as file:
         for name, (unit, description) in DATASETS.items():
             values = getattr(model, name)
             if values is not None:
@@ -167,16 +159,6 @@ def load_reduced(path: Path) -> ReducedModel:
     with h5py.File(path, "r") as file:
         found: dict[str, Any] = {name: file[name][()] for name in DATASETS if name in file}
     return ReducedModel(**({"mass": None} | found))
-
-
-@contextmanager
-def _replacing(path: Path) -> Iterator[Path]:
-    partial = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        yield partial
-        partial.replace(path)
-    finally:
-        partial.unlink(missing_ok=True)
 
 
 def _others(size: int, kept: Indices) -> Indices:

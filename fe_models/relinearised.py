@@ -32,26 +32,27 @@ Softening = tuple[sp.csr_matrix, sp.csr_matrix]
 class PrestressedStructure(Structure):
     """A structure with the stiffness that it has at one load.
 
-    ``displacements`` of both bodies and ``amplitudes`` ``(cases,)`` are those of that load.
+    ``displacements`` of both bodies are those of that load, ``share`` ``(cases,)`` how much of it
+    an amplitude of each load case is.
     """
 
     displacements: Displacements
-    amplitudes: Array
+    share: Array
 
     def condense_path(self, like: JointResolvent) -> JointResolvent:
         """The joint for a whole load path, ``like`` that of the linear structure.
 
         What contact alone holds in a centrifugal field has a negative stiffness to rigid motions,
         which would throw it out where nothing presses any more, though by then nothing spins. Here
-        they are free, as in the linear structure, under the forces that they bear at
-        ``amplitudes``, in proportion to the load.
+        they are free, as in the linear structure, under the forces that they bear at the one load,
+        in proportion to it.
         """
         joint = self.condense(like)
         free = ~self.body_2.held
         stiffness = _deflated(joint.stiffness, self._rigid_motions()[free])
         relative = self._relative()[free]
         taken = joint.stiffness @ relative - stiffness @ relative
-        loads = joint.loads + np.outer(taken, _share(self.amplitudes))
+        loads = joint.loads + np.outer(taken, self.share)
         return replace(joint, stiffness=stiffness, loads=loads).resolvent()
 
     def equilibrium_errors(self, states: Sequence[FrictionState], amplitudes: Array) -> Array:
@@ -62,7 +63,7 @@ class PrestressedStructure(Structure):
         """
         forces = -self.body_2.elastic.stiffness @ self.displacements[1]
         body_2 = copy(self.body_2)
-        body_2.loads = self.body_2.loads + np.outer(forces, _share(self.amplitudes))
+        body_2.loads = self.body_2.loads + np.outer(forces, self.share)
         plain = Structure(self.mesh, self.body_1, body_2)
         return plain.equilibrium_errors(states, amplitudes)
 
@@ -104,12 +105,13 @@ def stress_stiffened(
     has the second-order effect of the stress on displacements across it, and leaves out what the
     displacements themselves change, which :func:`relinearised` does not.
     """
+    share = _share(structure, amplitudes)
     bodies = []
     pairs = zip((structure.body_1, structure.body_2), displacements, softening, strict=True)
     for number, (body, displacement, soft) in enumerate(pairs, start=1):
         stiffness = TotalLagrangian(body.elastic).stress_stiffened(displacement) - soft
         bodies.append(_changed(body, number, structure.mesh.interfaces, stiffness, body.loads))
-    return PrestressedStructure(structure.mesh, bodies[0], bodies[1], displacements, amplitudes)
+    return PrestressedStructure(structure.mesh, bodies[0], bodies[1], displacements, share)
 
 
 def relinearised(
@@ -126,7 +128,7 @@ def relinearised(
     interfaces = tuple(
         turned_interface(i, body_1, displacements[0]) for i in structure.mesh.interfaces
     )
-    share = _share(amplitudes)
+    share = _share(structure, amplitudes)
     bodies = []
     pairs = zip((structure.body_1, structure.body_2), displacements, softening, strict=True)
     for number, (body, displacement, soft) in enumerate(pairs, start=1):
@@ -136,7 +138,7 @@ def relinearised(
         loads = body.loads + np.outer(offset, share)
         bodies.append(_changed(body, number, interfaces, tangent - soft, loads))
     mesh = replace(structure.mesh, interfaces=interfaces)
-    return PrestressedStructure(mesh, bodies[0], bodies[1], displacements, amplitudes)
+    return PrestressedStructure(mesh, bodies[0], bodies[1], displacements, share)
 
 
 def turned_interface(interface: Interface, body_1: Body, displacement: Array) -> Interface:
@@ -179,14 +181,17 @@ def _deflated(stiffness: Array, motions: Array) -> Array:
     return np.asarray(stiffness - half - half.T)
 
 
-def _share(amplitudes: Array) -> Array:
-    """Weights ``(cases,)`` whose sum is one at the amplitudes and falls with them."""
-    largest = int(np.argmax(np.abs(amplitudes)))
-    if amplitudes[largest] == 0.0:
+def _share(structure: Structure, amplitudes: Array) -> Array:
+    """How much of the load at ``amplitudes`` an amplitude of each load case is, ``(cases,)``.
+
+    The projection of the cases' nodal forces on those of that load: one at it, falling with it, and
+    whatever the order and the units of the cases.
+    """
+    forces = np.concatenate([b.nodal_loads() for b in (structure.body_1, structure.body_2)])
+    load = forces @ amplitudes
+    if not load.any():
         raise ValueError("a structure is re-linearised at a load: its amplitudes are all zero")
-    share = np.zeros_like(amplitudes)
-    share[largest] = 1.0 / amplitudes[largest]
-    return share
+    return np.asarray((load @ forces) / (load @ load))
 
 
 def _changed(

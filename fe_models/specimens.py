@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from fe_models.constraints import Constraints
@@ -14,7 +13,7 @@ from fe_models.elasticity import ElasticBody
 from fe_models.geometry.specimens import CONTACT, Specimen
 from fe_models.mesh import Body, StructureMesh
 from fe_models.reduction import ReducedModel, reduce_body
-from sa_solver.types import Array, Material
+from sa_solver.types import Array, Indices, Material
 
 # Fixed-interface modes of each specimen ("Dynamics simulations of fretting wear for aero-engine
 # applications", thesis, section 4.2).
@@ -33,13 +32,13 @@ class SpecimenMatrices:
     stiffness: sp.csr_matrix
     mass: sp.csr_matrix
     transformation: sp.csr_matrix
-    kept: NDArray[np.int64]
+    kept: Indices
 
 
 def specimen_matrices(
     specimen: Specimen,
     body: Body,
-    pad: NDArray[np.int64],
+    pad: Indices,
     material: Material,
     order: int = 2,
     tied_ring: bool = True,

@@ -14,7 +14,7 @@ from fe_models.mesh import Face, Interface, StructureMesh
 from fe_models.supported_body import SupportedBody
 from sa_solver.types import Array, LoadHistory, resultants
 
-# A flank slides as a whole when nodes that stick carry less than this share of its load.
+# A face slides as a whole when nodes that stick carry less than this share of its load.
 STICKING_SHARE = 1e-2
 # Below this share of the cycle's largest P the resultants are the friction solver's remainder.
 UNLOADED_SHARE = 1e-6

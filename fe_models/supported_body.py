@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from fe_models.constraints import Constraints
 from fe_models.elasticity import ElasticBody
 from fe_models.linear_solver import prepare
-from fe_models.mesh import Body, Indices, Interface
+from fe_models.mesh import Body, Interface
 from fe_models.multigrid import rigid_body_modes, rigid_motions
 from fe_models.reduction import reduce_body
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 
 # A rigid motion that supports change by less than this share of itself is free.
 FREE_MOTION = 1e-9
@@ -98,6 +98,12 @@ class SupportedBody:
         arms = self.elastic.nodes - about
         return np.array([forces.sum(axis=0), np.cross(arms, forces).sum(axis=0)])
 
+    def nodal_loads(self) -> Array:
+        """Forces ``(d all, cases)`` of load cases; of an imposed displacement the body's own."""
+        if self.imposed is None:
+            return self.loads
+        return np.asarray(self.loads - self.elastic.stiffness @ self.imposed)
+
     def free_motions(self, about: Array, size: float) -> Array:
         """Small rigid motions that the supports leave, ``(k, 6)``, orthonormal.
 
@@ -120,10 +126,8 @@ class SupportedBody:
         return rigid_body_modes(elastic.nodes, elastic.body.axes, self._transformation)
 
     def _reduced(self) -> tuple[sp.csr_matrix, Array]:
-        t, loads = self._transformation, self.loads
-        if self.imposed is not None:
-            loads = loads - self.elastic.stiffness @ self.imposed
-        return (t.T @ self.elastic.stiffness @ t).tocsr(), t.T @ loads
+        t = self._transformation
+        return (t.T @ self.elastic.stiffness @ t).tocsr(), t.T @ self.nodal_loads()
 
     def _all(self, free: Array, amplitudes: Array) -> Array:
         displacement = self._transformation @ free

@@ -16,11 +16,10 @@ from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from skfem import Basis
 
 from fe_models.elasticity import ELEMENTS, ElasticBody
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 
 
 class TotalLagrangian:
@@ -125,7 +124,7 @@ class TotalLagrangian:
         return (left * self._weights[:, None, :]) @ right.swapaxes(1, 2)
 
     @cached_property
-    def _pattern(self) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64]]:
+    def _pattern(self) -> tuple[Indices, Indices, Indices]:
         """Rows and columns of the node pairs, and which of them each pair of an element is."""
         nodes = self._element_nodes.astype(np.int64)
         keys = nodes[:, :, None] * self._nodes + nodes[:, None, :]

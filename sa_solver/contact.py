@@ -31,7 +31,7 @@ from sa_solver.gross_slip import (
 )
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalStart, NormalState
-from sa_solver.tangential import TangentialContact, TangentialState
+from sa_solver.tangential import FrictionLimitError, TangentialContact, TangentialState
 from sa_solver.tangential_problem import PlanarModes
 from sa_solver.types import Array
 
@@ -169,7 +169,9 @@ class FrictionalContact:
         offset, area = self.offset(before, load), self.grid.cell_area
         sliding = self._slides(limit, load)
         if sliding:
-            tangential = self._slide(limit, offset, load)
+            tangential, creeps = self._slide(limit, offset, load)
+            held = self._held(before, limit, offset, load) if creeps else None
+            tangential, sliding = (tangential, True) if held is None else (held, False)
         elif self.two_normal_problems(before, load) and abs(load.values[1]) < limit.sum() * area:
             tangential = first_loading(
                 self.normal, height, normal, self.friction, load.values[1], self.tolerance
@@ -237,8 +239,22 @@ class FrictionalContact:
             limit, offset, **imposed, tolerance=self.tolerance, start=before.shear
         )
 
-    def _slide(self, limit: Array, offset: Array, load: Load) -> TangentialState:
-        """Gross slip by the energy of ``load``."""
+    def _held(
+        self, before: ContactState, limit: Array, offset: Array, load: Load
+    ) -> TangentialState | None:
+        """The contact that creeps under its force, where that is still below the limit.
+
+        Bodies that creep towards sliding dissipate less than sliding would: then the force of the
+        increment is to be believed, not its energy.
+        """
+        try:
+            state = self._shear(before, limit, offset, load)
+        except FrictionLimitError:
+            return None
+        return state if state.converged else None
+
+    def _slide(self, limit: Array, offset: Array, load: Load) -> tuple[TangentialState, bool]:
+        """Gross slip by the energy of ``load``, and whether it creeps: see :class:`GrossSlip`."""
         area = self.grid.cell_area
         start = limit * sliding_direction(load.values[1:3])[:, None, None]
         moved = self.half_space.shear(start) + offset
@@ -258,7 +274,8 @@ class FrictionalContact:
         stored = float(np.vdot(start, moved))
         found = self._by_energy(slide, float(limit.sum()) * area, load, stored)
         state, message = found.state, found.state.message or found.message
-        return replace(state, convolutions=spent, converged=not message, message=message)
+        state = replace(state, convolutions=spent, converged=not message, message=message)
+        return state, found.creeps
 
     def _by_energy(
         self,

@@ -50,12 +50,14 @@ class GrossSlip(Generic[State]):
 
     ``missing`` is the error of the energy alone. Shear is coupled by Poisson's ratio, so no
     direction of sliding spares x or y all energy: then the error of ``energies`` in direction
-    stays, and the sum is met.
+    stays, and the sum is met. ``creeps`` says that without any motion the contact dissipates more
+    than given: its force is then below what sliding takes, and to be believed.
     """
 
     state: State
     error: float
     missing: float
+    creeps: bool
 
     @property
     def message(self) -> str:
@@ -102,7 +104,8 @@ def gross_slip(
         length = max(0.0, length + missing / carried)
         angle = turned
     lacking = abs(missing) / total
-    return GrossSlip(found.state, max(lacking, abs(wanted - measured)), lacking)
+    creeps = length == 0.0 and missing < -ACCURACY * total
+    return GrossSlip(found.state, max(lacking, abs(wanted - measured)), lacking, creeps)
 
 
 def sliding_direction(force: Array, angle: float | None = None) -> Array:

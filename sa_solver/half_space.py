@@ -132,7 +132,7 @@ class HalfSpace:
         ]
         kernel = self._influence(edges[0], edges[1], row, column)
         for axis, m in enumerate(period):
-            kernel = _continued(kernel, axis, m, odd=(row == axis) != (column == axis))
+            kernel = continued(kernel, axis, m, odd=(row == axis) != (column == axis))
         spectrum = scipy.fft.rfft2(kernel)
         # -i times the symbol of an odd kernel from (x, y) to z is its real counterpart.
         symbol = spectrum.real if (row == Z) == (column == Z) else -spectrum.imag
@@ -157,7 +157,7 @@ def padded_shape(grid: Grid) -> Shape:
     return nx, ny
 
 
-def _continued(kernel: Array, axis: int, period: int, odd: bool) -> Array:
+def continued(kernel: Array, axis: int, period: int, odd: bool) -> Array:
     """A kernel at distances 0 to period//2 along ``axis``, continued to a whole period."""
     kernel = np.moveaxis(kernel, axis, 0)[: period // 2 + 1]
     mirrored = kernel[1 : (period + 1) // 2][::-1]

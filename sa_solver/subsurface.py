@@ -26,7 +26,7 @@ from typing import Literal
 import numpy as np
 import scipy.fft
 
-from sa_solver.half_space import padded_shape
+from sa_solver.half_space import continued, padded_shape
 from sa_solver.subsurface_influence import (
     INDICES,
     XX,
@@ -190,7 +190,7 @@ class SubsurfaceStress:
 
     def _symbol(self, kernel: Array, component: int, traction: int) -> Array:
         for axis, period in enumerate(self._padded):
-            kernel = _continued(kernel, axis, period, _odd(component, traction, axis))
+            kernel = continued(kernel, axis, period, _odd(component, traction, axis))
         spectrum = scipy.fft.rfft2(kernel)
         shear_stress = component in (YZ, ZX)
         if shear_stress == (traction in SHEAR):
@@ -208,16 +208,6 @@ def _quarter_edges(period: int, pitch: float) -> Array:
     return (np.arange(period // 2 + 2, dtype=np.float64) - 0.5) * pitch
 
 
-def _continued(kernel: Array, axis: int, period: int, odd: bool) -> Array:
-    """A kernel at distances 0 to period//2 along ``axis``, continued to a whole period."""
-    distance = np.fft.fftfreq(period, 1.0 / period)
-    whole: Array = np.take(kernel, np.abs(distance).astype(int), axis=axis)
-    if odd:
-        signs = np.sign(distance)
-        whole *= signs[:, None] if axis == 0 else signs
-    return whole
-
-
 def _along_rows(kernels: Array, spectra: Array, along: int, period: int) -> Array:
     """Convolution along the rows of cells, summed over them, ``(6, period)``.
 
@@ -226,7 +216,7 @@ def _along_rows(kernels: Array, spectra: Array, along: int, period: int) -> Arra
     """
     total = np.zeros((6, spectra.shape[1]), dtype=np.complex128)
     for i, k in np.ndindex(6, 3):
-        whole = _continued(kernels[i, k], 0, period, _odd(i, k, along))
+        whole = continued(kernels[i, k], 0, period, _odd(i, k, along))
         total[i] += np.einsum("fr,fr->f", scipy.fft.rfft(whole, axis=0), spectra[k])
     stress: Array = scipy.fft.irfft(total, period, axis=1)
     return stress

@@ -55,6 +55,10 @@ class FrictionLimitError(TangentialContactError):
         super().__init__(message)
         self.share = share
 
+    def __reduce__(self) -> tuple[type[FrictionLimitError], tuple[float, str]]:
+        """To travel between processes: an exception would be made again from its message alone."""
+        return type(self), (self.share, str(self))
+
 
 @dataclass(frozen=True)
 class TangentialResiduals:

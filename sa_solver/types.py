@@ -30,6 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Indices = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -141,6 +142,11 @@ class Grid:
         """The grid of ``shape`` cells that exactly covers a rectangle of ``size`` (mm, mm)."""
         return cls(shape, (size[0] / max(shape[0], 1), size[1] / max(shape[1], 1)))
 
+    @classmethod
+    def over(cls, size: tuple[float, float], shape: tuple[int, int], line: bool) -> Grid:
+        """The grid over a face: strips across the width of a line contact, else as covering."""
+        return cls.strips(size[0], shape[0]) if line else cls.covering(size, shape)
+
     @property
     def cell_area(self) -> float:
         """S [mm²]."""
@@ -197,6 +203,23 @@ def resultants(forces: Array, x: Array, y: Array) -> Array:
     fx, fy, fz = forces
     moments = np.sum(fz * y), -np.sum(fz * x), np.sum(fy * x - fx * y)
     return np.array([np.sum(fz), np.sum(fx), np.sum(fy), *moments])
+
+
+def resultant_change(now: Array, then: Array, sizes: Array) -> Array:
+    """Change of resultants ``(faces, 6)``: of forces by P, of moments by P and half a face.
+
+    ``sizes`` ``(faces, 2)`` are extents along x and y [mm]. A face that was open is measured by the
+    P of the heaviest loaded; where none was loaded there is no change.
+    """
+    halves = 0.5 * sizes
+    longest = halves.max(axis=1)
+    # A line contact has no width along y, and no moment about x.
+    half_x, half_y = np.where(halves > 0.0, halves, longest[:, None]).T
+    loads = np.where(then[:, 0] > 0.0, then[:, 0], then[:, 0].max())
+    one = np.ones_like(longest)
+    scales = (loads * np.array([one, one, one, half_y, half_x, longest])).T
+    change: Array = np.divide(now - then, scales, out=np.zeros_like(scales), where=scales > 0.0)
+    return change
 
 
 @dataclass(frozen=True)

@@ -43,7 +43,6 @@ DIRECTIONS = 6
 FIRST_STEP = 0.6
 """First step of a refinement over the spacing of the samples: a little less than their reach."""
 
-
 AWAY = np.radians(30.0)
 """Angle from the best plane beyond which another is a rival, not its neighbour."""
 

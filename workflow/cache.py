@@ -1,4 +1,4 @@
-"""Condensed structures and solved missions on disk, found again by what they were made from."""
+"""Condensed structures and solved cycles on disk, found again by what they were made from."""
 
 from __future__ import annotations
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -46,8 +45,7 @@ def write_contact_output(outcome: ContactOutcome, folder: OutputFolder, reporter
         if outcome.case.output.figures:
             write_figures(folder.results, folder.figures)
     summary = _summary(outcome, reporter)
-    with replacing(folder.summary) as partial:
-        partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    folder.write_summary(summary)
     _say(summary, outcome.grid, reporter)
 
 

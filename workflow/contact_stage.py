@@ -103,7 +103,7 @@ class ContactStage:
         self._case = case = settings.case
         self._contact_face = settings.contact
         self.face = settings.contact.face
-        self.grid = self._covering(case.contact.grid)
+        self.grid = settings.contact.grid(case.contact.grid)
         self.transfer = FaceTransfer.between(self.face, self.grid)
         self.pair = ElasticPair(case.material(1), case.material(2))
         half_space = HalfSpace(self.grid, self.pair)
@@ -133,11 +133,7 @@ class ContactStage:
     @property
     def coarse_grid(self) -> Grid:
         """A grid with as many cells as the face has nodes."""
-        return self._covering(self._contact_face.coarse)
-
-    def _covering(self, cells: tuple[int, int]) -> Grid:
-        size = self._contact_face.size
-        return Grid.strips(size[0], cells[0]) if self.face.line else Grid.covering(size, cells)
+        return self._contact_face.grid(self._contact_face.coarse)
 
     def _gap(self, grid: Grid) -> Array:
         gap = self._contact_face.gap(grid.x, grid.y)

@@ -6,7 +6,6 @@ from math import ceil
 
 from fe_models.mesh import MeshError
 from fe_models.transfer import FaceTransfer
-from sa_solver.types import Grid
 from workflow.case import DovetailCase
 from workflow.dovetail_model import DovetailModel
 from workflow.errors import MethodFailed
@@ -60,12 +59,10 @@ def _mid_slot(case: DovetailCase, dimension: int) -> Numbers:
     mesh = case.mesh.model_copy(update={"flank_nodes": nodes, "size": width, "order": 1})
     structure = case.structure.model_copy(update={"dimension": dimension})
     coarse = case.model_copy(update={"structure": structure, "mesh": mesh})
-    stage = StructureStage(DovetailModel(coarse), mesh.order)
+    stage = StructureStage(DovetailModel(coarse))
     found = {}
     for contact, history in zip(stage.faces, stage.unworn(), strict=True):
-        size, cells = contact.size, contact.coarse
-        grid = Grid.strips(size[0], cells[0]) if stage.line else Grid.covering(size, cells)
-        transfer = FaceTransfer.between(contact.face, grid)
+        transfer = FaceTransfer.between(contact.face, contact.grid(contact.coarse))
         found[contact.face.name] = sections(transfer, history, stage.peak).middle
     return found
 

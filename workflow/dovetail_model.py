@@ -29,6 +29,7 @@ class DovetailModel:
         self.friction = case.friction.coefficient
         self.peak = case.load_path.peak_at - 1
         self.nonlinearity = case.nonlinearity
+        self.order = case.mesh.order
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -50,9 +51,7 @@ class DovetailModel:
 
     def structure(self, mesh: StructureMesh) -> Structure:
         disk, blade = self._case.material(1), self._case.material(2)
-        return dovetail_structure(
-            self.dovetail, mesh, disk, blade, self._mission, self._case.mesh.order
-        )
+        return dovetail_structure(self.dovetail, mesh, disk, blade, self._mission, self.order)
 
     def softening(self, structure: Structure) -> Softening:
         return dovetail_softening(structure, self.dovetail, self._mission)
@@ -64,7 +63,7 @@ class DovetailModel:
         widen = "widen structure.edge_width or structure.end_width"
         return ContactFace(interface, self.dovetail.flank_size(side), gap, nodes, widen)
 
-    def warn(self, reporter: Reporter) -> None:
+    def warn(self, structure: Structure, reporter: Reporter) -> None:
         """Self-locking joints."""
         slope = np.tan(self.dovetail.flank_angle)
         if self.friction > slope:

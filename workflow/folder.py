@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 import shutil
+from collections.abc import Mapping
 from pathlib import Path
+from typing import Any
 
 from workflow.case import Case, WearCase, dump_case, load_case
 from workflow.errors import UserError
@@ -61,6 +64,11 @@ class OutputFolder:
         """Remove what a run that was killed had begun to write."""
         for path in [*self.root.glob(f".*{PARTIAL}*"), *self.root.glob(f"*/.*{PARTIAL}*")]:
             path.unlink()
+
+    def write_summary(self, summary: Mapping[str, Any]) -> None:
+        """Write the summary, which marks the run as finished."""
+        with replacing(self.summary) as partial:
+            partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
 
     def _refuse_foreign(self, case: Case) -> None:
         if not self.case.exists():

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from fe_models.mesh import Face
-from sa_solver.types import Array, LoadHistory
+from sa_solver.types import Array, Grid, LoadHistory
 
 
 @dataclass(frozen=True)
@@ -24,6 +24,10 @@ class ContactFace:
     gap: Callable[[Array, Array], Array]
     coarse: tuple[int, int]
     remedy: str = "make the face larger or round its edges"
+
+    def grid(self, cells: tuple[int, int]) -> Grid:
+        """The grid of so many cells along x and y over the face."""
+        return Grid.over(self.size, cells, self.face.line)
 
 
 class FaceLoads(Protocol):

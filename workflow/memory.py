@@ -55,6 +55,8 @@ def _remedy(case: WearCase | Case) -> str:
     """What makes a case smaller."""
     if isinstance(case, SpecimensCase):
         return "lower mesh.pad_elements, mesh.order or contact.grid, or raise mesh.size"
-    if isinstance(case, WearCase):
+    if isinstance(case, DovetailCase):
         return "lower mesh.flank_nodes, mesh.order or contact.grid, or raise mesh.size"
+    if isinstance(case, WearCase):
+        return "lower contact.grid"
     return "lower contact.grid or the increments of load_path"

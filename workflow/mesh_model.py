@@ -13,15 +13,15 @@ from fe_models.imported_structure import imported_softening, imported_structure
 from fe_models.mesh import Interface, StructureMesh
 from fe_models.relinearised import Softening
 from fe_models.structure import Structure
+from sa_solver.shapes import PARTING_SLOPE
 from sa_solver.types import Array, Grid
 from workflow.case import MeshCase
-from workflow.case.mesh_case import RotationLoad, face_size
+from workflow.case.mesh_case import face_size
+from workflow.case.mesh_loads import RotationLoad
 from workflow.load_source import ContactFace
 from workflow.reporter import Reporter
 from workflow.resultants.gaps import GapFunction, gap_over
 
-# Slope at which the bodies part beyond their common face.
-PARTING_SLOPE = 1.0
 # A point is still on a facet when it is off by this share of it: edges belong to both sides.
 INSIDE = 1e-9
 
@@ -33,8 +33,8 @@ class MeshModel:
         self._case = case
         self.friction = case.friction.coefficient
         self.nonlinearity = case.nonlinearity
+        self.order = case.structure.order
         path = case.load_path
-        self._cut: tuple[str, ...] = ()
         self._begun = sum(path.increments[: path.cycle_from - 1])
         self.peak = sum(path.increments[: path.peak_leg]) - 1 - self._begun
 
@@ -88,23 +88,19 @@ class MeshModel:
         (pair,) = (p for p in self._case.structure.contacts if p.name == interface.name)
         if pair.gap is None:
             return None
-        size, cells = face_size(interface), self._case.contact.grid
-        line = interface.line
-        grid = Grid.strips(size[0], cells[0]) if line else Grid.covering(size, cells)
+        grid = Grid.over(face_size(interface), self._case.contact.grid, interface.line)
         return gap_over(pair.gap, None, grid)
 
     def structure(self, mesh: StructureMesh) -> Structure:
         case, described = self._case, self._case.structure
-        structure = imported_structure(
+        return imported_structure(
             mesh,
             described.read(),
             (case.material(1), case.material(2)),
             [support.described() for support in described.supports],
             [load.described() for load in described.loads],
-            described.order,
+            self.order,
         )
-        self._cut = tuple(structure.held_faces)
-        return structure
 
     def softening(self, structure: Structure) -> Softening:
         loads = [load.described() for load in self._case.structure.loads]
@@ -116,9 +112,9 @@ class MeshModel:
         gap = meshed if given is None else _Sum(meshed, given)
         return ContactFace(interface, size, gap, _coarse(interface, size))
 
-    def warn(self, reporter: Reporter) -> None:
+    def warn(self, structure: Structure, reporter: Reporter) -> None:
         """Planes of symmetry that cut a contact, of which its half-space knows nothing."""
-        for name in self._cut:
+        for name in structure.held_faces:
             reporter.warn(
                 f"{name}: supports hold some of its nodes, as on a plane of symmetry: the "
                 "structure knows of it, the half-space of the contact does not, whose pressure is "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import shutil
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,6 +11,8 @@ from typing import Any
 import h5py
 import numpy as np
 
+from sa_solver.normal import NormalContactError
+from sa_solver.types import LoadHistory
 from wear.kinetics import LinearRegime, linear_regime
 from workflow.case import ResultantsCase, WearCase, dump_case
 from workflow.checkpoint import KINETICS, RunState
@@ -91,8 +92,7 @@ def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> 
     uniform = uniformities(outcome.source, outcome.stages, outcome.state.interfaces)
     for name, own in uniform.items():
         summary[name]["uniformity"] = vars(own)
-    with replacing(folder.summary) as partial:
-        partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    folder.write_summary(summary)
     shutil.rmtree(folder.jumps)
     _say(outcome, summary, reporter)
     for name, own in uniform.items():
@@ -142,10 +142,7 @@ def _write_results(
         for stage, result, loads in zip(outcome.stages, outcome.first, outcome.unworn, strict=True):
             writer.put_grid(stage.name, stage.grid, stage.face.frame)
             writer.put_face(f"structure/{stage.name}", stage.face, loads)
-            coarse = f"contact/{stage.name}/coarse"
-            grid = stage.coarse_grid
-            writer.put(coarse, pressure=stage.coarse_pressure(loads.loads, source.peak))
-            file[coarse].attrs.update({"shape": grid.shape, "pitch": grid.pitch, "line": grid.line})
+            _write_coarse(writer, stage, loads.loads, source.peak)
             writer.put(f"contact/{stage.name}", energy_half_space=result.energy)
             if result.cycle:
                 write_comparison(writer, stage.name, result.cycle, source.peak)
@@ -155,6 +152,24 @@ def _write_results(
             structure.write(writer)
         for stress in stresses:
             stress.write(writer)
+
+
+def _write_coarse(
+    writer: ResultsWriter, stage: ContactStage, loads: LoadHistory, peak: int
+) -> None:
+    """The peak load on a grid as coarse as the mesh, to compare with.
+
+    None where the moments put that load outside the middles of the coarse cells: no reason to lose
+    the run.
+    """
+    try:
+        pressure = stage.coarse_pressure(loads, peak)
+    except NormalContactError:
+        return
+    place, grid = f"contact/{stage.name}/coarse", stage.coarse_grid
+    writer.put(place, pressure=pressure)
+    shape = {"shape": grid.shape, "pitch": grid.pitch, "line": grid.line}
+    writer.file[place].attrs.update(shape)
 
 
 def _write_jumps(writer: ResultsWriter, outcome: Outcome, folder: OutputFolder) -> None:

@@ -13,8 +13,8 @@ from workflow.structure_stage import StructureStage
 def load_source(case: WearCase) -> LoadSource:
     """Where the loads of the case's contacts come from."""
     if isinstance(case, DovetailCase):
-        return StructureStage(DovetailModel(case), case.mesh.order)
+        return StructureStage(DovetailModel(case))
     if isinstance(case, ResultantsCase):
         return ResultantsSource(case)
     assert isinstance(case, MeshCase)
-    return StructureStage(MeshModel(case), case.structure.order)
+    return StructureStage(MeshModel(case))

@@ -26,7 +26,7 @@ from fe_models.transfer import FaceTransfer
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalState
 from sa_solver.tangential import TangentialContact, TangentialState
-from sa_solver.types import Array, ElasticPair, Grid
+from sa_solver.types import Array, ElasticPair, Grid, Indices
 from workflow.errors import MethodFailed
 
 # A tied pad: any motion does, and a limit that no shear comes near.
@@ -84,7 +84,7 @@ class NodeGrid:
 
     x: Array
     y: Array
-    order: NDArray[np.int64]
+    order: Indices
 
     @classmethod
     def of(cls, face: Face) -> NodeGrid:

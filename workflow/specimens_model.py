@@ -76,9 +76,7 @@ class SpecimensModel:
 
     def node_count(self) -> int:
         """Nodes of both bodies, midsides included."""
-        meshes = self.mesh.body_1.mesh, self.mesh.body_2.mesh
-        midsides = [mesh.nedges for mesh in meshes if self._case.mesh.order == 2]
-        return int(sum(mesh.nvertices for mesh in meshes) + sum(midsides))
+        return self.mesh.node_count(self._case.mesh.order)
 
     def pair(self) -> ReducedPair:
         """Both reduced models on the nodes of the pad, rings held."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Any
 
 import h5py
@@ -31,7 +30,7 @@ from workflow.store import ResultsWriter, replacing
 from workflow.versions import versions
 
 if TYPE_CHECKING:
-    from fe_models.reduced_contact import StintState
+    from fe_models.stints import StintState
     from workflow.specimens_half_space import HalfSpaceState
     from workflow.specimens_run import KeptState, LoadOutcome, SpecimensOutcome
 
@@ -47,7 +46,8 @@ def write_specimens_output(
     with reporter.stage("results"):
         folder.reduced.mkdir(exist_ok=True)
         for number, model in enumerate(outcome.model.reduction.models, 1):
-            save_reduced(folder.reduced / f"body_{number}.h5", model)
+            with replacing(folder.reduced / f"body_{number}.h5") as partial:
+                save_reduced(partial, model)
         _write_results(outcome, folder)
     with reporter.stage("paraview and figures"):
         if outcome.case.output.paraview:
@@ -55,8 +55,7 @@ def write_specimens_output(
         if outcome.case.output.figures:
             write_figures(folder.results, folder.figures)
     summary = _summary(outcome, reporter)
-    with replacing(folder.summary) as partial:
-        partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    folder.write_summary(summary)
     _say(summary, reporter)
 
 

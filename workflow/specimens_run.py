@@ -12,17 +12,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from fe_models.friction import FrictionalJoint
 from fe_models.mesh import MeshError
-from fe_models.reduced_contact import (
-    NormalContact,
-    ReducedPair,
-    Rubbing,
-    StintError,
-    StintState,
-    VirginCurve,
-    wear_in_stints,
-)
+from fe_models.reduced_contact import ReducedPair, Rubbing, VirginCurve
+from fe_models.stints import StintError, StintState, wear_in_stints
 from sa_solver.types import Array, ElasticPair
 from workflow.case import SpecimensCase
 from workflow.errors import MethodFailed, UserError
@@ -258,27 +250,23 @@ def first_loading(pair: ReducedPair, state: StintState, rubbing: Rubbing) -> Vir
 
 def marched_cycle(pair: ReducedPair, gap: Array, rubbing: Rubbing) -> MarchedCycle:
     """March the cycle with everything coupled, and compare with the uncoupled method."""
-    amplitude = 0.5 * rubbing.stroke
-    up = amplitude * np.append(SMALL_MOTION, np.linspace(0.0, 1.0, QUARTER + 1)[1:])
-    down = np.linspace(amplitude, -amplitude, 2 * QUARTER + 1)[1:]
-    path = np.concatenate([[0.0], up, down, -down])
-    amplitudes = np.stack([np.full(len(path), rubbing.force), path, 0.0 * path], axis=1)
-    joint = FrictionalJoint(pair.joint().resolvent(), rubbing.friction)
-    states = list(joint.march(amplitudes, gap))
-    if not all(state.converged for state in states):
+    small = 0.5 * SMALL_MOTION * rubbing.stroke
+    cycle = pair.coupled_cycle(gap, rubbing, QUARTER, small)
+    if not cycle.converged:
         raise MethodFailed(
             f"the coupled cycle at {rubbing.force:g} N did not converge; lower friction.coefficient"
         )
-    force = np.array([-state.force[0].sum() for state in states])
-    pressure = np.array([state.force[2] for state in states]) / pair.areas
-    cycle = slice(QUARTER + 1, None)
-    energy = -sum(float(np.sum(s.force[:2] * s.slip)) for s in states[QUARTER + 2 :])
-    normal: NormalContact = pair.normal(gap, rubbing.force)
-    small = pair.tangential(normal, path[1], rubbing.friction)
+    pressed, moved = cycle.loading[:2]
+    pressure = np.array([state.force[2] for state in cycle.states]) / pair.areas
+    largest = float((pressed.force[2] / pair.areas).max())
+    uncoupled = pair.tangential(pair.normal(gap, rubbing.force), small, rubbing.friction)
     return MarchedCycle(
-        displacement=path[cycle],
-        force=force[cycle],
-        energy=(energy, pair.rub(gap, rubbing).energy),
-        secant_stiffness=((force[1] - force[0]) / path[1], small.force / path[1]),
-        pressure_change=float(np.ptp(pressure[cycle], axis=0).max() / pressure[0].max()),
+        displacement=cycle.loop.displacement,
+        force=cycle.loop.force,
+        energy=(float(cycle.energy.sum()), pair.rub(gap, rubbing).energy),
+        secant_stiffness=(
+            float(pressed.force[0].sum() - moved.force[0].sum()) / small,
+            uncoupled.force / small,
+        ),
+        pressure_change=float(np.ptp(pressure, axis=0).max()) / largest,
     )

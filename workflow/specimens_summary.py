@@ -10,7 +10,8 @@ from sa_solver.types import Array
 from workflow.specimens_half_space import BulkCompliance
 
 if TYPE_CHECKING:
-    from fe_models.reduced_contact import ReducedPair, StintState
+    from fe_models.reduced_contact import ReducedPair
+    from fe_models.stints import StintState
     from workflow.case.specimens_case import Reported
     from workflow.specimens_half_space import HalfSpaceState
     from workflow.specimens_run import KeptState, LoadOutcome, SpecimensOutcome

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from functools import cached_property
-from typing import Protocol
+from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -27,13 +26,15 @@ from workflow.errors import MethodFailed
 from workflow.load_source import ContactFace
 from workflow.reporter import Reporter
 
+Solved = TypeVar("Solved", CycleSolution, FrictionState)
+
 
 class StructureModel(Protocol):
     """A structure as a case describes it.
 
     ``key`` is everything that its condensed joint depends on, ``amplitudes`` ``(t, cases)`` those
     of its load cases over a cycle and ``preload`` ``(s, cases)`` those before the first one;
-    ``peak`` is the increment of peak load, counted from 0.
+    ``peak`` is the increment of peak load, counted from 0, ``order`` that of the elements.
     """
 
     @property
@@ -44,6 +45,8 @@ class StructureModel(Protocol):
     def amplitudes(self) -> Array: ...
     @property
     def peak(self) -> int: ...
+    @property
+    def order(self) -> int: ...
     @property
     def friction(self) -> float: ...
     @property
@@ -65,7 +68,7 @@ class StructureModel(Protocol):
         """What the contact stage needs of an interface."""
         ...
 
-    def warn(self, reporter: Reporter) -> None:
+    def warn(self, structure: Structure, reporter: Reporter) -> None:
         """Say what only this kind of structure can know."""
         ...
 
@@ -76,11 +79,10 @@ class StructureStage:
     Worn depths are nodal, ``(n,)`` per interface, of both bodies together [mm].
     """
 
-    def __init__(self, model: StructureModel, order: int) -> None:
+    def __init__(self, model: StructureModel) -> None:
         self.model = model
         self.peak = model.peak
         self.from_cache = False
-        self._order = order
 
     @cached_property
     def mesh(self) -> StructureMesh:
@@ -101,8 +103,12 @@ class StructureStage:
         resolvent = self._linear_resolvent
         if isinstance(self.structure, PrestressedStructure):
             resolvent = self.structure.condense_path(resolvent)
-        self.rigid_modes = resolvent.rigid_modes
         return FrictionalJoint(resolvent, self.model.friction)
+
+    @property
+    def rigid_modes(self) -> int:
+        """Rigid motions that contact alone holds."""
+        return self._linear_resolvent.rigid_modes
 
     @cached_property
     def _linear_resolvent(self) -> JointResolvent:
@@ -131,16 +137,14 @@ class StructureStage:
         amplitudes = self.model.amplitudes[self.peak]
         softening = self.model.softening(structure)
         how = {"stress_stiffened": stress_stiffened, "relinearised": relinearised}
-        return how[self.model.nonlinearity.stiffness](
-            structure, self._linear_peak, amplitudes, softening
-        )
+        return how[kind](structure, self._linear_peak, amplitudes, softening)
 
     @cached_property
     def _linear_peak(self) -> tuple[Array, Array]:
         """Displacements of both bodies of the linear structure at peak load."""
         amplitudes = self.model.amplitudes[self.peak]
         linear = FrictionalJoint(self._linear_resolvent, self.model.friction)
-        (state,) = linear.march(amplitudes[None], self._linear.gap())
+        (state,) = map(_converged, linear.march(amplitudes[None], self._linear.gap()))
         return deformation(self._linear, state.force, state.displacement, amplitudes)
 
     @cached_property
@@ -164,11 +168,7 @@ class StructureStage:
 
     def node_count(self) -> int:
         """Nodes of both bodies, midsides included."""
-        meshes = self.mesh.body_1.mesh, self.mesh.body_2.mesh
-        midsides = [
-            mesh.nedges if mesh.dim() == 3 else mesh.nfacets for mesh in meshes if self._order == 2
-        ]
-        return int(sum(mesh.nvertices for mesh in meshes) + sum(midsides))
+        return self.mesh.node_count(self.model.order)
 
     def prepare(self) -> None:
         """Do the costly part now: condense the structure, or find it in the cache."""
@@ -179,7 +179,9 @@ class StructureStage:
         """The closed cycle from rest with unworn faces, from the cache if it is there."""
         friction = self.model.friction
         loads = [path.tolist() for path in (self.model.preload, self.model.amplitudes)]
-        key = content_key(*self.model.key, *loads, self.model.nonlinearity.stiffness, friction)
+        stiffness = self.model.nonlinearity.stiffness
+        at = None if stiffness == "linear" else self.peak
+        key = content_key(*self.model.key, *loads, stiffness, at, friction)
         cycle = load_cycle(key, self.structure, friction)
         if cycle is None:
             cycle = self._cycle([np.zeros(len(i)) for i in self.mesh.interfaces], None)
@@ -201,30 +203,24 @@ class StructureStage:
         solution = self.structure.solve_cycle(
             self.joint, model.amplitudes, self._gap(depths), model.friction, after, model.preload
         )
-        if not solution.converged:
-            raise MethodFailed(
-                f"structural friction did not converge: residual {solution.residual:.1e} after "
-                f"{solution.iterations} iterations; refine load_path.increments or lower "
-                "friction.coefficient, and see that the loads leave no face open"
-            )
-        return solution
+        return _converged(solution)
 
     def probe(self, depths: list[Array]) -> Array:
         """Resultants ``(interfaces, 6)`` at peak load reached in a single increment.
 
         Cheap, and moved by wear as those of the full cycle are.
         """
-        (state,) = self._march_to_peak(depths, [self._unworn_peak.state])
+        state = self._march_to_peak(depths, [self._unworn_peak.state])
         return self.structure.interface_resultants(state)
 
     @cached_property
     def _unworn_peak(self) -> FrictionState:
-        (state,) = self._march_to_peak([np.zeros(len(i)) for i in self.mesh.interfaces], [])
-        return state
+        return self._march_to_peak([np.zeros(len(i)) for i in self.mesh.interfaces], [])
 
-    def _march_to_peak(self, depths: list[Array], guess: list[Array]) -> Iterator[FrictionState]:
+    def _march_to_peak(self, depths: list[Array], guess: list[Array]) -> FrictionState:
         amplitudes = self.model.amplitudes[self.peak : self.peak + 1]
-        return self.joint.march(amplitudes, self._gap(depths), guess=guess)
+        (state,) = map(_converged, self.joint.march(amplitudes, self._gap(depths), guess=guess))
+        return state
 
     def stress(self, mesh: StructureMesh, solution: CycleSolution) -> tuple[StressField, ...]:
         """Stress of both bodies at peak load, on the unworn or the worn mesh."""
@@ -236,3 +232,14 @@ class StructureStage:
 
     def _gap(self, depths: list[Array]) -> Array:
         return self.structure.gap() + np.concatenate(depths)
+
+
+def _converged(solved: Solved) -> Solved:
+    """What was solved. Raises MethodFailed unless it has converged."""
+    if not solved.converged:
+        raise MethodFailed(
+            f"structural friction did not converge: residual {solved.residual:.1e} after "
+            f"{solved.iterations} iterations; see that contacts and supports can carry the loads "
+            "and leave no face open, refine load_path.increments or lower friction.coefficient"
+        )
+    return solved

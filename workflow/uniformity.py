@@ -1,9 +1,9 @@
-"""How much alike the sections of a slot are: what decides whether one of them stands for all.
+"""How much alike the sections of a contact are: what decides whether one stands for all.
 
-A case in two dimensions (``structure.dimension: 2``) computes the section in mid-slot in plane
-strain, under the mean load per length. A run in three dimensions shows how good that would be: by
-how much P, slip and worn area change along the slot, and how far the mean load per length is from
-the one in mid-slot. Pressure and slip are the structure's, wear is the half-space's.
+A case in two dimensions (``structure.dimension: 2``) computes the middle section in plane strain,
+under the mean load per length. A run in three dimensions shows how good that would be: by how much
+P, slip and worn area change along y, and how far the mean load per length is from the one in the
+middle. Pressure and slip are the structure's, wear is the half-space's.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from workflow.contact_stage import ContactStage, InterfaceState
 from workflow.load_source import LoadSource
 from workflow.structure_stage import StructureStage
 
-# Sections whose values are this close to mid-slot's count as alike: a few per cent.
+# Sections whose values are this close to the middle's count as alike: a few per cent.
 ALIKE = 0.05
 # Deviations are taken over this share of the length, around its middle: the ends are never alike.
 MIDDLE = 0.5
@@ -28,7 +28,7 @@ MIDDLE = 0.5
 
 @dataclass(frozen=True)
 class Sections:
-    """What the sections of a contact carry, per length of the slot, ``(ny,)`` along it.
+    """What the sections of a contact carry, per length, ``(ny,)`` along y.
 
     ``P`` and ``Qx`` [N/mm] are those of the increment of peak load, ``energy`` [N mm/mm]
     is dissipated in a cycle and ``slip`` [mm] the mean path of the nodes, weighted by their
@@ -42,7 +42,7 @@ class Sections:
 
     @property
     def middle(self) -> dict[str, float]:
-        """Every quantity in mid-slot."""
+        """Every quantity in the middle."""
         return {name: _middle(values) for name, values in vars(self).items()}
 
 
@@ -94,7 +94,7 @@ class Uniformity:
             return f"{text}: too uneven for two dimensions"
         extra = self.mean_load - 1.0
         more = "more" if extra >= 0.0 else "less"
-        return f"{text}: two dimensions give mid-slot, with {abs(extra):.1%} {more} load"
+        return f"{text}: two dimensions give the middle, with {abs(extra):.1%} {more} load"
 
 
 def uniformities(

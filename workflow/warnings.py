@@ -17,7 +17,7 @@ PEAK_ERROR = 0.05
 
 def warn_of_structure(stage: StructureStage, reporter: Reporter) -> None:
     """What the model knows, cycles that do not close, faces that lose their contact."""
-    stage.model.warn(reporter)
+    stage.model.warn(stage.structure, reporter)
     unworn = stage.unworn_cycle
     if unworn.closure > OPEN_CYCLE:
         reporter.warn(

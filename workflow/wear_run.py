@@ -9,7 +9,7 @@ import numpy as np
 
 from fe_models.mesh import MeshError
 from sa_solver.normal import NormalContactError
-from sa_solver.types import Array
+from sa_solver.types import Array, resultant_change
 from wear.stepping import ContactFailure
 from workflow import checkpoint
 from workflow.case import WearCase
@@ -193,11 +193,8 @@ class WearLoop:
             return state, 0.0
         with self._reporter.stage("drift probe"):
             probe = self._probe(state.interfaces)
-        heaviest = float(state.solved_resultants[:, 0].max())
-        drift = max(
-            _drift(now, then, heaviest, stage.grid.size)
-            for now, then, stage in zip(probe, state.solved_resultants, self._stages, strict=True)
-        )
+        sizes = np.array([stage.grid.size for stage in self._stages])
+        drift = float(np.abs(resultant_change(probe, state.solved_resultants, sizes)).max())
         if drift <= coupling.drift:
             return state, drift
         with self._reporter.stage("structural friction"):
@@ -235,19 +232,6 @@ class WearLoop:
             attributes = {"cycles": float(state.cycles[-1])}
             write_arrays(self._folder.jump(state.jump), arrays, attributes)
             checkpoint.save(self._folder.checkpoint, state)
-
-
-def _drift(now: Array, then: Array, heaviest: float, size: tuple[float, float]) -> float:
-    """Change of resultants relative to P, and to P times half the face for moments.
-
-    A face that was open is measured by the P of the ``heaviest`` loaded.
-    """
-    load = then[0] if then[0] > 0.0 else heaviest
-    if load <= 0.0:
-        return 0.0
-    half_x, half_y = 0.5 * size[0], 0.5 * size[1]
-    scales = load * np.array([1.0, 1.0, 1.0, half_y, half_x, max(half_x, half_y)])
-    return float(np.max(np.abs(now - then) / scales))
 
 
 def _quotient(limit: float, rate: float) -> float:

@@ -34,7 +34,8 @@ from fe_models.geometry.grouped import (
     piece_blocks,
     pieces,
 )
-from fe_models.mesh import Indices, MeshError
+from fe_models.mesh import MeshError
+from sa_solver.types import Indices
 
 Value = TypeVar("Value")
 

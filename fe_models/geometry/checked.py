@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fe_models.geometry.grouped import pieces
-from fe_models.mesh import Body, Indices, MeshError, named_mesh
+from fe_models.mesh import Body, MeshError, named_mesh
 from fe_models.remesh import element_volumes
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 
 # An element is flat when its volume is below this share of the cube of its extent (the square in
 # the plane): meshers stop at slivers of 1e-4, rounding leaves 1e-16.

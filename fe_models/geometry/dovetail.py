@@ -13,13 +13,11 @@ from typing import Any, Literal
 
 import numpy as np
 
+from fe_models.geometry.gmsh_file import Group, generated_body
 from fe_models.gmsh_session import gmsh_model
 from fe_models.mesh import (
     AXES,
-    GMSH_CELL,
-    GMSH_FACET,
     Body,
-    Indices,
     MeshError,
     StructureMesh,
     matched_interface,
@@ -265,9 +263,10 @@ def _mesh_body(
             model.occ.synchronize()
             cells = [tag for dim, tag in extruded if dim == 3]
             swept = {label: _swept(model, curves, surfaces) for label, curves in swept.items()}
-        _name_groups(model, name, dimension, cells, swept)
         model.mesh.generate(dimension)
-        return _read_body(gmsh, name, dimension)
+        boundaries = [Group(label, dimension - 1, tags) for label, tags in _sided(swept).items()]
+        points, elements, facets = generated_body(gmsh, Group(name, dimension, cells), boundaries)
+    return Body(name, named_mesh(points[:, AXES[dimension]], elements, facets))
 
 
 def _draw_halves(
@@ -328,40 +327,8 @@ def _swept(model: Any, curves: list[int], sections: list[int]) -> list[int]:
     ]
 
 
-def _name_groups(
-    model: Any, body: str, dimension: int, cells: list[int], named: dict[str, list[int]]
-) -> None:
-    """Name the body and its boundaries; the first flank is the right one."""
-    model.addPhysicalGroup(dimension, cells, name=body)
+def _sided(named: dict[str, list[int]]) -> dict[str, list[int]]:
+    """The named entities with the two flanks told apart; the first one is the right one."""
     right, left = named["flank"]
-    boundaries = {label: tags for label, tags in named.items() if label != "flank"}
-    for label, tags in ({"intrados": [right], "extrados": [left]} | boundaries).items():
-        model.addPhysicalGroup(dimension - 1, tags, name=f"{body}_{label}")
-
-
-def _read_body(gmsh: Any, name: str, dimension: int) -> Body:
-    """The body of that name with its named boundaries, its vertices numbered from zero."""
-    model = gmsh.model
-    names = {model.getPhysicalName(dim, tag): (dim, tag) for dim, tag in model.getPhysicalGroups()}
-
-    def elements(group: str, element_type: int) -> Indices:
-        dim, tag = names[group]
-        nodes = [
-            model.mesh.getElementsByType(element_type, entity)[1]
-            for entity in model.getEntitiesForPhysicalGroup(dim, tag)
-        ]
-        return np.concatenate(nodes).reshape(-1, dim + 1).astype(np.int64)
-
-    cells = elements(name, GMSH_CELL[dimension])
-    boundaries = {
-        group.removeprefix(f"{name}_"): elements(group, GMSH_FACET[dimension])
-        for group in names
-        if group.startswith(f"{name}_")
-    }
-    used = np.unique(cells)
-    tags, points, _ = model.mesh.getNodes()
-    points = points.reshape(-1, 3)[np.argsort(tags)[np.searchsorted(np.sort(tags), used)]]
-    numbered = {group: np.searchsorted(used, nodes) for group, nodes in boundaries.items()}
-    return Body(
-        name, named_mesh(points[:, AXES[dimension]], np.searchsorted(used, cells), numbered)
-    )
+    others = {label: tags for label, tags in named.items() if label != "flank"}
+    return {"intrados": [right], "extrados": [left]} | others

@@ -8,9 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.geometry.grouped import Blocks, GroupedMesh
+from fe_models.geometry.grouped import Blocks, GroupedMesh, split
 from fe_models.gmsh_session import gmsh_model
-from fe_models.mesh import Indices, MeshError
+from fe_models.mesh import MeshError
+from sa_solver.types import Array, Indices
 
 # First word of gmsh's name of an element and the shape it is; corner nodes come first in all.
 SHAPES = {
@@ -80,6 +81,22 @@ def grouped_entities(gmsh: Any, groups: list[Group]) -> GroupedMesh:
             for name, blocks in lower.items()
         },
     )
+
+
+def generated_body(
+    gmsh: Any, body: Group, boundaries: list[Group]
+) -> tuple[Array, Indices, dict[str, Indices]]:
+    """A body just meshed in the open gmsh model: points ``(n, 3)``, simplices, boundaries by name.
+
+    Its nodes are numbered from zero, in gmsh's order; others are left out.
+    """
+    grouped = grouped_entities(gmsh, [body, *boundaries])
+    cells = split(grouped.bodies[body.name])
+    used = np.unique(cells)
+    named = {
+        name: np.searchsorted(used, split(blocks)) for name, blocks in grouped.surfaces.items()
+    }
+    return grouped.points[used], np.searchsorted(used, cells), named
 
 
 def _groups(model: Any) -> list[Group]:

@@ -13,8 +13,7 @@ import numpy as np
 import scipy.sparse as sp
 from scipy.sparse.csgraph import connected_components
 
-from fe_models.mesh import Indices
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 
 # Corner nodes of every shape that is read, and its dimension.
 CORNERS = {
@@ -75,6 +74,11 @@ def simplices(shape: str, cells: Indices) -> Indices:
     return np.concatenate(
         [_fan(shape, cells[lowest == apex], apex) for apex in range(CORNERS[shape])]
     )
+
+
+def split(blocks: Blocks) -> Indices:
+    """The elements of all blocks, each split by :func:`simplices`."""
+    return np.concatenate([simplices(shape, cells) for shape, cells in blocks])
 
 
 def _halved(quads: Indices) -> Indices:

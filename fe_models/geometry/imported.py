@@ -12,11 +12,11 @@ from fe_models.geometry.abaqus import read_abaqus
 from fe_models.geometry.cad import BEGINNINGS, read_cad
 from fe_models.geometry.checked import checked_body, opposite, vector
 from fe_models.geometry.gmsh_file import read_msh
-from fe_models.geometry.grouped import DIMENSION, Blocks, GroupedMesh, simplices
+from fe_models.geometry.grouped import DIMENSION, Blocks, GroupedMesh, split
 from fe_models.geometry.meshio_file import read_meshio
-from fe_models.mesh import Body, Indices, MeshError, in_space
+from fe_models.mesh import Body, MeshError, in_space
 from fe_models.remesh import element_volumes
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 
 # A mesh is plane when it is thinner than this share of its size.
 PLANE = 1e-9
@@ -147,7 +147,7 @@ def patch(body: Body, boundary: str) -> Patch:
 def _separated(grouped: GroupedMesh) -> ImportedMesh:
     """Give every body its own nodes, boundaries and node sets."""
     coordinates = _coordinates(grouped)
-    cells = {name: _split(blocks) for name, blocks in grouped.bodies.items()}
+    cells = {name: split(blocks) for name, blocks in grouped.bodies.items()}
     owner = _owners(cells, len(coordinates))
     names = list(cells)
     surfaces = {
@@ -199,10 +199,6 @@ def _coordinates(grouped: GroupedMesh) -> Array:
     return grouped.points[:, varying]
 
 
-def _split(blocks: Blocks) -> Indices:
-    return np.concatenate([simplices(shape, cells) for shape, cells in blocks])
-
-
 def _owners(cells: dict[str, Indices], count: int) -> Indices:
     """Number of the body that each node belongs to ``(n,)``, -1 of those that none uses."""
     owner = np.full(count, -1)
@@ -223,7 +219,7 @@ def _owners(cells: dict[str, Indices], count: int) -> Indices:
 
 def _facets(name: str, blocks: Blocks, owner: Indices) -> Indices:
     """Distinct facets of a surface; each is on one body."""
-    facets = np.unique(np.sort(_split(blocks), axis=1), axis=0)
+    facets = np.unique(np.sort(split(blocks), axis=1), axis=0)
     owners = owner[facets]
     loose = np.sum((owners != owners[:, :1]).any(axis=1) | (owners[:, 0] < 0))
     if loose:

@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from fe_models.geometry.grouped import CORNERS, DIMENSION, Blocks, GroupedMesh, piece_blocks
-from fe_models.mesh import Indices, MeshError
+from fe_models.mesh import MeshError
+from sa_solver.types import Indices
 
 # Cell data that number groups, by the format they come from; taken before any other integers.
 TAG_FIELDS = ("gmsh:physical", "medit:ref", "cell_tags", "nastran:ref", "tetgen:ref", "su2:tag")

@@ -22,12 +22,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from fe_models.geometry.gmsh_file import Group, generated_body
 from fe_models.gmsh_session import gmsh_model
 from fe_models.mesh import Body, MeshError, StructureMesh, matched_interface, named_mesh
-from sa_solver.types import Array, Frame
+from sa_solver.types import Array, Frame, Indices
 
 # Name of the interface, and of the boundary of both bodies that it joins.
 CONTACT = "contact"
@@ -41,10 +41,6 @@ SIZE_GROWTH = 0.5
 SAME_POINT = 1e-9
 # A bounding box of gmsh's is 1e-7 mm too wide; no two entities are as close as this [mm].
 BOX_MARGIN = 1e-5
-# gmsh's numbers for first-order elements.
-GMSH_TRIANGLE, GMSH_TETRAHEDRON = 2, 4
-
-Elements = NDArray[np.int64]
 
 
 @dataclass(frozen=True)
@@ -111,7 +107,7 @@ class Specimen:
         face = matched_interface(CONTACT, body_1, body_2, CONTACT, frame)
         return StructureMesh(body_1, body_2, (replace(face, gap=self.gap(*face.coordinates.T)),))
 
-    def ring(self, body: Body) -> NDArray[np.int64]:
+    def ring(self, body: Body) -> Indices:
         """Vertices of the ring, ``(ring_nodes,)``, by angle from the X axis."""
         angle = 2.0 * np.pi * np.arange(self.ring_nodes) / self.ring_nodes
         side = np.sign(body.mesh.p[2].mean())
@@ -131,7 +127,9 @@ class Specimen:
             _mesh_ring(gmsh.model, self)
             _set_sizes(gmsh, surfaces[CONTACT], self.strip_width / self.pad_elements, size, growth)
             gmsh.model.mesh.generate(3)
-            points, tets, faces = _read(gmsh, surfaces)
+            boundaries = [Group(name, 2, [surface]) for name, surface in surfaces.items()]
+            quarter = Group("quarter", 3, [tag for _, tag in gmsh.model.getEntities(3)])
+            points, tets, faces = generated_body(gmsh, quarter, boundaries)
         for axis in (0, 1):
             points, tets, faces = _mirrored(points, tets, faces, axis, SAME_POINT * self.diameter)
         return named_mesh(points, tets, faces)
@@ -223,22 +221,9 @@ def _set_sizes(gmsh: Any, pad: int, fine: float, coarse: float, growth: float) -
     gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
 
 
-def _read(gmsh: Any, surfaces: dict[str, int]) -> tuple[Array, Elements, dict[str, Elements]]:
-    """Points, tetrahedra and named triangles of the mesh, numbered from zero."""
-    tags, points, _ = gmsh.model.mesh.getNodes()
-    order = np.argsort(tags)
-
-    def elements(element_type: int, corners: int, entity: int = -1) -> Elements:
-        nodes = gmsh.model.mesh.getElementsByType(element_type, entity)[1]
-        return np.searchsorted(tags[order], nodes.reshape(-1, corners)).astype(np.int64)
-
-    faces = {name: elements(GMSH_TRIANGLE, 3, surface) for name, surface in surfaces.items()}
-    return points.reshape(-1, 3)[order], elements(GMSH_TETRAHEDRON, 4), faces
-
-
 def _mirrored(
-    points: Array, tets: Elements, faces: dict[str, Elements], axis: int, same: float
-) -> tuple[Array, Elements, dict[str, Elements]]:
+    points: Array, tets: Indices, faces: dict[str, Indices], axis: int, same: float
+) -> tuple[Array, Indices, dict[str, Indices]]:
     """A mesh and its mirror image about the plane through zero across an axis, as one."""
     on_plane = np.abs(points[:, axis]) < same
     points = points.copy()
@@ -248,7 +233,7 @@ def _mirrored(
     mirror = np.ones(3)
     mirror[axis] = -1.0
 
-    def both(elements: Elements) -> Elements:
+    def both(elements: Indices) -> Indices:
         return np.concatenate([elements, image[elements]])
 
     named = {name: both(triangles) for name, triangles in faces.items()}

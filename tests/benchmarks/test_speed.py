@@ -8,14 +8,11 @@ matrix, measured in the same run.
 
 from __future__ import annotations
 
-import csv
 import time
-from collections.abc import Callable, Iterator
-from datetime import UTC, datetime
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-import pytest
 
 from fe_models.dovetail import Mission, dovetail_structure
 from fe_models.friction import FrictionalJoint
@@ -25,7 +22,6 @@ from sa_solver.normal import NormalContact
 from sa_solver.types import ElasticPair, Grid, Material
 from workflow.case import load_case
 
-RECORD = Path(__file__).with_name("record.csv")
 CASE = load_case(Path(__file__).parents[2] / "cases" / "dovetail.yaml")
 TITANIUM = Material(115e3, 0.29, 4.43e-9)
 
@@ -38,21 +34,6 @@ def seconds(action: Callable[[], object], repeat: int) -> float:
         action()
         times.append(time.perf_counter() - begin)
     return min(times)
-
-
-@pytest.fixture(scope="module")
-def record() -> Iterator[dict[str, float]]:
-    measures: dict[str, float] = {}
-    yield measures
-    new = not RECORD.exists()
-    with RECORD.open("a", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        if new:
-            writer.writerow(["date", "measure", "value"])
-        date = datetime.now(UTC).date().isoformat()
-        for name, value in measures.items():
-            print(f"\n{name:<55} {value:10.4g}", end="")
-            writer.writerow([date, name, f"{value:.4g}"])
 
 
 def test_contact_of_the_default_flank(record: dict[str, float]) -> None:

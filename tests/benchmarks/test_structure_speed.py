@@ -89,7 +89,7 @@ def test_default_joint(
     monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path))
 
     def stage() -> StructureStage:
-        return StructureStage(DovetailModel(CASE), CASE.mesh.order)
+        return StructureStage(DovetailModel(CASE))
 
     first = stage()
     structure = first.structure

@@ -252,7 +252,33 @@ def test_plane_askew_to_the_frame_is_refused():
 def test_displacement_imposed_on_a_contact_face_is_refused():
     moved = [Displacement("plane", np.array([0.0, 1e-3, 0.0]))]
     with pytest.raises(MeshError, match="imposed on nodes of a contact face"):
-        built(block_and_pad(False, True), [Support("base", "xyz")], moved)
+        built(block_and_pad(False, True), [Support("base", "xz")], moved)
+
+
+@pytest.mark.parametrize("hold", ["x", "xyz", "mean_x"])
+def test_displacement_against_a_support_is_refused(hold):
+    """It must not win over what is held; where supports hold across it, all is well."""
+    moved = [Displacement("lid", np.array([1e-3, 0.0, 0.0]))]
+    base = Support("base", "xyz")
+    with pytest.raises(MeshError, match="imposed on lid along what a support holds"):
+        built(block_and_pad(False, True), [base, Support("lid", hold)], moved)
+    built(block_and_pad(False, True), [base, Support("lid", "yz"), Support("plane", "y")], moved)
+
+
+def test_displacements_add_up_on_one_boundary_only():
+    """Nodes of two boundaries would move twice as far as either."""
+    mesh = block_and_pad(False, True)
+    upper = mesh.bodies["upper"].mesh
+    half = upper.facets_satisfying(lambda p: np.isclose(p[2], 1.0) & (p[0] < 0.0))
+    mesh.bodies["upper"] = Body("upper", upper.with_boundaries({"half": half}))
+    base, along_x = Support("base", "xyz"), Displacement("lid", np.array([1e-3, 0.0, 0.0]))
+    with pytest.raises(MeshError, match="lid and half share nodes"):
+        built(mesh, [base], [along_x, Displacement("half", np.array([1e-3, 0.0, 0.0]))])
+    down = Displacement("half", np.array([0.0, 0.0, -1e-3]))
+    joined = built(mesh, [base], [along_x, along_x, down])
+    lid = joined.body_2.elastic.boundary_nodes("lid")
+    imposed = joined.body_2.imposed.sum(axis=1).reshape(-1, 3)[lid]
+    np.testing.assert_allclose(imposed[:, 0], 2e-3, rtol=1e-12)
 
 
 def test_body_1_alone_may_be_held_at_the_face(precise):

@@ -1,5 +1,6 @@
 """The dovetail at peak load with finite displacements, and the linear models that follow it."""
 
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -9,7 +10,7 @@ from scipy.spatial.transform import Rotation
 from fe_models import friction, nonlinear
 from fe_models.dovetail import dovetail_softening, dovetail_structure
 from fe_models.friction import FrictionalJoint
-from fe_models.nonlinear import check_nonlinearity, resultant_change, slip_change
+from fe_models.nonlinear import check_nonlinearity, face_sizes, slip_change
 from fe_models.relinearised import (
     mean_rotation,
     relinearised,
@@ -19,6 +20,7 @@ from fe_models.stress import deformation
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody
 from fe_models.total_lagrangian import TotalLagrangian
+from sa_solver.types import resultant_change
 
 MU, PEAK = 0.4, 7
 
@@ -53,7 +55,7 @@ class Peak:
         """How far a linear model's resultants and slips are from the nonlinear ones."""
         (state,) = self.march(model.condense(self.like).resolvent())
         resultants = model.interface_resultants(state)
-        change = resultant_change(self.structure, resultants, check.nonlinear)
+        change = resultant_change(resultants, check.nonlinear, face_sizes(self.structure))
         return np.abs(change).max(), slip_change(state.slip, check.slip)
 
 
@@ -258,8 +260,22 @@ def test_half_the_load(peak, check, tangent, coarse, dovetail, mission):
     np.testing.assert_allclose(exact.change[:, 0], 0.5 * check.change[:, 0], rtol=0.05)
     (state,) = half.march(tangent[0].condense_path(peak.like))
     resultants = tangent[0].interface_resultants(state)
-    found = resultant_change(half.structure, resultants, exact.linear)[:, 0]
+    found = resultant_change(resultants, exact.linear, face_sizes(half.structure))[:, 0]
     np.testing.assert_allclose(found, check.change[:, 0], rtol=0.05)
+
+
+def test_order_and_units_of_load_cases_do_not_matter(peak):
+    """What goes in proportion to the load follows the forces, not the numbers in front of them."""
+    amplitudes, units = peak.amplitudes + np.array([0.0, 3e4]), np.array([1e-6, 1e3])
+    other = copy(peak.structure.body_1), copy(peak.structure.body_2)
+    for body in other:
+        body.loads = (body.loads / units)[:, ::-1]
+    swapped = Structure(peak.structure.mesh, *other)
+    one = relinearised(peak.structure, peak.deformed, amplitudes, peak.softening)
+    two = relinearised(swapped, peak.deformed, (amplitudes * units)[::-1], peak.softening)
+    np.testing.assert_allclose(two.share, (one.share / units)[::-1], rtol=1e-10)
+    assert one.share @ amplitudes == pytest.approx(1.0, rel=1e-12)
+    assert one.share @ (amplitudes * [1.0, -1.0]) > 0.9  # the centrifugal force is most of it
 
 
 def test_without_load_there_is_nothing_to_linearise_at(peak):
@@ -298,7 +314,7 @@ def test_open_face_is_measured_by_the_loaded_one(coarse):
     structure, _ = coarse
     then = np.array([[0.0] * 6, [100.0] + [0.0] * 5])
     now = then + 1.0
-    change = resultant_change(structure, now, then)
+    change = resultant_change(now, then, face_sizes(structure))
     np.testing.assert_allclose(change[0], change[1])
     np.testing.assert_allclose(change[:, :3], 0.01)
     half = 0.5 * np.ptp(structure.mesh.interfaces[0].coordinates, axis=0)

@@ -8,17 +8,12 @@ import scipy.linalg as sl
 from scipy.optimize import nnls
 from scipy.spatial import cKDTree
 
+from fe_models.complementarity import complementary
 from fe_models.geometry.specimens import Specimen
 from fe_models.mesh import Face
-from fe_models.reduced_contact import (
-    ReducedPair,
-    Rubbing,
-    StintError,
-    complementary,
-    masing_loop,
-    wear_in_stints,
-)
+from fe_models.reduced_contact import ReducedPair, Rubbing, masing_loop
 from fe_models.specimens import pad_stiffness, reduced_specimens
+from fe_models.stints import StintError, wear_in_stints
 from sa_solver.influence import rectangle_influence
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Frame, Material

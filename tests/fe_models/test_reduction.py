@@ -1,14 +1,11 @@
 """Reduced models must be the full ones: static exactly, vibrating as far as their modes reach."""
 
-from pathlib import Path
-
 import h5py
 import numpy as np
 import pytest
 import scipy.linalg as sl
 import scipy.sparse as sp
 
-from fe_models import reduction
 from fe_models.constraints import Constraints
 from fe_models.linear_solver import SolverError
 from fe_models.reduction import free_frequencies, load_reduced, reduce_body, save_reduced
@@ -231,12 +228,3 @@ class TestStored:
         stiffness, _, kept = matrices
         save_reduced(tmp_path / "body.h5", reduce_body(stiffness, None, kept))
         assert load_reduced(tmp_path / "body.h5").mass is None
-
-    def test_a_failed_write_leaves_the_old_file(self, model, tmp_path, monkeypatch):
-        path: Path = tmp_path / "body.h5"
-        save_reduced(path, model)
-        monkeypatch.setitem(reduction.DATASETS, "no_such_field", ("1", ""))
-        with pytest.raises(AttributeError):
-            save_reduced(path, model)
-        np.testing.assert_array_equal(load_reduced(path).stiffness, model.stiffness)
-        assert list(tmp_path.iterdir()) == [path]

@@ -87,6 +87,21 @@ def test_sliding_is_decided_by_force_and_energy():
         solver.advance(pressed, HEIGHT, load(300.0, 1.05 * limit))
 
 
+def test_a_contact_that_creeps_keeps_its_force():
+    """Close to its limit, but with less energy than sliding on falling pressure takes."""
+    solver = contact()
+    pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0))
+    held = solver.advance(pressed, HEIGHT, load(300.0, 162.0))
+    force = 162.0 / (0.995 * FRICTION)
+    creeping = load(force, 162.0, energy=np.array([1e-6, 0.0]))
+    state = solver.advance(held, HEIGHT, creeping)
+    assert state.converged
+    assert not state.sliding
+    assert state.resultants[1] == pytest.approx(162.0, rel=1e-9)
+    plain = solver.advance(held, HEIGHT, load(force, 162.0))
+    np.testing.assert_allclose(state.shear, plain.shear, atol=1e-6 * plain.pressure.max())
+
+
 def test_without_friction_there_is_no_shear():
     solver = contact(0.0)
     state = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0))

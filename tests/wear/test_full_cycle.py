@@ -1,5 +1,6 @@
 """A cycle with the half-space's own friction: energies, closure, unlike bodies."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -109,3 +110,18 @@ def test_energy_that_is_not_met_is_told(monkeypatch, first):
     monkeypatch.setattr("sa_solver.gross_slip.ITERATIONS", 1)
     with pytest.raises(ContactFailure, match=r"increment 1: .*energy off by .*smaller increments"):
         full_cycle(contact(ElasticPair(first, TITANIUM)), GAP, mission())
+
+
+@pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["alike", "unlike"])
+@pytest.mark.parametrize("column", ["Qy", "My"])
+def test_loads_that_no_contact_carries_are_told(first, column):
+    """Shear that friction cannot carry in an increment that does not slide; moments off the face.
+
+    The failure reaches the process that asked for the contact, whole.
+    """
+    loads = replace(mission(), Edx=np.zeros(len(P)), Qx=0.1 * SHARE * FRICTION * mission().P)
+    values = np.where(np.arange(len(P)) == 2, 1e6, 0.0)
+    with pytest.raises(ContactFailure, match=f"increment 3: .*({column}|shear)") as info:
+        full_cycle(contact(ElasticPair(first, TITANIUM)), GAP, replace(loads, **{column: values}))
+    for error in (info.value, info.value.__cause__):
+        assert str(pickle.loads(pickle.dumps(error))) == str(error)

@@ -8,7 +8,7 @@ import math
 import shutil
 from dataclasses import dataclass
 from pathlib import Path as Folder
-from typing import Any, get_args, get_origin
+from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 import pytest
@@ -268,6 +268,8 @@ def test_value_out_of_range_is_refused(leaf, folders):
 def test_entry_is_described(leaf):
     assert leaf.field.description
     entry = entry_of(leaf.field)
+    choice = leaf.field.annotation is bool or get_origin(leaf.field.annotation) is Literal
+    assert choice or entry is not None, "no limits: neither a choice nor an Entry"
     if isinstance(entry, Quantity) and entry.unit is not None:
         assert leaf.field.description.endswith(f"[{entry.unit}]")
 

@@ -239,7 +239,7 @@ from pathlib import Path
 from workflow.case import load_case
 from workflow.run import run_case
 run_case(load_case({str(small)!r}), Path({str(tmp_path / "out")!r}), False)
-assert not {{"gmsh", "skfem", "fe_models"}} & set(sys.modules)
+assert not {{"gmsh", "skfem", "fe_models.mesh"}} & set(sys.modules)
 """
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
 

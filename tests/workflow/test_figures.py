@@ -7,8 +7,8 @@ import h5py
 import numpy as np
 import pytest
 
+from workflow.figures import structure_stress, write_figures
 from workflow.figures import wear as figures
-from workflow.figures import write_figures
 from workflow.figures.style import STYLE
 
 NAMES = {
@@ -143,7 +143,7 @@ def test_stress_section_cuts_every_body_in_mid_slot(changed: Path) -> None:
         for body in file["bodies"].values():
             # Linear, so that the cut has it exactly; the part along the slot must vanish.
             body["unworn/von_mises"][...] = body["unworn/points"][()] @ [2.0, 100.0, 3.0]
-        sections = figures._sections(file, "unworn")
+        sections = structure_stress._sections(file, "unworn")
     assert sum(triangle_areas(section) for section in sections) == pytest.approx(2 * 50.0 * 60.0)
     for section in sections:
         np.testing.assert_allclose(section.stress, section.points @ [2.0, 3.0], rtol=1e-4)
@@ -151,17 +151,19 @@ def test_stress_section_cuts_every_body_in_mid_slot(changed: Path) -> None:
 
 def test_change_of_stress_is_shown_where_the_meshes_agree(changed: Path) -> None:
     with h5py.File(changed, "a") as file:
-        figure = figures.structure_stress(file)
+        figure = structure_stress.structure_stress(file)
         panels = [axis.get_title() for axis in figure.axes if axis.get_title()]
         assert panels[:2] == ["unworn", "worn"]
-        assert panels[2].startswith(figures.CHANGE)
+        assert panels[2].startswith(structure_stress.CHANGE)
         # The synthetic stress falls by a tenth everywhere.
         for before, change in zip(
-            figures._sections(file, "unworn"), figures._sections(file, figures.CHANGE), strict=True
+            structure_stress._sections(file, "unworn"),
+            structure_stress._sections(file, structure_stress.CHANGE),
+            strict=True,
         ):
             np.testing.assert_allclose(change.stress, -0.1 * before.stress, rtol=1e-4)
         file["bodies/disk/worn/elements"][0] = file["bodies/disk/worn/elements"][1]
-        assert figures._states(file) == ["unworn", "worn"]
+        assert structure_stress._states(file) == ["unworn", "worn"]
 
 
 def triangle_areas(section: Any) -> float:

@@ -14,7 +14,7 @@ from click.testing import CliRunner, Result
 from fe_models.geometry.dovetail import Dovetail
 from sa_solver.types import Array, Grid
 from workflow.case import CaseError, ResultantsCase, dump_case, load_case, parse_case, template
-from workflow.case.resultants_case import ParaboloidGap, RoundedGap
+from workflow.case.gaps import ParaboloidGap, RoundedGap
 from workflow.cli import cli
 from workflow.figures import write_figures
 from workflow.paraview import write_paraview
@@ -141,7 +141,7 @@ def test_template_works_without_its_comment_signs(tmp_path):
         ("structure.size=11 mm", "structure.size", "not a list"),
         ("structure.gap=", "structure.gap", "no height of early; allowed: shape rounded"),
         ("structure.gap.shape=cone", "structure.gap.shape", "rounded, paraboloid, heights"),
-        ("structure.gap.edge_width=6", "structure.gap.edge_width", "up to half the size, 5.5 mm"),
+        ("structure.gap.edge_width=6", "structure.gap.edge_width", "size of the face, 5.5 mm"),
         ("structure.gap.edge_width=40", "structure.gap.edge_width", "below edge_radius, 30 mm"),
         ("structure.gap.end_radius=", "structure.gap.end_width", "end_width and end_radius"),
         ("structure.gap={shape: paraboloid}", "structure.gap.radius_x", "no radius"),

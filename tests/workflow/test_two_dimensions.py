@@ -244,7 +244,7 @@ def test_sentence_of_a_uniform_slot():
     good = Uniformity(0.01, 0.02, 0.03, 0.6, 1.0 + 0.5 * ALIKE, uniform=True)
     assert good.sentence("intrados") == (
         "intrados: sections alike within 5% over the middle 60% of the length: "
-        "two dimensions give mid-slot, with 2.5% more load"
+        "two dimensions give the middle, with 2.5% more load"
     )
 
 

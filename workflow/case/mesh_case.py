@@ -9,13 +9,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import Field, TypeAdapter, ValidationError, model_validator
+from pydantic import TypeAdapter, ValidationError, model_validator
 
-from workflow.case.fields import File, Quantity, Text, Whole
-from workflow.case.input_files import InputFileError, height_shape
-from workflow.case.resultants_case import Gap, HeightsGap, ParaboloidGap, RoundedGap
+from workflow.case.fields import File, Whole
+from workflow.case.gaps import Gap, check_gap
+from workflow.case.mesh_loads import Component, DisplacementLoad, Load, Name
 from workflow.case.sections import Length, Section, Title, disagreement, entry
-from workflow.case.wear_case import WearCase
+from workflow.case.wear_case import WearCase, check_interface_name
 from workflow.case.wear_sections import Coupling, Nonlinearity, TwoMaterials, Wear
 from workflow.errors import UserError
 
@@ -24,8 +24,6 @@ if TYPE_CHECKING:
     from fe_models.geometry.imported import ImportedMesh
     from fe_models.mesh import Interface, StructureMesh
 
-# Share of a face's size that is rounding.
-ROUNDING = 1e-9
 # Files that hold shapes and no mesh.
 CAD = (".step", ".stp", ".brep")
 # What the readers take; other endings are refused with advice.
@@ -34,16 +32,7 @@ ENDINGS = (
     ".nas", ".cdb", ".odb", ".cae", ".db", ".igs", ".iges",
 )  # fmt: skip
 
-Name = Annotated[str, Text()]
-Factor = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
-Coordinate = Annotated[float, Quantity("mm", at_least=-1e6, at_most=1e6)]
-Component = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
 Stamp = tuple[int, int]
-Pull = Annotated[float, Quantity("N", at_least=-1e9, at_most=1e9)]
-Push = Annotated[float, Quantity("MPa", at_least=-1e5, at_most=1e5)]
-Travel = Annotated[float, Quantity("mm", at_least=-1e3, at_most=1e3)]
-Speed = Annotated[float, Quantity("rad/s", above=0.0, at_most=1e5)]
-Pace = Annotated[float, Quantity("mm/s^2", at_least=-1e12, at_most=1e12)]
 
 
 class ContactPair(Section):
@@ -86,123 +75,6 @@ class Support(Section):
         from fe_models.imported_structure import Support as Held
 
         return Held(self.group, "xyz" if self.hold == "all" else self.hold)
-
-
-class _Load(Section):
-    """What every load needs."""
-
-    kind: str  # named first; each load narrows it to its own name
-    path: tuple[Factor, ...] = entry(
-        "factor of the load at the end of each leg of load_path; from 0, linearly [1]", [1.0, 0.0]
-    )
-
-
-class PressureLoad(_Load):
-    """Pressure on a boundary, into the body."""
-
-    kind: Literal["pressure"] = entry(
-        "pressure, force, displacement, rotation or acceleration", "pressure"
-    )
-    group: Name = entry("boundary", "blade_top")
-    pressure: Push = entry("into the body [MPa]", "10 MPa")
-
-    def described(self) -> fe.Pressure:
-        """As the structure takes it."""
-        from fe_models.imported_structure import Pressure
-
-        return Pressure(self.group, self.pressure)
-
-
-class ForceLoad(_Load):
-    """Force on a boundary, spread evenly."""
-
-    kind: Literal["force"] = entry(
-        "pressure, force, displacement, rotation or acceleration", "force"
-    )
-    group: Name = entry("boundary", "blade_top")
-    force: tuple[Pull, Pull, Pull] = entry(
-        "along the global axes; in the plane per length, N/mm [N]", [0.0, 0.0, "-1 kN"]
-    )
-
-    def described(self) -> fe.Force:
-        """As the structure takes it."""
-        from fe_models.imported_structure import Force
-
-        return Force(self.group, np.array(self.force))
-
-
-class DisplacementLoad(_Load):
-    """Displacement imposed on a boundary along its own direction; free across it."""
-
-    kind: Literal["displacement"] = entry(
-        "pressure, force, displacement, rotation or acceleration", "displacement"
-    )
-    group: Name = entry("boundary", "blade_top")
-    displacement: tuple[Travel, Travel, Travel] = entry(
-        "along the global axes [mm]", ["10 um", 0.0, 0.0]
-    )
-
-    @model_validator(mode="after")
-    def _moves(self) -> DisplacementLoad:
-        if not any(self.displacement):
-            raise disagreement("no displacement; allowed: one that is not zero", "displacement")
-        return self
-
-    def described(self) -> fe.Displacement:
-        """As the structure takes it."""
-        from fe_models.imported_structure import Displacement
-
-        return Displacement(self.group, np.array(self.displacement))
-
-
-class RotationLoad(_Load):
-    """Rotation of both bodies; its path is that of the speed, whose square the forces follow."""
-
-    kind: Literal["rotation"] = entry(
-        "pressure, force, displacement, rotation or acceleration", "rotation"
-    )
-    axis: tuple[Component, Component, Component] = entry(
-        "direction of the axis [1]", [0.0, 1.0, 0.0]
-    )
-    through: tuple[Coordinate, Coordinate, Coordinate] = entry(
-        "a point on the axis [mm]", [0.0, 0.0, 0.0]
-    )
-    speed: Speed = entry("[rad/s]", "6000 rpm")
-
-    @model_validator(mode="after")
-    def _has_axis(self) -> RotationLoad:
-        if not any(self.axis):
-            raise disagreement("no direction; allowed: one that is not zero", "axis")
-        return self
-
-    def described(self) -> fe.Rotation:
-        """As the structure takes it."""
-        from fe_models.imported_structure import Rotation
-
-        return Rotation(np.array(self.axis), np.array(self.through), self.speed)
-
-
-class AccelerationLoad(_Load):
-    """Acceleration of the frame of reference: both bodies are pulled against it."""
-
-    kind: Literal["acceleration"] = entry(
-        "pressure, force, displacement, rotation or acceleration", "acceleration"
-    )
-    acceleration: tuple[Pace, Pace, Pace] = entry(
-        "along the global axes [mm/s^2]", [0.0, 0.0, "9.81 m/s^2"]
-    )
-
-    def described(self) -> fe.Acceleration:
-        """As the structure takes it."""
-        from fe_models.imported_structure import Acceleration
-
-        return Acceleration(np.array(self.acceleration))
-
-
-Load = Annotated[
-    PressureLoad | ForceLoad | DisplacementLoad | RotationLoad | AccelerationLoad,
-    Field(discriminator="kind"),
-]
 
 
 class ImportedStructure(Section):
@@ -249,6 +121,8 @@ class ImportedStructure(Section):
         names = [pair.name for pair in self.contacts]
         if len(set(names)) < len(names):
             raise disagreement("two contacts of one name; allowed: names that differ", "contacts")
+        for index, name in enumerate(names):
+            check_interface_name(name, f"contacts.{index}.name")
         if self.body_1 == self.body_2:
             raise disagreement("the same body twice; allowed: two bodies", "body_2", "body_1")
         return self
@@ -419,39 +293,10 @@ class MeshCase(WearCase):
                     structure.model_copy(update={"contacts": (pair,)}).mesh()
             raise
         for index, (pair, face) in enumerate(zip(structure.contacts, interfaces, strict=True)):
-            self._check_gap(pair.gap, face, f"structure.contacts.{index}.gap")
-
-    def _check_gap(
-        self,
-        gap: RoundedGap | ParaboloidGap | HeightsGap | None,
-        face: Interface,
-        key: str,
-    ) -> None:
-        size, line = face_size(face), face.line
-        if isinstance(gap, RoundedGap):
-            widths = [("edge_width", gap.edge_width, size[0])]
-            widths += [] if line else [("end_width", gap.end_width or 0.0, size[1])]
-            for name, width, extent in widths:
-                if width > 0.5 * extent * (1.0 + ROUNDING):
-                    raise disagreement(
-                        f"{width:g} mm: too large; allowed: up to half the face, "
-                        f"{0.5 * extent:.6g} mm",
-                        f"{key}.{name}",
-                    )
-        elif isinstance(gap, ParaboloidGap) and line and gap.radius_x is None:
-            raise disagreement("no radius_x; allowed: one, in 2 dimensions", key)
-        elif isinstance(gap, HeightsGap):
-            try:
-                shape = height_shape(gap.file)
-            except InputFileError as error:
-                raise disagreement(str(error), f"{key}.file") from error
-            cells = self.contact.grid[0], 1 if line else self.contact.grid[1]
-            if shape != cells:
-                raise disagreement(
-                    f"{cells[0]} x {cells[1]} cells: the heights of {gap.file} are "
-                    f"{shape[0]} x {shape[1]}; allowed: [{shape[0]}, {shape[1]}]",
-                    "contact.grid",
-                )
+            if pair.gap is not None:
+                cells = self.contact.grid[0], 1 if face.line else self.contact.grid[1]
+                key = f"structure.contacts.{index}.gap"
+                check_gap(pair.gap, face_size(face), cells, face.line, key)
 
     def _check_supports(self, imported: ImportedMesh) -> None:
         """Build what holds the bodies, on elements of order 1 and without forces."""

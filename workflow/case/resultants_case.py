@@ -6,19 +6,19 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import model_validator
 
 from workflow.case.fields import File, Quantity, shown, split_dataset
-from workflow.case.input_files import InputFileError, height_shape
+from workflow.case.gaps import Gap, GapShape, check_cells, check_gap
+from workflow.case.input_files import InputFileError
 from workflow.case.sections import (
     Length,
-    RoundingRadius,
     Section,
     Title,
     disagreement,
     entry,
 )
-from workflow.case.wear_case import WearCase
+from workflow.case.wear_case import WearCase, check_interface_name
 from workflow.case.wear_sections import Contact, TwoMaterials, Wear
 
 if TYPE_CHECKING:
@@ -27,79 +27,12 @@ if TYPE_CHECKING:
 
 # How far x and normal may be from perpendicular: six printed digits.
 PERPENDICULAR = 1e-6
-# Names that the summary uses for itself.
-RESERVED = (
-    *("title", "assumed", "per_length", "cycles", "jumps", "structure", "kinetics", "warnings"),
-    *("seconds", "versions"),
-)
 
 Place = Annotated[float, Quantity("mm", at_least=-1e6, at_most=1e6)]
 Direction = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
 NodeFile = Annotated[str, File((".csv",))]
 
 # --- faces --------------------------------------------------------------------------------------
-
-
-class RoundedGap(Section):
-    """Flat, with rounded edges along x and rounded ends along y."""
-
-    shape: Literal["rounded"] = entry("rounded, paraboloid or heights", "rounded")
-    edge_width: Length = entry("of each rounded edge, inside the size along x [mm]", "1.5 mm")
-    edge_radius: RoundingRadius = entry("of the rounded edges [mm]", "30 mm")
-    end_width: Length | None = entry(
-        "of each rounded end, inside the size along y; counts for nothing in 2 dimensions [mm]",
-        "3 mm",
-        default=None,
-    )
-    end_radius: RoundingRadius | None = entry("of the rounded ends [mm]", "150 mm", default=None)
-
-    @model_validator(mode="after")
-    def _arcs_exist(self) -> RoundedGap:
-        if (self.end_width is None) != (self.end_radius is None):
-            given = "end_width" if self.end_radius is None else "end_radius"
-            raise disagreement(
-                f"{given} alone; allowed: end_width and end_radius, or neither", given
-            )
-        for name in ("edge", "end"):
-            width, radius = getattr(self, f"{name}_width"), getattr(self, f"{name}_radius")
-            if width is not None and width >= radius:
-                raise disagreement(
-                    f"{width:g} mm: the rounding ends beyond its own arc; "
-                    f"allowed: below {name}_radius, {radius:g} mm",
-                    f"{name}_width",
-                    f"{name}_radius",
-                )
-        return self
-
-
-class ParaboloidGap(Section):
-    """Paraboloid x² / 2 Rx + y² / 2 Ry; straight along x or y where there is no radius."""
-
-    shape: Literal["paraboloid"] = entry("rounded, paraboloid or heights", "paraboloid")
-    radius_x: RoundingRadius | None = entry(
-        "relative, of the section along x; without it straight [mm]", "300 mm", default=None
-    )
-    radius_y: RoundingRadius | None = entry(
-        "relative, of the section along y; without it straight [mm]", "10 m", default=None
-    )
-
-    @model_validator(mode="after")
-    def _is_curved(self) -> ParaboloidGap:
-        if self.radius_x is None and self.radius_y is None:
-            raise disagreement("no radius; allowed: radius_x, radius_y or both", "radius_x")
-        return self
-
-
-class HeightsGap(Section):
-    """Gap from a file, a value for every cell of ``contact.grid``."""
-
-    shape: Literal["heights"] = entry("rounded, paraboloid or heights", "heights")
-    file: Annotated[str, File((".npy", ".csv", ".h5"))] = entry(
-        "gap in mm, rows along x, columns along y; for .h5 with :dataset at the end", "gap.npy"
-    )
-
-
-Gap = Annotated[RoundedGap | ParaboloidGap | HeightsGap, Field(discriminator="shape")]
 
 
 class FaceFrame(Section):
@@ -203,7 +136,7 @@ class Resultants(Section):
         size = getattr(self._own(name), "size", None) or self.size
         return size[0], 1.0 if self.line else size[1]
 
-    def gap_of(self, name: str) -> RoundedGap | ParaboloidGap | HeightsGap | None:
+    def gap_of(self, name: str) -> GapShape | None:
         """Gap over a face, None where the file has it."""
         return getattr(self._own(name), "gap", None) or self.gap
 
@@ -326,11 +259,7 @@ class ResultantsCase(WearCase):
             if name in named[:number]:
                 raise disagreement(f"{shown(name)}: given twice; allowed: once", key)
         for name in named or found:
-            if name in RESERVED:
-                raise disagreement(
-                    f"an interface called {shown(name)}; allowed: names but {', '.join(RESERVED)}",
-                    "structure.file",
-                )
+            check_interface_name(name, "structure.file")
 
     def _check_slip(self, loads: ImportedLoads) -> None:
         if self.contact.method == "normal" and loads.slip is None:
@@ -343,16 +272,9 @@ class ResultantsCase(WearCase):
     def _check_gap(self, name: str, loads: ImportedLoads) -> None:
         structure, gap = self.structure, self.structure.gap_of(name)
         key = structure.key_of(name, "gap")
-        if isinstance(gap, RoundedGap):
-            self._check_roundings(name, gap, key)
-        elif isinstance(gap, ParaboloidGap):
-            if structure.line and gap.radius_x is None:
-                raise disagreement("no radius_x; allowed: one, in 2 dimensions", key)
-        elif isinstance(gap, HeightsGap):
-            try:
-                self._check_cells(height_shape(gap.file), gap.file)
-            except InputFileError as error:
-                raise disagreement(str(error), f"{key}.file") from error
+        if gap is not None:
+            beside = structure.key_of(name, "size")
+            check_gap(gap, structure.size_of(name), self.cells, structure.line, key, beside)
         elif loads.height is None:
             raise disagreement(
                 f"missing, and {structure.file} has no height of {name}; allowed: shape rounded, "
@@ -360,28 +282,7 @@ class ResultantsCase(WearCase):
                 key,
             )
         else:
-            self._check_cells(loads.height.shape, structure.file)
-
-    def _check_roundings(self, name: str, gap: RoundedGap, key: str) -> None:
-        size = self.structure.size_of(name)
-        widths: dict[str, tuple[float | None, float]] = {"edge_width": (gap.edge_width, size[0])}
-        if not self.structure.line:
-            widths["end_width"] = gap.end_width, size[1]
-        for entry_name, (width, extent) in widths.items():
-            if width is not None and width > 0.5 * extent:
-                raise disagreement(
-                    f"{width:g} mm: too large; allowed: up to half the size, {0.5 * extent:g} mm",
-                    f"{key}.{entry_name}",
-                    self.structure.key_of(name, "size"),
-                )
-
-    def _check_cells(self, shape: tuple[int, ...], file: str) -> None:
-        if shape != self.cells:
-            raise disagreement(
-                f"{self.cells[0]} x {self.cells[1]} cells: the heights of {file} are "
-                f"{shape[0]} x {shape[1]}; allowed: [{shape[0]}, {shape[1]}]",
-                "contact.grid",
-            )
+            check_cells(loads.height.shape, structure.file, self.cells)
 
     def _check_nodes(self, name: str, loads: ImportedLoads) -> None:
         from workflow.resultants.faces import FaceError

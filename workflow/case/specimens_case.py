@@ -67,7 +67,8 @@ class Specimens(Section):
         try:
             self.geometry().check()
         except MeshError as error:
-            raise disagreement(str(error)) from error
+            key, _, _ = str(error).partition(" ")
+            raise disagreement(str(error), *({key} & set(type(self).model_fields))) from error
         return self
 
     def geometry(self, **settings: int) -> Specimen:

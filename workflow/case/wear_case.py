@@ -15,6 +15,7 @@ from workflow.case.sections import (
     Scene,
     Section,
     Title,
+    disagreement,
     entry,
 )
 from workflow.case.wear_sections import (
@@ -25,6 +26,22 @@ from workflow.case.wear_sections import (
     Duration,
     EnergyBody,
 )
+
+# What the summary and the results call their own entries.
+RESERVED = (
+    *("title", "assumed", "per_length", "cycles", "jumps", "structure", "kinetics", "warnings"),
+    *("seconds", "versions", "fidelity"),
+)
+
+
+def check_interface_name(name: str, key: str) -> None:
+    """Refuse, at ``key``, an interface whose name could not stand in the results."""
+    if name in RESERVED or "/" in name:
+        raise disagreement(
+            f"an interface called {name!r}; allowed: names without / and none of "
+            f"{', '.join(RESERVED)}",
+            key,
+        )
 
 
 class WearCase(Scene):

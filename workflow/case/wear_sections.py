@@ -73,7 +73,7 @@ class Contact(Section):
     """Half-space solution on a grid over each contact face."""
 
     grid: tuple[GridCells, GridCells] = entry(
-        "cells across the flank, along the slot", [128, 256], default=(128, 256)
+        "cells along x, along y of every face", [128, 256], default=(128, 256)
     )
     method: Literal["normal", "full"] = entry(
         "normal: pressure of the half-space, slips of the structure; full: both of the half-space",
@@ -81,7 +81,7 @@ class Contact(Section):
         default="normal",
     )
     gross_slip: Literal["force", "energies"] = entry(
-        "direction in which a flank slides as a whole (method full): force: with the structure's "
+        "direction in which a face slides as a whole (method full): force: with the structure's "
         "shear force; energies: sharing the structure's energy between x and y",
         "force",
         default="force",

@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.figures.fields import centres, middle, near_middle
+from workflow.figures.fields import centres, line_contacts, middle, near_middle
 from workflow.figures.style import BLACK, BLUE, GREEN, ORANGE, new_figure
 from workflow.store import grid_of
 
@@ -23,9 +23,9 @@ FIELDS = (("pressure", "p [MPa]", 1.0), ("shear", "qx [MPa]", 1.0), ("slip", "sl
 
 
 def half_space_and_structure(file: h5py.File) -> Figure:
-    """Qx and Mz by increment, then p, qx and slip across the flank at some of them."""
+    """Qx and Mz by increment, then p, qx and slip along x at some of them."""
     interfaces = list(file["comparison"])
-    line = grid_of(next(iter(file["grid"].values()))).line
+    line = line_contacts(file)
     place, per = ("", "/mm") if line else (" at y = 0", "")
     loads = LOADS[:1] if line else LOADS
     rows = len(loads) + len(FIELDS)
@@ -37,7 +37,7 @@ def half_space_and_structure(file: h5py.File) -> Figure:
         for axis, (name, _, scale) in zip(column[len(loads) :], FIELDS, strict=True):
             _draw_profiles(axis, file, interface, name, scale)
         column[0].set_title(f"{interface}: resultants of the unworn cycle")
-        column[len(loads)].set_title(f"{interface}: across the flank{place}; x: finite elements")
+        column[len(loads)].set_title(f"{interface}: along x{place}; crosses: finite elements")
     labels = [f"{name} [{unit}{per}]" for name, unit in loads] + [label for _, label, _ in FIELDS]
     for axis, label in zip(axes[:, 0], labels, strict=True):
         axis.set_ylabel(label)

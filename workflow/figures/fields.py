@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+import h5py
 import numpy as np
 
 from sa_solver.types import Array, Grid
+from workflow.store import grid_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -64,3 +66,8 @@ def spread(items: list[str], count: int) -> list[str]:
     """At most ``count`` of the items, evenly spread, first and last among them."""
     places = np.linspace(0, len(items) - 1, min(count, len(items)))
     return [items[round(place)] for place in places]
+
+
+def line_contacts(file: h5py.File) -> bool:
+    """Whether the contacts of a wear run are line contacts."""
+    return grid_of(next(iter(file["grid"].values()))).line

@@ -138,8 +138,8 @@ def _maps(file: h5py.File, grids: dict[str, Grid]) -> Figure:
             body_name = body_names(file)[body]
             axis.set_title(f"{name}, {body_name}, {moment}: at most {field.max():.3g}")
     for axis in axes[-1]:
-        axis.set_xlabel("y, along the slot [mm]")
-    figure.supylabel("x, across the flank [mm]", fontsize=FONT_SIZE)
+        axis.set_xlabel("y [mm]")
+    figure.supylabel("x [mm]", fontsize=FONT_SIZE)
     _, symbol, unit = _parameter(file["stress/life"][rows[0][0]])
     figure.colorbar(
         image, ax=axes, label=f"{symbol} [{unit}]; white: 0", extend="max", shrink=0.8, pad=0.01
@@ -160,7 +160,7 @@ def _curves(file: h5py.File, grids: dict[str, Grid]) -> Figure:
                 axis.plot(centres(grid, 0), field[:, 0], color=colour, label=label)
             axis.set_title(f"{name}, {body_names(file)[body]}")
             axis.legend(loc="upper center")
-        column[-1].set_xlabel("x, across the flank [mm]")
+        column[-1].set_xlabel("x [mm]")
     _, symbol, unit = _parameter(group)
     for axis in axes[:, 0]:
         axis.set_ylabel(f"{symbol} [{unit}]")

@@ -1,27 +1,28 @@
-"""Figures of a wear run: resultants, peak pressure, worn profiles, kinetics, structure's stress."""
+"""Figures of a wear run: resultants, peak pressure, worn profiles, kinetics."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 
 from sa_solver.types import Array, Grid
 from wear.kinetics import LinearRegime
-from workflow.body_mesh import body_mesh
 from workflow.figures.comparison import half_space_and_structure
 from workflow.figures.fields import (
     MAP_PERCENTILE,
     MAX_PROFILES,
     centres,
     draw_map,
+    line_contacts,
     map_top,
     middle,
     near_middle,
     spread,
 )
+from workflow.figures.structure_stress import structure_stress
 from workflow.figures.style import BLACK, BLUE, FONT_SIZE, GREEN, ORANGE, PURPLE, new_figure
 from workflow.figures.subsurface import STRESS_FIGURES
 from workflow.store import body_names, grid_of, jump_names
@@ -32,34 +33,14 @@ if TYPE_CHECKING:
 
 BODY_STYLES = {1: (BLUE, "o"), 2: (ORANGE, "s")}
 CYCLE_COLOURS = "viridis"
-STRESS_COLOURS, CHANGE_COLOURS = "magma_r", "RdBu_r"
-CHANGE = "worn less unworn"
 
 # The rounding is many times deeper than young wear: heights are shown up to so many depths.
 HEIGHT_IN_DEPTHS = 2.0
 # How far the kinetics are extended, in computed numbers of cycles.
 EXTRAPOLATION = 2.0
 # What a profile along x and one along y show; a line contact has no y.
-ALONG = "across the flank at y = 0", "along the slot at x = 0"
-ALONG_LINE = ("across the flank",)
-# How far from the middle the section is, as a share of the body's diagonal.
-BESIDE = 1e-7
-# Around the faces, how far the section shows the bodies: as a share of what the faces span.
-SECTION_MARGIN = 0.4
-
-
-class _Section(NamedTuple):
-    """One body's stress in the plane across the slot.
-
-    ``points (n, 2)`` to the right and up [mm], ``triangles (m, 3)``, ``stress (n,)`` [MPa], and
-    ``outline (k, 2, 2)``, the segments of the body's border.
-    """
-
-    points: Array
-    triangles: np.ndarray
-    stress: Array
-    outline: Array
-
+ALONG = "along x at y = 0", "along y at x = 0"
+ALONG_LINE = ("along x",)
 
 # --- resultants ---------------------------------------------------------------------------------
 
@@ -86,12 +67,12 @@ def resultants(file: h5py.File) -> Figure:
 
 
 def _who_slides(file: h5py.File) -> str:
-    """What the flanks do, for the title."""
+    """What the faces do, for the title."""
     sliding = [group["load_history/sliding"][()] for group in file["structure"].values()]
     count, total = sum(int(s.sum()) for s in sliding), sum(len(s) for s in sliding)
     if count == 0:
-        return "no flank slides as a whole"
-    return f"flanks slide as a whole in {count / total:.0%} of the increments"
+        return "no face slides as a whole"
+    return f"faces slide as a whole in {count / total:.0%} of the increments"
 
 
 def _draw_normal_force(
@@ -157,7 +138,7 @@ def _change(before: float, after: float) -> str:
 
 
 def pressure_maps(file: h5py.File) -> Figure:
-    """Peak-load pressure of every flank, unworn above worn, on one colour scale."""
+    """Peak-load pressure of every face, unworn above worn, on one colour scale."""
     states = [(name, jump) for name in file["contact"] for jump in _ends(file, name)]
     fields = [file["contact"][name][jump]["pressure"][()] for name, jump in states]
     top = map_top(fields)
@@ -169,20 +150,20 @@ def pressure_maps(file: h5py.File) -> Figure:
         image = draw_map(axis, field, _grid(file, name), top)
         cycles = _cycles(file, name, jump)
         axis.set_title(f"{name}, {cycles}: largest {field.max():.0f} MPa, {_open(field)}")
-    axes[-1].set_xlabel("y, along the slot [mm]")
-    figure.supylabel("x, across the flank [mm]", fontsize=FONT_SIZE)
+    axes[-1].set_xlabel("y [mm]")
+    figure.supylabel("x [mm]", fontsize=FONT_SIZE)
     label = f"pressure [MPa]; white: open; arrow: highest {100 - MAP_PERCENTILE:g}% of the cells"
     figure.colorbar(image, ax=axes, label=label, extend="max", shrink=0.8, pad=0.01)
     return figure
 
 
 def _open(field: Array) -> str:
-    """The share of the flank's grid that is open."""
+    """The share of the face's grid that is open."""
     return f"{np.mean(field <= 0.0):.0%} of the grid open"
 
 
 def _peak_change(file: h5py.File) -> str:
-    """Largest pressure of each flank, unworn and worn."""
+    """Largest pressure of each face, unworn and worn."""
     texts = []
     for name in file["contact"]:
         peaks = [file["contact"][name][jump]["pressure"][()].max() for jump in _ends(file, name)]
@@ -191,9 +172,9 @@ def _peak_change(file: h5py.File) -> str:
 
 
 def pressure_profiles(file: h5py.File) -> Figure:
-    """Peak-load pressure across and along the middle of each flank, with the coarse answers."""
+    """Peak-load pressure along both middle lines of each face, with the coarse answers."""
     interfaces = list(file["contact"])
-    along = ALONG_LINE if _line(file) else ALONG
+    along = ALONG_LINE if line_contacts(file) else ALONG
     directions = len(along)
     figure = new_figure(_edge_peak(file), 4.5 * directions)
     axes = figure.subplots(directions, len(interfaces), sharey="row", sharex="row", squeeze=False)
@@ -235,14 +216,14 @@ def _nodes_on_middle(file: h5py.File, interface: str, direction: int) -> tuple[A
 
 
 def _edge_peak(file: h5py.File) -> str:
-    """Largest pressure at y = 0 of the flank where it is largest, by every method."""
+    """Largest pressure at y = 0 of the face where it is largest, by every method."""
     unworn = {name: file["contact"][name][_ends(file, name)[0]] for name in file["contact"]}
     peaks = {name: middle(group["pressure"][()], 0).max() for name, group in unworn.items()}
     name = max(peaks, key=lambda name: peaks[name])
     text = f"Edge peak on the {name}: {peaks[name]:.0f} MPa"
     if coarse := file["contact"][name].get("coarse"):
         peak = middle(coarse["pressure"][()], 0).max()
-        cells = "" if _line(file) else " cells"
+        cells = "" if line_contacts(file) else " cells"
         text += f"; {_cells(grid_of(coarse))}{cells} see {peak:.0f} MPa"
     if f"structure/{name}/pressure" in file:
         text += f", finite elements {_nodes_on_middle(file, name, 0)[1].max():.0f} MPa"
@@ -253,18 +234,19 @@ def _edge_peak(file: h5py.File) -> str:
 
 
 def worn_profiles(file: h5py.File) -> Figure:
-    """Both surfaces and the depth worn off, across the middle of each flank, as cycles go by."""
+    """Both surfaces and the depth worn off, along x in the middle of each face, as cycles go by."""
     interfaces = list(file["surfaces"])
     figure = new_figure("", 9.0)
     axes = figure.subplots(2, len(interfaces), sharex=True, sharey="row", squeeze=False)
+    lower, upper = body_names(file).values()
     deepest = []
     for column, interface in zip(axes.T, interfaces, strict=True):
         deepest.append(_draw_wear(column, file, interface))
-        column[0].set_title(f"{interface}: blade (above) and disk (below) in the flank's frame")
+        column[0].set_title(f"{interface}: {upper} (above) and {lower} (below)")
         column[1].set_title(f"{interface}: depth worn off both bodies")
-        column[1].set_xlabel("x, across the flank [mm]")
+        column[1].set_xlabel("x [mm]")
     texts = (f"{name} {depth:.3g} µm" for name, depth in zip(interfaces, deepest, strict=True))
-    place = "" if _line(file) else " at y = 0"
+    place = "" if line_contacts(file) else " at y = 0"
     figure.suptitle(f"Depth worn off{place}, at most: {', '.join(texts)}", fontweight="bold")
     low, high = axes[0, 0].get_ylim()
     axes[0, 0].set_ylim(low, min(high, HEIGHT_IN_DEPTHS * max(deepest)) if any(deepest) else high)
@@ -381,132 +363,6 @@ def _regime(group: h5py.Group, cycles: Array) -> str:
     return f"not yet linear at {cycles[-1]:,.0f}"
 
 
-# --- structure ----------------------------------------------------------------------------------
-
-
-def structure_stress(file: h5py.File) -> Figure:
-    """Von Mises stress in mid-slot around the flanks: unworn, worn and what wear changed."""
-    panels = {state: _sections(file, state) for state in _states(file)}
-    ranges = {state: _range_in_view(file, sections) for state, sections in panels.items()}
-    top = max(ranges[state][1] for state in panels if state != CHANGE)
-    texts = (f"{ranges[state][1]:.0f} MPa {state}" for state in panels if state != CHANGE)
-    place = "in plane strain" if _line(file) else "in mid-slot"
-    title = f"Von Mises stress {place} at peak load: at most {', '.join(texts)}"
-    figure = new_figure(title, 1.0 + 4.2 * len(panels))
-    axes = figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-    for axis, (state, sections) in zip(axes, panels.items(), strict=True):
-        low, high = ranges[state]
-        scale = max(-low, high) if state == CHANGE else top
-        colours = _draw_sections(axis, sections, scale, signed=state == CHANGE)
-        _zoom(axis, file)
-        axis.set_title(f"{state}: {low:+.0f} to {high:+.0f} MPa" if state == CHANGE else state)
-        axis.set_ylabel(f"{'XYZ'[_plane(file)[2]]} [mm]")
-        figure.colorbar(colours, ax=axis, label="[MPa]", pad=0.01)
-    axes[-1].set_xlabel(f"{'XYZ'[_plane(file)[1]]} [mm]")
-    return figure
-
-
-def _states(file: h5py.File) -> list[str]:
-    """What there is to show; a change needs both states on one mesh."""
-    bodies = list(file["bodies"].values())
-    states = [state for state in ("unworn", "worn") if all(state in body for body in bodies)]
-    if len(states) == 2 and all(
-        np.array_equal(body["unworn/elements"], body["worn/elements"]) for body in bodies
-    ):
-        states.append(CHANGE)
-    return states
-
-
-def _plane(file: h5py.File) -> tuple[int, int, int]:
-    """Global axes nearest to the slot's direction (the plane's normal), to right and to top."""
-    slot = np.abs(next(iter(file["grid"].values())).attrs["axes"][1])
-    normal = int(np.argmax(slot))
-    right, top = (axis for axis in range(3) if axis != normal)
-    return normal, right, top
-
-
-def _sections(file: h5py.File, state: str) -> list[_Section]:
-    """Cuts of the bodies through the middle of the slot."""
-    cuts = []
-    for body in file["bodies"].values():
-        if state == CHANGE:
-            change = body["worn/von_mises"][()] - body["unworn/von_mises"][()]
-            cuts.append(_cut(file, body["unworn"], change))
-        else:
-            cuts.append(_cut(file, body[state], body[state]["von_mises"][()]))
-    return cuts
-
-
-def _cut(file: h5py.File, body: h5py.Group, stress: Array) -> _Section:
-    """One body and a nodal stress cut by the plane across the slot; a plane body whole."""
-    shown = list(_plane(file)[1:])
-    flank = next(iter(file["grid"].values())).attrs
-    mesh = body_mesh(body)
-    mesh.point_data["stress"] = stress
-    if body["elements"].shape[1] == 4:
-        # Beside the middle: a plane through nodes of the mesh leaves holes between its elements.
-        beside = flank["origin"] + BESIDE * mesh.length * flank["axes"][1]
-        cut = mesh.slice(normal=flank["axes"][1], origin=beside).triangulate()
-    else:
-        cut = mesh.extract_surface(algorithm="dataset_surface")
-    border = cut.extract_feature_edges(
-        feature_edges=False, non_manifold_edges=False, manifold_edges=False
-    )
-    return _Section(
-        points=cut.points[:, shown],
-        triangles=cut.regular_faces,
-        stress=cut["stress"],
-        outline=border.points[border.lines.reshape(-1, 3)[:, 1:]][..., shown],
-    )
-
-
-def _draw_sections(axis: Axes, sections: list[_Section], top: float, signed: bool) -> Any:
-    """Colours and outlines of the bodies; returns the colours."""
-    from matplotlib.collections import LineCollection
-    from matplotlib.tri import Triangulation
-
-    axis.set_aspect("equal")
-    axis.grid(visible=False)
-    for section in sections:
-        axis.add_collection(LineCollection(list(section.outline), colors=BLACK, linewidths=0.8))
-        colours = axis.tripcolor(
-            Triangulation(section.points[:, 0], section.points[:, 1], section.triangles),
-            section.stress,
-            shading="gouraud",
-            cmap=CHANGE_COLOURS if signed else STRESS_COLOURS,
-            vmin=-top if signed else 0.0,
-            vmax=top,
-        )
-    return colours
-
-
-def _window(file: h5py.File) -> tuple[Array, Array]:
-    """Lower left and upper right corner of the view, ``(2,)`` each [mm]."""
-    shown = list(_plane(file)[1:])
-    ends = []
-    for group in file["grid"].values():
-        half = 0.5 * grid_of(group).size[0] * group.attrs["axes"][0]
-        ends += [(group.attrs["origin"] + sign * half)[shown] for sign in (-1.0, 1.0)]
-    low, high = np.min(ends, axis=0), np.max(ends, axis=0)
-    margin = SECTION_MARGIN * np.max(high - low)
-    return low - margin, high + margin
-
-
-def _range_in_view(file: h5py.File, sections: list[_Section]) -> tuple[float, float]:
-    """Smallest and largest stress in view [MPa]."""
-    low, high = _window(file)
-    seen = [s.stress[np.all((s.points >= low) & (s.points <= high), axis=1)] for s in sections]
-    every = np.concatenate(seen)
-    return float(every.min()), float(every.max())
-
-
-def _zoom(axis: Axes, file: h5py.File) -> None:
-    """Show the surroundings of the flanks, where wear makes the difference."""
-    low, high = _window(file)
-    axis.set_xlim(low[0], high[0])
-    axis.set_ylim(low[1], high[1])
-
-
 # --- reading ------------------------------------------------------------------------------------
 
 
@@ -526,14 +382,9 @@ def _peak(file: h5py.File) -> int:
     return int(file.attrs["peak_increment"])
 
 
-def _line(file: h5py.File) -> bool:
-    """Whether the contacts are line contacts."""
-    return grid_of(next(iter(file["grid"].values()))).line
-
-
 def _per_length(file: h5py.File) -> str:
     """What units of forces and volumes end in."""
-    return "/mm" if _line(file) else ""
+    return "/mm" if line_contacts(file) else ""
 
 
 def _cells(grid: Grid) -> str:
@@ -550,7 +401,8 @@ def figures_of(file: h5py.File) -> dict[str, Callable[[h5py.File], Figure]]:
     return {
         name: draw
         for name, (draw, needed) in (FIGURES | STRESS_FIGURES).items()
-        if all(group in file for group in needed) and not (draw is pressure_maps and _line(file))
+        if all(group in file for group in needed)
+        and not (draw is pressure_maps and line_contacts(file))
     }
 
 

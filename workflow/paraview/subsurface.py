@@ -1,4 +1,4 @@
-"""Stress under the contacts for ParaView: sections at their place, fretting maps on the flanks."""
+"""Stress under the contacts for ParaView: sections at their place, fretting maps on the faces."""
 
 from __future__ import annotations
 

@@ -1,9 +1,9 @@
-"""A wear run for ParaView: flanks as they wear, the structure before and after, worn surfaces.
+"""A wear run for ParaView: faces as they wear, the structure before and after, worn surfaces.
 
 Written into one folder:
 
 - ``<interface>.pvd``: time series over the cycles; every step is an image on the contact grid
-  (``<interface>/<jump>.vti``), turned and moved to the flank's place in the structure;
+  (``<interface>/<jump>.vti``), turned and moved to the face's place in the structure;
 - ``section_<interface>.pvd``: stress in a plane through both bodies under the contact, unworn and
   worn (``section/<interface>_<state>_<body>.vts``);
 - ``structure.pvd``: all bodies at peak load, unworn at 0 and worn at the last computed number of
@@ -45,7 +45,7 @@ def write_wear(file: h5py.File, folder: Path) -> list[Path]:
     """Write the files that show a wear run; returns their paths."""
     written: list[Path] = []
     for interface in file["grid"]:
-        written += _write_flank(file, interface, folder)
+        written += _write_face(file, interface, folder)
         written += write_sections(file, interface, _placement(file, interface)[1], folder)
         if not grid_of(file["grid"][interface]).line:
             written += _write_worn_surfaces(file, interface, folder)
@@ -54,23 +54,23 @@ def write_wear(file: h5py.File, folder: Path) -> list[Path]:
     return written
 
 
-# --- flanks -------------------------------------------------------------------------------------
+# --- faces --------------------------------------------------------------------------------------
 
 
-def _write_flank(file: h5py.File, interface: str, folder: Path) -> list[Path]:
-    """Images of one flank, one per jump, and the series that lists them."""
+def _write_face(file: h5py.File, interface: str, folder: Path) -> list[Path]:
+    """Images of one face, one per jump, and the series that lists them."""
     grid, frame = _placement(file, interface)
     steps: list[Step] = []
     for jump in jump_names(file, interface):
         path = folder / interface / f"{jump}.vti"
         image = grid_image(grid, frame)
-        attach(image.cell_data, _flank_fields(file, interface, jump, frame))
+        attach(image.cell_data, _face_fields(file, interface, jump, frame))
         write_xml(image, path)
         steps.append((float(file["contact"][interface][jump].attrs["cycles"]), interface, path))
     return write_series(folder / f"{interface}.pvd", steps)
 
 
-def _flank_fields(file: h5py.File, interface: str, jump: str, frame: Frame) -> Fields:
+def _face_fields(file: h5py.File, interface: str, jump: str, frame: Frame) -> Fields:
     """Cell fields of one jump, in the order in which an image counts its cells."""
     contact = file["contact"][interface][jump]
     fields: Fields = {"pressure": (cells(contact["pressure"]), "MPa")}
@@ -104,16 +104,16 @@ def _placement(file: h5py.File, interface: str) -> tuple[Grid, Frame]:
 
 
 def _write_worn_surfaces(file: h5py.File, interface: str, folder: Path) -> list[Path]:
-    """STL of both worn surfaces of one flank, for CAD and meshers.
+    """STL of both worn surfaces of one face, for CAD and meshers.
 
-    Vertices are the centres of the grid cells that lie on the rounded flank (the FE contact face):
+    Vertices are the centres of the grid cells that lie on the FE contact face, rounding included:
     what the grid has beyond it is no part of the bodies. Normals point out of the body. An STL
     file holds single precision: about 1e-5 mm at 250 mm from the origin.
     """
     import pyvista
 
     grid, frame = _placement(file, interface)
-    rows, columns = _flank_window(file, interface, grid)
+    rows, columns = _face_window(file, interface, grid)
     last = jump_names(file, interface)[-1]
     written = []
     for body, name in body_names(file).items():
@@ -130,7 +130,7 @@ def _write_worn_surfaces(file: h5py.File, interface: str, folder: Path) -> list[
     return written
 
 
-def _flank_window(file: h5py.File, interface: str, grid: Grid) -> tuple[slice, slice]:
+def _face_window(file: h5py.File, interface: str, grid: Grid) -> tuple[slice, slice]:
     """Rows and columns of the grid whose centres lie on the FE face; all without an FE face."""
     face = file.get(f"structure/{interface}/coordinates")
     if face is None:

@@ -14,7 +14,6 @@ from workflow.errors import UserError
 from workflow.load_source import ContactFace
 from workflow.memory import check_memory
 from workflow.reporter import Reporter
-from workflow.resultants.source import grid_over
 from workflow.resultants.writing import write_resultants_csv, write_resultants_h5
 from workflow.sources import load_source
 from workflow.store import replacing
@@ -83,7 +82,7 @@ def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter
 
 def _height(face: ContactFace, case: WearCase) -> Array:
     """Unworn gap on the contact grid of the case, ``(nx, ny)`` [mm]."""
-    grid = grid_over(face.size, case.contact.grid, face.face.line)
+    grid = face.grid(case.contact.grid)
     return np.array(np.broadcast_to(face.gap(grid.x, grid.y), grid.shape))
 
 

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 
 # Triangles flatter than this are slivers along a straight edge of the face, left by coordinates
 # that are printed with six digits; elements of a contact face are never as thin.
@@ -16,7 +15,7 @@ class FaceError(ValueError):
     """The nodes make no face."""
 
 
-def facets_over(coordinates: Array, line: bool) -> NDArray[np.int64]:
+def facets_over(coordinates: Array, line: bool) -> Indices:
     """Triangles ``(m, 3)`` over nodes ``(n, 2)`` [mm], segments ``(n - 1, 2)`` in a line contact.
 
     Triangles are Delaunay's and fill the convex hull of the nodes: the facets of a face with holes
@@ -27,7 +26,7 @@ def facets_over(coordinates: Array, line: bool) -> NDArray[np.int64]:
     return facets
 
 
-def check_facets(facets: NDArray[np.int64], count: int) -> None:
+def check_facets(facets: Indices, count: int) -> None:
     """Raise FaceError unless the ``facets`` join all of ``count`` nodes and no others."""
     if facets.size and not (facets.min() >= 0 and facets.max() < count):
         raise FaceError(
@@ -41,13 +40,13 @@ def check_facets(facets: NDArray[np.int64], count: int) -> None:
         )
 
 
-def _segments(coordinates: Array) -> NDArray[np.int64]:
+def _segments(coordinates: Array) -> Indices:
     order = np.argsort(coordinates[:, 0], kind="stable")
     apart = np.diff(coordinates[order, 0]) > 0.0
     return np.stack([order[:-1], order[1:]], axis=1)[apart].astype(np.int64)
 
 
-def _triangles(coordinates: Array) -> NDArray[np.int64]:
+def _triangles(coordinates: Array) -> Indices:
     from scipy.spatial import Delaunay, QhullError
 
     try:

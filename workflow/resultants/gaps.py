@@ -1,4 +1,4 @@
-"""Gap of the unloaded bodies over a nominal face, as a resultants case gives it."""
+"""Gap of the unloaded bodies over a face, as a function of the place on it."""
 
 from __future__ import annotations
 
@@ -10,8 +10,8 @@ import numpy as np
 
 from sa_solver.shapes import rounded_edge
 from sa_solver.types import Array, Grid
+from workflow.case.gaps import GapShape, HeightsGap, ParaboloidGap, RoundedGap
 from workflow.case.input_files import read_heights
-from workflow.case.resultants_case import HeightsGap, ParaboloidGap, RoundedGap
 
 GapFunction = Callable[[Array, Array], Array]
 
@@ -34,9 +34,7 @@ class GridHeights:
         return heights
 
 
-def gap_over(
-    shape: RoundedGap | ParaboloidGap | HeightsGap | None, heights: Array | None, grid: Grid
-) -> GapFunction:
+def gap_over(shape: GapShape | None, heights: Array | None, grid: Grid) -> GapFunction:
     """Gap [mm] at x and y of a face that ``grid`` covers.
 
     ``heights`` on the grid count where the case gives no shape.

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 
 import h5py
 import numpy as np
-from numpy.typing import NDArray
 
-from sa_solver.types import Array, Frame, LoadHistory
+from sa_solver.types import Array, Frame, Indices, LoadHistory
 from workflow.case import units
 from workflow.case.input_files import InputFileError
 from workflow.resultants.consistency import Bounds, check_loads, slides_by_limit
@@ -56,7 +55,7 @@ class Group:
         factor = units.to_base(f"1 {written}", unit)
         return numbers if factor == 1.0 else numbers * factor
 
-    def whole(self, name: str) -> NDArray[np.int64] | None:
+    def whole(self, name: str) -> Indices | None:
         """A dataset of whole numbers, None if there is none. Raises InputFileError."""
         numbers = self.numbers(name)
         if numbers is None:
@@ -202,7 +201,7 @@ def _coordinates(group: Group, line: bool) -> Array | None:
     return coordinates
 
 
-def _facets(group: Group, coordinates: Array, line: bool) -> NDArray[np.int64]:
+def _facets(group: Group, coordinates: Array, line: bool) -> Indices:
     facets = group.whole("facets")
     corners = 2 if line else 3
     if facets is not None and (facets.ndim != 2 or facets.shape[1] != corners):
@@ -216,7 +215,7 @@ def _facets(group: Group, coordinates: Array, line: bool) -> NDArray[np.int64]:
     return facets
 
 
-def _nodes(group: Group, name: str, count: int) -> NDArray[np.int64] | None:
+def _nodes(group: Group, name: str, count: int) -> Indices | None:
     nodes = group.whole(name)
     if nodes is None:
         return None

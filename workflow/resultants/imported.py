@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sa_solver.types import Array, Frame, LoadHistory
+from sa_solver.types import Array, Frame, Indices, LoadHistory
 from workflow.store import DATASETS, PER_LENGTH
 
 if TYPE_CHECKING:
@@ -36,10 +35,10 @@ class ImportedLoads:
     loads: LoadHistory
     slip: Array | None = None
     coordinates: Array | None = None
-    facets: NDArray[np.int64] | None = None
+    facets: Indices | None = None
     frame: Frame | None = None
-    nodes_1: NDArray[np.int64] | None = None
-    nodes_2: NDArray[np.int64] | None = None
+    nodes_1: Indices | None = None
+    nodes_2: Indices | None = None
     nodal_height: Array | None = None
     height: Array | None = None
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -82,7 +82,7 @@ class ResultantsSource:
 
     def _contact_face(self, name: str, own: ImportedLoads) -> ContactFace:
         structure = self._case.structure
-        grid = grid_over(structure.size_of(name), self._case.contact.grid, self.line)
+        grid = Grid.over(structure.size_of(name), self._case.contact.grid, self.line)
         face = self._face(name, own, grid.size)
         gap = gap_over(structure.gap_of(name), own.height, grid)
         return ContactFace(face, grid.size, gap, self._coarse(own, grid), REMEDY)
@@ -90,8 +90,9 @@ class ResultantsSource:
     def _face(self, name: str, own: ImportedLoads, size: tuple[float, float]) -> Face:
         """The face of the file, or the corners of the nominal one."""
         frame = self.frame(name) or Frame(np.zeros(3), np.eye(3))
-        if own.coordinates is not None and own.facets is not None:
-            return Face(name, frame, own.coordinates, own.facets)
+        found = own.face(name)
+        if found is not None:
+            return replace(found, frame=frame)
         half_x, half_y = 0.5 * size[0], 0.5 * size[1]
         if self.line:
             return Face(name, frame, np.array([[-half_x, 0.0], [half_x, 0.0]]), np.array([[0, 1]]))
@@ -110,11 +111,6 @@ class ResultantsSource:
             coarse = grid.size[0] / pitch, grid.size[1] / pitch
         cells = max(FEWEST, round(coarse[0])), max(FEWEST, round(coarse[1]))
         return cells[0], 1 if self.line else cells[1]
-
-
-def grid_over(size: tuple[float, float], cells: tuple[int, int], line: bool) -> Grid:
-    """The contact grid over a face."""
-    return Grid.strips(size[0], cells[0]) if line else Grid.covering(size, cells)
 
 
 def _slip(own: ImportedLoads, nodes: int) -> Array:

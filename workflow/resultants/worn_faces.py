@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sa_solver.types import Array, Frame
+from sa_solver.types import Array, Frame, Grid, Indices
 from workflow.case import ResultantsCase
 from workflow.contact_stage import ContactStage, InterfaceState
 from workflow.reporter import Reporter
-from workflow.resultants.source import ResultantsSource, grid_over
+from workflow.resultants.source import ResultantsSource
 from workflow.resultants.worn_nodes import (
     NodalDepths,
     nodal_depths,
@@ -34,7 +33,7 @@ def check_nodes(file: str, frame: Frame, size: tuple[float, float], line: bool) 
 
     InputFileError where the file is wrong, FaceError where its nodes are.
     """
-    grid = grid_over(size, (1, 1), line)
+    grid = Grid.over(size, (1, 1), line)
     nodal_depths(read_nodes(file).points, frame, grid, np.zeros(grid.shape))
 
 
@@ -69,7 +68,7 @@ class _WornFace:
     """The user's nodes of the face of one body, and what they lose."""
 
     body: Literal[1, 2]
-    numbers: NDArray[np.int64]
+    numbers: Indices
     frame: Frame
     worn: NodalDepths
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from fe_models.mesh import Face
 from fe_models.transfer import FaceTransfer
-from sa_solver.types import Array, Frame, Grid
+from sa_solver.types import Array, Frame, Grid, Indices
 from workflow.resultants.faces import FaceError, facets_over
 from workflow.resultants.table import read_table
 from workflow.store import replacing
@@ -33,7 +33,7 @@ OFF_PLANE = 0.1
 class NodeTable:
     """The user's node ``numbers`` ``(n,)`` of one face and their ``points`` ``(n, 3)`` [mm]."""
 
-    numbers: NDArray[np.int64]
+    numbers: Indices
     points: Array
 
     def __len__(self) -> int:
@@ -99,7 +99,7 @@ def worn_displacement(depth: Array, frame: Frame, body: Literal[1, 2]) -> Array:
     return np.outer(depth, inwards)
 
 
-def write_worn_nodes(path: Path, nodes: NDArray[np.int64], displacement: Array) -> None:
+def write_worn_nodes(path: Path, nodes: Indices, displacement: Array) -> None:
     """Write displacements ``(n, 3)`` [mm] by node number, such that they read back the same."""
     with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.writer(stream, lineterminator="\n")
@@ -122,7 +122,7 @@ def _in_plane(points: Array, frame: Frame, line: bool) -> Array:
     return local[:, :2]
 
 
-def _meets(coordinates: Array, facets: NDArray[np.int64], grid: Grid) -> NDArray[np.bool_]:
+def _meets(coordinates: Array, facets: Indices, grid: Grid) -> NDArray[np.bool_]:
     """Facets ``(m,)`` whose box overlaps the grid's: on the others nothing is worn."""
     corners = coordinates[facets]
     half = 0.5 * np.array(grid.size)

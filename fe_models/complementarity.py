@@ -1,0 +1,84 @@
+"""Contact as a linear complementarity: forces and gaps, neither negative, one of them zero."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sl
+from numpy.typing import NDArray
+
+from sa_solver.types import Array, Indices
+
+Flags = NDArray[np.bool_]
+
+# Forces and gaps below this share of the largest are rounding, whose sign says nothing.
+ROUNDING = 1e-12
+# Exchanges of all wrong nodes at once that may fail to lower their number, before one at a time.
+PATIENCE = 3
+# Exchanges that a contact needs are a few, one at a time at most some per node.
+EXCHANGES_PER_NODE = 20
+
+
+@dataclass(frozen=True)
+class Complementary:
+    """``force >= 0``, ``gap = offset + A force - level >= 0`` and ``force · gap = 0``, ``(n,)``."""
+
+    force: Array
+    gap: Array
+    level: float
+    iterations: int
+    converged: bool
+
+
+def complementary(
+    compliance: Array, offset: Array, total: float | None = None, guess: Flags | None = None
+) -> Complementary:
+    """Solve 0 <= f ⊥ offset + A f - level >= 0, with Σ f = ``total`` if it is given, else level 0.
+
+    ``compliance`` A ``(n, n)`` is symmetric positive definite. Status iteration: all nodes whose
+    force or gap is negative change their status, as long as their number falls; after that the last
+    of them alone, which ends for any A if the level is given (block principal pivoting: Júdice &
+    Pires 1994, Computers & Operations Research 21, 587). A result that has not converged says so.
+    """
+    active = np.ones(len(offset), dtype=np.bool_) if guess is None else guess.copy()
+    fewest, patience = len(offset) + 1, PATIENCE
+    wrong, iterations = np.arange(len(offset)), 0
+    while len(wrong) and iterations < EXCHANGES_PER_NODE * len(offset):
+        iterations += 1
+        if total is not None and not active.any():
+            active[np.argmin(offset)] = True
+        force, gap, level = _at_status(compliance, offset, total, active)
+        wrong = _wrong_nodes(force, gap, active, np.abs(offset).max() + abs(level))
+        if len(wrong) < fewest:
+            fewest, patience = len(wrong), PATIENCE
+        elif patience > 0:
+            patience -= 1
+        else:
+            wrong = wrong[-1:]
+        active[wrong] = ~active[wrong]
+    forces, gaps = np.maximum(force, 0.0), np.maximum(gap, 0.0)
+    return Complementary(forces, gaps, level, iterations, len(wrong) == 0)
+
+
+def _wrong_nodes(force: Array, gap: Array, active: Flags, size: float) -> Indices:
+    """Active nodes that pull, others that overlap, by more than rounding; gaps are of ``size``."""
+    pulls = force < -ROUNDING * np.abs(force).max(initial=0.0)
+    return np.flatnonzero(np.where(active, pulls, gap < -ROUNDING * size))
+
+
+def _at_status(
+    compliance: Array, offset: Array, total: float | None, active: Flags
+) -> tuple[Array, Array, float]:
+    """Forces on the active nodes that close their gaps, the gaps of the others, and the level."""
+    force, level = np.zeros(len(offset)), 0.0
+    nodes = np.flatnonzero(active)
+    if len(nodes):
+        sides = np.stack([-offset[nodes], np.ones(len(nodes))], axis=1)
+        closing, unit = sl.solve(compliance[np.ix_(nodes, nodes)], sides, assume_a="pos").T
+        if total is not None:
+            level = float((total - closing.sum()) / unit.sum())
+        force[nodes] = closing + level * unit
+    gap = offset + compliance[:, nodes] @ force[nodes] - level
+    gap[nodes] = 0.0
+    return force, gap, level

@@ -1,0 +1,129 @@
+"""Gap of the unloaded bodies over a contact face, as a case gives it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from workflow.case.fields import File
+from workflow.case.input_files import InputFileError, height_shape
+from workflow.case.sections import Length, RoundingRadius, Section, disagreement, entry
+
+# Share of a face's size that is rounding.
+ROUNDING = 1e-9
+
+
+class RoundedGap(Section):
+    """Flat, with rounded edges along x and rounded ends along y."""
+
+    shape: Literal["rounded"] = entry("rounded, paraboloid or heights", "rounded")
+    edge_width: Length = entry("of each rounded edge, inside the size along x [mm]", "1.5 mm")
+    edge_radius: RoundingRadius = entry("of the rounded edges [mm]", "30 mm")
+    end_width: Length | None = entry(
+        "of each rounded end, inside the size along y; counts for nothing in 2 dimensions [mm]",
+        "3 mm",
+        default=None,
+    )
+    end_radius: RoundingRadius | None = entry("of the rounded ends [mm]", "150 mm", default=None)
+
+    @model_validator(mode="after")
+    def _arcs_exist(self) -> RoundedGap:
+        if (self.end_width is None) != (self.end_radius is None):
+            given = "end_width" if self.end_radius is None else "end_radius"
+            raise disagreement(
+                f"{given} alone; allowed: end_width and end_radius, or neither", given
+            )
+        for name in ("edge", "end"):
+            width, radius = getattr(self, f"{name}_width"), getattr(self, f"{name}_radius")
+            if width is not None and width >= radius:
+                raise disagreement(
+                    f"{width:g} mm: the rounding ends beyond its own arc; "
+                    f"allowed: below {name}_radius, {radius:g} mm",
+                    f"{name}_width",
+                    f"{name}_radius",
+                )
+        return self
+
+
+class ParaboloidGap(Section):
+    """Paraboloid x² / 2 Rx + y² / 2 Ry; straight along x or y where there is no radius."""
+
+    shape: Literal["paraboloid"] = entry("rounded, paraboloid or heights", "paraboloid")
+    radius_x: RoundingRadius | None = entry(
+        "relative, of the section along x; without it straight [mm]", "300 mm", default=None
+    )
+    radius_y: RoundingRadius | None = entry(
+        "relative, of the section along y; without it straight [mm]", "10 m", default=None
+    )
+
+    @model_validator(mode="after")
+    def _is_curved(self) -> ParaboloidGap:
+        if self.radius_x is None and self.radius_y is None:
+            raise disagreement("no radius; allowed: radius_x, radius_y or both", "radius_x")
+        return self
+
+
+class HeightsGap(Section):
+    """Gap from a file, a value for every cell of ``contact.grid``."""
+
+    shape: Literal["heights"] = entry("rounded, paraboloid or heights", "heights")
+    file: Annotated[str, File((".npy", ".csv", ".h5"))] = entry(
+        "gap in mm, rows along x, columns along y; for .h5 with :dataset at the end", "gap.npy"
+    )
+
+
+GapShape = RoundedGap | ParaboloidGap | HeightsGap
+Gap = Annotated[GapShape, Field(discriminator="shape")]
+
+
+def check_gap(
+    gap: GapShape,
+    size: tuple[float, float],
+    cells: tuple[int, int],
+    line: bool,
+    key: str,
+    *beside: str,
+) -> None:
+    """Refuse, at ``key``, what does not fit a face of ``size`` [mm] or the ``cells`` of its grid.
+
+    ``beside`` are other entries that say how large the face is.
+    """
+    match gap:
+        case RoundedGap():
+            _check_roundings(gap, size, line, key, *beside)
+        case ParaboloidGap():
+            if line and gap.radius_x is None:
+                raise disagreement("no radius_x; allowed: one, in 2 dimensions", key)
+        case HeightsGap():
+            try:
+                shape = height_shape(gap.file)
+            except InputFileError as error:
+                raise disagreement(str(error), f"{key}.file") from error
+            check_cells(shape, gap.file, cells)
+
+
+def check_cells(shape: tuple[int, ...], file: str, cells: tuple[int, int]) -> None:
+    """Refuse heights of another shape than the contact grid's."""
+    if shape != cells:
+        raise disagreement(
+            f"{cells[0]} x {cells[1]} cells: the heights of {file} are {shape[0]} x {shape[1]}; "
+            f"allowed: [{shape[0]}, {shape[1]}]",
+            "contact.grid",
+        )
+
+
+def _check_roundings(
+    gap: RoundedGap, size: tuple[float, float], line: bool, key: str, *beside: str
+) -> None:
+    """Roundings lie within the face."""
+    widths: dict[str, tuple[float | None, float]] = {"edge_width": (gap.edge_width, size[0])}
+    if not line:
+        widths["end_width"] = gap.end_width, size[1]
+    for name, (width, extent) in widths.items():
+        if width is not None and width > 0.5 * extent * (1.0 + ROUNDING):
+            raise disagreement(
+                f"{width:g} mm: too large; allowed: up to half the size of the face, "
+                f"{0.5 * extent:g} mm",
+                *(f"{key}.{name}", *beside),
+            )

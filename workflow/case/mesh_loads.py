@@ -1,0 +1,141 @@
+"""Loads on the bodies of a user's mesh, as a case gives them."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from workflow.case.fields import Quantity, Text
+from workflow.case.sections import Section, disagreement, entry
+
+if TYPE_CHECKING:
+    from fe_models import imported_structure as fe
+
+Name = Annotated[str, Text()]
+Factor = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
+Coordinate = Annotated[float, Quantity("mm", at_least=-1e6, at_most=1e6)]
+Component = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
+Pull = Annotated[float, Quantity("N", at_least=-1e9, at_most=1e9)]
+Push = Annotated[float, Quantity("MPa", at_least=-1e5, at_most=1e5)]
+Travel = Annotated[float, Quantity("mm", at_least=-1e3, at_most=1e3)]
+Speed = Annotated[float, Quantity("rad/s", above=0.0, at_most=1e5)]
+Pace = Annotated[float, Quantity("mm/s^2", at_least=-1e12, at_most=1e12)]
+
+
+class _Load(Section):
+    """What every load needs."""
+
+    kind: str  # named first; each load narrows it to its own name
+    path: tuple[Factor, ...] = entry(
+        "factor of the load at the end of each leg of load_path; from 0, linearly [1]", [1.0, 0.0]
+    )
+
+
+class PressureLoad(_Load):
+    """Pressure on a boundary, into the body."""
+
+    kind: Literal["pressure"] = entry(
+        "pressure, force, displacement, rotation or acceleration", "pressure"
+    )
+    group: Name = entry("boundary", "blade_top")
+    pressure: Push = entry("into the body [MPa]", "10 MPa")
+
+    def described(self) -> fe.Pressure:
+        """As the structure takes it."""
+        from fe_models.imported_structure import Pressure
+
+        return Pressure(self.group, self.pressure)
+
+
+class ForceLoad(_Load):
+    """Force on a boundary, spread evenly."""
+
+    kind: Literal["force"] = entry(
+        "pressure, force, displacement, rotation or acceleration", "force"
+    )
+    group: Name = entry("boundary", "blade_top")
+    force: tuple[Pull, Pull, Pull] = entry(
+        "along the global axes; in the plane per length, N/mm [N]", [0.0, 0.0, "-1 kN"]
+    )
+
+    def described(self) -> fe.Force:
+        """As the structure takes it."""
+        from fe_models.imported_structure import Force
+
+        return Force(self.group, np.array(self.force))
+
+
+class DisplacementLoad(_Load):
+    """Displacement imposed on a boundary along its own direction; free across it."""
+
+    kind: Literal["displacement"] = entry(
+        "pressure, force, displacement, rotation or acceleration", "displacement"
+    )
+    group: Name = entry("boundary", "blade_top")
+    displacement: tuple[Travel, Travel, Travel] = entry(
+        "along the global axes [mm]", ["10 um", 0.0, 0.0]
+    )
+
+    @model_validator(mode="after")
+    def _moves(self) -> DisplacementLoad:
+        if not any(self.displacement):
+            raise disagreement("no displacement; allowed: one that is not zero", "displacement")
+        return self
+
+    def described(self) -> fe.Displacement:
+        """As the structure takes it."""
+        from fe_models.imported_structure import Displacement
+
+        return Displacement(self.group, np.array(self.displacement))
+
+
+class RotationLoad(_Load):
+    """Rotation of both bodies; its path is that of the speed, whose square the forces follow."""
+
+    kind: Literal["rotation"] = entry(
+        "pressure, force, displacement, rotation or acceleration", "rotation"
+    )
+    axis: tuple[Component, Component, Component] = entry(
+        "direction of the axis [1]", [0.0, 1.0, 0.0]
+    )
+    through: tuple[Coordinate, Coordinate, Coordinate] = entry(
+        "a point on the axis [mm]", [0.0, 0.0, 0.0]
+    )
+    speed: Speed = entry("[rad/s]", "6000 rpm")
+
+    @model_validator(mode="after")
+    def _has_axis(self) -> RotationLoad:
+        if not any(self.axis):
+            raise disagreement("no direction; allowed: one that is not zero", "axis")
+        return self
+
+    def described(self) -> fe.Rotation:
+        """As the structure takes it."""
+        from fe_models.imported_structure import Rotation
+
+        return Rotation(np.array(self.axis), np.array(self.through), self.speed)
+
+
+class AccelerationLoad(_Load):
+    """Acceleration of the frame of reference: both bodies are pulled against it."""
+
+    kind: Literal["acceleration"] = entry(
+        "pressure, force, displacement, rotation or acceleration", "acceleration"
+    )
+    acceleration: tuple[Pace, Pace, Pace] = entry(
+        "along the global axes [mm/s^2]", [0.0, 0.0, "9.81 m/s^2"]
+    )
+
+    def described(self) -> fe.Acceleration:
+        """As the structure takes it."""
+        from fe_models.imported_structure import Acceleration
+
+        return Acceleration(np.array(self.acceleration))
+
+
+Load = Annotated[
+    PressureLoad | ForceLoad | DisplacementLoad | RotationLoad | AccelerationLoad,
+    Field(discriminator="kind"),
+]
