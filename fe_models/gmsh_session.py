@@ -1,10 +1,10 @@
-"""A gmsh model that is always closed again."""
+"""A gmsh model that is always closed again, and sizes that grow away from its faces."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any
+from typing import Any, Literal
 
 
 @contextmanager
@@ -22,3 +22,27 @@ def gmsh_model(name: str) -> Iterator[Any]:
         yield gmsh
     finally:
         gmsh.finalize()
+
+
+def grow_from(
+    gmsh: Any,
+    kind: Literal["CurvesList", "SurfacesList"],
+    entities: list[int],
+    fine: float,
+    coarse: float,
+    growth: float,
+) -> int:
+    """Mesh size: ``fine`` on the entities, up to ``coarse``, by ``growth`` times the distance.
+
+    Returns the number of the distance field, for further settings of it.
+    """
+    field = gmsh.model.mesh.field
+    distance = field.add("Distance")
+    field.setNumbers(distance, kind, entities)
+    growing = field.add("MathEval")
+    field.setString(growing, "F", f"{fine!r} + {growth!r} * F{distance}")
+    field.setAsBackgroundMesh(growing)
+    gmsh.option.setNumber("Mesh.MeshSizeMax", coarse)
+    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
+    gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
+    return int(distance)

@@ -192,6 +192,11 @@ def check_load(imported: ImportedMesh, bodies: tuple[Body, Body], load: Load) ->
             else f"no boundary {group} on {bodies[0].name} or {bodies[1].name}"
         )
         raise MeshError(f"{wrong}; allowed: {', '.join(sorted(boundaries)) or 'none'}")
+    if isinstance(load, Force) and all(group in _groups(imported, [b])[0] for b in bodies):
+        raise MeshError(
+            f"{group} is a boundary of both bodies, and each would take all of the force; allowed: "
+            "boundaries of one body"
+        )
     vector = _vector(load)
     if vector is not None and bodies[0].mesh.dim() == 2 and vector[1] != 0.0:
         raise MeshError("a load along y, across the plane; allowed: x and z")

@@ -18,7 +18,7 @@ import scipy.sparse as sp
 from fe_models import superlu
 from fe_models.memory import available_bytes
 from fe_models.multigrid import MultigridSolver, softness
-from fe_models.pardiso import Kind, Pardiso, PardisoError
+from fe_models.pardiso import Pardiso, PardisoError
 from sa_solver.types import Array, Indices
 
 # A backward-stable factorisation leaves about 1e-13; anything above this is a wrong answer.
@@ -29,15 +29,10 @@ GROWTH_LIMIT = 1e12
 COLUMNS_AT_ONCE = 256
 BYTES = 8
 
-SINGULAR = {
-    Kind.POSITIVE_DEFINITE: (
-        "the stiffness matrix is close to singular: a body is not held, or the mesh has a "
-        "degenerate element"
-    ),
-    Kind.INDEFINITE: (
-        "the shifted matrix is close to singular: move the shift away from the eigenvalue it hits"
-    ),
-}
+SINGULAR = (
+    "the stiffness matrix is close to singular: a body is not held, or the mesh has a "
+    "degenerate element"
+)
 
 
 class SolverError(RuntimeError):
@@ -91,22 +86,10 @@ def factorise(matrix: sp.csr_matrix, memory: float | None = None) -> Factorisati
     :class:`FactorMemoryError` before anything large is allocated, and :class:`SolverError` if the
     matrix is singular, which one random load shows.
     """
-    return _factorised(matrix, Kind.POSITIVE_DEFINITE, memory)
-
-
-def factorise_symmetric(matrix: sp.csr_matrix, memory: float | None = None) -> Factorisation:
-    """Factorise a sparse symmetric matrix that may be indefinite, such as K - σ M.
-
-    As :func:`factorise` otherwise; it raises :class:`SolverError` if σ is an eigenvalue.
-    """
-    return _factorised(matrix, Kind.INDEFINITE, memory)
-
-
-def _factorised(matrix: sp.csr_matrix, kind: Kind, memory: float | None) -> Factorisation:
-    solve = _Checked(matrix, kind, _limit(memory))
+    solve = _Checked(matrix, _limit(memory))
     load = np.random.default_rng(0).standard_normal(matrix.shape[0])
     if np.abs(matrix).max() * np.abs(solve(load)).max() > GROWTH_LIMIT * np.abs(load).max():
-        raise SolverError(SINGULAR[kind])
+        raise SolverError(SINGULAR)
     return solve
 
 
@@ -160,7 +143,7 @@ class _Iterative:
     ) -> None:
         soft = np.ones((matrix.shape[0], 1)) if near_nullspace is None else near_nullspace
         if not softness(matrix, soft) * GROWTH_LIMIT > 1.0:
-            raise SolverError(SINGULAR[Kind.POSITIVE_DEFINITE])
+            raise SolverError(SINGULAR)
         self._grids, self._choice = MultigridSolver(matrix, soft), choice
 
     def __call__(self, rhs: Array) -> Array:
@@ -187,10 +170,10 @@ def _limit(memory: float | None) -> float:
 class _Checked:
     """Solutions whose residual has been looked at."""
 
-    def __init__(self, matrix: sp.csr_matrix, kind: Kind, limit: float) -> None:
-        self._matrix, self._kind, self._limit = matrix, kind, limit
+    def __init__(self, matrix: sp.csr_matrix, limit: float) -> None:
+        self._matrix, self._limit = matrix, limit
         self._largest = np.abs(matrix).max()
-        self._solve = _pardiso(matrix, kind, limit) or _superlu(matrix, kind, limit)
+        self._solve = _pardiso(matrix, limit) or _superlu(matrix, limit)
 
     def __call__(self, rhs: Array) -> Array:
         try:
@@ -199,10 +182,10 @@ class _Checked:
             solution = np.full(rhs.shape, np.nan)
         if not self._is_good(rhs, solution):
             self._solve = None  # gives its memory back
-            self._solve = _superlu(self._matrix, self._kind, self._limit)
+            self._solve = _superlu(self._matrix, self._limit)
             solution = self._solve(rhs)
             if not self._is_good(rhs, solution):
-                raise SolverError(SINGULAR[self._kind])
+                raise SolverError(SINGULAR)
         return solution
 
     def _is_good(self, rhs: Array, solution: Array) -> bool:
@@ -213,18 +196,18 @@ class _Checked:
         return bool(np.all(error <= RESIDUAL_LIMIT * np.maximum(scale, load)))
 
 
-def _superlu(matrix: sp.csr_matrix, kind: Kind, limit: float) -> Any:
+def _superlu(matrix: sp.csr_matrix, limit: float) -> Any:
     _require(superlu.factor_bytes(matrix), limit, f"factorising {matrix.shape[0]} unknowns")
     try:
-        return superlu.factors(matrix, kind is Kind.POSITIVE_DEFINITE).solve
+        return superlu.factors(matrix).solve
     except RuntimeError as error:
-        raise SolverError(SINGULAR[kind]) from error
+        raise SolverError(SINGULAR) from error
 
 
-def _pardiso(matrix: sp.csr_matrix, kind: Kind, limit: float) -> Pardiso | None:
+def _pardiso(matrix: sp.csr_matrix, limit: float) -> Pardiso | None:
     """PARDISO's factors; None where it is not installed, or refuses the matrix."""
     try:
-        analysed = Pardiso(matrix, kind)
+        analysed = Pardiso(matrix)
         _require(analysed.factor_bytes, limit, f"factorising {matrix.shape[0]} unknowns")
         analysed.factorise()
     except PardisoError:
@@ -235,7 +218,7 @@ def _pardiso(matrix: sp.csr_matrix, kind: Kind, limit: float) -> Pardiso | None:
 def _pardiso_schur(matrix: sp.csr_matrix, kept: Indices, limit: float) -> Array | None:
     """PARDISO's own Schur complement; None where it is not installed, or fails."""
     try:
-        analysed = Pardiso(matrix, Kind.POSITIVE_DEFINITE, kept)
+        analysed = Pardiso(matrix, kept)
         # Its result and the same in the order asked for.
         needed = analysed.factor_bytes + 2 * BYTES * len(kept) ** 2
         _require(needed, limit, f"condensing {matrix.shape[0]} unknowns onto {len(kept)}")

@@ -1,4 +1,4 @@
-"""MKL PARDISO for sparse symmetric matrices: analysis, factors, solutions, Schur complement.
+"""MKL PARDISO for sparse symmetric positive definite matrices: factors, Schur complement.
 
 pypardiso finds the library. Its own solver compares the whole matrix before every solve, and gives
 neither the memory PARDISO announces nor the Schur complement, so the routine is called here.
@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import ctypes
 import weakref
-from enum import IntEnum
 from functools import cache
 from typing import Any
 
@@ -27,18 +26,13 @@ NESTED_DISSECTION = 2
 # MKL's mode of reproducible results with its fastest kernels: two solutions with two threads
 # differ in the last bits otherwise.
 REPRODUCIBLE = 2
+# Its number for real symmetric positive definite matrices.
+POSITIVE_DEFINITE = 2
 KILOBYTE = 1024
 
 
-class Kind(IntEnum):
-    """PARDISO's types of matrix that are used here."""
-
-    POSITIVE_DEFINITE = 2
-    INDEFINITE = -2
-
-
 class PardisoError(RuntimeError):
-    """PARDISO is not installed or refuses a matrix: not of its kind, an empty row, no memory."""
+    """PARDISO is not installed or refuses a matrix: indefinite, an empty row, no memory."""
 
 
 @cache
@@ -54,13 +48,13 @@ def library() -> Any | None:
 
 
 class Pardiso:
-    """A symmetric matrix analysed by PARDISO; its memory is given back with the object.
+    """A matrix analysed by PARDISO; its memory is given back with the object.
 
     After :meth:`factorise` call it with right-hand sides. With ``kept`` unknowns, their Schur
     complement is what :meth:`schur` gives, and there are no factors to solve with.
     """
 
-    def __init__(self, matrix: sp.csr_matrix, kind: Kind, kept: Indices | None = None) -> None:
+    def __init__(self, matrix: sp.csr_matrix, kept: Indices | None = None) -> None:
         mkl = library()
         if mkl is None:
             raise PardisoError("PARDISO is not installed")
@@ -78,7 +72,7 @@ class Pardiso:
             self._marked[kept] = 1
         self._kept, self._parameters = kept, parameters
         # Looked up by item: the attribute is pypardiso's, with its types of arguments.
-        self._state = (mkl["pardiso"], np.zeros(64, np.int64), int(kind), parameters)
+        self._state = (mkl["pardiso"], np.zeros(64, np.int64), parameters)
         # Unlike __del__ this also comes in time when the interpreter ends.
         weakref.finalize(self, _release, self._state)
         self._call(ANALYSE)
@@ -132,7 +126,7 @@ def _upper(matrix: sp.csr_matrix) -> sp.csr_matrix:
 
 
 def _pardiso(
-    state: tuple[Any, NDArray, int, NDArray],
+    state: tuple[Any, NDArray, NDArray],
     phase: int,
     size: int,
     matrix: tuple[NDArray | None, ...],
@@ -140,11 +134,11 @@ def _pardiso(
     result: Array | None = None,
 ) -> None:
     """One call of the routine, which takes every argument by its address."""
-    routine, handle, kind, parameters = state
+    routine, handle, parameters = state
     error = ctypes.c_int32(0)
     columns = 1 if rhs is None else rhs.shape[1]
     routine(
-        _address(handle), _integer(1), _integer(1), _integer(kind), _integer(phase),
+        _address(handle), _integer(1), _integer(1), _integer(POSITIVE_DEFINITE), _integer(phase),
         _integer(size), *map(_address, matrix), _integer(columns), _address(parameters),
         _integer(0), _address(rhs), _address(result), ctypes.byref(error),
     )  # fmt: skip
@@ -152,7 +146,7 @@ def _pardiso(
         raise PardisoError(f"PARDISO's error {error.value} in phase {phase}")
 
 
-def _release(state: tuple[Any, NDArray, int, NDArray]) -> None:
+def _release(state: tuple[Any, NDArray, NDArray]) -> None:
     _pardiso(state, RELEASE, 0, (None,) * 4)
 
 

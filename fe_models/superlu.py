@@ -11,20 +11,17 @@ from scipy.sparse.linalg import splu
 
 # An entry of a factor with its share of the indices: 9.7 to 10.8 bytes measured.
 BYTES_PER_ENTRY = 10.3
-# The diagonal is the pivot, as the ordering for little fill wants, unless it is below this share
-# of its column; that happens in indefinite matrices alone.
-PIVOT_SHARE = {True: 0.0, False: 0.1}
 
 
-def factors(matrix: sp.csr_matrix, positive: bool) -> Any:
-    """Factors of a symmetric matrix, ``positive`` definite or not.
+def factors(matrix: sp.csr_matrix) -> Any:
+    """Factors of a symmetric positive definite matrix, the diagonal its pivots.
 
     Raises :class:`RuntimeError` if the matrix is exactly singular.
     """
     return splu(
         matrix.tocsc(),
         permc_spec="MMD_AT_PLUS_A",
-        diag_pivot_thresh=PIVOT_SHARE[positive],
+        diag_pivot_thresh=0.0,
         options={"SymmetricMode": True},
     )
 

@@ -47,7 +47,8 @@ def choose_dimension(case: DovetailCase) -> Decision:
     probe = {"two": values[2], "three": values[3], "differences": differences}
     text = (
         f"in a coarse probe of mid-slot two dimensions differ from three by at most {largest:.1%} "
-        f"({quantity} on the {flank}); asked for: {case.accuracy:.1%}"
+        f"({quantity} on the {flank}); asked for: {case.accuracy:.1%}; "
+        "the ends of the slot, which may wear more, are left out"
     )
     return Decision(ENTRY, 2 if largest <= case.accuracy else 3, text, probe)
 

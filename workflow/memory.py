@@ -21,8 +21,13 @@ REST = 1.2e9
 BYTES = 8
 
 
-def required_bytes(case: WearCase | Case, structure_nodes: int = 0) -> float:
-    """Upper estimate of the memory a run takes, with the nodes of both bodies once known."""
+def required_bytes(
+    case: WearCase | Case, structure_nodes: int = 0, interface_nodes: int = 0
+) -> float:
+    """Upper estimate of the memory a run takes.
+
+    ``structure_nodes`` of both bodies and ``interface_nodes`` of all contacts, once known.
+    """
     if isinstance(case, SpecimensCase):
         pad = 3 * (case.mesh.pad_elements + 1) ** 2
         factors = FACTOR_BYTES * (structure_nodes / FACTOR_NODES) ** FACTOR_POWER
@@ -33,17 +38,18 @@ def required_bytes(case: WearCase | Case, structure_nodes: int = 0) -> float:
         cells = case.contact.grid if isinstance(case, LineContactCase) else prod(case.contact.grid)
         increments = len(case.load_path.table())
         return BYTES * cells * (SPECTRA + STATE_FIELDS * increments) + REST
-    if not isinstance(case, DovetailCase) or case.structure.dimension == 2:
-        return BYTES * prod(case.contact.grid) * SPECTRA + REST
-    unknowns = 3 * 2 * prod(case.mesh.flank_nodes)
-    contact = 2 * prod(case.contact.grid) * case.load_path.increments * FIELDS
+    contact = prod(case.contact.grid) * SPECTRA
+    if isinstance(case, DovetailCase) and case.structure.dimension == 3:
+        interface_nodes = 2 * prod(case.mesh.flank_nodes)
+        contact = 2 * prod(case.contact.grid) * case.load_path.increments * FIELDS
     factors = FACTOR_BYTES * (structure_nodes / FACTOR_NODES) ** FACTOR_POWER
-    return BYTES * (DENSE_MATRICES * unknowns**2 + contact) + factors + REST
+    return BYTES * (DENSE_MATRICES * (3 * interface_nodes) ** 2 + contact) + factors + REST
 
 
-def check_memory(case: WearCase | Case, structure_nodes: int = 0) -> None:
+def check_memory(case: WearCase | Case, structure_nodes: int = 0, interface_nodes: int = 0) -> None:
     """Raise :class:`OutOfMemory` if the machine has less than the case needs."""
-    required, available = required_bytes(case, structure_nodes), _available_bytes()
+    required = required_bytes(case, structure_nodes, interface_nodes)
+    available = _available_bytes()
     if available is not None and required > available:
         raise OutOfMemory(
             f"this case needs about {required / 1e9:.1f} GB of memory, {available / 1e9:.1f} GB "

@@ -21,6 +21,8 @@ from workflow.store import ResultsWriter, replacing
 from workflow.structure_stage import StructureStage
 
 RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
+# What the summary tells of a total Lagrangian check, beside the resultants.
+MEASURES = ("slip_change", "slide", "largest_strain", "largest_rotation", "face_rotation")
 
 
 @dataclass(frozen=True)
@@ -141,10 +143,7 @@ def nonlinearity_summary(stage: StructureStage) -> dict[str, Any]:
             name: dict(zip(RESULTANTS, row.tolist(), strict=True))
             for name, row in zip(names, check.change, strict=True)
         },
-        **{
-            name: float(getattr(check, name))
-            for name in ("slip_change", "slide", "largest_strain", "largest_rotation")
-        },
+        **{name: float(getattr(check, name)) for name in MEASURES},
         "iterations": check.iterations,
         "residual": check.residual,
     }

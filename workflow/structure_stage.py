@@ -170,6 +170,10 @@ class StructureStage:
         """Nodes of both bodies, midsides included."""
         return self.mesh.node_count(self.model.order)
 
+    def interface_count(self) -> int:
+        """Nodes of all interfaces."""
+        return sum(len(interface) for interface in self.mesh.interfaces)
+
     def prepare(self) -> None:
         """Do the costly part now: condense the structure, or find it in the cache."""
         _ = self.joint

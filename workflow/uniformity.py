@@ -20,6 +20,8 @@ from workflow.contact_stage import ContactStage, InterfaceState
 from workflow.load_source import LoadSource
 from workflow.structure_stage import StructureStage
 
+# A middle below this share of the largest is rounding.
+ROUNDING = 1e-9
 # Sections whose values are this close to the middle's count as alike: a few per cent.
 ALIKE = 0.05
 # Deviations are taken over this share of the length, around its middle: the ends are never alike.
@@ -139,11 +141,11 @@ def uniformity(
 
 
 def _deviation(values: Array) -> Array:
-    """Relative difference from the middle, ``(ny,)``; none where the middle has nothing."""
+    """Difference from the middle relative to it ``(ny,)``, or to the largest of nothing there."""
     middle = _middle(values)
-    if middle == 0.0:
-        return np.zeros_like(values)
-    deviation: Array = np.abs(values / middle - 1.0)
+    largest = float(np.abs(values).max())
+    scale = abs(middle) if abs(middle) > ROUNDING * largest else largest
+    deviation: Array = np.abs(values - middle) / scale if scale > 0.0 else np.zeros_like(values)
     return deviation
 
 

@@ -9,8 +9,12 @@ from workflow.contact_stage import ContactStage, FirstContact
 from workflow.reporter import Reporter
 from workflow.structure_stage import StructureStage
 
-# The second cycle should repeat the first's forces; a larger change means a cycle not closed.
+# Every cycle should repeat the forces of the one before; a larger change is a cycle not closed.
 OPEN_CYCLE = 0.02
+# Forces and moments on body 2 left out of balance, relative: the friction solver leaves 1e-7.
+OUT_OF_BALANCE = 1e-3
+# Energies of structure and half-space over a cycle that differ by more tell of different slips.
+ENERGIES_APART = 0.25
 # Share of the closed form's edge peak that the grid may miss.
 PEAK_ERROR = 0.05
 
@@ -24,9 +28,18 @@ def warn_of_structure(stage: StructureStage, reporter: Reporter) -> None:
             f"the last two of {unworn.cycles} cycles differ by {unworn.closure:.1%} of the largest "
             "contact force: the cycle that feeds the wear is not closed"
         )
+    imbalance = float(unworn.equilibrium.max())
+    if imbalance > OUT_OF_BALANCE:
+        reporter.warn(
+            f"forces and moments on body 2 are out of balance by {imbalance:.1e}: the stiffness of "
+            "peak load does not suit the other increments (nonlinearity.stiffness)"
+        )
     for history in unworn.histories:
-        if history.loads.P[stage.peak] <= 0.0:
-            reporter.warn(f"{history.interface.name} is open at peak load: it does not wear")
+        name, P = history.interface.name, history.loads.P
+        if P.max() <= 0.0:
+            reporter.warn(f"{name} is open all the time: it does not wear")
+        elif P[stage.peak] <= 0.0:
+            reporter.warn(f"{name} is open at peak load: its pressure and stress there are none")
 
 
 def warn_of_contact(
@@ -51,6 +64,13 @@ def warn_of_contact(
             reporter.warn(
                 f"{stage.name}: the pressure reaches {highest:.0f} MPa, above the yield stress of "
                 f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there"
+            )
+        given, found = float((own.loads.Edx + own.loads.Edy).sum()), float(result.energy.sum())
+        if abs(found - given) > ENERGIES_APART * max(found, given) and not result.cycle:
+            reporter.warn(
+                f"{stage.name}: pressure on the grid and slip of the structure dissipate "
+                f"{found:.3g} N mm a cycle, the structure {given:.3g}: its mesh is too coarse for "
+                "the slip zone, or little slips; refine it or use contact.method: full"
             )
         if result.touches_border:
             warn_of_border(stage, reporter)

@@ -62,7 +62,7 @@ class WearRun:
         with self._reporter.stage("mesh"):
             faces = source.faces
         if isinstance(source, StructureStage):
-            check_memory(self._case, source.node_count())
+            check_memory(self._case, source.node_count(), source.interface_count())
         settings = [StageSettings(self._case, face) for face in faces]
         with contact_workers(settings) as workers:
             with self._reporter.stage("condensation"):

@@ -111,13 +111,19 @@ def _end_with_parent() -> None:
 def _serve(connection: Connection, settings: StageSettings) -> None:
     """Answer calls until the other end of the pipe closes."""
     # Imported here: a process that writes pictures needs no solvers, which take a second to load.
+    from wear.stepping import ContactFailure
     from workflow.contact_stage import ContactStage
 
     stage = _attempt(ContactStage, (settings,))
     while True:
         method, arguments = connection.recv()
-        failed = isinstance(stage, Exception)
-        connection.send(stage if failed else _attempt(getattr(stage, method), arguments))
+        if isinstance(stage, Exception):
+            connection.send(stage)
+            continue
+        answer = _attempt(getattr(stage, method), arguments)
+        if isinstance(answer, ContactFailure):
+            answer = ContactFailure(f"{stage.name}: {answer}")
+        connection.send(answer)
 
 
 def _do(connection: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:

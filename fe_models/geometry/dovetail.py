@@ -14,7 +14,7 @@ from typing import Any, Literal
 import numpy as np
 
 from fe_models.geometry.gmsh_file import Group, generated_body
-from fe_models.gmsh_session import gmsh_model
+from fe_models.gmsh_session import gmsh_model, grow_from
 from fe_models.mesh import (
     AXES,
     Body,
@@ -28,6 +28,8 @@ from sa_solver.types import Array, Frame
 
 # How fast the mesh size grows with the distance from the flanks.
 SIZE_GROWTH = 0.25
+# Points along a flank that distances are measured from: many more than it usually has nodes.
+FLANK_SAMPLES = 200
 # Elements round a full circle of a fillet, whose stress is asked for.
 ELEMENTS_PER_CIRCLE = 24
 
@@ -254,7 +256,10 @@ def _mesh_body(
         model.occ.synchronize()
         for curve in named["flank"]:
             model.mesh.setTransfiniteCurve(curve, flank_nodes[0])
-        _set_sizes(gmsh, named["flank"], dovetail.flank_width / (flank_nodes[0] - 1), size)
+        fine = dovetail.flank_width / (flank_nodes[0] - 1)
+        distance = grow_from(gmsh, "CurvesList", named["flank"], fine, size, SIZE_GROWTH)
+        model.mesh.field.setNumber(distance, "Sampling", FLANK_SAMPLES)
+        gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", ELEMENTS_PER_CIRCLE)
         _mirror_mesh(model, surfaces, -0.5 * slot[0])
         halves, cells = [(2, surface) for surface in surfaces], surfaces
         swept = {label: curves for label, curves in named.items() if label not in ("", "middle")}
@@ -294,21 +299,6 @@ def _draw_halves(
             loop.append(curve)
         surfaces.append(occ.addPlaneSurface([occ.addCurveLoop(loop)]))
     return surfaces, named
-
-
-def _set_sizes(gmsh: Any, flanks: list[int], fine: float, coarse: float) -> None:
-    """Mesh size: ``fine`` on the flanks, growing with the distance from them up to ``coarse``."""
-    field = gmsh.model.mesh.field
-    distance = field.add("Distance")
-    field.setNumbers(distance, "CurvesList", flanks)
-    field.setNumber(distance, "Sampling", 200)
-    growing = field.add("MathEval")
-    field.setString(growing, "F", f"{fine!r} + {SIZE_GROWTH!r} * F{distance}")
-    field.setAsBackgroundMesh(growing)
-    gmsh.option.setNumber("Mesh.MeshSizeMax", coarse)
-    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
-    gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
-    gmsh.option.setNumber("Mesh.MeshSizeFromCurvature", ELEMENTS_PER_CIRCLE)
 
 
 def _mirror_mesh(model: Any, surfaces: list[int], middle: float) -> None:

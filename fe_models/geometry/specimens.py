@@ -25,7 +25,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from fe_models.geometry.gmsh_file import Group, generated_body
-from fe_models.gmsh_session import gmsh_model
+from fe_models.gmsh_session import gmsh_model, grow_from
 from fe_models.mesh import Body, MeshError, StructureMesh, matched_interface, named_mesh
 from sa_solver.types import Array, Frame, Indices
 
@@ -125,7 +125,8 @@ class Specimen:
             half = 0.5 * self.strip_width
             _mesh_pad(gmsh.model, surfaces[CONTACT], half, self.pad_elements // 2)
             _mesh_ring(gmsh.model, self)
-            _set_sizes(gmsh, surfaces[CONTACT], self.strip_width / self.pad_elements, size, growth)
+            fine = self.strip_width / self.pad_elements
+            grow_from(gmsh, "SurfacesList", [surfaces[CONTACT]], fine, size, growth)
             gmsh.model.mesh.generate(3)
             boundaries = [Group(name, 2, [surface]) for name, surface in surfaces.items()]
             quarter = Group("quarter", 3, [tag for _, tag in gmsh.model.getEntities(3)])
@@ -206,19 +207,6 @@ def _mesh_ring(model: Any, specimen: Specimen) -> None:
     radius, level = 0.5 * specimen.diameter, -specimen.ring_distance
     arc = _entity(model, 1, (0.0, 0.0, level), (radius, radius, level))
     model.mesh.setTransfiniteCurve(arc, specimen.ring_nodes // 4 + 1)
-
-
-def _set_sizes(gmsh: Any, pad: int, fine: float, coarse: float, growth: float) -> None:
-    """Mesh size: ``fine`` on the pad, growing with the distance from it up to ``coarse``."""
-    field = gmsh.model.mesh.field
-    distance = field.add("Distance")
-    field.setNumbers(distance, "SurfacesList", [pad])
-    growing = field.add("MathEval")
-    field.setString(growing, "F", f"{fine!r} + {growth!r} * F{distance}")
-    field.setAsBackgroundMesh(growing)
-    gmsh.option.setNumber("Mesh.MeshSizeMax", coarse)
-    gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
-    gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
 
 
 def _mirrored(

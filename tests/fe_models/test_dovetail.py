@@ -182,7 +182,6 @@ def test_equilibrium_error_sees_a_wrong_force(structure, joint, mission):
     amplitudes = mission.amplitudes()
     state = list(frictional.march(amplitudes[:8], structure.gap()))[-1]
 
-
     def error(force):
         states = [replace(state, force=force)]
         return structure.equilibrium_errors(states, amplitudes[PEAK : PEAK + 1])[0]

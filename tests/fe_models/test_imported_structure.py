@@ -281,6 +281,13 @@ def test_displacements_add_up_on_one_boundary_only():
     np.testing.assert_allclose(imposed[:, 0], 2e-3, rtol=1e-12)
 
 
+def test_force_on_a_boundary_of_both_bodies_is_refused():
+    """It would be applied twice."""
+    push = Force("plane", np.array([0.0, 0.0, -10.0]))
+    with pytest.raises(MeshError, match="plane is a boundary of both bodies"):
+        built(block_and_pad(False, True), [Support("base", "xyz")], [push])
+
+
 def test_body_1_alone_may_be_held_at_the_face(precise):
     """Its nodes at rest where they meet the support; body 2 still slides over them."""
     mesh = block_and_pad(False, True)

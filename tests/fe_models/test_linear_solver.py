@@ -15,12 +15,11 @@ from fe_models.linear_solver import (
     LinearSolver,
     SolverError,
     factorise,
-    factorise_symmetric,
     prepare,
     schur_complement,
 )
 from fe_models.multigrid import MultigridSolver, rigid_body_modes, softness
-from fe_models.pardiso import Kind, Pardiso
+from fe_models.pardiso import Pardiso
 
 SIZE = 120
 
@@ -129,7 +128,6 @@ def test_wrong_solution_of_pardiso_is_caught(matrix, rng, monkeypatch, wrong):
     )
     need_pardiso()
     np.testing.assert_allclose(factorise(matrix)(rhs), exact, rtol=1e-9)
-    np.testing.assert_allclose(factorise_symmetric(matrix)(rhs), exact, rtol=1e-9)
 
 
 def test_pardiso_that_fails_while_solving_is_replaced(matrix, rng, monkeypatch):
@@ -186,33 +184,6 @@ def test_singular_matrix(rows, solver):
         factorise(sp.csr_matrix(np.array(rows)))
 
 
-@pytest.mark.parametrize("columns", [None, 3])
-def test_shifted_matrix(matrix, rng, solver, columns):
-    """K - σ M between two eigenvalues, as shift-invert wants it."""
-    mass = sp.diags(0.5 + rng.random(SIZE), format="csr")
-    shift = 2.0
-    shifted = (matrix - shift * mass).tocsr()
-    values = np.linalg.eigvalsh(shifted.toarray())
-    assert values[0] < 0.0 < values[-1]
-    rhs = rng.standard_normal((SIZE,) if columns is None else (SIZE, columns))
-    exact = np.linalg.solve(shifted.toarray(), rhs)
-    np.testing.assert_allclose(
-        factorise_symmetric(shifted)(rhs), exact, rtol=1e-8, atol=1e-9 * np.abs(exact).max()
-    )
-
-
-def test_shifted_matrix_with_no_stored_diagonal(solver):
-    """PARDISO wants every diagonal entry, zeros too; pivots off the diagonal are needed here."""
-    matrix = sp.csr_matrix(np.array([[0.0, 2.0], [2.0, 0.0]]))
-    np.testing.assert_allclose(factorise_symmetric(matrix)(np.array([2.0, 4.0])), [2.0, 1.0])
-
-
-def test_shift_on_an_eigenvalue(matrix, solver):
-    value = np.linalg.eigvalsh(matrix.toarray())[SIZE // 2]
-    with pytest.raises(SolverError, match="move the shift"):
-        factorise_symmetric((matrix - value * sp.eye(SIZE)).tocsr())
-
-
 def test_too_little_memory_is_said_before_factorising(box, titanium, solver, monkeypatch):
     matrix, _, _ = held_box(box, titanium, (4, 4, 4), (1, 1, 1))
 
@@ -222,11 +193,10 @@ def test_too_little_memory_is_said_before_factorising(box, titanium, solver, mon
     monkeypatch.setattr(Pardiso, "factorise", never)
     monkeypatch.setattr(Pardiso, "schur", never)
     monkeypatch.setattr(superlu, "factors", never)
-    for action in (factorise, factorise_symmetric):
-        with pytest.raises(FactorMemoryError, match="coarser mesh") as caught:
-            action(matrix, memory=1e4)
-        assert caught.value.available == 1e4
-        assert caught.value.needed > 1e4
+    with pytest.raises(FactorMemoryError, match="coarser mesh") as caught:
+        factorise(matrix, memory=1e4)
+    assert caught.value.available == 1e4
+    assert caught.value.needed > 1e4
     with pytest.raises(MemoryError, match="onto 30"):
         schur_complement(matrix, np.arange(30), np.arange(30, 300), lambda b: b, memory=1e4)
 
@@ -282,7 +252,7 @@ def test_memory_that_pardiso_announces(box, titanium):
     need_pardiso()
     matrix, _, _ = held_box(box, titanium, (18, 18, 18), (1, 1, 1))
     before = resident_bytes()
-    analysed = Pardiso(matrix, Kind.POSITIVE_DEFINITE)
+    analysed = Pardiso(matrix)
     announced = analysed.factor_bytes
     analysed.factorise()
     assert resident_bytes() - before == pytest.approx(announced, rel=0.25)
@@ -302,7 +272,7 @@ def resident_bytes():
 def test_memory_estimated_for_superlu(box, titanium, counts):
     """Cube, bar and plate, whose factors differ tenfold: within half to three times."""
     matrix, _, _ = held_box(box, titanium, counts, counts)
-    actual = superlu.BYTES_PER_ENTRY * superlu.factors(matrix, positive=True).nnz
+    actual = superlu.BYTES_PER_ENTRY * superlu.factors(matrix).nnz
     assert 0.5 < superlu.factor_bytes(matrix) / actual < 3.0
 
 

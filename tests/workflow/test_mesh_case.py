@@ -291,6 +291,21 @@ def test_load_beyond_the_middles_of_coarse_cells_costs_no_run(blocks, tmp_path):
         assert file["contact/foot/00002/pressure"].shape == (16, 16)
 
 
+@pytest.mark.parametrize(("factor", "wear"), [(1.0, "at peak load"), (-1.0, "all the time")])
+def test_open_faces_are_told(blocks, tmp_path, factor, wear):
+    """One that is open at the increment that is shown may wear all the same."""
+    lift = {"kind": "displacement", "group": "foot_high", "displacement": [0.0, 0.0, -1e-3]}
+    supports = json.dumps([*BLOCKS["supports"], {"group": "foot_high", "hold": "xy"}])
+    summary = run(
+        blocks,
+        tmp_path / "out",
+        f"structure.supports={supports}",
+        f"structure.loads={json.dumps([lift | {'path': [factor, -1.0]}])}",
+        "load_path={increments: [2, 2], peak_leg: 2}",
+    )
+    assert any(line.startswith(f"foot is open {wear}") for line in summary["warnings"])
+
+
 def test_keyword_that_is_not_read_is_refused_with_its_line(blocks):
     file = blocks.with_name("blocks.inp")
     lines = edit(file, "*Step\n", "*Tie, name=T\na, b\n*Step\n")

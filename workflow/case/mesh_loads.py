@@ -68,7 +68,10 @@ class ForceLoad(_Load):
 
 
 class DisplacementLoad(_Load):
-    """Displacement imposed on a boundary along its own direction; free across it."""
+    """Displacement imposed on a boundary along its own direction; free across it.
+
+    Several on one boundary add up as vectors: make them perpendicular.
+    """
 
     kind: Literal["displacement"] = entry(
         "pressure, force, displacement, rotation or acceleration", "displacement"

@@ -97,7 +97,9 @@ class Step(Section):
     kind: Literal["explicit", "implicit"] = entry("explicit or implicit", "implicit")
     cycles: Cycles | None = entry("jumped in a step [1]", 30000, default=None)
     depth: Length | None = entry("largest depth worn in a step [mm]", "1 um", default=None)
-    volume: Volume | None = entry("worn in a step [mm^3]", "0.01 mm^3", default=None)
+    volume: Volume | None = entry(
+        "worn in a step; in the plane per length [mm^3]", "0.01 mm^3", default=None
+    )
 
     @model_validator(mode="after")
     def _one_size(self) -> Step:
@@ -113,7 +115,9 @@ class Stop(Section):
     """Ends the run before its cycles are over, at the first of these that is reached."""
 
     depth: Length | None = entry("largest depth of either body [mm]", "0.5 mm", default=None)
-    volume: Volume | None = entry("worn from both bodies [mm^3]", "10 mm^3", default=None)
+    volume: Volume | None = entry(
+        "worn from both bodies; in the plane per length [mm^3]", "10 mm^3", default=None
+    )
 
 
 class Duration(Section):

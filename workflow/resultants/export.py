@@ -65,7 +65,7 @@ def _claim(out: Path, force: bool) -> None:
 def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter) -> None:
     with reporter.stage("mesh"):
         faces = source.faces
-    check_memory(case, source.node_count())
+    check_memory(case, source.node_count(), source.interface_count())
     with reporter.stage("condensation"):
         source.prepare()
     with reporter.stage("structural friction"):
