@@ -352,7 +352,7 @@ def _rate(group: h5py.Group) -> str:
     if not np.isfinite(rate):
         return "no linear regime, no extrapolation"
     unit = f"mm³{_per_length(group.file)}"
-    return f"{1e6 * rate:.3g} {unit} per million cycles at the end"
+    return f"{1e6 * rate:.3g} {unit} per 10⁶ cycles at the end"
 
 
 def _regime(group: h5py.Group, cycles: Array) -> str:
