@@ -101,7 +101,9 @@ class StructureStage:
     def joint(self) -> FrictionalJoint:
         """The condensed joint, from the cache when it is there."""
         resolvent = self._linear_resolvent
-        if isinstance(self.structure, PrestressedStructure):
+        # The linear structure itself takes seconds to build, and is not asked for.
+        if self.model.nonlinearity.stiffness != "linear":
+            assert isinstance(self.structure, PrestressedStructure)
             resolvent = self.structure.condense_path(resolvent)
         return FrictionalJoint(resolvent, self.model.friction)
 

@@ -18,7 +18,7 @@ def record() -> Iterator[dict[str, float]]:
     yield measures
     new = not RECORD.exists()
     with RECORD.open("a", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
+        writer = csv.writer(file, lineterminator="\n")
         if new:
             writer.writerow(["date", "measure", "value"])
         date = datetime.now(UTC).date().isoformat()
