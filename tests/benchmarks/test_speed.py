@@ -16,7 +16,6 @@ import numpy as np
 
 from fe_models.dovetail import Mission, dovetail_structure
 from fe_models.friction import FrictionalJoint
-from fe_models.geometry.dovetail import Dovetail
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import ElasticPair, Grid, Material
@@ -38,7 +37,7 @@ def seconds(action: Callable[[], object], repeat: int) -> float:
 
 def test_contact_of_the_default_flank(record: dict[str, float]) -> None:
     """Cold, and warm after a little wear, at peak load on 128 x 256 cells."""
-    dovetail = Dovetail(**CASE.structure.model_dump(exclude={"kind"}))
+    dovetail = CASE.structure.geometry()
     grid = Grid.covering(dovetail.flank_size(), CASE.contact.grid)
     contact = NormalContact(HalfSpace(grid, ElasticPair(TITANIUM, TITANIUM)))
     gap = dovetail.flank_gap(grid.x, grid.y, 1)
@@ -57,7 +56,7 @@ def test_contact_of_the_default_flank(record: dict[str, float]) -> None:
 
 def test_friction_of_the_default_joint(record: dict[str, float]) -> None:
     """Iterations of the two missions, and what an iteration costs against its matrix product."""
-    dovetail = Dovetail(**CASE.structure.model_dump(exclude={"kind"}))
+    dovetail = CASE.structure.geometry()
     mission = Mission(**CASE.load_path.model_dump())
     mesh = dovetail.mesh(CASE.mesh.flank_nodes, CASE.mesh.size)
     structure = dovetail_structure(dovetail, mesh, TITANIUM, TITANIUM, mission, 1)
