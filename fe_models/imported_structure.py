@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 from fe_models.constraints import Constraints
 from fe_models.elasticity import ElasticBody
 from fe_models.geometry.imported import ImportedMesh
-from fe_models.mesh import Body, MeshError, StructureMesh, matched_interface, meet_node_to_node
+from fe_models.mesh import Body, MatchError, MeshError, StructureMesh, matched_interface
 from fe_models.mortar import frame_of_faces, mortar_interface
 from fe_models.spin_softening import spin_softening
 from fe_models.structure import Structure
@@ -108,10 +108,11 @@ def imported_mesh(
     for pair in pairs:
         faces = (body_1, pair.face_1, body_2, pair.face_2)
         frame, _ = frame_of_faces(*faces, pair.x_direction)
-        if meet_node_to_node(body_1, body_2, pair.name):
-            interfaces.append(matched_interface(pair.name, body_1, body_2, pair.name, frame))
-        else:
-            interfaces.append(mortar_interface(pair.name, *faces, frame))
+        try:
+            interface = matched_interface(pair.name, body_1, body_2, pair.name, frame)
+        except MatchError:
+            interface = mortar_interface(pair.name, *faces, frame)
+        interfaces.append(interface)
     return StructureMesh(body_1, body_2, tuple(interfaces))
 
 
@@ -334,7 +335,7 @@ def _interface_nodes(mesh: StructureMesh, number: int) -> Indices:
     """Nodes of all contact faces of body ``number``, no node on two of them."""
     nodes: list[Indices] = []
     for index, interface in enumerate(mesh.interfaces):
-        nodes.append((interface.nodes_1, interface.nodes_2)[number - 1])
+        nodes.append(interface.nodes(number))
         for earlier, before in zip(mesh.interfaces[:index], nodes, strict=False):
             if len(np.intersect1d(nodes[-1], before)):
                 raise MeshError(

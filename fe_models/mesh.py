@@ -25,6 +25,10 @@ class MeshError(ValueError):
     """The geometry or its mesh cannot be used; the message says what to change."""
 
 
+class MatchError(MeshError):
+    """Two faces do not meet node to node."""
+
+
 @dataclass(frozen=True)
 class Body:
     """One meshed body: tetrahedra, or triangles in the plane (X, Z) for plane strain.
@@ -119,6 +123,10 @@ class Interface(Face):
         """The face of body ``number``, 1 or 2, with its own nodes."""
         return self.face_1 if number == 1 and self.face_1 is not None else self
 
+    def nodes(self, number: int) -> Indices:
+        """Vertices of body ``number``, 1 or 2, on its own face."""
+        return (self.nodes_1, self.nodes_2)[number - 1]
+
 
 @dataclass(frozen=True)
 class StructureMesh:
@@ -164,20 +172,12 @@ def named_mesh(points: Array, cells: Indices, boundaries: dict[str, Indices]) ->
     return mesh.with_boundaries(named)
 
 
-def meet_node_to_node(body_1: Body, body_2: Body, boundary: str) -> bool:
-    """Whether the vertices of the boundary of that name on both bodies lie on each other."""
-    points_1, points_2 = (b.points[b.vertices(boundary)] for b in (body_1, body_2))
-    distance, _ = cKDTree(points_1).query(points_2)
-    size = np.ptp(points_2, axis=0).max()
-    return len(points_1) == len(points_2) and bool(distance.max() <= MATCHING_TOLERANCE * size)
-
-
 def matched_interface(
     name: str, body_1: Body, body_2: Body, boundary: str, frame: Frame
 ) -> Interface:
     """Pair the vertices of the boundary of that name on both bodies; their gap is zero.
 
-    Raises :class:`MeshError` if a vertex of one face has no partner on the other.
+    Raises :class:`MatchError` if a vertex of one face has no partner on the other.
     """
     nodes_2 = body_2.vertices(boundary)
     nodes_1 = body_1.vertices(boundary)
@@ -185,7 +185,7 @@ def matched_interface(
     distance, partner = cKDTree(body_1.points[nodes_1]).query(points_2)
     size = np.ptp(points_2, axis=0).max()
     if len(nodes_1) != len(nodes_2) or distance.max() > MATCHING_TOLERANCE * size:
-        raise MeshError(
+        raise MatchError(
             f"the two faces of interface {name} do not match node to node: "
             f"{len(nodes_1)} and {len(nodes_2)} nodes, {distance.max():.3g} mm apart"
         )

@@ -204,6 +204,6 @@ def _changed(
     """Body ``number``, supported as it is, with another stiffness, other loads and frames."""
     elastic = copy(body.elastic)
     elastic.stiffness = stiffness
-    nodes = np.concatenate([(i.nodes_1, i.nodes_2)[number - 1] for i in interfaces])
+    nodes = np.concatenate([i.nodes(number) for i in interfaces])
     frames = interface_frames(interfaces, number, elastic.body)
     return SupportedBody(elastic, body.constraints, nodes, frames, loads, body.imposed)

@@ -28,12 +28,11 @@ def worn_mesh(mesh: StructureMesh, depths: list[tuple[Array, Array]]) -> Structu
     crushed, when the depth is no longer small against the elements at the flank.
     """
     bodies = []
-    for number, body in enumerate((mesh.body_1, mesh.body_2)):
+    for number, body in enumerate((mesh.body_1, mesh.body_2), start=1):
         prescribed = np.zeros_like(body.points)
         for interface, pair in zip(mesh.interfaces, depths, strict=True):
-            nodes = (interface.nodes_1, interface.nodes_2)[number]
-            inwards = (-1.0, 1.0)[number] * interface.frame.axes[2]
-            prescribed[nodes] += np.outer(pair[number], inwards)
+            inwards = {1: -1.0, 2: 1.0}[number] * interface.frame.axes[2]
+            prescribed[interface.nodes(number)] += np.outer(pair[number - 1], inwards)
         bodies.append(_moved(body, prescribed[:, body.axes]))
     return StructureMesh(bodies[0], bodies[1], mesh.interfaces)
 
@@ -44,8 +43,7 @@ def worn_volume(before: Body, after: Body, interface: Interface, number: int) ->
     Each facet sweeps a prism: its area times the mean distance of its corners; per length in the
     plane [mm²].
     """
-    nodes = (interface.nodes_1, interface.nodes_2)[number - 1]
-    moved = (after.points - before.points)[nodes] @ interface.frame.axes[2]
+    moved = (after.points - before.points)[interface.nodes(number)] @ interface.frame.axes[2]
     return float(interface.face(number).nodal_areas @ np.abs(moved))
 
 

@@ -101,7 +101,7 @@ class SpecimensModel:
             alike: Array = known["full/1"]
             return alike
         body = (self.mesh.body_1, self.mesh.body_2)[number - 1]
-        pad = (self.face.nodes_1, self.face.nodes_2)[number - 1]
+        pad = self.face.nodes(number)
         material, order = self._materials[number - 1], self._case.mesh.order
         matrices = specimen_matrices(self.specimen, body, pad, material, order)
         return _lowest(matrices.stiffness, matrices.mass)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import ClassVar, Literal
 
 from pydantic import model_validator
@@ -44,7 +45,7 @@ def check_interface_name(name: str, key: str) -> None:
         )
 
 
-class WearCase(Scene):
+class WearCase(Scene, ABC):
     """One scene: where its loads come from, its contacts and how they wear.
 
     Each kind of structure narrows ``structure``, ``materials`` and ``wear`` to its own.
@@ -79,9 +80,9 @@ class WearCase(Scene):
         body: EnergyBody | ArchardBody = getattr(self.wear, self.bodies[number - 1])
         return body
 
+    @abstractmethod
     def outline(self) -> list[tuple[str, str]]:
         """What structure and loads would run, in a few rows of name and text."""
-        raise NotImplementedError
 
     @property
     def recoupling(self) -> Coupling:
