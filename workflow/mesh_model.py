@@ -69,19 +69,22 @@ class MeshModel:
 
     @cached_property
     def _mesh(self) -> StructureMesh:
-        mesh = self._case.structure.mesh()
-        return replace(mesh, interfaces=tuple(map(self._with_gap, mesh.interfaces)))
+        interfaces = tuple(map(self._with_gap, self._meshed.interfaces))
+        return replace(self._meshed, interfaces=interfaces)
+
+    @cached_property
+    def _meshed(self) -> StructureMesh:
+        """The mesh of the file, without the gaps that the case gives."""
+        return self._case.structure.mesh()
 
     def _with_gap(self, interface: Interface) -> Interface:
         """The interface with the case's own gap on top of the meshes'."""
-        return replace(interface, gap=interface.gap + self._given_at_nodes(interface))
-
-    def _given_at_nodes(self, interface: Interface) -> Array:
         given = self._given(interface)
         if given is None:
-            return np.zeros(len(interface))
+            return interface
         points = interface.coordinates[:, :, None, None]
-        return np.array([float(given(x, y)[0, 0]) for x, y in points])
+        at_nodes = np.array([float(given(x, y)[0, 0]) for x, y in points])
+        return replace(interface, gap=interface.gap + at_nodes)
 
     def _given(self, interface: Interface) -> GapFunction | None:
         """The gap that the case gives an interface, if it does."""
@@ -108,8 +111,8 @@ class MeshModel:
 
     def contact_face(self, interface: Interface) -> ContactFace:
         size, given = face_size(interface), self._given(interface)
-        meshed = _MeshGap(interface, interface.gap - self._given_at_nodes(interface))
-        gap = meshed if given is None else _Sum(meshed, given)
+        (own,) = (i for i in self._meshed.interfaces if i.name == interface.name)
+        gap = _MeshGap(own) if given is None else _Sum(_MeshGap(own), given)
         return ContactFace(interface, size, gap, _coarse(interface, size))
 
     def warn(self, structure: Structure, reporter: Reporter) -> None:
@@ -137,8 +140,8 @@ class _Sum:
 class _MeshGap:
     """Gap of the meshed faces, linear between nodes; the bodies part beyond them."""
 
-    def __init__(self, interface: Interface, gap: Array) -> None:
-        self._face, self._gap = interface, gap
+    def __init__(self, interface: Interface) -> None:
+        self._face, self._gap = interface, interface.gap
 
     def __call__(self, x: Array, y: Array) -> Array:
         """Gap ``(nx, ny)`` [mm] at ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``."""

@@ -17,7 +17,7 @@ from wear.kinetics import LinearRegime, linear_regime
 from workflow.case import ResultantsCase, WearCase, dump_case
 from workflow.checkpoint import KINETICS, RunState
 from workflow.comparison import comparison_summary, write_comparison
-from workflow.contact_stage import ContactStage, FirstContact
+from workflow.contact_stage import ContactStage, CycleTractions, FirstContact
 from workflow.fidelity import kept
 from workflow.figures import write_figures
 from workflow.folder import OutputFolder
@@ -40,7 +40,7 @@ class Outcome:
     """Everything a wear run found.
 
     ``unworn`` are the loads of the faces before wear and ``first`` the contact of that cycle, by
-    interface.
+    interface; ``worn`` the tractions of a cycle at the end, none where no stress is asked for.
     """
 
     case: WearCase
@@ -49,6 +49,7 @@ class Outcome:
     state: RunState
     unworn: Sequence[FaceLoads]
     first: list[FirstContact]
+    worn: list[CycleTractions]
 
     @cached_property
     def regimes(self) -> dict[str, dict[str, LinearRegime | None]]:
@@ -75,7 +76,7 @@ def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> 
             outcome.source.peak,
             outcome.stages,
             list(zip(outcome.unworn, outcome.first, strict=True)),
-            outcome.state.interfaces,
+            outcome.worn,
             reporter,
         )
     with reporter.stage("results"):

@@ -20,7 +20,7 @@ from sa_solver.types import Array, Grid, Material
 from wear.life import findley, ruiz, smith_watson_topper
 from workflow.case import WearCase
 from workflow.case.wear_sections import ContactStress, Life
-from workflow.contact_stage import ContactStage, CycleTractions, FirstContact, InterfaceState
+from workflow.contact_stage import ContactStage, CycleTractions, FirstContact
 from workflow.load_source import FaceLoads
 from workflow.reporter import Reporter
 from workflow.store import ResultsWriter
@@ -171,19 +171,19 @@ def contact_stresses(
     peak: int,
     stages: Sequence[ContactStage],
     unworn: Sequence[tuple[FaceLoads, FirstContact]],
-    worn: Sequence[InterfaceState],
+    worn: Sequence[CycleTractions],
     reporter: Reporter,
 ) -> list[InterfaceStress]:
     """Stress under every contact as the case asks for it; empty if it does not.
 
-    ``unworn`` are the loads and the contact of the first cycle, ``worn`` the last states; ``peak``
-    is the increment of peak load.
+    ``unworn`` are the loads and the contact of the first cycle, ``worn`` the tractions of the last;
+    ``peak`` is the increment of peak load.
     """
     if not case.stress.wanted:
         return []
     found, unknown = [], []
-    for stage, (loads, first), state in zip(stages, unworn, worn, strict=True):
-        cycles = stage.unworn_tractions(loads, first), stage.tractions(state)
+    for stage, (loads, first), last in zip(stages, unworn, worn, strict=True):
+        cycles = stage.unworn_tractions(loads, first), last
         unknown += [cycle.unknown for cycle in cycles]
         found.append(_interface_stress(case, stage, peak, cycles))
     _tell_of_stick(np.array(unknown), peak, reporter)

@@ -14,7 +14,13 @@ from wear.stepping import ContactFailure
 from workflow import checkpoint
 from workflow.case import WearCase
 from workflow.checkpoint import KINETICS, RunState
-from workflow.contact_stage import ContactStage, FirstContact, InterfaceState, StageSettings
+from workflow.contact_stage import (
+    ContactStage,
+    CycleTractions,
+    FirstContact,
+    InterfaceState,
+    StageSettings,
+)
 from workflow.errors import MethodFailed, UserError
 from workflow.folder import OutputFolder
 from workflow.load_source import FaceLoads, LoadSource
@@ -80,7 +86,11 @@ class WearRun:
             if kept is None:
                 loop.keep(state)
             state = loop.advance(kept or state)
-        outcome = Outcome(self._case, source, stages, state, unworn, first)
+            worn: list[CycleTractions] = []
+            if self._case.stress.wanted:
+                with self._reporter.stage("stress under the contacts"):
+                    worn = workers.call("tractions", state.interfaces)
+        outcome = Outcome(self._case, source, stages, state, unworn, first, worn)
         write_output(outcome, self._folder, self._reporter)
 
     def _check_nonlinearity(self, source: StructureStage) -> None:
