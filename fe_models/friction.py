@@ -129,9 +129,13 @@ class _Problem:
 
     def _force(self, trial: Array) -> Array:
         """Force that brings a trial displacement ``(3, n)`` back to the law, at stiffness ρ."""
+        return coulomb(self._sticking_force(trial), self._friction)
+
+    def _sticking_force(self, trial: Array) -> Array:
+        """Force ``(3, n)`` that would close the gap and undo the slip, whatever its size."""
         stick = self._rho * (self._previous - trial)
         stick[2] = -self._rho * (self._gap + trial[2])
-        return coulomb(stick, self._friction)
+        return stick
 
     def _distance(self, start: Array) -> float:
         """How far a start is from a solution: the splitting's first step."""
@@ -139,11 +143,13 @@ class _Problem:
         return float(np.linalg.norm(self._law(2.0 * elastic - start) - elastic))
 
     def _state(self, split: SplittingResult, iterations: int) -> FrictionState:
-        displacement = self._nodal(split.solution)
+        stick = self._sticking_force(self._nodal(2.0 * split.elastic - split.state))
+        force = coulomb(stick, self._friction)
         return FrictionState(
-            force=self._force(self._nodal(2.0 * split.elastic - split.state)),
-            displacement=displacement,
-            slip=displacement[:2] - self._previous[:2],
+            force=force,
+            displacement=self._nodal(split.solution),
+            # The difference of displacements, but 0 where a node sticks and never along the force.
+            slip=(force - stick)[:2] / self._rho,
             state=split.state,
             residual=split.residual,
             iterations=iterations,

@@ -21,9 +21,6 @@ from workflow.case.wear_sections import ArchardBody, ContactStress, EnergyAmplit
 from workflow.errors import UserError
 from workflow.load_source import ContactFace, FaceLoads
 
-# Slip of a sticking node is rounding, 1e-15 of the largest and less: it has no direction.
-SLIP_NOISE = 1e-9
-
 
 @dataclass(frozen=True)
 class InterfaceState:
@@ -186,7 +183,7 @@ class ContactStage:
         if wearing.cycle:
             own = wearing.cycle[peak]
             return {"pressure": own.pressure, "shear": own.shear, "slip": own.slip}
-        slip = self.transfer.to_cells(_true_slip(state.slip)[peak])
+        slip = self.transfer.to_cells(state.slip[peak])
         pressure = wearing.contact.solve(state.surfaces, peak, state.starts.get(peak)).pressure
         return {"pressure": pressure, "shear": self._sliding_shear(pressure, slip), "slip": slip}
 
@@ -207,7 +204,7 @@ class ContactStage:
 
     def _structures_tractions(self, nodal_slip: Array, pressure: Array) -> CycleTractions:
         """Those where slip is the structure's."""
-        slip = self.transfer.to_cells(_true_slip(nodal_slip))
+        slip = self.transfer.to_cells(nodal_slip)
         stuck = ~slip.any(axis=1)
         force = pressure.sum(axis=(1, 2))
         held = np.where(stuck, pressure, 0.0).sum(axis=(1, 2))
@@ -302,12 +299,6 @@ def _check_section(stress: ContactStress, grid: Grid) -> None:
             f"stress.at: {stress.at:g} mm is off the contact's grid; "
             f"allowed: {-reach:.4g} to {reach:.4g} mm"
         )
-
-
-def _true_slip(slip: Array) -> Array:
-    """Slips ``(t, 2, n)`` of nodes, 0 where they are but rounding."""
-    size = np.hypot(slip[:, 0], slip[:, 1])[:, None]
-    return np.where(size > SLIP_NOISE * size.max(), slip, 0.0)
 
 
 def _own_tractions(cycle: tuple[ContactState, ...]) -> CycleTractions:

@@ -283,3 +283,13 @@ def test_floating_body_that_starts_apart_arrives(distance):
     assert state.converged
     assert state.force[2].sum() == pytest.approx(17.0, rel=1e-6)
     assert np.all(gap + state.displacement[2] > -1e-9 * distance)
+
+
+def test_sticking_nodes_have_no_slip_and_none_gains_energy(structure, joint, mission):
+    """To the last bit, component by component: what rounding leaves has a sign."""
+    amplitudes = mission.amplitudes()
+    for state in FrictionalJoint(joint.resolvent(), 0.4).march(amplitudes, structure.gap()):
+        assert np.all(state.force[:2] * state.slip <= 0.0)
+        pressed = state.force[2] > 0.0
+        inside = np.hypot(*state.force[:2]) < 0.4 * state.force[2] * (1.0 - 1e-12)
+        assert not state.slip[:, pressed & inside].any()
