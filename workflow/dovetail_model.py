@@ -63,6 +63,9 @@ class DovetailModel:
         widen = "widen structure.edge_width or structure.end_width"
         return ContactFace(interface, self.dovetail.flank_size(side), gap, nodes, widen)
 
+    def node_numbers(self, body: int) -> None:
+        """Nobody but us knows the nodes."""
+
     def warn(self, structure: Structure, reporter: Reporter) -> None:
         """Self-locking joints."""
         slope = np.tan(self.dovetail.flank_angle)

@@ -14,7 +14,7 @@ from fe_models.mesh import Interface, StructureMesh
 from fe_models.relinearised import Softening
 from fe_models.structure import Structure
 from sa_solver.shapes import PARTING_SLOPE
-from sa_solver.types import Array, Grid
+from sa_solver.types import Array, Grid, Indices
 from workflow.case import MeshCase
 from workflow.case.mesh_case import face_size
 from workflow.case.mesh_loads import RotationLoad
@@ -114,6 +114,11 @@ class MeshModel:
         (own,) = (i for i in self._meshed.interfaces if i.name == interface.name)
         gap = _MeshGap(own) if given is None else _Sum(_MeshGap(own), given)
         return ContactFace(interface, size, gap, _coarse(interface, size))
+
+    def node_numbers(self, body: int) -> Indices:
+        structure = self._case.structure
+        name = {1: structure.body_1, 2: structure.body_2}[body]
+        return structure.read().node_numbers[name]
 
     def warn(self, structure: Structure, reporter: Reporter) -> None:
         """Planes of symmetry that cut a contact, of which its half-space knows nothing."""

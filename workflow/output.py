@@ -25,7 +25,7 @@ from workflow.load_source import FaceLoads, LoadSource
 from workflow.paraview import write_paraview
 from workflow.reporter import Reporter
 from workflow.resultants.source import ResultantsSource
-from workflow.resultants.worn_faces import write_worn_faces
+from workflow.resultants.worn_faces import WornFace, imported_faces, meshed_faces, write_worn_faces
 from workflow.store import ResultsWriter, read_arrays, replacing
 from workflow.stress_stage import InterfaceStress, contact_stresses
 from workflow.structure_output import WornStructure, resultants_at, worn_structure
@@ -103,12 +103,16 @@ def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> 
 def _write_worn_nodes(
     outcome: Outcome, folder: OutputFolder, reporter: Reporter
 ) -> dict[str, dict[str, Any]]:
-    """Worn surfaces at the user's own nodes, where the loads are those of another code."""
+    """Worn surfaces at the user's own nodes, where the loads or the mesh are the user's."""
     case, source = outcome.case, outcome.source
-    if not (isinstance(case, ResultantsCase) and isinstance(source, ResultantsSource)):
-        return {}
-    states = outcome.state.interfaces
-    return write_worn_faces(case, source, outcome.stages, states, folder.root, reporter)
+    faces: list[WornFace] = []
+    pairs = zip(outcome.stages, outcome.state.interfaces, strict=True)
+    for number, (stage, state) in enumerate(pairs):
+        if isinstance(case, ResultantsCase) and isinstance(source, ResultantsSource):
+            faces += imported_faces(case, source, stage, state)
+        elif isinstance(source, StructureStage):
+            faces += meshed_faces(source, number, stage, state)
+    return write_worn_faces(faces, folder.root, reporter)
 
 
 def _write_pictures(case: WearCase, folder: OutputFolder) -> None:

@@ -19,7 +19,7 @@ from fe_models.relinearised import (
 )
 from fe_models.stress import StressField, deformation, stress_state
 from fe_models.structure import CycleSolution, InterfaceHistory, Structure
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 from workflow.cache import content_key, load_cycle, load_joint, save_cycle, save_joint
 from workflow.case.wear_sections import Nonlinearity
 from workflow.errors import MethodFailed
@@ -66,6 +66,10 @@ class StructureModel(Protocol):
 
     def contact_face(self, interface: Interface) -> ContactFace:
         """What the contact stage needs of an interface."""
+        ...
+
+    def node_numbers(self, body: int) -> Indices | None:
+        """The user's numbers of the vertices of body 1 or 2; None where the mesh is ours."""
         ...
 
     def warn(self, structure: Structure, reporter: Reporter) -> None:

@@ -259,6 +259,23 @@ def test_parts_and_instances_run(blocks, tmp_path):
     assert summary["structure"]["closure"] <= CLOSED
 
 
+def test_worn_faces_come_back_at_the_users_nodes(blocks, tmp_path):
+    """By the numbers of the file: the top of the base and the bottom of the foot."""
+    summary = run(blocks, tmp_path / "out")["foot"]
+    for body, numbers, into in ((1, range(19, 28), -1.0), (2, range(1, 10), 1.0)):
+        told = summary["worn_nodes"][f"body_{body}"]
+        rows = np.loadtxt(tmp_path / "out" / told["file"], delimiter=",", skiprows=1)
+        assert sorted(rows[:, 0].astype(int)) == list(numbers)
+        np.testing.assert_allclose(rows[:, 1:3], 0.0, atol=1e-15)
+        assert np.all(into * rows[:, 3] >= 0.0)
+        assert np.any(into * rows[:, 3] > 0.0)
+        assert told["volume_share"] == pytest.approx(1.0, abs=1e-12)
+    ending = invoke("resultants", blocks, "--out", tmp_path / "files")
+    assert ending.exit_code == 0, ending.stderr
+    with h5py.File(tmp_path / "files" / "resultants.h5") as file:
+        assert sorted(file["foot/nodes_2"]) == list(range(1, 10))
+
+
 def test_cycle_of_another_peak_is_not_taken_from_the_cache(blocks, tmp_path, monkeypatch):
     """The same cycle, but stiff as at another of its loads."""
     found = []

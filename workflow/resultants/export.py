@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from fe_models.mesh import MeshError
+from fe_models.mesh import Interface, MeshError
+from fe_models.structure import InterfaceHistory
 from sa_solver.types import Array
 from workflow.case import Case, ResultantsCase, WearCase, dump_case
 from workflow.errors import UserError
@@ -69,7 +71,7 @@ def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter
     with reporter.stage("condensation"):
         source.prepare()
     with reporter.stage("structural friction"):
-        histories = {own.interface.name: own for own in source.unworn()}
+        histories = {own.interface.name: _numbered(source, own) for own in source.unworn()}
     warn_of_structure(source, reporter)
     heights = {face.face.name: _height(face, case) for face in faces}
     loads = {name: history.loads for name, history in histories.items()}
@@ -78,6 +80,16 @@ def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter
     text = dump_case(_imported(case, faces, out))
     with replacing(out / CASE) as partial:
         partial.write_text(text, encoding="utf-8")
+
+
+def _numbered(source: StructureStage, history: InterfaceHistory) -> InterfaceHistory:
+    """The history with the user's own node numbers, where the mesh has them."""
+    face = history.interface
+    numbers = source.model.node_numbers(1), source.model.node_numbers(2)
+    if not isinstance(face, Interface) or numbers[0] is None or numbers[1] is None:
+        return history
+    own = replace(face, nodes_1=numbers[0][face.nodes_1], nodes_2=numbers[1][face.nodes_2])
+    return replace(history, interface=own)
 
 
 def _height(face: ContactFace, case: WearCase) -> Array:
