@@ -47,9 +47,9 @@ class FrictionState:
 
 
 class FrictionalJoint:
-    """A joint with friction coefficient µ, for any gaps and loads."""
+    """A joint with friction coefficient µ, one or by node ``(n,)``, for any gaps and loads."""
 
-    def __init__(self, joint: JointResolvent, friction: float) -> None:
+    def __init__(self, joint: JointResolvent, friction: float | Array) -> None:
         self._inverse, self._rho, self._loads = joint.inverse, joint.rho, joint.loads
         self._friction = friction
 
@@ -88,7 +88,7 @@ class _Problem:
         self,
         inverse: Array,
         rho: float,
-        friction: float,
+        friction: float | Array,
         load: Array,
         gap: Array,
         previous: Array,

@@ -132,11 +132,11 @@ class Structure:
         joint: FrictionalJoint,
         amplitudes: Array,
         gap: Array,
-        friction: float,
+        friction: float | Array,
         after: CycleSolution | None = None,
         preload: Array | None = None,
     ) -> CycleSolution:
-        """Solve one closed cycle of ``amplitudes`` ``(t, cases)``.
+        """Solve one closed cycle of ``amplitudes`` ``(t, cases)``; ``friction`` is the joint's.
 
         From rest and ``preload`` ``(s, cases)``, which is passed once, the first that repeats the
         one before it; or one that follows ``after``, as many cycles on as that one had repeated.
@@ -178,13 +178,14 @@ class Structure:
         )
 
     def histories(
-        self, force: Array, displacement: Array, slip: Array, friction: float
+        self, force: Array, displacement: Array, slip: Array, friction: float | Array
     ) -> tuple[InterfaceHistory, ...]:
         """Histories of the interfaces from the fields ``(t, components, n)`` over all of them."""
         histories = []
+        nodal = np.broadcast_to(friction, force.shape[-1:])
         for interface, own in self._shares():
             parts = force[..., own], displacement[..., own], slip[..., own]
-            loads = load_history(interface, parts[0], parts[2], friction)
+            loads = load_history(interface, parts[0], parts[2], nodal[own])
             histories.append(InterfaceHistory(interface, loads, *parts))
         return tuple(histories)
 
@@ -230,6 +231,32 @@ class Structure:
         ]
 
 
+def mixed(cycles: Sequence[CycleSolution], shares: Sequence[float]) -> CycleSolution:
+    """Closed ``cycles`` of one structure one after the other, each so large a share of all.
+
+    Solvers' counts are sums, their errors the largest. A cycle that follows it must follow one of
+    ``cycles``.
+    """
+    if len(cycles) == 1:
+        return cycles[0]
+    histories = []
+    for parts in zip(*(cycle.histories for cycle in cycles), strict=True):
+        fields = {name: np.concatenate([getattr(p, name) for p in parts]) for name in FIELDS}
+        loads = LoadHistory.mix([part.loads for part in parts], shares)
+        histories.append(InterfaceHistory(parts[0].interface, loads, **fields))
+    return CycleSolution(
+        histories=tuple(histories),
+        states=tuple(state for cycle in cycles for state in cycle.states),
+        last_displacement=cycles[-1].last_displacement,
+        iterations=sum(cycle.iterations for cycle in cycles),
+        residual=max(cycle.residual for cycle in cycles),
+        converged=all(cycle.converged for cycle in cycles),
+        closure=max(cycle.closure for cycle in cycles),
+        equilibrium=np.concatenate([cycle.equilibrium for cycle in cycles]),
+        cycles=max(cycle.cycles for cycle in cycles),
+    )
+
+
 def _closure(one: Sequence[FrictionState], two: Sequence[FrictionState]) -> float:
     """Largest difference of the contact forces of two cycles, relative to the largest force."""
     largest = max(float(np.abs(state.force).max()) for state in two)
@@ -238,8 +265,13 @@ def _closure(one: Sequence[FrictionState], two: Sequence[FrictionState]) -> floa
     return change / largest if largest > 0.0 else 0.0
 
 
-def load_history(interface: Face, force: Array, slip: Array, friction: float) -> LoadHistory:
-    """Resultants and energies of nodal ``force`` ``(t, 3, n)`` and ``slip`` ``(t, 2, n)``."""
+def load_history(
+    interface: Face, force: Array, slip: Array, friction: float | Array
+) -> LoadHistory:
+    """Resultants and energies of nodal ``force`` ``(t, 3, n)`` and ``slip`` ``(t, 2, n)``.
+
+    ``friction`` is µ, one or by node ``(n,)``.
+    """
     x, y = interface.coordinates.T
     columns = np.array([resultants(f, x, y) for f in force]).T
     energy = -np.einsum("tan,tan->at", force[:, :2], slip)

@@ -159,8 +159,9 @@ class _Search:
 
     def _search(self, residual: Array, gradient: Array, energy: float, revised: bool) -> bool:
         """Minimise along the conjugate direction (Polak-Ribière, never negative)."""
-        conjugacy = (energy - float(np.vdot(gradient, self._residual))) / self._energy
-        self._direction *= max(0.0, conjugacy)
+        change = energy - float(np.vdot(gradient, self._residual))
+        # The last gap can have vanished to rounding: then there is nothing to be conjugate to.
+        self._direction *= max(0.0, change / self._energy) if self._energy > 0.0 else 0.0
         self._direction -= gradient
         if revised:
             self._remove_resultants(self._direction)

@@ -31,7 +31,12 @@ from sa_solver.gross_slip import (
 )
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalStart, NormalState
-from sa_solver.tangential import FrictionLimitError, TangentialContact, TangentialState
+from sa_solver.tangential import (
+    FrictionLimitError,
+    TangentialContact,
+    TangentialContactError,
+    TangentialState,
+)
 from sa_solver.tangential_problem import PlanarModes
 from sa_solver.types import Array
 
@@ -297,7 +302,13 @@ class FrictionalContact:
 
     def _slides(self, limit: Array, load: Load) -> bool:
         """Whether the energy is known and forces are within 1 % of the largest friction carries."""
-        if load.energy is None or not load.energy.sum() > 0.0:
+        if load.energy is None:
+            return False
+        if not np.all(np.isfinite(load.energy)):
+            raise TangentialContactError(
+                f"energies {load.energy} must be finite: check the load history"
+            )
+        if load.energy.sum() <= 0.0:
             return False
         modes = self._modes
         forces = load.values[[TANGENTIAL[k] for k in modes.free]]

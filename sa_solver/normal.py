@@ -13,7 +13,7 @@ Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -22,6 +22,7 @@ from sa_solver.nested_solver import NestedSolver, Solution
 from sa_solver.normal_control import NormalContactError as NormalContactError
 from sa_solver.normal_control import NormalControl
 from sa_solver.normal_problem import (
+    Iterate,
     NormalProblem,
     NormalResiduals,
     Work,
@@ -137,13 +138,17 @@ class NormalContact:
         self._check_fields(height, start, compliance)
         control = NormalControl(P, Mx, My, approach, tilt_x, tilt_y)
         control.check_moments(self.grid)
-        problem = self._problem(height, control, compliance)
+        # Counted from the lowest point, heights keep the digits of a small displacement.
+        lowest = float(height.min()) if APPROACH in control.free else 0.0
+        problem = self._problem(height - lowest, control, compliance)
         apart = _separated(problem)
-        if apart is not None:
-            return self._unpressed(problem, control, apart)
-        pressure, displacement = self._start(problem, start)
-        solution = self._solver.solve(problem, pressure, displacement, tolerance)
-        return self._state(problem, control, solution, tolerance)
+        if apart is None:
+            pressure, displacement = self._start(problem, start)
+            solution = self._solver.solve(problem, pressure, displacement, tolerance)
+            state = self._state(problem, control, solution, tolerance)
+        else:
+            state = self._unpressed(problem, control, apart)
+        return replace(state, approach=state.approach + lowest)
 
     # -- steps of solve -----------------------------------------------------------------------
     def _problem(
@@ -199,7 +204,7 @@ class NormalContact:
             My=My,
             residuals=measured,
             converged=converged,
-            message="" if converged else _failure(measured, tolerance),
+            message="" if converged else _failure(problem, iterate, measured, tolerance),
             method=solution.method,
             iterations=solution.iterations,
             convolutions=_equivalents(problem.work, self.half_space),
@@ -296,9 +301,22 @@ def _check_field(name: str, field: Array, shape: tuple[int, int]) -> None:
         raise NormalContactError(f"{name} hold NaN or infinity: fill or crop the missing points")
 
 
-def _failure(measured: NormalResiduals, tolerance: float) -> str:
+def _failure(
+    problem: NormalProblem, iterate: Iterate, measured: NormalResiduals, tolerance: float
+) -> str:
+    largest = float(np.abs(problem.height)[iterate.pressure > 0.0].max(initial=0.0))
+    smallest = float(np.spacing(largest)) / tolerance
+    depth = float(iterate.displacement.max(initial=0.0))
+    if depth < smallest:
+        remedy = (
+            f"with heights of {largest:.1e} mm in contact, rounding hides what a displacement of "
+            f"{depth:.1e} mm changes: take a slope off the heights, raise the load, or loosen the "
+            "tolerance"
+        )
+    else:
+        remedy = "loosen the tolerance, or smooth or refine the heights"
     return (
         f"the normal contact stopped at a residual of {measured.largest:.1e} (penetration "
         f"{measured.penetration:.1e}, complementarity {measured.complementarity:.1e}) above the "
-        f"tolerance {tolerance:.0e}: loosen the tolerance, or smooth or refine the heights"
+        f"tolerance {tolerance:.0e}: {remedy}"
     )

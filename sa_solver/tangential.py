@@ -40,6 +40,12 @@ FALLBACK_ITERATIONS = 3000
 BOX_STEP = 16
 """Boxes around the pressed cells grow in these steps, so that few transforms need be planned."""
 
+UNCARRIED = (
+    "nothing carries the shear load: no cell is in contact, or the friction coefficient is 0; give "
+    "a normal load first, or impose motions instead of forces"
+)
+"""Said of a shear force or a moment Mz without pressure, or without friction."""
+
 NAMES = ("Qx", "Qy", "Mz")
 UNITS = ("N", "N", "N mm")
 
@@ -263,11 +269,7 @@ class TangentialContact:
     ) -> TangentialState:
         """Bodies apart: no shear, and no slip either."""
         if forces[list(free)].any():
-            raise FrictionLimitError(
-                0.0,
-                "a shear force without pressure: no cell is in contact; give a normal load first, "
-                "or impose motions instead of forces",
-            )
+            raise FrictionLimitError(0.0, UNCARRIED)
         zero = np.zeros((2, *self.grid.shape))
         motions = np.append(imposed, 0.0)
         return TangentialState(

@@ -23,8 +23,11 @@ increment is ``Ed = -Σ q·Δs S >= 0``.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields
+from collections.abc import Sequence
+from dataclasses import dataclass, field, fields
 from functools import cached_property
+from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -228,6 +231,9 @@ class LoadHistory:
 
     ``P, Qx, Qy`` in N, ``Mx, My, Mz`` in N mm; ``Edx, Edy`` [N mm] is the energy dissipated in the
     increment that ends at this state, by direction; ``sliding`` marks gross slip.
+
+    A mix of missions holds several closed cycles one after the other: ``block`` counts them from 0,
+    and ``share`` is how often each increment happens per mean cycle.
     """
 
     P: Array
@@ -239,11 +245,49 @@ class LoadHistory:
     Edx: Array
     Edy: Array
     sliding: NDArray[np.bool_]
+    share: Array = field(default_factory=lambda: np.empty(0))
+    block: Indices = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
     def __post_init__(self) -> None:
+        if not self.block.size and not self.share.size:
+            object.__setattr__(self, "share", np.ones(len(self.P)))
+            object.__setattr__(self, "block", np.zeros(len(self.P), dtype=np.int64))
         lengths = {len(getattr(self, f.name)) for f in fields(self)}
         if len(lengths) != 1:
             raise ValueError(f"columns of a load history differ in length: {sorted(lengths)}")
 
     def __len__(self) -> int:
         return len(self.P)
+
+    @classmethod
+    def mix(cls, cycles: Sequence[LoadHistory], shares: Sequence[float]) -> LoadHistory:
+        """Closed ``cycles`` of one block each, of which each is so large a share of all cycles."""
+        lengths = [len(cycle) for cycle in cycles]
+        columns = {
+            column.name: np.concatenate([getattr(cycle, column.name) for cycle in cycles])
+            for column in fields(cls)
+        }
+        columns["share"] = np.repeat(np.asarray(shares, dtype=np.float64), lengths)
+        columns["block"] = np.repeat(np.arange(len(cycles)), lengths)
+        return cls(**columns)
+
+    @property
+    def blocks(self) -> list[slice]:
+        """The increments of each closed cycle."""
+        begins = np.flatnonzero(np.diff(self.block, prepend=-1)).tolist()
+        return [slice(*ends) for ends in pairwise([*begins, len(self)])]
+
+    @property
+    def mixed(self) -> bool:
+        """Whether there is more than one closed cycle, each with its share."""
+        return bool(self.block.any() or np.any(self.share != 1.0))
+
+    @property
+    def mean_energy(self) -> float:
+        """Energy dissipated per mean cycle [N mm]."""
+        return float(self.share @ (self.Edx + self.Edy))
+
+    def columns(self) -> dict[str, NDArray[Any]]:
+        """Columns by name; those of a mix only where there is one."""
+        names = [column.name for column in fields(self)]
+        return {name: getattr(self, name) for name in (names if self.mixed else names[:-2])}

@@ -1,7 +1,8 @@
 """A cycle whose shear and slip come from the half-space itself (wear method 2 of Gallego 2007).
 
 The resultants of each increment are those of the structure; where these let the contact slide as a
-whole, the energies dissipated there say how far.
+whole, the energies dissipated there say how far. Bodies without a structure have their motion
+imposed instead of the tangential force.
 """
 
 from __future__ import annotations
@@ -19,34 +20,76 @@ from wear.stepping import ContactFailure
 IMPOSSIBLE = (NormalContactError, TangentialContactError, CoupledContactError)
 
 
-def full_cycle(contact: FrictionalContact, height: Array, loads: LoadHistory) -> list[ContactState]:
+def full_cycle(
+    contact: FrictionalContact, height: Array, loads: LoadHistory, motion: Array | None = None
+) -> list[ContactState]:
     """States at the ends of the increments of one closed cycle, on surfaces that do not change.
 
-    ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies. A cycle that ends with the
-    bodies apart is closed; any other is marched twice, and the second pass counts.
+    ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies, or ``(t, nx, ny)`` that at the
+    place of each increment. A cycle that ends with the bodies apart is closed; any other is marched
+    twice, and the second pass counts. In a mix every block is such a cycle of its own, begun with
+    the bodies apart. ``motion`` ``(t, 2)`` [mm] of body 2 over body 1 in each increment, far from
+    the contact, is imposed in the place of Qx, Qy and Mz, without twist; the bodies meet in the
+    middle of it.
 
     Raises :class:`ContactFailure` where an increment does not converge, or its load is more than
     the contact can carry.
     """
-    state = contact.apart(height)
-    for _ in range(1 if loads.P[-1] == 0.0 else 2):
+    states: list[ContactState] = []
+    heights = np.broadcast_to(height, (len(loads), *contact.grid.shape))
+    for block in loads.blocks:
+        own = [_force(loads, t) for t in range(block.start, block.stop)]
+        if motion is not None:
+            shifts = _shifts(motion[block])
+            own = [_motion(loads, t, shift) for t, shift in enumerate(shifts, block.start)]
+        states += _closed_cycle(contact, heights[block], own, block.start)
+    return states
+
+
+def _closed_cycle(
+    contact: FrictionalContact, heights: Array, loads: list[Load], first: int
+) -> list[ContactState]:
+    """States of one closed cycle, whose first increment is number ``first`` of all."""
+    state = contact.apart(heights[0])
+    for _ in range(1 if loads[-1].values[0] == 0.0 else 2):
         states = []
-        for t in range(len(loads)):
-            state = _advance(contact, state, height, loads, t)
+        for t, (height, load) in enumerate(zip(heights, loads, strict=True), first):
+            state = _advance(contact, state, height, load, t)
             states.append(state)
     return states
 
 
-def _advance(
-    contact: FrictionalContact, before: ContactState, height: Array, loads: LoadHistory, t: int
-) -> ContactState:
-    if loads.P[t] <= 0.0:
-        return contact.apart(height)
+def _shifts(motion: Array) -> Array:
+    """Motions ``(t, 2)`` of body 1 relative to body 2 since they met, half way of the ``motion``.
+
+    A contact that slips in part remembers from where it first moved: met at one end of the way,
+    its loop would not be centred.
+    """
+    way = np.concatenate([np.zeros((1, 2)), np.cumsum(motion, axis=0)])
+    shifts: Array = 0.5 * (way.max(axis=0) + way.min(axis=0)) - way[1:]
+    return shifts
+
+
+def _force(loads: LoadHistory, t: int) -> Load:
+    """The resultants of an increment, and what it dissipates."""
     columns = (loads.P, loads.Qx, loads.Qy, loads.Mx, loads.My, loads.Mz)
     values = np.array([column[t] for column in columns])
-    energy = np.array([loads.Edx[t], loads.Edy[t]])
+    return Load(values, energy=np.array([loads.Edx[t], loads.Edy[t]]))
+
+
+def _motion(loads: LoadHistory, t: int, shift: Array) -> Load:
+    """The pressing resultants of an increment, and the shift (2,) [mm] of body 1."""
+    values = np.array([loads.P[t], *shift, loads.Mx[t], loads.My[t], 0.0])
+    return Load(values, motion=(False, True, True, False, False, True))
+
+
+def _advance(
+    contact: FrictionalContact, before: ContactState, height: Array, load: Load, t: int
+) -> ContactState:
+    if load.values[0] <= 0.0:
+        return contact.apart(height)
     try:
-        state = contact.advance(before, height, Load(values, energy=energy))
+        state = contact.advance(before, height, load)
     except IMPOSSIBLE as error:
         raise ContactFailure(f"increment {t + 1}: {error}") from error
     if not state.converged:

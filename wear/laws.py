@@ -3,23 +3,39 @@
 Every law here is linear in the pressure once the slips of the cycle are known. A law therefore
 gives the depth per pressure of each increment, which serves the explicit step (depth = Σ w p) and
 the implicit one (w ΔN is a local compliance) alike.
-
-Slip is the size of the slip of each increment, ``(t, nx, ny)`` [mm]; depth per pressure has the
-same shape [mm/MPa per cycle].
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
+from typing import Literal, Protocol
 
 from sa_solver.types import Array
+from wear.evolution import EnergyTable
+
+
+@dataclass(frozen=True)
+class Sliding:
+    """What one body's wear during a step may depend on.
+
+    ``slip`` ``(t, nx, ny)`` is the size of the slip in each increment of the cycle [mm] and
+    ``friction`` Coulomb's coefficient. ``work`` is the energy dissipated per area of this body's
+    surface since it was new, ``(nx, ny)`` [N/mm], and ``energy`` that of the whole contact [N mm],
+    each before the step and, as predicted, after it.
+    """
+
+    slip: Array
+    friction: float
+    work: tuple[Array, Array]
+    energy: tuple[float, float]
 
 
 class WearLaw(Protocol):
     """Wear of one body."""
 
-    def depth_per_pressure(self, slip: Array, friction: float) -> Array: ...
+    def depth_per_pressure(self, sliding: Sliding) -> Array:
+        """Depth per pressure worn in each increment ``(t, nx, ny)`` [mm/MPa per cycle]."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -29,8 +45,8 @@ class Archard:
     coefficient: float
     hardness: float
 
-    def depth_per_pressure(self, slip: Array, friction: float) -> Array:
-        return self.coefficient / self.hardness * slip
+    def depth_per_pressure(self, sliding: Sliding) -> Array:
+        return self.coefficient / self.hardness * sliding.slip
 
 
 @dataclass(frozen=True)
@@ -39,8 +55,8 @@ class Energy:
 
     coefficient: float
 
-    def depth_per_pressure(self, slip: Array, friction: float) -> Array:
-        return self.coefficient * friction * slip
+    def depth_per_pressure(self, sliding: Sliding) -> Array:
+        return self.coefficient * sliding.friction * sliding.slip
 
 
 @dataclass(frozen=True)
@@ -54,7 +70,24 @@ class EnergyAmplitude:
     coefficient: float
     reference_amplitude: float
 
-    def depth_per_pressure(self, slip: Array, friction: float) -> Array:
-        amplitude: Array = slip.sum(axis=0) / 4.0
-        depth: Array = self.coefficient * friction * slip * (amplitude / self.reference_amplitude)
+    def depth_per_pressure(self, sliding: Sliding) -> Array:
+        amplitude = sliding.slip.sum(axis=0) / 4.0 / self.reference_amplitude
+        depth: Array = self.coefficient * sliding.friction * sliding.slip * amplitude
         return depth
+
+
+@dataclass(frozen=True)
+class Evolving:
+    """Any law, times a factor that changes with cumulative energy.
+
+    ``scope`` local: with the energy per area of this body's own surface [N/mm]; global: with that
+    of the whole contact [N mm]. During a step it is the exact mean between its two ends.
+    """
+
+    law: WearLaw
+    factor: EnergyTable
+    scope: Literal["local", "global"]
+
+    def depth_per_pressure(self, sliding: Sliding) -> Array:
+        before, after = sliding.work if self.scope == "local" else sliding.energy
+        return self.factor.mean(before, after) * self.law.depth_per_pressure(sliding)

@@ -3,22 +3,37 @@
 Pressure comes from the half-space solver under the resultants of each increment. Slip is given: by
 the structure (wear method 1 of Gallego 2007) or by the half-space (method 2, see
 :mod:`wear.full_cycle`), and does not change during a step. Where it slips, q = µ p.
+
+With w_t the depth per pressure and cycle of increment t (:mod:`wear.laws`) and p_t(h) its pressure
+on the worn gap h, wear is dh/dN = Σ_t w_t p_t(h): stiff, since short waves of h are pressed away at
+once. Three steps are offered here; :mod:`wear.steppers` chooses their length.
+
+- explicit Euler, at the pressures of the surfaces before the step; stable below a limit only;
+- implicit Euler, increment after increment, each at the pressure it ends with: the depth of an
+  increment enters its contact problem as the local compliance w_t ΔN. Stable at any length;
+- second order: all increments over half the step and back in reverse order over the other half
+  (Strang 1968, doi:10.1137/0705041), each by the two implicit stages of Alexander's method
+  (1977, doi:10.1137/0714068; L-stable). Both stages weigh in with their own positive share, so that
+  nothing ever grows back and energies add up to the volume.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
+from sa_solver.influence import Z
 from sa_solver.normal import NormalContact, NormalStart, NormalState
+from sa_solver.transform import SpectralFilter
 from sa_solver.types import Array, LoadHistory
-from wear.laws import WearLaw
+from wear.laws import Sliding, WearLaw
+from wear.moving import Passage, TravelError
 from wear.surfaces import Surfaces
 
-# In explicit steps a roughness of the grid's shortest wavelength grows when the depth lost per
-# pressure in one step exceeds this many pitches over E*, its stiffness being 2/1.161 E*/pitch.
-EXPLICIT_LIMIT = 1.161
+GAMMA = 1.0 - np.sqrt(0.5)
+"""Share of the second stage of Alexander's method, and the reach of either."""
 
 States = dict[int, NormalState]
 Starts = dict[int, NormalStart]
@@ -29,115 +44,261 @@ class ContactFailure(RuntimeError):
 
 
 @dataclass(frozen=True)
+class SlidingCycle:
+    """One closed cycle as the wear of a contact feels it.
+
+    ``slip`` ``(t, nx, ny)`` is the size of the slip in each increment [mm]; ``uplift``
+    ``(t, nx, ny)`` [mm] the normal displacement under its shear, None for similar bodies;
+    ``passages`` how body 2 moves over body 1 in each, None where that is too little to matter.
+    """
+
+    loads: LoadHistory
+    slip: Array
+    uplift: Array | None = None
+    passages: tuple[Passage, ...] | None = None
+
+    def gap(self, surfaces: Surfaces, increment: int) -> Array:
+        """Gap before loading ``(nx, ny)`` [mm], body 2 being where an increment has it."""
+        if self.passages is None:
+            return surfaces.gap
+        seen = self.passages[increment].carry(surfaces.depth_1)
+        return surfaces.initial_gap + surfaces.depth_2 + seen
+
+    def midway(self, other: SlidingCycle) -> SlidingCycle:
+        """The mean of two cycles with the same loads and passages."""
+        uplift = None
+        if self.uplift is not None and other.uplift is not None:
+            uplift = 0.5 * (self.uplift + other.uplift)
+        return replace(self, slip=0.5 * (self.slip + other.slip), uplift=uplift)
+
+
+@dataclass(frozen=True)
 class CycleResult:
     """A cycle on given surfaces.
 
-    ``states`` by increment; ``energy`` ``(t,)`` dissipated in each increment of one cycle [N mm];
-    ``depth_1`` and ``depth_2`` ``(nx, ny)`` worn per cycle [mm]; ``convolutions`` spent.
+    ``states`` by increment; ``energy`` ``(t,)`` dissipated by each increment of a mean cycle
+    [N mm]; ``depth_1`` and ``depth_2`` ``(nx, ny)`` worn per mean cycle [mm].
     """
 
     states: States
     energy: Array
     depth_1: Array
     depth_2: Array
-    convolutions: int
 
     def per_cycle(self, cell_area: float) -> tuple[float, float]:
         """Largest depth [mm] and volume of both bodies [mm³] worn per cycle."""
         depth = max(self.depth_1.max(), self.depth_2.max())
         return float(depth), float((self.depth_1 + self.depth_2).sum() * cell_area)
 
+    @property
+    def convolutions(self) -> int:
+        """Convolutions spent."""
+        return sum(state.convolutions for state in self.states.values())
+
+
+@dataclass(frozen=True)
+class WearState:
+    """What wear must remember between two steps.
+
+    ``energy`` is what the contact has dissipated so far [N mm]; ``depth_rate`` the largest depth
+    [mm] and ``volume_rate`` the volume of both bodies [mm³] worn per cycle of the last step;
+    ``starts`` the contact solver's, by increment; ``error`` ``(nx, ny)`` the estimated error of the
+    depth of both bodies [mm]; ``next_cycles`` how far an automatic step would go next.
+    """
+
+    surfaces: Surfaces
+    energy: float
+    depth_rate: float
+    volume_rate: float
+    starts: Starts
+    error: Array
+    next_cycles: float
+
+    @classmethod
+    def unworn(cls, gap: Array) -> WearState:
+        """Before the first cycle, at the gap ``(nx, ny)`` [mm] of the unloaded bodies."""
+        return cls(Surfaces.unworn(gap), 0.0, 0.0, 0.0, {}, np.zeros_like(gap), np.inf)
+
+
+@dataclass(frozen=True)
+class WearStep:
+    """A step: the ``state`` after it, its ``cycles``, and the contact problems it took.
+
+    ``midway`` ``(nx, ny)`` is the depth of both bodies in the middle of a step of second order.
+    """
+
+    state: WearState
+    cycles: float
+    contact_solves: int
+    convolutions: int
+    midway: Array | None = None
+
 
 class WearingContact:
-    """One interface under the loads and slips of a cycle.
-
-    ``slip`` ``(t, nx, ny)`` is the size of the slip in each increment [mm]; ``laws`` are those of
-    body 1 and body 2. ``uplift`` ``(t, nx, ny)`` [mm] is the normal displacement under the shear of
-    each increment, None for similar bodies.
-    """
+    """One interface under a cycle; ``laws`` are those of body 1 and body 2."""
 
     def __init__(
         self,
         contact: NormalContact,
         laws: tuple[WearLaw, WearLaw],
         friction: float,
-        loads: LoadHistory,
-        slip: Array,
+        cycle: SlidingCycle,
         tolerance: float,
-        uplift: Array | None = None,
     ) -> None:
         self.contact = contact
+        self._laws = laws
         self._friction = friction
-        self._loads = loads
-        self._slip = slip
-        self._uplift = uplift
+        self._cycle = cycle
         self._tolerance = tolerance
-        self._wear_1, self._wear_2 = (law.depth_per_pressure(slip, friction) for law in laws)
 
-    @property
+    def midway(self, other: WearingContact) -> WearingContact:
+        """The contact under the mean of both cycles."""
+        cycle = self._cycle.midway(other._cycle)
+        return WearingContact(self.contact, self._laws, self._friction, cycle, self._tolerance)
+
+    @cached_property
     def working(self) -> list[int]:
         """Increments that dissipate, loaded and with slip somewhere, the heaviest load last.
 
         Over thousands of cycles it does not matter where a cycle begins. A step that ends with the
         widest contact leaves no unworn rim for the next one.
         """
-        slipping = [bool(slip.any()) for slip in self._slip]
-        count, heaviest = len(self._loads), int(np.argmax(self._loads.P))
+        loads = self._cycle.loads
+        works = (loads.P > 0.0) & (loads.share > 0.0) & self._cycle.slip.any(axis=(1, 2))
+        count, heaviest = len(loads), int(np.argmax(loads.P))
         order = [(heaviest + 1 + k) % count for k in range(count)]
-        return [t for t in order if slipping[t] and self._loads.P[t] > 0.0]
+        return [t for t in order if works[t]]
 
-    def stable_cycles(self) -> float:
-        """Largest explicit jump that does not amplify the grid's shortest wavelength.
+    # -- rates --------------------------------------------------------------------------------
+    def depth_per_pressure(self, state: WearState, cycles: float = 0.0) -> tuple[Array, Array]:
+        """Depth per pressure of both bodies over a step from ``state``, each ``(t, nx, ny)``.
 
-        From the decay of a roughness mode per update, 1 - w ΔN E* k/2, with w the depth of both
-        bodies per pressure and cycle.
+        In mm/MPa and mean cycle. Laws that change with energy are told that of the state, and
+        that expected after so many cycles at its pressures.
         """
-        fastest = float((self._wear_1 + self._wear_2).sum(axis=0).max())
-        pitch = min(self.contact.grid.pitch)
-        limit = EXPLICIT_LIMIT * pitch / self.contact.half_space.pair.contact_modulus
-        return limit / fastest if fastest > 0.0 else np.inf
+        surfaces, area = state.surfaces, self.contact.grid.cell_area
+        work_1, work_2 = (cycles * work for work in self._work(state.starts))
+        energies = state.energy, state.energy + float(work_2.sum()) * area
+        ends = (
+            (surfaces.work_1, surfaces.work_1 + work_1),
+            (surfaces.work_2, surfaces.work_2 + work_2),
+        )
+        first, second = (
+            self._by_block(law, work, energies) for law, work in zip(self._laws, ends, strict=True)
+        )
+        return first, second
 
+    def _by_block(
+        self, law: WearLaw, work: tuple[Array, Array], energies: tuple[float, float]
+    ) -> Array:
+        """Depth per pressure of one body: each closed cycle of a mix for itself, by its share."""
+        loads, slip = self._cycle.loads, self._cycle.slip
+        parts = [
+            law.depth_per_pressure(Sliding(slip[block], self._friction, work, energies))
+            for block in loads.blocks
+        ]
+        depth: Array = loads.share[:, None, None] * np.concatenate(parts)
+        return depth
+
+    def rate(self, state: WearState) -> Array:
+        """Depth of both bodies per mean cycle ``(nx, ny)`` [mm] at the state's last pressures."""
+        per_pressure = np.add(*self.depth_per_pressure(state))
+        rate = np.zeros(self.contact.grid.shape)
+        for t, start in state.starts.items():
+            rate += per_pressure[t] * start.pressure
+        return rate
+
+    def stable_cycles(self, state: WearState) -> float:
+        """Longest explicit step that does not make a roughness of the grid's shortest waves grow.
+
+        A mode of compliance λ is multiplied by 1 - w ΔN/λ per step, w being the depth of both
+        bodies per pressure and cycle over all increments that press there; the limit is
+        w ΔN = 2 λ_min. Where the last pressures are unknown all increments count.
+        """
+        per_pressure = np.add(*self.depth_per_pressure(state))
+        for t, start in state.starts.items():
+            per_pressure[t] *= start.pressure > 0.0
+        fastest = float(per_pressure.sum(axis=0).max())
+        softest = float(self.contact.half_space.symbol(Z, Z).min())
+        return 2.0 * softest / fastest if fastest > 0.0 else np.inf
+
+    def lasting(self, error: Array, state: WearState, cycles: float) -> Array:
+        """What implicit wear over ``cycles`` leaves of an ``error`` of the depth ``(nx, ny)`` [mm].
+
+        A depth e is pressed away to K (K + D)⁻¹ e, with D the largest depth per pressure of all
+        increments and both bodies over the step; here on the whole grid, as if all of it touched.
+        """
+        per_pressure = np.add(*self.depth_per_pressure(state)).sum(axis=0)
+        compliance = cycles * float(per_pressure.max())
+        half_space, shape = self.contact.half_space, self.contact.grid.shape
+        symbol = half_space.symbol(Z, Z)
+        transform = half_space.transform(shape, half_space.padded, 1)
+        damping = SpectralFilter(transform, [[symbol / (symbol + compliance)]])
+        left: Array = damping.apply(error[None])[0]
+        return left
+
+    # -- cycles on surfaces that do not change --------------------------------------------------
     def solve(self, surfaces: Surfaces, increment: int, start: NormalStart | None) -> NormalState:
         """Contact state of one increment on given surfaces."""
-        return self._solve(surfaces.gap, increment, start, None)
+        return self._solve(surfaces, increment, start, None)
 
-    def cycle(self, surfaces: Surfaces, starts: Starts, increments: list[int]) -> CycleResult:
-        """Solve the given increments on surfaces that do not change."""
+    def cycle(self, state: WearState, increments: list[int]) -> CycleResult:
+        """Solve the given increments on the surfaces of ``state``."""
         found: States = {}
         for t in increments:
             before = found[t - 1].start if t - 1 in found else None
-            found[t] = self.solve(surfaces, t, starts.get(t, before))
-        return self._result(found)
+            found[t] = self.solve(state.surfaces, t, state.starts.get(t, before))
+        return self._result(state, found)
 
-    def explicit_step(
-        self, surfaces: Surfaces, starts: Starts, cycles: float
-    ) -> tuple[Surfaces, CycleResult]:
+    def _result(self, state: WearState, states: States) -> CycleResult:
+        wear_1, wear_2 = self.depth_per_pressure(state)
+        energy = np.zeros(len(self._cycle.loads))
+        worn = Surfaces.unworn(state.surfaces.initial_gap)
+        for t, own in states.items():
+            worn = self._worn(worn, t, own.pressure, (wear_1, wear_2))
+            energy[t] = self._dissipated(t, own.pressure).sum() * self.contact.grid.cell_area
+        return CycleResult(states, energy, worn.depth_1, worn.depth_2)
+
+    # -- steps ----------------------------------------------------------------------------------
+    def explicit_step(self, state: WearState, cycles: float) -> WearStep:
         """Wear ``cycles`` cycles at the pressures of the present surfaces."""
-        result = self.cycle(surfaces, starts, self.working)
-        return surfaces.worn(result.depth_1 * cycles, result.depth_2 * cycles), result
+        march = _March(self, state, cycles)
+        for t, own in self.cycle(state, self.working).states.items():
+            march.wear(t, own, cycles)
+        return march.step()
 
-    def implicit_step(
-        self, surfaces: Surfaces, starts: Starts, cycles: float
-    ) -> tuple[Surfaces, CycleResult]:
-        """Wear ``cycles`` cycles, increment after increment, each at the pressure it ends with.
+    def implicit_step(self, state: WearState, cycles: float) -> WearStep:
+        """Wear ``cycles`` cycles, first order in them, each increment at the pressure it ends with.
 
-        The depth of an increment enters its contact problem as the local compliance
-        D = (w1 + w2) ΔN. First order in ΔN and stable for any, at given slips.
+        Stable at any length, at given slips.
         """
-        found: States = {}
+        march = _March(self, state, cycles)
         for t in self.working:
-            per_pressure = (self._wear_1[t] + self._wear_2[t]) * cycles
-            found[t] = self._solve(surfaces.gap, t, starts.get(t), per_pressure)
-            pressure = found[t].pressure * cycles
-            surfaces = surfaces.worn(self._wear_1[t] * pressure, self._wear_2[t] * pressure)
-        return surfaces, self._result(found)
+            march.wear(t, march.solve(t, cycles), cycles)
+        return march.step()
 
+    def second_order_step(self, state: WearState, cycles: float) -> WearStep:
+        """Wear ``cycles`` cycles, second order in them and stable at any length, at given slips."""
+        march = _March(self, state, cycles)
+        half = 0.5 * cycles
+        for t in reversed(self.working):
+            march.two_stages(t, half)
+        midway = march.surfaces.depth
+        for t in self.working:
+            march.two_stages(t, half)
+        return replace(march.step(), midway=midway)
+
+    # -- one increment --------------------------------------------------------------------------
     def _solve(
-        self, gap: Array, increment: int, start: NormalStart | None, compliance: Array | None
+        self,
+        surfaces: Surfaces,
+        increment: int,
+        start: NormalStart | None,
+        compliance: Array | None,
     ) -> NormalState:
-        loads = self._loads
+        loads = self._cycle.loads
         state = self.contact.solve(
-            gap if self._uplift is None else gap + self._uplift[increment],
+            self.gap(surfaces, increment),
             float(loads.P[increment]),
             float(loads.Mx[increment]),
             float(loads.My[increment]),
@@ -149,13 +310,96 @@ class WearingContact:
             raise ContactFailure(f"increment {increment + 1}: {state.message}")
         return state
 
-    def _result(self, states: States) -> CycleResult:
-        energy = np.zeros(len(self._loads))
-        depth_1, depth_2 = np.zeros_like(self._slip[0]), np.zeros_like(self._slip[0])
-        area = self.contact.grid.cell_area
-        for t, state in states.items():
-            energy[t] = self._friction * np.sum(state.pressure * self._slip[t]) * area
-            depth_1 += self._wear_1[t] * state.pressure
-            depth_2 += self._wear_2[t] * state.pressure
-        convolutions = sum(state.convolutions for state in states.values())
-        return CycleResult(states, energy, depth_1, depth_2, convolutions)
+    def gap(self, surfaces: Surfaces, increment: int) -> Array:
+        """Gap before loading ``(nx, ny)`` [mm] at the place of an increment, lifted by shear."""
+        gap, uplift = self._cycle.gap(surfaces, increment), self._cycle.uplift
+        return gap if uplift is None else gap + uplift[increment]
+
+    def _worn(
+        self,
+        surfaces: Surfaces,
+        increment: int,
+        pressure_cycles: Array,
+        per_pressure: tuple[Array, Array],
+    ) -> Surfaces:
+        """The surfaces after the pressure times cycles [MPa] of an increment."""
+        wear_1, wear_2 = (own[increment] * pressure_cycles for own in per_pressure)
+        work = self._dissipated(increment, pressure_cycles)
+        return surfaces.worn(
+            self._on_body_1(increment, wear_1), wear_2, self._on_body_1(increment, work), work
+        )
+
+    def _on_body_1(self, increment: int, field: Array) -> Array:
+        """What the contact leaves behind on body 1's own surface, passing over it."""
+        passages = self._cycle.passages
+        if passages is None:
+            return field
+        try:
+            return passages[increment].deposit(field)
+        except TravelError as error:
+            raise ContactFailure(f"increment {increment + 1}: {error}") from error
+
+    def _dissipated(self, increment: int, pressure: Array) -> Array:
+        """Energy per area ``(nx, ny)`` [N/mm] of an increment of a mean cycle."""
+        share = float(self._cycle.loads.share[increment])
+        work: Array = share * self._friction * self._cycle.slip[increment] * pressure
+        return work
+
+    def _work(self, starts: Starts) -> tuple[Array, Array]:
+        """Energy per area of both bodies' surfaces and mean cycle, at the given pressures."""
+        unworn = Surfaces.unworn(np.zeros(self.contact.grid.shape))
+        work_1, work_2 = unworn.work_1, unworn.work_2
+        for t, start in starts.items():
+            work = self._dissipated(t, start.pressure)
+            work_1, work_2 = work_1 + self._on_body_1(t, work), work_2 + work
+        return work_1, work_2
+
+
+class _March:
+    """A step under way: surfaces, starts and what it has taken so far."""
+
+    def __init__(self, contact: WearingContact, state: WearState, cycles: float) -> None:
+        self.surfaces = state.surfaces
+        self._contact, self._before, self._cycles = contact, state, cycles
+        self._starts = dict(state.starts)
+        self._per_pressure = contact.depth_per_pressure(state, cycles)
+        self._solves = self._convolutions = 0
+
+    def solve(self, increment: int, cycles: float) -> NormalState:
+        """Contact whose wear over ``cycles`` is part of its gap."""
+        wear_1, wear_2 = (own[increment] for own in self._per_pressure)
+        state = self._contact._solve(
+            self.surfaces, increment, self._starts.get(increment), (wear_1 + wear_2) * cycles
+        )
+        self._starts[increment] = state.start
+        return state
+
+    def wear(self, increment: int, state: NormalState, cycles: float) -> None:
+        """Let an increment wear ``cycles`` times at the pressure of ``state``."""
+        self._starts[increment] = state.start
+        self._solves += 1
+        self._convolutions += state.convolutions
+        self.surfaces = self._contact._worn(
+            self.surfaces, increment, state.pressure * cycles, self._per_pressure
+        )
+
+    def two_stages(self, increment: int, cycles: float) -> None:
+        """Alexander's method on one increment."""
+        stage = GAMMA * cycles
+        self.wear(increment, self.solve(increment, stage), cycles - stage)
+        self.wear(increment, self.solve(increment, stage), stage)
+
+    def step(self) -> WearStep:
+        """The step taken."""
+        before, after = self._before.surfaces, self.surfaces
+        lost = after.depth_1 - before.depth_1, after.depth_2 - before.depth_2
+        area = self._contact.contact.grid.cell_area
+        state = replace(
+            self._before,
+            surfaces=after,
+            energy=self._before.energy + float((after.work_2 - before.work_2).sum()) * area,
+            depth_rate=float(max(own.max() for own in lost)) / self._cycles,
+            volume_rate=float(sum(own.sum() for own in lost)) * area / self._cycles,
+            starts=self._starts,
+        )
+        return WearStep(state, self._cycles, self._solves, self._convolutions)

@@ -11,16 +11,27 @@ from sa_solver.types import Array
 
 @dataclass(frozen=True)
 class Surfaces:
-    """Unworn gap and the depths both bodies have lost, ``(nx, ny)`` [mm]."""
+    """Unworn gap, and what both bodies have been through, all ``(nx, ny)``.
+
+    ``depth_1`` and ``depth_2`` are the depths lost [mm], ``work_1`` and ``work_2`` the energies
+    dissipated per area [N/mm], each on the body's own surface.
+    """
 
     initial_gap: Array
     depth_1: Array
     depth_2: Array
+    work_1: Array
+    work_2: Array
 
     @classmethod
     def unworn(cls, initial_gap: Array) -> Surfaces:
         """Surfaces before the first cycle."""
-        return cls(initial_gap, np.zeros_like(initial_gap), np.zeros_like(initial_gap))
+        return cls(initial_gap, *(np.zeros_like(initial_gap) for _ in range(4)))
+
+    @property
+    def depth(self) -> Array:
+        """Depth lost by both bodies together [mm]."""
+        return self.depth_1 + self.depth_2
 
     @property
     def gap(self) -> Array:
@@ -32,6 +43,18 @@ class Surfaces:
         """Heights of body 1 and body 2 in the interface frame [mm]; body 1 starts flat."""
         return -self.depth_1, self.initial_gap + self.depth_2
 
-    def worn(self, depth_1: Array, depth_2: Array) -> Surfaces:
-        """The surfaces after losing these further depths."""
-        return replace(self, depth_1=self.depth_1 + depth_1, depth_2=self.depth_2 + depth_2)
+    def worn(
+        self,
+        depth_1: Array,
+        depth_2: Array,
+        work_1: Array | float = 0.0,
+        work_2: Array | float = 0.0,
+    ) -> Surfaces:
+        """The surfaces after losing these further depths to these further energies."""
+        return replace(
+            self,
+            depth_1=self.depth_1 + depth_1,
+            depth_2=self.depth_2 + depth_2,
+            work_1=self.work_1 + work_1,
+            work_2=self.work_2 + work_2,
+        )

@@ -1,4 +1,4 @@
-"""What the contact solver takes of a contact case: grid, gap, materials and path."""
+"""What the contact solver takes of a case of two bodies: grid, gap, materials and path."""
 
 from __future__ import annotations
 
@@ -8,9 +8,12 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.history import LoadPath
 from sa_solver.types import Array, ElasticPair, Grid, Material
 from workflow.case import ContactCase, LineContactCase
-from workflow.case.contact_case import Body, Cylinder, Ellipsoid, FlatRounded, Sphere
+from workflow.case.bodies_wear_case import Flat, FlatStrip
+from workflow.case.contact_case import Body, Cylinder, Ellipsoid, FlatRounded, Heights, Sphere
 from workflow.case.input_files import read_heights
 from workflow.case.load_table import LoadTable
+
+Shape = Sphere | Ellipsoid | Cylinder | FlatRounded | Flat | FlatStrip
 
 RIGID = Material(young=np.inf, poisson=0.0)
 
@@ -24,7 +27,13 @@ def grid_of(case: ContactCase | LineContactCase) -> Grid:
 
 def height_of(case: ContactCase | LineContactCase, grid: Grid) -> Array:
     """Gap before loading on ``grid``, ``(nx, ny)`` [mm]."""
-    shape, x, y = case.structure, grid.x, grid.y
+    if isinstance(case.structure, Heights):
+        return read_heights(case.structure.file)
+    return height_at(case.structure, grid.x, grid.y)
+
+
+def height_at(shape: Shape, x: Array, y: Array) -> Array:
+    """Gap before loading [mm] at ``x`` and ``y``, which broadcast against each other."""
     match shape:
         case Sphere():
             height = (x**2 + y**2) / (2.0 * shape.radius)
@@ -35,8 +44,11 @@ def height_of(case: ContactCase | LineContactCase, grid: Grid) -> Array:
         case FlatRounded():
             beyond = np.maximum(np.abs(x) - shape.half_width, 0.0)
             height = beyond**2 / (2.0 * shape.edge_radius)
-        case _:
-            height = read_heights(shape.file)
+        case Flat():
+            on_top = (np.abs(x) < shape.half_width) & (np.abs(y) < shape.half_length)
+            height = np.where(on_top, 0.0, shape.step)
+        case FlatStrip():
+            height = np.where(np.abs(x) < shape.half_width, 0.0, shape.step)
     return height
 
 

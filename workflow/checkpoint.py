@@ -11,12 +11,14 @@ import numpy as np
 from sa_solver.normal import NormalStart
 from sa_solver.types import Array, LoadHistory
 from wear.surfaces import Surfaces
-from workflow.contact_stage import InterfaceState
+from workflow.contact_stage import InterfaceState, Spent
 from workflow.errors import UserError
 from workflow.store import read_arrays, write_arrays
 
 # Columns of the kinetics of one interface.
 KINETICS = ("depth_1", "depth_2", "volume_1", "volume_2", "energy")
+# Numbers of the state of one interface.
+SCALARS = ("energy", "depth_rate", "volume_rate", "next_cycles")
 
 
 @dataclass(frozen=True)
@@ -26,7 +28,8 @@ class RunState:
     ``cycles`` ``(j,)`` are those at the end of every jump so far, the unworn state included;
     ``kinetics`` ``(j, interfaces, 5)`` has the columns ``KINETICS``; ``solved_resultants``
     ``(interfaces, 6)`` is the probe at the last structural solution; ``drift`` ``(j,)`` the drift
-    found after each jump; ``solutions`` counts the structural solutions.
+    found after each jump; ``solutions`` counts the structural solutions, ``spent`` what the
+    contacts have taken.
     """
 
     interfaces: tuple[InterfaceState, ...]
@@ -35,6 +38,7 @@ class RunState:
     drift: Array
     solved_resultants: Array
     solutions: int
+    spent: Spent
 
     @property
     def jump(self) -> int:
@@ -77,11 +81,14 @@ def save(path: Path, state: RunState) -> None:
         for column in fields(LoadHistory):
             arrays[f"{group}/loads/{column.name}"] = getattr(own.loads, column.name)
         arrays[f"{group}/slip"] = own.slip
-        arrays[f"{group}/scalars"] = np.array([own.energy, own.depth_rate, own.volume_rate])
+        arrays[f"{group}/error"] = own.error
+        arrays[f"{group}/ends"] = own.ends
+        arrays[f"{group}/scalars"] = np.array([getattr(own, name) for name in SCALARS])
         for increment, start in own.starts.items():
             arrays[f"{group}/starts/{increment}/pressure"] = start.pressure
             arrays[f"{group}/starts/{increment}/displacement"] = start.displacement
     attributes = {"solutions": state.solutions, "interfaces": len(state.interfaces)}
+    attributes |= vars(state.spent)
     write_arrays(path, arrays, attributes)
 
 
@@ -105,6 +112,7 @@ def _restored(arrays: dict[str, Any], attributes: dict[str, Any]) -> RunState:
         drift=arrays["drift"],
         solved_resultants=arrays["solved_resultants"],
         solutions=int(attributes["solutions"]),
+        spent=Spent(*(int(attributes[own.name]) for own in fields(Spent))),
     )
 
 
@@ -117,15 +125,15 @@ def _load_interface(arrays: dict[str, Array], group: str) -> InterfaceState:
         t: NormalStart(arrays[f"{prefix}{t}/pressure"], arrays[f"{prefix}{t}/displacement"])
         for t in increments
     }
-    energy, depth_rate, volume_rate = (float(v) for v in arrays[f"{group}/scalars"])
+    scalars = dict(zip(SCALARS, arrays[f"{group}/scalars"].tolist(), strict=True))
     surfaces = {part.name: arrays[f"{group}/surfaces/{part.name}"] for part in fields(Surfaces)}
     loads = {column.name: arrays[f"{group}/loads/{column.name}"] for column in fields(LoadHistory)}
     return InterfaceState(
-        Surfaces(**surfaces),
-        LoadHistory(**loads),  # type: ignore[arg-type]
-        arrays[f"{group}/slip"],
-        energy,
-        depth_rate,
-        volume_rate,
-        starts,
+        surfaces=Surfaces(**surfaces),
+        loads=LoadHistory(**loads),  # type: ignore[arg-type]
+        slip=arrays[f"{group}/slip"],
+        error=arrays[f"{group}/error"],
+        ends=arrays[f"{group}/ends"],
+        starts=starts,
+        **scalars,
     )

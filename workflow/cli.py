@@ -29,7 +29,8 @@ class _OneLineGroup(click.Group):
         except (errors.FretscaleError, OSError, ImportError, MemoryError) as error:
             code = _report(error)
         except click.Abort:
-            click.echo("fretscale: interrupted; a run continues with `resume DIR`", err=True)
+            told = "a run continues with `resume DIR`, many with the same command"
+            click.echo(f"fretscale: interrupted; {told}", err=True)
             code = errors.INTERRUPTED
         except click.exceptions.NoArgsIsHelpError as error:
             error.show()
@@ -122,6 +123,67 @@ def verify(cases: tuple[Path, ...], out: Path) -> int:
 
 
 @cli.command()
+@click.argument("case", type=click.Path(path_type=Path))
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
+@click.option("--axis", "axes", multiple=True, metavar="NAME", help="Only this approximation.")
+@click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
+@click.option("--quantity", "quantities", multiple=True, metavar="PATH", help="In summary.json.")
+@click.option("--accuracy", default="1 %", show_default=True, help="To choose settings for.")
+def chart(
+    case: Path,
+    out: Path,
+    axes: tuple[str, ...],
+    overrides: tuple[str, ...],
+    quantities: tuple[str, ...],
+    accuracy: str,
+) -> None:
+    """Chart error against cost for each approximation of CASE.
+
+    Each AXIS has a ladder of runs about the settings of CASE: grid, tolerance, method, stepper,
+    dimension, coupling, history, mesh, order; by default all that apply. Finished runs are kept:
+    the same command goes on where it was interrupted.
+    """
+    from workflow.chart import accuracy_of, chart_case
+    from workflow.chart.report import show, write_chart
+
+    found = chart_case(
+        case,
+        out,
+        axes=axes,
+        overrides=overrides,
+        quantities=quantities,
+        accuracy=accuracy_of(accuracy),
+        report=lambda line: click.echo(line, err=True),
+    )
+    write_chart(found, out)
+    show(found)
+
+
+@cli.command()
+@click.argument("file", metavar="SWEEP", type=click.Path(path_type=Path))
+@click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
+@click.option("--processes", type=click.IntRange(1), help="Cores to use; all by default.")
+@click.option("--dask", metavar="ADDRESS", help="Of a dask.distributed scheduler, to run there.")
+@click.option("--force", is_flag=True, help="Overwrite runs of another case.")
+def sweep(file: Path, out: Path, processes: int | None, dask: str | None, force: bool) -> int:
+    """Run a case many times with other values, as SWEEP says.
+
+    SWEEP is a YAML file with the `case`, what to `vary` and the `design`: grid, zip or sample. All
+    cases are checked before anything runs. A run that fails does not stop the others; the exit code
+    then is 3. Finished runs are kept: the same command goes on where it was interrupted.
+
+    With --dask the runs go to a cluster whose machines share the folders, such as one that
+    dask-jobqueue's SLURMCluster starts; they go on elsewhere where a worker dies.
+    """
+    if processes is not None and dask is not None:
+        raise errors.UserError("--processes is for this machine; allowed: it or --dask")
+    from workflow.sweep import run_sweep
+
+    done = run_sweep(file, out, processes=processes, dask=dask, force=force)
+    return errors.DONE if done else errors.MethodFailed.exit_code
+
+
+@cli.command()
 @click.argument("case")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
 def check(case: str, overrides: tuple[str, ...]) -> None:
@@ -204,21 +266,29 @@ def _outline(case: Case) -> list[tuple[str, str]]:
 
 def _wear_outline(case: WearCase) -> list[tuple[str, str]]:
     grid, wear = case.contact.grid, case.wear
-    plane = getattr(case.structure, "dimension", 3) == 2
+    plane = getattr(case.structure, "dimension", 3) == 2 or grid[1] == 1
     cells = f"{grid[0]} strips" if plane else f"{grid[0]} x {grid[1]} cells"
     return [
         *case.outline(),
         ("contact", f"{cells}, {case.contact.method}"),
-        ("wear", f"{wear.law}, {wear.cycles:g} cycles, {wear.step.kind} steps of {_step(case)}"),
+        ("wear", f"{wear.law}, {wear.cycles:g} cycles, {wear.step.kind} steps, {_step(case)}"),
     ]
 
 
 def _step(case: WearCase) -> str:
     """Size of a wear step, with the number of jumps where it is known beforehand."""
-    step = case.wear.step
+    wear, step = case.wear, case.wear.step
     if step.cycles is not None:
-        return f"{step.cycles:g} cycles: {ceil(case.wear.cycles / step.cycles)} jumps"
-    return f"{step.depth:g} mm" if step.depth is not None else f"{step.volume:g} mm^3"
+        return f"{step.cycles:g} cycles each: {ceil(wear.cycles / step.cycles)} jumps"
+    if step.depth is not None:
+        return f"{step.depth:g} mm deep each"
+    if step.volume is not None:
+        return f"{step.volume:g} mm^3 each"
+    if step.fraction is not None:
+        return f"{step.fraction:g} of their stability limit each"
+    if wear.depth_tolerance is not None:
+        return f"for an error of {wear.depth_tolerance:g} mm"
+    return f"for an error of {wear.tolerance:.2g} of the depth"
 
 
 def _contact_outline(case: ContactCase | LineContactCase) -> list[tuple[str, str]]:

@@ -14,21 +14,26 @@ from workflow.store import ResultsWriter
 SHOWN = 0.0, 2.0 / 7.0, 0.5
 
 
-def half_space_loads(cycle: tuple[ContactState, ...]) -> LoadHistory:
-    """Resultants and energies of a cycle of the half-space."""
+def half_space_loads(cycle: tuple[ContactState, ...], structure: LoadHistory) -> LoadHistory:
+    """Resultants and energies of a cycle of the half-space, mixed as those of the structure."""
     P, Qx, Qy, Mx, My, Mz = np.stack([state.resultants for state in cycle], axis=1)
     Edx, Edy = np.stack([state.energy for state in cycle], axis=1)
     sliding = np.array([state.sliding for state in cycle])
-    return LoadHistory(P, Qx, Qy, Mx, My, Mz, Edx, Edy, sliding)
+    mix = structure.share, structure.block
+    return LoadHistory(P, Qx, Qy, Mx, My, Mz, Edx, Edy, sliding, *mix)
 
 
 def write_comparison(
-    writer: ResultsWriter, name: str, cycle: tuple[ContactState, ...], peak: int
+    writer: ResultsWriter,
+    name: str,
+    cycle: tuple[ContactState, ...],
+    structure: LoadHistory,
+    peak: int,
 ) -> None:
-    """Loads of the cycle, and its fields at the increments shown."""
+    """Loads of the cycle, and its fields at the increments shown; of a mix, of the peak's cycle."""
     group = f"comparison/{name}"
-    writer.put(f"{group}/load_history", **vars(half_space_loads(cycle)))
-    left = len(cycle) - 1 - peak
+    writer.put(f"{group}/load_history", **half_space_loads(cycle, structure).columns())
+    left = next(own.stop for own in structure.blocks if peak < own.stop) - 1 - peak
     # A set: in a short cycle two of them may be the same.
     for increment in sorted({peak + round(share * left) for share in SHOWN}):
         state = cycle[increment]
@@ -42,7 +47,7 @@ def write_comparison(
 
 def comparison_summary(cycle: tuple[ContactState, ...], structure: LoadHistory) -> dict[str, Any]:
     """By increment, what follows in the half-space and what the structure says."""
-    half_space = half_space_loads(cycle)
+    half_space = half_space_loads(cycle, structure)
     columns = ("Qx", "Qy", "Mz", "Edx", "Edy")
     return {
         "sliding": half_space.sliding.tolist(),

@@ -10,34 +10,55 @@ from fe_models.mesh import Interface
 from fe_models.transfer import FaceTransfer
 from sa_solver.contact import ContactState, FrictionalContact
 from sa_solver.half_space import HalfSpace
-from sa_solver.normal import NormalContact, NormalStart
+from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
 from wear.full_cycle import full_cycle
-from wear.laws import Archard, Energy, EnergyAmplitude, WearLaw
-from wear.stepping import CycleResult, Starts, WearingContact
-from wear.surfaces import Surfaces
+from wear.moving import followed, passages
+from wear.steppers import (
+    FIRST_STEP,
+    ErrorControl,
+    Explicit,
+    Implicit,
+    SecondOrder,
+    Stepper,
+    advance,
+)
+from wear.stepping import CycleResult, SlidingCycle, Starts, WearingContact, WearState
 from workflow.case import WearCase
-from workflow.case.wear_sections import ArchardBody, ContactStress, EnergyAmplitudeLaw
+from workflow.case.wear_sections import ContactStress, Duration
+from workflow.contact_loops import WornLoop, worn_loop
 from workflow.errors import UserError
 from workflow.load_source import ContactFace, FaceLoads
 
 
 @dataclass(frozen=True)
-class InterfaceState:
+class InterfaceState(WearState):
     """What an interface must remember between two jumps.
 
-    ``loads`` and nodal ``slip`` ``(t, 2, n)`` are those of the last structural solution, ``energy``
-    [N mm] is dissipated so far, ``depth_rate`` [mm] and ``volume_rate`` [mm³] are per cycle,
-    ``starts`` the solver's, by increment.
+    ``loads`` and nodal ``slip`` ``(t, 2, n)`` are those of the last structural solution; ``ends``
+    ``(t, 2, 2)`` [mm] are where body 2 is before and after each increment, none where its motion is
+    too little to follow (:func:`wear.moving.followed`).
     """
 
-    surfaces: Surfaces
     loads: LoadHistory
     slip: Array
-    energy: float
-    depth_rate: float
-    volume_rate: float
-    starts: Starts
+    ends: Array
+
+
+@dataclass(frozen=True)
+class Spent:
+    """Contact problems of an increment solved, convolutions they took, and wear steps."""
+
+    contact_solves: int = 0
+    convolutions: int = 0
+    steps: int = 0
+
+    def __add__(self, other: Spent) -> Spent:
+        return Spent(
+            self.contact_solves + other.contact_solves,
+            self.convolutions + other.convolutions,
+            self.steps + other.steps,
+        )
 
 
 @dataclass(frozen=True)
@@ -76,7 +97,7 @@ class FirstContact:
     pressure: Array
     touches_border: bool
     largest_residual: float
-    convolutions: int
+    spent: Spent
     cycle: tuple[ContactState, ...]
 
     @property
@@ -87,9 +108,12 @@ class FirstContact:
 
 @dataclass(frozen=True)
 class Wearing:
-    """A contact that wears, and the cycle its slips come from (empty: from the structure)."""
+    """A contact that wears, ``slip`` ``(t, 2, nx, ny)`` [mm], and the cycle of the half-space that
+    it comes from (empty: from the structure).
+    """
 
     contact: WearingContact
+    slip: Array
     cycle: tuple[ContactState, ...]
 
 
@@ -104,18 +128,12 @@ class ContactStage:
         self.transfer = FaceTransfer.between(self.face, self.grid)
         self.pair = ElasticPair(case.material(1), case.material(2))
         half_space = HalfSpace(self.grid, self.pair)
+        self._contact = NormalContact(half_space)
         self._frictional: FrictionalContact | None = None
-        if case.contact.method == "full":
-            self._frictional = FrictionalContact(
-                half_space,
-                case.friction.coefficient,
-                case.contact.tolerance,
-                case.contact.gross_slip,
-            )
-        own = self._frictional
-        self._contact = NormalContact(half_space) if own is None else own.normal
-        self._laws = _law(case, 1), _law(case, 2)
+        self._laws = case.wear_of(1).described(), case.wear_of(2).described()
         _check_section(case.stress, self.grid)
+        self._stepper = _stepper(case.wear)
+        self._spent = Spent()
         self._current: tuple[tuple[Array, ...], Wearing] | None = None
 
     @property
@@ -138,21 +156,53 @@ class ContactStage:
 
     def begin(self, history: FaceLoads) -> tuple[InterfaceState, FirstContact]:
         """The unworn state, and the contact at every loaded increment of the first cycle."""
-        surfaces = Surfaces.unworn(self._gap(self.grid))
-        state = InterfaceState(surfaces, history.loads, history.slip, 0.0, 0.0, 0.0, {})
+        unworn = WearState.unworn(self._gap(self.grid))
+        state = InterfaceState(
+            **vars(unworn), loads=history.loads, slip=history.slip, ends=np.empty((0, 2, 2))
+        )
         loaded = np.flatnonzero(history.loads.P > 0.0).tolist()
-        wearing = self._wearing(state)
-        result = wearing.contact.cycle(surfaces, {}, loaded)
+        before, wearing = self._spent, self._wearing(state)
+        result = wearing.contact.cycle(state, loaded)
         states = result.states.values()
         first = FirstContact(
             energy=result.energy,
             pressure=self._pressure(result),
             touches_border=any(s.touches_border for s in states),
             largest_residual=max((s.residuals.largest for s in states), default=0.0),
-            convolutions=result.convolutions + sum(s.convolutions for s in wearing.cycle),
+            spent=self._spent_since(before) + Spent(len(states), result.convolutions),
             cycle=wearing.cycle,
         )
-        return self._after(state, surfaces, result, 0.0), first
+        depth_rate, volume_rate = result.per_cycle(self.grid.cell_area)
+        starts = {t: own.start for t, own in result.states.items()}
+        ends = self._ends(wearing.slip, starts, history.loads)
+        state = replace(
+            state, depth_rate=depth_rate, volume_rate=volume_rate, starts=starts, ends=ends
+        )
+        first_step = FIRST_STEP * wearing.contact.stable_cycles(state)
+        return replace(state, next_cycles=first_step), first
+
+    def follow(self, state: InterfaceState, history: FaceLoads) -> InterfaceState:
+        """The state under the loads of a new structural solution."""
+        ends = self._ends(self.transfer.to_cells(history.slip), state.starts, history.loads)
+        return replace(state, loads=history.loads, slip=history.slip, ends=ends)
+
+    def _ends(self, slip: Array, starts: Starts, loads: LoadHistory) -> Array:
+        """Where body 2 is before and after each increment, if its motion is to be followed."""
+        pressure = np.zeros(self.grid.shape)
+        for start in starts.values():
+            pressure += start.pressure
+        wear, body_1 = self._case.wear, self._case.wear_of(1)
+        forced = {"auto": None, "follow": True, "neglect": False}[wear.motion]
+        if forced is None and getattr(body_1, "coefficient", None) == 0.0:
+            forced = False  # what does not wear looks the same everywhere
+        ends = followed(self.grid, slip, pressure, loads.blocks, forced)
+        if len(ends) and getattr(body_1.evolution, "scope", None) == "local":
+            raise UserError(
+                "wear.motion: the surfaces move over each other, and that of body 1 changes from "
+                "place to place (evolution.scope: local), which no wear step follows; allowed: "
+                "motion: neglect, or scope: global"
+            )
+        return ends
 
     def _pressure(self, result: CycleResult) -> Array:
         """Pressure of every increment of a cycle ``(t, nx, ny)``."""
@@ -161,21 +211,33 @@ class ContactStage:
             pressure[t] = state.pressure
         return pressure
 
-    def jump(self, state: InterfaceState, cycles: float) -> tuple[InterfaceState, int]:
-        """Wear ``cycles`` cycles in one step; also the convolutions it took."""
-        wearing = self._wearing(state).contact
-        implicit = self._case.wear.step.kind == "implicit"
-        step = wearing.implicit_step if implicit else wearing.explicit_step
-        surfaces, result = step(state.surfaces, state.starts, cycles)
-        after = self._after(state, surfaces, result, cycles)
+    def jump(
+        self, state: InterfaceState, cycles: float, left: float
+    ) -> tuple[InterfaceState, Spent]:
+        """Wear ``cycles`` of the ``left`` cycles of the run; also what it took."""
+        before = self._spent
+        result = advance(self._stepper, state, cycles, left, self._contact_at)
+        after = result.state
+        assert isinstance(after, InterfaceState)
         # Friction of the half-space on the new surfaces: for the record now, to wear by next.
-        following = self._wearing(after).cycle
-        spent = result.convolutions + sum(own.convolutions for own in following)
-        return after, spent
+        self._wearing(after)
+        own = Spent(result.contact_solves, result.convolutions, result.steps)
+        return after, own + self._spent_since(before)
+
+    def _contact_at(self, state: WearState) -> WearingContact:
+        assert isinstance(state, InterfaceState)
+        return self._wearing(state).contact
+
+    def _spent_since(self, before: Spent) -> Spent:
+        """What cycles with the half-space's own friction have taken since."""
+        now = self._spent
+        return Spent(
+            now.contact_solves - before.contact_solves, now.convolutions - before.convolutions
+        )
 
     def stable_cycles(self, state: InterfaceState) -> float:
         """Largest stable explicit jump."""
-        return self._wearing(state).contact.stable_cycles()
+        return self._wearing(state).contact.stable_cycles(state)
 
     def peak_fields(self, state: InterfaceState, peak: int) -> dict[str, Array]:
         """Pressure, shear and slip at peak load on the present surfaces, for the record."""
@@ -185,13 +247,14 @@ class ContactStage:
             return {"pressure": own.pressure, "shear": own.shear, "slip": own.slip}
         slip = self.transfer.to_cells(state.slip[peak])
         pressure = wearing.contact.solve(state.surfaces, peak, state.starts.get(peak)).pressure
-        return {"pressure": pressure, "shear": self._sliding_shear(pressure, slip), "slip": slip}
+        shear = self._sliding_shear(pressure, slip, state.energy)
+        return {"pressure": pressure, "shear": shear, "slip": slip}
 
     def unworn_tractions(self, history: FaceLoads, first: FirstContact) -> CycleTractions:
         """Tractions of the first cycle, solved already."""
         if first.cycle:
             return _own_tractions(first.cycle)
-        return self._structures_tractions(history.slip, first.pressure)
+        return self._structures_tractions(history.slip, first.pressure, 0.0)
 
     def tractions(self, state: InterfaceState) -> CycleTractions:
         """Tractions of a cycle on the present surfaces."""
@@ -199,24 +262,27 @@ class ContactStage:
         if wearing.cycle:
             return _own_tractions(wearing.cycle)
         loaded = np.flatnonzero(state.loads.P > 0.0).tolist()
-        result = wearing.contact.cycle(state.surfaces, state.starts, loaded)
-        return self._structures_tractions(state.slip, self._pressure(result))
+        result = wearing.contact.cycle(state, loaded)
+        return self._structures_tractions(state.slip, self._pressure(result), state.energy)
 
-    def _structures_tractions(self, nodal_slip: Array, pressure: Array) -> CycleTractions:
-        """Those where slip is the structure's."""
+    def _structures_tractions(
+        self, nodal_slip: Array, pressure: Array, energy: float
+    ) -> CycleTractions:
+        """Those where slip is the structure's, once so much ``energy`` [N mm] is dissipated."""
         slip = self.transfer.to_cells(nodal_slip)
         stuck = ~slip.any(axis=1)
         force = pressure.sum(axis=(1, 2))
         held = np.where(stuck, pressure, 0.0).sum(axis=(1, 2))
         unknown = np.divide(held, force, out=np.zeros_like(force), where=force > 0.0)
-        shear = np.stack([self._sliding_shear(p, s) for p, s in zip(pressure, slip, strict=True)])
+        pairs = zip(pressure, slip, strict=True)
+        shear = np.stack([self._sliding_shear(p, s, energy) for p, s in pairs])
         return CycleTractions(pressure, shear, slip, unknown)
 
-    def _sliding_shear(self, pressure: Array, slip: Array) -> Array:
+    def _sliding_shear(self, pressure: Array, slip: Array, energy: float) -> Array:
         """µp against ``slip`` ``(2, nx, ny)``; 0 where nothing slips."""
         size = np.hypot(*slip)
         opposing = np.divide(-slip, size, out=np.zeros_like(slip), where=size > 0.0)
-        shear: Array = self._case.friction.coefficient * pressure * opposing
+        shear: Array = self._case.friction.at(energy) * pressure * opposing
         return shear
 
     def coarse_pressure(self, loads: LoadHistory, peak: int) -> Array:
@@ -237,33 +303,57 @@ class ContactStage:
         surfaces = state.surfaces
         return own.to_nodes(surfaces.depth_1), self.transfer.to_nodes(surfaces.depth_2)
 
+    def loop(self, state: InterfaceState, peak: int) -> WornLoop:
+        """The tangential loop that the case asks for, on the present surfaces."""
+        friction = self._case.friction.at(state.energy)
+        return worn_loop(self._rubbed(friction), self._case.loops, self.name, state, peak)
+
+    def _rubbed(self, friction: float) -> FrictionalContact:
+        """The contact with the half-space's own friction."""
+        if self._frictional is None or self._frictional.friction != friction:
+            contact, half_space = self._case.contact, self._contact.half_space
+            self._frictional = FrictionalContact(
+                half_space, friction, contact.tolerance, contact.gross_slip
+            )
+        return self._frictional
+
     def _wearing(self, state: InterfaceState) -> Wearing:
         """The contact under the state's loads and slips, kept until these change.
 
         Slips of the structure change with its solution, those of the half-space with wear.
         """
-        key: tuple[Array, ...] = np.array([*vars(state.loads).values()], dtype=float), state.slip
-        if self._frictional is not None:
-            key = *key, state.surfaces.gap
+        full = self._case.contact.method == "full"
+        friction = self._case.friction.at(state.energy)
+        columns = np.array([*vars(state.loads).values()], dtype=float)
+        key: tuple[Array, ...] = columns, state.slip, state.ends, np.array([friction])
+        if full:
+            key = *key, state.surfaces.gap, state.surfaces.depth_1
         if self._current is not None and all(map(np.array_equal, self._current[0], key)):
             return self._current[1]
+        ways = passages(self.grid, state.ends)
+        slip = self.transfer.to_cells(state.slip)
+        sliding = SlidingCycle(state.loads, np.hypot(slip[:, 0], slip[:, 1]), None, ways)
         cycle: tuple[ContactState, ...] = ()
-        slip, uplift = self.transfer.to_cells(state.slip), None
-        if self._frictional is not None:
-            cycle = tuple(full_cycle(self._frictional, state.surfaces.gap, state.loads))
+        if full:
+            cycle = self._rubbing(state, sliding, friction)
             slip = np.stack([own.slip for own in cycle])
-            uplift = self._uplift(cycle)
+            sizes = np.hypot(slip[:, 0], slip[:, 1])
+            sliding = replace(sliding, slip=sizes, uplift=self._uplift(cycle))
         contact = WearingContact(
-            self._contact,
-            self._laws,
-            self._case.friction.coefficient,
-            state.loads,
-            np.hypot(slip[:, 0], slip[:, 1]),
-            self._case.contact.tolerance,
-            uplift,
+            self._contact, self._laws, friction, sliding, self._case.contact.tolerance
         )
-        self._current = key, Wearing(contact, cycle)
+        self._current = key, Wearing(contact, slip, cycle)
         return self._current[1]
+
+    def _rubbing(
+        self, state: InterfaceState, sliding: SlidingCycle, friction: float
+    ) -> tuple[ContactState, ...]:
+        """The closed cycle with the half-space's own friction, on the present surfaces."""
+        gaps = np.stack([sliding.gap(state.surfaces, t) for t in range(len(state.loads))])
+        motion = state.slip.mean(axis=2) if self._contact_face.driven else None
+        cycle = tuple(full_cycle(self._rubbed(friction), gaps, state.loads, motion))
+        self._spent += Spent(len(cycle), sum(own.convolutions for own in cycle))
+        return cycle
 
     def _uplift(self, cycle: tuple[ContactState, ...]) -> Array | None:
         """Normal displacement under the shear of each increment; None for similar bodies."""
@@ -272,19 +362,17 @@ class ContactStage:
         half_space = self._contact.half_space
         return np.stack([half_space.normal_under_shear(own.shear) for own in cycle])
 
-    def _after(
-        self, state: InterfaceState, surfaces: Surfaces, result: CycleResult, cycles: float
-    ) -> InterfaceState:
-        depth_rate, volume_rate = result.per_cycle(self.grid.cell_area)
-        starts: dict[int, NormalStart] = {t: s.start for t, s in result.states.items()}
-        return replace(
-            state,
-            surfaces=surfaces,
-            energy=state.energy + float(result.energy.sum()) * cycles,
-            depth_rate=depth_rate,
-            volume_rate=volume_rate,
-            starts=state.starts | starts,
-        )
+
+def _stepper(wear: Duration) -> Stepper:
+    """What advances the surfaces of a contact, as the case asks for."""
+    step = wear.step
+    if step.kind == "explicit":
+        return Explicit(step.fraction)
+    control = None
+    if step.automatic:
+        relative = wear.tolerance if wear.depth_tolerance is None else None
+        control = ErrorControl(relative, wear.depth_tolerance)
+    return Implicit(control) if step.kind == "implicit" else SecondOrder(control)
 
 
 def _check_section(stress: ContactStress, grid: Grid) -> None:
@@ -307,12 +395,3 @@ def _own_tractions(cycle: tuple[ContactState, ...]) -> CycleTractions:
         np.stack([getattr(own, name) for own in cycle]) for name in ("pressure", "shear", "slip")
     )
     return CycleTractions(pressure, shear, slip, np.zeros(len(cycle)))
-
-
-def _law(case: WearCase, body: int) -> WearLaw:
-    own = case.wear_of(body)
-    if isinstance(own, ArchardBody):
-        return Archard(own.coefficient, own.hardness)
-    if isinstance(case.wear, EnergyAmplitudeLaw):
-        return EnergyAmplitude(own.coefficient, case.wear.reference_amplitude)
-    return Energy(own.coefficient)

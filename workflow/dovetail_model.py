@@ -10,10 +10,10 @@ from fe_models.dovetail import Mission, dovetail_softening, dovetail_structure
 from fe_models.mesh import Interface, StructureMesh
 from fe_models.relinearised import Softening
 from fe_models.structure import Structure
-from sa_solver.types import Array
 from workflow.case import DovetailCase
 from workflow.load_source import ContactFace
 from workflow.reporter import Reporter
+from workflow.structure_stage import LoadBlock
 
 # The flank at X > 0 and the one at X < 0.
 SIDES = {"intrados": 1, "extrados": -1}
@@ -25,9 +25,11 @@ class DovetailModel:
     def __init__(self, case: DovetailCase) -> None:
         self._case = case
         self.dovetail = case.structure.geometry()
-        self._mission = Mission(**case.load_path.model_dump())
-        self.friction = case.friction.coefficient
-        self.peak = case.load_path.peak_at - 1
+        self._missions = [Mission(**entries) for entries in case.load_path.missions()]
+        heaviest = case.load_path.heaviest
+        self._mission = self._missions[heaviest]
+        self.friction = case.friction.at(0.0)
+        self.peak = heaviest * case.load_path.increments + case.load_path.peak_at - 1
         self.nonlinearity = case.nonlinearity
         self.order = case.mesh.order
 
@@ -38,12 +40,10 @@ class DovetailModel:
         return self.dovetail, case.structure.dimension, case.mesh, case.materials, pull
 
     @property
-    def preload(self) -> Array:
-        return self.amplitudes[:0]
-
-    @property
-    def amplitudes(self) -> Array:
-        return self._mission.amplitudes()
+    def blocks(self) -> tuple[LoadBlock, ...]:
+        paths = [mission.amplitudes() for mission in self._missions]
+        shares = self._case.load_path.shares
+        return tuple(LoadBlock(p, p[:0], share) for p, share in zip(paths, shares, strict=True))
 
     def mesh(self) -> StructureMesh:
         mesh = self._case.mesh

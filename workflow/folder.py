@@ -13,8 +13,8 @@ from workflow.errors import UserError
 from workflow.store import PARTIAL, replacing
 
 FILES = ("case.yaml", "summary.json", "results.h5", "worn.msh", "checkpoint.h5", "run.log")
-# Worn surfaces at the nodes of another code, by interface and body.
-WORN_NODES = "worn_nodes_*.csv"
+# Worn surfaces at the nodes of another code, and tangential loops, by interface.
+TABLES = ("worn_nodes_*.csv", "loops_*.csv")
 FOLDERS = ("jumps", "reduced", "paraview", "figures")
 
 
@@ -50,8 +50,9 @@ class OutputFolder:
         self.root.mkdir(parents=True, exist_ok=True)
         for name in FILES:
             (self.root / name).unlink(missing_ok=True)
-        for path in self.root.glob(WORN_NODES):
-            path.unlink()
+        for pattern in TABLES:
+            for path in self.root.glob(pattern):
+                path.unlink()
         for name in FOLDERS:
             shutil.rmtree(self.root / name, ignore_errors=True)
         self.clear_partial()

@@ -16,7 +16,8 @@ class ContactFace:
 
     ``size`` (x, y) [mm] is what the contact grid covers, ``gap`` gives the distance [mm] at x and y
     of the face, and ``coarse`` as many cells as the face has nodes. ``remedy`` is what to do where
-    the contact reaches the end of the face.
+    the contact reaches the end of the face. A ``driven`` contact has the motion of its bodies
+    imposed and not the tangential force: the slip of its loads is then that motion.
     """
 
     face: Face
@@ -24,6 +25,7 @@ class ContactFace:
     gap: Callable[[Array, Array], Array]
     coarse: tuple[int, int]
     remedy: str = "make the face larger or round its edges"
+    driven: bool = False
 
     def grid(self, cells: tuple[int, int]) -> Grid:
         """The grid of so many cells along x and y over the face."""
@@ -42,7 +44,8 @@ class FaceLoads(Protocol):
 class LoadSource(Protocol):
     """Loads and slips of every contact face over one closed cycle.
 
-    Worn depths are nodal, ``(n,)`` per face, of both bodies together [mm].
+    Worn depths are nodal, ``(n,)`` per face, of both bodies together [mm]. Coefficients of friction
+    are one per face; those before any wear where they are not given.
     """
 
     @property
@@ -66,10 +69,12 @@ class LoadSource(Protocol):
         """The closed cycle with unworn faces."""
         ...
 
-    def worn(self, depths: list[Array]) -> Sequence[FaceLoads]:
+    def worn(
+        self, depths: list[Array], friction: Sequence[float] | None = None
+    ) -> Sequence[FaceLoads]:
         """The closed cycle with worn faces."""
         ...
 
-    def probe(self, depths: list[Array]) -> Array:
+    def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
         """Resultants ``(faces, 6)`` that wear moves as it moves those of the cycle, but cheap."""
         ...

@@ -41,7 +41,8 @@ def required_bytes(
     contact = prod(case.contact.grid) * SPECTRA
     if isinstance(case, DovetailCase) and case.structure.dimension == 3:
         interface_nodes = 2 * prod(case.mesh.flank_nodes)
-        contact = 2 * prod(case.contact.grid) * case.load_path.increments * FIELDS
+        increments = len(case.load_path.shares) * case.load_path.increments
+        contact = 2 * prod(case.contact.grid) * increments * FIELDS
     factors = FACTOR_BYTES * (structure_nodes / FACTOR_NODES) ** FACTOR_POWER
     return BYTES * (DENSE_MATRICES * (3 * interface_nodes) ** 2 + contact) + factors + REST
 

@@ -21,6 +21,7 @@ from workflow.case.mesh_loads import RotationLoad
 from workflow.load_source import ContactFace
 from workflow.reporter import Reporter
 from workflow.resultants.gaps import GapFunction, gap_over
+from workflow.structure_stage import LoadBlock
 
 # A point is still on a facet when it is off by this share of it: edges belong to both sides.
 INSIDE = 1e-9
@@ -31,7 +32,7 @@ class MeshModel:
 
     def __init__(self, case: MeshCase) -> None:
         self._case = case
-        self.friction = case.friction.coefficient
+        self.friction = case.friction.at(0.0)
         self.nonlinearity = case.nonlinearity
         self.order = case.structure.order
         path = case.load_path
@@ -48,19 +49,22 @@ class MeshModel:
         return contents, described, loads, gaps, self._case.materials
 
     @property
-    def preload(self) -> Array:
-        return self._path()[: self._begun]
+    def blocks(self) -> tuple[LoadBlock, ...]:
+        begun, made = self._begun, []
+        for factors, share in self._case.load_path.mixed(len(self._case.structure.loads)):
+            path = self._path(factors)
+            made.append(LoadBlock(path[begun:], path[:begun], share))
+        return tuple(made)
 
-    @property
-    def amplitudes(self) -> Array:
-        return self._path()[self._begun :]
-
-    def _path(self) -> Array:
-        """Factors of the loads, ``(t, loads)``; squared where a load is a rotation."""
+    def _path(self, factors: tuple[float, ...]) -> Array:
+        """Amplitudes of the loads, ``(t, loads)``; squared where a load is a rotation."""
         legs, loads = self._case.load_path.increments, self._case.structure.loads
         ends = np.insert(np.cumsum(legs), 0, 0)
         steps = np.arange(1, ends[-1] + 1)
-        columns = [np.interp(steps, ends, (0.0, *load.path)) for load in loads]
+        columns = [
+            factor * np.interp(steps, ends, (0.0, *load.path))
+            for factor, load in zip(factors, loads, strict=True)
+        ]
         squared = [isinstance(load, RotationLoad) for load in loads]
         return np.stack([c**2 if s else c for c, s in zip(columns, squared, strict=True)], axis=1)
 
@@ -107,7 +111,7 @@ class MeshModel:
 
     def softening(self, structure: Structure) -> Softening:
         loads = [load.described() for load in self._case.structure.loads]
-        return imported_softening(structure, loads, self.amplitudes[self.peak])
+        return imported_softening(structure, loads, self.blocks[0].amplitudes[self.peak])
 
     def contact_face(self, interface: Interface) -> ContactFace:
         size, given = face_size(interface), self._given(interface)

@@ -12,14 +12,22 @@ import h5py
 import numpy as np
 
 from sa_solver.normal import NormalContactError
-from sa_solver.types import LoadHistory
+from sa_solver.types import Array, LoadHistory
 from wear.kinetics import LinearRegime, linear_regime
+from wear.steppers import root_mean_square
 from workflow.case import ResultantsCase, WearCase, dump_case
 from workflow.checkpoint import KINETICS, RunState
 from workflow.comparison import comparison_summary, write_comparison
+from workflow.contact_loops import (
+    loops_sentence,
+    warn_of_border,
+    write_loop_tables,
+    write_loops,
+)
 from workflow.contact_stage import ContactStage, CycleTractions, FirstContact
 from workflow.fidelity import kept
 from workflow.figures import write_figures
+from workflow.figures.wear import EXTRAPOLATION
 from workflow.folder import OutputFolder
 from workflow.load_source import FaceLoads, LoadSource
 from workflow.paraview import write_paraview
@@ -69,7 +77,14 @@ def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> 
     """Write all files of a finished run; the summary comes last and marks it as finished."""
     structure = None
     if isinstance(outcome.source, StructureStage):
-        structure = worn_structure(outcome.source, outcome.stages, outcome.state, folder, reporter)
+        structure = worn_structure(
+            outcome.source,
+            outcome.stages,
+            outcome.state,
+            outcome.case.friction,
+            folder,
+            reporter,
+        )
     with reporter.stage("stress under the contacts"):
         stresses = contact_stresses(
             outcome.case,
@@ -85,9 +100,14 @@ def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> 
         _write_pictures(outcome.case, folder)
     worn_nodes = _write_worn_nodes(outcome, folder, reporter)
     pressures = _peak_pressures(outcome, folder)
+    loops = write_loop_tables(folder, outcome.source.line)
+    warn_of_border(loops, outcome.case.loops, reporter)
     summary = _summary(outcome, structure, stresses, pressures, reporter)
+    _add_areas(summary, outcome, folder)
     for name, written in worn_nodes.items():
         summary[name]["worn_nodes"] = written
+    for name, found in loops.items():
+        summary[name]["loops"] = found
     if chosen := kept(folder):
         summary["fidelity"] = chosen
     uniform = uniformities(outcome.source, outcome.stages, outcome.state.interfaces)
@@ -98,6 +118,8 @@ def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> 
     _say(outcome, summary, reporter)
     for name, own in uniform.items():
         reporter.say(f"  {own.sentence(name)}")
+    for name, found in loops.items():
+        reporter.say(f"  {loops_sentence(name, found, outcome.source.line)}")
 
 
 def _write_worn_nodes(
@@ -138,7 +160,7 @@ def _write_results(
         file.attrs.update(
             {
                 "title": outcome.case.title,
-                "friction": outcome.case.friction.coefficient,
+                "friction": outcome.case.friction.at(0.0),
                 "peak_increment": source.peak,
                 "bodies": list(outcome.case.bodies),
             }
@@ -150,9 +172,10 @@ def _write_results(
             _write_coarse(writer, stage, loads.loads, source.peak)
             writer.put(f"contact/{stage.name}", energy_half_space=result.energy)
             if result.cycle:
-                write_comparison(writer, stage.name, result.cycle, source.peak)
+                write_comparison(writer, stage.name, result.cycle, loads.loads, source.peak)
         _write_jumps(writer, outcome, folder)
         _write_kinetics(writer, outcome)
+        write_loops(writer, folder, outcome.state.jump)
         if structure is not None:
             structure.write(writer)
         for stress in stresses:
@@ -196,14 +219,34 @@ def _write_kinetics(writer: ResultsWriter, outcome: Outcome) -> None:
     for number, stage in enumerate(outcome.stages):
         group = f"kinetics/{stage.name}"
         columns = dict(zip(KINETICS, state.kinetics[:, number].T, strict=True))
-        writer.put(group, **columns)
+        writer.put(group, **columns, area=_contact_area(writer.file, stage, state.jump))
         for name, regime in outcome.regimes[stage.name].items():
             writer.file[group].attrs.update(
                 {
                     f"{name}_linear_from": regime.start if regime else np.nan,
                     f"{name}_rate": regime.rate if regime else np.nan,
+                    f"{name}_trend": regime.trend if regime else np.nan,
+                    f"{name}_scatter": regime.scatter if regime else np.nan,
                 }
             )
+
+
+def _contact_area(file: h5py.File, stage: ContactStage, jumps: int) -> Array:
+    """Area in contact at peak load after every jump, unworn first, ``(jumps + 1,)`` [mm²]."""
+    pressures = (file[f"contact/{stage.name}/{jump:05d}/pressure"] for jump in range(jumps + 1))
+    cells = [np.count_nonzero(pressure[()] > 0.0) for pressure in pressures]
+    return np.array(cells, dtype=np.float64) * stage.grid.cell_area
+
+
+def _add_areas(summary: dict[str, Any], outcome: Outcome, folder: OutputFolder) -> None:
+    """Area in contact at peak load over the cycles, and that which has worn by the end."""
+    with h5py.File(folder.results, "r") as file:
+        for stage, state in zip(outcome.stages, outcome.state.interfaces, strict=True):
+            area = file[f"kinetics/{stage.name}/area"][()].tolist()
+            summary["kinetics"][stage.name]["area"] = area
+            worn = np.count_nonzero(state.surfaces.depth_1 + state.surfaces.depth_2 > 0.0)
+            areas = {"area": area[-1], "worn_area": worn * stage.grid.cell_area}
+            summary[stage.name].update(areas)
 
 
 def _peak_pressures(outcome: Outcome, folder: OutputFolder) -> dict[str, dict[str, float]]:
@@ -234,6 +277,7 @@ def _summary(
         "per_length": outcome.source.line,
         "cycles": float(state.cycles[-1]),
         "jumps": state.jump,
+        "work": vars(state.spent),
         **({"structure": structure.summary(state)} if structure else {}),
         **{
             stage.name: _interface_summary(outcome, number)
@@ -266,24 +310,47 @@ def _interface_summary(outcome: Outcome, number: int) -> dict[str, Any]:
         "slip_per_cycle": _slip_per_cycle(unworn, first),
         "energy_per_cycle": {
             "half_space": float(first.energy.sum()),
-            "structure": float((loads.Edx + loads.Edy).sum()),
+            "structure": loads.mean_energy,
         },
         **({"by_increment": comparison_summary(first.cycle, loads)} if first.cycle else {}),
+        "depth_error": _depth_error(outcome, number),
         "contact_residual": first.largest_residual,
-        "convolutions": first.convolutions,
+        "convolutions": first.spent.convolutions,
         "linear_regime": {
-            name: None if regime is None else vars(regime)
+            name: None if regime is None else _regime_summary(regime)
             for name, regime in outcome.regimes[stage.name].items()
         },
     }
 
 
+def _regime_summary(regime: LinearRegime) -> dict[str, Any]:
+    """A linear regime, and where it leads with its uncertainty."""
+    cycles = np.array(EXTRAPOLATION * regime.last_cycles)
+    return vars(regime) | {
+        "extrapolated": {
+            "cycles": float(cycles),
+            "value": float(regime.extrapolate(cycles)),
+            "uncertainty": float(regime.uncertainty(cycles)),
+        }
+    }
+
+
+def _depth_error(outcome: Outcome, number: int) -> float | None:
+    """Estimated error of the depth by wear steps, root mean square, relative; None if unknown."""
+    if outcome.case.wear.step.kind == "explicit":
+        return None
+    own = outcome.state.interfaces[number]
+    depth = own.surfaces.depth
+    size = root_mean_square(depth, depth)
+    return root_mean_square(own.error, depth) / size if size > 0.0 else 0.0
+
+
 def _slip_per_cycle(unworn: FaceLoads, first: FirstContact) -> float:
-    """Largest path of slip [mm] in the unworn cycle: of the half-space where loads have no slip."""
+    """Largest path of slip [mm] per unworn, mean cycle: of the half-space where loads have none."""
     slip = unworn.slip
     if first.cycle and not slip.any():
         slip = np.stack([state.slip for state in first.cycle])
-    return float(np.hypot(slip[:, 0], slip[:, 1]).sum(axis=0).max())
+    return float(np.tensordot(unworn.loads.share, np.hypot(slip[:, 0], slip[:, 1]), 1).max())
 
 
 def _say(outcome: Outcome, summary: dict[str, Any], reporter: Reporter) -> None:

@@ -2,7 +2,15 @@
 
 from __future__ import annotations
 
-from workflow.case import DovetailCase, MeshCase, ResultantsCase, WearCase
+from workflow.bodies_source import BodiesSource
+from workflow.case import (
+    BodiesWearCase,
+    DovetailCase,
+    LineBodiesWearCase,
+    MeshCase,
+    ResultantsCase,
+    WearCase,
+)
 from workflow.dovetail_model import DovetailModel
 from workflow.load_source import LoadSource
 from workflow.mesh_model import MeshModel
@@ -16,5 +24,7 @@ def load_source(case: WearCase) -> LoadSource:
         return StructureStage(DovetailModel(case))
     if isinstance(case, ResultantsCase):
         return ResultantsSource(case)
+    if isinstance(case, BodiesWearCase | LineBodiesWearCase):
+        return BodiesSource(case)
     assert isinstance(case, MeshCase)
     return StructureStage(MeshModel(case))

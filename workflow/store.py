@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 BODIES = "bodies"
 
 # Units of the forces and moments of a line contact, by those of a contact over an area.
-PER_LENGTH = {"N": "N/mm", "N mm": "N mm/mm", "mm^3": "mm^3/mm"}
+PER_LENGTH = {"N": "N/mm", "N mm": "N mm/mm", "mm^2": "mm^2/mm", "mm^3": "mm^3/mm"}
 
 # Ending of files that are being written.
 PARTIAL = ".part"
@@ -40,6 +40,8 @@ DATASETS = {
     "Edx": ("N mm", "energy dissipated in the increment by slip along x"),
     "Edy": ("N mm", "energy dissipated in the increment by slip along y"),
     "sliding": ("1", "whether the whole face slides"),
+    "share": ("1", "of the mission's cycles among all cycles of the mix"),
+    "block": ("1", "mission of the mix, counted from 0"),
     "coordinates": ("mm", "nodes in the interface frame"),
     "facets": ("1", "corner nodes of the triangles, or of the segments of a line contact"),
     "gap": ("mm", "distance of the deformed faces"),
@@ -196,7 +198,7 @@ class ResultsWriter:
 
     def put_face(self, group: str, face: Face, loads: FaceLoads) -> None:
         """A contact face over a cycle; nodal pressure and shear where a structure gives them."""
-        self.put(f"{group}/load_history", **vars(loads.loads))
+        self.put(f"{group}/load_history", **loads.loads.columns())
         self.put(group, coordinates=face.coordinates, facets=face.facets, slip=loads.slip)
         force = getattr(loads, "force", None)
         if force is not None:

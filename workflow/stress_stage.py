@@ -185,13 +185,17 @@ def contact_stresses(
     for stage, (loads, first), last in zip(stages, unworn, worn, strict=True):
         cycles = stage.unworn_tractions(loads, first), last
         unknown += [cycle.unknown for cycle in cycles]
-        found.append(_interface_stress(case, stage, peak, cycles))
+        found.append(_interface_stress(case, stage, peak, cycles, loads.loads.share))
     _tell_of_stick(np.array(unknown), peak, reporter)
     return found
 
 
 def _interface_stress(
-    case: WearCase, stage: ContactStage, peak: int, cycles: tuple[CycleTractions, CycleTractions]
+    case: WearCase,
+    stage: ContactStage,
+    peak: int,
+    cycles: tuple[CycleTractions, CycleTractions],
+    share: Array,
 ) -> InterfaceStress:
     planes = Planes(case.stress, stage.grid)
     materials = case.material(1), case.material(2)
@@ -206,7 +210,7 @@ def _interface_stress(
         body_1, body_2 = (
             BodyStress(
                 planes.section(solver, _traction(cycle, peak)),
-                life_maps(case.stress.life, solver, material, cycle, known),
+                life_maps(case.stress.life, solver, material, cycle, known, share),
             )
             for solver, material in zip(solvers, materials, strict=True)
         )
@@ -232,11 +236,13 @@ def life_maps(
     material: Material,
     cycle: CycleTractions,
     known: np.ndarray,
+    share: Array | None = None,
 ) -> dict[str, Array]:
     """Maps of the parameter and of what it is made of, at the critical distance, by name.
 
-    Stress is that of the ``known`` ``(t,)`` increments, friction work that of all. Where no
-    increment is known there is no map.
+    Stress is that of the ``known`` ``(t,)`` increments, of all cycles of a mix together; friction
+    work that of all, by the ``share`` ``(t,)`` of each in a mean cycle. Where no increment is known
+    there is no map.
     """
     if life.parameter == "none" or not known.any():
         return {}
@@ -245,7 +251,7 @@ def life_maps(
         history[t] = solver.at_depth(_traction(cycle, int(t)), life.depth)
     if life.parameter == "ruiz":
         # Without stress, an increment adds its work and leaves the largest tension as it is.
-        parameters = ruiz(history, cycle.shear, cycle.slip)
+        parameters = ruiz(history, cycle.shear, cycle.slip, share)
         names = "friction_parameter", "tension", "cracking_parameter"
         return {name: getattr(parameters, name) for name in names}
     if life.parameter == "findley":

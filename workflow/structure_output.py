@@ -13,6 +13,7 @@ from fe_models.remesh import worn_mesh, worn_volume
 from fe_models.stress import StressField
 from fe_models.structure import CycleSolution
 from sa_solver.types import LoadHistory
+from workflow.case.evolution import EvolvingFriction
 from workflow.checkpoint import RunState
 from workflow.contact_stage import ContactStage
 from workflow.folder import OutputFolder
@@ -94,13 +95,17 @@ def worn_structure(
     stage: StructureStage,
     contacts: list[ContactStage],
     state: RunState,
+    friction: EvolvingFriction,
     folder: OutputFolder,
     reporter: Reporter,
 ) -> WornStructure:
     """Solve the worn structure, put the worn shape into its mesh and write that."""
     pairs = list(zip(contacts, state.interfaces, strict=True))
     with reporter.stage("structural friction"):
-        cycle = stage.worn_cycle([contact.nodal_depth(own) for contact, own in pairs])
+        cycle = stage.worn_cycle(
+            [contact.nodal_depth(own) for contact, own in pairs],
+            None if friction.evolution is None else [friction.at(own.energy) for _, own in pairs],
+        )
     with reporter.stage("re-meshing"):
         mesh = worn_mesh(stage.mesh, [contact.depths_of_bodies(own) for contact, own in pairs])
         with replacing(folder.root / "worn.msh") as partial:

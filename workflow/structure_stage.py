@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol, TypeVar
 
@@ -18,7 +20,7 @@ from fe_models.relinearised import (
     stress_stiffened,
 )
 from fe_models.stress import StressField, deformation, stress_state
-from fe_models.structure import CycleSolution, InterfaceHistory, Structure
+from fe_models.structure import CycleSolution, InterfaceHistory, Structure, mixed
 from sa_solver.types import Array, Indices
 from workflow.cache import content_key, load_cycle, load_joint, save_cycle, save_joint
 from workflow.case.wear_sections import Nonlinearity
@@ -29,20 +31,31 @@ from workflow.reporter import Reporter
 Solved = TypeVar("Solved", CycleSolution, FrictionState)
 
 
+@dataclass(frozen=True)
+class LoadBlock:
+    """A closed cycle of loads that is so large a ``share`` of all cycles.
+
+    ``amplitudes`` ``(t, cases)`` are those of the load cases over the cycle and ``preload``
+    ``(s, cases)`` those before the first one.
+    """
+
+    amplitudes: Array
+    preload: Array
+    share: float = 1.0
+
+
 class StructureModel(Protocol):
     """A structure as a case describes it.
 
-    ``key`` is everything that its condensed joint depends on, ``amplitudes`` ``(t, cases)`` those
-    of its load cases over a cycle and ``preload`` ``(s, cases)`` those before the first one;
-    ``peak`` is the increment of peak load, counted from 0, ``order`` that of the elements.
+    ``key`` is everything that its condensed joint depends on, ``blocks`` are the closed cycles of
+    its loads, one unless missions are mixed; ``peak`` is the increment of peak load, counted from 0
+    over all blocks, ``friction`` µ before any wear, ``order`` that of the elements.
     """
 
     @property
     def key(self) -> tuple[object, ...]: ...
     @property
-    def preload(self) -> Array: ...
-    @property
-    def amplitudes(self) -> Array: ...
+    def blocks(self) -> tuple[LoadBlock, ...]: ...
     @property
     def peak(self) -> int: ...
     @property
@@ -80,7 +93,8 @@ class StructureModel(Protocol):
 class StructureStage:
     """Everything the run asks of the structure: a load source, and stress and worn mesh after it.
 
-    Worn depths are nodal, ``(n,)`` per interface, of both bodies together [mm].
+    Worn depths are nodal, ``(n,)`` per interface, of both bodies together [mm]. Coefficients of
+    friction are one per interface; those before any wear where they are not given.
     """
 
     def __init__(self, model: StructureModel) -> None:
@@ -103,13 +117,18 @@ class StructureStage:
 
     @cached_property
     def joint(self) -> FrictionalJoint:
-        """The condensed joint, from the cache when it is there."""
+        """The condensed joint before any wear, from the cache when it is there."""
+        return FrictionalJoint(self._resolvent, self.model.friction)
+
+    @cached_property
+    def _resolvent(self) -> JointResolvent:
+        """The condensed joint, as stiff as the case asks for."""
         resolvent = self._linear_resolvent
         # The linear structure itself takes seconds to build, and is not asked for.
         if self.model.nonlinearity.stiffness != "linear":
             assert isinstance(self.structure, PrestressedStructure)
             resolvent = self.structure.condense_path(resolvent)
-        return FrictionalJoint(resolvent, self.model.friction)
+        return resolvent
 
     @property
     def rigid_modes(self) -> int:
@@ -140,7 +159,7 @@ class StructureStage:
         kind = self.model.nonlinearity.stiffness
         if kind == "linear":
             return structure
-        amplitudes = self.model.amplitudes[self.peak]
+        amplitudes = self._peak_amplitudes
         softening = self.model.softening(structure)
         how = {"stress_stiffened": stress_stiffened, "relinearised": relinearised}
         return how[kind](structure, self._linear_peak, amplitudes, softening)
@@ -148,7 +167,7 @@ class StructureStage:
     @cached_property
     def _linear_peak(self) -> tuple[Array, Array]:
         """Displacements of both bodies of the linear structure at peak load."""
-        amplitudes = self.model.amplitudes[self.peak]
+        amplitudes = self._peak_amplitudes
         linear = FrictionalJoint(self._linear_resolvent, self.model.friction)
         (state,) = map(_converged, linear.march(amplitudes[None], self._linear.gap()))
         return deformation(self._linear, state.force, state.displacement, amplitudes)
@@ -161,7 +180,7 @@ class StructureStage:
             linear,
             self._linear_resolvent,
             self.model.friction,
-            self.model.amplitudes[self.peak],
+            self._peak_amplitudes,
             linear.gap(),
             self.model.softening(linear),
         )
@@ -186,58 +205,102 @@ class StructureStage:
 
     @cached_property
     def unworn_cycle(self) -> CycleSolution:
-        """The closed cycle from rest with unworn faces, from the cache if it is there."""
+        """The closed cycle from rest with unworn faces, of all blocks one after the other."""
+        return self._mixed(self._unworn_blocks)
+
+    @cached_property
+    def _unworn_blocks(self) -> tuple[CycleSolution, ...]:
+        return tuple(map(self._unworn_block, self.model.blocks))
+
+    def _unworn_block(self, block: LoadBlock) -> CycleSolution:
+        """The closed cycle of one block from rest, from the cache if it is there."""
         friction = self.model.friction
-        loads = [path.tolist() for path in (self.model.preload, self.model.amplitudes)]
+        loads = [path.tolist() for path in (block.preload, block.amplitudes)]
         stiffness = self.model.nonlinearity.stiffness
-        at = None if stiffness == "linear" else self.peak
+        at = None if stiffness == "linear" else self._peak_amplitudes.tolist()
         key = content_key(*self.model.key, *loads, stiffness, at, friction)
         cycle = load_cycle(key, self.structure, friction)
         if cycle is None:
-            cycle = self._cycle([np.zeros(len(i)) for i in self.mesh.interfaces], None)
+            unworn = [np.zeros(len(i)) for i in self.mesh.interfaces]
+            cycle = self._cycle(block, unworn, None, None)
             save_cycle(key, cycle)
         return cycle
 
     def unworn(self) -> tuple[InterfaceHistory, ...]:
         return self.unworn_cycle.histories
 
-    def worn_cycle(self, depths: list[Array]) -> CycleSolution:
+    def worn_cycle(
+        self, depths: list[Array], friction: Sequence[float] | None = None
+    ) -> CycleSolution:
         """The cycle that follows the unworn one when the gaps are wider by the worn depths."""
-        return self._cycle(depths, self.unworn_cycle)
+        pairs = zip(self.model.blocks, self._unworn_blocks, strict=True)
+        return self._mixed([self._cycle(block, depths, own, friction) for block, own in pairs])
 
-    def worn(self, depths: list[Array]) -> tuple[InterfaceHistory, ...]:
-        return self.worn_cycle(depths).histories
+    def worn(
+        self, depths: list[Array], friction: Sequence[float] | None = None
+    ) -> tuple[InterfaceHistory, ...]:
+        return self.worn_cycle(depths, friction).histories
 
-    def _cycle(self, depths: list[Array], after: CycleSolution | None) -> CycleSolution:
-        model = self.model
+    def _mixed(self, cycles: Sequence[CycleSolution]) -> CycleSolution:
+        return mixed(cycles, [block.share for block in self.model.blocks])
+
+    def _cycle(
+        self,
+        block: LoadBlock,
+        depths: list[Array],
+        after: CycleSolution | None,
+        friction: Sequence[float] | None,
+    ) -> CycleSolution:
+        nodal = self._nodal_friction(friction)
         solution = self.structure.solve_cycle(
-            self.joint, model.amplitudes, self._gap(depths), model.friction, after, model.preload
+            self._joint_of(nodal), block.amplitudes, self._gap(depths), nodal, after, block.preload
         )
         return _converged(solution)
 
-    def probe(self, depths: list[Array]) -> Array:
+    def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
         """Resultants ``(interfaces, 6)`` at peak load reached in a single increment.
 
-        Cheap, and moved by wear as those of the full cycle are.
+        Cheap, and moved by wear and friction as those of the full cycle are.
         """
-        state = self._march_to_peak(depths, [self._unworn_peak.state])
+        state = self._march_to_peak(depths, [self._unworn_peak.state], friction)
         return self.structure.interface_resultants(state)
 
     @cached_property
     def _unworn_peak(self) -> FrictionState:
-        return self._march_to_peak([np.zeros(len(i)) for i in self.mesh.interfaces], [])
+        return self._march_to_peak([np.zeros(len(i)) for i in self.mesh.interfaces], [], None)
 
-    def _march_to_peak(self, depths: list[Array], guess: list[Array]) -> FrictionState:
-        amplitudes = self.model.amplitudes[self.peak : self.peak + 1]
-        (state,) = map(_converged, self.joint.march(amplitudes, self._gap(depths), guess=guess))
+    def _march_to_peak(
+        self, depths: list[Array], guess: list[Array], friction: Sequence[float] | None
+    ) -> FrictionState:
+        joint = self._joint_of(self._nodal_friction(friction))
+        path = self._peak_amplitudes[None]
+        (state,) = map(_converged, joint.march(path, self._gap(depths), guess=guess))
         return state
+
+    def _nodal_friction(self, friction: Sequence[float] | None) -> float | Array:
+        """Coefficients of the interfaces at all nodes ``(n,)``; one for all before any wear."""
+        if friction is None:
+            return self.model.friction
+        return np.repeat(friction, [len(interface) for interface in self.mesh.interfaces])
+
+    def _joint_of(self, friction: float | Array) -> FrictionalJoint:
+        if isinstance(friction, float):
+            return self.joint
+        return FrictionalJoint(self._resolvent, friction)
+
+    @property
+    def _peak_amplitudes(self) -> Array:
+        """Amplitudes of the load cases at peak load ``(cases,)``."""
+        amplitudes = np.concatenate([block.amplitudes for block in self.model.blocks])
+        peak: Array = amplitudes[self.peak]
+        return peak
 
     def stress(self, mesh: StructureMesh, solution: CycleSolution) -> tuple[StressField, ...]:
         """Stress of both bodies at peak load, on the unworn or the worn mesh."""
         worn = mesh is not self.mesh
         structure = self._prestressed(self.model.structure(mesh)) if worn else self.structure
         fields = {name: values[self.peak] for name, values in solution.fields().items()}
-        amplitudes = self.model.amplitudes[self.peak]
+        amplitudes = self._peak_amplitudes
         return stress_state(structure, fields["force"], fields["displacement"], amplitudes)
 
     def _gap(self, depths: list[Array]) -> Array:

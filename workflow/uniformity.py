@@ -33,8 +33,8 @@ class Sections:
     """What the sections of a contact carry, per length, ``(ny,)`` along y.
 
     ``P`` and ``Qx`` [N/mm] are those of the increment of peak load, ``energy`` [N mm/mm]
-    is dissipated in a cycle and ``slip`` [mm] the mean path of the nodes, weighted by their
-    pressure at peak load.
+    is dissipated in a mean cycle and ``slip`` [mm] the mean path of the nodes in it, weighted by
+    their pressure at peak load.
     """
 
     P: Array
@@ -59,9 +59,10 @@ def sections(transfer: FaceTransfer, history: InterfaceHistory, peak: int) -> Se
 
     traction = history.force / history.interface.nodal_areas
     pressure = traction[peak, 2]
-    path = np.hypot(history.slip[:, 0], history.slip[:, 1]).sum(axis=0)
+    share = history.loads.share
+    path = share @ np.hypot(history.slip[:, 0], history.slip[:, 1])
     normal = per_length(pressure)
-    energy = -np.einsum("tan,tan->n", traction[:, :2], history.slip)
+    energy = -np.einsum("t,tan,tan->n", share, traction[:, :2], history.slip)
     weighted = per_length(pressure * path)
     slip = np.divide(weighted, normal, out=np.zeros_like(normal), where=normal > 0.0)
     return Sections(normal, per_length(traction[peak, 0]), per_length(energy), slip)

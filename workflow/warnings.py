@@ -65,7 +65,7 @@ def warn_of_contact(
                 f"{stage.name}: the pressure reaches {highest:.0f} MPa, above the yield stress of "
                 f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there"
             )
-        given, found = float((own.loads.Edx + own.loads.Edy).sum()), float(result.energy.sum())
+        given, found = own.loads.mean_energy, float(result.energy.sum())
         if abs(found - given) > ENERGIES_APART * max(found, given) and not result.cycle:
             reporter.warn(
                 f"{stage.name}: pressure on the grid and slip of the structure dissipate "

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,11 +15,13 @@ from wear.stepping import ContactFailure
 from workflow import checkpoint
 from workflow.case import WearCase
 from workflow.checkpoint import KINETICS, RunState
+from workflow.contact_loops import kept_loops, loops_due
 from workflow.contact_stage import (
     ContactStage,
     CycleTractions,
     FirstContact,
     InterfaceState,
+    Spent,
     StageSettings,
 )
 from workflow.errors import MethodFailed, UserError
@@ -36,6 +39,10 @@ from workflow.workers import Workers, contact_workers
 
 # Jumps that add up to the cycles of the run but for rounding leave no jump over.
 ROUNDING = 1e-9
+# Jumps of a run whose explicit steps are too short to be recorded one by one.
+RECORDS = 10
+# How near to a stop a run must come: a jump that is to reach it is cut short to do so.
+AT_STOP = 1e-3
 
 
 def run_wear(case: WearCase, folder: OutputFolder, reporter: Reporter, resume: bool) -> None:
@@ -133,6 +140,7 @@ class WearLoop:
             drift=np.empty(0),
             solved_resultants=self._probe(interfaces),
             solutions=1,
+            spent=sum((own.spent for _, own in begun), Spent()),
         )
         return state.record(0.0, self._areas, 0.0), [first for _, first in begun]
 
@@ -146,36 +154,64 @@ class WearLoop:
         return state
 
     def _jump(self, state: RunState) -> RunState:
-        cycles = self._jump_cycles(state)
+        cycles, left = self._jump_cycles(state), self._left(state)
+        count = len(self._stages)
         with self._reporter.stage("wear"):
-            jumped = self._workers.call("jump", state.interfaces, [cycles] * len(self._stages))
-        state = replace(state, interfaces=tuple(own for own, _ in jumped))
+            jumped = self._workers.call("jump", state.interfaces, [cycles] * count, [left] * count)
+        spent = sum((own for _, own in jumped), Spent())
+        interfaces = tuple(own for own, _ in jumped)
+        state = replace(state, interfaces=interfaces, spent=state.spent + spent)
         warn_of_growth(self._stages, state, self._reporter)
         state, drift = self._follow_drift(state)
         state = state.record(float(state.cycles[-1]) + cycles, self._areas, drift)
-        convolutions = sum(spent for _, spent in jumped)
+        depths = ", ".join(f"{own * 1e3:.3f}" for own in state.kinetics[-1, :, :2].ravel())
         self._reporter.log(
-            f"jump {state.jump}: {state.cycles[-1]:.6g} cycles, depths "
-            f"{np.array2string(state.kinetics[-1, :, :2] * 1e3, precision=3)} um, "
-            f"{convolutions} convolutions, drift {drift:.2%}"
+            f"jump {state.jump}: {state.cycles[-1]:.6g} cycles, depths {depths} um, "
+            f"{spent.steps} steps, {spent.contact_solves} contact problems, "
+            f"{spent.convolutions} convolutions, drift {drift:.2%}"
         )
         self.keep(state)
         return state
 
     def _jump_cycles(self, state: RunState) -> float:
         """Cycles of the next jump, by the case's measure at the present rates."""
-        step = self._case.wear.step
+        step, left = self._case.wear.step, self._left(state)
         if step.cycles is not None:
             cycles = step.cycles
         elif step.depth is not None:
-            cycles = _quotient(step.depth, max(own.depth_rate for own in state.interfaces))
+            cycles = _quotient(step.depth, self._depth_rate(state))
+        elif step.volume is not None:
+            cycles = _quotient(step.volume, self._volume_rate(state))
+        elif step.fraction is not None:
+            cycles = self._case.wear.cycles / RECORDS
         else:
-            assert step.volume is not None
-            cycles = _quotient(step.volume, sum(own.volume_rate for own in state.interfaces))
-        if step.kind == "explicit":
+            # The steps that are left, all of one length: none of them is a mere remainder.
+            proposed = min(own.next_cycles for own in state.interfaces)
+            cycles = left / np.ceil(left / proposed * (1.0 - ROUNDING))
+        if step.kind == "explicit" and step.fraction is None:
             self._warn_of_instability(state, cycles)
-        left = self._case.wear.cycles - float(state.cycles[-1])
-        return left if cycles > left * (1.0 - ROUNDING) else cycles
+        cycles = min(cycles, self._to_stop(state))
+        return left if cycles > left * (1.0 - ROUNDING) else float(cycles)
+
+    def _left(self, state: RunState) -> float:
+        """Cycles to the end of the run."""
+        return self._case.wear.cycles - float(state.cycles[-1])
+
+    def _to_stop(self, state: RunState) -> float:
+        """Cycles to the nearest stop at the present rates."""
+        stop, worn = self._case.wear.stop, _worn(state)
+        to_depth = to_volume = np.inf
+        if stop.depth is not None:
+            to_depth = _quotient(stop.depth - worn.depth, self._depth_rate(state))
+        if stop.volume is not None:
+            to_volume = _quotient(stop.volume - worn.volume, self._volume_rate(state))
+        return max(1.0, min(to_depth, to_volume))
+
+    def _depth_rate(self, state: RunState) -> float:
+        return max(own.depth_rate for own in state.interfaces)
+
+    def _volume_rate(self, state: RunState) -> float:
+        return sum(own.volume_rate for own in state.interfaces)
 
     def _warn_of_instability(self, state: RunState, cycles: float) -> None:
         pairs = zip(self._stages, state.interfaces, strict=True)
@@ -187,13 +223,12 @@ class WearLoop:
             )
 
     def _ended(self, state: RunState) -> bool:
-        wear = self._case.wear
-        depth = state.kinetics[-1, :, :2].max()
-        volume = state.kinetics[-1, :, 2:4].sum()
+        wear, worn = self._case.wear, _worn(state)
+        reached = 1.0 - AT_STOP
         return bool(
             state.cycles[-1] >= wear.cycles * (1.0 - ROUNDING)
-            or (wear.stop.depth is not None and depth >= wear.stop.depth)
-            or (wear.stop.volume is not None and volume >= wear.stop.volume)
+            or (wear.stop.depth is not None and worn.depth >= wear.stop.depth * reached)
+            or (wear.stop.volume is not None and worn.volume >= wear.stop.volume * reached)
         )
 
     def _follow_drift(self, state: RunState) -> tuple[RunState, float]:
@@ -205,21 +240,29 @@ class WearLoop:
             probe = self._probe(state.interfaces)
         sizes = np.array([stage.grid.size for stage in self._stages])
         drift = float(np.abs(resultant_change(probe, state.solved_resultants, sizes)).max())
-        if drift <= coupling.drift:
+        if coupling.resultants == "drift" and drift <= coupling.drift:
             return state, drift
         with self._reporter.stage("structural friction"):
-            histories = self._source.worn(self._depths(state.interfaces))
+            depths, friction = self._depths(state.interfaces), self._friction(state.interfaces)
+            histories = self._source.worn(depths, friction)
         self._reporter.log(f"drift {drift:.2%}: resultants computed again")
-        pairs = zip(state.interfaces, histories, strict=True)
+        triples = zip(self._stages, state.interfaces, histories, strict=True)
         return replace(
             state,
-            interfaces=tuple(replace(own, loads=h.loads, slip=h.slip) for own, h in pairs),
+            interfaces=tuple(stage.follow(own, history) for stage, own, history in triples),
             solved_resultants=probe,
             solutions=state.solutions + 1,
         ), drift
 
     def _probe(self, interfaces: tuple[InterfaceState, ...]) -> Array:
-        return self._source.probe(self._depths(interfaces))
+        return self._source.probe(self._depths(interfaces), self._friction(interfaces))
+
+    def _friction(self, interfaces: tuple[InterfaceState, ...]) -> list[float] | None:
+        """Coefficients of friction of the interfaces, where they change."""
+        friction = self._case.friction
+        if friction.evolution is None:
+            return None
+        return [friction.at(own.energy) for own in interfaces]
 
     def _depths(self, interfaces: tuple[InterfaceState, ...]) -> list[Array]:
         return [s.nodal_depth(own) for s, own in zip(self._stages, interfaces, strict=True)]
@@ -228,8 +271,18 @@ class WearLoop:
     def _areas(self) -> list[float]:
         return [stage.grid.cell_area for stage in self._stages]
 
+    def _loops(self, state: RunState) -> dict[str, Array]:
+        """Tangential loops on the present surfaces, where they are due."""
+        if not loops_due(self._case.loops, state.jump, self._ended(state)):
+            return {}
+        with self._reporter.stage("tangential loops"):
+            peaks = [self._source.peak] * len(self._stages)
+            found = self._workers.call("loop", state.interfaces, peaks)
+        return kept_loops([stage.name for stage in self._stages], found)
+
     def keep(self, state: RunState) -> None:
         """Write the fields of this jump, then the state that the next one starts from."""
+        loops = self._loops(state)
         with self._reporter.stage("checkpoints"):
             peaks = [self._source.peak] * len(self._stages)
             recorded = self._workers.call("peak_fields", state.interfaces, peaks)
@@ -240,8 +293,21 @@ class WearLoop:
                 arrays[f"surfaces/{stage.name}/body_2"] = body_2
                 arrays |= {f"contact/{stage.name}/{name}": field for name, field in fields.items()}
             attributes = {"cycles": float(state.cycles[-1])}
-            write_arrays(self._folder.jump(state.jump), arrays, attributes)
+            write_arrays(self._folder.jump(state.jump), arrays | loops, attributes)
             checkpoint.save(self._folder.checkpoint, state)
+
+
+class _Worn(NamedTuple):
+    """Largest depth of either body [mm] and volume of all [mm³]."""
+
+    depth: float
+    volume: float
+
+
+def _worn(state: RunState) -> _Worn:
+    last = dict(zip(KINETICS, state.kinetics[-1].T, strict=True))
+    depth = max(last["depth_1"].max(), last["depth_2"].max())
+    return _Worn(float(depth), float((last["volume_1"] + last["volume_2"]).sum()))
 
 
 def _quotient(limit: float, rate: float) -> float:

@@ -57,7 +57,7 @@ def test_contact_of_the_default_flank(record: dict[str, float]) -> None:
 def test_friction_of_the_default_joint(record: dict[str, float]) -> None:
     """Iterations of the two missions, and what an iteration costs against its matrix product."""
     dovetail = CASE.structure.geometry()
-    mission = Mission(**CASE.load_path.model_dump())
+    mission = Mission(**CASE.load_path.missions()[0])
     mesh = dovetail.mesh(CASE.mesh.flank_nodes, CASE.mesh.size)
     structure = dovetail_structure(dovetail, mesh, TITANIUM, TITANIUM, mission, 1)
     resolvent = structure.condense().resolvent()

@@ -1,18 +1,28 @@
 """Wear laws against values worked out by hand, in the units users think in."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from wear.laws import Archard, Energy, EnergyAmplitude
+from sa_solver.types import Array
+from wear.evolution import EnergyTable
+from wear.laws import Archard, Energy, EnergyAmplitude, Evolving, Sliding
 
 UM3_PER_J = 1e-12  # [1/MPa]: 1e-9 mm³ per 1e3 N mm
 FRICTION = 0.4
 
 
+def sliding(slip: Array, friction: float = FRICTION) -> Sliding:
+    """Slip on surfaces that are new and stay so."""
+    unworn = np.zeros(slip.shape[1:])
+    return Sliding(slip, friction, (unworn, unworn), (0.0, 0.0))
+
+
 def test_energy_law_by_hand() -> None:
     """200 MPa at µ 0.4 over 50 um are 4 mJ/mm²; 1e4 um³/J make 0.04 nm of it."""
     slip = np.full((1, 1, 1), 0.05)
-    depth = Energy(1e4 * UM3_PER_J).depth_per_pressure(slip, FRICTION) * 200.0
+    depth = Energy(1e4 * UM3_PER_J).depth_per_pressure(sliding(slip)) * 200.0
     assert depth.item() == pytest.approx(4e-8, rel=1e-12)
 
 
@@ -21,14 +31,14 @@ def test_archard_law_by_hand() -> None:
     slip = np.full((1, 1, 1), 0.05)
     law = Archard(coefficient=1e-4, hardness=3500.0)
     for friction in (0.0, FRICTION):
-        depth = law.depth_per_pressure(slip, friction) * 200.0
+        depth = law.depth_per_pressure(sliding(slip, friction)) * 200.0
         assert depth.item() == pytest.approx(1e-4 * 0.05 * 200.0 / 3500.0, rel=1e-12)
 
 
 def test_archard_is_the_energy_law_with_its_coefficient_over_hardness_and_friction() -> None:
     slip = np.random.default_rng(1).random((5, 3, 4))
-    archard = Archard(1e-4, 3500.0).depth_per_pressure(slip, FRICTION)
-    energy = Energy(1e-4 / 3500.0 / FRICTION).depth_per_pressure(slip, FRICTION)
+    archard = Archard(1e-4, 3500.0).depth_per_pressure(sliding(slip))
+    energy = Energy(1e-4 / 3500.0 / FRICTION).depth_per_pressure(sliding(slip))
     np.testing.assert_allclose(archard, energy, rtol=1e-13)
 
 
@@ -46,15 +56,15 @@ def test_amplitude_law_is_the_energy_law_at_its_reference(increments: int) -> No
     reference = 0.075
     slip = np.random.default_rng(2).random((increments, 3, 4))
     slip *= 4.0 * reference / slip.sum(axis=0)
-    amplitude = EnergyAmplitude(1e-8, reference).depth_per_pressure(slip, FRICTION)
-    energy = Energy(1e-8).depth_per_pressure(slip, FRICTION)
+    amplitude = EnergyAmplitude(1e-8, reference).depth_per_pressure(sliding(slip))
+    energy = Energy(1e-8).depth_per_pressure(sliding(slip))
     np.testing.assert_allclose(amplitude, energy, rtol=1e-13)
 
 
 def test_amplitude_law_is_quadratic_in_slip() -> None:
     slip = np.random.default_rng(3).random((5, 3, 4))
     law = EnergyAmplitude(1e-8, 0.075)
-    once, thrice = (law.depth_per_pressure(scale * slip, FRICTION) for scale in (1.0, 3.0))
+    once, thrice = (law.depth_per_pressure(sliding(scale * slip)) for scale in (1.0, 3.0))
     np.testing.assert_allclose(thrice, 9.0 * once, rtol=1e-13)
 
 
@@ -62,7 +72,7 @@ def test_amplitude_law_by_hand() -> None:
     """α / (4 δ_ref) (Σ|Δs|) (Σ|q·Δs|), with pressures of its own in every increment."""
     slip, pressure = np.array([0.01, 0.0, 0.03]), np.array([100.0, 300.0, 200.0])
     law = EnergyAmplitude(1e-8, 0.075)
-    depth = law.depth_per_pressure(slip[:, None, None], FRICTION).ravel() @ pressure
+    depth = law.depth_per_pressure(sliding(slip[:, None, None])).ravel() @ pressure
     dissipated = FRICTION * (100.0 * 0.01 + 200.0 * 0.03)
     assert depth == pytest.approx(1e-8 / (4.0 * 0.075) * 0.04 * dissipated, rel=1e-12)
 
@@ -71,5 +81,99 @@ def test_amplitude_law_by_hand() -> None:
 def test_no_slip_no_wear(law) -> None:
     slip = np.zeros((4, 2, 2))
     slip[1, 0, 0] = 0.01
-    depth = law.depth_per_pressure(slip, FRICTION)
+    depth = law.depth_per_pressure(sliding(slip))
     assert np.all((depth > 0.0) == (slip > 0.0))
+
+
+# --- coefficients that change with energy ---------------------------------------------------------
+
+TABLE = EnergyTable((10.0, 30.0, 40.0), (1.0, 3.0, 0.5))
+
+
+def quadrature(table: EnergyTable, before: float, after: float) -> float:
+    """Mean by Gauss points between the kinks, where the table is a straight line."""
+    kinks = [e for e in (*table.energy, table.threshold) if before < e < after]
+    ends = np.array([before, *sorted(kinks), after])
+    points = ends[:-1, None] + np.diff(ends)[:, None] * (0.5 + np.array([-0.5, 0.5]) / np.sqrt(3.0))
+    integral = table.at(points).mean(axis=1) @ np.diff(ends)
+    return float(integral / (after - before))
+
+
+@pytest.mark.parametrize("threshold", [0.0, 5.0, 25.0, 60.0])
+@pytest.mark.parametrize("ends", [(0, 5), (2, 18), (12, 14), (0, 100), (35, 45), (50, 70)])
+def test_mean_of_a_table_is_its_integral(ends: tuple[float, float], threshold: float) -> None:
+    table = replace(TABLE, threshold=threshold)
+    mean = float(table.mean(*ends))
+    assert mean == pytest.approx(quadrature(table, *ends), rel=1e-13, abs=1e-15)
+
+
+def test_table_by_hand() -> None:
+    """Constant before 10 and after 40; linear between."""
+    np.testing.assert_allclose(
+        TABLE.at(np.array([0.0, 10.0, 20.0, 30.0, 35.0, 99.0])), [1.0, 1.0, 2.0, 3.0, 1.75, 0.5]
+    )
+    assert float(TABLE.mean(0.0, 20.0)) == pytest.approx((10.0 + 15.0) / 20.0, rel=1e-14)
+    with_threshold = replace(TABLE, threshold=20.0)
+    assert float(with_threshold.mean(0.0, 30.0)) == pytest.approx(25.0 / 30.0, rel=1e-14)
+    assert with_threshold.at(np.array([19.9, 20.0])).tolist() == [0.0, 2.0]
+
+
+def test_steps_of_any_length_add_up() -> None:
+    """Exact means: what a step wears does not depend on how it is cut, even into slivers."""
+    table = replace(TABLE, threshold=7.0)
+    cuts = np.sort(np.random.default_rng(5).uniform(0.0, 60.0, 200))
+    cuts = np.concatenate([[0.0], cuts, [60.0]])
+    parts = float(np.sum(table.mean(cuts[:-1], cuts[1:]) * np.diff(cuts)))
+    assert parts == pytest.approx(float(table.mean(0.0, 60.0)) * 60.0, rel=1e-13)
+
+
+@pytest.mark.parametrize("step", [0.0, 1e-12, 1e-6])
+def test_mean_of_a_short_step_is_the_value(step: float) -> None:
+    """Far from 0 a difference of integrals would leave no digit of it."""
+    table = EnergyTable((0.0, 2e9), (1.0, 3.0))
+    assert float(table.mean(1e9, 1e9 + step)) == pytest.approx(2.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("energy", "factor"), [((), ()), ((1.0,), (1.0, 2.0)), ((1.0, 1.0), (1.0, 2.0))]
+)
+def test_tables_that_are_none(energy: tuple[float, ...], factor: tuple[float, ...]) -> None:
+    with pytest.raises(ValueError, match="give"):
+        EnergyTable(energy, factor)
+
+
+def random_step(seed: int) -> Sliding:
+    """Energies that pass all the kinks of the table somewhere."""
+    rng = np.random.default_rng(seed)
+    before = rng.uniform(0.0, 50.0, (3, 4))
+    work = before, before + rng.uniform(0.0, 20.0, (3, 4))
+    return Sliding(rng.random((5, 3, 4)), FRICTION, work, (20.0, 35.0))
+
+
+@pytest.mark.parametrize("base", [Archard(1e-4, 3500.0), Energy(1e-8), EnergyAmplitude(1e-8, 0.1)])
+def test_evolving_law_is_its_base_times_the_mean_factor(base) -> None:
+    step = random_step(6)
+    plain = base.depth_per_pressure(step)
+    local = Evolving(base, TABLE, "local").depth_per_pressure(step) / plain
+    means = TABLE.mean(*step.work)
+    np.testing.assert_allclose(local, np.broadcast_to(means, local.shape), rtol=1e-13)
+    whole = Evolving(base, TABLE, "global").depth_per_pressure(step) / plain
+    np.testing.assert_allclose(whole, float(TABLE.mean(20.0, 35.0)), rtol=1e-13)
+
+
+def test_laws_may_be_nested() -> None:
+    """A local factor times a global one."""
+    step, base = random_step(7), Energy(1e-8)
+    both = Evolving(Evolving(base, TABLE, "local"), TABLE, "global").depth_per_pressure(step)
+    once = Evolving(base, TABLE, "local").depth_per_pressure(step)
+    np.testing.assert_allclose(both, float(TABLE.mean(20.0, 35.0)) * once, rtol=1e-13)
+
+
+def test_nothing_wears_below_the_threshold() -> None:
+    """V = α (ΣEd - Ed_th): per area and by place where the threshold is local."""
+    step = random_step(8)
+    law = Evolving(Energy(1e-8), EnergyTable(threshold=30.0), "local")
+    pressure = (step.work[1] - step.work[0]) / (FRICTION * step.slip.sum(axis=0))
+    depth = (law.depth_per_pressure(step) * pressure).sum(axis=0)
+    beyond = np.maximum(step.work[1], 30.0) - np.maximum(step.work[0], 30.0)
+    np.testing.assert_allclose(depth, 1e-8 * beyond, rtol=1e-12, atol=1e-22)

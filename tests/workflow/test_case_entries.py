@@ -37,11 +37,16 @@ INTERFACE = {
 EXPECT = [{"quantity": "a.b", "value": "3 um", "tolerance": "1 %", "source": "a test"}]
 REPORTED = [{"normal_force": "17 N", "steady": "stiffness", "cycles": 1e6}]
 ALWAYS = ""  # in place of a kind: for sections of one kind alone
+FRICTION = {"friction.evolution": {ALWAYS: {"energy": [0, 1e6], "factor": [1, 2]}}}
+EVOLUTIONS = {
+    "local": {"scope": "local", "energy": [0, 1000], "factor": [1, 2], "threshold": 10},
+    "global": {"scope": "global", "energy": [0, 1e6], "factor": [1, 2], "threshold": 1e4},
+}
 
 
-def laws(*bodies):
-    """The wear laws that the templates do not have, for bodies of these names."""
-    return {
+def wear(*bodies):
+    """The laws and evolutions that the templates do not have, for bodies of these names."""
+    laws = {
         "archard": {"law": "archard", **LENGTHS, **dict.fromkeys(bodies, ARCHARD_BODY)},
         "energy_amplitude": {
             "law": "energy_amplitude",
@@ -50,6 +55,7 @@ def laws(*bodies):
             **dict.fromkeys(bodies, ENERGY_BODY),
         },
     }
+    return FRICTION | {"wear": laws} | {f"wear.{body}.evolution": EVOLUTIONS for body in bodies}
 
 
 def with_path(**loads):
@@ -59,8 +65,9 @@ def with_path(**loads):
 
 # Sections that the templates do not have: kind of case, key of the section, its own kinds.
 GIVEN = {
-    "dovetail": {"wear": laws("blade", "disk")},
+    "dovetail": {"load_path.mix": {ALWAYS: [{"share": 1}]}, **wear("blade", "disk")},
     "mesh": {
+        "load_path.mix": {ALWAYS: [{"share": 1, "factors": [1]}]},
         "structure.contacts.0.gap": GAPS,
         "structure.loads.0": with_path(
             force={"group": "blade_top", "force": [0, 0, -100]},
@@ -68,7 +75,7 @@ GIVEN = {
             rotation={"axis": [0, 1, 0], "through": [0, 0, 0], "speed": "6000 rpm"},
             acceleration={"acceleration": [0, 0, 9810]},
         ),
-        "wear": laws("body_1", "body_2"),
+        **wear("body_1", "body_2"),
     },
     "resultants": {
         "structure.gap": GAPS,
@@ -76,7 +83,7 @@ GIVEN = {
             **{shape: [{**INTERFACE, "gap": gap}] for shape, gap in GAPS.items()},
             ALWAYS: [INTERFACE],
         },
-        "wear": laws("body_1", "body_2"),
+        **wear("body_1", "body_2"),
     },
     "specimens": {
         "structure.form": {ALWAYS: {"along": "1 m", "across": "50 mm"}},
@@ -100,6 +107,14 @@ GIVEN = {
         }
     },
 }
+FLAT = {"kind": "bodies", "shape": "flat", "half_width": 0.1, "step": 0.1}
+FLATS = {"bodies": FLAT | {"half_length": 0.1}, "line": FLAT}
+# Two bodies that wear may have the shapes of those that do not, or be flat.
+GIVEN |= {
+    f"{kind}_wear": wear("body_1", "body_2")
+    | {"structure": GIVEN[kind]["structure"] | {"flat": flat}}
+    for kind, flat in FLATS.items()
+}
 # A CAD file in the place of the template's mesh; gmsh writes no names into it.
 CAD = [
     "structure.file=joint.step",
@@ -111,7 +126,9 @@ CAD = [
     "structure.loads.0.group=solid_2.face_6",
 ]
 # Cells of the templates that may take heights.
-CELLS = {"mesh": (128, 256), "resultants": (128, 256), "bodies": (128, 128), "line": (512,)}
+CELLS = {"mesh": (128, 256), "resultants": (128, 256)}
+CELLS |= dict.fromkeys(("bodies", "bodies_wear"), (128, 128))
+CELLS |= dict.fromkeys(("line", "line_wear"), (512,))
 
 
 @dataclass(frozen=True)
@@ -155,7 +172,7 @@ def leaves(model, path=(), tags=()):
         sections = list(sections_of(field.annotation))
         index = (0,) if get_origin(field.annotation) is tuple and sections else ()
         for section in sections:
-            choices = [section.model_fields[key] for key in ("law", "shape", "kind")
+            choices = [section.model_fields[key] for key in ("law", "shape", "kind", "scope")
                        if key in section.model_fields and len(sections) > 1]  # fmt: skip
             tag = [get_args(choice.annotation)[0] for choice in choices[:1]]
             yield from leaves(section, (*path, name, *index), (*tags, *tag))
@@ -280,8 +297,10 @@ def stated(leaf):
     example = str(example).lower() if isinstance(example, bool) else example
     plain = f"{leaf.key}={example}"
     match leaf.key:
-        case "wear.step.depth" | "wear.step.volume":
+        case "wear.step.depth" | "wear.step.volume" | "wear.step.fraction":
             return [f"wear.step={{kind: explicit, {leaf.name}: {example}}}"]
+        case "wear.reference_amplitude":
+            return ["wear.law=energy_amplitude", plain]
         case "wear.energy":
             return ["wear.cycles=", plain]
         case "load_path.file":

@@ -106,6 +106,8 @@ def uncommented(text, *sections):
             ["form", "reported"],
             {"structure.form.along": 1000.0, "wear.reported.0.normal_force": 17.0},
         ),
+        ("bodies_wear", ["stop"], {"wear.stop.depth": 0.5, "load_path.increments": 4}),
+        ("line_wear", ["stop"], {"wear.stop.volume": 10.0, "contact.grid.1": 1}),
         ("bodies", [], {}),
         ("line", [], {}),
     ],

@@ -70,17 +70,19 @@ def test_check_says_what_would_run(dovetail_path):
     assert first == f"OK {dovetail_path}: Ti-6Al-4V dovetail, one mission per cycle"
     assert "128 x 256 cells" in result.stdout
     assert "22 increments" in result.stdout
-    assert "10 jumps" in result.stdout
+    assert "implicit steps, for an error of 0.01" in result.stdout
     assert len(rows) < 8
 
 
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
-        ("dovetail", "10 jumps"),
+        ("dovetail", "implicit steps, for an error of 0.01"),
         ("mesh", "22 increments in 2 legs"),
         ("resultants", "loads in 3-D from loads.csv, without slip"),
         ("specimens", "pad 1 x 1 mm of 121 nodes, flat"),
+        ("bodies_wear", "50 N, stroke 0.05 mm in 8 increments"),
+        ("line_wear", "50 N/mm, stroke 0.05 mm in 8 increments"),
         ("bodies", "128 x 128 cells of 0.007812 x 0.007812 mm, history auto"),
         ("line", "512 strips of 0.003906 mm"),
     ],

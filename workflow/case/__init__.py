@@ -1,5 +1,6 @@
 """The case file: YAML with units in, a frozen ``Case`` in base units out, or why not."""
 
+from workflow.case.bodies_wear_case import BodiesWearCase, LineBodiesWearCase
 from workflow.case.contact_case import ContactCase, LineContactCase
 from workflow.case.dovetail_case import DovetailCase
 from workflow.case.loading import load_case, parse_case
@@ -14,10 +15,12 @@ from workflow.errors import CaseError
 
 __all__ = [
     "KINDS",
+    "BodiesWearCase",
     "Case",
     "CaseError",
     "ContactCase",
     "DovetailCase",
+    "LineBodiesWearCase",
     "LineContactCase",
     "MeshCase",
     "ResultantsCase",

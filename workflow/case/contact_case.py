@@ -353,7 +353,7 @@ class ContactCase(Scene):
         self.require_entries(self.assumed)
         _require_elastic(self.materials, self.load_path.table())
         if isinstance(self.structure, Heights):
-            _require_shape(self.structure.file, self.contact.grid)
+            require_shape(self.structure.file, self.contact.grid)
         return self
 
 
@@ -382,7 +382,7 @@ class LineContactCase(Scene):
         self.require_entries(self.assumed)
         _require_elastic(self.materials, self.load_path.table())
         if isinstance(self.structure, Heights):
-            _require_shape(self.structure.file, (self.contact.grid, 1))
+            require_shape(self.structure.file, (self.contact.grid, 1))
         return self
 
 
@@ -398,7 +398,7 @@ def _require_elastic(materials: BodyMaterials, loads: LoadTable) -> None:
             )
 
 
-def _require_shape(file: str, grid: tuple[int, int]) -> None:
+def require_shape(file: str, grid: tuple[int, int]) -> None:
     """Raise unless a file of heights has a value for each cell of ``grid``."""
     try:
         shape = height_shape(file)

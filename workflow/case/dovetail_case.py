@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from math import cos, pi, radians, sin, tan
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import model_validator
 
@@ -22,6 +22,8 @@ from workflow.case.wear_sections import (
     DovetailWear,
     Nonlinearity,
     Ratio,
+    Share,
+    check_shares,
 )
 
 if TYPE_CHECKING:
@@ -165,6 +167,16 @@ def _require_below(section: Section, key: str, limit: float, name: str) -> None:
         )
 
 
+class MissionOfMix(Section):
+    """One of several missions; what it does not name is that of load_path."""
+
+    share: Share = entry("of all cycles; the shares add up to 1 [1]", "100 %")
+    rotation_speed: RotationSpeed | None = entry("at the peak [rad/s]", "5000 rpm", default=None)
+    aerodynamic_moment: Moment | None = entry(
+        "at peak speed, about the slot; presses on the intrados [N*mm]", "20 N*m", default=None
+    )
+
+
 class LoadPath(Section):
     """One mission: the speed rises linearly to its peak and falls back to zero.
 
@@ -181,6 +193,31 @@ class LoadPath(Section):
     aerodynamic_moment: Moment = entry(
         "at peak speed, about the slot; presses on the intrados [N*mm]", "30 N*m", default=0.0
     )
+    mix: tuple[MissionOfMix, ...] = entry(
+        "missions that take turns; without it there is one", default=()
+    )
+
+    @model_validator(mode="after")
+    def _shares_are_whole(self) -> LoadPath:
+        check_shares(self.shares)
+        return self
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Share of each mission in all cycles."""
+        return tuple(own.share for own in self.mix) or (1.0,)
+
+    def missions(self) -> list[dict[str, Any]]:
+        """The entries of every mission of the mix."""
+        entries = self.model_dump(exclude={"mix"})
+        own = [mission.model_dump(exclude={"share"}, exclude_none=True) for mission in self.mix]
+        return [entries | given for given in own or [{}]]
+
+    @property
+    def heaviest(self) -> int:
+        """The mission of the highest speed, of several the one of the largest moment."""
+        peaks = [(m["rotation_speed"], abs(m["aerodynamic_moment"])) for m in self.missions()]
+        return peaks.index(max(peaks))
 
     @model_validator(mode="after")
     def _peak_inside_cycle(self) -> LoadPath:
@@ -226,9 +263,10 @@ class DovetailCase(WearCase):
     def outline(self) -> list[tuple[str, str]]:
         path, (across, along) = self.load_path, self.mesh.flank_nodes
         nodes = f"{across} x {along}" if self.structure.dimension == 3 else f"{across}"
+        missions = f", {len(path.mix)} missions" if path.mix else ""
         rows = [
             ("structure", f"dovetail in {self.structure.dimension}-D, {nodes} nodes on a flank"),
-            ("load path", f"{path.increments} increments, peak at {path.peak_at}"),
+            ("load path", f"{path.increments} increments, peak at {path.peak_at}{missions}"),
         ]
         if self.fidelity == "auto":
             rows.append(("fidelity", f"2-D or 3-D, by a probe: {100 * self.accuracy:g} %"))

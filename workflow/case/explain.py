@@ -12,7 +12,9 @@ from workflow.case.fields import shown
 from workflow.case.sections import Section, sections_of
 from workflow.case.source import KeyPath, Source, child, dotted, split_path
 
-KINDS_ARE_NAMED_BY = ("kind", "law", "shape")  # keys that choose between sections
+# Keys that choose between sections, and the one that a section takes from that around it.
+KINDS_ARE_NAMED_BY = ("kind", "law", "shape", "scope")
+INHERITED = "law"
 
 # What to say about pydantic's own errors, in the words of a case.
 SENTENCES = {
@@ -118,7 +120,7 @@ class _Explanation:
         node: Any = self.source.data
         models: list[type[Section]] = [self.case]
         for key in path:
-            node = child(node, key)
+            node = _within(node, key)
             if isinstance(key, str):
                 fields = [m.model_fields[key] for m in models if key in m.model_fields]
                 models = [section for f in fields for section in sections_of(f.annotation)]
@@ -141,8 +143,15 @@ class _Explanation:
             if isinstance(key, str) and key.startswith("("):  # a tag of ours, as (section)
                 continue
             path.append(key)
-            node, tag_seen = child(node, key), False
+            node, tag_seen = _within(node, key), False
         return tuple(path)
+
+
+def _within(node: Any, key: str | int) -> Any:
+    """The entry ``key`` of a section, with the law of the section where it has none of its own."""
+    inner = child(node, key)
+    law = child(node, INHERITED)
+    return {INHERITED: law} | inner if law is not None and isinstance(inner, dict) else inner
 
 
 def _is_kind(model: type[Section], node: Any) -> bool:

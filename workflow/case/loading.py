@@ -7,6 +7,7 @@ from pathlib import Path
 
 from pydantic import ValidationError
 
+from workflow.case.bodies_wear_case import FLAT, BodiesWearCase, LineBodiesWearCase
 from workflow.case.contact_case import (
     AREA_SHAPES,
     HEIGHTS,
@@ -47,7 +48,7 @@ def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
         raise CaseError("\n".join(lines_about(source, kind, error.errors()))) from None
 
 
-# Wear cases by their kind of structure.
+# Wear cases by their kind of structure; two bodies without one have a shape instead.
 WEAR_CASES: dict[str, type[Case]] = {
     "dovetail": DovetailCase,
     "mesh": MeshCase,
@@ -59,14 +60,22 @@ WEAR_CASES: dict[str, type[Case]] = {
 def _kind_of_case(source: Source) -> type[Case]:
     """The kind that the source means by its analysis and structure, whatever else is wrong."""
     if _choice(source, ("analysis",), ("wear", "contact")) == "wear":
-        return WEAR_CASES[_choice(source, ("structure", "kind"), tuple(WEAR_CASES))]
+        kind = _choice(source, ("structure", "kind"), (*WEAR_CASES, "bodies"))
+        if kind != "bodies":
+            return WEAR_CASES[kind]
+        return LineBodiesWearCase if _is_line(source, (HEIGHTS, FLAT)) else BodiesWearCase
     _choice(source, ("structure", "kind"), ("bodies",))
-    shapes = (*AREA_SHAPES, *LINE_SHAPES, HEIGHTS)
-    shape = _choice(source, ("structure", "shape"), shapes)
-    # Heights know no dimension: a grid of one size is that of a line contact.
+    return LineContactCase if _is_line(source, (HEIGHTS,)) else ContactCase
+
+
+def _is_line(source: Source, either: tuple[str, ...]) -> bool:
+    """Whether two bodies touch along a line: by their shape, or one that may be ``either``.
+
+    Heights and flats know no dimension: a grid of one size is that of a line contact.
+    """
+    shape = _choice(source, ("structure", "shape"), (*AREA_SHAPES, *LINE_SHAPES, *either))
     one_size = isinstance(source.at(("contact", "size")), str | int | float)
-    line = one_size if shape == HEIGHTS else shape in LINE_SHAPES
-    return LineContactCase if line else ContactCase
+    return one_size if shape in either else shape in LINE_SHAPES
 
 
 def _choice(source: Source, path: KeyPath, allowed: tuple[str, ...]) -> str:

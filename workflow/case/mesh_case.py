@@ -13,10 +13,17 @@ from pydantic import TypeAdapter, ValidationError, model_validator
 
 from workflow.case.fields import File, Whole
 from workflow.case.gaps import Gap, check_gap
-from workflow.case.mesh_loads import Component, DisplacementLoad, Load, Name
+from workflow.case.mesh_loads import Component, DisplacementLoad, Factor, Load, Name
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 from workflow.case.wear_case import WearCase, check_interface_name
-from workflow.case.wear_sections import Coupling, Nonlinearity, TwoMaterials, Wear
+from workflow.case.wear_sections import (
+    Coupling,
+    Nonlinearity,
+    Share,
+    TwoMaterials,
+    Wear,
+    check_shares,
+)
 from workflow.errors import UserError
 
 if TYPE_CHECKING:
@@ -180,6 +187,15 @@ def _length(text: str) -> float:
     return length
 
 
+class CycleOfMix(Section):
+    """One of several cycles, in which every load has its own factor."""
+
+    share: Share = entry("of all cycles; the shares add up to 1 [1]", "100 %")
+    factors: tuple[Factor, ...] = entry(
+        "of every load, in the order of structure.loads; of the speed for a rotation [1]", [1.0]
+    )
+
+
 class Legs(Section):
     """Every load goes linearly from leg to leg; the last legs are one cycle."""
 
@@ -190,11 +206,17 @@ class Legs(Section):
     peak_leg: Annotated[int, Whole(1, 1000)] = entry(
         "leg of the cycle at whose end the load peaks: stress is shown there", 1, default=1
     )
+    mix: tuple[CycleOfMix, ...] = entry(
+        "cycles that take turns, all on these legs, the one to show first; without it there is one",
+        default=(),
+    )
 
     @model_validator(mode="after")
     def _peak_is_a_leg(self) -> Legs:
         if not self.increments:
             raise disagreement("none; allowed: one or more", "increments")
+        if self.mix:
+            check_shares([own.share for own in self.mix])
         if not self.cycle_from <= self.peak_leg <= len(self.increments):
             raise disagreement(
                 f"{self.peak_leg}: no leg of the cycle; "
@@ -202,6 +224,10 @@ class Legs(Section):
                 *("peak_leg", "cycle_from"),
             )
         return self
+
+    def mixed(self, loads: int) -> list[tuple[tuple[float, ...], float]]:
+        """Factors of all ``loads``, so many, and share of every cycle."""
+        return [(own.factors, own.share) for own in self.mix] or [((1.0,) * loads, 1.0)]
 
 
 class MeshCase(WearCase):
@@ -223,12 +249,13 @@ class MeshCase(WearCase):
 
     def outline(self) -> list[tuple[str, str]]:
         structure, legs = self.structure, self.load_path.increments
+        cycles = f", {len(self.load_path.mix)} cycles mixed" if self.load_path.mix else ""
         mesh = structure.mesh()
         bodies = [f"{b.name} of {b.mesh.nvertices} nodes" for b in (mesh.body_1, mesh.body_2)]
         return [
             ("structure", f"{Path(structure.file).name}: {' and '.join(bodies)}"),
             *(("face", _outline_of(interface)) for interface in mesh.interfaces),
-            ("load path", f"{sum(legs)} increments in {len(legs)} legs"),
+            ("load path", f"{sum(legs)} increments in {len(legs)} legs{cycles}"),
         ]
 
     @model_validator(mode="after")
@@ -240,6 +267,13 @@ class MeshCase(WearCase):
                     f"{len(load.path)} factors for {legs} legs of load_path; "
                     "allowed: one for each leg",
                     f"structure.loads.{index}.path",
+                )
+        loads = len(self.structure.loads)
+        for index, own in enumerate(self.load_path.mix):
+            if len(own.factors) != loads:
+                raise disagreement(
+                    f"{len(own.factors)} factors for {loads} loads; allowed: one for each load",
+                    f"load_path.mix.{index}.factors",
                 )
         return self
 

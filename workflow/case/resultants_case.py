@@ -204,7 +204,7 @@ class ResultantsCase(WearCase):
 
     def loads(self) -> dict[str, ImportedLoads]:
         """Loads of the interfaces that are taken, by name. Raises InputFileError."""
-        return self.structure.taken(self.structure.read(self.friction.coefficient))
+        return self.structure.taken(self.structure.read(self.friction.at(0.0)))
 
     @property
     def cells(self) -> tuple[int, int]:
@@ -233,7 +233,7 @@ class ResultantsCase(WearCase):
     @model_validator(mode="after")
     def _loads_can_be_used(self) -> ResultantsCase:
         try:
-            found = self.structure.read(self.friction.coefficient)
+            found = self.structure.read(self.friction.at(0.0))
         except InputFileError as error:
             raise disagreement(str(error), "structure.file") from error
         self._check_names(list(found))

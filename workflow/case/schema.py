@@ -6,13 +6,23 @@ from typing import Any
 
 from pydantic import TypeAdapter
 
+from workflow.case.bodies_wear_case import BodiesWearCase, LineBodiesWearCase
 from workflow.case.contact_case import ContactCase, LineContactCase
 from workflow.case.dovetail_case import DovetailCase
 from workflow.case.mesh_case import MeshCase
 from workflow.case.resultants_case import ResultantsCase
 from workflow.case.specimens_case import SpecimensCase
 
-Case = DovetailCase | MeshCase | ResultantsCase | SpecimensCase | ContactCase | LineContactCase
+Case = (
+    DovetailCase
+    | MeshCase
+    | ResultantsCase
+    | SpecimensCase
+    | BodiesWearCase
+    | LineBodiesWearCase
+    | ContactCase
+    | LineContactCase
+)
 
 
 def json_schema() -> dict[str, Any]:

@@ -78,13 +78,18 @@ class Expectation(Section):
         "relative to the value [1]", "1 %"
     )
     source: Title = entry("where the value comes from", "closed form")
+    exact: StrictBool = entry(
+        "whether finer and finer grids go to the value, to all digits given: what `chart` needs",
+        False,
+        default=False,
+    )
 
 
 # The sections of a case, of whatever kind, in the order in which they are written.
 SCENE_ORDER = (
     *("title", "analysis", "structure", "materials", "friction", "load_path", "mesh"),
     *("nonlinearity", "reduction", "contact", "wear", "coupling", "accuracy", "fidelity"),
-    *("stress", "output", "assumed", "expect"),
+    *("loops", "stress", "output", "assumed", "expect"),
 )
 
 

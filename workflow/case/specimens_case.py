@@ -23,7 +23,8 @@ from workflow.case.sections import (
     disagreement,
     entry,
 )
-from workflow.case.wear_sections import Cycles, EnergyBody, Ratio, TwoBodies, TwoMaterials
+from workflow.case.wear_sections import Cycles, Ratio, TwoBodies, TwoMaterials
+from workflow.case.worn_bodies import EnergyBody
 
 if TYPE_CHECKING:
     from fe_models.geometry.specimens import Specimen

@@ -8,10 +8,11 @@ from typing import ClassVar, Literal
 from pydantic import model_validator
 
 from sa_solver.types import Material as ElasticMaterial
+from workflow.case.evolution import EvolvingFriction
+from workflow.case.loops import Loops
 from workflow.case.sections import (
     DottedPath,
     Expectation,
-    Friction,
     Output,
     Scene,
     Section,
@@ -19,19 +20,13 @@ from workflow.case.sections import (
     disagreement,
     entry,
 )
-from workflow.case.wear_sections import (
-    ArchardBody,
-    Contact,
-    ContactStress,
-    Coupling,
-    Duration,
-    EnergyBody,
-)
+from workflow.case.wear_sections import BodiesThatWear, Contact, ContactStress, Coupling
+from workflow.case.worn_bodies import Worn
 
 # What the summary and the results call their own entries.
 RESERVED = (
-    *("title", "assumed", "per_length", "cycles", "jumps", "structure", "kinetics", "warnings"),
-    *("seconds", "versions", "fidelity"),
+    *("title", "assumed", "per_length", "cycles", "jumps", "work", "structure", "kinetics"),
+    *("warnings", "seconds", "versions", "fidelity"),
 )
 
 
@@ -58,9 +53,12 @@ class WearCase(Scene, ABC):
     analysis: Literal["wear"] = entry("what is computed", "wear")
     structure: Section = entry("what is loaded")
     materials: Section = entry("the two bodies in contact")
-    friction: Friction = entry("Coulomb's law on every contact face")
+    friction: EvolvingFriction = entry("Coulomb's law on every contact face")
     contact: Contact = entry("half-space grid over each contact face", default=Contact())
-    wear: Duration = entry("law, length of the run and step")
+    wear: BodiesThatWear = entry("law, length of the run and step")
+    loops: Loops = entry(
+        "tangential loops on the worn contacts, where amplitude or force is given", default=Loops()
+    )
     stress: ContactStress = entry("under the contacts, unworn and worn", default=ContactStress())
     output: Output = entry("files beside summary and results", default=Output())
     assumed: tuple[DottedPath, ...] = entry(
@@ -75,10 +73,10 @@ class WearCase(Scene, ABC):
         material: ElasticMaterial = getattr(self.materials, self.bodies[number - 1]).elastic()
         return material
 
-    def wear_of(self, number: int) -> EnergyBody | ArchardBody:
-        """Wear coefficients of body ``number``, 1 or 2."""
-        body: EnergyBody | ArchardBody = getattr(self.wear, self.bodies[number - 1])
-        return body
+    def wear_of(self, number: int) -> Worn:
+        """Wear law of body ``number``, 1 or 2."""
+        worn: Worn = getattr(self.wear, self.bodies[number - 1])
+        return worn
 
     @abstractmethod
     def outline(self) -> list[tuple[str, str]]:

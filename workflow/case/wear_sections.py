@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Generic, Literal, TypeVar
+from collections.abc import Sequence
+from typing import Annotated, Any, Generic, Literal, TypeVar, get_args
 
-from pydantic import Field, StrictBool, model_validator
+from pydantic import StrictBool, model_validator
+from pydantic_core import PydanticCustomError
 
 from workflow.case.fields import Quantity, Whole
 from workflow.case.sections import (
@@ -17,6 +19,10 @@ from workflow.case.sections import (
     disagreement,
     entry,
 )
+from workflow.case.worn_bodies import BodyWear, LawName, WornByEnergyAmplitude, with_laws
+
+# The sizes that a wear step may be given.
+SIZES = ("cycles", "depth", "volume", "fraction")
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual machine.
 Density = Annotated[
@@ -26,12 +32,19 @@ Density = Annotated[
 Poisson = Annotated[float, Quantity("1", above=0.0, below=0.5)]
 Volume = Annotated[float, Quantity("mm^3", above=0.0, at_most=1e9)]
 Cycles = Annotated[float, Quantity("1", at_least=1.0, at_most=1e12)]
-# Metals wear 1e2 to 1e6 um^3 per joule; a forgotten unit gives 1e16.
-VolumePerEnergy = Annotated[
-    float, Quantity("1/MPa", at_least=0.0, at_most=1e-3, range_text="0 to 1e9 um^3/J")
-]
 Ratio = Annotated[float, Quantity("1", above=0.0, at_most=1.0)]
+Share = Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)]
 Place = Annotated[float, Quantity("mm", at_least=-1e4, at_most=1e4)]
+
+# Shares add up to 1 but for the rounding of what was written.
+SHARES_APART = 1e-6
+
+
+def check_shares(shares: Sequence[float]) -> None:
+    """Refuse a mix of missions that are not all cycles together, or more."""
+    if abs(sum(shares) - 1.0) > SHARES_APART:
+        raise disagreement(f"shares that add up to {sum(shares):g}; allowed: to 1", "mix")
+
 
 Part = TypeVar("Part", bound=Section)
 
@@ -92,27 +105,47 @@ class Contact(Section):
 
 
 class Step(Section):
-    """Size of a wear step: exactly one of cycles, depth and volume."""
+    """How a wear step is made, and its size; without one it is chosen by an error estimate."""
 
-    kind: Literal["explicit", "implicit"] = entry("explicit or implicit", "implicit")
+    kind: Literal["explicit", "implicit", "second_order"] = entry(
+        "implicit and second_order are stable at any size, explicit below a limit",
+        "implicit",
+        default="implicit",
+    )
     cycles: Cycles | None = entry("jumped in a step [1]", 30000, default=None)
     depth: Length | None = entry("largest depth worn in a step [mm]", "1 um", default=None)
     volume: Volume | None = entry(
         "worn in a step; in the plane per length [mm^3]", "0.01 mm^3", default=None
     )
+    fraction: Annotated[float, Quantity("1", above=0.0, at_most=10.0)] | None = entry(
+        "of the stability limit, for explicit steps [1]", 0.9, default=None
+    )
 
     @model_validator(mode="after")
     def _one_size(self) -> Step:
-        sizes = [key for key in ("cycles", "depth", "volume") if getattr(self, key) is not None]
-        if len(sizes) != 1:
-            given = " and ".join(sizes) or "no size"
-            message = f"{given} given; allowed: exactly one of cycles, depth, volume"
-            raise disagreement(message, *sizes[1:])
+        sizes = [key for key in SIZES if getattr(self, key) is not None]
+        if len(sizes) > 1:
+            allowed = f"one of {', '.join(SIZES)}, or none"
+            raise disagreement(f"{' and '.join(sizes)} given; allowed: {allowed}", *sizes[1:])
+        if self.fraction is not None and self.kind != "explicit":
+            raise disagreement(
+                f"{self.kind} steps have no stability limit; allowed: fraction with explicit",
+                *("fraction", "kind"),
+            )
+        if not sizes and self.kind == "explicit":
+            raise disagreement(
+                f"explicit steps without a size; allowed: one of {', '.join(SIZES)}", "kind"
+            )
         return self
+
+    @property
+    def automatic(self) -> bool:
+        """Whether an error estimate chooses the size."""
+        return all(getattr(self, key) is None for key in SIZES)
 
 
 class Stop(Section):
-    """Ends the run before its cycles are over, at the first of these that is reached."""
+    """Ends the run before its cycles are over, at the first of these that is reached to 0.1 %."""
 
     depth: Length | None = entry("largest depth of either body [mm]", "0.5 mm", default=None)
     volume: Volume | None = entry(
@@ -125,77 +158,77 @@ class Duration(Section):
 
     law: str  # named first in every wear section; each law narrows it to its own name
     cycles: Cycles = entry("of the whole run [1]", 3e5)
-    step: Step = entry("how far one wear step jumps")
+    step: Step = entry("how far one wear step jumps", default=Step())
+    tolerance: Annotated[float, Quantity("1", above=0.0, at_most=1.0)] = entry(
+        "error of the depth that steps of no given size may make, root mean square over the worn "
+        "area, relative to the depth at the end [1]",
+        "1 %",
+        default=0.01,
+    )
+    depth_tolerance: Length | None = entry("instead of tolerance [mm]", "0.05 um", default=None)
+    motion: Literal["auto", "follow", "neglect"] = entry(
+        "of the surfaces over each other within a cycle: auto follows it where it is more than a "
+        "tenth of the contact's width and the grid can resolve it",
+        "auto",
+        default="auto",
+    )
     stop: Stop = entry("ends the run early", default=Stop())
 
 
-class EnergyBody(Section):
-    """Wear of one body by dissipated energy."""
+class BodiesThatWear(Duration):
+    """A law for both bodies, unless one has its own."""
 
-    coefficient: VolumePerEnergy = entry("volume per dissipated energy [1/MPa]", "1e4 um^3/J")
-
-
-class EnergyLaw(Duration):
-    """Depth = coefficient x dissipated energy per area."""
-
-    law: Literal["energy"] = entry("energy, energy_amplitude or archard", "energy")
-
-
-class EnergyAmplitudeLaw(Duration):
-    """Energy law whose coefficient grows with the slip amplitude over a reference amplitude."""
-
-    law: Literal["energy_amplitude"] = entry(
-        "energy, energy_amplitude or archard", "energy_amplitude"
+    law: LawName = entry("energy, energy_amplitude or archard; a body may name its own", "energy")
+    reference_amplitude: Length | None = entry(
+        "at which coefficients of energy_amplitude hold [mm]", "75 um", default=None
     )
-    reference_amplitude: Length = entry("at which the coefficients hold [mm]", "75 um")
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_in_laws(cls, data: Any) -> Any:
+        """Give the bodies that name no law of their own that of this section."""
+        if not isinstance(data, dict):
+            return data
+        law: Any = data.get("law")
+        if law not in get_args(LawName):
+            # As pydantic says it of a section that is one of several kinds.
+            context = {"discriminator": "law"}
+            raise PydanticCustomError("union_tag_invalid", "{discriminator}", context)
+        bodies = {name: data[name] for name in cls._names() if name in data}
+        return data | with_laws(bodies, law, data.get("reference_amplitude"))
+
+    @model_validator(mode="after")
+    def _amplitude_is_needed(self) -> BodiesThatWear:
+        amplitudes = [
+            body.reference_amplitude
+            for body in (getattr(self, name) for name in self._names())
+            if isinstance(body, WornByEnergyAmplitude)
+        ]
+        if None in amplitudes:
+            field = type(self).model_fields["reference_amplitude"]
+            raise disagreement(
+                f"missing; allowed: {field.description}, such as 75 um", "reference_amplitude"
+            )
+        if self.reference_amplitude is not None and not amplitudes:
+            raise disagreement(
+                f"{self.reference_amplitude:g} mm: no body wears by energy_amplitude; "
+                "allowed: leave it out",
+                *("reference_amplitude", "law"),
+            )
+        return self
+
+    @classmethod
+    def _names(cls) -> list[str]:
+        """The keys of the two bodies."""
+        return [name for name in cls.model_fields if name not in BodiesThatWear.model_fields]
 
 
-class ArchardBody(Section):
-    """Wear of one body by pressure times slip over hardness."""
-
-    coefficient: Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)] = entry(
-        "Archard's wear coefficient K [1]", 1e-4
-    )
-    hardness: Annotated[
-        float, Quantity("MPa", above=0.0, at_most=1e5, range_text="above 0 and at most 100 GPa")
-    ] = entry("of the worn body [MPa]", "3.5 GPa")
+class DovetailWear(BladeAndDisk[BodyWear], BodiesThatWear):
+    """Wear of blade and disk, and how far it goes."""
 
 
-class ArchardLaw(Duration):
-    """Depth = coefficient / hardness x pressure x slip."""
-
-    law: Literal["archard"] = entry("energy, energy_amplitude or archard", "archard")
-
-
-class DovetailEnergyWear(BladeAndDisk[EnergyBody], EnergyLaw):
-    """Depth = coefficient x dissipated energy per area."""
-
-
-class DovetailEnergyAmplitudeWear(BladeAndDisk[EnergyBody], EnergyAmplitudeLaw):
-    """Energy law whose coefficient grows with the slip amplitude over a reference amplitude."""
-
-
-class DovetailArchardWear(BladeAndDisk[ArchardBody], ArchardLaw):
-    """Depth = coefficient / hardness x pressure x slip."""
-
-
-class EnergyWear(TwoBodies[EnergyBody], EnergyLaw):
-    """Depth = coefficient x dissipated energy per area."""
-
-
-class EnergyAmplitudeWear(TwoBodies[EnergyBody], EnergyAmplitudeLaw):
-    """Energy law whose coefficient grows with the slip amplitude over a reference amplitude."""
-
-
-class ArchardWear(TwoBodies[ArchardBody], ArchardLaw):
-    """Depth = coefficient / hardness x pressure x slip."""
-
-
-DovetailWear = Annotated[
-    DovetailEnergyWear | DovetailEnergyAmplitudeWear | DovetailArchardWear,
-    Field(discriminator="law"),
-]
-Wear = Annotated[EnergyWear | EnergyAmplitudeWear | ArchardWear, Field(discriminator="law")]
+class Wear(TwoBodies[BodyWear], BodiesThatWear):
+    """Wear of two bodies, and how far it goes."""
 
 
 class Nonlinearity(Section):
@@ -217,8 +250,9 @@ class Nonlinearity(Section):
 class Coupling(Section):
     """How often the worn surfaces go back to the structure."""
 
-    resultants: Literal["constant", "drift"] = entry(
-        "constant: of the unworn structure; drift: computed again when wear changes them",
+    resultants: Literal["constant", "drift", "every"] = entry(
+        "constant: of the unworn structure; drift: computed again when wear changes them; every: "
+        "after every jump",
         "drift",
         default="drift",
     )

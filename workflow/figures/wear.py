@@ -22,6 +22,7 @@ from workflow.figures.fields import (
     near_middle,
     spread,
 )
+from workflow.figures.loops import LOOP_FIGURES
 from workflow.figures.structure_stress import structure_stress
 from workflow.figures.style import BLACK, BLUE, FONT_SIZE, GREEN, ORANGE, PURPLE, new_figure
 from workflow.figures.subsurface import STRESS_FIGURES
@@ -38,6 +39,8 @@ CYCLE_COLOURS = "viridis"
 HEIGHT_IN_DEPTHS = 2.0
 # How far the kinetics are extended, in computed numbers of cycles.
 EXTRAPOLATION = 2.0
+# Of the band of its uncertainty, which is curved.
+BAND_POINTS = 50
 # What a profile along x and one along y show; a line contact has no y.
 ALONG = "along x at y = 0", "along y at x = 0"
 ALONG_LINE = ("along x",)
@@ -48,7 +51,7 @@ ALONG_LINE = ("along x",)
 def resultants(file: h5py.File) -> Figure:
     """P, Qx within the Coulomb limits, and energy per increment, one column per interface."""
     interfaces = list(file["structure"])
-    figure = new_figure(f"Resultants over one cycle: {_who_slides(file)}", 9.0)
+    figure = new_figure(f"Resultants over {_cycles_shown(file)}: {_who_slides(file)}", 9.0)
     axes = figure.subplots(3, len(interfaces), sharex=True, sharey="row", squeeze=False)
     per = _per_length(file)
     for column, interface in zip(axes.T, interfaces, strict=True):
@@ -57,13 +60,24 @@ def resultants(file: h5py.File) -> Figure:
         _draw_normal_force(column[0], increments, history, interface, per)
         _draw_tangential_force(column[1], increments, history, float(file.attrs["friction"]))
         half_space = file.get(f"contact/{interface}/energy_half_space")
-        _draw_energy(column[2], increments, history["Edx"] + history["Edy"], half_space, per)
+        # As the half-space's, that of an increment of a mix is per mean cycle.
+        energy = history.get("share", 1.0) * (history["Edx"] + history["Edy"])
+        _draw_energy(column[2], increments, energy, half_space, per)
         column[2].set_xlabel("increment")
     labels = f"P [kN{per}]", f"Qx [kN{per}]", f"energy per\nincrement [N mm{per}]"
     for axis, label in zip(axes[:, 0], labels, strict=True):
         axis.set_ylabel(label)
     axes[0, 0].set_ylim(bottom=0.0)
     return figure
+
+
+def _cycles_shown(file: h5py.File) -> str:
+    """One cycle, or those of a mix with their shares, by which energies are drawn."""
+    loads = next(iter(file["structure"].values()))["load_history"]
+    if "share" not in loads:
+        return "one cycle"
+    _, first = np.unique(loads["block"][()], return_index=True)
+    return f"a mix of {', '.join(f'{share:.0%}' for share in loads['share'][()][first])}"
 
 
 def _who_slides(file: h5py.File) -> str:
@@ -281,25 +295,32 @@ def _middle_heights(surfaces: h5py.Group) -> Array:
 
 
 def kinetics(file: h5py.File) -> Figure:
-    """Largest depth and volume over the cycles, with the linear regime and its extrapolation."""
+    """Depth, volume and area over the cycles, with linear regimes and where they lead."""
     interfaces = [name for name in file["kinetics"] if name != "cycles"]
     cycles = file["kinetics/cycles"][()]
     unit = f"mm³{_per_length(file)}"
     totals = (f"{name} {_worn_volume(file, name):.3g} {unit}" for name in interfaces)
     title = f"Worn off in {cycles[-1]:,.0f} cycles: {', '.join(totals)}"
-    figure = new_figure(title, 9.0)
-    axes = figure.subplots(2, len(interfaces), sharex=True, sharey="row", squeeze=False)
+    with_area = all("area" in file["kinetics"][name] for name in interfaces)
+    rows = 3 if with_area else 2
+    figure = new_figure(title, 4.0 * rows + 1.0)
+    axes = figure.subplots(rows, len(interfaces), sharex=True, sharey="row", squeeze=False)
     for column, interface in zip(axes.T, interfaces, strict=True):
         group = file["kinetics"][interface]
+        if with_area:
+            _draw_area(column[2], cycles, group)
+            axes[2, 0].set_ylim(0.0, max(axes[2, 0].get_ylim()[1], 1.1 * group["area"][()].max()))
         _draw_kinetics(column[0], cycles, group, "depth", 1e3)
         _draw_kinetics(column[1], cycles, group, "volume", 1.0)
         column[0].set_title(f"{interface}: largest depth, {_regime(group, cycles)}")
         column[1].set_title(f"{interface}: volume, {_rate(group)}")
-        column[1].set_xlabel("cycles")
-        column[1].xaxis.set_major_formatter("{x:,.0f}")
-        column[1].locator_params(axis="x", nbins=5)
+        column[-1].set_xlabel("cycles")
+        column[-1].xaxis.set_major_formatter("{x:,.0f}")
+        column[-1].locator_params(axis="x", nbins=5)
     axes[0, 0].set_ylabel("largest depth [µm]")
     axes[1, 0].set_ylabel(f"volume [mm³{_per_length(file)}]")
+    if with_area:
+        axes[2, 0].set_ylabel(f"area [mm²{_per_length(file)}]")
     # Not every panel has a linear regime: the legend takes each name where it is found.
     named: dict[str, Any] = {}
     for axis in axes.flat:
@@ -330,14 +351,34 @@ def _draw_kinetics(
         )
     total = np.sum(list(worn.values()), axis=0)
     axis.plot(cycles, total, "-", color=BLACK, label="both")
-    rate = scale * float(group.attrs[f"{quantity}_rate"])
     linear_from = float(group.attrs[f"{quantity}_linear_from"])
+    # Older files do not have all of it.
+    rate, trend, scatter = (
+        scale * float(group.attrs.get(f"{quantity}_{name}", 0.0))
+        for name in ("rate", "trend", "scatter")
+    )
     if np.isfinite(rate):
-        beyond = cycles[-1] * np.array([1.0, EXTRAPOLATION])
-        line = LinearRegime(linear_from, rate, cycles[-1], total[-1]).extrapolate(beyond)
-        axis.plot(beyond, line, "--", color=BLACK, label="both, extrapolated (not computed)")
+        regime = LinearRegime(linear_from, rate, cycles[-1], total[-1], trend, scatter)
+        _draw_extrapolation(axis, regime)
     if np.isfinite(linear_from):
         axis.axvspan(linear_from, cycles[-1], color=GREEN, alpha=0.15, lw=0, label="linear regime")
+
+
+def _draw_extrapolation(axis: Axes, regime: LinearRegime) -> None:
+    """The line beyond the computed cycles, dashed, in the band of its uncertainty."""
+    beyond = regime.last_cycles * np.array([1.0, EXTRAPOLATION])
+    label = "both, extrapolated (not computed)"
+    axis.plot(beyond, regime.extrapolate(beyond), "--", color=BLACK, label=label)
+    fine = np.linspace(beyond[0], beyond[1], BAND_POINTS)
+    line, reach = regime.extrapolate(fine), regime.uncertainty(fine)
+    look: dict[str, Any] = {"color": BLACK, "alpha": 0.2, "lw": 0, "label": "its uncertainty"}
+    axis.fill_between(fine, line - reach, line + reach, **look)
+
+
+def _draw_area(axis: Axes, cycles: Array, group: h5py.Group) -> None:
+    area = group["area"][()]
+    axis.plot(cycles, area, "o-", color=PURPLE, markersize=4)
+    axis.set_title(f"{group.name.split('/')[-1]}: contact at peak load, {_change(*area[[0, -1]])}")
 
 
 def _worn_volume(file: h5py.File, interface: str) -> float:
@@ -400,7 +441,7 @@ def figures_of(file: h5py.File) -> dict[str, Callable[[h5py.File], Figure]]:
     """The figures there are data for, by name."""
     return {
         name: draw
-        for name, (draw, needed) in (FIGURES | STRESS_FIGURES).items()
+        for name, (draw, needed) in (FIGURES | LOOP_FIGURES | STRESS_FIGURES).items()
         if all(group in file for group in needed)
         and not (draw is pressure_maps and line_contacts(file))
     }

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from sa_solver.contact import GROSS_SHARE
-from sa_solver.types import Array
+from sa_solver.types import Array, LoadHistory
 from workflow.case.input_files import InputFileError
+from workflow.case.wear_sections import SHARES_APART
 from workflow.resultants.imported import COLUMNS
 
 # Below this share of a column's largest value numbers are what an iterative solver leaves.
@@ -59,6 +61,46 @@ def slides_by_limit(columns: dict[str, Array], friction: float | None) -> NDArra
     shear = np.hypot(columns["Qx"], columns["Qy"])
     energy = columns["Edx"] + columns["Edy"]
     return (P > 0.0) & (energy > 0.0) & (shear >= GROSS_SHARE * friction * P)
+
+
+MIX = ("block", "share")
+"""Columns of files that hold several closed cycles, which take turns."""
+
+
+def mix_columns(columns: Mapping[str, Array], refusal: Refusal) -> dict[str, Any]:
+    """``block`` counted from 0 and ``share`` ``(n,)`` of a mix, from what a file calls them.
+
+    Empty where the file has neither. Raises what ``refusal`` makes of columns that are no mix: the
+    rows of a block follow each other and have one share, and the shares add up to 1.
+    """
+    given = [name for name in MIX if name in columns]
+    if not given:
+        return {}
+    if len(given) == 1:
+        raise refusal(0, given[0], "given alone", f"{' and '.join(MIX)}, or neither")
+    names, share = (columns[name] for name in MIX)
+    begins = np.flatnonzero(np.diff(names, prepend=np.nan) != 0.0)
+    for number, row in enumerate(begins.tolist()):
+        if names[row] in names[begins[:number]]:
+            raise refusal(row, "block", "a block that had ended", "the rows of a block together")
+    block = np.searchsorted(begins, np.arange(len(names)), side="right") - 1
+    _refuse_where((share < 0.0) | (share > 1.0), "share", "out of range", "0 to 1", refusal)
+    _refuse_where(share != share[begins][block], "share", "not as above", "one in a block", refusal)
+    total = float(share[begins].sum())
+    if abs(total - 1.0) > SHARES_APART:
+        wrong = f"the shares of all blocks add up to {total:g}"
+        raise refusal(len(share) - 1, "share", wrong, "to 1")
+    return {"block": block, "share": share}
+
+
+def differently_mixed(loads: Mapping[str, LoadHistory]) -> str | None:
+    """An interface whose cycles are mixed otherwise than those of the first one."""
+    first = next(iter(loads.values()))
+    for name, own in loads.items():
+        pairs = ((own.block, first.block), (own.share, first.share))
+        if not all(np.array_equal(*pair) for pair in pairs):
+            return name
+    return None
 
 
 def _refuse_where(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any
 
 import h5py
 import numpy as np
@@ -11,7 +12,13 @@ import numpy as np
 from sa_solver.types import Array, Frame, Indices, LoadHistory
 from workflow.case import units
 from workflow.case.input_files import InputFileError
-from workflow.resultants.consistency import Bounds, check_loads, slides_by_limit
+from workflow.resultants.consistency import (
+    MIX,
+    Bounds,
+    check_loads,
+    mix_columns,
+    slides_by_limit,
+)
 from workflow.resultants.faces import FaceError, check_facets, facets_over
 from workflow.resultants.imported import ImportedLoads, base_units, required_columns
 from workflow.resultants.table import check_unit
@@ -151,27 +158,32 @@ def _loads(group: Group, bounds: Bounds) -> LoadHistory:
         present = ", ".join(group.group) or "nothing"
         raise group.error("", f"{', '.join(missing)} missing", f"all of them; there is {present}")
     for name in group.group:
-        if name not in (*units_of, "sliding"):
-            raise group.error(name, "unknown column", ", ".join((*units_of, "sliding")))
+        known = (*units_of, "sliding", *MIX)
+        if name not in known:
+            raise group.error(name, "unknown column", ", ".join(known))
     first = group.numbers("P", units_of["P"])
     assert first is not None
     shape = (first.size,)
-    columns: dict[str, Array] = {}
+    columns: dict[str, Any] = {}
     for name, unit in units_of.items():
         column = group.shaped(name, unit, shape)
         columns[name] = np.zeros(shape) if column is None else column
 
+    found = {name: group.shaped(name, "1", shape) for name in MIX}
+    given = {name: column for name, column in found.items() if column is not None}
+
     def refusal(increment: int, column: str, wrong: str, allowed: str) -> InputFileError:
-        value = columns[column][increment]
+        value = (columns | given)[column][increment]
         return group.error(column, f"increment {increment + 1}: {value:g}: {wrong}", allowed)
 
     check_loads(columns, bounds, refusal)
+    mix = mix_columns(given, refusal)
     marks = group.shaped("sliding", "1", shape)
     if marks is None:
-        return LoadHistory(**columns, sliding=slides_by_limit(columns, bounds.friction))
+        return LoadHistory(**columns, sliding=slides_by_limit(columns, bounds.friction), **mix)
     if np.any((marks != 0.0) & (marks != 1.0)):
         raise group.error("sliding", "neither yes nor no", "0 or 1")
-    return LoadHistory(**columns, sliding=marks == 1.0)
+    return LoadHistory(**columns, sliding=marks == 1.0, **mix)
 
 
 def _frame(group: Group) -> Frame | None:

@@ -6,13 +6,21 @@ import re
 from collections.abc import Mapping
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from sa_solver.types import Array, LoadHistory
+from sa_solver.types import LoadHistory
 from workflow.case.fields import shown, split_dataset
 from workflow.case.input_files import InputFileError
-from workflow.resultants.consistency import Bounds, check_loads, slides_by_limit
+from workflow.resultants.consistency import (
+    MIX,
+    Bounds,
+    check_loads,
+    differently_mixed,
+    mix_columns,
+    slides_by_limit,
+)
 from workflow.resultants.hdf5 import read_h5
 from workflow.resultants.imported import (
     UNNAMED,
@@ -50,16 +58,30 @@ def read_resultants(
         return Bounds(friction, sizes.get(name), line)
 
     if file.endswith(HDF5):
-        return read_h5(file, group, bounds, line)
+        return _alike(file, read_h5(file, group, bounds, line))
     table = read_table(file, _columns(line), required_columns(line))
     rows = _rows_of(table)
     _check_counts(table, rows)
-    return {name: ImportedLoads(_loads(table, own, bounds(name))) for name, own in rows.items()}
+    read = {name: ImportedLoads(_loads(table, own, bounds(name))) for name, own in rows.items()}
+    return _alike(file, read)
+
+
+def _alike(file: str, read: dict[str, ImportedLoads]) -> dict[str, ImportedLoads]:
+    """What was read, if all interfaces go through the same mix of cycles."""
+    other = differently_mixed({name: own.loads for name, own in read.items()})
+    if other is not None:
+        first = next(iter(read))
+        raise InputFileError(
+            f"{file}: blocks or shares of {other} and {first} differ; allowed: the same for every "
+            "interface"
+        )
+    return read
 
 
 def _columns(line: bool) -> dict[str, str | None]:
     """Base units of all columns of a CSV file; None is text."""
-    return {INTERFACE: None, INCREMENT: "1", **base_units(line), SLIDING: "1"}
+    bare = dict.fromkeys((SLIDING, *MIX), "1")
+    return {INTERFACE: None, INCREMENT: "1", **base_units(line), **bare}
 
 
 def _rows_of(table: Table) -> dict[str, list[int]]:
@@ -99,18 +121,20 @@ def _check_counts(table: Table, rows: dict[str, list[int]]) -> None:
 
 def _loads(table: Table, rows: list[int], bounds: Bounds) -> LoadHistory:
     zeros = np.zeros(len(rows))
-    columns: dict[str, Array] = {
+    columns: dict[str, Any] = {
         name: table.numbers[name][rows] if name in table.numbers else zeros
         for name in base_units(bounds.line)
     }
     refusal = partial(_refusal, table, rows)
     check_loads(columns, bounds, refusal)
+    given = {name: table.numbers[name][rows] for name in MIX if name in table.numbers}
+    mix = mix_columns(given, refusal)
     if SLIDING not in table.numbers:
-        return LoadHistory(**columns, sliding=slides_by_limit(columns, bounds.friction))
+        return LoadHistory(**columns, sliding=slides_by_limit(columns, bounds.friction), **mix)
     marks = table.numbers[SLIDING][rows]
     for increment in np.flatnonzero((marks != 0.0) & (marks != 1.0)).tolist():
         raise refusal(increment, SLIDING, "neither yes nor no", "0 or 1")
-    return LoadHistory(**columns, sliding=marks == 1.0)
+    return LoadHistory(**columns, sliding=marks == 1.0, **mix)
 
 
 def _refusal(

@@ -66,11 +66,13 @@ class ResultantsSource:
             for own, contact in zip(self.imported.values(), self.faces, strict=True)
         )
 
-    def worn(self, depths: Sequence[Array]) -> tuple[FaceHistory, ...]:
+    def worn(
+        self, depths: Sequence[Array], friction: Sequence[float] | None = None
+    ) -> tuple[FaceHistory, ...]:
         """As unworn: no structure answers to wear."""
         return self.unworn()
 
-    def probe(self, depths: Sequence[Array]) -> Array:
+    def probe(self, depths: Sequence[Array], friction: Sequence[float] | None = None) -> Array:
         """Resultants ``(faces, 6)`` at peak load, whatever the wear."""
         columns = ("P", "Qx", "Qy", "Mx", "My", "Mz")
         return np.array(

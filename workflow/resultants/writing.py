@@ -11,6 +11,7 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array, LoadHistory
+from workflow.resultants.consistency import MIX
 from workflow.resultants.imported import base_units
 from workflow.store import ResultsWriter, replacing
 
@@ -39,11 +40,14 @@ def write_resultants_csv(
         stream.write(NOTE + "\n")
         writer = csv.writer(stream, lineterminator="\n")
         header = [f"{name} [{unit}]" for name, unit in units.items()]
-        writer.writerow(["interface", "increment", *header, "sliding"])
+        mixed = [name for name in MIX if any(loads.mixed for loads in histories.values())]
+        writer.writerow(["interface", "increment", *header, "sliding", *mixed])
         for interface, loads in histories.items():
             columns = np.array([getattr(loads, name) for name in units]).T.tolist()
-            for number, (row, slides) in enumerate(zip(columns, loads.sliding, strict=True), 1):
-                writer.writerow([interface, number, *map(repr, row), int(slides)])
+            marks = zip(loads.sliding, *(getattr(loads, name) for name in mixed), strict=True)
+            for number, (row, (slides, *mix)) in enumerate(zip(columns, marks, strict=True), 1):
+                cells = map(repr, [*row, int(slides), *(own.item() for own in mix)])
+                writer.writerow([interface, number, *cells])
 
 
 def write_resultants_h5(
@@ -62,7 +66,7 @@ def write_resultants_h5(
         writer = ResultsWriter(file, per_length=line)
         for name, history in histories.items():
             face = history.interface
-            writer.put(f"{name}/load_history", **vars(history.loads))
+            writer.put(f"{name}/load_history", **history.loads.columns())
             writer.put(name, coordinates=face.coordinates, facets=face.facets, slip=history.slip)
             file[name].attrs.update({"origin": face.frame.origin, "axes": face.frame.axes})
             if heights is not None:

@@ -1,0 +1,108 @@
+"""Wear steps on either side of the explicit stability limit, and far beyond it.
+
+A flat punch that slides as a whole, all of its cells in contact: then wear is linear in the heights
+and a roughness of the shortest wave is multiplied by 1 - w ΔN/λ_min at every step, λ_min being the
+smallest eigenvalue of the half-space on the grid.
+"""
+
+import numpy as np
+import pytest
+
+from sa_solver.half_space import HalfSpace
+from sa_solver.normal import NormalContact
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from wear.laws import Energy
+from wear.stepping import SlidingCycle, WearingContact, WearState
+
+BODY = Material(115e3, 0.29)
+PAIR = ElasticPair(BODY, BODY)
+GRIDS = {
+    "line 16": Grid.strips(4.0, 16),
+    "line 33": Grid.strips(4.0, 33),
+    "line 64": Grid.strips(4.0, 64),
+    "square 12": Grid.covering((4.0, 4.0), (12, 12)),
+    "square 21": Grid.covering((4.0, 4.0), (21, 21)),
+    "long cells": Grid.covering((4.0, 12.0), (24, 16)),
+}
+FRICTION, SLIP, MEAN_PRESSURE = 0.4, 0.02, 200.0
+RNG_SEED = 5
+
+
+def punch(grid: Grid) -> WearingContact:
+    load = np.array([MEAN_PRESSURE * grid.cell_area * np.prod(grid.shape)])
+    zero = np.zeros(1)
+    history = LoadHistory(load, *[zero] * 7, sliding=np.array([True]))
+    slip = np.full((1, *grid.shape), SLIP)
+    contact = NormalContact(HalfSpace(grid, PAIR))
+    cycle = SlidingCycle(history, slip)
+    return WearingContact(contact, (Energy(1e-8), Energy(2e-8)), FRICTION, cycle, 1e-12)
+
+
+def unevenness(own: WearingContact, kind: str, limits: float, steps: int) -> Array:
+    """How far the pressure of a rough punch is from uniform after each step ``(steps,)`` [MPa].
+
+    Its shape under uniform pressure has worn in already: it would wear on evenly for ever. On it
+    lies a roughness of 0.01 nm.
+    """
+    grid = own.contact.grid
+    rough = 1e-8 * np.random.default_rng(RNG_SEED).standard_normal(grid.shape)
+    dished = -own.contact.half_space.normal(np.full(grid.shape, MEAN_PRESSURE))
+    state, sizes = WearState.unworn(dished + rough), []
+    cycles = limits * own.stable_cycles(state)
+    for _ in range(steps):
+        state = getattr(own, f"{kind}_step")(state, cycles).state
+        pressure = own.solve(state.surfaces, 0, None).pressure
+        assert pressure.min() > 0.0
+        sizes.append(np.abs(pressure - MEAN_PRESSURE).max())
+    return np.array(sizes)
+
+
+@pytest.mark.parametrize("name", GRIDS)
+def test_explicit_steps_are_stable_just_below_their_limit_and_unstable_just_above(name) -> None:
+    """Per step |1 - 2 · 0.9| = 0.8 and |1 - 2 · 1.1| = 1.2 on an endless grid, less at its ends."""
+    own = punch(GRIDS[name])
+    for limits, least, most in ((0.9, 0.0, 0.98), (1.1, 1.08, 1.2)):
+        sizes = unevenness(own, "explicit", limits, 24)
+        growth = (sizes[-1] / sizes[-9]) ** (1.0 / 8.0)
+        assert least < growth < most, (limits, growth)
+
+
+@pytest.mark.parametrize("kind", ["implicit", "second_order"])
+@pytest.mark.parametrize("name", GRIDS)
+def test_other_steps_do_not_grow_at_a_hundred_times_that_limit(name, kind) -> None:
+    """Short waves go by 1 / (1 + 2 · 100) in the first step, longer ones more slowly."""
+    sizes = unevenness(punch(GRIDS[name]), kind, 100.0, 3)
+    assert np.all(sizes[1:] <= 0.5 * sizes[:-1]), sizes
+
+
+@pytest.mark.parametrize("kind", ["implicit", "second_order"])
+def test_no_checkerboard_and_no_growth_back(kind) -> None:
+    """A ball worn by 100 times the limit a step: alternate cells do not part."""
+    grid = Grid.covering((4.0, 4.0), (32, 32))
+    own = punch(grid)
+    ball = (grid.x**2 + grid.y**2) / 80.0
+    state = WearState.unworn(ball)
+    cycles = 100.0 * own.stable_cycles(state)
+    signs = (-1.0) ** np.add.outer(np.arange(32), np.arange(32))
+    for _ in range(3):
+        before, state = state, getattr(own, f"{kind}_step")(state, cycles).state
+        for name in ("depth_1", "depth_2"):
+            assert np.all(getattr(state.surfaces, name) >= getattr(before.surfaces, name))
+    depth = state.surfaces.depth
+    inside = depth[10:22, 10:22]
+    second = np.diff(np.diff(inside, 2, axis=0), 2, axis=1) / 16.0
+    assert abs(np.mean(second * signs[11:21, 11:21])) < 1e-4 * depth.max()
+
+
+@pytest.mark.parametrize("limits", [0.5, 5.0, 100.0])
+@pytest.mark.parametrize("kind", ["implicit", "second_order"])
+def test_a_symmetric_problem_stays_symmetric_over_100_jumps(kind, limits) -> None:
+    """The sphere's four reflections, to 1e-8 of the depth."""
+    grid = Grid.covering((4.0, 4.0), (16, 16))
+    own, state = punch(grid), WearState.unworn((grid.x**2 + grid.y**2) / 80.0)
+    cycles = limits * own.stable_cycles(state) / 10.0
+    for _ in range(100):
+        state = getattr(own, f"{kind}_step")(state, cycles).state
+    depth = state.surfaces.depth
+    for mirrored in (depth[::-1], depth[:, ::-1], depth.T):
+        np.testing.assert_allclose(mirrored, depth, atol=1e-8 * depth.max())

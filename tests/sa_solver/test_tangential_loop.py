@@ -1,0 +1,298 @@
+"""Tangential loops against Mindlin, Jenkins and Masing, for similar and dissimilar bodies."""
+
+import numpy as np
+import pytest
+
+from sa_solver import tangential_loop as loops
+from sa_solver.contact import FrictionalContact
+from sa_solver.half_space import HalfSpace
+from sa_solver.reference.hertz import Cylinder
+from sa_solver.reference.line_partial_slip import ShearedCylinder
+from sa_solver.reference.mindlin import ShearedSphere
+from sa_solver.tangential import FrictionLimitError, TangentialContact
+from sa_solver.tangential_loop import LoopError, LoopFailure, LoopPath, tangential_loop
+from sa_solver.types import ElasticPair, Grid, Material
+
+LOAD, RADIUS, FRICTION = 400.0, 10.0, 0.7
+SLIDING = FRICTION * LOAD
+PLAIN, TITANIUM = Material(115e3, 0.0), Material(115e3, 0.29)
+STEEL, SOFT = Material(200e3, 0.3), Material(10e3, 0.2)
+
+# What a grid of so many cells over a sphere's contact leaves; the contact's area comes in cells, so
+# that it does not fall steadily.
+CELLS, GRID_ERROR = 64, 1e-3
+
+
+def sphere(body_1, body_2=None):
+    return ShearedSphere(LOAD, RADIUS, body_1, body_2 or body_1, FRICTION)
+
+
+def run(case, path, cells=CELLS):
+    """The loop of a sphere on a grid that just holds its contact."""
+    size = 2.2 * case.contact.contact_radius
+    grid = Grid.covering((size, size), (cells, cells))
+    pair = ElasticPair(case.body_1, case.body_2)
+    contact = FrictionalContact(HalfSpace(grid, pair), case.friction)
+    return tangential_loop(contact, case.contact.gap(grid.x, grid.y), path)
+
+
+def press_flat(pair, cells, path, friction=FRICTION):
+    """A flat punch 2 mm wide, in the plane."""
+    grid = Grid.strips(2.0, cells)
+    contact = FrictionalContact(HalfSpace(grid, pair), friction)
+    return tangential_loop(contact, np.zeros(grid.shape), path)
+
+
+@pytest.fixture(scope="module")
+def partial():
+    """Sphere with ν = 0, in partial slip at 3/4 of the sliding force."""
+    return run(sphere(PLAIN), LoopPath(LOAD, 0.75 * SLIDING, "force"))
+
+
+@pytest.fixture(scope="module")
+def sliding():
+    """The same, slid to and fro by three times the displacement at which it begins to slide."""
+    return run(sphere(PLAIN), LoopPath(LOAD, 3.0 * sphere(PLAIN).displacement(SLIDING)))
+
+
+# --- partial slip -------------------------------------------------------------------------------
+
+
+def test_energy_and_amplitude_are_mindlins(partial):
+    case = sphere(PLAIN)
+    assert partial.energy == pytest.approx(case.loop_energy(0.75 * SLIDING), rel=GRID_ERROR)
+    assert partial.amplitude == pytest.approx(case.displacement(0.75 * SLIDING), rel=GRID_ERROR)
+    assert partial.force_amplitude == pytest.approx(0.75 * SLIDING, rel=1e-9)
+    assert partial.friction == pytest.approx(0.75 * FRICTION, rel=1e-9)
+    assert not partial.slides
+    assert partial.border_load == 0.0
+
+
+def test_first_loading_is_cattaneos(partial):
+    displacement, force = partial.loading
+    exact = np.array([sphere(PLAIN).displacement(Q) for Q in force])
+    np.testing.assert_allclose(displacement, exact, atol=GRID_ERROR * exact[-1])
+
+
+def test_sliding_share_is_that_of_the_annulus(partial):
+    """The load on r > c is P (1 - c²/a²)^(3/2); cells at its rim count whole."""
+    case = sphere(PLAIN)
+    ratio = case.stick_radius(0.75 * SLIDING) / case.contact.contact_radius
+    assert partial.sliding == pytest.approx((1.0 - ratio**2) ** 1.5, abs=0.02)
+
+
+@pytest.mark.parametrize("material", [PLAIN, TITANIUM])
+def test_stiffness_is_mindlins(material):
+    """1/kt = Σ (2-ν)/G / 8a, for ν > 0 too as nothing slips."""
+    found = run(sphere(material), LoopPath(LOAD, 0.1 * SLIDING, "force", increments=2))
+    expected = 1.0 / sphere(material).tangential_compliance
+    assert found.stiffness == pytest.approx(expected, rel=GRID_ERROR)
+
+
+def test_branches_are_first_loading_doubled(partial):
+    """Masing's rule, exact for ν = 0 on any grid."""
+    displacement, force = partial.loading
+    back, forth = (branch for branch in partial._branches)
+    scale = 1e-7 * displacement[-1]
+    np.testing.assert_allclose(displacement[-1] - back[0], 2.0 * displacement, atol=scale)
+    np.testing.assert_allclose(force[-1] - back[1], 2.0 * force, atol=1e-9 * SLIDING)
+    np.testing.assert_allclose(displacement[-1] + forth[0], 2.0 * displacement, atol=scale)
+
+
+def test_energy_does_not_depend_on_the_increments_and_the_area_does_by_their_square():
+    """ν = 0: cells slip only at |q| = µp, so slip's energy is exact; trapezoids cut the corners."""
+    found = {
+        count: run(sphere(PLAIN), LoopPath(LOAD, 0.75 * SLIDING, "force", count), cells=32)
+        for count in (6, 12, 24)
+    }
+    energies = [own.energy for own in found.values()]
+    np.testing.assert_allclose(energies, energies[0], rtol=1e-6)
+    missing = np.array([own.energy - own.work for own in found.values()])
+    assert np.all(missing > 0.0)
+    np.testing.assert_allclose(missing[:-1] / missing[1:], 4.0, rtol=0.15)
+    assert missing[-1] < 3e-3 * energies[0]
+
+
+def test_slope_after_a_reversal_tends_to_the_stuck_stiffness():
+    """First increments slip already: the secant is Mindlin's, and so less than the tangent."""
+    case, amplitude = sphere(PLAIN), 0.75 * SLIDING
+    secants = []
+    for count in (3, 6):
+        found = run(case, LoopPath(LOAD, amplitude, "force", count))
+        step = 2.0 * amplitude / count
+        expected = step / (2.0 * case.displacement(0.5 * step))
+        assert found.reversal_stiffness == pytest.approx(expected, rel=2.0 * GRID_ERROR)
+        secants.append(found.reversal_stiffness)
+    # It falls in proportion to the increment, to first order.
+    extrapolated = 2.0 * secants[1] - secants[0]
+    assert secants[0] < secants[1] < found.stiffness
+    assert extrapolated == pytest.approx(found.stiffness, rel=0.01)
+
+
+def test_both_axes_are_alike_for_a_sphere():
+    along, across = (
+        run(sphere(TITANIUM), LoopPath(LOAD, 0.5 * SLIDING, "force", 4, axis), cells=24)
+        for axis in ("x", "y")
+    )
+    np.testing.assert_allclose(across.displacement, along.displacement, rtol=1e-7, atol=1e-12)
+    assert across.energy == pytest.approx(along.energy, rel=1e-6)
+    assert across.stiffness == pytest.approx(along.stiffness, rel=1e-9)
+
+
+def test_line_contact():
+    pair = ElasticPair(TITANIUM, TITANIUM)
+    line = ShearedCylinder(Cylinder(LOAD, RADIUS, pair.contact_modulus), FRICTION)
+    grid = Grid.strips(2.2 * line.contact.half_width, 128)
+    contact = FrictionalContact(HalfSpace(grid, pair), FRICTION)
+    height = line.contact.gap(grid.x)
+    found = tangential_loop(contact, height, LoopPath(LOAD, 0.75 * SLIDING, "force", 6))
+    datum = contact.half_space.datum
+    expected = line.displacement(0.75 * SLIDING, datum)
+    assert found.energy == pytest.approx(line.loop_energy(0.75 * SLIDING), rel=GRID_ERROR)
+    assert found.amplitude == pytest.approx(expected, rel=GRID_ERROR)
+    # Stuck: q = Q/π sqrt(a²-x²) moves it by (2Q/πE*) ln(2L/a); its singular ends cost 1/cells.
+    logarithm = np.log(2.0 * datum / line.contact.half_width)
+    stuck = 0.5 * np.pi * pair.contact_modulus / logarithm
+    assert found.stiffness == pytest.approx(stuck, rel=1.0 / 128)
+
+
+# --- sliding ------------------------------------------------------------------------------------
+
+
+def test_sliding_loop_of_a_sphere(sliding):
+    """Beyond the onset δ1 of sliding the loop of ±µP, 0.8 µP δ1, grows by 4 µP per stroke."""
+    onset = sphere(PLAIN).displacement(SLIDING)
+    assert sliding.slides
+    assert sliding.friction == pytest.approx(FRICTION, rel=1e-7)
+    assert sliding.friction_by_opening == pytest.approx(FRICTION, rel=1e-7)
+    assert sliding.residual_stiffness == pytest.approx(0.0, abs=1e-6 * sliding.stiffness)
+    assert sliding.energy == pytest.approx(4.0 * SLIDING * (3.0 - 0.8) * onset, rel=GRID_ERROR)
+    assert sliding.work == pytest.approx(sliding.energy, rel=0.02)
+
+
+def test_flat_punch_is_a_jenkins_element():
+    """µ p(P) - µ p(P - Q/µ) is in proportion to p: all sticks, then all slides.
+
+    Energy 4 µP (A - µP/kt), to the solver's tolerance on any grid, and so is the opening.
+    """
+    pair = ElasticPair(TITANIUM, TITANIUM)
+    found = press_flat(pair, 32, LoopPath(LOAD, 0.02))
+    assert found.amplitude == pytest.approx(0.02, rel=1e-12)
+    expected = 4.0 * SLIDING * (0.02 - SLIDING / found.stiffness)
+    assert found.energy == pytest.approx(expected, rel=1e-6)
+    assert found.friction == pytest.approx(FRICTION, rel=1e-8)
+    assert found.area == pytest.approx(2.0)
+    assert found.border_load > 0.0
+    elastic = found.loading[1] < 0.99 * SLIDING
+    displacement, force = (own[elastic] for own in found.loading)
+    np.testing.assert_allclose(force, found.stiffness * displacement, atol=1e-6 * SLIDING)
+
+
+# --- stiffness of the stuck contact -------------------------------------------------------------
+
+
+def test_stuck_stiffness_agrees_with_friction_without_limit():
+    grid = Grid.covering((1.0, 1.2), (20, 18))
+    half_space = HalfSpace(grid, ElasticPair(TITANIUM, TITANIUM))
+    pressed = grid.x**2 + 1.7 * grid.y**2 < 0.15
+    limit = np.where(pressed, 1e9, 0.0)
+    motion = {"shift_x": 0.0, "shift_y": 1e-3, "twist": 0.0}
+    state = TangentialContact(half_space).solve(limit, **motion, tolerance=1e-11)
+    found = loops.stuck_stiffness(half_space, pressed, LoopPath(1.0, 1.0, axis="y"))
+    assert found == pytest.approx(state.Qy / 1e-3, rel=1e-9)
+
+
+def test_stuck_dissimilar_bodies_are_softer_where_pressure_is_free():
+    """Against dense algebra: tilts held or moments imposed, P always."""
+    grid = Grid.covering((1.0, 1.0), (6, 5))
+    half_space = HalfSpace(grid, ElasticPair(STEEL, SOFT))
+    count = 30
+    units = np.eye(3 * count).reshape(-1, 3, *grid.shape)
+    compliance = np.stack([half_space.displacement(unit).ravel() for unit in units], axis=1)
+    one, zero = np.ones(count), np.zeros(count)
+    x, y = (np.broadcast_to(own, grid.shape).ravel() for own in (grid.x, grid.y))
+    motion = np.concatenate([one, zero, zero])
+    found = {}
+    for moments, modes in ((None, [one]), ((0.0, 0.0), [one, x, y])):
+        held = np.stack([np.concatenate([zero, zero, mode]) for mode in modes], axis=1)
+        size = 3 * count + held.shape[1]
+        matrix = np.zeros((size, size))
+        matrix[: 3 * count, : 3 * count] = compliance
+        matrix[: 3 * count, 3 * count :] = held
+        matrix[3 * count :, : 3 * count] = held.T
+        traction = np.linalg.solve(matrix, np.append(motion, np.zeros(held.shape[1])))
+        expected = float(motion @ traction[: 3 * count]) * grid.cell_area
+        path = LoopPath(1.0, 1.0, moments=moments)
+        pressed = np.ones(grid.shape, dtype=bool)
+        found[moments] = loops.stuck_stiffness(half_space, pressed, path)
+        assert found[moments] == pytest.approx(expected, rel=1e-9)
+    assert found[0.0, 0.0] < found[None]
+
+
+# --- dissimilar bodies --------------------------------------------------------------------------
+
+
+def test_dissimilar_bodies_slide_alike_and_close():
+    """β 0.35. Mindlin's formulas leave out β: stiffness and energy within 2 %."""
+    case = sphere(STEEL, SOFT)
+    onset = case.displacement(SLIDING)
+    found = run(case, LoopPath(LOAD, 2.5 * onset, increments=8), cells=16)
+    assert found.closure <= loops.CLOSED
+    assert found.slides
+    assert found.friction == pytest.approx(FRICTION, rel=1e-6)
+    assert found.energy == pytest.approx(4.0 * SLIDING * (2.5 - 0.8) * onset, rel=0.02)
+    assert found.work == pytest.approx(found.energy, rel=0.02)
+    assert found.stiffness == pytest.approx(1.0 / case.tangential_compliance, rel=0.02)
+
+
+def test_dissimilar_bodies_in_partial_slip_are_marched_until_they_close():
+    """Pressing has left slip of its own, which takes cycles to forget."""
+    path = LoopPath(LOAD, 0.4 * SLIDING, "force", 6)
+    found = run(sphere(STEEL, SOFT), path, cells=12)
+    assert found.closure <= loops.CLOSED
+    assert len(found.force) > 1 + 3 * 6
+    assert len(found.cycle[0]) == 1 + 2 * 6
+    assert found.work == pytest.approx(found.energy, rel=0.05)
+
+
+# --- what is imposed ----------------------------------------------------------------------------
+
+
+def test_moments_and_tilts():
+    """Moments put the pressure where they say; without, the bodies do not tilt."""
+    grid = Grid.covering((1.0, 1.0), (16, 16))
+    contact = FrictionalContact(HalfSpace(grid, ElasticPair(TITANIUM, TITANIUM)), FRICTION)
+    height = (grid.x**2 + grid.y**2) / 400.0
+    pressed = {
+        moments: loops._press(contact, height, LoopPath(LOAD, 1e-3, moments=moments))
+        for moments in ((0.0, 0.0), (0.0, -40.0), None)
+    }
+    assert pressed[0.0, -40.0].resultants[4] == pytest.approx(-40.0, rel=1e-8)
+    assert pressed[0.0, -40.0].rigid[4] != 0.0
+    np.testing.assert_allclose(pressed[None].traction, pressed[0.0, 0.0].traction, atol=1e-3)
+    found = tangential_loop(contact, height, LoopPath(LOAD, 1e-4, moments=(0.0, -40.0)))
+    assert found.amplitude == pytest.approx(1e-4, rel=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("settings", "complaint"),
+    [
+        ({"P": 0.0, "amplitude": 1.0}, "P = 0"),
+        ({"P": 1.0, "amplitude": np.nan}, "amplitude = nan"),
+        ({"P": 1.0, "amplitude": 1.0, "increments": 1}, "at least 2"),
+    ],
+)
+def test_paths_without_meaning(settings, complaint):
+    with pytest.raises(LoopError, match=complaint):
+        LoopPath(**settings)
+
+
+def test_force_beyond_friction_is_refused():
+    with pytest.raises(FrictionLimitError, match="the largest in this direction"):
+        run(sphere(PLAIN), LoopPath(LOAD, 1.1 * SLIDING, "force", 4), cells=8)
+
+
+def test_what_does_not_converge_is_said(monkeypatch):
+    monkeypatch.setattr(loops, "STUCK_ITERATIONS", 1)
+    with pytest.raises(LoopFailure, match="stuck contact"):
+        run(sphere(TITANIUM), LoopPath(LOAD, 0.1 * SLIDING, "force", 2), cells=16)

@@ -1,0 +1,184 @@
+"""Length of wear steps: rates of convergence, error control, what a run of steps adds up to."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sa_solver.half_space import HalfSpace
+from sa_solver.normal import NormalContact
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from wear.laws import Energy
+from wear.steppers import ErrorControl, Explicit, Implicit, SecondOrder, advance
+from wear.stepping import SlidingCycle, WearingContact, WearState
+
+BODY = Material(115e3, 0.29)
+GRID = Grid.strips(8.0, 40)
+HALF_SPACE = HalfSpace(GRID, ElasticPair(BODY, BODY))
+CONTACT = NormalContact(HALF_SPACE)
+X = GRID.x / 4.0
+FRICTION, MEAN = 0.4, 200.0
+LAWS = Energy(1e-8), Energy(2e-8)
+
+
+def history(P: Array, My: Array) -> LoadHistory:
+    zero = np.zeros(len(P))
+    columns = dict.fromkeys(("Qx", "Qy", "Mx", "Mz", "Edx", "Edy"), zero)
+    return LoadHistory(P=P, My=My, **columns, sliding=zero > 0.0)
+
+
+def cycle(scale: Array | float = 1.0) -> SlidingCycle:
+    """Three loads off centre and unlike slips, ``scale`` ``(nx, 1)`` of them."""
+    P = MEAN * 8.0 * np.array([0.7, 1.0, 0.85])
+    slip = [0.02 * (1.0 + 0.4 * np.sin(k + X)) * scale for k in (0.0, 2.0, 4.0)]
+    return SlidingCycle(history(P, P * [0.2, -0.1, 0.05]), np.stack(slip))
+
+
+def wearing(scale: Array | float = 1.0) -> WearingContact:
+    return WearingContact(CONTACT, LAWS, FRICTION, cycle(scale), 1e-10)
+
+
+def waved() -> WearState:
+    """A flat that has worn to uniform pressure, with a long wave on it: everything touches."""
+    dished = -HALF_SPACE.normal(np.full(GRID.shape, 0.85 * MEAN))
+    gap = dished + 1e-4 * np.cos(2.0 * X)
+    return WearState.unworn(gap)
+
+
+def rounded() -> WearState:
+    """A flat with rounded edges: the contact grows as it wears."""
+    gap = np.maximum(np.abs(GRID.x) - 2.0, 0.0) ** 2 / 60.0
+    return WearState.unworn(gap)
+
+
+def unchanging(state: WearState) -> WearingContact:
+    return CONSTANT
+
+
+def evolving(state: WearState) -> WearingContact:
+    """Slip that grows with what has worn: as that of the half-space, it belongs to a state."""
+    return wearing(1.0 + state.surfaces.depth / 4e-3)
+
+
+CONSTANT = wearing()
+LIMIT = CONSTANT.stable_cycles(waved())
+
+
+# --- order --------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("contact_at", [unchanging, evolving])
+@pytest.mark.parametrize(
+    ("stepper", "order"), [(Explicit(), 1), (Implicit(), 1), (SecondOrder(), 2)]
+)
+def test_order_of_convergence(stepper, order, contact_at) -> None:
+    """Depth anywhere converges at the order of the method, with slips that wear changes too."""
+    cycles = 6.0 * LIMIT
+
+    def depth(jumps: int) -> Array:
+        state = waved()
+        for _ in range(jumps):
+            state = stepper.step(state, cycles / jumps, cycles, contact_at).state
+        return state.surfaces.depth
+
+    coarse, middle, fine = (depth(jumps) for jumps in (12, 24, 48))
+    rate = np.log2(np.abs(coarse - middle).max() / np.abs(middle - fine).max())
+    assert rate == pytest.approx(order, abs=0.25)
+
+
+def test_methods_agree_in_the_limit() -> None:
+    cycles = 6.0 * LIMIT
+    ends = []
+    for stepper in (Explicit(), Implicit(), SecondOrder()):
+        coarse, fine = [advance_in(stepper, waved(), cycles, jumps) for jumps in (32, 64)]
+        order = 2 if isinstance(stepper, SecondOrder) else 1
+        ends.append(fine + (fine - coarse) / (2**order - 1))
+    for end in ends[1:]:
+        np.testing.assert_allclose(end, ends[0], rtol=2e-4)
+
+
+def advance_in(stepper, state: WearState, cycles: float, jumps: int) -> Array:
+    for _ in range(jumps):
+        state = stepper.step(state, cycles / jumps, cycles, unchanging).state
+    return state.surfaces.depth
+
+
+# --- automatic length -----------------------------------------------------------------------------
+
+
+def run(stepper, cycles: float) -> tuple[Array, int, int]:
+    """Depth at the end of a run, wear steps and contact problems it took."""
+    state = rounded()
+    first = CONSTANT.cycle(state, CONSTANT.working)
+    starts = {t: own.start for t, own in first.states.items()}
+    limit = CONSTANT.stable_cycles(state)
+    state = replace(state, starts=starts, next_cycles=4.0 * limit)
+    end = advance(stepper, state, cycles, cycles, unchanging)
+    return end.state.surfaces.depth, end.steps, end.contact_solves + len(first.states)
+
+
+@pytest.mark.parametrize("kind", [Implicit, SecondOrder])
+def test_automatic_steps_meet_their_tolerance_and_grow_fewer_with_it(kind) -> None:
+    cycles = 100.0 * CONSTANT.stable_cycles(rounded())
+    exact = run(SecondOrder(ErrorControl(2e-4)), cycles)[0]
+    steps = []
+    for tolerance in (0.05, 0.01, 0.002):
+        depth, count, _ = run(kind(ErrorControl(tolerance)), cycles)
+        error = np.sqrt(np.mean((depth - exact) ** 2) / np.mean(exact**2))
+        assert error < tolerance
+        assert depth.max() == pytest.approx(exact.max(), rel=tolerance)
+        steps.append(count)
+    assert steps == sorted(set(steps))
+
+
+def test_automatic_steps_take_a_tenth_of_the_explicit_ones() -> None:
+    """One per cent of depth and volume, against explicit steps at their limit."""
+    cycles = 150.0 * CONSTANT.stable_cycles(rounded())
+    explicit, _, most = run(Explicit(fraction=1.0), cycles)
+    depth, _, solves = run(Implicit(ErrorControl(0.01)), cycles)
+    assert solves <= 0.1 * most
+    assert depth.max() == pytest.approx(explicit.max(), rel=0.01)
+    assert depth.sum() == pytest.approx(explicit.sum(), rel=0.01)
+
+
+def test_an_absolute_tolerance_is_a_depth() -> None:
+    """The error of a step in mm, whatever the depth at the end."""
+    cycles = 100.0 * CONSTANT.stable_cycles(rounded())
+    exact = run(SecondOrder(ErrorControl(2e-4)), cycles)[0]
+    worn = exact > 0.0
+    allowed = 0.01 * float(np.sqrt(np.mean(exact[worn] ** 2)))
+    absolute, relative = (
+        run(Implicit(control), cycles)
+        for control in (ErrorControl(absolute=allowed), ErrorControl(relative=0.01))
+    )
+    assert abs(absolute[1] - relative[1]) <= 2
+    assert np.sqrt(np.mean((absolute[0] - exact)[worn] ** 2)) < allowed
+
+
+def test_a_step_that_was_too_long_is_taken_again() -> None:
+    """A first guess a hundred times too long costs contact problems, not accuracy."""
+    cycles = 100.0 * CONSTANT.stable_cycles(rounded())
+    exact = run(SecondOrder(ErrorControl(2e-4)), cycles)[0]
+    end = advance(Implicit(ErrorControl(0.01)), rounded(), cycles, cycles, unchanging)
+    assert end.contact_solves > 3 * end.steps
+    assert end.state.surfaces.depth.max() == pytest.approx(exact.max(), rel=0.01)
+
+
+def test_explicit_steps_keep_to_their_share_of_the_limit() -> None:
+    limit = CONSTANT.stable_cycles(rounded())
+    end = advance(Explicit(fraction=0.5), rounded(), 10.0 * limit, 10.0 * limit, unchanging)
+    assert end.steps >= 20
+
+
+@pytest.mark.parametrize(
+    "stepper", [Explicit(0.9), Explicit(), Implicit(), Implicit(ErrorControl(0.01)), SecondOrder()]
+)
+def test_steps_add_up_to_the_cycles_asked_for(stepper) -> None:
+    """Energy of gross sliding is that of so many cycles: µ Σ p s over them."""
+    cycles = 3.3 * LIMIT
+    state = advance(stepper, waved(), cycles, 10.0 * cycles, unchanging).state
+    volume = state.surfaces.depth.sum() * GRID.cell_area
+    assert volume == pytest.approx(3e-8 * state.energy, rel=1e-10)
+    assert state.energy == pytest.approx(
+        advance(Implicit(), waved(), cycles, cycles, unchanging).state.energy, rel=0.01
+    )

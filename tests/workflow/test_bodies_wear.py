@@ -1,0 +1,288 @@
+"""Two bodies that wear without a structure: the case, its loads, and what a run of it finds."""
+
+import json
+import pickle
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from click.testing import CliRunner, Result
+
+from workflow.bodies_source import BodiesSource
+from workflow.case import (
+    BodiesWearCase,
+    CaseError,
+    LineBodiesWearCase,
+    dump_case,
+    load_case,
+    parse_case,
+    template,
+)
+from workflow.cli import cli
+from workflow.contact_stage import ContactStage, InterfaceState, StageSettings
+
+CASES = Path(__file__).parents[2] / "cases"
+AREA, LINE = template("bodies_wear"), template("line_wear")
+FLAT = "{kind: bodies, shape: flat, half_width: 0.2, half_length: 0.1, step: 5 um}"
+STRIP = "{kind: bodies, shape: flat, half_width: 0.2}"
+SMALL = ["contact.grid=[40, 40]", "load_path.increments=1"]
+
+
+def area(*overrides: str) -> BodiesWearCase:
+    case = parse_case(AREA, "area.yaml", [*SMALL, *overrides])
+    assert isinstance(case, BodiesWearCase)
+    return case
+
+
+def line(*overrides: str) -> LineBodiesWearCase:
+    case = parse_case(LINE, "line.yaml", ["contact.grid=[80, 1]", *overrides])
+    assert isinstance(case, LineBodiesWearCase)
+    return case
+
+
+def worn(
+    case: BodiesWearCase | LineBodiesWearCase, jumps: int = 4
+) -> tuple[ContactStage, InterfaceState]:
+    """The contact after the cycles of the case, in this process."""
+    source = BodiesSource(case)
+    stage = ContactStage(StageSettings(case, source.faces[0]))
+    state, _ = stage.begin(source.unworn()[0])
+    for jump in range(jumps):
+        left = case.wear.cycles * (1.0 - jump / jumps)
+        state, _ = stage.jump(state, case.wear.cycles / jumps, left)
+    return stage, state
+
+
+# --- the case -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "override", "kind"),
+    [
+        (AREA, "structure.radius=1 m", BodiesWearCase),
+        (AREA, f"structure={FLAT}", BodiesWearCase),
+        (LINE, "structure.radius=1 m", LineBodiesWearCase),
+        (LINE, f"structure={STRIP}", LineBodiesWearCase),
+    ],
+)
+def test_shape_or_size_say_whether_bodies_touch_along_a_line(text, override, kind) -> None:
+    case = parse_case(text, "case.yaml", [override])
+    assert isinstance(case, kind)
+    assert parse_case(dump_case(case), "dump") == case
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("structure.shape=cone", "allowed: sphere, ellipsoid, cylinder, flat_rounded, heights, "),
+        ("structure.shape=cylinder", "allowed:"),  # an area has two sizes
+        ("load_path.P=0 N", "above 0 and at most 1e6 kN"),
+        ("load_path.stroke=0 um", "above 0 mm"),
+        ("load_path.increments=0", "a whole number from 1 to 1000"),
+        ("contact.method=half", "normal"),
+        ("load_path.legs=[]", "unknown key; allowed: P, stroke, direction, increments"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(override: str, words: str) -> None:
+    with pytest.raises(CaseError) as refusal:
+        area(override)
+    assert words in str(refusal.value)
+
+
+def test_heights_must_suit_the_grid(tmp_path: Path) -> None:
+    np.save(tmp_path / "gap.npy", np.zeros((30, 40)))
+    heights = "structure={kind: bodies, shape: heights, file: gap.npy}"
+    with pytest.raises(CaseError, match=r"allowed: \[30, 40\]"):
+        parse_case(AREA, str(tmp_path / "case.yaml"), [*SMALL, heights])
+
+
+@pytest.mark.parametrize("name", ["cylinder_wear", "sphere_wear"])
+def test_cases_of_the_repository_expect_something(name: str) -> None:
+    case = load_case(CASES / f"{name}.yaml")
+    assert isinstance(case, BodiesWearCase | LineBodiesWearCase)
+    assert case.expect
+
+
+# --- the loads ----------------------------------------------------------------------------------
+
+
+def test_a_cycle_goes_there_and_back() -> None:
+    """Constant speed, closed, along the direction asked for; friction against it."""
+    case = area("load_path.increments=3", "load_path.direction=30 deg", "friction.coefficient=0.5")
+    source = BodiesSource(case)
+    motion = source.motion
+    np.testing.assert_allclose(np.hypot(*motion.T), 0.05 / 3, rtol=1e-12)
+    np.testing.assert_allclose(motion.sum(axis=0), 0.0, atol=1e-15)
+    np.testing.assert_allclose(motion[:, 1], np.tan(np.pi / 6) * motion[:, 0], rtol=1e-12)
+    loads = source.unworn()[0].loads
+    np.testing.assert_allclose(np.hypot(loads.Qx, loads.Qy), 0.5 * 50.0, rtol=1e-12)
+    assert np.all(loads.Qx * motion[:, 0] + loads.Qy * motion[:, 1] < 0.0)
+    # Energy of gross sliding: 4 amplitudes, two strokes, of µ P.
+    assert (loads.Edx + loads.Edy).sum() == pytest.approx(2 * 0.05 * 25.0, rel=1e-12)
+    assert source.unworn()[0].slip.shape == (6, 2, 4)
+    np.testing.assert_array_equal(source.probe([])[0, :3], [50.0, loads.Qx[1], loads.Qy[1]])
+    # Friction that has changed with wear.
+    (later,) = source.worn([], [0.7])
+    np.testing.assert_allclose(later.loads.Edx, 1.4 * loads.Edx, rtol=1e-12)
+    np.testing.assert_array_equal(later.slip, source.unworn()[0].slip)
+
+
+def test_faces_travel_to_the_processes_of_contacts() -> None:
+    for case in (area(), area(f"structure={FLAT}"), line(), line(f"structure={STRIP}")):
+        (face,) = BodiesSource(case).faces
+        again = pickle.loads(pickle.dumps(face))
+        grid = again.grid(case.contact.grid)
+        np.testing.assert_array_equal(again.gap(grid.x, grid.y), face.gap(grid.x, grid.y))
+        assert again.driven
+
+
+def test_a_flat_stands_on_its_step() -> None:
+    (face,) = BodiesSource(area(f"structure={FLAT}")).faces
+    grid = face.grid((40, 40))
+    gap = face.gap(grid.x, grid.y)
+    assert set(np.unique(gap)) == {0.0, 0.005}
+    assert np.count_nonzero(gap == 0.0) * grid.cell_area == pytest.approx(0.4 * 0.2, rel=1e-9)
+
+
+# --- wear ---------------------------------------------------------------------------------------
+
+
+def test_volume_is_what_sliding_that_far_wears() -> None:
+    """V = α µ P 2 s N for either body, whatever the shape."""
+    case = area("wear.cycles=1000", "wear.body_2.coefficient=3e3 um^3/J")
+    stage, state = worn(case)
+    sliding = case.friction.coefficient * 50.0 * 2.0 * 0.05 * 1000.0
+    for depth, coefficient in ((state.surfaces.depth_1, 1e-8), (state.surfaces.depth_2, 3e-9)):
+        volume = depth.sum() * stage.grid.cell_area
+        assert volume == pytest.approx(coefficient * sliding, rel=1e-9)
+    assert state.energy == pytest.approx(sliding, rel=1e-9)
+
+
+def test_heights_of_a_cylinder_wear_as_the_cylinder(tmp_path: Path) -> None:
+    case = line("wear.cycles=1000")
+    (face,) = BodiesSource(case).faces
+    grid = face.grid(case.contact.grid)
+    np.save(tmp_path / "gap.npy", face.gap(grid.x, grid.y))
+    heights = "structure={kind: bodies, shape: heights, file: gap.npy}"
+    overrides = ["contact.grid=[80, 1]", "wear.cycles=1000", heights]
+    same = parse_case(LINE, str(tmp_path / "case.yaml"), overrides)
+    assert isinstance(same, LineBodiesWearCase)
+    np.testing.assert_array_equal(worn(same)[1].surfaces.depth_2, worn(case)[1].surfaces.depth_2)
+
+
+def test_direction_turns_what_wears() -> None:
+    """Along y as along x, turned; over a stroke that is not small."""
+    overrides = "wear.cycles=200", "load_path.stroke=0.2 mm", "load_path.P=20 N"
+    along_x = worn(area(*overrides))[1].surfaces
+    along_y = worn(area(*overrides, "load_path.direction=90 deg"))[1].surfaces
+    for name in ("depth_1", "depth_2"):
+        x, y = getattr(along_x, name), getattr(along_y, name)
+        np.testing.assert_allclose(y, x.T, atol=1e-7 * x.max())
+    # The scar on body 1 is longer than that on body 2, by the stroke.
+    lengths = [
+        np.count_nonzero(depth.any(axis=1)) / 40.0 for depth in (along_x.depth_1, along_x.depth_2)
+    ]
+    assert lengths[0] - lengths[1] == pytest.approx(0.2, abs=2.1 / 40.0)
+
+
+def test_following_the_motion_can_be_forced() -> None:
+    """Automatic is what a stroke of all of the first contact or a fiftieth of it asks for."""
+    overrides = "wear.cycles=200", "load_path.P=20 N"
+    for stroke, automatic in (("0.2 mm", "follow"), ("4 um", "neglect")):
+        given = [*overrides, f"load_path.stroke={stroke}"]
+        found = {
+            chosen: worn(area(*given, f"wear.motion={chosen}"))[1].surfaces.depth_1
+            for chosen in ("auto", "follow", "neglect")
+        }
+        np.testing.assert_array_equal(found["auto"], found[automatic])
+        assert np.abs(found["follow"] - found["neglect"]).max() > 0.0
+
+
+def test_the_flat_wears_as_the_punch_passes_over_it() -> None:
+    """A strip that wears nothing by itself: the trapezoid of its pressure, once that is uniform.
+
+    Conforming, p = P/2a; the flat is then worn by p times the share of the stroke that the strip is
+    over it: down to the whole in the middle, half of it below the strip's edges in their middle
+    place, nothing a + s/2 away.
+    """
+    case = line(
+        f"structure={STRIP}",
+        *("load_path.P=20 N/mm", "load_path.stroke=0.1 mm", "load_path.increments=8"),
+        *("wear.body_2.coefficient=0", "wear.cycles=400", "wear.motion=follow"),
+    )
+    stage, state = worn(case, 40)
+    x, depth = stage.grid.x.ravel(), state.surfaces.depth_1.ravel()
+    reach = np.abs(x[depth > 0.0]).max() + 0.5 * stage.grid.pitch[0]
+    assert reach == pytest.approx(0.25, abs=1.01 * stage.grid.pitch[0])
+    volume = 1e-8 * case.friction.coefficient * 20.0 * 0.2 * 400.0
+    assert depth.sum() * stage.grid.pitch[0] == pytest.approx(volume, rel=1e-9)
+    assert not state.surfaces.depth_2.any()
+
+
+def test_wear_beyond_the_grid_is_refused_with_the_remedy() -> None:
+    from wear.stepping import ContactFailure
+
+    case = area("load_path.stroke=0.9 mm", "wear.cycles=10", "load_path.increments=2")
+    with pytest.raises(ContactFailure, match="beyond the end of the grid along x: make the grid"):
+        worn(case, 1)
+
+
+def test_partial_slip_over_a_given_stroke_is_that_of_mindlin() -> None:
+    """Method full: stroke and energy of Mindlin and Deresiewicz's loop at Q = 0.75 µP.
+
+    cases/sphere_fretting.yaml has the closed forms: an amplitude of 6.69523 µm dissipates 0.414092
+    N mm a cycle; they neglect the shear across, 2 %.
+    """
+    case = area(
+        *("load_path.P=400 N", "load_path.stroke=13.39046 um", "load_path.increments=4"),
+        *("friction.coefficient=0.7", "contact.method=full", "wear.cycles=1"),
+    )
+    source = BodiesSource(case)
+    stage = ContactStage(StageSettings(case, source.faces[0]))
+    _, first = stage.begin(source.unworn()[0])
+    assert first.energy.sum() == pytest.approx(0.414092, rel=2e-2)
+    forces = [state.resultants[1] for state in first.cycle]
+    assert max(forces) == pytest.approx(210.0, rel=2e-2)
+    assert min(forces) == pytest.approx(-max(forces), rel=1e-3)
+    # Body 2 is pulled along x on the way there: friction holds it back.
+    assert forces[3] == min(forces)
+
+
+# --- the run ------------------------------------------------------------------------------------
+
+
+def command(name: str, *arguments: object, overrides: list[str] | None = None) -> Result:
+    """``fretscale name`` in this process."""
+    settings = [part for entry in overrides or [] for part in ("--set", entry)]
+    result = CliRunner().invoke(cli, [name, *map(str, arguments), *settings])
+    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
+    return result
+
+
+def run(case: Path, out: Path, *overrides: str) -> dict[str, Any]:
+    done = command("run", case, "--out", out, overrides=["output.figures=false", *overrides])
+    assert done.exit_code == 0, done.stderr
+    summary: dict[str, Any] = json.loads((out / "summary.json").read_text("utf-8"))
+    return summary
+
+
+def test_a_run_writes_what_every_wear_run_does(tmp_path: Path) -> None:
+    summary = run(
+        *(CASES / "cylinder_wear.yaml", tmp_path / "out"),
+        *("wear.cycles=1e5", "wear.step.cycles=5e4", "contact.grid=[64, 1]"),
+        "stress={section: x, life: {parameter: ruiz}}",
+    )
+    own = summary["interface"]
+    assert summary["per_length"] is True
+    # µ P 2s = 0.5 N mm/mm a cycle.
+    assert own["volume_1"] == pytest.approx(5e-9 * 0.5 * 1e5, rel=1e-9)
+    assert own["energy_per_cycle"]["half_space"] == pytest.approx(0.5, rel=1e-9)
+    assert {"results.h5", "case.yaml", "run.log"} <= {p.name for p in (tmp_path / "out").iterdir()}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["cylinder_wear", "sphere_wear"])
+def test_cases_of_the_repository_are_verified(name: str, tmp_path: Path) -> None:
+    done = command("verify", CASES / f"{name}.yaml", "--out", tmp_path)
+    assert done.exit_code == 0, done.output

@@ -1,0 +1,361 @@
+"""Charts without runs: frontier, Richardson, ladders, costs with a cache, axes of each case."""
+
+import json
+from itertools import pairwise, product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from sa_solver.types import Grid
+from workflow.case import dump_case, load_case
+from workflow.chart import Chart, accuracy_of
+from workflow.chart.axes import AXES, Axis, Rung, axes_of
+from workflow.chart.convergence import richardson
+from workflow.chart.frontier import Option, cheapest, efficient
+from workflow.chart.ladder import Ladder, Point, judge
+from workflow.chart.measures import Cost, costs, number_at, profile_difference, stage_seconds
+from workflow.chart.report import combination, sentences, write_chart
+from workflow.errors import UserError
+
+# --- frontier -----------------------------------------------------------------------------------
+
+
+def test_efficient_points_are_those_that_nothing_beats_in_both():
+    random = np.random.default_rng(1)
+    spent, errors = random.uniform(size=(2, 60)).round(1).tolist()
+    flags = efficient(spent, errors)
+    points = list(zip(spent, errors, strict=True))
+    for (cost, error), flag in zip(points, flags, strict=True):
+        beaten = any(c <= cost and e <= error and (c, e) != (cost, error) for c, e in points)
+        assert not (flag and beaten)
+    # Whatever is asked for, an efficient point is as cheap as any that will do.
+    for accuracy in np.linspace(min(errors), 1.0, 20):
+        best = min(c for c, e in points if e <= accuracy)
+        kept = [c for (c, e), flag in zip(points, flags, strict=True) if flag and e <= accuracy]
+        assert min(kept) == best
+
+
+def test_of_points_alike_one_is_efficient():
+    assert efficient([1.0, 1.0, 2.0], [0.1, 0.1, 0.1]) == [True, False, False]
+
+
+def test_cheapest_combination_is_that_of_an_exhaustive_search():
+    random = np.random.default_rng(2)
+    axes = [
+        [Option(f"{axis}{k}", *random.uniform((0.2, 0.0), (3.0, 0.02)).tolist()) for k in range(5)]
+        for axis in "abcd"
+    ]
+    everything = list(product(*axes))
+    for accuracy in (0.02, 0.03, 0.05):
+        met = [c for c in everything if sum(option.error for option in c) <= accuracy]
+        best = min(np.prod([option.ratio for option in c]) for c in met)
+        found = cheapest(axes, accuracy)
+        assert found is not None
+        assert found.ratio == pytest.approx(best, rel=1e-12)
+        assert found.error <= accuracy
+        assert [name[0] for name in found.names] == list("abcd")
+    assert cheapest(axes, 1e-6) is None
+
+
+# --- Richardson ---------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("steps", [(4.0, 2.0, 1.0), (5.0, 2.5, 2.0), (0.3, 0.2, 0.1)])
+@pytest.mark.parametrize("order", [0.5, 1.0, 2.0])
+def test_richardson_finds_order_and_limit_of_a_power(steps: tuple[float, ...], order: float):
+    values = [3.0 - 0.7 * h**order for h in steps]
+    found = richardson(values, steps, order=2.0)
+    assert found.order == pytest.approx(order, rel=1e-9)
+    assert found.error == pytest.approx(3.0 - values[-1], rel=1e-9)
+
+
+def test_an_order_above_what_is_believed_is_not_used():
+    values = [1.0 + h**4 for h in (4.0, 2.0, 1.0)]
+    found = richardson(values, (4.0, 2.0, 1.0), order=2.0)
+    assert found.order == pytest.approx(4.0)
+    assert found.error == pytest.approx((values[1] - values[2]) / 3.0)
+    assert found.error > abs(values[-1] - 1.0)
+
+
+def test_values_that_swing_to_a_limit_have_it_between_the_last_two():
+    found = richardson([1.4, 0.8, 1.1], (4.0, 2.0, 1.0), order=2.0)
+    assert found.order is None
+    assert found.error == pytest.approx(0.3)
+
+
+def test_values_that_do_not_settle_are_known_to_their_spread():
+    found = richardson([1.0, 1.1, 0.7], (4.0, 2.0, 1.0), order=2.0)
+    assert found.order is None
+    assert found.error == pytest.approx(0.4)
+
+
+def test_rounding_is_no_convergence():
+    found = richardson([1.0, 1.0 + 2e-16, 1.0], (4.0, 2.0, 1.0), order=2.0, noise=1e-12)
+    assert found.order is None
+    assert found.error < 1e-12
+
+
+def test_few_rungs_say_little():
+    assert richardson([1.0, 1.2], (2.0, 1.0), order=2.0).error == pytest.approx(0.2)
+    assert richardson([1.0], (1.0,), order=2.0).error == np.inf
+
+
+# --- ladders ------------------------------------------------------------------------------------
+
+GRID, METHOD = (next(axis for axis in AXES if axis.name == name) for name in ("grid", "method"))
+
+
+def point(name: str, step: float | None, values: dict[str, float], seconds: float) -> Point:
+    """A rung that took ten convolutions per second; ``own`` is the case as written."""
+    cost = Cost(seconds, round(10 * seconds), 1)
+    return Point(Rung(name, (f"a={name}",), step), name == "own", name, values, cost)
+
+
+def second_order(closed: float = 1.0) -> list[Point]:
+    """depth = closed + h², volume = 2 + h."""
+    names = {"coarse": 0.4, "own": 0.2, "fine": 0.1}
+    return [
+        point(name, h, {"depth": closed + h**2, "volume": 2.0 + h}, 1.0 / h)
+        for name, h in names.items()
+    ]
+
+
+def test_the_last_rung_is_the_reference_and_known_to_its_estimated_error():
+    ladder = judge(GRID, second_order(), {}, {})
+    assert ladder.references["depth"].order == pytest.approx(2.0)
+    assert ladder.references["depth"].floor == pytest.approx(0.01 / 1.01)
+    assert ladder.references["volume"].order == pytest.approx(1.0)
+    assert ladder.floor == pytest.approx(0.1 / 2.1)
+    coarse, own, fine = ladder.rungs
+    assert coarse.error == pytest.approx(0.15 / 1.01)
+    assert coarse.worst == "depth"
+    assert (fine.error, fine.unresolved) == (0.0, True)
+    assert fine.bound == pytest.approx(ladder.floor)
+    # 0.1 / 2.1 apart from a value that is known no better than that.
+    assert own.error == pytest.approx(0.1 / 2.1)
+    assert own.bound >= (2.2 - 2.0) / 2.1
+    assert [rung.by_seconds for rung in ladder.rungs] == [True, True, True]
+
+
+def test_a_closed_form_is_the_reference_where_the_axis_goes_to_it():
+    exact = {"depth": 1.0, "volume": 2.0}
+    ladder = judge(GRID, second_order(), exact, {})
+    assert ladder.floor == 0.0
+    assert [rung.error for rung in ladder.rungs] == pytest.approx([0.2, 0.1, 0.05])
+    # A choice has no limit that a closed form would be.
+    assert judge(METHOD, second_order(), exact, {}).rungs[-1].error == 0.0
+
+
+def test_the_bound_holds_against_the_true_limit():
+    ladder = judge(GRID, second_order(), {}, {})
+    for rung in ladder.rungs:
+        values = rung.point.values
+        true = max(abs(values["depth"] - 1.0) / 1.0, abs(values["volume"] - 2.0) / 2.0)
+        assert rung.bound == pytest.approx(true, rel=0.15)
+
+
+def test_quantities_that_are_zero_or_missing_are_left_out():
+    points = [
+        point("a", 2.0, {"depth": 1.1, "nothing": 0.0, "here": 1.0}, 1.0),
+        point("b", 1.0, {"depth": 1.0, "nothing": 0.0}, 2.0),
+    ]
+    assert list(judge(GRID, points, {}, {}).references) == ["depth"]
+
+
+def test_the_last_rung_of_a_choice_is_right_by_definition():
+    points = [point("own", None, {"depth": 1.1}, 1.0), point("full", None, {"depth": 1.0}, 9.0)]
+    ladder = judge(METHOD, points, {}, {})
+    assert ladder.floor == 0.0
+    assert [rung.bound for rung in ladder.rungs] == pytest.approx([0.1, 0.0])
+    assert not any(rung.unresolved for rung in ladder.rungs)
+
+
+def charted(accuracy: float) -> Chart:
+    points = [point("own", None, {"depth": 1.001}, 2.0), point("full", None, {"depth": 1.0}, 9.0)]
+    method = judge(METHOD, points, {}, {"broken": "no convergence"})
+    return Chart("Test", (judge(GRID, second_order(), {"volume": 2.0}, {}), method), accuracy)
+
+
+def test_sentences_say_what_to_take():
+    grid, method, together = sentences(charted(0.1))
+    assert grid.startswith("grid: for 10 % take fine: 10 s, 100 convolutions, error 5 % (volume)")
+    assert method.startswith("method: for 10 % take own: 2 s, 20 convolutions, error 0.1 % (depth)")
+    assert "take grid fine, method own: errors, each axis varied alone, add up to 5.1 %" in together
+    assert "about 2 times the seconds" in together
+
+
+def test_sentences_say_when_nothing_is_enough():
+    grid, method, together = sentences(charted(1e-3 / 2))
+    assert "no rung is known to be enough: the best, fine, is within 5 %" in grid
+    assert "take full: 9 s, 90 convolutions, the reference, by definition" in method
+    assert "no choice of rungs is known to be enough" in together
+    assert combination(charted(1e-3 / 2)) is None
+
+
+def test_files_of_a_chart(tmp_path: Path):
+    write_chart(charted(0.1), tmp_path)
+    lines = (tmp_path / "chart.csv").read_text("utf-8").splitlines()
+    assert len(lines) == 6
+    assert lines[0].startswith("axis,branch,rung,settings,own,folder,depth,volume,error")
+    summary = json.loads((tmp_path / "summary.json").read_text("utf-8"))
+    assert summary["together"]["rungs"] == {"grid": "fine", "method": "own"}
+    assert summary["axes"]["method"]["failed"] == {"broken": "no convergence"}
+    assert summary["axes"]["grid"]["references"]["volume"]["exact"] is True
+    drawn = {path.name for path in (tmp_path / "figures").iterdir()}
+    assert drawn == {"chart_grid.png", "chart_method.png", "chart_all.png"}
+
+
+def test_figures_of_odd_ladders(tmp_path: Path):
+    """Nothing but a reference, no convolutions, an unknown floor."""
+    alone = judge(GRID, [point("own", 1.0, {"depth": 1.0}, 0.01)], {}, {})
+    empty = Ladder(METHOD, (), {}, {"own": "failed"})
+    chart = Chart("Odd", (alone, empty), 0.01)
+    write_chart(chart, tmp_path)
+    assert (tmp_path / "figures" / "chart_grid.png").exists()
+    assert sentences(chart)[1] == "method: nothing ran"
+    assert json.loads((tmp_path / "summary.json").read_text("utf-8"))["together"] is None
+
+
+# --- measures -----------------------------------------------------------------------------------
+
+LOG = """\
+10:00:00 run: a title: 12.00 s
+10:00:01 mesh: 0.50 s
+10:00:09 condensation: {condensation} s
+10:00:12 structural friction: {unworn} s
+10:00:14 wear: 1.00 s
+10:00:14 jump 1: 1000 cycles, depths [[1. 1.]] um, 20 convolutions, drift 3.00%
+10:00:15 structural friction: 2.50 s
+10:00:16 wear: 1.25 s
+10:00:17 paraview and figures: 7.00 s
+"""
+
+
+def test_seconds_of_the_log_by_stage():
+    found = stage_seconds(LOG.format(condensation="8.00", unworn="3.00"))
+    assert found["wear"] == [1.0, 1.25]
+    assert found["structural friction"] == [3.0, 2.5]
+    assert not any(name.startswith("run") for name in found)
+
+
+def test_what_is_found_in_the_cache_costs_what_it_took_to_compute(tmp_path: Path, small_path: Path):
+    """The second run shares everything structural, the third the condensation alone."""
+    overrides = ((), ("contact.grid=[16, 32]",), ("load_path.increments=24", "load_path.peak_at=9"))
+    cases = [load_case(small_path, own) for own in overrides]
+    logged = ("8.00", "3.00"), ("0.10", "0.20"), ("0.10", "6.00")
+    folders = [tmp_path / str(number) for number in range(3)]
+    for folder, (condensation, unworn) in zip(folders, logged, strict=True):
+        folder.mkdir()
+        log = LOG.format(condensation=condensation, unworn=unworn)
+        (folder / "run.log").write_text(log, encoding="utf-8")
+    work = {"work": {"convolutions": 20, "contact_solves": 3}}
+    first, second, third = costs(cases, folders, [work] * 3)
+    whole = 0.5 + 8.0 + 3.0 + 1.0 + 2.5 + 1.25
+    assert first == Cost(pytest.approx(whole), 20, 3)
+    assert second.seconds == pytest.approx(whole)
+    assert third.seconds == pytest.approx(whole + 3.0)
+
+
+def test_numbers_are_found_by_their_path():
+    summary = {"states": [{"P": 1.0}, {"P": 2}], "flag": True, "text": "x"}
+    assert number_at(summary, "states.-1.P") == 2.0
+    for path in ("states.5.P", "states.P", "flag", "text", "text.0", "states"):
+        assert number_at(summary, path) is None
+
+
+@pytest.mark.parametrize("line", [False, True])
+def test_depth_anywhere_is_compared_across_grids(line: bool):
+    """A smooth field on two grids differs by the interpolation; a bump by its height."""
+
+    def depths(cells: int, bump: float) -> dict[str, tuple[Grid, np.ndarray, np.ndarray]]:
+        shape = (cells, 1 if line else cells)
+        grid = Grid(shape, (2.0 / cells, 1.0 if line else 2.0 / cells), line)
+        field = np.cos(grid.x) * (1.0 if line else np.cos(grid.y))
+        field[cells // 2, 0 if line else cells // 2] += bump
+        return {"face": (grid, field, field)}
+
+    assert profile_difference(depths(32, 0.0), depths(128, 0.0)) == pytest.approx(0.0, abs=1e-3)
+    assert profile_difference(depths(32, 0.1), depths(128, 0.0)) == pytest.approx(0.1, abs=2e-3)
+
+
+def test_depths_in_the_plane_are_not_compared_with_those_in_space():
+    plane = Grid((8, 1), (0.1, 1.0), True), np.ones((8, 1)), np.ones((8, 1))
+    space = Grid((8, 8), (0.1, 0.1)), np.ones((8, 8)), np.ones((8, 8))
+    assert profile_difference({"face": plane}, {"face": space}) is None
+
+
+# --- axes ---------------------------------------------------------------------------------------
+
+CASES = sorted((Path(__file__).parents[2] / "cases").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+def test_every_rung_of_every_case_is_another_case_and_finer(path: Path):
+    own = dump_case(load_case(path))
+    for axis, settings in axes_of(path, (), ()).items():
+        texts = [setting.text for setting in settings]
+        assert len(set(texts)) == len(texts) > 1
+        assert own in texts
+        names = [setting.rung.name for setting in settings]
+        assert len(set(names)) == len(names)
+        _check_steps(axis, settings)
+
+
+def _check_steps(axis: Axis, settings: list) -> None:
+    """Rungs of a branch go from coarse to fine."""
+    branches: dict[str, list[float]] = {}
+    for setting in settings:
+        if setting.rung.step is not None:
+            branches.setdefault(setting.rung.branch, []).append(setting.rung.step)
+    for steps in branches.values():
+        assert all(one > other for one, other in pairwise(steps))
+    assert axis.order is not None or not branches
+
+
+@pytest.mark.parametrize(
+    ("case", "expected"),
+    [
+        ("sphere_fretting", {"grid", "tolerance", "history"}),
+        ("line_dissimilar", {"grid", "tolerance", "history"}),
+        (
+            "dovetail",
+            {
+                *("grid", "tolerance", "method", "stepper", "dimension"),
+                *("coupling", "history", "mesh", "order"),
+            },
+        ),
+        ("specimens_flat", {"grid", "tolerance", "mesh", "order"}),
+    ],
+)
+def test_axes_that_apply(case: str, expected: set[str]):
+    path = next(path for path in CASES if path.stem == case)
+    assert {axis.name for axis in axes_of(path, (), ())} == expected
+
+
+def test_axes_that_do_not_apply_are_refused():
+    path = next(path for path in CASES if path.stem == "sphere_fretting")
+    with pytest.raises(UserError, match="--axis mesh: does not apply to this case; allowed: grid,"):
+        axes_of(path, (), ("grid", "mesh"))
+    with pytest.raises(UserError, match="--axis gird: no such axis; allowed: grid, tolerance"):
+        axes_of(path, (), ("gird",))
+    (found,) = axes_of(path, (), ("grid",))
+    assert found.name == "grid"
+
+
+def test_a_skewed_slot_has_no_section():
+    path = next(path for path in CASES if path.stem == "dovetail")
+    names = {axis.name for axis in axes_of(path, ("structure.skew=10 deg",), ())}
+    assert "dimension" not in names
+    assert "mesh" in names
+
+
+@pytest.mark.parametrize(("text", "value"), [("1 %", 0.01), ("0.02", 0.02), ("1", 1.0)])
+def test_accuracy_is_a_share(text: str, value: float):
+    assert accuracy_of(text) == pytest.approx(value)
+
+
+@pytest.mark.parametrize("text", ["0", "-1 %", "200 %", "much", "1 mm"])
+def test_accuracy_that_is_none_is_refused(text: str):
+    with pytest.raises(UserError, match=r"--accuracy .*allowed"):
+        accuracy_of(text)

@@ -1,0 +1,346 @@
+"""Tangential loops of a wear run: what is imposed, kept, written, drawn, and read again."""
+
+from types import SimpleNamespace
+
+import h5py
+import numpy as np
+import pytest
+
+import workflow.wear_run
+from sa_solver.contact import FrictionalContact
+from sa_solver.half_space import HalfSpace
+from sa_solver.reference.mindlin import ShearedSphere
+from sa_solver.types import ElasticPair, Grid, Material
+from wear.stepping import ContactFailure
+from workflow.case import load_case
+from workflow.case.loops import Loops
+from workflow.contact_loops import (
+    COLUMNS,
+    MEASURED,
+    kept_loops,
+    loop_path,
+    loops_due,
+    read_loop_table,
+    warn_of_border,
+    worn_loop,
+    write_loops,
+    write_table,
+)
+from workflow.errors import CaseError, UserError
+from workflow.figures import loops as loops_figure
+from workflow.figures import wear as figures
+from workflow.folder import OutputFolder
+from workflow.store import ResultsWriter, write_arrays
+
+BODY = Material(115e3, 0.0)
+SPHERE = ShearedSphere(400.0, 10.0, BODY, BODY, 0.7)
+FORCE = 0.5 * SPHERE.sliding_force
+
+# Loops of the small dovetail, few and coarse: they are to be kept, not to be accurate.
+ASKED = "loops.amplitude=30 um", "loops.increments=3"
+
+
+def state(P=400.0, Mx=0.0, My=0.0, grid=None):
+    """An interface before wear, its peak load in the second of two increments."""
+    loads = SimpleNamespace(
+        **{k: np.array([0.0, v]) for k, v in (("P", P), ("Mx", Mx), ("My", My))}
+    )
+    gap = None if grid is None else SPHERE.contact.gap(grid.x, grid.y)
+    return SimpleNamespace(loads=loads, surfaces=SimpleNamespace(gap=gap), energy=1500.0)
+
+
+@pytest.fixture(scope="module")
+def sphere():
+    """A loop of a sphere in partial slip."""
+    size = 2.2 * SPHERE.contact.contact_radius
+    grid = Grid.covering((size, size), (32, 32))
+    contact = FrictionalContact(HalfSpace(grid, ElasticPair(BODY, BODY)), SPHERE.friction)
+    return worn_loop(contact, Loops(force=FORCE), "sphere", state(grid=grid), 1)
+
+
+# --- what is imposed ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("every", "jump", "ended", "due"),
+    [
+        ("jump", 0, False, True),
+        ("jump", 3, False, True),
+        ("end", 0, False, True),
+        ("end", 3, False, False),
+        ("end", 3, True, True),
+    ],
+)
+def test_loops_are_due(every, jump, ended, due):
+    assert loops_due(Loops(amplitude=5e-3, every=every), jump, ended) is due
+    assert not loops_due(Loops(every=every), jump, ended)
+
+
+def test_path_is_that_of_the_peak_load():
+    path = loop_path(Loops(amplitude=5e-3, axis="y", increments=7), "face", state(My=-80.0), 1)
+    assert (path.P, path.moments, path.amplitude, path.by) == (400.0, (0.0, -80.0), 5e-3, "motion")
+    assert (path.axis, path.increments) == ("y", 7)
+
+
+def test_a_normal_force_of_ones_own_acts_along_the_same_line():
+    path = loop_path(Loops(force=3.0, normal_force=100.0), "face", state(Mx=40.0, My=-80.0), 1)
+    assert (path.P, path.moments, path.amplitude, path.by) == (100.0, (10.0, -20.0), 3.0, "force")
+    open_face = loop_path(Loops(force=3.0, normal_force=100.0), "face", state(P=0.0), 1)
+    assert (open_face.P, open_face.moments) == (100.0, (0.0, 0.0))
+
+
+def test_a_face_without_load_is_refused():
+    with pytest.raises(UserError, match=r"face carries nothing .* loops.normal_force"):
+        loop_path(Loops(amplitude=5e-3), "face", state(P=0.0), 1)
+
+
+def test_both_drives_are_refused(small_path):
+    with pytest.raises(CaseError, match=r"loops.force: amplitude and force given; allowed: one"):
+        load_case(small_path, ["loops={amplitude: 5 um, force: 3 N}"])
+    assert not load_case(small_path).loops.wanted
+
+
+def test_values_are_those_of_the_loop(sphere):
+    """Mindlin's, to what 32 cells leave."""
+    values = sphere.values
+    assert tuple(values) == MEASURED
+    assert values["energy"] == 1500.0
+    assert values["P"] == 400.0
+    assert values["kt"] == pytest.approx(1.0 / SPHERE.tangential_compliance, rel=0.01)
+    assert values["energy_per_loop"] == pytest.approx(SPHERE.loop_energy(FORCE), rel=0.01)
+    assert values["amplitude"] == pytest.approx(SPHERE.displacement(FORCE), rel=0.01)
+    assert values["force"] == pytest.approx(FORCE)
+    assert values["mu"] == pytest.approx(0.35)
+    assert values["area"] == pytest.approx(np.pi * SPHERE.contact.contact_radius**2, rel=0.03)
+
+
+def test_force_beyond_friction_ends_the_run_in_one_line():
+    grid = Grid.covering((1.0, 1.0), (8, 8))
+    contact = FrictionalContact(HalfSpace(grid, ElasticPair(BODY, BODY)), SPHERE.friction)
+    with pytest.raises(ContactFailure, match="tangential loop: friction cannot carry"):
+        worn_loop(contact, Loops(force=1e4), "sphere", state(grid=grid), 1)
+
+
+# --- kept and written ---------------------------------------------------------------------------
+
+
+@pytest.fixture
+def written(sphere, tmp_path):
+    """Results with loops of jumps 0 and 2, as after ``every: end``."""
+    folder = OutputFolder(tmp_path)
+    folder.jumps.mkdir()
+    for jump in range(3):
+        arrays = kept_loops(["sphere"], [sphere]) if jump != 1 else {"other": np.zeros(1)}
+        write_arrays(folder.jump(jump), arrays, {"cycles": 100.0 * jump})
+    with h5py.File(folder.results, "w") as file:
+        write_loops(ResultsWriter(file), folder, 2)
+        group = file.create_group("grid/sphere")
+        group.attrs.update(shape=(32, 32), pitch=(0.1, 0.1))
+    return folder
+
+
+def test_results_have_the_loops_of_their_jumps(written, sphere):
+    with h5py.File(written.results) as file:
+        group = file["loops/sphere"]
+        assert list(group) == ["00000", "00002"]
+        np.testing.assert_array_equal(group["00002/force"], sphere.force)
+        np.testing.assert_array_equal(group["00002/displacement"], sphere.displacement)
+        assert group["00002"].attrs["cycles"] == 200.0
+        assert {name: group["00002"].attrs[name] for name in MEASURED} == sphere.values
+        assert all(
+            dataset.attrs[own]
+            for dataset in group["00002"].values()
+            for own in ("unit", "description")
+        )
+
+
+def test_figure_shows_the_loops(written, sphere):
+    with h5py.File(written.results) as file:
+        assert "loops" in figures.figures_of(file)
+        figure = loops_figure.loops(file)
+    kt = sphere.values["kt"] * 1e-3
+    assert f"sphere {kt:.4g} → {kt:.4g} N/µm" in figure.get_suptitle()
+    loop, stiffness, energy = figure.axes
+    assert [line.get_label() for line in loop.lines] == ["unworn", "200 cycles"]
+    np.testing.assert_allclose(loop.lines[0].get_xdata(), 1e3 * sphere.displacement)
+    np.testing.assert_allclose(stiffness.lines[0].get_ydata(), [kt, kt])
+    np.testing.assert_allclose(stiffness.lines[0].get_xdata(), [1.5, 1.5])
+    assert energy.get_ylim()[1] > sphere.values["energy_per_loop"]
+
+
+def test_kinetics_show_area_and_the_band_of_the_extrapolation(results, tmp_path):
+    copy = tmp_path / "results.h5"
+    copy.write_bytes(results.read_bytes())
+    with h5py.File(copy, "a") as file:
+        group = file["kinetics/intrados"]
+        for own in ("intrados", "extrados"):
+            file[f"kinetics/{own}/area"] = np.linspace(500.0, 600.0, 7)
+        group.attrs.update(depth_trend=-1e-16, depth_scatter=1e-11)
+        figure = figures.kinetics(file)
+        rate = group.attrs["depth_rate"]
+        last = group["depth_1"][-1] + group["depth_2"][-1]
+    panel, areas = figure.axes[1], figure.axes[5]
+    (band,) = [own for own in panel.collections if own.get_label() == "its uncertainty"]
+    corners = band.get_paths()[0].vertices
+    at_end = corners[np.isclose(corners[:, 0], 2e5), 1]
+    # Half a regime of 6e4 cycles before, 1e5 ahead: |trend| (3e4 + 5e4) 1e5 + scatter 1e5.
+    reach = 1e-16 * 8e4 * 1e5 + 1e-11 * 1e5
+    middle = last + rate * 1e5
+    np.testing.assert_allclose(
+        [at_end.min(), at_end.max()], 1e3 * np.array([middle - reach, middle + reach])
+    )
+    assert "+20.0%" in areas.get_title()
+
+
+def test_warning_of_a_contact_that_outgrows_its_grid():
+    said = []
+    reporter = SimpleNamespace(warn=said.append)
+    found = {"face": {"unworn": {"border_load": 0.0}, "worn": {"border_load": 0.02}}}
+    warn_of_border(found, Loops(amplitude=5e-3), reporter)  # then the run has said so
+    assert not said
+    warn_of_border(found, Loops(amplitude=5e-3, normal_force=1e4), reporter)
+    assert len(said) == 1
+    assert "face: in the tangential loops" in said[0]
+    assert "2.0%" in said[0]
+
+
+# --- the table ----------------------------------------------------------------------------------
+
+
+def rows(count):
+    numbers = np.random.default_rng(4).random((count, len(COLUMNS)))
+    numbers[:, 1].sort()
+    return [dict(zip([c.name for c in COLUMNS], own, strict=True)) for own in numbers]
+
+
+@pytest.mark.parametrize("per_length", [False, True])
+def test_table_reads_back_equal(tmp_path, per_length):
+    path = tmp_path / "loops_face.csv"
+    given = rows(5)
+    write_table(path, given, per_length)
+    table = read_loop_table(path)
+    assert table.per_length is per_length
+    for column in COLUMNS:
+        expected = [row[column.name] for row in given]
+        np.testing.assert_allclose(getattr(table, column.name), expected, rtol=1e-11)
+
+
+def test_table_names_everyday_units(tmp_path):
+    path = tmp_path / "loops_face.csv"
+    write_table(path, [dict.fromkeys((c.name for c in COLUMNS), 1000.0)])
+    headings, first = path.read_text().splitlines()
+    assert headings.startswith("cycles [1],energy [J],P [N],kt [N/mm],mu [1],energy_per_loop [mJ],")
+    assert first.split(",")[:2] == ["1000", "1"]
+
+
+def test_measured_tables_may_have_units_of_their_own(tmp_path):
+    path = tmp_path / "measured.csv"
+    path.write_text("mu,kt [N/um],energy [kJ],P\n0.5,26.5,0,60\n0.9,60,2.8,60\n\n")
+    table = read_loop_table(path)
+    np.testing.assert_allclose(table.kt, [26500.0, 60000.0])
+    np.testing.assert_allclose(table.energy, [0.0, 2.8e6])
+    np.testing.assert_allclose(table.mu, [0.5, 0.9])
+    assert np.all(np.isnan(table.area))
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("", "no table"),
+        ("energy,P,kt,mu\n", "no table"),
+        ("energy,P,kt,mu,colour\n0,1,1,1,1\n", "'colour': no column; allowed: cycles, energy"),
+        ("energy,P,kt\n0,1,1\n", "no column mu; allowed: at least energy, P, kt, mu"),
+        ("energy,P,kt,mu,mu\n0,1,1,1,1\n", "two columns mu"),
+        ("energy,P,kt [s],mu\n0,1,1,1\n", "kt: unit 's' cannot be converted to N/mm"),
+        ("energy [J/mm],P,kt,mu\n0,1,1,1\n", "energy: unit 'J/mm' cannot be converted"),
+        ("energy,P,kt,mu\n0,1,1\n", ":2: 3 cells; allowed: 4"),
+        ("energy,P,kt,mu\n0,1,one,1\n", ":2: 'one'; allowed: numbers"),
+        ("energy,P,kt,mu\n0,1,nan,1\n", ":2: a number that is not finite"),
+        ("energy,P,kt,mu\n2,1,1,1\n1,1,1,1\n", "the energy falls"),
+    ],
+)
+def test_what_is_no_table_is_refused_in_one_line(tmp_path, text, complaint):
+    path = tmp_path / "table.csv"
+    path.write_text(text)
+    with pytest.raises(UserError) as refusal:
+        read_loop_table(path)
+    (line,) = str(refusal.value).splitlines()
+    assert line.startswith(str(path))
+    assert complaint in line
+
+
+def test_missing_file_is_refused(tmp_path):
+    with pytest.raises(UserError, match="cannot be read"):
+        read_loop_table(tmp_path / "none.csv")
+
+
+# --- runs ---------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def rubbed(start, tmp_path_factory):
+    """The small dovetail with a loop after every jump, not to be changed."""
+    run = start(tmp_path_factory.mktemp("rubbed") / "out", *ASKED)
+    assert run.ending.exit_code == 0, run.ending.stderr
+    return run
+
+
+def test_run_writes_a_table_for_every_interface(rubbed):
+    """Cycles, energy, load and area are those of the run; the loop slides, so µ is the case's."""
+    summary = rubbed.summary
+    for name in ("intrados", "extrados"):
+        table = read_loop_table(rubbed.folder / f"loops_{name}.csv")
+        kinetics = summary["kinetics"][name]
+        np.testing.assert_allclose(table.cycles, summary["kinetics"]["cycles"])
+        np.testing.assert_allclose(table.energy, kinetics["energy"], rtol=1e-9)
+        np.testing.assert_allclose(table.area, kinetics["area"], rtol=1e-9)
+        assert table.P[0] == pytest.approx(summary[name]["peak_load"]["unworn"]["P"], rel=1e-9)
+        np.testing.assert_allclose(table.mu, 0.4, rtol=2e-3)
+        np.testing.assert_array_equal(table.sliding, 1.0)
+        # Wear widens a rounded contact, which stiffens it.
+        assert table.area[-1] > table.area[0]
+        assert table.kt[-1] > table.kt[0]
+        # Sliding as a whole costs less than a rectangle, and more than what is stuck gives back.
+        largest = 4.0 * 0.4 * table.P * 0.03
+        assert np.all(table.energy_per_loop < largest)
+        assert np.all(table.energy_per_loop > largest - 4.0 * 1.5 * (0.4 * table.P) ** 2 / table.kt)
+        assert summary[name]["loops"]["worn"]["kt"] == pytest.approx(table.kt[-1])
+        assert summary[name]["area"] == kinetics["area"][-1]
+        assert summary[name]["worn_area"] > 0.0
+
+
+def test_loops_change_nothing_else(rubbed, whole):
+    for name, height in whole.heights().items():
+        np.testing.assert_array_equal(rubbed.heights()[name], height, err_msg=name)
+    assert rubbed.summary["kinetics"] == whole.summary["kinetics"]
+    assert not list(whole.folder.glob("loops_*"))
+
+
+def test_resumed_run_keeps_its_earlier_loops(start, resume, rubbed, tmp_path, monkeypatch):
+    keep = workflow.wear_run.WearLoop.keep
+
+    def interrupting(loop, state):
+        keep(loop, state)
+        if state.jump == 2:
+            raise KeyboardInterrupt
+
+    with monkeypatch.context() as patch:
+        patch.setattr(workflow.wear_run.WearLoop, "keep", interrupting)
+        assert start(tmp_path / "out", *ASKED).ending.exit_code == 130
+    run = resume(tmp_path / "out")
+    assert run.ending.exit_code == 0, run.ending.stderr
+    for table in ("loops_intrados.csv", "loops_extrados.csv"):
+        assert (run.folder / table).read_bytes() == (rubbed.folder / table).read_bytes()
+
+
+def test_loops_only_at_the_end(start, rubbed, tmp_path):
+    run = start(tmp_path / "out", *ASKED, "loops.every=end")
+    table = read_loop_table(run.folder / "loops_intrados.csv")
+    expected = read_loop_table(rubbed.folder / "loops_intrados.csv")
+    np.testing.assert_array_equal(table.kt, expected.kt[[0, -1]])
+    np.testing.assert_array_equal(table.cycles, expected.cycles[[0, -1]])
+
+
+def test_linear_regime_says_where_it_leads(rubbed):
+    """Three jumps are too few for a regime: the summary says so."""
+    assert rubbed.summary["intrados"]["linear_regime"] == {"depth": None, "volume": None}

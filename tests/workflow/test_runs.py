@@ -1,0 +1,386 @@
+"""Many runs in folders: done once, taken up again, none stopped by another."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+from workflow import runs_job
+from workflow.case import load_case
+from workflow.errors import UserError
+from workflow.folder import OutputFolder
+from workflow.runs import Job, kept_in, run_jobs
+
+CONTACT = """\
+title: Sphere
+analysis: contact
+structure: {kind: bodies, shape: sphere, radius: 10 mm}
+materials:
+  body_1: {young: 115 GPa, poisson: 0.29}
+  body_2: {young: 115 GPa, poisson: 0.29}
+friction: {coefficient: 0.7}
+load_path: {legs: [{P: 400 N}, {Qx: 210 N, increments: 3}]}
+contact: {grid: [16, 16], size: [1 mm, 1 mm], history: full}
+output: {paraview: false, figures: false}
+"""
+LOADS = """\
+P [kN/m], Qx [kN/m], My [N], Edx [mJ/mm]
+200, 80, 40, 0.3
+1000, 400, 100, 3
+1000, -400, 100, 8
+"""
+WEAR = """\
+title: Strip under loads of a table
+analysis: wear
+structure:
+  kind: resultants
+  file: loads.csv
+  dimension: 2
+  size: [10 mm]
+  gap: {shape: rounded, edge_width: 1 mm, edge_radius: 30 mm}
+materials:
+  body_1: {young: 115 GPa, poisson: 0.29, density: 4430 kg/m^3}
+  body_2: {young: 115 GPa, poisson: 0.29, density: 4430 kg/m^3}
+friction: {coefficient: 0.5}
+contact: {grid: [32, 8]}
+wear:
+  law: energy
+  body_1: {coefficient: 1e4 um^3/J}
+  body_2: {coefficient: 1e4 um^3/J}
+  cycles: 3e4
+  step: {kind: implicit, cycles: 1e4}
+stress: {section: none, life: {parameter: none}}
+output: {paraview: false, figures: false}
+"""
+# Jumps of some hundredths of a second each, so that a moment among them is easily met.
+MANY = "wear.step.cycles=1000"
+# Seconds within which everything must have ended.
+PATIENCE = 120.0
+
+posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+
+
+@pytest.fixture
+def contact(tmp_path):
+    path = tmp_path / "contact.yaml"
+    path.write_text(CONTACT, encoding="utf-8")
+    return path
+
+
+@pytest.fixture
+def wear(tmp_path):
+    (tmp_path / "loads.csv").write_text(LOADS, encoding="utf-8")
+    path = tmp_path / "wear.yaml"
+    path.write_text(WEAR, encoding="utf-8")
+    return path
+
+
+def without_times(summary):
+    return {key: value for key, value in summary.items() if key != "seconds"}
+
+
+def wait_until(condition):
+    end = time.monotonic() + PATIENCE
+    while not condition() and time.monotonic() < end:
+        time.sleep(0.02)
+    assert condition()
+
+
+# --- what run_jobs promises -----------------------------------------------------------------------
+
+
+def test_failures_are_values_and_stop_nobody(contact, tmp_path):
+    jobs = [
+        Job("slides", contact, ("load_path.legs.0.P=100 N",)),
+        Job("wrong", contact, ("friction.coefficient=-1",)),
+        Job("good", contact),
+    ]
+    told = []
+    slides, wrong, good = run_jobs(jobs, tmp_path / "out", report=told.append)
+    assert {own.job.name for own in told} == {"slides", "wrong", "good"}
+    assert slides.summary is None
+    assert "friction cannot carry Qx" in slides.error
+    assert "--set friction.coefficient=-1: -1: out of range" in wrong.error
+    assert "\n" not in slides.error + wrong.error
+    assert good.error == ""
+    assert good.folder == tmp_path / "out" / "good"
+    # Hertz: p0 = (6 P E*² / π³ R²)^(1/3), a cell of 1/16 mm against a = 0.36 mm leaves 3 %.
+    assert good.summary["states"][-1]["peak_pressure"] == pytest.approx(1450.3, rel=0.03)
+
+
+def test_a_finished_run_stays_and_another_case_takes_its_place(contact, tmp_path):
+    out = tmp_path / "out"
+    (first,) = run_jobs([Job("one", contact)], out)
+    written = (out / "one/summary.json").stat().st_mtime_ns
+    (again,) = run_jobs([Job("one", contact)], out)
+    assert again.summary == first.summary
+    assert (out / "one/summary.json").stat().st_mtime_ns == written
+    other = Job("one", contact, ("load_path.legs.0.P=500 N",))
+    assert kept_in(out / "one", other.load()) == "other"
+    (changed,) = run_jobs([other], out)
+    assert changed.summary["states"][-1]["P"] == pytest.approx(500.0, rel=1e-6)
+
+
+def test_case_in_the_words_of_another_version_is_the_same(contact, tmp_path):
+    (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
+    case = done.folder / "case.yaml"
+    case.write_text(case.read_text("utf-8").replace("#", "# formerly:"), encoding="utf-8")
+    assert kept_in(done.folder, load_case(contact)) == "finished"
+
+
+def test_what_is_no_run_is_left_alone(contact, tmp_path):
+    figures = tmp_path / "out/mine/figures"
+    figures.mkdir(parents=True)
+    (done,) = run_jobs([Job("mine", contact)], tmp_path / "out")
+    assert "not empty and no run of fretscale" in done.error
+    assert figures.exists()
+
+
+@pytest.mark.parametrize("names", [["a", "a"], ["a/b"], [".."], [""]])
+def test_names_are_folders_of_their_own(contact, tmp_path, names):
+    with pytest.raises(ValueError, match="name"):
+        run_jobs([Job(name, contact) for name in names], tmp_path / "out")
+
+
+def test_a_process_killed_is_a_failure(contact, tmp_path, monkeypatch):
+    code = "import os, signal; os.kill(os.getpid(), signal.SIGKILL)"
+    monkeypatch.setattr(runs_job, "COMMAND", code)
+    (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
+    assert done.summary is None
+    assert "signal 9" in done.error
+
+
+def test_a_process_that_breaks_tells_its_last_words(contact, tmp_path, monkeypatch):
+    monkeypatch.setattr(runs_job, "COMMAND", "raise SystemError('broken')")
+    (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
+    assert done.error.endswith("exit code 1: SystemError: broken")
+
+
+def test_a_mistake_of_the_program_leaves_its_traceback_in_the_log(contact, tmp_path, monkeypatch):
+    code = "import workflow.contact_run as c; c.bodies_of = None;" + runs_job.COMMAND
+    monkeypatch.setattr(runs_job, "COMMAND", code)
+    (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
+    assert done.error == "TypeError: 'NoneType' object is not callable"
+    assert "Traceback" in (done.folder / "run.log").read_text("utf-8")
+
+
+def test_jobs_have_one_thread_each(contact, tmp_path, monkeypatch):
+    names = list(runs_job.THREAD_SETTINGS)
+    for name in names:
+        monkeypatch.setenv(name, "7")
+    code = f"import os; raise SystemError([os.environ[name] for name in {names}])"
+    monkeypatch.setattr(runs_job, "COMMAND", code)
+    (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
+    assert done.error.endswith(f"SystemError: {['1'] * len(names)}")
+
+
+def test_a_run_takes_a_core_for_each_of_its_contacts(dovetail_path, contact, wear):
+    assert runs_job.cores_of(load_case(dovetail_path)) == 2
+    assert runs_job.cores_of(load_case(contact)) == 1
+    assert runs_job.cores_of(load_case(wear)) == 1
+
+
+def test_cores_are_shared_out(contact, tmp_path, monkeypatch):
+    """Never more in use than there are, and all used where jobs allow it."""
+    import workflow.runs as runs
+
+    wants, used, most = {"a": 2, "b": 1, "c": 1, "d": 3, "e": 9}, [], []
+
+    def pretend(job, out, unwanted):
+        used.append(job.name)
+        most.append(sum(min(wants[name], 3) for name in used))
+        time.sleep(0.05)
+        used.remove(job.name)
+        return "pretended"
+
+    cases = {name: Job(name, contact, (f"title={name}",)) for name in wants}
+    monkeypatch.setattr(runs, "run_job", pretend)
+    monkeypatch.setattr(runs, "cores_of", lambda case: wants[case.title])
+    done = run_jobs(list(cases.values()), tmp_path / "out", processes=3)
+    assert [own.error for own in done] == ["pretended"] * 5
+    assert max(most) == 3
+
+
+# --- interruptions --------------------------------------------------------------------------------
+
+RUN = """
+import sys
+from pathlib import Path
+from workflow.runs import Job, run_jobs
+case, out, *overrides = sys.argv[1:]
+run_jobs([Job("one", Path(case), tuple(overrides))], Path(out), processes=1)
+"""
+
+
+def start(*arguments):
+    command = [sys.executable, "-c", RUN, *map(str, arguments)]
+    return subprocess.Popen(command, stderr=subprocess.PIPE, start_new_session=True)
+
+
+def below(pid):
+    """Processes below one, the job and its contact workers."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*/stat"):
+        try:
+            own, parent = path.parent.name, path.read_text().rpartition(")")[2].split()[1]
+        except OSError:
+            continue
+        if int(parent) == pid:
+            found += [int(own), *below(int(own))]
+    return found
+
+
+def alive(pid):
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+WAIT = """
+import threading, time
+from workflow.runs_job import _end_with_parent
+threading.Thread(target=_end_with_parent, daemon=True).start()
+time.sleep(600)
+"""
+
+
+@posix_only
+@pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
+def test_a_job_ends_with_whoever_waits_for_it(contact, tmp_path):
+    """However that one ends."""
+    code = f"from workflow import runs_job\nruns_job.COMMAND = {WAIT!r}\n{RUN}"
+    process = subprocess.Popen([sys.executable, "-c", code, contact, tmp_path / "out"])
+    wait_until(lambda: below(process.pid))
+    (job,) = below(process.pid)
+    process.kill()
+    process.wait(PATIENCE)
+    wait_until(lambda: not alive(job))
+
+
+@pytest.mark.slow
+@posix_only
+@pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
+def test_whoever_is_killed_leaves_a_run_to_take_up(wear, tmp_path):
+    """Ctrl-C, then kill, then to the end: equal to a run that nobody touched, nothing left over."""
+    out = tmp_path / "out"
+    reached = 0
+    for stop in (signal.SIGINT, signal.SIGKILL):
+        process = start(wear, out, MANY)
+        jump = out / f"one/jumps/{reached + 5:05d}.h5"
+        wait_until(jump.exists)
+        descendants = below(process.pid)
+        assert len(descendants) >= 2
+        if stop == signal.SIGINT:
+            os.killpg(process.pid, stop)
+        else:
+            process.kill()
+        process.wait(PATIENCE)
+        wait_until(lambda pids=descendants: not any(map(alive, pids)))
+        reached = max(int(path.stem) for path in (out / "one/jumps").glob("*.h5"))
+    case = load_case(wear, (MANY,))
+    assert kept_in(out / "one", case) == "unfinished"
+    jobs = [Job("one", wear, (MANY,)), Job("untouched", wear, (MANY,))]
+    taken_up, untouched = run_jobs(jobs, out)
+    assert (out / "one/run.log").read_text("utf-8").count("resume: ") == 2
+    assert without_times(taken_up.summary)["kinetics"] == untouched.summary["kinetics"]
+
+
+def test_a_damaged_state_is_started_again(wear, tmp_path):
+    job = Job("one", wear)
+    (done,) = run_jobs([job], tmp_path / "out")
+    folder = OutputFolder(done.folder)
+    folder.summary.unlink()
+    folder.checkpoint.write_bytes(folder.checkpoint.read_bytes()[:1000])
+    assert kept_in(done.folder, job.load()) == "unfinished"
+    (again,) = run_jobs([job], tmp_path / "out")
+    assert without_times(again.summary) == without_times(done.summary)
+
+
+def test_a_chosen_case_is_known_by_the_case_that_was_asked_for(wear, tmp_path):
+    """What fidelity chose is in the folder's case; its record says so."""
+    job = Job("one", wear)
+    (done,) = run_jobs([job], tmp_path / "out")
+    folder = OutputFolder(done.folder)
+    chosen = json.dumps(done.summary | {"fidelity": {"chosen": {"contact.grid": [32, 8]}}})
+    folder.summary.write_text(chosen, encoding="utf-8")
+    asked = load_case(wear, ("contact.grid=[64, 16]",))
+    assert kept_in(done.folder, asked) == "finished"
+    assert kept_in(done.folder, load_case(wear, ("friction.coefficient=0.6",))) == "other"
+
+
+# --- a cluster ------------------------------------------------------------------------------------
+
+
+def test_no_scheduler_is_one_line(contact, tmp_path, monkeypatch):
+    pytest.importorskip("distributed")
+    from workflow import runs_dask
+
+    monkeypatch.setattr(runs_dask, "PATIENCE", "1 s")
+    with pytest.raises(UserError, match=r"--dask tcp://127.0.0.1:9: no scheduler answers: \S+"):
+        run_jobs([Job("one", contact)], tmp_path / "out", dask="tcp://127.0.0.1:9")
+
+
+def test_a_cluster_finds_what_local_processes_find(contact, tmp_path):
+    distributed = pytest.importorskip("distributed")
+    jobs = [Job("good", contact), Job("slides", contact, ("load_path.legs.0.P=100 N",))]
+    with distributed.LocalCluster(1, processes=False, dashboard_address=None) as cluster:
+        there = run_jobs(jobs, tmp_path / "there", dask=cluster.scheduler_address)
+    here = run_jobs(jobs, tmp_path / "here")
+    assert without_times(there[0].summary) == without_times(here[0].summary)
+    assert "friction cannot carry" in there[1].error
+
+
+@pytest.mark.slow
+@posix_only
+@pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
+def test_a_worker_killed_at_work_changes_nothing(contact, wear, tmp_path):
+    """Two worker processes, one killed: all runs end, bit for bit as local processes find them."""
+    distributed = pytest.importorskip("distributed")
+    coefficients = [(MANY, f"wear.body_1.coefficient={value} um^3/J") for value in (5e3, 1e4, 2e4)]
+    jobs = [Job(f"run{number}", wear, own) for number, own in enumerate(coefficients)]
+    jobs.append(Job("slides", contact, ("load_path.legs.0.P=100 N",)))
+    out, told = tmp_path / "cluster", []
+    cluster = distributed.LocalCluster(
+        n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
+    )
+    with cluster, ThreadPoolExecutor() as beside:
+        workers = [nanny.pid for nanny in cluster.workers.values()]
+        killed = beside.submit(kill_at_work, workers, out / "run0")
+        found = run_jobs(jobs, out, dask=cluster.scheduler_address, report=told.append)
+        assert killed.result() in workers
+    assert (out / "run0/run.log").read_text("utf-8").count("resume: ") == 1
+    assert len(told) == len(jobs)
+    for one, other in zip(found, run_jobs(jobs, tmp_path / "here"), strict=True):
+        if one.job.name == "slides":
+            assert "friction cannot carry" in one.error
+            assert "friction cannot carry" in other.error
+            continue
+        assert one.summary["kinetics"] == other.summary["kinetics"], one.error or other.error
+        np.testing.assert_array_equal(surfaces(one.folder), surfaces(other.folder))
+
+
+def kill_at_work(workers, folder):
+    """Kill the worker below which the job of the folder runs, when it has done some jumps."""
+    wait_until((folder / "jumps/00005.h5").exists)
+    for worker in workers:
+        commands = [Path(f"/proc/{pid}/cmdline").read_text() for pid in below(worker)]
+        if any(f'"{folder.name}"' in command for command in commands):
+            os.kill(worker, signal.SIGKILL)
+            return worker
+    return None
+
+
+def surfaces(folder):
+    """Both surfaces of all jumps, ``(jumps, 2, nx)``."""
+    with h5py.File(folder / "results.h5") as file:
+        jumps = file["surfaces/interface"].values()
+        return np.array([[jump[f"body_{body}"][()] for body in (1, 2)] for jump in jumps])

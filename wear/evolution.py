@@ -1,0 +1,55 @@
+"""How a coefficient changes with the energy that the sliding has dissipated so far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from sa_solver.types import Array
+
+
+@dataclass(frozen=True)
+class EnergyTable:
+    """A factor against cumulative energy: linear between points, constant beyond its ends.
+
+    ``energy`` ascends [N mm, or N/mm where it is per area]. Below ``threshold`` the factor is 0:
+    with a constant factor the worn volume is V = α (ΣEd - Ed_th) (Fouvry et al., Wear 255, 2003).
+    Raises ValueError for a table of no or unequal columns, or that does not ascend.
+    """
+
+    energy: tuple[float, ...] = (0.0,)
+    factor: tuple[float, ...] = (1.0,)
+    threshold: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not self.energy or len(self.energy) != len(self.factor):
+            raise ValueError(
+                f"{len(self.energy)} energies and {len(self.factor)} factors: give one or more, "
+                "as many of both"
+            )
+        if any(after <= before for before, after in pairwise(self.energy)):
+            raise ValueError("energies that do not ascend: give each once, the smallest first")
+
+    def at(self, energy: Array | float) -> Array:
+        """Factor at an energy, of its shape."""
+        return np.where(np.asarray(energy) >= self.threshold, self._line(energy), 0.0)
+
+    def mean(self, before: Array | float, after: Array | float) -> Array:
+        """Mean factor while the energy grows from ``before`` to ``after``, exact.
+
+        Where it does not grow, the factor there. Summed over the segments of the table: a
+        difference of antiderivatives would lose all digits of a small step.
+        """
+        before, after = np.asarray(before, dtype=float), np.asarray(after, dtype=float)
+        total = np.zeros(np.broadcast_shapes(before.shape, after.shape))
+        for ends in pairwise((-np.inf, *self.energy, np.inf)):
+            low, high = (np.clip(e, max(ends[0], self.threshold), ends[1]) for e in (before, after))
+            total += (high - low) * self._line(0.5 * (low + high))
+        grown, mean = after - before, np.empty_like(total)
+        mean[...] = self.at(before)
+        return np.divide(total, grown, out=mean, where=grown > 0.0)
+
+    def _line(self, energy: Array | float) -> Array:
+        return np.asarray(np.interp(energy, self.energy, self.factor), dtype=np.float64)

@@ -1,0 +1,223 @@
+"""Surfaces that move over each other within a cycle.
+
+The grid goes with body 2, which carries the form of the contact. With body 2 at an offset s from
+its mean position, the cell at x of the grid lies over the point x + s of body 1, whose surface is
+kept in the frame of that mean position. Over an increment that leads straight from s0 to s1,
+
+    carried  c_i = Σ_k w_k f_{i+k}          deposited  d_{i+k} = Σ_i w_k p_i
+
+the grid sees the mean c of body 1's field f along the path, and what wears at p on the grid is
+spread over body 1 by the adjoint. The weights are those of cells that overlap, averaged over the
+path: w_k = ∫₀¹ Λ(s_x/dx - k_x) Λ(s_y/dy - k_y) dt with the hat Λ(u) = max(0, 1 - |u|). They are 0
+or more and their sum is 1, so that constants stay, nothing rises that only falls, and depositing
+keeps volume. Between the places where the path passes into the next cell the integrand is a
+quadratic of t, which two Gauss points integrate exactly.
+
+Cells blur what they carry. Against the motion they stand for, the second moment of the weights is
+too large by dx²/6 for a long path, and for one of length L < 2 dx about its middle by L dx/4 -
+L²/12: the blur is then more than the motion itself, L²/12, unless L > 3 dx/2. A shorter stroke is
+therefore better taken for none (``LEAST_RESOLVED``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sa_solver.types import Array, Grid
+
+LEAST_RESOLVED = 1.5
+"""Strokes, in pitches, below which moving cells blur a surface more than the motion does."""
+
+LARGE_STROKE = 0.1
+"""Strokes, in widths of the contact, above which the motion counts: what neglecting it costs grows
+with their square. Depth and volume (the sum of what is too much or too little) of either body of a
+cylinder, worn from 0.2 to 1 mm of width by 8 increments a cycle, were wrong by 0.2 % to 0.9 % at
+0.1, and by 0.5 % to 1.8 % at 0.15, with a quarter, half or three quarters of the wear on body 1;
+those of a sphere, half and half, by 0.6 % to 0.8 %, by 1.3 % to 1.5 % and, at 0.2, by 2.2 % to
+2.5 %. Where only one body wears it is less: nothing where that is body 2."""
+
+GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
+"""Gauss points of the unit interval, of weight one half."""
+
+
+class TravelError(ValueError):
+    """What wears is carried beyond the grid."""
+
+
+@dataclass(frozen=True)
+class Passage:
+    """Body 2 on its straight way from offset ``before`` to ``after`` (x, y) [mm] of its mean place.
+
+    In a line contact motion along y changes nothing and is left out.
+    """
+
+    grid: Grid
+    before: tuple[float, float]
+    after: tuple[float, float]
+
+    @cached_property
+    def _weights(self) -> dict[tuple[int, int], float]:
+        """Weight w_k of each shift k in cells."""
+        start, end = (np.array(offset) / self.grid.pitch for offset in (self.before, self.after))
+        if self.grid.line:
+            start[1] = end[1] = 0.0
+        times = _crossings(start, end)
+        weights: dict[tuple[int, int], float] = {}
+        for begin, length in zip(times[:-1], np.diff(times), strict=True):
+            for point in GAUSS:
+                shift = start + (begin + point * length) * (end - start)
+                for cell, share in _overlaps(shift):
+                    weights[cell] = weights.get(cell, 0.0) + 0.5 * length * share
+        return weights
+
+    def carry(self, field: Array) -> Array:
+        """Body 1's ``field`` ``(nx, ny)`` as the grid sees it, the mean over the path.
+
+        Beyond the grid it is taken for 0: nothing wears there.
+        """
+        seen = np.zeros_like(field)
+        for (k, m), weight in self._weights.items():
+            here, there = _shifted(field.shape, k, m)
+            seen[here] += weight * field[there]
+        return seen
+
+    def deposit(self, field: Array) -> Array:
+        """What lies on the grid, ``(nx, ny)``, spread over body 1: the adjoint of ``carry``.
+
+        Raises TravelError where some of it would leave the grid.
+        """
+        self._check_room(field)
+        spread = np.zeros_like(field)
+        for (k, m), weight in self._weights.items():
+            here, there = _shifted(field.shape, k, m)
+            spread[there] += weight * field[here]
+        return spread
+
+    def _check_room(self, field: Array) -> None:
+        occupied = np.nonzero(field)
+        if len(occupied[0]) == 0:
+            return
+        for axis, name in enumerate("xy"):
+            shifts = [cell[axis] for cell in self._weights]
+            first, last = int(occupied[axis].min()), int(occupied[axis].max())
+            beyond = max(-(first + min(shifts)), last + max(shifts) + 1 - field.shape[axis])
+            if beyond > 0:
+                raise TravelError(
+                    f"the stroke carries wear {beyond} cells beyond the end of the grid along "
+                    f"{name}: make the grid longer by {2 * beyond * self.grid.pitch[axis]:.3g} mm "
+                    "or more"
+                )
+
+
+def _crossings(start: Array, end: Array) -> Array:
+    """Times from 0 to 1 at which a path passes into another cell, ends included."""
+    times = [0.0, 1.0]
+    for begin, stop in zip(start, end, strict=True):
+        low, high = min(begin, stop), max(begin, stop)
+        borders = np.arange(np.floor(low) + 1.0, np.ceil(high))
+        times += ((borders - begin) / (stop - begin)).tolist() if len(borders) else []
+    return np.unique(np.clip(times, 0.0, 1.0))
+
+
+def _overlaps(shift: Array) -> Iterator[tuple[tuple[int, int], float]]:
+    """Cells that a cell shifted by ``shift`` cells lies over, and its share over each."""
+    k, m = (int(c) for c in np.floor(shift))
+    u, v = shift - (k, m)
+    for cell, share in (
+        ((k, m), (1.0 - u) * (1.0 - v)),
+        ((k + 1, m), u * (1.0 - v)),
+        ((k, m + 1), (1.0 - u) * v),
+        ((k + 1, m + 1), u * v),
+    ):
+        if share > 0.0:
+            yield cell, float(share)
+
+
+def _shifted(
+    shape: tuple[int, ...], k: int, m: int
+) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
+    """Cells whose neighbour ``k`` along x and ``m`` along y is on the grid, and the neighbours."""
+    pairs = [
+        (
+            slice(max(0, -by), max(0, min(count, count - by))),
+            slice(max(0, by), max(0, min(count, count + by))),
+        )
+        for by, count in zip((k, m), shape, strict=True)
+    ]
+    (here_x, there_x), (here_y, there_y) = pairs
+    return (here_x, here_y), (there_x, there_y)
+
+
+def offsets(slip: Array, weight: Array) -> Array:
+    """Offsets ``(t + 1, 2)`` [mm] of body 2 before the first and after each increment of a cycle.
+
+    The motion is the mean of ``slip`` ``(t, 2, nx, ny)`` [mm] weighted by ``weight`` ``(nx, ny)``,
+    such as the pressure of the cycle, and counts from the middle between its extremes. A closed
+    cycle comes back to where it began; what is missing is spread evenly over its increments.
+    """
+    total = float(weight.sum())
+    steps = np.einsum("tcij,ij->tc", slip, weight) / (total if total > 0.0 else 1.0)
+    path = np.concatenate([np.zeros((1, 2)), np.cumsum(steps, axis=0)])
+    path -= np.linspace(0.0, 1.0, len(path))[:, None] * path[-1]
+    middle: Array = 0.5 * (path.max(axis=0) + path.min(axis=0))
+    return path - middle
+
+
+def moves(path: Array, pressed: NDArray[np.bool_], grid: Grid) -> bool:
+    """Whether the motion along ``path`` ``(t + 1, 2)`` [mm] counts, and the grid can follow it.
+
+    The stroke is held against the extent of the cells ``pressed`` ``(nx, ny)`` along it.
+    """
+    if grid.line:
+        path = path * [1.0, 0.0]
+    stroke, (x, y) = stroke_of(path)
+    along = np.broadcast_to(grid.x * x + grid.y * y, grid.shape)[pressed]
+    if stroke < LEAST_RESOLVED * np.hypot(grid.pitch[0] * x, grid.pitch[1] * y) or not len(along):
+        return False
+    width = np.ptp(along) + abs(grid.pitch[0] * x) + abs(grid.pitch[1] * y)
+    return bool(stroke > LARGE_STROKE * width)
+
+
+def followed(
+    grid: Grid,
+    slip: Array,
+    pressure: Array,
+    blocks: Sequence[slice] = (slice(None),),
+    forced: bool | None = None,
+) -> Array:
+    """Offsets of body 2 before and after each increment ``(t, 2, 2)`` [mm], if they count.
+
+    ``(0, 2, 2)`` where the motion does not count. ``slip`` ``(t, 2, nx, ny)`` [mm] is that of the
+    increments and ``pressure`` ``(nx, ny)`` that of the whole cycle, see :func:`offsets`;
+    ``blocks`` are the increments of each closed cycle of a mix. Motion that counts in one block
+    (:func:`moves`) is followed in all; ``forced`` says instead whether to follow it.
+    """
+    paths = [offsets(slip[block], pressure) for block in blocks]
+    if forced is None:
+        forced = any(moves(path, pressure > 0.0, grid) for path in paths)
+    if not forced:
+        return np.empty((0, 2, 2))
+    return np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for path in paths])
+
+
+def passages(grid: Grid, ends: Array) -> tuple[Passage, ...] | None:
+    """The passages between offsets ``ends`` ``(t, 2, 2)`` [mm]; None where there are none."""
+    if not len(ends):
+        return None
+    return tuple(
+        Passage(grid, (float(x), float(y)), (float(u), float(v))) for (x, y), (u, v) in ends
+    )
+
+
+def stroke_of(path: Array) -> tuple[float, Array]:
+    """Longest distance of two offsets of ``path`` ``(t + 1, 2)`` [mm], and its direction (2,)."""
+    apart = path[:, None] - path[None]
+    lengths = np.hypot(apart[..., 0], apart[..., 1])
+    longest = np.unravel_index(int(lengths.argmax()), lengths.shape)
+    stroke = float(lengths[longest])
+    return stroke, apart[longest] / stroke if stroke > 0.0 else np.array([1.0, 0.0])

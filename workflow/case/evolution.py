@@ -1,0 +1,123 @@
+"""Coefficients that change with the energy dissipated so far, as a case gives them."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from workflow.case.fields import Quantity
+from workflow.case.sections import Friction, Section, disagreement, entry
+
+if TYPE_CHECKING:
+    from wear.evolution import EnergyTable
+
+# Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual material.
+EnergyPerArea = Annotated[
+    float, Quantity("N/mm", at_least=0.0, at_most=1e9, range_text="0 to 1e6 J/mm^2")
+]
+TotalEnergy = Annotated[
+    float, Quantity("N*mm", at_least=0.0, at_most=1e15, range_text="0 to 1e12 J")
+]
+Factor = Annotated[float, Quantity("1", at_least=0.0, at_most=1e6)]
+LARGEST_FRICTION = 2.0  # as for the coefficient itself
+
+
+class Table(Section):
+    """A factor against cumulative energy: linear between points, constant beyond its ends."""
+
+    energy: tuple[float, ...]  # each table narrows it to its own unit
+    factor: tuple[Factor, ...] = entry(
+        "of the coefficient at these energies; linear between, constant beyond [1]",
+        [1.0, 0.3],
+        default=(1.0,),
+    )
+
+    @model_validator(mode="after")
+    def _is_a_table(self) -> Table:
+        energies, factors = len(self.energy), len(self.factor)
+        if not energies or energies != factors:
+            raise disagreement(
+                f"{factors} factors for {energies} energies; allowed: one or more, as many of both",
+                *("factor", "energy"),
+            )
+        if any(after <= before for before, after in pairwise(self.energy)):
+            raise disagreement("not ascending; allowed: each energy above the last", "energy")
+        return self
+
+    def described(self) -> EnergyTable:
+        """As the wear laws take it."""
+        from wear.evolution import EnergyTable
+
+        return EnergyTable(self.energy, self.factor)
+
+
+class _Scope(Section):
+    scope: str  # named first; each evolution narrows it to its own name
+
+
+class _WearEvolution(Table, _Scope):
+    """A wear coefficient against energy, and the energy that it takes to begin with."""
+
+    threshold: float  # each scope narrows it to its own unit
+
+    def described(self) -> EnergyTable:
+        return replace(super().described(), threshold=self.threshold)
+
+
+class LocalEvolution(_WearEvolution):
+    """The coefficient against the energy per area of this body's own surface, place by place."""
+
+    scope: Literal["local"] = entry("local, by place, or global, of the whole contact", "local")
+    energy: tuple[EnergyPerArea, ...] = entry(
+        "dissipated so far per area, ascending [N/mm]", ["0 J/mm^2", "10 J/mm^2"], default=(0.0,)
+    )
+    threshold: EnergyPerArea = entry("below which nothing wears [N/mm]", "1 J/mm^2", default=0.0)
+
+
+class GlobalEvolution(_WearEvolution):
+    """The coefficient against the energy of the whole contact."""
+
+    scope: Literal["global"] = entry("local, by place, or global, of the whole contact", "global")
+    energy: tuple[TotalEnergy, ...] = entry(
+        "dissipated so far in the contact, ascending [N*mm]", ["0 J", "1 kJ"], default=(0.0,)
+    )
+    threshold: TotalEnergy = entry("below which nothing wears [N*mm]", "100 J", default=0.0)
+
+
+Evolution = Annotated[LocalEvolution | GlobalEvolution, Field(discriminator="scope")]
+
+
+class FrictionEvolution(Table):
+    """The coefficient of friction against the energy of the whole contact."""
+
+    energy: tuple[TotalEnergy, ...] = entry(
+        "dissipated so far in the contact, ascending [N*mm]", ["0 J", "1 kJ"], default=(0.0,)
+    )
+
+
+class EvolvingFriction(Friction):
+    """Coulomb friction that wear may change."""
+
+    evolution: FrictionEvolution | None = entry(
+        "of the coefficient with dissipated energy; without it none", default=None
+    )
+
+    @model_validator(mode="after")
+    def _stays_in_range(self) -> EvolvingFriction:
+        factors = (1.0,) if self.evolution is None else self.evolution.factor
+        largest = self.coefficient * max(factors)
+        if largest > LARGEST_FRICTION:
+            raise disagreement(
+                f"a coefficient of {largest:g}; allowed: up to {LARGEST_FRICTION:g}",
+                *("evolution.factor", "coefficient"),
+            )
+        return self
+
+    def at(self, energy: float) -> float:
+        """Coefficient after a contact has dissipated so much ``energy`` [N mm]."""
+        if self.evolution is None:
+            return self.coefficient
+        return self.coefficient * float(self.evolution.described().at(energy))

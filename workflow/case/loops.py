@@ -1,0 +1,47 @@
+"""Tangential loops on worn contacts: the section that asks for them."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import model_validator
+
+from workflow.case.fields import Quantity, Whole
+from workflow.case.sections import Length, Section, disagreement, entry
+
+LoopForce = Annotated[float, Quantity("N", above=0.0, at_most=1e9, range_text="above 0 to 1e6 kN")]
+
+
+class Loops(Section):
+    """A tangential loop now and then: kt, µ and energy against wear, for joint laws to read.
+
+    There are none unless ``amplitude`` or ``force`` is given.
+    """
+
+    amplitude: Length | None = entry("of the motion to and fro [mm]", "5 um", default=None)
+    force: LoopForce | None = entry(
+        "instead of amplitude, below µP; in the plane per length [N]", "100 N", default=None
+    )
+    axis: Literal["x", "y"] = entry("of the contact's frame, to move along", "x", default="x")
+    increments: Annotated[int, Whole(2, 1000)] = entry(
+        "of each branch: a finer picture, the energy hardly needs them", 12, default=12
+    )
+    normal_force: LoopForce | None = entry(
+        "without it that at peak load; in the plane per length [N]", "60 N", default=None
+    )
+    every: Literal["jump", "end"] = entry(
+        "jump: unworn and after every wear step; end: unworn and at the end", "jump", default="jump"
+    )
+
+    @model_validator(mode="after")
+    def _one_drive(self) -> Loops:
+        if self.amplitude is not None and self.force is not None:
+            raise disagreement(
+                "amplitude and force given; allowed: one of them, or none for no loops", "force"
+            )
+        return self
+
+    @property
+    def wanted(self) -> bool:
+        """Whether there are any."""
+        return self.amplitude is not None or self.force is not None

@@ -1,0 +1,301 @@
+"""The approximations that can be charted: for each a ladder of settings, from coarse to fine.
+
+A rung is a few ``--set`` overrides about the case's own settings, everything else as written. A
+rung that the case's schema refuses is left out, and an axis on which fewer than two rungs are left
+does not apply to the case.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from workflow.case import Case, CaseError, MeshCase, dump_case, load_case
+from workflow.case.contact_case import HEIGHTS
+from workflow.errors import UserError
+
+# Refinements of a contact grid along each direction. A grid twice as fine takes four times as long
+# in 3-D, once for every increment of every jump where the contact wears.
+CONTACT_GRIDS = 1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0
+WEAR_GRIDS = 1 / 4, 1 / 2, 1.0, 2.0
+FEWEST_CELLS = 16  # with fewer, the contact is hardly there
+TOLERANCES = 1e-3, 1e-4, 1e-5, 1e-6
+# How far the finest rung of a tolerance is beyond the case's own.
+FINER_TOLERANCE = 1e-2
+INCREMENTS = 1 / 4, 1 / 2, 1.0, 2.0
+DRIFTS = 0.2, 0.1, 0.05, 0.02, 0.01
+# Condensing the structure takes about the fourth power of the refinement in 3-D.
+MESHES_3D = 0.5, 0.5**0.5, 1.0, 2.0**0.5
+MESHES_2D = 0.5, 1.0, 2.0, 4.0
+JUMPS = 5, 10, 20, 40, 80, 160
+ERRORS = 0.1, 0.03, 0.01, 3e-3, 1e-3
+EXPLICIT = 0.9, 0.45
+# Where a cycle takes seconds: so many rungs of jumps and errors fewer, and the longest explicit.
+COARSER_3D = 2
+
+
+@dataclass(frozen=True)
+class Rung:
+    """One setting: ``name`` is its own on its axis, ``branch`` the line that it belongs to.
+
+    ``step`` goes to zero with the error, in any unit; None where nothing converges. ``of_limit`` is
+    the jump of explicit steps over their stability limit.
+    """
+
+    name: str
+    overrides: tuple[str, ...]
+    step: float | None = None
+    branch: str = ""
+    of_limit: float | None = None
+
+
+AS_WRITTEN = Rung("as written", ())
+
+
+@dataclass(frozen=True)
+class Axis:
+    """A named approximation.
+
+    ``ladder`` gives the rungs of a case, coarse to fine; the last is what all are held against.
+    ``order`` is the highest order of convergence that is believed of it, None for a choice, whose
+    last rung is right by definition. ``closed_form`` says that the ladder ends at an exact solution
+    where there is one. On an axis that ``moves_states`` the computed increments are others on each
+    rung; one across ``sections`` compares the middle of the faces per length.
+    """
+
+    name: str
+    what: str
+    ladder: Callable[[Case], Iterator[Rung]]
+    order: float | None = None
+    closed_form: bool = False
+    moves_states: bool = False
+    sections: bool = False
+
+
+@dataclass(frozen=True)
+class Setting:
+    """A rung on its case: ``text`` is the case as written out, by which equal ones are known."""
+
+    rung: Rung
+    case: Case
+    text: str
+
+    @classmethod
+    def of(cls, case: Path, base: Sequence[str], rung: Rung = AS_WRITTEN) -> Setting:
+        """The rung about a case file with the overrides ``base``. Raises CaseError."""
+        changed = load_case(case, (*base, *rung.overrides))
+        return cls(rung, changed, dump_case(changed))
+
+
+def axes_of(case: Path, base: Sequence[str], names: Sequence[str]) -> dict[Axis, list[Setting]]:
+    """Rungs of the axes called ``names``, without names of all that apply.
+
+    Raises :class:`UserError` for an axis that there is not or that does not apply.
+    """
+    own = Setting.of(case, base)
+    wanted = [axis for axis in AXES if not names or axis.name in names]
+    applying = _applying(wanted, own, case, base)
+    for name in names:
+        if all(axis.name != name for axis in applying):
+            known = any(axis.name == name for axis in AXES)
+            wrong = "does not apply to this case" if known else "no such axis"
+            offered = ", ".join(axis.name for axis in _applying(AXES, own, case, base))
+            raise UserError(f"--axis {name}: {wrong}; allowed: {offered or 'none'}")
+    if not applying:
+        raise UserError(f"{case}: nothing of a case of this kind can be charted")
+    return applying
+
+
+def _applying(
+    axes: Sequence[Axis], own: Setting, case: Path, base: Sequence[str]
+) -> dict[Axis, list[Setting]]:
+    found = {axis: _settings(axis, own, case, base) for axis in axes}
+    return {axis: settings for axis, settings in found.items() if len(settings) > 1}
+
+
+def _settings(axis: Axis, own: Setting, case: Path, base: Sequence[str]) -> list[Setting]:
+    """Rungs of the axis that the case admits, its own settings among them and each once."""
+    found: dict[str, Setting] = {}
+    for rung in axis.ladder(own.case):
+        try:
+            setting = Setting.of(case, base, rung)
+        except CaseError:
+            continue
+        found.setdefault(setting.text, setting)
+    if found and own.text not in found:
+        return [own, *found.values()]
+    return list(found.values())
+
+
+def _entry(case: Case, path: str) -> Any:
+    """The entry at a dotted path, None where this kind of case has none."""
+    node: Any = case
+    for key in path.split("."):
+        node = getattr(node, key, None)
+    return node
+
+
+def _is_line(case: Case) -> bool:
+    """Whether the contacts are line contacts."""
+    size = _entry(case, "contact.size")
+    return _entry(case, "structure.dimension") == 2 or isinstance(size, float)
+
+
+# --- contact ------------------------------------------------------------------------------------
+
+
+def _grids(case: Case) -> Iterator[Rung]:
+    grid = _entry(case, "contact.grid")
+    if grid is None or _entry(case, "structure.shape") == HEIGHTS:
+        return
+    cells = (grid,) if isinstance(grid, int) else tuple(grid)
+    line = _is_line(case)
+    cheap = line or case.analysis == "contact"
+    for factor in CONTACT_GRIDS if cheap else WEAR_GRIDS:
+        # Even numbers keep the middle between two cells on every rung; a line has no other cells.
+        finer = [2 * round(0.5 * factor * count) for count in cells[: 1 if line else 2]]
+        if min(finer) < FEWEST_CELLS:
+            continue
+        shown = f"{finer[0]} strips" if line else " x ".join(map(str, finer))
+        value = finer[0] if isinstance(grid, int) else [*finer, *cells[len(finer) :]]
+        yield Rung(shown, (f"contact.grid={value}",), 1.0 / finer[0])
+
+
+def _tolerances(case: Case) -> Iterator[Rung]:
+    own = _entry(case, "contact.tolerance")
+    if own is None:
+        return
+    coarser = [tolerance for tolerance in TOLERANCES if tolerance > own]
+    for tolerance in (*coarser, own, max(FINER_TOLERANCE * own, 1e-12)):
+        yield Rung(f"{tolerance:.0e}", (f"contact.tolerance={tolerance!r}",), tolerance)
+
+
+def _methods(case: Case) -> Iterator[Rung]:
+    if _entry(case, "contact.method") is not None:
+        for method in ("normal", "full"):
+            yield Rung(method, (f"contact.method={method}",))
+
+
+def _histories(case: Case) -> Iterator[Rung]:
+    if _entry(case, "contact.history") is not None:
+        yield Rung("reversals", ("contact.history=reversals",), branch="reversals")
+        yield from _legs(case)
+    else:
+        yield from _cycle(_entry(case, "load_path"))
+
+
+def _cycle(path: Any) -> Iterator[Rung]:
+    """The loads of a wear cycle in fewer and in more increments."""
+    own, peak = getattr(path, "increments", None), getattr(path, "peak_at", None)
+    if own is None:
+        return
+    for factor in INCREMENTS:
+        legs = (own,) if isinstance(own, int) else own
+        counts = [max(1, round(factor * count)) for count in legs]
+        overrides = [f"load_path.increments={counts[0] if isinstance(own, int) else counts}"]
+        if peak is not None:
+            overrides.append(f"load_path.peak_at={round(factor * peak)}")
+        yield Rung(f"{sum(counts)} increments", tuple(overrides), 1.0 / factor)
+
+
+def _legs(case: Case) -> Iterator[Rung]:
+    """The full history of a contact case in fewer and in more increments."""
+    legs = _entry(case, "load_path.legs")
+    full = "contact.history=full"
+    if not legs or all(leg.increments == 1 for leg in legs):
+        yield Rung("full", (full,), branch="full")
+        return
+    for factor in INCREMENTS:
+        # A leg of one increment is a single load, which no finer ones would follow better.
+        counts = [leg.increments for leg in legs]
+        counts = [n if n == 1 else max(1, round(factor * n)) for n in counts]
+        overrides = [f"load_path.legs.{k}.increments={n}" for k, n in enumerate(counts)]
+        name = f"full, {sum(counts)} increments"
+        yield Rung(name, (full, *overrides), 1.0 / factor, branch="full")
+
+
+# --- wear ---------------------------------------------------------------------------------------
+
+
+def _steppers(case: Case) -> Iterator[Rung]:
+    """Fixed jumps and automatic ones of each kind, and explicit ones in shares of their limit."""
+    cycles = _entry(case, "wear.cycles")
+    if _entry(case, "wear.step.kind") is None:
+        return
+    coarser = 0 if _is_line(case) else COARSER_3D
+    for share in EXPLICIT if _is_line(case) else EXPLICIT[:1]:
+        step = f"wear.step={{kind: explicit, fraction: {share}}}"
+        name = f"explicit, {share:g} of its limit"
+        yield Rung(name, (step,), share, branch="explicit", of_limit=share)
+    for kind, word in (("implicit", "implicit"), ("second_order", "second order")):
+        for tolerance in ERRORS[: len(ERRORS) - coarser]:
+            overrides = (
+                *(f"wear.step={{kind: {kind}}}", f"wear.tolerance={tolerance!r}"),
+                "wear.depth_tolerance=null",
+            )
+            branch = f"{word}, automatic"
+            yield Rung(f"{branch}, {tolerance:.1%}", overrides, tolerance, branch=branch)
+        for count in JUMPS[: len(JUMPS) - coarser]:
+            step = f"wear.step={{kind: {kind}, cycles: {cycles / count!r}}}"
+            yield Rung(f"{word}, {count} jumps", (step,), 1.0 / count, branch=word)
+
+
+def _couplings(case: Case) -> Iterator[Rung]:
+    own = _entry(case, "coupling")
+    if own is None:
+        return
+    yield Rung("constant", (f"coupling={{resultants: constant, drift: {own.drift!r}}}",))
+    for drift in DRIFTS:
+        text = f"coupling={{resultants: drift, drift: {drift!r}}}"
+        yield Rung(f"drift of {drift:.0%}", (text,))
+    yield Rung("every jump", (f"coupling={{resultants: every, drift: {own.drift!r}}}",))
+
+
+# --- structure ----------------------------------------------------------------------------------
+
+
+def _dimensions(case: Case) -> Iterator[Rung]:
+    if _entry(case, "structure.kind") == "dovetail":
+        for dimension in (2, 3):
+            yield Rung(f"{dimension}-D", (f"structure.dimension={dimension}",))
+
+
+def _meshes(case: Case) -> Iterator[Rung]:
+    for factor in MESHES_2D if _is_line(case) else MESHES_3D:
+        if (nodes := _entry(case, "mesh.flank_nodes")) is not None:
+            counts = [max(3, 1 + round(factor * (count - 1))) for count in nodes]
+            size = _entry(case, "mesh.size") / factor
+            overrides = f"mesh.flank_nodes={counts}", f"mesh.size={size!r}"
+            yield Rung(f"{counts[0]} x {counts[1]} nodes", overrides, 1.0 / factor)
+        elif (own := _entry(case, "mesh.pad_elements")) is not None:
+            elements = 2 * max(1, round(0.5 * factor * own))
+            size = _entry(case, "mesh.size") / factor
+            overrides = f"mesh.pad_elements={elements}", f"mesh.size={size!r}"
+            yield Rung(f"{elements} elements on the pad", overrides, 1.0 / factor)
+        elif isinstance(case, MeshCase) and case.structure.size is not None:
+            size = case.structure.size / factor
+            yield Rung(f"elements of {size:.3g} mm", (f"structure.size={size!r}",), 1.0 / factor)
+
+
+def _orders(case: Case) -> Iterator[Rung]:
+    for entry in ("mesh.order", "structure.order"):
+        if _entry(case, entry) is not None:
+            for order in (1, 2):
+                yield Rung(f"order {order}", (f"{entry}={order}",))
+
+
+# Orders: pressures that end like a square root keep a grid from second order, slips that follow a
+# path in increments are first order, and so is a residual in its tolerance.
+AXES = (
+    Axis("grid", "cells of the contact grid", _grids, order=2.0, closed_form=True),
+    Axis("tolerance", "tolerance of the contact solver", _tolerances, order=1.0),
+    Axis("method", "slip of the structure or of the half-space", _methods),
+    Axis("stepper", "how wear steps, and how far", _steppers, order=2.0),
+    Axis("dimension", "two dimensions or three", _dimensions, sections=True),
+    Axis("coupling", "how often worn surfaces go back to the structure", _couplings),
+    Axis("history", "increments of the load path", _histories, order=1.0, moves_states=True),
+    Axis("mesh", "finite elements of the structure", _meshes, order=2.0),
+    Axis("order", "order of the finite elements", _orders),
+)

@@ -1,0 +1,59 @@
+"""What is worth its cost: efficient points, and the cheapest combination of several axes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from math import inf, isfinite
+
+
+def efficient(costs: Sequence[float], errors: Sequence[float]) -> list[bool]:
+    """Which points are on the frontier: nothing as cheap is more accurate, nor the reverse.
+
+    Of points alike in both the first counts.
+    """
+    order = sorted(range(len(costs)), key=lambda k: (costs[k], errors[k], k))
+    found, best = [False] * len(costs), inf
+    for k in order:
+        if errors[k] < best:
+            found[k], best = True, errors[k]
+    return found
+
+
+@dataclass(frozen=True)
+class Option:
+    """A choice on one axis: its cost over that of the case's own settings, and its error."""
+
+    name: str
+    ratio: float
+    error: float
+
+
+@dataclass(frozen=True)
+class Combination:
+    """A choice on every axis: names in their order, costs multiplied, errors added."""
+
+    names: tuple[str, ...] = ()
+    ratio: float = 1.0
+    error: float = 0.0
+
+    def with_one(self, option: Option) -> Combination:
+        """This and a choice on one more axis."""
+        names = (*self.names, option.name)
+        return Combination(names, self.ratio * option.ratio, self.error + option.error)
+
+
+def cheapest(axes: Sequence[Sequence[Option]], accuracy: float) -> Combination | None:
+    """The cheapest choice on every axis whose errors add up to ``accuracy`` at most, if any.
+
+    Each axis was varied alone: that errors add is a bound as far as they do not feed each other,
+    and that costs multiply an estimate.
+    """
+    kept = [Combination()]
+    for options in axes:
+        grown = [own.with_one(option) for own in kept for option in options]
+        # What is no frontier point so far is none of any longer combination either.
+        flags = efficient([own.ratio for own in grown], [own.error for own in grown])
+        kept = [own for own, flag in zip(grown, flags, strict=True) if flag]
+    met = [own for own in kept if isfinite(own.error) and own.error <= accuracy]
+    return min(met, key=lambda own: own.ratio, default=None)

@@ -1,0 +1,158 @@
+"""The rungs of an axis side by side: what they are held against, and which are efficient."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from math import inf, nan
+
+from workflow.chart.axes import Axis, Rung
+from workflow.chart.convergence import Convergence, richardson
+from workflow.chart.frontier import Option, efficient
+from workflow.chart.measures import Cost
+
+# Changes of a quantity below this share of it are rounding, and no sign of convergence or its lack.
+ROUNDING = 1e-12
+
+
+@dataclass(frozen=True)
+class Point:
+    """A rung that has run.
+
+    ``values`` by quantity; ``extras`` are told beside them. ``own`` marks the case's own settings.
+    """
+
+    rung: Rung
+    own: bool
+    folder: str
+    values: Mapping[str, float]
+    cost: Cost
+    extras: Mapping[str, float] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Reference:
+    """What a quantity is held against: a closed form, or the value of the last rung.
+
+    ``order`` and ``floor`` are those of the last rungs: ``floor`` estimates, relative to the value,
+    how far a last rung is from the limit itself; it is 0 for a closed form and for a choice.
+    """
+
+    value: float
+    exact: bool
+    order: float | None
+    floor: float
+
+
+@dataclass(frozen=True)
+class Judged:
+    """A rung beside the references.
+
+    ``error`` is its largest relative difference, that of ``worst``; with the floor of the reference
+    no more than ``bound``. ``unresolved``: less than the references themselves are known to.
+    """
+
+    point: Point
+    error: float
+    worst: str
+    bound: float
+    unresolved: bool
+    by_seconds: bool
+    by_convolutions: bool
+
+    @property
+    def name(self) -> str:
+        return self.point.rung.name
+
+
+@dataclass(frozen=True)
+class Ladder:
+    """An axis with everything that ran on it; ``failed`` has an error for each that did not."""
+
+    axis: Axis
+    rungs: tuple[Judged, ...]
+    references: Mapping[str, Reference]
+    failed: Mapping[str, str]
+
+    @property
+    def floor(self) -> float:
+        """How well the references are known, at worst."""
+        return max((own.floor for own in self.references.values()), default=nan)
+
+    @property
+    def own(self) -> Judged | None:
+        """The case's own settings, where they ran."""
+        return next((rung for rung in self.rungs if rung.point.own), None)
+
+    def cheapest(self, accuracy: float) -> Judged | None:
+        """The rung of fewest seconds whose error is at most ``accuracy`` for sure."""
+        met = [rung for rung in self.rungs if rung.bound <= accuracy]
+        return min(met, key=lambda rung: rung.point.cost.seconds, default=None)
+
+    def options(self) -> list[Option]:
+        """The rungs as choices, their costs over that of the case's own settings."""
+        own = self.own
+        if own is None:
+            return []
+        unit = max(own.point.cost.seconds, 1e-2)  # seconds are logged to a hundredth
+        return [Option(r.name, r.point.cost.seconds / unit, r.bound) for r in self.rungs]
+
+
+def judge(
+    axis: Axis,
+    points: Sequence[Point],
+    exact: Mapping[str, float],
+    failed: Mapping[str, str],
+) -> Ladder:
+    """Hold the points of an axis, coarse to fine, against the last of them.
+
+    Quantities in ``exact`` are held against those values instead, where the axis goes to them.
+    Quantities that are 0 in the reference, or that a point does not have, are left out.
+    """
+    shared = [q for q in points[-1].values if all(q in point.values for point in points)]
+    references = {q: _reference(axis, points, q, exact) for q in shared}
+    references = {q: own for q, own in references.items() if own.value}
+    errors = [_errors(point, references) for point in points]
+    seconds = [point.cost.seconds for point in points]
+    convolutions = [float(point.cost.convolutions) for point in points]
+    bounds = [max((e + references[q].floor for q, e in own.items()), default=inf) for own in errors]
+    flags = zip(efficient(seconds, bounds), efficient(convolutions, bounds), strict=True)
+    floor = max((own.floor for own in references.values()), default=0.0)
+    judged = []
+    for point, own, bound, (quick, few) in zip(points, errors, bounds, flags, strict=True):
+        worst = max(own, key=lambda q: own[q], default="")
+        error = own.get(worst, inf)
+        judged.append(Judged(point, error, worst, bound, error < floor, quick, few))
+    return Ladder(axis, tuple(judged), references, failed)
+
+
+def _reference(
+    axis: Axis, points: Sequence[Point], quantity: str, exact: Mapping[str, float]
+) -> Reference:
+    last = points[-1]
+    value = last.values[quantity]
+    found = _convergence(axis, points, quantity)
+    if axis.closed_form and quantity in exact:
+        return Reference(exact[quantity], True, found.order, 0.0)
+    return Reference(value, False, found.order, found.error / abs(value) if value else 0.0)
+
+
+def _convergence(axis: Axis, points: Sequence[Point], quantity: str) -> Convergence:
+    """Of the branch that the last point belongs to; one that refines nothing is a choice."""
+    last = points[-1]
+    if axis.order is None:
+        return Convergence(None, 0.0)
+    branch = [p for p in points if p.rung.branch == last.rung.branch and p.rung.step is not None]
+    if not branch:
+        return Convergence(None, 0.0)
+    values = [point.values[quantity] for point in branch]
+    steps = [float(point.rung.step or nan) for point in branch]
+    return richardson(values, steps, axis.order, ROUNDING * abs(last.values[quantity]))
+
+
+def _errors(point: Point, references: Mapping[str, Reference]) -> dict[str, float]:
+    """Relative difference of each quantity to its reference."""
+    return {
+        quantity: abs(point.values[quantity] - own.value) / abs(own.value)
+        for quantity, own in references.items()
+    }

@@ -1,0 +1,243 @@
+"""A chart as files and on the terminal: tables, ``summary.json``, figures, what to choose."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Iterator
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Column, Table
+
+from workflow.chart.frontier import Combination, cheapest
+from workflow.chart.ladder import Judged, Ladder
+from workflow.chart.run import Chart
+from workflow.store import replacing
+from workflow.versions import versions
+
+# Columns of text where the tables go to a file.
+FILE_WIDTH = 120
+HEAD = ("axis", "branch", "rung", "settings", "own", "folder")
+TAIL = ("error", "worst", "bound", "floor", "unresolved", "seconds", "convolutions", "solves")
+FRONTIER = ("efficient_by_seconds", "efficient_by_convolutions")
+
+
+def write_chart(chart: Chart, out: Path) -> None:
+    """Write ``chart.csv``, ``figures`` and, last, ``summary.json``."""
+    from workflow.figures.chart import write_chart_figures
+
+    _write_table(chart, out / "chart.csv")
+    write_chart_figures(chart, out / "figures")
+    with replacing(out / "summary.json") as partial:
+        partial.write_text(json.dumps(_summary(chart), indent=2) + "\n", encoding="utf-8")
+
+
+# --- what to choose -----------------------------------------------------------------------------
+
+
+def sentences(chart: Chart) -> list[str]:
+    """What to take for the accuracy asked for: on each axis, and on all together."""
+    lines = [_choice(ladder, chart.accuracy) for ladder in chart.ladders]
+    return [*lines, _together(chart)] if len(chart.ladders) > 1 else lines
+
+
+def _choice(ladder: Ladder, accuracy: float) -> str:
+    wanted, name = percent(accuracy), ladder.axis.name
+    chosen = ladder.cheapest(accuracy)
+    if chosen is not None:
+        return (
+            f"{name}: for {wanted} take {chosen.name}: {_costs(chosen)}, {_error(ladder, chosen)}"
+        )
+    best = min(ladder.rungs, key=lambda rung: rung.bound, default=None)
+    if best is None:
+        return f"{name}: nothing ran"
+    return (
+        f"{name}: for {wanted} no rung is known to be enough: the best, {best.name}, is within "
+        f"{percent(best.bound)} ({_costs(best)})"
+    )
+
+
+def _costs(rung: Judged) -> str:
+    cost = rung.point.cost
+    return f"{cost.seconds:.3g} s, {cost.convolutions} convolutions"
+
+
+def _error(ladder: Ladder, rung: Judged) -> str:
+    """The error of a rung in words, with what is not known of it."""
+    if rung.error == 0.0:
+        known = f"known to {percent(ladder.floor)}" if ladder.floor else "by definition"
+        return f"the reference, {known}"
+    text = f"error {percent(rung.error)} ({rung.worst})"
+    if rung.unresolved:
+        return f"{text}, below the {percent(ladder.floor)} to which the reference is known"
+    return text
+
+
+def combination(chart: Chart) -> Combination | None:
+    """The cheapest rung on every axis with errors that add up to no more than the accuracy."""
+    return cheapest([ladder.options() for ladder in chart.ladders], chart.accuracy)
+
+
+def _together(chart: Chart) -> str:
+    found = combination(chart)
+    if found is None:
+        return (
+            f"all axes: for {percent(chart.accuracy)} no choice of rungs is known to be enough: "
+            "their errors, each axis varied alone, add up to more"
+        )
+    names = zip(chart.ladders, found.names, strict=True)
+    choice = ", ".join(f"{ladder.axis.name} {name}" for ladder, name in names)
+    return (
+        f"all axes: for {percent(chart.accuracy)} take {choice}: errors, each axis varied alone, "
+        f"add up to {percent(found.error)} at most, and about {found.ratio:.2g} times the seconds "
+        "of the case as written"
+    )
+
+
+def percent(share: float) -> str:
+    """A share in per cent, with two digits."""
+    return f"{100 * share:.2g} %" if isfinite(share) else "an unknown error"
+
+
+# --- tables -------------------------------------------------------------------------------------
+
+
+def show(chart: Chart) -> None:
+    """Tables and sentences on the terminal."""
+    console = Console(highlight=False, markup=False)
+    if not console.is_terminal:
+        console.width = FILE_WIDTH
+    for ladder in chart.ladders:
+        console.print(_table(ladder))
+        for name, error in ladder.failed.items():
+            console.print(f"{ladder.axis.name}: {name} failed: {error}", soft_wrap=True)
+    for line in sentences(chart):
+        console.print(line, soft_wrap=True)
+
+
+def _table(ladder: Ladder) -> Table:
+    columns = [Column(name, justify="right") for name in ("error", "s", "convolutions", "solves")]
+    title = f"{ladder.axis.name}: {ladder.axis.what}{_reference(ladder)}"
+    table = Table(Column("", no_wrap=True), *columns, "worst", "", title=title, box=SIMPLE)
+    for rung in ladder.rungs:
+        cost, marks = rung.point.cost, _marks(rung)
+        error = "reference" if rung.error == 0.0 else percent(rung.error)
+        numbers = f"{cost.seconds:.2f}", str(cost.convolutions), str(cost.solves)
+        table.add_row(rung.name, error, *numbers, rung.worst, ", ".join(marks))
+    return table
+
+
+def _reference(ladder: Ladder) -> str:
+    """How well the references are known, for a title."""
+    if ladder.axis.order is None or not ladder.references:
+        return ""
+    orders = [own.order for own in ladder.references.values() if own.order is not None]
+    observed = f", orders {min(orders):.1f} to {max(orders):.1f}" if orders else ""
+    return f" (references known to {percent(ladder.floor)}{observed})"
+
+
+def _marks(rung: Judged) -> list[str]:
+    marks = {
+        "as written": rung.point.own,
+        "efficient": rung.by_seconds,
+        "unresolved": rung.unresolved and rung.error > 0.0,
+    }
+    return [name for name, on in marks.items() if on]
+
+
+def _write_table(chart: Chart, path: Path) -> None:
+    """One row for each rung; a quantity that its axis does not have is empty."""
+    points = [rung.point for ladder in chart.ladders for rung in ladder.rungs]
+    quantities = list(dict.fromkeys(q for p in points for q in (*p.values, *p.extras)))
+    with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, [*HEAD, *quantities, *TAIL, *FRONTIER], restval="")
+        writer.writeheader()
+        for ladder in chart.ladders:
+            writer.writerows(_rows(ladder))
+
+
+def _rows(ladder: Ladder) -> Iterator[dict[str, object]]:
+    for rung in ladder.rungs:
+        point, cost = rung.point, rung.point.cost
+        head = (
+            *(ladder.axis.name, point.rung.branch, rung.name, " ".join(point.rung.overrides)),
+            *(point.own, point.folder),
+        )
+        tail = (
+            *(rung.error, rung.worst, rung.bound, ladder.floor, rung.unresolved),
+            *(round(cost.seconds, 2), cost.convolutions, cost.solves),
+        )
+        yield {
+            **dict(zip(HEAD, head, strict=True)),
+            **point.values,
+            **point.extras,
+            **dict(zip(TAIL, tail, strict=True)),
+            **dict(zip(FRONTIER, (rung.by_seconds, rung.by_convolutions), strict=True)),
+        }
+
+
+# --- summary ------------------------------------------------------------------------------------
+
+
+def _summary(chart: Chart) -> dict[str, Any]:
+    found = combination(chart)
+    return {
+        "title": chart.title,
+        "accuracy": chart.accuracy,
+        "axes": {ladder.axis.name: _axis_summary(ladder, chart) for ladder in chart.ladders},
+        "together": None
+        if found is None
+        else {
+            "rungs": {
+                ladder.axis.name: name
+                for ladder, name in zip(chart.ladders, found.names, strict=True)
+            },
+            "error": found.error,
+            "seconds_ratio": found.ratio,
+        },
+        "sentences": sentences(chart),
+        "versions": versions(),
+    }
+
+
+def _axis_summary(ladder: Ladder, chart: Chart) -> dict[str, Any]:
+    chosen = ladder.cheapest(chart.accuracy)
+    return {
+        "converges": ladder.axis.order is not None,
+        "floor": _finite(ladder.floor),
+        "references": {
+            quantity: {**vars(own), "floor": _finite(own.floor)}
+            for quantity, own in ladder.references.items()
+        },
+        "rungs": [_rung_summary(rung) for rung in ladder.rungs],
+        "failed": dict(ladder.failed),
+        "chosen": None if chosen is None else chosen.name,
+    }
+
+
+def _rung_summary(rung: Judged) -> dict[str, Any]:
+    point = rung.point
+    return {
+        "name": rung.name,
+        "branch": point.rung.branch,
+        "settings": list(point.rung.overrides),
+        "own": point.own,
+        "folder": f"runs/{point.folder}",
+        "values": dict(point.values),
+        "extras": dict(point.extras),
+        "error": _finite(rung.error),
+        "worst": rung.worst,
+        "bound": _finite(rung.bound),
+        "unresolved": rung.unresolved,
+        "efficient": {"seconds": rung.by_seconds, "convolutions": rung.by_convolutions},
+        "cost": vars(point.cost),
+    }
+
+
+def _finite(value: float) -> float | None:
+    """JSON has no infinity."""
+    return value if isfinite(value) else None

@@ -1,0 +1,287 @@
+"""The rungs of a chart: their runs, one at a time, and what these are compared by.
+
+Every axis is varied alone about the case's own settings. Rungs are run one at a time, so that their
+times do not disturb each other, each in a process of one thread; a finished one is taken as it is
+and an interrupted one goes on.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from pydantic_core import PydanticCustomError
+
+from workflow.case import Case, WearCase, load_case
+from workflow.case.fields import Quantity
+from workflow.chart.axes import Axis, Setting, axes_of
+from workflow.chart.ladder import Ladder, Point, judge
+from workflow.chart.measures import (
+    CONTACT,
+    FROM_THE_FIRST,
+    MIDDLE,
+    Cost,
+    costs,
+    default_quantities,
+    extra_quantities,
+    interfaces,
+    middle_quantities,
+    middle_sections,
+    number_at,
+    profile_difference,
+    worn_depths,
+)
+from workflow.errors import UserError
+from workflow.runs import Finished, Job, kept_in, run_jobs
+
+CACHE = "FRETSCALE_CACHE"
+ACCURACY = Quantity("1", above=0.0, at_most=1.0)
+# Folders of a chart, and the run of the case as it is written.
+RUNS, STRUCTURES, OWN = "runs", "structures", "own"
+# Entry of an interface in the summary: the longest stable explicit step of the unworn contact.
+LIMIT = "explicit_limit"
+# Explicit steps beyond this number are left out: as many cycles are solved, most of a day in 3-D.
+MOST_STEPS = 5000
+# Key of the difference of worn depth anywhere among the extras.
+PROFILE = "depth anywhere"
+
+
+@dataclass(frozen=True)
+class Chart:
+    """The ladders of a case, and the accuracy that is asked for."""
+
+    title: str
+    ladders: tuple[Ladder, ...]
+    accuracy: float
+
+
+@dataclass(frozen=True)
+class _Run:
+    """A finished run of a setting; ``summary`` with the middle sections of wear in it."""
+
+    case: Case
+    finished: Finished
+    summary: Mapping[str, Any]
+    cost: Cost
+
+
+def accuracy_of(text: str) -> float:
+    """A share such as ``1 %`` or ``0.01``. Raises UserError."""
+    value = float(text) if text.replace(".", "", 1).isdecimal() else text
+    try:
+        return ACCURACY.parse(value)
+    except PydanticCustomError as error:
+        raise UserError(f"--accuracy {error.message()}") from error
+
+
+def chart_case(
+    case: Path,
+    out: Path,
+    *,
+    axes: Sequence[str] = (),
+    overrides: Sequence[str] = (),
+    quantities: Sequence[str] = (),
+    accuracy: float = 0.01,
+    report: Callable[[str], None] = lambda line: None,
+) -> Chart:
+    """Run the ladders of ``axes``, by default of all that apply, in folders below ``out/runs``.
+
+    The structural cache lies in ``out`` too: what a run found there is charged to it at the price
+    of the run that computed it. ``quantities`` are dotted paths into ``summary.json``. Raises
+    :class:`UserError` where an axis does not apply or a quantity is nowhere to be found.
+    """
+    base = (*overrides, *_plain(load_case(case, overrides), quantities))
+    settings = axes_of(case, base, axes)
+    jobs = _jobs(case, base, settings)
+    _claim(out, load_case(case, base))
+    with _environment(CACHE, str((out / STRUCTURES).absolute())):
+        ended, left_out = _run(jobs, settings, out / RUNS, report)
+    runs = _runs(ended)
+    if not runs:
+        raise UserError(f"{out}: not a single rung ran: {ended[0].job.name}: {ended[0].error}")
+    first = runs.get(OWN) or next(iter(runs.values()))
+    _check(quantities, first.summary)
+    errors = left_out | {own.job.name: own.error for own in ended if own.summary is None}
+    ladders = [
+        _ladder(axis, [(own, jobs[own.text].name) for own in rungs], runs, errors, quantities)
+        for axis, rungs in settings.items()
+    ]
+    return Chart(first.case.title, tuple(ladders), accuracy)
+
+
+def _plain(case: Case, quantities: Sequence[str]) -> Iterator[str]:
+    """Overrides that leave out what no quantity needs, and any other choice of settings."""
+    yield from ("output.paraview=false", "output.figures=false")
+    if isinstance(case, WearCase) and not any(".stress." in path for path in quantities):
+        yield from ("stress.section=none", "stress.life.parameter=none")
+    if hasattr(case, "fidelity"):
+        yield "fidelity=fixed"
+
+
+def _claim(out: Path, own: Case) -> None:
+    """Make sure of the folder. Raises UserError where it holds anything but a chart."""
+    if out.exists() and not (out / RUNS).is_dir() and (not out.is_dir() or any(out.iterdir())):
+        raise UserError(f"{out}: not empty and no chart of fretscale; give another folder")
+    if kept_in(out / RUNS / OWN, own) != "finished":
+        # It is the first to run, and is to pay for its structure itself.
+        for path in (out / STRUCTURES).glob("*.h5"):
+            path.unlink()
+
+
+def _jobs(
+    case: Path, base: Sequence[str], settings: Mapping[Axis, list[Setting]]
+) -> dict[str, Job]:
+    """A job for each different case, by its text; the case's own settings come first."""
+    own = Setting.of(case, base)
+    jobs = {own.text: Job(OWN, case, tuple(base))}
+    for axis, rungs in settings.items():
+        for setting in rungs:
+            words = "".join(c if c.isalnum() or c in "-." else " " for c in setting.rung.name)
+            name = "-".join([axis.name, *words.split()])
+            job = Job(name, case, (*base, *setting.rung.overrides))
+            jobs.setdefault(setting.text, job)
+    return jobs
+
+
+def _run(
+    jobs: Mapping[str, Job],
+    settings: Mapping[Axis, list[Setting]],
+    out: Path,
+    report: Callable[[str], None],
+) -> tuple[list[Finished], dict[str, str]]:
+    """How the jobs ended, and why some were left out, by their name."""
+    told = _Progress(len(jobs), report)
+    own, *others = jobs.values()
+    ended = run_jobs([own], out, processes=1, report=told)
+    left_out = {}
+    for setting in (one for rungs in settings.values() for one in rungs):
+        if why := _too_long(setting, ended[0].summary or {}):
+            left_out[jobs[setting.text].name] = why
+    others = [job for job in others if job.name not in left_out]
+    return ended + run_jobs(others, out, processes=1, report=told), left_out
+
+
+def _too_long(setting: Setting, own: Mapping[str, Any]) -> str:
+    """Why nobody would wait for explicit steps, as far as the run of the case itself knows it."""
+    share, case = setting.rung.of_limit, setting.case
+    limits = [limit for name in interfaces(own) if (limit := number_at(own, f"{name}.{LIMIT}"))]
+    if share is None or not limits or not isinstance(case, WearCase):
+        return ""
+    length = share * min(limits)
+    steps = case.wear.cycles / length
+    return f"it would take {steps:.2g} steps of {length:.3g} cycles" if steps > MOST_STEPS else ""
+
+
+class _Progress:
+    """Tells each run as it ends."""
+
+    def __init__(self, total: int, report: Callable[[str], None]) -> None:
+        self._total, self._report, self._done = total, report, 0
+
+    def __call__(self, own: Finished) -> None:
+        self._done += 1
+        ending = f"failed: {own.error}"
+        if own.summary is not None:
+            ending = f"{sum(own.summary.get('seconds', {}).values()):.1f} s"
+        self._report(f"{self._done}/{self._total} {own.job.name}: {ending}")
+
+
+@contextmanager
+def _environment(name: str, value: str) -> Iterator[None]:
+    """Set an environment variable for the processes started within."""
+    before = os.environ.get(name)
+    os.environ[name] = value
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[name]
+        else:
+            os.environ[name] = before
+
+
+def _runs(ended: Sequence[Finished]) -> dict[str, _Run]:
+    """What has run, by the name of the job."""
+    found = [(own, own.summary) for own in ended if own.summary is not None]
+    cases = [own.job.load() for own, _ in found]
+    paid = costs(cases, [own.folder for own, _ in found], [summary for _, summary in found])
+    return {
+        own.job.name: _Run(case, own, _with_middle(case, own.folder, summary), cost)
+        for (own, summary), case, cost in zip(found, cases, paid, strict=True)
+    }
+
+
+def _with_middle(case: Case, folder: Path, summary: Mapping[str, Any]) -> Mapping[str, Any]:
+    if not isinstance(case, WearCase):
+        return summary
+    return {**summary, MIDDLE: middle_sections(folder, interfaces(summary))}
+
+
+def _check(quantities: Sequence[str], summary: Mapping[str, Any]) -> None:
+    for path in quantities:
+        value = number_at(summary, path)
+        if not value:
+            wrong = "no number there" if value is None else "0, and no error is relative to it"
+            raise UserError(
+                f"--quantity {path}: {wrong}; allowed: dotted paths to numbers of summary.json, "
+                "such as states.-1.approach or intrados.depth_1"
+            )
+
+
+def _ladder(
+    axis: Axis,
+    rungs: Sequence[tuple[Setting, str]],
+    runs: Mapping[str, _Run],
+    errors: Mapping[str, str],
+    picked: Sequence[str],
+) -> Ladder:
+    """The rungs of an axis, each with the name of its job, that ran or did not."""
+    found = [(setting.rung, runs[name]) for setting, name in rungs if name in runs]
+    failed = {setting.rung.name: errors[name] for setting, name in rungs if name in errors}
+    if not found:
+        return Ladder(axis, (), {}, failed)
+    last = found[-1][1]
+    wanted = _quantities(axis, runs.get(OWN, last), picked)
+    exact = {own.quantity: own.value for own in last.case.expect if own.exact}
+    points = [
+        Point(
+            rung=rung,
+            own=run.finished.job.name == OWN,
+            folder=run.finished.job.name,
+            values=_numbers(run.summary, wanted),
+            cost=run.cost,
+            extras=_numbers(run.summary, extra_quantities(run.summary)) | _profile(run, last),
+        )
+        for rung, run in found
+    ]
+    return judge(axis, points, exact, failed)
+
+
+def _quantities(axis: Axis, own: _Run, picked: Sequence[str]) -> list[str]:
+    """What the rungs of an axis are compared by."""
+    if axis.sections:
+        return middle_quantities(own.summary)
+    paths = list(picked) or default_quantities(own.case, own.summary)
+    if axis.moves_states:
+        paths = [p for p in paths if not FROM_THE_FIRST.match(p)] or list(CONTACT)
+    return paths
+
+
+def _numbers(summary: Mapping[str, Any], paths: Sequence[str]) -> dict[str, float]:
+    found = {path: number_at(summary, path) for path in paths}
+    return {path: value for path, value in found.items() if value is not None}
+
+
+def _profile(run: _Run, last: _Run) -> dict[str, float]:
+    """Largest difference of worn depth anywhere to the last rung, over its largest depth."""
+    if not isinstance(run.case, WearCase):
+        return {}
+    own, reference = (
+        worn_depths(each.finished.folder, interfaces(each.summary)) for each in (run, last)
+    )
+    difference = profile_difference(own, reference)
+    return {} if difference is None else {PROFILE: difference}

@@ -1,0 +1,5 @@
+"""Many runs of one case, each with other values: ``fretscale sweep``."""
+
+from workflow.sweep.running import run_sweep
+
+__all__ = ["run_sweep"]

@@ -1,0 +1,158 @@
+"""From what varies to the runs: a grid, values in step, or a Latin hypercube."""
+
+from __future__ import annotations
+
+import hashlib
+import re
+from dataclasses import dataclass
+from itertools import product
+from math import prod
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sa_solver.types import Array
+from workflow.case import CaseError
+from workflow.case.writing import scalar
+from workflow.runs import Job
+from workflow.sweep.schema import MOST_RUNS, Amount, LogNormal, Normal, Sweep, Variation
+
+# Of a folder; what is longer is called by its hash.
+LONGEST_NAME = 100
+# Pictures of every run would take longer than many a run; `set` can have them.
+QUIET = {"output.paraview": False, "output.figures": False}
+
+
+@dataclass(frozen=True)
+class Run:
+    """One run of a sweep: the values of what varies, as written, by path."""
+
+    name: str
+    values: dict[str, Any]
+
+    def job(self, sweep: Sweep) -> Job:
+        """What to compute."""
+        entries = QUIET | sweep.file.set | self.values
+        overrides = tuple(f"{path}={scalar(value)}" for path, value in entries.items())
+        return Job(self.name, Path(sweep.file.case), overrides)
+
+
+def runs_of(sweep: Sweep) -> list[Run]:
+    """The runs of a sweep; a sample may draw the same one twice. Raises CaseError."""
+    varied = sweep.file.variations()
+    if sweep.file.design == "sample":
+        rows = _sampled(list(varied.values()), sweep.file.samples or 0, sweep.file.seed)
+    else:
+        rows = _combined(sweep, [_listed(own) for own in varied.values()])
+    names = _names(_short_names(list(varied)), rows)
+    return [
+        Run(name, dict(zip(varied, row, strict=True)))
+        for name, row in zip(names, rows, strict=True)
+    ]
+
+
+def _combined(sweep: Sweep, columns: list[list[Any]]) -> list[tuple[Any, ...]]:
+    place = sweep.source.where(("design",))[1]
+    if sweep.file.design == "zip":
+        counts = [len(column) for column in columns]
+        if len(set(counts)) > 1:
+            told = ", ".join(map(str, counts))
+            raise CaseError(f"{place}: design: zip of {told} values; allowed: as many of each")
+        return list(zip(*columns, strict=True))
+    count = prod(len(column) for column in columns)
+    if count > MOST_RUNS:
+        raise CaseError(f"{place}: design: a grid of {count} runs; allowed: up to {MOST_RUNS}")
+    return list(product(*columns))
+
+
+def _listed(own: Variation) -> list[Any]:
+    """All values of a list or range."""
+    if own.values is not None:
+        return list(own.values)
+    assert own.range is not None
+    assert own.range.count is not None
+    first, last = own.range.ends
+    share = np.linspace(0.0, 1.0, own.range.count)
+    return [_written(first, number) for number in _between(first, last, share, own.range.scale)]
+
+
+def _between(first: Amount, last: Amount, share: Array, scale: str) -> Array:
+    """Numbers at ``share`` (0 to 1) of the way between two ends."""
+    if scale == "log":
+        ratio: Array = first.number * (last.number / first.number) ** share
+        return ratio
+    number: Array = first.number * (1.0 - share) + last.number * share
+    return number
+
+
+def _written(like: Amount, number: float) -> int | float | str:
+    return like.with_number(float(number)).written
+
+
+# --- samples ------------------------------------------------------------------------------------
+
+
+def _sampled(varied: list[Variation], samples: int, seed: int) -> list[tuple[Any, ...]]:
+    """A Latin hypercube: in every column each of ``samples`` equal shares is hit once."""
+    from scipy.stats import qmc  # half a second
+
+    points = qmc.LatinHypercube(d=len(varied), seed=np.random.default_rng(seed)).random(samples)
+    columns = [_drawn(own, share) for own, share in zip(varied, points.T, strict=True)]
+    return list(zip(*columns, strict=True))
+
+
+def _drawn(own: Variation, share: Array) -> list[Any]:
+    """Values below which ``share`` of the distribution lies; those of a list are as likely."""
+    if own.values is not None:
+        return [own.values[int(u * len(own.values))] for u in share]
+    if own.range is not None:
+        first, last = own.range.ends
+        numbers = _between(first, last, share, own.range.scale)
+    else:
+        first, numbers = _quantiles(own.distribution, share)
+    return [_written(first, number) for number in numbers]
+
+
+def _quantiles(distribution: Any, share: Array) -> tuple[Amount, Array]:
+    """Quantiles of a distribution, and an amount of its unit."""
+    from scipy.special import ndtri
+
+    if isinstance(distribution, Normal):
+        mean = distribution.mean
+        return mean, mean.number + distribution.deviation.number * ndtri(share)
+    if isinstance(distribution, LogNormal):
+        median = distribution.median
+        return median, median.number * distribution.factor ** ndtri(share)
+    first, last = distribution.ends
+    return first, _between(first, last, share, "linear")
+
+
+# --- names --------------------------------------------------------------------------------------
+
+
+def _short_names(paths: list[str]) -> list[str]:
+    """The fewest last keys of each path that no other one ends in."""
+    return [_shortest(path, [other for other in paths if other != path]) for path in paths]
+
+
+def _shortest(path: str, others: list[str]) -> str:
+    keys = path.split(".")
+    ends = [".".join(keys[-count:]) for count in range(1, len(keys) + 1)]
+    return next((e for e in ends if not any(f".{o}".endswith(f".{e}") for o in others)), path)
+
+
+def _names(short: list[str], rows: list[tuple[Any, ...]]) -> list[str]:
+    """The folder of each run: what varies and its values, so that it is found again by them."""
+    whole = ["_".join(f"{n}={scalar(v)}" for n, v in zip(short, row, strict=True)) for row in rows]
+    plain = [re.sub(r"[^\w.+=-]", "", text.replace(", ", "x")) for text in whole]
+    told = {name: {w for w, p in zip(whole, plain, strict=True) if p == name} for name in plain}
+    return [
+        name if len(name) <= LONGEST_NAME and len(told[name]) == 1 else _hashed(name, text)
+        for name, text in zip(plain, whole, strict=True)
+    ]
+
+
+def _hashed(name: str, text: str) -> str:
+    """A name that is short and that no other run has."""
+    return f"{name[: LONGEST_NAME // 2]}-{hashlib.sha256(text.encode()).hexdigest()[:8]}"

@@ -1,0 +1,174 @@
+"""``fretscale sweep``: check all runs, run them, and write the table, the summary and the figures.
+
+All is taken up where an earlier call was interrupted: the runs are found again by their folders.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import time
+from collections.abc import Iterable, Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+from workflow.case import CaseError
+from workflow.errors import UserError
+from workflow.reporter import Reporter
+from workflow.runs import Finished, Job, kept_in, run_jobs
+from workflow.store import replacing
+from workflow.sweep.design import Run, runs_of
+from workflow.sweep.schema import Sweep, load_sweep
+from workflow.sweep.table import Row, columns_of, spread, unit_of, varied_in, write_table
+from workflow.versions import versions
+
+# A copy of the file marks the folder as that of a sweep.
+FILE, RUNS, TABLE, SUMMARY, LOG = "sweep.yaml", "runs", "sweep.csv", "summary.json", "sweep.log"
+FIGURES = "figures"
+# Lines about cases that cannot be run; the same mistake mostly is in many of them.
+MOST_LINES = 10
+
+
+def run_sweep(
+    path: Path, out: Path, *, processes: int | None, dask: str | None, force: bool
+) -> bool:
+    """Run the sweep in file ``path`` into ``out``; False if any of its runs failed.
+
+    Raises CaseError, before anything runs, if the file or the case of any run is wrong, and
+    UserError if ``out`` has something else, or runs of another case and ``force`` is not given.
+    """
+    sweep = load_sweep(path)
+    runs = runs_of(sweep)
+    _check_folder(out)
+    finished = _check_runs(sweep, runs, out / RUNS, force)
+    (out / RUNS).mkdir(parents=True, exist_ok=True)
+    with replacing(out / FILE) as partial:
+        partial.write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
+    reporter = Reporter(out / LOG, append=True)
+    try:
+        reporter.say(f"sweep: {len(runs)} runs of {sweep.file.case}, {finished} finished before")
+        rows = _run(sweep, runs, out, processes, dask, reporter)
+        with reporter.stage("figures"):
+            _write_figures(sweep, rows, out)
+        _write_summary(sweep, rows, out)
+        failed = sum(not row.done for row in rows)
+        reporter.say(f"{len(rows) - failed} runs done, {failed} failed: {out / TABLE}")
+    finally:
+        reporter.close()
+    return failed == 0
+
+
+def _check_folder(out: Path) -> None:
+    if out.exists() and not out.is_dir():
+        raise UserError(f"{out}: is a file; give a folder to --out")
+    if out.is_dir() and any(out.iterdir()) and not (out / FILE).exists():
+        raise UserError(f"{out}: not empty and no sweep of fretscale; give another folder")
+
+
+def _check_runs(sweep: Sweep, runs: Sequence[Run], out: Path, force: bool) -> int:
+    """Load the case of every run and look at its folder; how many are finished."""
+    wrong: dict[str, None] = {}
+    states = []
+    for run in {run.name: run for run in runs}.values():
+        try:
+            case = run.job(sweep).load()
+        except CaseError as error:
+            wrong |= dict.fromkeys(_explained(sweep, run.job(sweep), str(error)))
+            continue
+        states.append(kept_in(out / run.name, case))
+        if states[-1] == "other" and not force:
+            raise UserError(
+                f"{out / run.name}: holds a run of another case; give another folder, or --force"
+            )
+    if wrong:
+        more = [f"and {len(wrong) - MOST_LINES} more like these"] if len(wrong) > MOST_LINES else []
+        raise CaseError("\n".join([*list(wrong)[:MOST_LINES], *more]))
+    return states.count("finished")
+
+
+def _explained(sweep: Sweep, job: Job, text: str) -> Iterator[str]:
+    """Lines about a case; what the sweep gives it is told with its place in the sweep's file."""
+    given = {f"--set {override}: ": override.partition("=")[0] for override in job.overrides}
+    for line in text.splitlines():
+        start = next((start for start in given if line.startswith(start)), "")
+        unknown = re.search(r":\d+: (\S+): unknown key", line)
+        if start:
+            yield f"{sweep.place(given[start])}: {line.removeprefix(start)}"
+        elif unknown and (path := _below(unknown[1], given.values())):
+            yield f"{sweep.place(path)}: {line[unknown.start(1) :]}"
+        else:
+            yield line
+
+
+def _below(section: str, paths: Iterable[str]) -> str:
+    """What is given below a section that the case has not but for that; "" if nothing is."""
+    return next((path for path in paths if path.startswith(f"{section}.")), "")
+
+
+def _run(
+    sweep: Sweep,
+    runs: Sequence[Run],
+    out: Path,
+    processes: int | None,
+    dask: str | None,
+    reporter: Reporter,
+) -> list[Row]:
+    """Run all there are, each once; the table is written of those that have ended, come what may.
+
+    A sample may draw the same run twice, which then has two rows.
+    """
+    jobs = {run.name: run.job(sweep) for run in runs}
+    ended: dict[str, Finished] = {}
+    begin = time.perf_counter()
+
+    def report(finished: Finished) -> None:
+        ended[finished.job.name] = finished
+        how = f"failed: {finished.error}" if finished.error else "done"
+        spent = time.perf_counter() - begin
+        reporter.say(f"  {len(ended)}/{len(jobs)}, {spent:.0f} s: {finished.job.name}: {how}")
+
+    try:
+        run_jobs(list(jobs.values()), out / RUNS, processes=processes, dask=dask, report=report)
+    finally:
+        rows = [Row(run, ended[run.name]) for run in runs if run.name in ended]
+        if rows:
+            write_table(rows, out / TABLE)
+    return rows
+
+
+def _write_summary(sweep: Sweep, rows: list[Row], out: Path) -> None:
+    found = columns_of(rows)
+    summary = {
+        "title": _title(sweep, rows),
+        "case": os.path.relpath(sweep.file.case, out),
+        "design": sweep.file.design,
+        "varied": [own.path for own in varied_in(rows)],
+        "runs": len(rows),
+        "failed": {row.run.name: row.finished.error for row in rows if not row.done},
+        "found": {
+            name: {"unit": unit_of(name, rows), **told}
+            for name, values in found.items()
+            if (told := spread(values)) is not None
+        },
+        "seconds": round(sum(row.seconds or 0.0 for row in rows), 2),
+        "versions": versions(),
+    }
+    with replacing(out / SUMMARY) as partial:
+        partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+
+
+def _title(sweep: Sweep, rows: Sequence[Row]) -> str:
+    """Of the sweep, or else of its first run's case."""
+    if sweep.file.title is not None:
+        return sweep.file.title
+    titles: list[Any] = [row.finished.summary["title"] for row in rows if row.finished.summary]
+    return str(titles[0]) if titles else sweep.name
+
+
+def _write_figures(sweep: Sweep, rows: list[Row], out: Path) -> None:
+    if not any(row.done for row in rows):
+        return
+    from workflow.figures.sweep import write_sweep_figures
+
+    write_sweep_figures(_title(sweep, rows), rows, out / FIGURES)

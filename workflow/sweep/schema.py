@@ -1,0 +1,306 @@
+"""The file of a sweep: which case, which of its entries vary, and how they are combined."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, ValidationError, create_model, model_validator
+
+from workflow.case import CaseError, units
+from workflow.case.explain import lines_about
+from workflow.case.fields import Entry, File, Whole, shown
+from workflow.case.sections import Section, Title, disagreement, entry
+from workflow.case.source import Source, read_text
+from workflow.case.writing import scalar
+
+# Beyond it a sweep is a slip of the pen: a run takes seconds at least.
+MOST_RUNS = 10_000
+# Of what is computed from a range or a distribution: what the table says is what was run.
+SIGNIFICANT = 6
+
+
+@dataclass(frozen=True)
+class Amount:
+    """A number and the unit it was written with, "" for none."""
+
+    number: float
+    unit: str = ""
+
+    @property
+    def written(self) -> int | float | str:
+        """As one would write it into a case."""
+        if self.unit:
+            return f"{self.number:.{SIGNIFICANT}g} {self.unit}"
+        return int(self.number) if self.number.is_integer() else self.number
+
+    def over(self, unit: str) -> float:
+        """As a multiple of ``unit``; "" is the base unit, as a case has it."""
+        if unit == self.unit:
+            return self.number
+        sizes = [units.to_base(f"1 {name}", None) if name else 1.0 for name in (self.unit, unit)]
+        return self.number * sizes[0] / sizes[1]
+
+    def with_number(self, number: float) -> Amount:
+        """Another number of the same unit, rounded."""
+        return Amount(float(f"{number:.{SIGNIFICANT}g}"), self.unit)
+
+
+def amount_of(value: object) -> Amount | None:
+    """A value of an entry as a number with its unit; None if it is no number."""
+    if isinstance(value, str):
+        try:
+            number, unit = units.split(value)
+            units.to_base(value, None)
+        except (units.UnitError, ArithmeticError):
+            return None
+        return Amount(float(number), unit)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return None
+    return Amount(float(value)) if math.isfinite(value) else None
+
+
+@dataclass(frozen=True)
+class Quantity(Entry):
+    """A number with or without a unit; that the unit suits is for the case to say."""
+
+    positive: bool = False
+
+    @property
+    def allowed(self) -> str:
+        return f"a {'positive ' if self.positive else ''}number, with a unit where the case has one"
+
+    def parse(self, value: object) -> Amount:
+        amount = value if isinstance(value, Amount) else amount_of(value)
+        if amount is None:
+            raise self.refusal(value, "not a number with a known unit")
+        if self.positive and amount.number <= 0.0:
+            raise self.refusal(value, "out of range")
+        return amount
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"anyOf": [{"type": "number"}, {"type": "string"}]}
+
+
+@dataclass(frozen=True)
+class Value(Entry):
+    """Whatever a leaf of a case can be."""
+
+    @property
+    def allowed(self) -> str:
+        return "a number, text, a switch, or a list of them"
+
+    def parse(self, value: object) -> Any:
+        if isinstance(value, list | tuple) and value:
+            return tuple(self.parse(item) for item in value)
+        if isinstance(value, bool | str):
+            return value
+        if isinstance(value, int | float) and math.isfinite(value):
+            return value
+        raise self.refusal(value, "not the value of an entry")
+
+    def json_schema(self) -> dict[str, Any]:
+        return {}
+
+
+AnyAmount = Annotated[Amount, Quantity()]
+PositiveAmount = Annotated[Amount, Quantity(positive=True)]
+AnyValue = Annotated[Any, Value()]
+Scale = Literal["linear", "log"]
+
+
+class _Between(Section):
+    """Base of what lies between two ends; ``from`` is a word of Python, hence their making."""
+
+    @property
+    def ends(self) -> tuple[Amount, Amount]:
+        """First and last, of one unit."""
+        return getattr(self, "from"), getattr(self, "to")  # noqa: B009
+
+    @model_validator(mode="after")
+    def _one_unit(self) -> _Between:
+        _require_one_unit(self, "from", "to")
+        return self
+
+
+class _Range(_Between):
+    """Evenly spaced values."""
+
+    count: Annotated[int, Whole(2, MOST_RUNS)] | None = entry(
+        "number of values, both ends included; not for design: sample", 5, default=None
+    )
+    scale: Scale = entry("linear, or log for equal ratios", "linear", default="linear")
+
+    @model_validator(mode="after")
+    def _positive_on_a_log_scale(self) -> _Range:
+        first, last = self.ends
+        if self.scale == "log" and not (first.number > 0.0 and last.number > 0.0):
+            raise disagreement(
+                "log between ends that are not both positive; allowed: linear, or positive ends",
+                "scale",
+            )
+        return self
+
+
+class _Uniform(_Between):
+    """Every value between two ends is as likely."""
+
+    kind: Literal["uniform"] = entry("of the distribution", "uniform")
+
+
+_FIRST = {"from": (AnyAmount, entry("first value", "20 mm"))}
+_LAST = {"to": (AnyAmount, entry("last value", "40 mm"))}
+Range = create_model("Range", __base__=_Range, **_FIRST, **_LAST)  # type: ignore[call-overload]
+Uniform = create_model("Uniform", __base__=_Uniform, **_FIRST, **_LAST)  # type: ignore[call-overload]
+
+
+class Normal(Section):
+    """Normal distribution; its tails go on without end, and a case may refuse what they bring."""
+
+    kind: Literal["normal"] = entry("of the distribution", "normal")
+    mean: AnyAmount = entry("of the values", "30 mm")
+    deviation: PositiveAmount = entry("standard deviation of the values", "1 mm")
+
+    @model_validator(mode="after")
+    def _one_unit(self) -> Normal:
+        _require_one_unit(self, "mean", "deviation")
+        return self
+
+
+class LogNormal(Section):
+    """Logarithms are normal: 68 % of the values are within ``factor`` of the median."""
+
+    kind: Literal["lognormal"] = entry("of the distribution", "lognormal")
+    median: PositiveAmount = entry("half of the values are below it", "1e4 um^3/J")
+    factor: Annotated[float, Field(gt=1.0)] = entry(
+        "exp of the standard deviation of the logarithms [1]", 1.3
+    )
+
+
+def _require_one_unit(section: Section, one: str, other: str) -> None:
+    first, second = getattr(section, one), getattr(section, other)
+    if first.unit != second.unit:
+        raise disagreement(
+            f"{shown(second.written)} beside {shown(first.written)}; allowed: the same unit",
+            other,
+        )
+
+
+Distribution = Annotated[Uniform | Normal | LogNormal, Field(discriminator="kind")]
+
+
+class Variation(Section):
+    """What one entry of the case is given: exactly one of values, range and distribution."""
+
+    values: tuple[AnyValue, ...] | None = entry(
+        "list of them", [0.3, 0.4], default=None, min_length=1
+    )
+    range: Range | None = entry("evenly spaced values", default=None)
+    distribution: Distribution | None = entry("for design: sample", default=None)
+
+    @model_validator(mode="after")
+    def _one_of_them(self) -> Variation:
+        keys = "values", "range", "distribution"
+        given = [key for key in keys if getattr(self, key) is not None]
+        if len(given) != 1:
+            wrong = " and ".join(given) or "nothing"
+            raise disagreement(f"{wrong} given; allowed: exactly one of {', '.join(keys)}")
+        texts = [scalar(value) for value in self.values or ()]
+        twice = [text for text in texts if texts.count(text) > 1]
+        if twice:
+            raise disagreement(f"{twice[0]}: given twice; allowed: once", "values")
+        return self
+
+
+class SweepFile(Section):
+    """Runs of one case, each with other values."""
+
+    title: Title | None = entry("one line; the case's by default", "Spread of wear", default=None)
+    case: Annotated[str, File((".yaml", ".yml"))] = entry(
+        "file, as seen from the folder of this one", "dovetail_2d.yaml"
+    )
+    set: dict[str, AnyValue] = entry("entries changed in every run", default={})
+    vary: Section = entry("what each entry is given, by its dotted path in the case")
+    design: Literal["grid", "zip", "sample"] = entry(
+        "grid: every value with every other; zip: first with first, second with second; sample: "
+        "a Latin hypercube",
+        "grid",
+        default="grid",
+    )
+    samples: Annotated[int, Whole(1, MOST_RUNS)] | None = entry(
+        "number of runs, for design: sample", 50, default=None
+    )
+    seed: Annotated[int, Whole(0, 2**31)] = entry("of the sample", 0, default=0)
+
+    def variations(self) -> dict[str, Variation]:
+        """What each entry is given, by its path."""
+        return {name: getattr(self.vary, name) for name in type(self.vary).model_fields}
+
+
+@dataclass(frozen=True)
+class Sweep:
+    """The file of a sweep, read, and where its entries were written."""
+
+    name: str
+    file: SweepFile
+    source: Source
+
+    def place(self, path: str) -> str:
+        """File and line, and the entry that varies or is set."""
+        section = "set" if path in self.file.set else "vary"
+        return f"{self.source.where((section, path))[1]}: {section}.{path}"
+
+
+def load_sweep(path: Path) -> Sweep:
+    """Read the file of a sweep. Raises CaseError, a line ``file:line: key: ...`` for each thing."""
+    source = Source(str(path), read_text(path))
+    kind = _kind_of(source)
+    try:
+        file = kind.model_validate(source.data, context={"folder": str(path.parent)})
+    except ValidationError as error:
+        raise CaseError("\n".join(lines_about(source, kind, error.errors()))) from None
+    sweep = Sweep(str(path), file, source)
+    if wrong := list(_disagreements(sweep)):
+        raise CaseError("\n".join(wrong))
+    return sweep
+
+
+def _kind_of(source: Source) -> type[SweepFile]:
+    """The kind of file whose section ``vary`` has the entries that this one gives it."""
+    given = source.at(("vary",))
+    names = list(given) if isinstance(given, dict) else []
+    one: Any = {name: (Variation, entry("values, range or distribution")) for name in names}
+    vary: Any = create_model("Vary", __base__=Section, **one)
+    return create_model(
+        "SweepFile",
+        __base__=SweepFile,
+        vary=(vary, SweepFile.model_fields["vary"]),
+    )
+
+
+def _disagreements(sweep: Sweep) -> Iterator[str]:
+    """What does not go together."""
+    file, varied = sweep.file, sweep.file.variations()
+    place = sweep.source.where
+    if not varied:
+        yield f"{place(('vary',))[1]}: vary: nothing; allowed: such as friction.coefficient"
+    for name in varied.keys() & file.set.keys():
+        yield f"{place(('set', name))[1]}: set.{name}: varies as well; allowed: one of them"
+    if (file.design == "sample") != (file.samples is not None):
+        needed = "missing" if file.samples is None else f"not for design: {file.design}"
+        yield f"{place(('samples',))[1]}: samples: {needed}; allowed: with design: sample"
+    if file.design != "sample":
+        for name, own in varied.items():
+            yield from _without_sample(sweep, name, own)
+
+
+def _without_sample(sweep: Sweep, name: str, own: Variation) -> Iterator[str]:
+    """What a variation lacks where values are combined, not drawn."""
+    where = f"{sweep.place(name)}"
+    if own.distribution is not None:
+        yield f"{where}: a distribution in design: {sweep.file.design}; allowed: design: sample"
+    elif own.range is not None and own.range.count is None:
+        yield f"{where}.range.count: missing; allowed: number of values, such as 5"

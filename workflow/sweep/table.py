@@ -1,0 +1,213 @@
+"""The runs of a sweep as a table: a row each, with the numbers that its summary has."""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sa_solver.types import Array
+from workflow.runs import Finished
+from workflow.store import PER_LENGTH, replacing
+from workflow.sweep.design import Run
+from workflow.sweep.schema import Amount, amount_of
+
+DONE, FAILED = "done", "failed"
+# What wear runs tell of an interface, and the units of it.
+WEAR_UNITS = {
+    "depth": "mm",
+    "depth_1": "mm",
+    "depth_2": "mm",
+    "volume": "mm^3",
+    "volume_1": "mm^3",
+    "volume_2": "mm^3",
+    "energy": "N mm",
+    "peak_pressure.unworn": "MPa",
+    "peak_pressure.worn": "MPa",
+}
+# Of other kinds of run every number is told but these; of the states of a path the last alone.
+UNTOLD = ("seconds", "versions")
+PATH = "states"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One run: what it was given, how it ended, and what it found."""
+
+    run: Run
+    finished: Finished
+
+    @property
+    def done(self) -> bool:
+        """Whether it has come to its end."""
+        return self.finished.summary is not None
+
+    @property
+    def seconds(self) -> float | None:
+        """Its own, of all its stages."""
+        summary = self.finished.summary
+        return None if summary is None else round(sum(summary["seconds"].values()), 2)
+
+    def numbers(self) -> dict[str, float]:
+        """What it found, by path in its summary."""
+        summary = self.finished.summary
+        if summary is None:
+            return {}
+        return _wear_numbers(summary) if "kinetics" in summary else dict(_numbers(summary))
+
+
+def interfaces_of(summary: Mapping[str, Any]) -> list[str]:
+    """Names of the contacts that wear; none in other kinds of run."""
+    return [name for name in summary.get("kinetics", {}) if name != "cycles"]
+
+
+def _wear_numbers(summary: dict[str, Any]) -> dict[str, float]:
+    """The end of a wear run; depth and volume are those of both bodies together."""
+    found: dict[str, float] = {"cycles": summary["cycles"], "jumps": summary["jumps"]}
+    for name in interfaces_of(summary):
+        own = summary[name]
+        numbers = {key: own[key] for key in WEAR_UNITS if key in own}
+        numbers |= {key: own[f"{key}_1"] + own[f"{key}_2"] for key in ("depth", "volume")}
+        numbers |= {f"peak_pressure.{when}": p for when, p in own["peak_pressure"].items()}
+        found |= {f"{name}.{key}": numbers[key] for key in WEAR_UNITS}
+    return found | dict(_numbers(summary.get("work", {}), "work."))
+
+
+def _numbers(node: Any, path: str = "") -> Iterator[tuple[str, float]]:
+    """All numbers below a node with their dotted paths."""
+    if isinstance(node, dict):
+        for key, value in node.items():
+            if not path and key == PATH and value:
+                yield from _numbers(value[-1], f"{PATH}.-1.")
+            elif path or key not in UNTOLD:
+                yield from _numbers(value, f"{path}{key}.")
+    elif isinstance(node, list):
+        for index, value in enumerate(node):
+            yield from _numbers(value, f"{path}{index}.")
+    elif isinstance(node, int | float) and not isinstance(node, bool):
+        yield path.rstrip("."), node
+
+
+# --- columns ------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Varied:
+    """An entry that varies: its values as ``texts``, with the ``unit`` left out where all share it.
+
+    ``numbers`` ``(runs,)`` are in ``unit``, the first one's; None where some value is no number.
+    """
+
+    path: str
+    unit: str
+    texts: list[str]
+    numbers: Array | None
+
+    @property
+    def heading(self) -> str:
+        """Path and unit."""
+        return f"{self.path} [{self.unit}]" if self.unit else self.path
+
+
+def varied_in(rows: Sequence[Row]) -> list[Varied]:
+    """What varies over the runs, as it was written."""
+    return [_varied(path, [row.run.values[path] for row in rows]) for path in rows[0].run.values]
+
+
+def _varied(path: str, values: list[Any]) -> Varied:
+    amounts = [found for value in values if (found := amount_of(value)) is not None]
+    if len(amounts) < len(values):
+        return Varied(path, "", [_text(value) for value in values], None)
+    unit = amounts[0].unit
+    numbers = np.array([amount.over(unit) for amount in amounts])
+    if all(amount.unit == unit for amount in amounts):
+        return Varied(path, unit, [_text(amount.number) for amount in amounts], numbers)
+    return Varied(path, unit, [_text(value) for value in values], numbers)
+
+
+def _text(value: object) -> str:
+    """A value in a cell."""
+    if isinstance(value, tuple):
+        return " ".join(map(_text, value))
+    if isinstance(value, bool):
+        return str(value).lower()
+    return str(Amount(float(value)).written) if isinstance(value, int | float) else str(value)
+
+
+def columns_of(rows: Sequence[Row]) -> dict[str, Array]:
+    """All that the runs found ``(runs,)``, by path; NaN where a run has not found it."""
+    found = [row.numbers() for row in rows]
+    names = dict.fromkeys(name for numbers in found for name in numbers)
+    return {
+        name: np.array([numbers.get(name, np.nan) for numbers in found], dtype=np.float64)
+        for name in names
+    }
+
+
+def unit_of(name: str, rows: Sequence[Row]) -> str:
+    """Unit of a column of a wear run; "" where it goes without saying."""
+    unit = WEAR_UNITS.get(name.partition(".")[2], "")
+    per_length = {bool(s["per_length"]) for row in rows if (s := row.finished.summary) and unit}
+    both = {False: unit, True: PER_LENGTH.get(unit, unit)}
+    return " or ".join(dict.fromkeys(both[line] for line in sorted(per_length)))
+
+
+# --- the file -----------------------------------------------------------------------------------
+
+
+def write_table(rows: Sequence[Row], path: Path) -> None:
+    """Write the table as CSV: name, what varies, how the run ended, and what it found.
+
+    Numbers are in base units, with all their digits; cells of a run that failed are empty.
+    """
+    varied, found = varied_in(rows), columns_of(rows)
+    units = {name: unit_of(name, rows) for name in found}
+    text = io.StringIO(newline="")
+    writer = csv.writer(text, lineterminator="\n")
+    headings = [f"{name} [{unit}]" if unit else name for name, unit in units.items()]
+    ends = "status", "message", "seconds"
+    writer.writerow(["name", *map(_heading, varied), *ends, *headings])
+    for number, row in enumerate(rows):
+        cells = [column[number] for column in found.values()]
+        writer.writerow(
+            [
+                row.run.name,
+                *(own.texts[number] for own in varied),
+                DONE if row.done else FAILED,
+                row.finished.error,
+                "" if row.seconds is None else row.seconds,
+                *("" if np.isnan(cell) else _cell(cell) for cell in cells),
+            ]
+        )
+    with replacing(path) as partial:
+        partial.write_text(text.getvalue(), encoding="utf-8")
+
+
+def _heading(varied: Varied) -> str:
+    """The path, with the unit unless the cells have it."""
+    cells_have_it = any(varied.unit and varied.unit in text for text in varied.texts)
+    return varied.path if cells_have_it else varied.heading
+
+
+def _cell(number: float) -> str:
+    """The shortest text that reads back as the number."""
+    return str(int(number)) if number.is_integer() and abs(number) < 1e15 else repr(float(number))
+
+
+def spread(values: Array) -> dict[str, float] | None:
+    """How values spread over the runs; None where no run has found one."""
+    known = values[np.isfinite(values)]
+    if not known.size:
+        return None
+    names = "least", "quartile_1", "median", "quartile_3", "largest"
+    quantiles = np.quantile(known, [0.0, 0.25, 0.5, 0.75, 1.0]).tolist()
+    return {
+        **dict(zip(names, quantiles, strict=True)),
+        "mean": float(known.mean()),
+        "deviation": float(known.std(ddof=1)) if known.size > 1 else 0.0,
+    }
