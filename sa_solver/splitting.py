@@ -40,6 +40,10 @@ GRAM_CUTOFF = 1e-13
 """Eigenvalues of the scaled Gram matrix below this are rounding, since it squares the differences:
 their directions are left out of the least-squares problem."""
 
+RETURN_GROWTH = 10.0
+"""An extrapolation to a residual so many times the least so far is taken back: it may have thrown
+a body off its contacts, where it would float on for ever. Plain steps get on, if slowly."""
+
 AT_REST = 1e-9
 """A residual that changes by less than this share of itself is that of a body in free motion, at
 constant speed until it meets something: differences are rounding, and would throw it far off."""
@@ -119,6 +123,7 @@ class AndersonMemory:
         self._depth = depth
         self._last_image = self._last_residual = np.empty(0)
         self._last_norm = 0.0
+        self._least_norm, self._least_image = np.inf, np.empty(0)
         self._seen = 0
 
     def next_state(self, state: Array, residual: Array) -> Array:
@@ -129,6 +134,11 @@ class AndersonMemory:
             return image
         if self._seen == 0:
             self._unit = max(norm, TINY)
+        if norm < self._least_norm:
+            self._least_norm, self._least_image = norm, image
+        elif norm > RETURN_GROWTH * self._least_norm:
+            self._seen, self._least_norm = 0, np.inf
+            return self._least_image
         if self._seen > 0 and norm > RESTART_GROWTH * self._last_norm:
             self._seen = 0
         accelerated = self._accelerate(image, residual) if self._seen > 0 else image

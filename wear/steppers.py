@@ -4,16 +4,19 @@ A stepper advances the surfaces of one interface by at most so many cycles, give
 cycle on any surfaces. Explicit steps keep below their stability limit; implicit ones, and those of
 second order, are as long as the caller says or as an error estimate allows.
 
-An implicit step errs by ½ ΔN (r₁ - r₀), r being the depth per cycle at the pressures (and slips) of
-its two ends. What came before and what it adds are both pressed away in part by wear itself, the
-short waves first (:meth:`wear.stepping.WearingContact.lasting`; Shampine & Baca 1984,
-doi:10.1007/BF01934907). So the estimated error of the depth is carried from step to step. On a
-rounded flat under nine loads it came within 25 % of the true one, in root mean square, from runs
-of 4 steps to runs of 140; without damping it was ten times too large. Steps of second order are
-measured by the error of a first-order step between the same ends, which is more than their own.
+An implicit step errs by what it wears more than ½ ΔN (r₀ + r₁), r being the depth per cycle at the
+pressures (and slips) of its two ends. What came before and what it adds are both pressed away in
+part by wear itself, the short waves first: see :meth:`wear.stepping.WearingContact.lasting` and
+Shampine & Baca 1984, doi:10.1007/BF01934907. So the estimated error of the depth is carried from
+step to step. In root mean square it came within 25 % of the true one on a rounded flat under nine
+loads, from runs of 4 steps to runs of 140, and without damping was ten times too large. On another
+under three it told 0.6 % for 0.6 %, 0.3 % for 0.4 % and, in long runs of short steps, 0.08 % for
+0.23 %: edges that are pressed part of the time are damped less. Steps of second order are measured
+by the error of a first-order step between the same ends.
 
 Errors count by their root mean square over the worn cells: the few at a moving contact edge are
-worn by jumps however short the steps, and say little about depth or volume.
+worn by jumps however short the steps, and say little about depth or volume. The volume counts for
+itself, undamped: where slip follows from wear, as in partial slip, no pressure corrects it.
 """
 
 from __future__ import annotations
@@ -33,6 +36,10 @@ and steps may grow eightfold from one to the next."""
 
 GROWTH, SHRINKAGE, SAFETY = 8.0, 0.2, 0.8
 """Bounds of one change of an automatic step, and the share of its room that it aims at."""
+
+SHORTEST = 0.01
+"""Steps so short, over the explicit limit, are not tried again: something other than their length
+is wrong."""
 
 LEAST_ROOM = 0.1
 """Share of the tolerance that a step may always fill: errors carried along die out by themselves,
@@ -79,12 +86,11 @@ class ErrorControl:
     absolute: float | None = None
 
     def tolerance(self, depth: Array, expected: Array) -> float:
-        """The bound for a contact worn to ``depth`` in a run that is ``expected`` to end deeper."""
-        bounds = [np.inf]
-        if self.relative is not None:
-            bounds.append(self.relative * root_mean_square(expected, depth))
-        if self.absolute is not None:
-            bounds.append(self.absolute)
+        """The bound for a contact worn to ``depth``, as a share of the one ``expected`` to come."""
+        scale = root_mean_square(expected, depth)
+        bounds = [np.inf if self.relative is None else self.relative]
+        if self.absolute is not None and scale > 0.0:
+            bounds.append(self.absolute / scale)
         return min(bounds)
 
 
@@ -108,8 +114,8 @@ class Implicit:
             return contact.implicit_step(state, cycles)
 
         def error(step: WearStep) -> Array:
-            change = contact_at(step.state).rate(step.state) - rate
-            return 0.5 * step.cycles * change
+            ends = 0.5 * (rate + contact_at(step.state).rate(step.state))
+            return step.state.surfaces.depth - state.surfaces.depth - step.cycles * ends
 
         return _estimated(_Attempts(contact, attempt, error), self.control, state, most, left)
 
@@ -159,35 +165,61 @@ class _Attempts:
 def _estimated(
     own: _Attempts, control: ErrorControl | None, state: WearState, most: float, left: float
 ) -> WearStep:
-    """A step with the error of the depth after it, tried again shorter until ``control`` agrees.
-
-    One below the explicit limit is not worth trying again.
-    """
-    shortest = own.contact.stable_cycles(state)
+    """A step with the error of the depth after it, tried again shorter until ``control`` agrees."""
+    shortest = SHORTEST * own.contact.stable_cycles(state)
     cycles = most if control is None else min(most, state.next_cycles)
     solves = convolutions = 0
     while True:
         step = own.attempt(cycles)
         solves, convolutions = solves + step.contact_solves, convolutions + step.convolutions
-        carried = own.contact.lasting(state.error, state, cycles)
-        added = own.contact.lasting(own.error(step), state, cycles)
-        proposed, fits = cycles, True
+        raw = own.error(step)
+        carried, added = (own.contact.lasting(e, state, cycles) for e in (state.error, raw))
+        fits, proposed = True, cycles
         if control is not None:
-            depth = step.state.surfaces.depth
-            expected = depth + (depth - state.surfaces.depth) * max(left / cycles - 1.0, 0.0)
-            tolerance = control.tolerance(depth, expected)
-            size, room = root_mean_square(added, depth), LEAST_ROOM * tolerance
-            total = root_mean_square(carried + added, depth)
-            fits = total <= tolerance or size <= room or cycles <= shortest
-            # Errors of different steps lie in different places: their squares add up.
-            free = tolerance**2 - root_mean_square(carried, depth) ** 2
-            room = max(room, np.sqrt(max(free, 0.0)))
-            change = np.sqrt(SAFETY * room / size) if size > 0.0 else GROWTH
+            fits, change = _judged(control, state, step, left, carried, added, raw)
             proposed = max(cycles * float(np.clip(change, SHRINKAGE, GROWTH)), shortest)
-        if fits:
-            after = replace(step.state, error=carried + added, next_cycles=proposed)
+        if fits or cycles <= shortest:
+            volume_error = state.volume_error + float(raw.sum()) * own.contact.grid.cell_area
+            after = replace(
+                step.state,
+                error=carried + added,
+                volume_error=volume_error,
+                next_cycles=proposed,
+            )
             return replace(step, state=after, contact_solves=solves, convolutions=convolutions)
-        cycles = proposed
+        cycles = max(min(proposed, 0.5 * cycles), shortest)
+
+
+def _judged(
+    control: ErrorControl,
+    state: WearState,
+    step: WearStep,
+    left: float,
+    carried: Array,
+    added: Array,
+    raw: Array,
+) -> tuple[bool, float]:
+    """Whether a step's error will do, and the change of length that fills what it may be.
+
+    ``carried`` and ``added`` are what is left of the error before and of the step's own ``raw``
+    one. Wear presses no error of the volume away: of that each step gets its share.
+    """
+    depth = step.state.surfaces.depth
+    worn = depth - state.surfaces.depth
+    expected = depth + worn * max(left / step.cycles - 1.0, 0.0)
+    tolerance = control.tolerance(depth, expected)
+    bound = tolerance * root_mean_square(expected, depth)
+    before, size, total = (root_mean_square(e, depth) for e in (carried, added, carried + added))
+    # Errors of different steps lie in different places: their squares add up.
+    room = max(LEAST_ROOM * bound, np.sqrt(max(bound**2 - before**2, 0.0)))
+    volume, volume_room = abs(float(raw.sum())), tolerance * float(worn.sum())
+    fits = (total <= bound or size <= LEAST_ROOM * bound) and volume <= volume_room
+    changes = [GROWTH]
+    if size > 0.0:
+        changes.append(np.sqrt(SAFETY * room / size))
+    if volume > 0.0:
+        changes.append(SAFETY * volume_room / volume)
+    return fits, min(changes)
 
 
 @dataclass(frozen=True)

@@ -103,7 +103,8 @@ class WearState:
     ``energy`` is what the contact has dissipated so far [N mm]; ``depth_rate`` the largest depth
     [mm] and ``volume_rate`` the volume of both bodies [mm³] worn per cycle of the last step;
     ``starts`` the contact solver's, by increment; ``error`` ``(nx, ny)`` the estimated error of the
-    depth of both bodies [mm]; ``next_cycles`` how far an automatic step would go next.
+    depth of both bodies [mm] and ``volume_error`` that of their volume [mm³]; ``next_cycles`` how
+    far an automatic step would go next.
     """
 
     surfaces: Surfaces
@@ -112,12 +113,13 @@ class WearState:
     volume_rate: float
     starts: Starts
     error: Array
+    volume_error: float
     next_cycles: float
 
     @classmethod
     def unworn(cls, gap: Array) -> WearState:
         """Before the first cycle, at the gap ``(nx, ny)`` [mm] of the unloaded bodies."""
-        return cls(Surfaces.unworn(gap), 0.0, 0.0, 0.0, {}, np.zeros_like(gap), np.inf)
+        return cls(Surfaces.unworn(gap), 0.0, 0.0, 0.0, {}, np.zeros_like(gap), 0.0, np.inf)
 
 
 @dataclass(frozen=True)
@@ -145,7 +147,7 @@ class WearingContact:
         cycle: SlidingCycle,
         tolerance: float,
     ) -> None:
-        self.contact = contact
+        self.contact, self.grid = contact, contact.grid
         self._laws = laws
         self._friction = friction
         self._cycle = cycle
@@ -176,7 +178,7 @@ class WearingContact:
         In mm/MPa and mean cycle. Laws that change with energy are told that of the state, and
         that expected after so many cycles at its pressures.
         """
-        surfaces, area = state.surfaces, self.contact.grid.cell_area
+        surfaces, area = state.surfaces, self.grid.cell_area
         work_1, work_2 = (cycles * work for work in self._work(state.starts))
         energies = state.energy, state.energy + float(work_2.sum()) * area
         ends = (
@@ -203,7 +205,7 @@ class WearingContact:
     def rate(self, state: WearState) -> Array:
         """Depth of both bodies per mean cycle ``(nx, ny)`` [mm] at the state's last pressures."""
         per_pressure = np.add(*self.depth_per_pressure(state))
-        rate = np.zeros(self.contact.grid.shape)
+        rate = np.zeros(self.grid.shape)
         for t, start in state.starts.items():
             rate += per_pressure[t] * start.pressure
         return rate
@@ -230,7 +232,7 @@ class WearingContact:
         """
         per_pressure = np.add(*self.depth_per_pressure(state)).sum(axis=0)
         compliance = cycles * float(per_pressure.max())
-        half_space, shape = self.contact.half_space, self.contact.grid.shape
+        half_space, shape = self.contact.half_space, self.grid.shape
         symbol = half_space.symbol(Z, Z)
         transform = half_space.transform(shape, half_space.padded, 1)
         damping = SpectralFilter(transform, [[symbol / (symbol + compliance)]])
@@ -256,7 +258,7 @@ class WearingContact:
         worn = Surfaces.unworn(state.surfaces.initial_gap)
         for t, own in states.items():
             worn = self._worn(worn, t, own.pressure, (wear_1, wear_2))
-            energy[t] = self._dissipated(t, own.pressure).sum() * self.contact.grid.cell_area
+            energy[t] = self._dissipated(t, own.pressure).sum() * self.grid.cell_area
         return CycleResult(states, energy, worn.depth_1, worn.depth_2)
 
     # -- steps ----------------------------------------------------------------------------------
@@ -347,7 +349,7 @@ class WearingContact:
 
     def _work(self, starts: Starts) -> tuple[Array, Array]:
         """Energy per area of both bodies' surfaces and mean cycle, at the given pressures."""
-        unworn = Surfaces.unworn(np.zeros(self.contact.grid.shape))
+        unworn = Surfaces.unworn(np.zeros(self.grid.shape))
         work_1, work_2 = unworn.work_1, unworn.work_2
         for t, start in starts.items():
             work = self._dissipated(t, start.pressure)
@@ -393,7 +395,7 @@ class _March:
         """The step taken."""
         before, after = self._before.surfaces, self.surfaces
         lost = after.depth_1 - before.depth_1, after.depth_2 - before.depth_2
-        area = self._contact.contact.grid.cell_area
+        area = self._contact.grid.cell_area
         state = replace(
             self._before,
             surfaces=after,

@@ -18,7 +18,7 @@ from workflow.store import read_arrays, write_arrays
 # Columns of the kinetics of one interface.
 KINETICS = ("depth_1", "depth_2", "volume_1", "volume_2", "energy")
 # Numbers of the state of one interface.
-SCALARS = ("energy", "depth_rate", "volume_rate", "next_cycles")
+SCALARS = ("energy", "depth_rate", "volume_rate", "volume_error", "next_cycles")
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from fe_models.transfer import FaceTransfer
 from workflow.case import DovetailCase
 from workflow.dovetail_model import DovetailModel
 from workflow.errors import MethodFailed
-from workflow.fidelity import Decision
+from workflow.fidelity.decision import Decision
 from workflow.structure_stage import StructureStage
 from workflow.uniformity import sections
 
@@ -22,6 +22,8 @@ NODES_ACROSS = 8
 ROWS_PER_WIDTH = 3
 # A flank that carries or dissipates less than this share of the other's is measured by that share.
 LESSER_FLANK = 0.1
+# The most that two dimensions may use of the accuracy: the other approximations need some of it.
+MOST_USED = 0.9
 
 Numbers = dict[str, dict[str, float]]  # by interface and quantity
 
@@ -47,10 +49,13 @@ def choose_dimension(case: DovetailCase) -> Decision:
     probe = {"two": values[2], "three": values[3], "differences": differences}
     text = (
         f"in a coarse probe of mid-slot two dimensions differ from three by at most {largest:.1%} "
-        f"({quantity} on the {flank}); asked for: {case.accuracy:.1%}; "
+        f"({quantity} on the {flank}); allowed: {MOST_USED * case.accuracy:.1%}; "
         "the ends of the slot, which may wear more, are left out"
     )
-    return Decision(ENTRY, 2 if largest <= case.accuracy else 3, text, probe)
+    allowed = MOST_USED * case.accuracy
+    if largest > allowed:
+        return Decision(ENTRY, 3, text, probe, allowed=allowed, error=0.0)
+    return Decision(ENTRY, 2, text, probe, allowed=allowed, error=largest)
 
 
 def _mid_slot(case: DovetailCase, dimension: int) -> Numbers:

@@ -313,7 +313,7 @@ def _interface_summary(outcome: Outcome, number: int) -> dict[str, Any]:
             "structure": loads.mean_energy,
         },
         **({"by_increment": comparison_summary(first.cycle, loads)} if first.cycle else {}),
-        "depth_error": _depth_error(outcome, number),
+        "step_error": _step_error(outcome, number),
         "contact_residual": first.largest_residual,
         "convolutions": first.spent.convolutions,
         "linear_regime": {
@@ -335,14 +335,20 @@ def _regime_summary(regime: LinearRegime) -> dict[str, Any]:
     }
 
 
-def _depth_error(outcome: Outcome, number: int) -> float | None:
-    """Estimated error of the depth by wear steps, root mean square, relative; None if unknown."""
-    if outcome.case.wear.step.kind == "explicit":
-        return None
+def _step_error(outcome: Outcome, number: int) -> dict[str, float] | None:
+    """Estimated errors by wear steps of depth (root mean square) and volume, relative.
+
+    None where they are unknown or nothing is worn.
+    """
     own = outcome.state.interfaces[number]
     depth = own.surfaces.depth
-    size = root_mean_square(depth, depth)
-    return root_mean_square(own.error, depth) / size if size > 0.0 else 0.0
+    if outcome.case.wear.step.kind == "explicit" or not depth.any():
+        return None
+    volume = float(depth.sum()) * outcome.stages[number].grid.cell_area
+    return {
+        "depth": root_mean_square(own.error, depth) / root_mean_square(depth, depth),
+        "volume": abs(own.volume_error) / volume,
+    }
 
 
 def _slip_per_cycle(unworn: FaceLoads, first: FirstContact) -> float:

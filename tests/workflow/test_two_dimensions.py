@@ -19,6 +19,7 @@ from workflow.case import dump_case, load_case
 from workflow.contact_stage import ContactStage, StageSettings
 from workflow.dimension import choose_dimension
 from workflow.errors import MethodFailed
+from workflow.fidelity import axes
 from workflow.figures.style import STYLE
 from workflow.figures.wear import FIGURES, figures_of
 from workflow.folder import OutputFolder
@@ -251,6 +252,12 @@ def test_sentence_of_a_uniform_slot():
 # --- Who chooses -----------------------------------------------------------------------------
 
 
+@pytest.fixture
+def dimension_only(monkeypatch):
+    """The other axes leave the case as it is."""
+    monkeypatch.setattr(axes, "AXES", ())
+
+
 def auto(path: Path, *overrides: str):
     return load_case(path, ["fidelity=auto", "structure.dimension=3", *COARSE, *overrides])
 
@@ -262,6 +269,7 @@ def test_settings_stand_as_written_unless_asked_otherwise(plane_path, dovetail_p
 
 
 @pytest.mark.parametrize(("accuracy", "dimension"), [("5 %", 2), ("3 %", 3)])
+@pytest.mark.usefixtures("dimension_only")
 def test_dimension_follows_the_accuracy(plane_path, accuracy, dimension):
     case = auto(plane_path, f"accuracy={accuracy}")
     chosen, record = fidelity.choose(case)
@@ -311,6 +319,7 @@ def test_a_probe_that_fails_decides_nothing(plane_path, monkeypatch):
     assert "no convergence" in decision.why
 
 
+@pytest.mark.usefixtures("dimension_only")
 def test_choice_is_kept_until_the_run_is_finished(plane_path, tmp_path):
     """So a run that is interrupted and resumed still knows why."""
     case, record = fidelity.choose(auto(plane_path, "structure.skew=5 deg"))
@@ -324,13 +333,14 @@ def test_choice_is_kept_until_the_run_is_finished(plane_path, tmp_path):
 
 def test_check_says_that_a_probe_decides(plane_path):
     told = invoke("check", plane_path, "--set", "fidelity=auto", "--set", "accuracy=4 %").stdout
-    assert "2-D or 3-D, by a probe: 4 %" in told
+    assert "2-D or 3-D and how fine, by probes: 4 %" in told
     fixed = invoke("check", plane_path).stdout
     assert "fidelity" not in fixed
     assert "dovetail in 2-D, 20 nodes on a flank" in fixed
     assert "128 strips" in fixed
 
 
+@pytest.mark.usefixtures("dimension_only")
 def test_run_writes_what_was_chosen_and_why(plane_path, tmp_path):
     settings = "fidelity=auto", "structure.dimension=3", "accuracy=5 %", "wear.cycles=3e4"
     run = run_case(plane_path, tmp_path / "out", *settings, *COARSE, *QUIET)

@@ -252,10 +252,12 @@ class DovetailCase(WearCase):
     nonlinearity: Nonlinearity = entry("geometric, of the structure", default=Nonlinearity())
     wear: DovetailWear = entry("law, length of the run and step")
     coupling: Coupling = entry("worn surfaces back to the structure", default=Coupling())
-    accuracy: Ratio = entry("of mid-slot values, when fidelity is auto [1]", "5 %", default=0.05)
+    accuracy: Ratio = entry(
+        "of depth and volume in mid-slot, when fidelity is auto [1]", "5 %", default=0.05
+    )
     fidelity: Literal["fixed", "auto"] = entry(
-        "fixed: as written; auto: structure.dimension 2 where a coarse probe shows it meets the "
-        "accuracy, else 3",
+        "fixed: as written; auto: dimension, increments, mesh, grid, tolerances, wear steps and "
+        "drift as coarse as probes show that the accuracy allows",
         "fixed",
         default="fixed",
     )
@@ -269,7 +271,8 @@ class DovetailCase(WearCase):
             ("load path", f"{path.increments} increments, peak at {path.peak_at}{missions}"),
         ]
         if self.fidelity == "auto":
-            rows.append(("fidelity", f"2-D or 3-D, by a probe: {100 * self.accuracy:g} %"))
+            by_probes = f"2-D or 3-D and how fine, by probes: {100 * self.accuracy:g} %"
+            rows.append(("fidelity", by_probes))
         return rows
 
     @property

@@ -25,10 +25,11 @@ TOLERANCES = 1e-3, 1e-4, 1e-5, 1e-6
 # How far the finest rung of a tolerance is beyond the case's own.
 FINER_TOLERANCE = 1e-2
 INCREMENTS = 1 / 4, 1 / 2, 1.0, 2.0
+INCREMENTS_2D = 1 / 2, 1.0, 2.0, 4.0, 8.0
 DRIFTS = 0.2, 0.1, 0.05, 0.02, 0.01
 # Condensing the structure takes about the fourth power of the refinement in 3-D.
 MESHES_3D = 0.5, 0.5**0.5, 1.0, 2.0**0.5
-MESHES_2D = 0.5, 1.0, 2.0, 4.0
+MESHES_2D = 0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0, 2.0**1.5, 4.0
 JUMPS = 5, 10, 20, 40, 80, 160
 ERRORS = 0.1, 0.03, 0.01, 3e-3, 1e-3
 EXPLICIT = 0.9, 0.45
@@ -183,15 +184,16 @@ def _histories(case: Case) -> Iterator[Rung]:
         yield Rung("reversals", ("contact.history=reversals",), branch="reversals")
         yield from _legs(case)
     else:
-        yield from _cycle(_entry(case, "load_path"))
+        finer = INCREMENTS_2D if _is_line(case) else INCREMENTS
+        yield from _cycle(_entry(case, "load_path"), finer)
 
 
-def _cycle(path: Any) -> Iterator[Rung]:
+def _cycle(path: Any, factors: Sequence[float]) -> Iterator[Rung]:
     """The loads of a wear cycle in fewer and in more increments."""
     own, peak = getattr(path, "increments", None), getattr(path, "peak_at", None)
     if own is None:
         return
-    for factor in INCREMENTS:
+    for factor in factors:
         legs = (own,) if isinstance(own, int) else own
         counts = [max(1, round(factor * count)) for count in legs]
         overrides = [f"load_path.increments={counts[0] if isinstance(own, int) else counts}"]
@@ -236,7 +238,7 @@ def _steppers(case: Case) -> Iterator[Rung]:
                 "wear.depth_tolerance=null",
             )
             branch = f"{word}, automatic"
-            yield Rung(f"{branch}, {tolerance:.1%}", overrides, tolerance, branch=branch)
+            yield Rung(f"{branch}, {100 * tolerance:g} %", overrides, tolerance, branch=branch)
         for count in JUMPS[: len(JUMPS) - coarser]:
             step = f"wear.step={{kind: {kind}, cycles: {cycles / count!r}}}"
             yield Rung(f"{word}, {count} jumps", (step,), 1.0 / count, branch=word)
@@ -249,7 +251,7 @@ def _couplings(case: Case) -> Iterator[Rung]:
     yield Rung("constant", (f"coupling={{resultants: constant, drift: {own.drift!r}}}",))
     for drift in DRIFTS:
         text = f"coupling={{resultants: drift, drift: {drift!r}}}"
-        yield Rung(f"drift of {drift:.0%}", (text,))
+        yield Rung(f"drift of {100 * drift:g} %", (text,))
     yield Rung("every jump", (f"coupling={{resultants: every, drift: {own.drift!r}}}",))
 
 

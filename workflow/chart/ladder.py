@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf, nan
 
 from workflow.chart.axes import Axis, Rung
@@ -13,6 +13,8 @@ from workflow.chart.measures import Cost
 
 # Changes of a quantity below this share of it are rounding, and no sign of convergence or its lack.
 ROUNDING = 1e-12
+# Times of the same run differ by this share on a machine that does little else.
+TIMING = 0.1
 
 
 @dataclass(frozen=True)
@@ -85,9 +87,14 @@ class Ladder:
         return next((rung for rung in self.rungs if rung.point.own), None)
 
     def cheapest(self, accuracy: float) -> Judged | None:
-        """The rung of fewest seconds whose error is at most ``accuracy`` for sure."""
+        """The rung of fewest seconds whose error is at most ``accuracy`` for sure.
+
+        Of those as quick but for what a busy machine makes of it, the one of fewest convolutions.
+        """
         met = [rung for rung in self.rungs if rung.bound <= accuracy]
-        return min(met, key=lambda rung: rung.point.cost.seconds, default=None)
+        least = min((rung.point.cost.seconds for rung in met), default=0.0)
+        quick = [rung for rung in met if rung.point.cost.seconds <= (1.0 + TIMING) * least]
+        return min(quick, key=lambda rung: rung.point.cost.convolutions, default=None)
 
     def options(self) -> list[Option]:
         """The rungs as choices, their costs over that of the case's own settings."""
@@ -103,14 +110,19 @@ def judge(
     points: Sequence[Point],
     exact: Mapping[str, float],
     failed: Mapping[str, str],
+    finest: str = "",
 ) -> Ladder:
     """Hold the points of an axis, coarse to fine, against the last of them.
+
+    Where that is a choice and not the ``finest`` rung there is, nothing is known of the errors.
 
     Quantities in ``exact`` are held against those values instead, where the axis goes to them.
     Quantities that are 0 in the reference, or that a point does not have, are left out.
     """
     shared = [q for q in points[-1].values if all(q in point.values for point in points)]
     references = {q: _reference(axis, points, q, exact) for q in shared}
+    if axis.order is None and finest not in ("", points[-1].rung.name):
+        references = {q: replace(own, floor=inf) for q, own in references.items()}
     references = {q: own for q, own in references.items() if own.value}
     errors = [_errors(point, references) for point in points]
     seconds = [point.cost.seconds for point in points]

@@ -133,6 +133,8 @@ def _table(ladder: Ladder) -> Table:
 
 def _reference(ladder: Ladder) -> str:
     """How well the references are known, for a title."""
+    if ladder.references and not isfinite(ladder.floor):
+        return " (nothing to hold the rungs against)"
     if ladder.axis.order is None or not ladder.references:
         return ""
     orders = [own.order for own in ladder.references.values() if own.order is not None]

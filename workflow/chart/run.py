@@ -258,7 +258,7 @@ def _ladder(
         )
         for rung, run in found
     ]
-    return judge(axis, points, exact, failed)
+    return judge(axis, points, exact, failed, finest=rungs[-1][0].rung.name)
 
 
 def _quantities(axis: Axis, own: _Run, picked: Sequence[str]) -> list[str]:

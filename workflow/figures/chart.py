@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import inf, isfinite
+from math import inf, isfinite, log10
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -24,6 +24,10 @@ LEGEND_COLUMNS = 4
 LEGEND_SIZE = 10
 # Errors and costs that nothing else bounds are drawn this far from the next point.
 MARGIN = 3.0
+# Names that still find room beside their marks.
+MOST_NAMES = 12
+# Rungs whose costs and errors agree to so many decimals of their logarithm are at one place.
+PLACE = 2
 # Quantities that are drawn one by one: more would hide the rungs.
 MOST_QUANTITIES = 4
 # Errors of all axes are drawn down to this share of the accuracy: less decides nothing.
@@ -63,12 +67,13 @@ def axis_figure(ladder: Ladder, accuracy: float) -> Figure:
             own = [rung for rung in ladder.rungs if rung.point.rung.branch == branch]
             label = branch if len(branches) > 1 else ""
             _draw_line(axis, own, cost, bottom, number, label or None)
-        _name_rungs(axis, ladder.rungs, cost, bottom)
+        _name_rungs(axis, _named(ladder.rungs, cost), cost, bottom)
+        _draw_own(axis, [rung for rung in ladder.rungs if rung.point.own], cost, bottom)
         _draw_frontier(axis, ladder.rungs, cost, bottom)
         _draw_floor(axis, ladder)
         if len(branches) == 1 and 1 < len(ladder.references) <= MOST_QUANTITIES:
             _draw_quantities(axis, ladder, cost)
-        _finish(axis, cost, accuracy, bottom)
+        _finish(axis, cost, accuracy, (bottom, _top([ladder], accuracy)))
     figure.axes[0].set_ylabel("largest relative error of the quantities")
     _legend(figure)
     return figure
@@ -83,12 +88,11 @@ def all_figure(chart: Chart) -> Figure:
     for axis, cost in _panels(figure, ladders):
         for number, ladder in enumerate(ladders):
             own = [rung for rung in ladder.rungs if rung.point.own]
-            shown = [*_frontier(ladder.rungs, cost), *own]
-            shown.sort(key=lambda rung: getattr(rung.point.cost, cost))
-            _draw_line(axis, shown, cost, lowest, number, ladder.axis.name)
+            _draw_line(axis, own, cost, lowest, number, None)
+            _draw_line(axis, _frontier(ladder.rungs, cost), cost, lowest, number, ladder.axis.name)
             _draw_own(axis, own, cost, lowest)
         axis.axhline(lowest, color=BLACK, lw=0.6, ls=":")
-        _finish(axis, cost, chart.accuracy, lowest)
+        _finish(axis, cost, chart.accuracy, (lowest, _top(ladders, chart.accuracy)))
     figure.axes[0].set_ylabel("largest relative error of the quantities")
     _legend(figure)
     return figure
@@ -110,6 +114,12 @@ def _bottom(ladders: Sequence[Ladder]) -> float:
     errors = [rung.error for ladder in ladders for rung in ladder.rungs]
     seen = [*errors, *(ladder.floor for ladder in ladders)]
     return min((own for own in seen if 0.0 < own < inf), default=SMALLEST * MARGIN) / MARGIN
+
+
+def _top(ladders: Sequence[Ladder], accuracy: float) -> float:
+    """Above every error."""
+    errors = [rung.error for ladder in ladders for rung in ladder.rungs if isfinite(rung.error)]
+    return MARGIN * max([accuracy, *errors])
 
 
 def _place(rung: Judged, cost: str, bottom: float) -> tuple[float, float]:
@@ -138,14 +148,28 @@ def _draw_line(
         axis.plot([], [], f"-{marker}", color=colour, ms=8, label=label)
 
 
+def _named(rungs: Sequence[Judged], cost: str) -> list[Judged]:
+    """Rungs whose names are written: all, or of many the efficient ones and those that begin."""
+    if len(rungs) <= MOST_NAMES:
+        return list(rungs)
+    first = {rung.point.rung.branch: rung.name for rung in reversed(rungs)}
+    kept = {*first.values(), *(rung.name for rung in _frontier(rungs, cost))}
+    return [rung for rung in rungs if rung.name in kept or rung.point.own]
+
+
 def _name_rungs(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> None:
-    for number, rung in enumerate(rungs):
+    """Names beside the marks; those of one place are named together."""
+    together: dict[tuple[float, ...], list[Judged]] = {}
+    for rung in rungs:
         place = _place(rung, cost, bottom)
+        together.setdefault(tuple(round(log10(own), PLACE) for own in place), []).append(rung)
+    for number, own in enumerate(together.values()):
+        names = [rung.name.removeprefix(f"{rung.point.rung.branch}, ") for rung in own]
+        text = names[0] if len(names) == 1 else f"{names[0]} to {names[-1]}"
         # Neighbours may be alike in cost and error: names go above and below in turn.
         shift = (8, 6) if number % 2 == 0 else (8, -14)
-        text = rung.name.removeprefix(f"{rung.point.rung.branch}, ")
+        place = _place(own[0], cost, bottom)
         axis.annotate(text, place, shift, textcoords="offset points", fontsize=9)
-    _draw_own(axis, [rung for rung in rungs if rung.point.own], cost, bottom)
 
 
 def _draw_own(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> None:
@@ -190,19 +214,20 @@ def _draw_quantities(axis: Axes, ladder: Ladder, cost: str) -> None:
             axis.plot(*zip(*seen, strict=True), ":", color=colour, lw=1.6, zorder=2, label=quantity)
 
 
-def _finish(axis: Axes, cost: str, accuracy: float, bottom: float) -> None:
+def _finish(axis: Axes, cost: str, accuracy: float, ends: tuple[float, float]) -> None:
+    """Scales and labels; ``ends`` are the lowest and the highest error shown."""
     from matplotlib.ticker import LogLocator
 
     axis.axhline(accuracy, color=BLACK, lw=1.0, ls="--", label=f"asked for: {100 * accuracy:g} %")
     axis.set_xscale("log")
     axis.set_yscale("log")
     axis.set_xlabel(COSTS[cost])
-    axis.set_ylim(bottom=bottom / 1.6)
+    axis.set_ylim(ends[0] / 1.6, ends[1])
     # Room for the name of the dearest rung.
     low, high = axis.get_xlim()
     high *= (high / low) ** 0.18
     axis.set_xlim(low, high)
-    axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7) if high < 20 * low else (1, 2, 5)))
+    axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7) if high < 20 * low else (1, 3)))
     axis.xaxis.set_major_formatter("{x:g}")
     axis.xaxis.set_minor_formatter("")
     axis.yaxis.set_major_formatter(lambda share, _: f"{100 * share:g} %")
