@@ -30,9 +30,9 @@ import numpy as np
 from sa_solver.types import Array
 from wear.stepping import WearingContact, WearState, WearStep
 
-FIRST_STEP = 8.0
-"""First automatic step over the explicit limit: short enough to be accepted at 1 %, if not always,
-and steps may grow eightfold from one to the next."""
+FIRST_STEP, FIRST_SHARE = 8.0, 0.1
+"""First automatic step over the explicit limit, and its largest share of the run: short enough to
+be accepted at 1 %, if not always, and steps may grow eightfold from one to the next."""
 
 GROWTH, SHRINKAGE, SAFETY = 8.0, 0.2, 0.8
 """Bounds of one change of an automatic step, and the share of its room that it aims at."""
@@ -210,16 +210,22 @@ def _judged(
     tolerance = control.tolerance(depth, expected)
     bound = tolerance * root_mean_square(expected, depth)
     before, size, total = (root_mean_square(e, depth) for e in (carried, added, carried + added))
-    # Errors of different steps lie in different places: their squares add up.
-    room = max(LEAST_ROOM * bound, np.sqrt(max(bound**2 - before**2, 0.0)))
     volume, volume_room = abs(float(raw.sum())), tolerance * float(worn.sum())
     fits = (total <= bound or size <= LEAST_ROOM * bound) and volume <= volume_room
+    # Errors of different steps lie in different places: their squares add up.
+    taken = total if fits else before
+    room = max(LEAST_ROOM * bound, np.sqrt(max(bound**2 - taken**2, 0.0)))
     changes = [GROWTH]
     if size > 0.0:
         changes.append(np.sqrt(SAFETY * room / size))
     if volume > 0.0:
         changes.append(SAFETY * volume_room / volume)
     return fits, min(changes)
+
+
+def first_cycles(contact: WearingContact, state: WearState, total: float) -> float:
+    """How far the first automatic step of a run of ``total`` cycles goes."""
+    return min(FIRST_STEP * contact.stable_cycles(state), FIRST_SHARE * total)
 
 
 @dataclass(frozen=True)

@@ -15,13 +15,13 @@ from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
 from wear.full_cycle import full_cycle
 from wear.moving import followed, passages
 from wear.steppers import (
-    FIRST_STEP,
     ErrorControl,
     Explicit,
     Implicit,
     SecondOrder,
     Stepper,
     advance,
+    first_cycles,
 )
 from wear.stepping import CycleResult, SlidingCycle, Starts, WearingContact, WearState
 from workflow.case import WearCase
@@ -89,8 +89,9 @@ class CycleTractions:
 class FirstContact:
     """What the contact of the unworn cycle says: see :class:`wear.stepping.CycleResult`.
 
-    ``energy`` ``(t,)`` [N mm]; ``pressure`` ``(t, nx, ny)`` [MPa]; ``cycle`` the states at its
-    increments where the half-space has its own friction (method full), else empty.
+    ``energy`` ``(t,)`` [N mm]; ``pressure`` ``(t, nx, ny)`` [MPa]; ``stable_cycles`` the longest
+    stable explicit step; ``cycle`` the states at its increments where the half-space has its own
+    friction (method full), else empty.
     """
 
     energy: Array
@@ -98,6 +99,7 @@ class FirstContact:
     touches_border: bool
     largest_residual: float
     spent: Spent
+    stable_cycles: float
     cycle: tuple[ContactState, ...]
 
     @property
@@ -163,23 +165,26 @@ class ContactStage:
         loaded = np.flatnonzero(history.loads.P > 0.0).tolist()
         before, wearing = self._spent, self._wearing(state)
         result = wearing.contact.cycle(state, loaded)
+        depth_rate, volume_rate = result.per_cycle(self.grid.cell_area)
+        starts = {t: own.start for t, own in result.states.items()}
+        state = replace(
+            state,
+            depth_rate=depth_rate,
+            volume_rate=volume_rate,
+            starts=starts,
+            ends=self._ends(wearing.slip, starts, history.loads),
+        )
+        first_step = first_cycles(wearing.contact, state, self._case.wear.cycles)
         states = result.states.values()
-        first = FirstContact(
+        return replace(state, next_cycles=first_step), FirstContact(
             energy=result.energy,
             pressure=self._pressure(result),
             touches_border=any(s.touches_border for s in states),
             largest_residual=max((s.residuals.largest for s in states), default=0.0),
             spent=self._spent_since(before) + Spent(len(states), result.convolutions),
+            stable_cycles=wearing.contact.stable_cycles(state),
             cycle=wearing.cycle,
         )
-        depth_rate, volume_rate = result.per_cycle(self.grid.cell_area)
-        starts = {t: own.start for t, own in result.states.items()}
-        ends = self._ends(wearing.slip, starts, history.loads)
-        state = replace(
-            state, depth_rate=depth_rate, volume_rate=volume_rate, starts=starts, ends=ends
-        )
-        first_step = FIRST_STEP * wearing.contact.stable_cycles(state)
-        return replace(state, next_cycles=first_step), first
 
     def follow(self, state: InterfaceState, history: FaceLoads) -> InterfaceState:
         """The state under the loads of a new structural solution."""

@@ -314,6 +314,7 @@ def _interface_summary(outcome: Outcome, number: int) -> dict[str, Any]:
         },
         **({"by_increment": comparison_summary(first.cycle, loads)} if first.cycle else {}),
         "step_error": _step_error(outcome, number),
+        "explicit_limit": first.stable_cycles if np.isfinite(first.stable_cycles) else None,
         "contact_residual": first.largest_residual,
         "convolutions": first.spent.convolutions,
         "linear_regime": {

@@ -19,6 +19,7 @@ from workflow.fidelity.decision import Axis, Decision, changed
 from workflow.fidelity.estimate import Numbers, estimate
 from workflow.fidelity.probe import (
     INCREMENTS,
+    STEPS,
     coupled_life,
     end_life,
     increments,
@@ -34,8 +35,9 @@ DOUBLINGS, MOST_INCREMENTS = 2, 1500
 # In space the time grows with the fourth power: a mesh is never made finer than the case has it.
 FEWEST_ELEMENTS, MOST_ELEMENTS = 7, 160
 # Cells of a contact grid along one direction: fewer hardly show a contact. In the plane so many may
-# be chosen; in space, where each doubling takes four times as long, twice those of the case.
-FEWEST_CELLS, MOST_STRIPS, FINER_SPACE = 16, 512, 2
+# be chosen; in space, where each doubling takes four times as long, twice those of the case. None
+# is coarser than the case's own by more than the last.
+FEWEST_CELLS, MOST_STRIPS, FINER_SPACE, COARSER = 16, 512, 2, 4
 # Rungs of a ladder that are probed before any is chosen: an order takes three.
 LEAST_RUNGS = 3
 # The contact solver's tolerance left at most 0.35 of itself as error of depth and volume, for
@@ -157,7 +159,7 @@ def _ends(section: DovetailCase, rung: _Rung) -> Numbers:
 
 def _climb_grid(own: int, most: int, allowed: float, worn: Callable[[_Rung], Numbers]) -> _Climb:
     """Up the halves and doubles of so many cells."""
-    sizes = _doublings(own, FEWEST_CELLS, most)
+    sizes = _doublings(own, max(FEWEST_CELLS, own // COARSER), most)
     return _climb([_Rung(size, {}) for size in sizes], worn, allowed)
 
 
@@ -230,7 +232,8 @@ def choose_drift(case: DovetailCase, allowed: float) -> Decision:
     section = plane_section(case)
     apart = life(section)
     coupled, drift = coupled_life(section)
-    effect = _effect(apart, coupled)
+    # Loads that follow at the end of a step miss half of it: of a steady drift, one step of all.
+    effect = _effect(apart, coupled) * STEPS / (STEPS - 1)
     bounded = max(LEAST_DRIFT, min(1.0, drift * allowed / effect)) if effect > 0.0 else 1.0
     settings = {"coupling.drift": bounded, "coupling.resultants": "drift"}
     error = effect if drift <= 0.0 else min(effect, effect * bounded / drift)
