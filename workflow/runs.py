@@ -26,6 +26,7 @@ def run_jobs(
     out: Path,
     *,
     processes: int | None = None,
+    alone: bool = False,
     dask: str | None = None,
     report: Report | None = None,
 ) -> list[Finished]:
@@ -34,8 +35,9 @@ def run_jobs(
     A finished run of the same case is taken as it is, an unfinished wear run goes on from its last
     jump, anything else in such a folder is run anew. A job that fails is a :class:`Finished` with
     its ``error``. Local runs share ``processes`` cores (default: all there are), of which each
-    takes as many as it has contacts; ``dask`` is the address of a scheduler to send them to
-    instead. ``report`` is told each job as it ends. Ctrl-C ends all of them; another call goes on.
+    takes as many as it has contacts; run ``alone``, one after the other, they have all cores and
+    threads as by themselves. ``dask`` is the address of a scheduler to send them to instead.
+    ``report`` is told each job as it ends. Ctrl-C ends all of them; another call goes on.
 
     Raises ValueError where two jobs would share a folder.
     """
@@ -63,7 +65,7 @@ def run_jobs(
 
         run_on_cluster([(own.job, own.case) for own in left], out, dask, end)
     else:
-        _run_here(left, out, processes or os.cpu_count() or 1, end)
+        _run_here(left, out, 1 if alone else processes or os.cpu_count() or 1, end, not alone)
     return [ended[job.name] for job in jobs]
 
 
@@ -83,7 +85,11 @@ def _check_names(jobs: Sequence[Job]) -> None:
 
 
 def _run_here(
-    jobs: Sequence[_Waiting], out: Path, cores: int, end: Callable[[Job, str], None]
+    jobs: Sequence[_Waiting],
+    out: Path,
+    cores: int,
+    end: Callable[[Job, str], None],
+    one_thread: bool,
 ) -> None:
     """Run jobs side by side, first come, first served; one that wants more cores runs alone."""
     stop = threading.Event()
@@ -95,7 +101,7 @@ def _run_here(
                 free = cores - sum(wanted for _, wanted in running.values())
                 while queue and queue[0][1] <= free:
                     job, wanted = queue.pop(0)
-                    running[pool.submit(run_job, job, out, stop.is_set)] = job, wanted
+                    running[pool.submit(run_job, job, out, stop.is_set, one_thread)] = job, wanted
                     free -= wanted
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     job, _ = running.pop(future)

@@ -107,9 +107,7 @@ def read_summary(root: Path) -> dict[str, Any]:
 
 def _as_chosen(case: Case, record: dict[str, Any] | None) -> Case:
     """The case as a run of it was claimed, after ``fidelity`` had chosen."""
-    for entry, value in (record or {}).get("chosen", {}).items():
-        case = fidelity._changed(case, entry.split("."), value)
-    return case
+    return fidelity.changed(case, (record or {}).get("chosen", {}))
 
 
 # --- in the process that computes ---------------------------------------------------------------
@@ -203,8 +201,8 @@ def _end_with_parent() -> None:
 # --- in the process that waits ------------------------------------------------------------------
 
 
-def run_job(job: Job, out: Path, unwanted: Callable[[], bool]) -> str:
-    """Compute a job in a fresh process of one thread; the error in one line, "" if none.
+def run_job(job: Job, out: Path, unwanted: Callable[[], bool], one_thread: bool = True) -> str:
+    """Compute a job in a fresh process; the error in one line, "" if none.
 
     It is ended when it is ``unwanted``. It has a process group of its own, so that Ctrl-C comes to
     whoever waits, and only there.
@@ -220,7 +218,7 @@ def run_job(job: Job, out: Path, unwanted: Callable[[], bool]) -> str:
             stderr=subprocess.PIPE,
             text=True,
             errors="replace",
-            env=os.environ | dict.fromkeys(THREAD_SETTINGS, "1"),
+            env=os.environ | (dict.fromkeys(THREAD_SETTINGS, "1") if one_thread else {}),
             start_new_session=True,
         )
         try:

@@ -156,13 +156,13 @@ def _run(
     """How the jobs ended, and why some were left out, by their name."""
     told = _Progress(len(jobs), report)
     own, *others = jobs.values()
-    ended = run_jobs([own], out, processes=1, report=told)
+    ended = run_jobs([own], out, alone=True, report=told)
     left_out = {}
     for setting in (one for rungs in settings.values() for one in rungs):
         if why := _too_long(setting, ended[0].summary or {}):
             left_out[jobs[setting.text].name] = why
     others = [job for job in others if job.name not in left_out]
-    return ended + run_jobs(others, out, processes=1, report=told), left_out
+    return ended + run_jobs(others, out, alone=True, report=told), left_out
 
 
 def _too_long(setting: Setting, own: Mapping[str, Any]) -> str:

@@ -15,7 +15,6 @@ from typing import Any
 
 from workflow.case import Case, DovetailCase
 from workflow.fidelity.decision import Axis, Decision, changed, own_value
-from workflow.fidelity.decision import _changed as _changed
 from workflow.folder import OutputFolder
 from workflow.reporter import Reporter
 
