@@ -109,8 +109,8 @@ class Passage:
             if beyond > 0:
                 raise TravelError(
                     f"the stroke carries wear {beyond} cells beyond the end of the grid along "
-                    f"{name}: make the grid longer by {2 * beyond * self.grid.pitch[axis]:.3g} mm "
-                    "or more"
+                    f"{name}: make the grid (contact.size) longer by "
+                    f"{2 * beyond * self.grid.pitch[axis]:.3g} mm or more"
                 )
 
 

@@ -8,11 +8,11 @@ An implicit step errs by what it wears more than ½ ΔN (r₀ + r₁), r being t
 pressures (and slips) of its two ends. What came before and what it adds are both pressed away in
 part by wear itself, the short waves first: see :meth:`wear.stepping.WearingContact.lasting` and
 Shampine & Baca 1984, doi:10.1007/BF01934907. So the estimated error of the depth is carried from
-step to step. In root mean square it came within 25 % of the true one on a rounded flat under nine
-loads, from runs of 4 steps to runs of 140, and without damping was ten times too large. On another
-under three it told 0.6 % for 0.6 %, 0.3 % for 0.4 % and, in long runs of short steps, 0.08 % for
-0.23 %: edges that are pressed part of the time are damped less. Steps of second order are measured
-by the error of a first-order step between the same ends.
+step to step. In root mean square it came within 50 % of the true one where that was 0.3 % or more of
+the depth, on two rounded flats under three and nine loads (without damping it was ten times too
+large); in long runs of short steps it was up to three times too small, since edges that are pressed
+part of the time are damped less. Steps of second order are measured by the error of a first-order
+step between the same ends.
 
 Errors count by their root mean square over the worn cells: the few at a moving contact edge are
 worn by jumps however short the steps, and say little about depth or volume. The volume counts for

@@ -136,7 +136,7 @@ def chart(
     overrides: tuple[str, ...],
     quantities: tuple[str, ...],
     accuracy: str,
-) -> None:
+) -> int:
     """Chart error against cost for each approximation of CASE.
 
     Each AXIS has a ladder of runs about the settings of CASE: grid, tolerance, method, stepper,
@@ -157,6 +157,7 @@ def chart(
     )
     write_chart(found, out)
     show(found)
+    return errors.DONE if found.complete else errors.MethodFailed.exit_code
 
 
 @cli.command()
@@ -229,7 +230,7 @@ def describe(file: Path, size: str | None) -> None:
 def new(kind: str, file: Path | None) -> None:
     """Write a commented case of KIND to FILE, or print it.
 
-    KIND is dovetail, mesh, resultants, specimens, bodies or line.
+    KIND is dovetail, mesh, resultants, specimens, bodies, line, bodies_wear or line_wear.
     """
     from workflow.case import KINDS, template
 

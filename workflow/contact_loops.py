@@ -18,11 +18,15 @@ import h5py
 import numpy as np
 
 from sa_solver.contact import FrictionalContact
-from sa_solver.coupled import CoupledContactError
-from sa_solver.normal import NormalContactError
-from sa_solver.tangential import TangentialContactError
-from sa_solver.tangential_loop import LoopFailure, LoopPath, tangential_loop
+from sa_solver.tangential_loop import (
+    CLOSED,
+    MOST_CYCLES,
+    LoopFailure,
+    LoopPath,
+    tangential_loop,
+)
 from sa_solver.types import Array
+from wear.full_cycle import IMPOSSIBLE
 from wear.stepping import ContactFailure
 from workflow.case.loops import Loops
 from workflow.case.units import UnitError, to_base
@@ -140,11 +144,15 @@ def worn_loop(
     path = loop_path(loops, name, state, peak)
     try:
         loop = tangential_loop(contact, state.surfaces.gap, path)
-    except (
-        *(LoopFailure, TangentialContactError, NormalContactError),
-        CoupledContactError,
-    ) as error:
-        raise ContactFailure(f"tangential loop: {error}") from error
+    except (LoopFailure, *IMPOSSIBLE) as error:
+        raise ContactFailure(
+            f"tangential loop: {error}; allowed: lower loops.force or loops.amplitude"
+        ) from error
+    if loop.closure > CLOSED:
+        raise ContactFailure(
+            f"tangential loop: still open by {loop.closure:.1e} of its range after {MOST_CYCLES} "
+            "cycles; allowed: lower loops.amplitude or loops.force"
+        )
     values = {
         "energy": state.energy,
         "P": loop.P,

@@ -1,4 +1,4 @@
-"""Many runs in folders: each in a fresh process of one thread, as many at once as there are cores.
+"""Many runs in folders: each in a fresh process, as many at once as there are cores, or one by one.
 
 What is finished stays, what was interrupted is taken up, and a run that fails is a value.
 """
@@ -65,7 +65,8 @@ def run_jobs(
 
         run_on_cluster([(own.job, own.case) for own in left], out, dask, end)
     else:
-        _run_here(left, out, 1 if alone else processes or os.cpu_count() or 1, end, not alone)
+        cores = 1 if alone else processes or os.cpu_count() or 1
+        _run_here(left, out, cores, end, one_thread=not alone)
     return [ended[job.name] for job in jobs]
 
 

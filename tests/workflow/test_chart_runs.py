@@ -85,9 +85,9 @@ def in_process(run: Callable[[Job, Path], None]) -> RunJobs:
     """What runs the jobs of a chart by a function, here and now."""
 
     def run_jobs(
-        jobs: Sequence[Job], out: Path, *, processes: int, report: Callable[[Finished], None]
+        jobs: Sequence[Job], out: Path, *, alone: bool, report: Callable[[Finished], None]
     ) -> list[Finished]:
-        assert processes == 1
+        assert alone
         ended = []
         for job in jobs:
             folder = OutputFolder(out / job.name)

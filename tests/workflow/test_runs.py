@@ -194,7 +194,7 @@ def test_cores_are_shared_out(contact, tmp_path, monkeypatch):
 
     wants, used, most = {"a": 2, "b": 1, "c": 1, "d": 3, "e": 9}, [], []
 
-    def pretend(job, out, unwanted):
+    def pretend(job, out, unwanted, one_thread):
         used.append(job.name)
         most.append(sum(min(wants[name], 3) for name in used))
         time.sleep(0.05)

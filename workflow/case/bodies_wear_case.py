@@ -6,6 +6,7 @@ own, though both are written ``analysis: wear`` and ``kind: bodies``.
 
 from __future__ import annotations
 
+from math import cos, inf, sin
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -20,7 +21,7 @@ from workflow.case.contact_case import (
     require_shape,
 )
 from workflow.case.fields import Quantity, Whole
-from workflow.case.sections import GridCells, Length, Section, Title, entry
+from workflow.case.sections import GridCells, Length, Section, Title, disagreement, entry
 from workflow.case.wear_case import WearCase
 from workflow.case.wear_sections import Contact, TwoBodies, Wear
 
@@ -136,6 +137,10 @@ class BodiesWearCase(WearCase):
     def _can_run(self) -> BodiesWearCase:
         if isinstance(self.structure, Heights):
             require_shape(self.structure.file, self.contact.grid)
+        x, y = self.contact.size
+        across, along = abs(cos(self.load_path.direction)), abs(sin(self.load_path.direction))
+        room = min(x / across if across > 0.0 else inf, y / along if along > 0.0 else inf)
+        _require_room(self.load_path.stroke, room, self.wear.motion)
         return self
 
     def outline(self) -> list[tuple[str, str]]:
@@ -159,11 +164,22 @@ class LineBodiesWearCase(WearCase):
     def _can_run(self) -> LineBodiesWearCase:
         if isinstance(self.structure, Heights):
             require_shape(self.structure.file, self.contact.grid)
+        _require_room(self.load_path.stroke, self.contact.size, self.wear.motion)
         return self
 
     def outline(self) -> list[tuple[str, str]]:
         path = self.load_path
         return _outline(self.structure.shape, "line contact", path, f"{path.P:g} N/mm")
+
+
+def _require_room(stroke: float, room: float, motion: str) -> None:
+    """Raise where the grid has no ``room`` [mm] for the stroke that is to be followed on it."""
+    if stroke >= room and motion != "neglect":
+        raise disagreement(
+            f"{stroke:g} mm: the grid reaches over {room:g} mm along it; allowed: shorter strokes, "
+            "a larger contact.size, or wear.motion: neglect",
+            *("load_path.stroke", "contact.size"),
+        )
 
 
 def _outline(

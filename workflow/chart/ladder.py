@@ -134,6 +134,7 @@ def judge(
     for point, own, bound, (quick, few) in zip(points, errors, bounds, flags, strict=True):
         worst = max(own, key=lambda q: own[q], default="")
         error = own.get(worst, inf)
+        worst = worst if error > 0.0 else ""
         judged.append(Judged(point, error, worst, bound, error < floor, quick, few))
     return Ladder(axis, tuple(judged), references, failed)
 

@@ -51,13 +51,6 @@ class Cost:
     solves: int
 
 
-@dataclass(frozen=True)
-class Depths:
-    """Worn depth of both bodies together ``(nx, ny)`` [mm] over the grid of each interface."""
-
-    by_interface: Mapping[str, tuple[Grid, Array]]
-
-
 # --- numbers ------------------------------------------------------------------------------------
 
 

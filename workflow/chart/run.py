@@ -1,8 +1,8 @@
 """The rungs of a chart: their runs, one at a time, and what these are compared by.
 
 Every axis is varied alone about the case's own settings. Rungs are run one at a time, so that their
-times do not disturb each other, each in a process of one thread; a finished one is taken as it is
-and an interrupted one goes on.
+times do not disturb each other, with all cores and threads of the machine; a finished one is taken
+as it is and an interrupted one goes on.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ from workflow.chart.measures import (
     profile_difference,
     worn_depths,
 )
-from workflow.errors import UserError
+from workflow.errors import MethodFailed, UserError
 from workflow.runs import Finished, Job, kept_in, run_jobs
 
 CACHE = "FRETSCALE_CACHE"
@@ -52,11 +52,12 @@ PROFILE = "depth anywhere"
 
 @dataclass(frozen=True)
 class Chart:
-    """The ladders of a case, and the accuracy that is asked for."""
+    """The ladders of a case, the accuracy that is asked for, and whether no run failed."""
 
     title: str
     ladders: tuple[Ladder, ...]
     accuracy: float
+    complete: bool = True
 
 
 @dataclass(frozen=True)
@@ -99,18 +100,18 @@ def chart_case(
     jobs = _jobs(case, base, settings)
     _claim(out, load_case(case, base))
     with _environment(CACHE, str((out / STRUCTURES).absolute())):
-        ended, left_out = _run(jobs, settings, out / RUNS, report)
+        ended, left_out = _run(jobs, settings, out / RUNS, quantities, report)
     runs = _runs(ended)
     if not runs:
-        raise UserError(f"{out}: not a single rung ran: {ended[0].job.name}: {ended[0].error}")
+        raise MethodFailed(f"{out}: not a single rung ran: {ended[0].job.name}: {ended[0].error}")
     first = runs.get(OWN) or next(iter(runs.values()))
-    _check(quantities, first.summary)
     errors = left_out | {own.job.name: own.error for own in ended if own.summary is None}
     ladders = [
         _ladder(axis, [(own, jobs[own.text].name) for own in rungs], runs, errors, quantities)
         for axis, rungs in settings.items()
     ]
-    return Chart(first.case.title, tuple(ladders), accuracy)
+    complete = all(own.summary is not None for own in ended)
+    return Chart(first.case.title, tuple(ladders), accuracy, complete)
 
 
 def _plain(case: Case, quantities: Sequence[str]) -> Iterator[str]:
@@ -151,12 +152,18 @@ def _run(
     jobs: Mapping[str, Job],
     settings: Mapping[Axis, list[Setting]],
     out: Path,
+    quantities: Sequence[str],
     report: Callable[[str], None],
 ) -> tuple[list[Finished], dict[str, str]]:
-    """How the jobs ended, and why some were left out, by their name."""
+    """How the jobs ended, and why some were left out, by their name.
+
+    The first one tells whether there are such ``quantities``, before all others are run.
+    """
     told = _Progress(len(jobs), report)
     own, *others = jobs.values()
     ended = run_jobs([own], out, alone=True, report=told)
+    if (summary := ended[0].summary) is not None:
+        _check(quantities, _with_middle(own.load(), ended[0].folder, summary))
     left_out = {}
     for setting in (one for rungs in settings.values() for one in rungs):
         if why := _too_long(setting, ended[0].summary or {}):

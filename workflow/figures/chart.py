@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from workflow.chart.ladder import Judged, Ladder
     from workflow.chart.run import Chart
 
-COSTS = {"seconds": "seconds, in processes of one thread", "convolutions": "convolutions"}
+COSTS = {"seconds": "seconds, alone on this machine", "convolutions": "convolutions"}
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, "#E69F00", "#56B4E9", "#F0E442", BLACK, "#999999")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
 HEIGHT = 6.6
