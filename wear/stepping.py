@@ -15,6 +15,9 @@ once. Three steps are offered here; :mod:`wear.steppers` chooses their length.
   (Strang 1968, doi:10.1137/0705041), each by the two implicit stages of Alexander's method
   (1977, doi:10.1137/0714068; L-stable). Both stages weigh in with their own positive share, so that
   nothing ever grows back and energies add up to the volume.
+
+Where the surfaces move over each other, body 1 wears where it passes, and its local compliance only
+stands for that: then no step is better than first order.
 """
 
 from __future__ import annotations
@@ -103,8 +106,8 @@ class WearState:
     ``energy`` is what the contact has dissipated so far [N mm]; ``depth_rate`` the largest depth
     [mm] and ``volume_rate`` the volume of both bodies [mm³] worn per cycle of the last step;
     ``starts`` the contact solver's, by increment; ``error`` ``(nx, ny)`` the estimated error of the
-    depth of both bodies [mm] and ``volume_error`` that of their volume [mm³]; ``next_cycles`` how
-    far an automatic step would go next.
+    depth of both bodies [mm] and ``volume_error`` a bound of that of their volume [mm³];
+    ``next_cycles`` how far an automatic step would go next.
     """
 
     surfaces: Surfaces
@@ -126,7 +129,8 @@ class WearState:
 class WearStep:
     """A step: the ``state`` after it, its ``cycles``, and the contact problems it took.
 
-    ``midway`` ``(nx, ny)`` is the depth of both bodies in the middle of a step of second order.
+    ``midway`` ``(nx, ny)`` is the depth of both bodies in the middle of a step of second order, and
+    ``drift`` what its slips and friction, changing on the way, have added to it [mm].
     """
 
     state: WearState
@@ -134,6 +138,7 @@ class WearStep:
     contact_solves: int
     convolutions: int
     midway: Array | None = None
+    drift: Array | None = None
 
 
 class WearingContact:
@@ -156,7 +161,8 @@ class WearingContact:
     def midway(self, other: WearingContact) -> WearingContact:
         """The contact under the mean of both cycles."""
         cycle = self._cycle.midway(other._cycle)
-        return WearingContact(self.contact, self._laws, self._friction, cycle, self._tolerance)
+        friction = 0.5 * (self._friction + other._friction)
+        return WearingContact(self.contact, self._laws, friction, cycle, self._tolerance)
 
     @cached_property
     def working(self) -> list[int]:
@@ -204,20 +210,21 @@ class WearingContact:
 
     def rate(self, state: WearState) -> Array:
         """Depth of both bodies per mean cycle ``(nx, ny)`` [mm] at the state's last pressures."""
-        per_pressure = np.add(*self.depth_per_pressure(state))
+        wear_1, wear_2 = self.depth_per_pressure(state)
         rate = np.zeros(self.grid.shape)
         for t, start in state.starts.items():
-            rate += per_pressure[t] * start.pressure
+            rate += self._on_body_1(t, wear_1[t] * start.pressure) + wear_2[t] * start.pressure
         return rate
 
-    def stable_cycles(self, state: WearState) -> float:
+    def stable_cycles(self, state: WearState, cycles: float = 0.0) -> float:
         """Longest explicit step that does not make a roughness of the grid's shortest waves grow.
 
         A mode of compliance λ is multiplied by 1 - w ΔN/λ per step, w being the depth of both
         bodies per pressure and cycle over all increments that press there; the limit is
-        w ΔN = 2 λ_min. Where the last pressures are unknown all increments count.
+        w ΔN = 2 λ_min. Where the last pressures are unknown all increments count. Laws that change
+        with energy are those of a step of ``cycles``.
         """
-        per_pressure = np.add(*self.depth_per_pressure(state))
+        per_pressure = np.add(*self.depth_per_pressure(state, cycles))
         for t, start in state.starts.items():
             per_pressure[t] *= start.pressure > 0.0
         fastest = float(per_pressure.sum(axis=0).max())
@@ -229,6 +236,7 @@ class WearingContact:
 
         A depth e is pressed away to K (K + D)⁻¹ e, with D the largest depth per pressure of all
         increments and both bodies over the step; here on the whole grid, as if all of it touched.
+        That is too much damping where slip is uneven or cells are pressed part of the time.
         """
         per_pressure = np.add(*self.depth_per_pressure(state)).sum(axis=0)
         compliance = cycles * float(per_pressure.max())

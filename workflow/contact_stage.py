@@ -188,8 +188,12 @@ class ContactStage:
 
     def follow(self, state: InterfaceState, history: FaceLoads) -> InterfaceState:
         """The state under the loads of a new structural solution."""
-        ends = self._ends(self.transfer.to_cells(history.slip), state.starts, history.loads)
-        return replace(state, loads=history.loads, slip=history.slip, ends=ends)
+        starts = {t: start for t, start in state.starts.items() if history.loads.P[t] > 0.0}
+        state = replace(state, loads=history.loads, slip=history.slip, starts=starts)
+        if self._case.contact.method == "full":
+            return state  # body 2 goes on as the half-space's own slip has it
+        ends = self._ends(self.transfer.to_cells(history.slip), starts, history.loads)
+        return replace(state, ends=ends)
 
     def _ends(self, slip: Array, starts: Starts, loads: LoadHistory) -> Array:
         """Where body 2 is before and after each increment, if its motion is to be followed."""

@@ -102,6 +102,7 @@ def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> 
     pressures = _peak_pressures(outcome, folder)
     loops = write_loop_tables(folder, outcome.source.line)
     warn_of_border(loops, outcome.case.loops, reporter)
+    _warn_of_steps(outcome, reporter)
     summary = _summary(outcome, structure, stresses, pressures, reporter)
     _add_areas(summary, outcome, folder)
     for name, written in worn_nodes.items():
@@ -350,6 +351,27 @@ def _step_error(outcome: Outcome, number: int) -> dict[str, float] | None:
         "depth": root_mean_square(own.error, depth) / root_mean_square(depth, depth),
         "volume": abs(own.volume_error) / volume,
     }
+
+
+def _warn_of_steps(outcome: Outcome, reporter: Reporter) -> None:
+    """Automatic steps that did not meet their tolerance."""
+    wear = outcome.case.wear
+    if not wear.step.automatic:
+        return
+    for number, stage in enumerate(outcome.stages):
+        found = _step_error(outcome, number)
+        if found is None:
+            continue
+        asked = wear.tolerance
+        if wear.depth_tolerance is not None:
+            depth = outcome.state.interfaces[number].surfaces.depth
+            asked = wear.depth_tolerance / root_mean_square(depth, depth)
+        if max(found.values()) > asked:
+            reporter.warn(
+                f"{stage.name}: wear steps leave an estimated error of {max(found.values()):.2%} "
+                f"where {asked:.2%} was asked for (wear.tolerance): try wear.step.kind: "
+                "second_order, or a smaller tolerance"
+            )
 
 
 def _slip_per_cycle(unworn: FaceLoads, first: FirstContact) -> float:

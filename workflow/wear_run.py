@@ -14,7 +14,7 @@ from sa_solver.types import Array, resultant_change
 from wear.stepping import ContactFailure
 from workflow import checkpoint
 from workflow.case import WearCase
-from workflow.checkpoint import KINETICS, RunState
+from workflow.checkpoint import KINETICS, RunState, kinetics_row
 from workflow.contact_loops import kept_loops, loops_due
 from workflow.contact_stage import (
     ContactStage,
@@ -84,6 +84,11 @@ class WearRun:
                 unworn = source.unworn()
             if isinstance(source, StructureStage):
                 warn_of_structure(source, self._reporter)
+                if self._case.friction.evolution and self._case.recoupling.resultants == "constant":
+                    self._reporter.warn(
+                        "friction.evolution: the structure keeps its first coefficient "
+                        "(coupling.resultants: constant)"
+                    )
                 self._check_nonlinearity(source)
             with self._reporter.stage("contact set-up"):
                 stages = [ContactStage(own) for own in settings]
@@ -154,12 +159,20 @@ class WearLoop:
         return state
 
     def _jump(self, state: RunState) -> RunState:
-        cycles, left = self._jump_cycles(state), self._left(state)
-        count = len(self._stages)
-        with self._reporter.stage("wear"):
-            jumped = self._workers.call("jump", state.interfaces, [cycles] * count, [left] * count)
-        spent = sum((own for _, own in jumped), Spent())
-        interfaces = tuple(own for own, _ in jumped)
+        cycles, spent = self._jump_cycles(state), Spent()
+        # The run ends at a stop if it comes to that.
+        left, count = max(cycles, min(self._left(state), self._to_stop(state))), len(self._stages)
+        while True:
+            with self._reporter.stage("wear"):
+                jumped = self._workers.call(
+                    "jump", state.interfaces, [cycles] * count, [left] * count
+                )
+            spent = sum((own for _, own in jumped), spent)
+            interfaces = tuple(own for own, _ in jumped)
+            shorter = cycles * self._share_to_stop(state, interfaces)
+            if shorter == cycles or cycles <= 1.0:
+                break
+            cycles = max(1.0, shorter)
         state = replace(state, interfaces=interfaces, spent=state.spent + spent)
         warn_of_growth(self._stages, state, self._reporter)
         state, drift = self._follow_drift(state)
@@ -187,7 +200,7 @@ class WearLoop:
         else:
             # The steps that are left, all of one length: none of them is a mere remainder.
             proposed = min(own.next_cycles for own in state.interfaces)
-            cycles = left / np.ceil(left / proposed * (1.0 - ROUNDING))
+            cycles = left / max(1.0, np.ceil(left / proposed * (1.0 - ROUNDING)))
         if step.kind == "explicit" and step.fraction is None:
             self._warn_of_instability(state, cycles)
         cycles = min(cycles, self._to_stop(state))
@@ -199,13 +212,26 @@ class WearLoop:
 
     def _to_stop(self, state: RunState) -> float:
         """Cycles to the nearest stop at the present rates."""
-        stop, worn = self._case.wear.stop, _worn(state)
+        stop, worn = self._case.wear.stop, _worn(state.kinetics[-1])
         to_depth = to_volume = np.inf
         if stop.depth is not None:
             to_depth = _quotient(stop.depth - worn.depth, self._depth_rate(state))
         if stop.volume is not None:
             to_volume = _quotient(stop.volume - worn.volume, self._volume_rate(state))
         return max(1.0, min(to_depth, to_volume))
+
+    def _share_to_stop(self, before: RunState, interfaces: tuple[InterfaceState, ...]) -> float:
+        """Share of a jump at which it came to a stop that it went past; else 1."""
+        rows = zip(interfaces, self._areas, strict=True)
+        after = _worn(np.array([kinetics_row(own, area) for own, area in rows]))
+        worn, stop, share = _worn(before.kinetics[-1]), self._case.wear.stop, 1.0
+        for limit, then, now in (
+            (stop.depth, worn.depth, after.depth),
+            (stop.volume, worn.volume, after.volume),
+        ):
+            if limit is not None and now > limit * (1.0 + AT_STOP):
+                share = min(share, (limit - then) / (now - then))
+        return share
 
     def _depth_rate(self, state: RunState) -> float:
         return max(own.depth_rate for own in state.interfaces)
@@ -223,7 +249,7 @@ class WearLoop:
             )
 
     def _ended(self, state: RunState) -> bool:
-        wear, worn = self._case.wear, _worn(state)
+        wear, worn = self._case.wear, _worn(state.kinetics[-1])
         reached = 1.0 - AT_STOP
         return bool(
             state.cycles[-1] >= wear.cycles * (1.0 - ROUNDING)
@@ -304,8 +330,9 @@ class _Worn(NamedTuple):
     volume: float
 
 
-def _worn(state: RunState) -> _Worn:
-    last = dict(zip(KINETICS, state.kinetics[-1].T, strict=True))
+def _worn(kinetics: Array) -> _Worn:
+    """Of a row of kinetics ``(interfaces, 5)``."""
+    last = dict(zip(KINETICS, kinetics.T, strict=True))
     depth = max(last["depth_1"].max(), last["depth_2"].max())
     return _Worn(float(depth), float((last["volume_1"] + last["volume_2"]).sum()))
 
