@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 
@@ -99,9 +100,13 @@ class _Problem:
         self._offset = inverse @ load
 
     def solve(self, starts: list[Array], scale: float) -> FrictionState:
-        """Split from the most promising start, and from the others should it fail."""
+        """Split from the most promising start, and from the others should it fail.
+
+        First so that no extrapolation throws a body off, then so that one may fly to its contacts.
+        """
         iterations = 0
-        for start in sorted(starts, key=self._distance):
+        promising = sorted(starts, key=self._distance)
+        for returning, start in product((True, False), promising):
             split = douglas_rachford(
                 self._elastic,
                 self._law,
@@ -109,6 +114,7 @@ class _Problem:
                 scale=scale / self._rho,
                 tolerance=TOLERANCE,
                 max_iterations=MAX_ITERATIONS,
+                returning=returning,
             )
             iterations += split.iterations
             if split.converged:

@@ -42,7 +42,8 @@ their directions are left out of the least-squares problem."""
 
 RETURN_GROWTH = 10.0
 """An extrapolation to a residual so many times the least so far is taken back: it may have thrown
-a body off its contacts, where it would float on for ever. Plain steps get on, if slowly."""
+a body off its contacts, where it would float on for ever. Plain steps get on, if slowly. A body
+that floats towards its contacts must not be held back so: there the residual grows on landing."""
 
 AT_REST = 1e-9
 """A residual that changes by less than this share of itself is that of a body in free motion, at
@@ -80,16 +81,17 @@ def douglas_rachford(
     max_iterations: int = 1000,
     relaxation: float = OVER_RELAXATION,
     depth: int = ANDERSON_DEPTH,
+    returning: bool = False,
 ) -> SplittingResult:
     """Iterate the two steps from ``start`` until ``|t2 - t1| <= tolerance scale``.
 
     ``scale`` is the size to measure the residual against, max(|t1|, |t2|) unless it is given.
     ``elastic_step`` and ``local_law`` map an array of any shape to one of the same shape and must
-    not modify it. ``depth = 0`` turns the acceleration off. A result that has not
-    converged after ``max_iterations`` says so.
+    not modify it. ``depth = 0`` turns the acceleration off; ``returning`` takes back extrapolations
+    that made things much worse. A result that has not converged after ``max_iterations`` says so.
     """
     state = np.array(start, dtype=np.float64)
-    memory = AndersonMemory(state.size, depth)
+    memory = AndersonMemory(state.size, depth, returning)
     elastic = solution = state
     residual, iterations = np.inf, 0
     while iterations < max_iterations:
@@ -114,8 +116,9 @@ class AndersonMemory:
     same number of iterations as in double precision, and reading them is most of the work.
     """
 
-    def __init__(self, size: int, depth: int) -> None:
+    def __init__(self, size: int, depth: int, returning: bool = False) -> None:
         """Memory for vectors of ``size`` values."""
+        self._returning = returning
         self._images = np.empty((depth, size), dtype=np.float32)
         self._residuals = np.empty((depth, size), dtype=np.float32)
         self._unit = 1.0
@@ -124,6 +127,7 @@ class AndersonMemory:
         self._last_image = self._last_residual = np.empty(0)
         self._last_norm = 0.0
         self._least_norm, self._least_image = np.inf, np.empty(0)
+        self._extrapolated = False
         self._seen = 0
 
     def next_state(self, state: Array, residual: Array) -> Array:
@@ -136,12 +140,13 @@ class AndersonMemory:
             self._unit = max(norm, TINY)
         if norm < self._least_norm:
             self._least_norm, self._least_image = norm, image
-        elif norm > RETURN_GROWTH * self._least_norm:
-            self._seen, self._least_norm = 0, np.inf
+        elif self._returning and self._extrapolated and norm > RETURN_GROWTH * self._least_norm:
+            self._seen, self._least_norm, self._extrapolated = 0, np.inf, False
             return self._least_image
         if self._seen > 0 and norm > RESTART_GROWTH * self._last_norm:
             self._seen = 0
         accelerated = self._accelerate(image, residual) if self._seen > 0 else image
+        self._extrapolated = accelerated is not image
         self._last_image, self._last_residual, self._last_norm = image, residual, norm
         self._seen += 1
         return accelerated
