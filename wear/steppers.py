@@ -178,7 +178,7 @@ def _estimated(
         stable = min(own.contact.stable_cycles(ends) for ends in (state, step.state))
         shortest = SHORTEST * stable if np.isfinite(stable) else 0.0
         raw = own.error(step)
-        carried, added = (own.contact.lasting(e, state, cycles) for e in (state.error, raw))
+        carried, added = own.contact.lasting([state.error, raw], state, cycles)
         fits, proposed = True, cycles
         if control is not None:
             fits, change = _judged(control, state, step, left, carried, added, raw)

@@ -22,6 +22,7 @@ stands for that: then no step is better than first order.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -231,8 +232,8 @@ class WearingContact:
         softest = float(self.contact.half_space.symbol(Z, Z).min())
         return 2.0 * softest / fastest if fastest > 0.0 else np.inf
 
-    def lasting(self, error: Array, state: WearState, cycles: float) -> Array:
-        """What implicit wear over ``cycles`` leaves of an ``error`` of the depth ``(nx, ny)`` [mm].
+    def lasting(self, errors: Sequence[Array], state: WearState, cycles: float) -> list[Array]:
+        """What implicit wear over ``cycles`` leaves of ``errors`` of the depth ``(nx, ny)`` [mm].
 
         A depth e is pressed away to K (K + D)⁻¹ e, with D the largest depth per pressure of all
         increments and both bodies over the step; here on the whole grid, as if all of it touched.
@@ -244,8 +245,7 @@ class WearingContact:
         symbol = half_space.symbol(Z, Z)
         transform = half_space.transform(shape, half_space.padded, 1)
         damping = SpectralFilter(transform, [[symbol / (symbol + compliance)]])
-        left: Array = damping.apply(error[None])[0]
-        return left
+        return [damping.apply(error[None])[0] for error in errors]
 
     # -- cycles on surfaces that do not change --------------------------------------------------
     def solve(self, surfaces: Surfaces, increment: int, start: NormalStart | None) -> NormalState:

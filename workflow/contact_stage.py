@@ -303,7 +303,7 @@ class ContactStage:
 
     def nodal_depth(self, state: InterfaceState) -> Array:
         """Worn depth of both bodies together at the nodes of the face, volume kept."""
-        return self.transfer.to_nodes(state.surfaces.depth_1 + state.surfaces.depth_2)
+        return self.transfer.to_nodes(state.surfaces.depth)
 
     def depths_of_bodies(self, state: InterfaceState) -> tuple[Array, Array]:
         """Worn depths of body 1 and body 2 at the nodes of their own faces, volumes kept."""

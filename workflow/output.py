@@ -245,7 +245,7 @@ def _add_areas(summary: dict[str, Any], outcome: Outcome, folder: OutputFolder) 
         for stage, state in zip(outcome.stages, outcome.state.interfaces, strict=True):
             area = file[f"kinetics/{stage.name}/area"][()].tolist()
             summary["kinetics"][stage.name]["area"] = area
-            worn = np.count_nonzero(state.surfaces.depth_1 + state.surfaces.depth_2 > 0.0)
+            worn = np.count_nonzero(state.surfaces.depth > 0.0)
             areas = {"area": area[-1], "worn_area": worn * stage.grid.cell_area}
             summary[stage.name].update(areas)
 

@@ -122,7 +122,7 @@ def uniformity(
     if _middle(found.P) <= 0.0:
         return None
     surfaces = state.surfaces
-    worn = np.sum(surfaces.depth_1 + surfaces.depth_2, axis=0)
+    worn = np.sum(surfaces.depth, axis=0)
     deviations = [_deviation(values) for values in (found.P, found.slip, worn)]
     y = np.abs(stage.grid.y.ravel())
     half = 0.5 * stage.grid.size[1]

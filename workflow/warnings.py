@@ -88,7 +88,7 @@ def warn_of_contact(
 def warn_of_growth(stages: list[ContactStage], state: RunState, reporter: Reporter) -> None:
     """Contacts that have grown to the border of their grid: they have worn there."""
     for stage, own in zip(stages, state.interfaces, strict=True):
-        worn = own.surfaces.depth_1 + own.surfaces.depth_2
+        worn = own.surfaces.depth
         if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):
             warn_of_border(stage, reporter)
 
