@@ -1,0 +1,1 @@
+"""Structures that vibrate with joints: models, excitations and integration in time."""

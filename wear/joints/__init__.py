@@ -1,0 +1,1 @@
+"""Joint laws: what a contact transmits when it is one spring of a vibrating structure."""
