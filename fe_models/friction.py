@@ -16,6 +16,7 @@ import numpy as np
 
 from fe_models.joint import JointResolvent
 from fe_models.mesh import AXES, in_space
+from fe_models.symmetry import SplitMatrix
 from sa_solver.contact_law import coulomb
 from sa_solver.splitting import SplittingResult, douglas_rachford
 from sa_solver.types import Array
@@ -87,7 +88,7 @@ class _Problem:
 
     def __init__(
         self,
-        inverse: Array,
+        inverse: Array | SplitMatrix,
         rho: float,
         friction: float | Array,
         load: Array,

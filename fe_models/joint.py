@@ -23,12 +23,16 @@ import scipy.sparse as sp
 from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, eigsh
 
+from fe_models.symmetry import Mirror, SplitMatrix
 from sa_solver.types import Array, Indices
 
 # Eigenvalues below this share of the largest are rigid motions; elastic ones start near 1e-3.
 RIGID_LIMIT = 1e-7
 # Share of the largest eigenvalue that makes the singular joint invertible for the Lanczos search.
 SPECTRUM_SHIFT = 1e-5
+
+# Stiffness and loads of a condensed body.
+Condensed = tuple[Array, Array]
 
 
 @dataclass(frozen=True)
@@ -38,10 +42,11 @@ class JointStiffness:
     ``stiffness`` ``(d n, d n)`` [N/mm] and ``loads`` ``(d n, cases)`` [N], numbered ``d node +
     component`` over all interfaces in d dimensions, per length in the plane; ``rigid_modes`` counts
     H's null space; ``smallest`` and ``largest`` are its extreme elastic eigenvalues. Of the
-    displacements that ``held`` ``(d n,)`` marks, which stay zero, there are no rows and columns.
+    displacements that ``held`` ``(d n,)`` marks, which stay zero, there are no rows and columns. A
+    joint with a mirror symmetry, which holds none, is split into what the mirror keeps and turns.
     """
 
-    stiffness: Array
+    stiffness: Array | SplitMatrix
     loads: Array
     rigid_modes: int
     smallest: float
@@ -54,11 +59,11 @@ class JointStiffness:
         It is zero for displacements that are held, as if H were infinite there.
         """
         rho = float(np.sqrt(self.smallest * self.largest))
-        shifted = self.stiffness.copy()
-        shifted[np.diag_indices_from(shifted)] += rho
-        factor = sl.cholesky(shifted, lower=True, overwrite_a=True, check_finite=False)
-        inverse, _ = sl.lapack.dpotri(factor, lower=1, overwrite_c=1)
-        inverse = np.tril(inverse) + np.tril(inverse, -1).T
+        if isinstance(self.stiffness, SplitMatrix):
+            kept, turned = (_shifted_inverse(block, rho) for block in self.stiffness.blocks)
+            split = SplitMatrix(self.stiffness.mirror, (kept, turned))
+            return JointResolvent(split, rho, self.loads, self.rigid_modes)
+        inverse = _shifted_inverse(self.stiffness, rho)
         loads = self.loads
         if self.held is not None and self.held.any():
             free = np.flatnonzero(~self.held)
@@ -75,15 +80,15 @@ class JointResolvent:
     ``rigid_modes`` are the joint's.
     """
 
-    inverse: Array
+    inverse: Array | SplitMatrix
     rho: float
     loads: Array
     rigid_modes: int
 
 
 def join(
-    condensed_1: tuple[Array, Array],
-    condensed_2: tuple[Array, Array],
+    condensed_1: Condensed,
+    condensed_2: Condensed,
     projection: sp.csr_matrix | None = None,
     held: NDArray[np.bool_] | None = None,
     like: JointResolvent | None = None,
@@ -95,6 +100,31 @@ def join(
     little from ``like`` may take its ρ as extreme eigenvalues: the search for its own fails where
     contact alone holds a body in a centrifugal field, which makes H slightly indefinite.
     """
+    stiffness, loads = _joined(condensed_1, condensed_2, projection)
+    if like is None:
+        rigid_modes, smallest, largest = _spectrum(stiffness)
+    else:
+        rigid_modes, smallest, largest = like.rigid_modes, like.rho, like.rho
+    return JointStiffness(stiffness, loads, rigid_modes, smallest, largest, held)
+
+
+def join_halves(
+    halves_1: tuple[Condensed, ...], halves_2: tuple[Condensed, ...], mirror: Mirror
+) -> JointStiffness:
+    """Join bodies that meet node to node, condensed in halves of the same ``mirror``."""
+    kept, turned = (_joined(*pair, None) for pair in zip(halves_1, halves_2, strict=True))
+    counts, smallest, largest = zip(*(_spectrum(block) for block, _ in (kept, turned)), strict=True)
+    loads = mirror.bases[0] @ kept[1] + mirror.bases[1] @ turned[1]
+    stiffness = SplitMatrix(mirror, (kept[0], turned[0]))
+    return JointStiffness(stiffness, loads, sum(counts), min(smallest), max(largest))
+
+
+def _joined(
+    condensed_1: Condensed,
+    condensed_2: Condensed,
+    projection: sp.csr_matrix | None,
+) -> tuple[Array, Array]:
+    """H and f0 of the load cases."""
     (stiffness_1, loads_1), (stiffness_2, loads_2) = condensed_1, condensed_2
     if projection is None:
         coupling, carried, handed = stiffness_2, stiffness_2, loads_2
@@ -106,11 +136,16 @@ def join(
     half = sl.solve_triangular(factor, coupling, lower=True)
     stiffness = stiffness_2 - half.T @ half
     loads = half.T @ sl.solve_triangular(factor, loads_1 + handed, lower=True) - loads_2
-    if like is None:
-        rigid_modes, smallest, largest = _spectrum(stiffness)
-    else:
-        rigid_modes, smallest, largest = like.rigid_modes, like.rho, like.rho
-    return JointStiffness(stiffness, loads, rigid_modes, smallest, largest, held)
+    return stiffness, loads
+
+
+def _shifted_inverse(stiffness: Array, rho: float) -> Array:
+    """(H + ρ)⁻¹, symmetric to the last bit."""
+    shifted = stiffness.copy()
+    shifted[np.diag_indices_from(shifted)] += rho
+    factor = sl.cholesky(shifted, lower=True, overwrite_a=True, check_finite=False)
+    inverse, _ = sl.lapack.dpotri(factor, lower=1, overwrite_c=1)
+    return np.asarray(np.tril(inverse) + np.tril(inverse, -1).T)
 
 
 def _spread(rows: Array, places: Indices, count: int) -> Array:

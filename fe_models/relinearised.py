@@ -49,9 +49,10 @@ class PrestressedStructure(Structure):
         """
         joint = self.condense(like)
         free = ~self.body_2.held
-        stiffness = _deflated(joint.stiffness, self._rigid_motions()[free])
+        full = np.asarray(joint.stiffness)
+        stiffness = _deflated(full, self._rigid_motions()[free])
         relative = self._relative()[free]
-        taken = joint.stiffness @ relative - stiffness @ relative
+        taken = full @ relative - stiffness @ relative
         loads = joint.loads + np.outer(taken, self.share)
         return replace(joint, stiffness=stiffness, loads=loads).resolvent()
 

@@ -9,7 +9,7 @@ import numpy as np
 import scipy.sparse as sp
 
 from fe_models.friction import LOAD_FLOOR, FrictionalJoint, FrictionState
-from fe_models.joint import JointResolvent, JointStiffness, join
+from fe_models.joint import JointResolvent, JointStiffness, join, join_halves
 from fe_models.mesh import Face, Interface, StructureMesh
 from fe_models.supported_body import SupportedBody
 from sa_solver.types import Array, LoadHistory, resultants
@@ -95,10 +95,29 @@ class Structure:
         """
         held_1, held_2 = self.body_1.held, self.body_2.held
         projection = self.projection
+        if like is None and projection is None and not held_1.any() and not held_2.any():
+            halves = self._condense_halves()
+            if halves is not None:
+                return halves
         if held_1.any() or held_2.any():
             every = sp.identity(len(held_2), format="csr") if projection is None else projection
             projection = every[~held_2][:, ~held_1]
         return join(self.body_1.condense(), self.body_2.condense(), projection, held_2, like)
+
+    def _condense_halves(self) -> JointStiffness | None:
+        """As :meth:`condense`, by a mirror symmetry of both bodies; None if there is none."""
+        for axis in self.body_1.elastic.body.axes:
+            mirrors = self.body_1.mirror(axis), self.body_2.mirror(axis)
+            if mirrors[0] is None or mirrors[1] is None:
+                continue
+            on_1 = self.body_1.on_interface(mirrors[0])
+            if on_1 is None or on_1 != self.body_2.on_interface(mirrors[1]):
+                continue
+            halves_1 = self.body_1.condense_halves(mirrors[0])
+            halves_2 = None if halves_1 is None else self.body_2.condense_halves(mirrors[1])
+            if halves_1 is not None and halves_2 is not None:
+                return join_halves(halves_1, halves_2, on_1)
+        return None
 
     @property
     def projection(self) -> sp.csr_matrix | None:

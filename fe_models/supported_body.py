@@ -14,6 +14,7 @@ from fe_models.linear_solver import prepare
 from fe_models.mesh import Body, Interface
 from fe_models.multigrid import rigid_body_modes, rigid_motions
 from fe_models.reduction import reduce_body
+from fe_models.symmetry import Mirror, halves, mirror_of_nodes
 from sa_solver.types import Array, Indices
 
 # A rigid motion that supports change by less than this share of itself is free.
@@ -64,6 +65,49 @@ class SupportedBody:
         stiffness, loads = self._reduced()
         model = reduce_body(stiffness, None, self._interface, loads=loads)
         return model.static_stiffness, model.loads
+
+    def mirror(self, axis: int) -> Mirror | None:
+        """The mirror across a global ``axis`` of the displacements that supports leave.
+
+        Those of the interface are in its frames. None unless nodes, supports and frames have it;
+        loads need not.
+        """
+        free = self.constraints.free
+        every = mirror_of_nodes(self.elastic.nodes, self.elastic.body.axes, axis)
+        own = None if every is None else every.restricted(free)
+        if own is None:
+            return None
+        rotation = self._transformation[free]
+        return Mirror.of(rotation.T @ own.matrix() @ rotation)
+
+    def on_interface(self, mirror: Mirror) -> Mirror | None:
+        """What a mirror of all displacements does to the interface's; None if it leaves them."""
+        return mirror.restricted(self._interface)
+
+    def condense_halves(self, mirror: Mirror) -> tuple[tuple[Array, Array], ...] | None:
+        """As :meth:`condense`, but what the mirror keeps and what it turns round apart.
+
+        The coordinates are those of the bases of the mirror on the interface. None if the stiffness
+        is not its own mirror image.
+        """
+        stiffness, loads = self._reduced()
+        stiffnesses = halves(stiffness, mirror)
+        on_interface = self.on_interface(mirror)
+        if stiffnesses is None or on_interface is None:
+            return None
+        condensed = []
+        for part, basis, coordinates in zip(
+            stiffnesses, mirror.bases, on_interface.bases, strict=True
+        ):
+            own = basis[self._interface]
+            kept = np.unique(own.indices)
+            model = reduce_body(part, None, kept, loads=basis.T @ loads)
+            # The same motions, in another order and some with the opposite sign.
+            renamed = coordinates.T @ own[:, kept]
+            condensed.append(
+                (renamed @ (renamed @ model.static_stiffness).T, renamed @ model.loads)
+            )
+        return tuple(condensed)
 
     def recover(self, interface_displacement: Array, amplitudes: Array) -> Array:
         """All displacements ``(d all,)`` for given interface displacements ``(d n,)``.

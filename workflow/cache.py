@@ -14,11 +14,14 @@ import fe_models
 import sa_solver
 from fe_models.joint import JointResolvent
 from fe_models.structure import FIELDS, CycleSolution, Structure
+from fe_models.symmetry import Mirror, SplitMatrix
 from sa_solver.types import Array
 from workflow.store import read_arrays, write_arrays
 
-# Files are pruned, least recently used first, above this size; one default dovetail takes 134 MB.
+# Files are pruned, least recently used first, above this size; one default dovetail takes 67 MB.
 LARGEST_CACHE = 4 * 1024**3
+# Datasets of a joint with a mirror symmetry.
+HALVES = "kept", "turned"
 SOLVERS = ("numpy", "scipy", "scikit-fem", "gmsh")
 
 
@@ -46,7 +49,7 @@ def load_joint(key: str) -> JointResolvent | None:
         return None
     arrays, attributes = found
     return JointResolvent(
-        inverse=arrays["inverse"],
+        inverse=_inverse(arrays),
         rho=float(attributes["rho"]),
         loads=arrays["loads"],
         rigid_modes=int(attributes["rigid_modes"]),
@@ -55,8 +58,22 @@ def load_joint(key: str) -> JointResolvent | None:
 
 def save_joint(key: str, joint: JointResolvent) -> None:
     """Keep a condensed joint."""
-    arrays = {"inverse": joint.inverse, "loads": joint.loads}
+    inverse = joint.inverse
+    arrays: dict[str, Any] = {"loads": joint.loads}
+    if isinstance(inverse, SplitMatrix):
+        mirror = {"partner": inverse.mirror.partner, "sign": inverse.mirror.sign}
+        arrays |= mirror | dict(zip(HALVES, inverse.blocks, strict=True))
+    else:
+        arrays["inverse"] = inverse
     _save(f"joint-{key}", arrays, {"rho": joint.rho, "rigid_modes": joint.rigid_modes})
+
+
+def _inverse(arrays: dict[str, Any]) -> Array | SplitMatrix:
+    """(H + ρ)⁻¹ as it was kept."""
+    if "inverse" in arrays:
+        return np.asarray(arrays["inverse"])
+    kept, turned = (arrays[name] for name in HALVES)
+    return SplitMatrix(Mirror(arrays["partner"], arrays["sign"]), (kept, turned))
 
 
 def load_cycle(key: str, structure: Structure, friction: float) -> CycleSolution | None:

@@ -257,7 +257,7 @@ def test_free_shape_of_the_joint_does_not_matter(joint):
     """A joint with twice the stiffness and loads moves the same under twice the forces."""
     doubled = replace(
         joint,
-        stiffness=2.0 * joint.stiffness,
+        stiffness=2.0 * np.asarray(joint.stiffness),
         loads=2.0 * joint.loads,
         smallest=2.0 * joint.smallest,
         largest=2.0 * joint.largest,

@@ -1,0 +1,186 @@
+"""Rigs: lumped masses, springs and reduced bodies that vibrate, and where their joints are.
+
+Points are known by their names. Damping is that of the modes with the joints free, so that a rig
+without friction rings down as measured: C = M Φ diag(2 ζ ω) Φᵀ M with Φᵀ M Φ = I.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import scipy.linalg as sl
+
+from fe_models.dynamics.model import DynamicModel
+from fe_models.reduction import ReducedModel
+from sa_solver.types import Array
+
+NOTHING: Mapping[str, float] = {}
+
+
+class RigError(ValueError):
+    """A rig that cannot be built from what was given."""
+
+
+@dataclass(frozen=True)
+class Link:
+    """What stretches by the displacement of ``second`` relative to ``first``, or to the ground."""
+
+    second: str
+    first: str | None = None
+
+
+def two_mass_rig(
+    masses: tuple[float, float], springs: tuple[float, float], damping_ratio: float = 0.0
+) -> DynamicModel:
+    """The friction rig: ground - k1 - m1 - k2 - m2 - joint - ground.
+
+    ``masses`` [t], ``springs`` [N/mm], ``damping_ratio`` that of both modes with the joint free.
+    Its points are ``m1`` and ``m2`` (Fantetti et al. 2019, Tribology International 138, 111).
+    """
+    return lumped_rig(
+        dict(zip(("m1", "m2"), masses, strict=True)),
+        {Link("m1"): springs[0], Link("m2", "m1"): springs[1]},
+        [[Link("m2")]],
+        damping_ratio,
+    )
+
+
+def lumped_rig(
+    masses: Mapping[str, float],
+    springs: Mapping[Link, float],
+    joints: Sequence[Sequence[Link]],
+    damping_ratio: float | Array = 0.0,
+) -> DynamicModel:
+    """Masses [t] and springs [N/mm] that move along one line, with joints.
+
+    Every joint is one link per direction. ``damping_ratio`` is one, or that of each mode ``(n,)``.
+    Raises :class:`RigError` for a name that is not a mass, or a mass that is not above zero.
+    """
+    empty = np.zeros((0, 0))
+    return _rig(empty, empty, (), masses, springs, joints, damping_ratio)
+
+
+def reduced_rig(
+    reduced: ReducedModel,
+    names: Sequence[str],
+    joints: Sequence[Sequence[Link]],
+    masses: Mapping[str, float] = NOTHING,
+    springs: Mapping[Link, float] | None = None,
+    damping_ratio: float | Array = 0.0,
+) -> DynamicModel:
+    """A reduced body, with lumped masses [t] and springs [N/mm] added to it, and joints.
+
+    ``names`` ``(c,)`` are those of its kept displacements; its modes follow as ``mode 1`` ... A
+    mass of another name is a further point. Every joint is one link per direction, its
+    displacement the second's minus the first's. ``damping_ratio`` is one, or that of each mode
+    ``(n,)`` of the rig. Raises :class:`RigError` for a model without mass, for names that are not
+    as many as the kept displacements, and as :func:`lumped_rig`.
+    """
+    if reduced.mass is None:
+        raise RigError("the reduced model has no mass: reduce the body with its mass matrix")
+    if len(names) != len(reduced.kept):
+        raise RigError(
+            f"{len(names)} names for {len(reduced.kept)} kept displacements: give one for each"
+        )
+    modes = tuple(f"mode {mode + 1}" for mode in range(len(reduced.frequencies)))
+    named = (*names, *modes)
+    return _rig(
+        reduced.mass, reduced.stiffness, named, masses, springs or {}, joints, damping_ratio
+    )
+
+
+def modal_damping(mass: Array, stiffness: Array, ratio: float | Array) -> Array:
+    """C = M Φ diag(2 ζ ω) Φᵀ M ``(n, n)`` with ``ratio`` ζ of all modes, or of each ``(n,)``.
+
+    Rigid motions (ω = 0) are not damped. Raises :class:`RigError` if the mass is not positive
+    definite, or a ratio is below zero.
+    """
+    if np.any(np.asarray(ratio) < 0.0):
+        raise RigError(f"damping ratio {np.min(ratio):g}: give 0 or more")
+    try:
+        squares, shapes = sl.eigh(stiffness, mass)
+    except np.linalg.LinAlgError:
+        raise RigError("the mass matrix is not positive definite: give every point mass") from None
+    angular = np.sqrt(np.maximum(squares, 0.0))
+    moved = mass @ shapes
+    return np.asarray((moved * (2.0 * np.asarray(ratio) * angular)) @ moved.T)
+
+
+def natural_frequencies(model: DynamicModel, joint_stiffness: float | Array = 0.0) -> Array:
+    """Natural frequencies ``(n,)`` [Hz], undamped, with springs in place of the joints.
+
+    ``joint_stiffness`` [N/mm] is one for all, one for each row of the connection ``(j d,)``, or
+    the joints' tangents ``(j, d, d)``. Zero leaves the joints free.
+    """
+    stretch = model.connection
+    held = np.asarray(joint_stiffness, dtype=float)
+    if held.ndim == 3:
+        springs = sl.block_diag(*held)
+    else:
+        springs = np.diag(np.broadcast_to(held, len(stretch)))
+    squares = sl.eigh(
+        model.stiffness + stretch.T @ springs @ stretch, model.mass, eigvals_only=True
+    )
+    return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi))
+
+
+def unit_force(model: DynamicModel, name: str) -> Array:
+    """A force of 1 N on the point ``name``, as ``(n,)``. Raises :class:`RigError` if unknown."""
+    force = np.zeros(len(model.names))
+    force[_place(model.names, name)] = 1.0
+    return force
+
+
+def _rig(
+    mass: Array,
+    stiffness: Array,
+    names: tuple[str, ...],
+    masses: Mapping[str, float],
+    springs: Mapping[Link, float],
+    joints: Sequence[Sequence[Link]],
+    damping_ratio: float | Array,
+) -> DynamicModel:
+    """Add masses and springs to the matrices of the points ``names``, and connect the joints."""
+    every = names + tuple(name for name in masses if name not in names)
+    if len(set(every)) < len(every):
+        raise RigError("two points have the same name: give each its own")
+    added = len(every) - len(names)
+    mass, stiffness = (np.pad(matrix, (0, added)) for matrix in (mass, stiffness))
+    for name, value in masses.items():
+        place = _place(every, name)
+        mass[place, place] += value
+    for link, value in springs.items():
+        stretch = _stretch(every, link)
+        stiffness += value * np.outer(stretch, stretch)
+    return DynamicModel(
+        mass=mass,
+        damping=modal_damping(mass, stiffness, damping_ratio),
+        stiffness=stiffness,
+        connection=_connection(every, joints),
+        names=every,
+    )
+
+
+def _connection(names: tuple[str, ...], joints: Sequence[Sequence[Link]]) -> Array:
+    """B ``(j d, n)``. All joints have the same directions."""
+    if len({len(joint) for joint in joints}) > 1:
+        raise RigError("joints of different numbers of directions: give all the same")
+    rows = [_stretch(names, link) for joint in joints for link in joint]
+    return np.array(rows).reshape(len(rows), len(names))
+
+
+def _stretch(names: tuple[str, ...], link: Link) -> Array:
+    """The row that takes the displacements of all points to the stretch of a link."""
+    row = np.zeros(len(names))
+    row[_place(names, link.second)] += 1.0
+    if link.first is not None:
+        row[_place(names, link.first)] -= 1.0
+    return row
+
+
+def _place(names: tuple[str, ...], name: str) -> int:
+    if name not in names:
+        raise RigError(f"there is no point {name!r}: the rig has {', '.join(names)}")
+    return names.index(name)
