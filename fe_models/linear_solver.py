@@ -114,25 +114,24 @@ def prepare(
     return _Iterative(matrix, near_nullspace, choice)
 
 
-def schur_complement(
-    matrix: sp.csr_matrix,
-    kept: Indices,
-    inner: Indices,
-    solve_inner: Factorisation,
-    memory: float | None = None,
-) -> Array:
-    """Condense a symmetric matrix onto the unknowns ``kept``: K_cc - K_ci K_ii⁻¹ K_ic, dense.
+def condense(
+    matrix: sp.csr_matrix, loads: Array, kept: Indices, memory: float | None = None
+) -> tuple[Array, Array]:
+    """Condense a symmetric system onto the unknowns ``kept`` ``(c,)``, with ``loads`` ``(n, m)``.
 
-    Rows and columns follow the order of ``kept``; ``inner`` are all others and ``solve_inner`` the
-    factorised K_ii, which must be positive definite, as K need not be. Raises
-    :class:`FactorMemoryError` if it needs more than ``memory`` [bytes], by default all that is
-    free: no iteration replaces it.
+    K_cc - K_ci K_ii⁻¹ K_ic ``(c, c)``, dense, and f_c - K_ci K_ii⁻¹ f_i ``(c, m)``, in the order of
+    ``kept``; ``i`` are all other unknowns. K_ii must be positive definite, K need not be. Raises
+    :class:`SolverError` if it is not, and :class:`FactorMemoryError` if it needs more than
+    ``memory`` [bytes], by default all that is free: no iteration replaces it.
     """
     limit = _limit(memory)
-    condensed = _pardiso_schur(matrix, kept, limit)
-    if condensed is None or not _is_schur(matrix, kept, inner, solve_inner, condensed):
-        condensed = _schur_by_columns(matrix, kept, inner, solve_inner, limit)
-    return condensed
+    # A load whose displacements are known tells whether the result is right.
+    displacement = np.random.default_rng(0).standard_normal(matrix.shape[0])
+    every = np.column_stack([loads, matrix @ displacement])
+    found = _condense_by_pardiso(matrix, every, kept, limit)
+    if found is None or not _is_condensed(*found, displacement[kept]):
+        found = _condense_by_columns(matrix, every, kept, limit)
+    return found[0], found[1][:, :-1]
 
 
 class _Iterative:
@@ -215,16 +214,26 @@ def _pardiso(matrix: sp.csr_matrix, limit: float) -> Pardiso | None:
     return analysed
 
 
-def _pardiso_schur(matrix: sp.csr_matrix, kept: Indices, limit: float) -> Array | None:
-    """PARDISO's own Schur complement; None where it is not installed, or fails."""
+def _condense_by_pardiso(
+    matrix: sp.csr_matrix, loads: Array, kept: Indices, limit: float
+) -> tuple[Array, Array] | None:
+    """PARDISO's own Schur complement; None where it is not installed, or fails.
+
+    That of the matrix bordered by the loads as if they were more unknowns to keep: its entries
+    between these and the others are the condensed loads.
+    """
+    size, cases = loads.shape
+    border = sp.csr_matrix(loads)
+    bordered = sp.bmat([[matrix, border], [border.T, sp.identity(cases)]], format="csr")
     try:
-        analysed = Pardiso(matrix, kept)
+        analysed = Pardiso(bordered, np.append(kept, np.arange(size, size + cases)))
         # Its result and the same in the order asked for.
-        needed = analysed.factor_bytes + 2 * BYTES * len(kept) ** 2
-        _require(needed, limit, f"condensing {matrix.shape[0]} unknowns onto {len(kept)}")
-        return analysed.schur()
+        needed = analysed.factor_bytes + 2 * BYTES * (len(kept) + cases) ** 2
+        _require(needed, limit, f"condensing {size} unknowns onto {len(kept)}")
+        schur = analysed.schur()
     except PardisoError:
         return None
+    return schur[: len(kept), : len(kept)], schur[: len(kept), len(kept) :]
 
 
 def _require(needed: float, limit: float, task: str) -> None:
@@ -232,25 +241,23 @@ def _require(needed: float, limit: float, task: str) -> None:
         raise FactorMemoryError(task, needed, limit)
 
 
-def _is_schur(
-    matrix: sp.csr_matrix, kept: Indices, inner: Indices, solve: Factorisation, condensed: Array
-) -> bool:
-    """Whether S v equals the interface forces of the full system, for one random v."""
-    v = np.random.default_rng(0).standard_normal(len(kept))
-    exact = matrix[kept][:, kept] @ v
-    exact -= matrix[kept][:, inner] @ solve(matrix[inner][:, kept] @ v)
-    return bool(np.abs(condensed @ v - exact).max() < RESIDUAL_LIMIT * np.abs(exact).max())
+def _is_condensed(stiffness: Array, loads: Array, displacement: Array) -> bool:
+    """Whether the last of the loads is that of the ``displacement``."""
+    expected = stiffness @ displacement
+    return bool(np.abs(loads[:, -1] - expected).max() < RESIDUAL_LIMIT * np.abs(expected).max())
 
 
-def _schur_by_columns(
-    matrix: sp.csr_matrix, kept: Indices, inner: Indices, solve: Factorisation, limit: float
-) -> Array:
+def _condense_by_columns(
+    matrix: sp.csr_matrix, loads: Array, kept: Indices, limit: float
+) -> tuple[Array, Array]:
+    inner = np.setdiff1d(np.arange(matrix.shape[0]), kept)
     # The result and its symmetric part; right-hand sides and solutions of one block.
     dense = 2 * len(kept) ** 2 + 3 * len(inner) * min(COLUMNS_AT_ONCE, len(kept))
     _require(BYTES * dense, limit, f"condensing {matrix.shape[0]} unknowns onto {len(kept)}")
+    solve = factorise(matrix[inner][:, inner].tocsr(), limit)
     coupling = matrix[inner][:, kept].tocsc()
     condensed = matrix[kept][:, kept].toarray()
     for start in range(0, len(kept), COLUMNS_AT_ONCE):
         block = slice(start, start + COLUMNS_AT_ONCE)
         condensed[:, block] -= coupling.T @ solve(coupling[:, block].toarray())
-    return 0.5 * (condensed + condensed.T)
+    return 0.5 * (condensed + condensed.T), loads[kept] - coupling.T @ solve(loads[inner])

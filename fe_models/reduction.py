@@ -25,7 +25,7 @@ import scipy.linalg as sl
 import scipy.sparse as sp
 from scipy.sparse.linalg import LinearOperator, eigsh
 
-from fe_models.linear_solver import COLUMNS_AT_ONCE, Factorisation, factorise, schur_complement
+from fe_models.linear_solver import COLUMNS_AT_ONCE, Factorisation, condense, factorise
 from sa_solver.types import Array, Indices
 
 # The shift of a free body's search over the median of K_jj/M_jj, which no choice of coordinates
@@ -99,17 +99,19 @@ def reduce_body(
         raise ValueError("fixed-interface modes need a mass matrix")
     if modes >= len(inner) > 0 or modes < 0:
         raise ValueError(f"{modes} modes of {len(inner)} inner displacements: take 0 to fewer")
-    solve = factorise(stiffness[inner][:, inner].tocsr())
-    static = schur_complement(stiffness, kept, inner, solve)
     full_loads = np.zeros((size, 0)) if loads is None else loads
-    values, shapes = np.empty(0), np.zeros((size, modes))
-    if mass is not None and modes > 0:
-        values, shapes[inner] = _lowest_modes(stiffness, mass, inner, modes, solve)
+    static, static_loads = condense(stiffness, full_loads, kept)
+    values, shapes, reduced_mass = np.empty(0), np.zeros((size, modes)), None
+    if mass is not None:
+        solve = factorise(stiffness[inner][:, inner].tocsr())
+        if modes > 0:
+            values, shapes[inner] = _lowest_modes(stiffness, mass, inner, modes, solve)
+        reduced_mass = _reduced_mass(stiffness, mass, kept, inner, shapes, solve)
     return ReducedModel(
         kept=kept,
         stiffness=_block_diagonal(static, np.diag(values)),
-        mass=None if mass is None else _reduced_mass(stiffness, mass, kept, inner, shapes, solve),
-        loads=_reduced_loads(stiffness, full_loads, kept, inner, shapes, solve),
+        mass=reduced_mass,
+        loads=np.concatenate([static_loads, shapes.T @ full_loads]),
         mode_shapes=shapes,
         frequencies=np.sqrt(values) / (2.0 * np.pi),
     )
@@ -215,21 +217,6 @@ def _reduced_mass(
     reduced[: len(kept), len(kept) :] = mixed
     reduced[len(kept) :, : len(kept)] = mixed.T
     return reduced
-
-
-def _reduced_loads(
-    stiffness: sp.csr_matrix,
-    loads: Array,
-    kept: Indices,
-    inner: Indices,
-    shapes: Array,
-    solve: Factorisation,
-) -> Array:
-    """Tᵀ f of load cases ``(n, cases)``."""
-    static = loads[kept]
-    if loads.shape[1] > 0:
-        static = static - stiffness[kept][:, inner] @ solve(loads[inner])
-    return np.concatenate([static, shapes.T @ loads])
 
 
 def _block_diagonal(first: Array, second: Array) -> Array:
