@@ -1,0 +1,596 @@
+"""Friction contact in three dimensions: closed forms, brute force, symmetries, balances."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from numba import njit
+from scipy.integrate import quad, solve_ivp
+
+from wear.joints.friction_contact import FrictionContact, advance
+from wear.joints.law import march
+from wear.joints.parameters import JointError
+
+KT, KN, MU, LOAD = 10.0, 13.0, 0.6, 2.0
+LAW = FrictionContact(KT, KN, MU, LOAD)
+REACH = MU * LOAD / KT  # stretch at which the slider slips under the preload
+LIFT = LOAD / KN  # lift at which the preload is gone
+
+
+def one(law, state, increment):
+    """Force, state, energy and tangent of a single joint."""
+    answer = law.respond(np.atleast_2d(state), np.atleast_2d(np.asarray(increment, float)))
+    return answer.force[0], answer.state[0], answer.dissipated[0], answer.tangent[0]
+
+
+def derivative(law, state, increment):
+    """Force and its derivative with respect to state and increment, from the scalar kernel."""
+    force, end, jacobian = np.empty(3), np.empty(3), np.empty((3, 6))
+    advance(law.parameters[0], np.asarray(state, float), increment, force, end, jacobian)
+    return force, jacobian
+
+
+def central(law, state, increment, step=1e-6 * REACH):
+    """The same derivative by central differences."""
+    at = np.concatenate([state, increment])
+    columns = []
+    for change in step * np.eye(6):
+        high, low = at + change, at - change
+        upper, lower = one(law, high[:3], high[3:])[0], one(law, low[:3], low[3:])[0]
+        columns.append((upper - lower) / (2.0 * step))
+    return np.array(columns).T
+
+
+def random_path(seed, points, size=3.0 * REACH, lift=1.6 * LIFT):
+    """Points ``(points, 3)`` of a random polygon that sticks, slips, lifts off and touches."""
+    rng = np.random.default_rng(seed)
+    return rng.uniform(-1.0, 1.0, (points, 3)) * [size, size, lift]
+
+
+def lead(law, path, state=None, start=(0.0, 0.0, 0.0)):
+    """March one joint through ``path`` ``(t, 3)``."""
+    state = law.rest(1) if state is None else np.atleast_2d(state)
+    return march(law, state, np.array([start]), path[:, None, :])
+
+
+def split(path, parts):
+    """A polygon from the origin with every side cut into equal parts."""
+    share = np.arange(1, parts + 1)[:, None] / parts
+    corners = np.vstack([np.zeros(3), path])
+    return np.vstack([a + share * (b - a) for a, b in pairwise(corners)])
+
+
+def brute_force(path, steps):
+    """Radial return in ``steps`` tiny steps per side: tangential force at every corner, energy."""
+    x = y = lost = 0.0
+    forces = []
+    for a, b in pairwise(np.vstack([np.zeros(3), path])):
+        dx, dy, dz = (float(d) for d in (b - a) / steps)
+        z = float(a[2])
+        for _ in range(steps):
+            z += dz
+            x, y = x + KT * dx, y + KT * dy
+            limit, size = MU * max(LOAD + KN * z, 0.0), (x * x + y * y) ** 0.5
+            if size > limit:
+                lost += limit * (size - limit) / KT
+                x, y = x * limit / size, y * limit / size
+        forces.append((x, y))
+    return np.array(forces), lost
+
+
+# --- what it reduces to -----------------------------------------------------------------------
+
+
+def test_constant_load_along_a_line_is_a_jenkins_element():
+    rng = np.random.default_rng(1)
+    along = np.cumsum(rng.normal(scale=REACH, size=400))
+    direction = np.array([np.cos(0.7), np.sin(0.7), 0.0])
+    history = lead(LAW, along[:, None] * direction)
+    slider, limit = 0.0, MU * LOAD
+    for step, x in enumerate(along):
+        before = slider
+        slider = min(max(slider, x - limit / KT), x + limit / KT)
+        expected = KT * (x - slider) * direction + [0.0, 0.0, LOAD]
+        np.testing.assert_allclose(history.force[step, 0], expected, atol=1e-12)
+        assert history.dissipated[step, 0] == pytest.approx(limit * abs(slider - before), abs=1e-12)
+
+
+def test_a_growing_load_catches_the_slider_and_a_falling_one_lets_it_go():
+    _, sliding, _, _ = one(LAW, LAW.rest(1), [2.0 * REACH, 0.0, 0.0])
+    # Pulled on, but the limit grows faster than the spring: it sticks from the first moment.
+    pull = 0.5 * REACH
+    force, _, lost, tangent = one(LAW, sliding, [pull, 0.0, 1.1 * KT * pull / (MU * KN)])
+    assert force[0] == pytest.approx(MU * LOAD + KT * pull, rel=1e-13)
+    assert lost == pytest.approx(0.0, abs=1e-15)
+    np.testing.assert_allclose(tangent[:2], [[KT, 0, 0], [0, KT, 0]], atol=1e-12)
+    # Pulled back, but the limit falls faster: it slips, against the pull.
+    force, _, lost, _ = one(LAW, sliding, [-pull, 0.0, -1.1 * KT * pull / (MU * KN)])
+    limit = MU * LOAD - 1.1 * KT * pull
+    assert force[0] == pytest.approx(limit, rel=1e-13)
+    slipped = (MU * LOAD - limit) / KT - pull
+    assert lost == pytest.approx(0.5 * (MU * LOAD + limit) * slipped, rel=1e-12)
+
+
+# --- sliding along a straight path ------------------------------------------------------------
+
+
+def slide(angle, pull, limits):
+    """End of a slip that begins on the circle, at an angle from the pull, by its equation."""
+    first, last = limits
+    change = last - first
+
+    def rate(s, force):
+        limit = first + change * s
+        direction = force / np.hypot(*force)
+        slip = pull * direction[0] - change
+        return np.array([pull, 0.0]) - slip * force / limit
+
+    start = first * np.array([np.cos(angle), np.sin(angle)])
+    return solve_ivp(rate, (0.0, 1.0), start, rtol=1e-12, atol=1e-13, method="DOP853").y[:, -1]
+
+
+@pytest.mark.parametrize(
+    ("angle", "pull", "last"),
+    [(angle, 4.0, last) for angle in (0.3, -1.2) for last in (0.05, 0.97, 1.0, 1.03, 1.04, 1.9)]
+    + [(1.56, 4.0, last) for last in (0.05, 0.97, 1.0, 1.03, 1.04)]
+    # Against the force a pull slips only where the circle shrinks faster.
+    + [(2.8, 0.5, 0.05), (2.8, 0.02, 0.97), (-3.1, 0.9, 0.05)],
+)
+def test_the_force_turns_into_the_path_at_the_closed_rate(angle, pull, last):
+    limit = MU * LOAD
+    pull, end = pull * limit, last * limit
+    state = [REACH * np.cos(angle), REACH * np.sin(angle), 0.0]
+    force, _, _, _ = one(LAW, state, [pull / KT, 0.0, (end - limit) / (MU * KN)])
+    length = pull / limit if end == limit else pull * np.log(end / limit) / (end - limit)
+    half = np.tan(angle / 2.0) * np.exp(-length)
+    expected = end * np.array([1.0 - half**2, 2.0 * half]) / (1.0 + half**2)
+    np.testing.assert_allclose(force[:2], expected, atol=1e-13)
+    np.testing.assert_allclose(force[:2], slide(angle, pull, (limit, end)), atol=1e-10)
+
+
+def test_the_direction_tends_to_the_path_even_where_the_pressure_vanishes():
+    state = [0.0, REACH, 0.0]
+    for left in 10.0 ** -np.arange(2.0, 13.0, 2.0):
+        force, _, _, _ = one(LAW, state, [0.3 * REACH, 0.0, -LIFT * (1.0 - left)])
+        assert np.hypot(*force[:2]) == pytest.approx(MU * force[2], rel=1e-12)
+        assert force[2] == pytest.approx(LOAD * left, rel=1e-2)
+        exponent = 0.3 / (1.0 - left)
+        half = np.tan(0.5 * np.arctan2(force[1], force[0]))
+        assert half == pytest.approx((force[2] / LOAD) ** exponent, rel=1e-10)
+
+
+def test_energy_of_a_slip_under_constant_load_is_its_closed_form():
+    for angle, length in [(1.2, 0.3), (0.7, 2.0), (-1.5, 7.0), (0.1, 900.0)]:
+        state = [REACH * np.cos(angle), REACH * np.sin(angle), 0.0]
+        _, _, lost, _ = one(LAW, state, [length * REACH, 0.0, 0.0])
+        shape = np.logaddexp(
+            length + np.log1p(np.cos(angle)), -length + np.log1p(-np.cos(angle))
+        ) - np.log(2.0)
+        assert lost == pytest.approx((MU * LOAD) ** 2 / KT * shape, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("angle", "pull", "last"),
+    [
+        (1.3, 0.5, 1.1),
+        (1.0, 3.0, 0.2),
+        (0.4, 30.0, 12.0),
+        (1.5, 900.0, 3.0),
+        (0.2, 2e4, 40.0),
+        (3.0, 0.5, 0.01),
+        (np.pi, 0.9, 0.05),
+        (np.pi / 2, 1e-3, 0.5),
+        (0.9, 0.0, 0.3),
+    ],
+)
+def test_energy_of_a_slip_under_changing_load_is_its_integral(angle, pull, last):
+    limit = MU * LOAD
+    state = [REACH * np.cos(angle), REACH * np.sin(angle), 0.0]
+    increment = np.array([pull * REACH, 0.0, (last - 1.0) * LIFT])
+    _, _, lost, _ = one(LAW, state, increment)
+
+    def power(s):
+        now, change = limit * (1.0 + s * (last - 1.0)), limit * (last - 1.0)
+        half = 2.0 * np.arctanh(-(last - 1.0) * s / (2.0 + s * (last - 1.0)))  # ln R0/R1
+        decay = np.exp(pull / (last - 1.0) * half)
+        p, m = (1.0 + np.cos(angle)), (1.0 - np.cos(angle)) * decay**2
+        return now * (pull * limit * (p - m) / (p + m) - change) / KT
+
+    corners = np.concatenate([[0.0], np.minimum(1.0, np.geomspace(1e-3, 64.0, 30) / (pull + 1.0))])
+    corners = np.unique(np.append(corners, 1.0))
+    expected = sum(quad(power, a, b, epsrel=1e-13, epsabs=0)[0] for a, b in pairwise(corners))
+    assert lost == pytest.approx(expected, rel=1e-11)
+
+
+# --- symmetry, splitting, brute force, order --------------------------------------------------
+
+
+def test_the_cone_is_round():
+    path = random_path(2, 200)
+    turn = np.eye(3)
+    turn[:2, :2] = [[np.cos(0.8), -np.sin(0.8)], [np.sin(0.8), np.cos(0.8)]]
+    state, turned = LAW.rest(1), LAW.rest(1)
+    for increment in np.diff(path, axis=0, prepend=np.zeros((1, 3))):
+        here = LAW.respond(state, increment[None])
+        there = LAW.respond(turned, (turn @ increment)[None])
+        np.testing.assert_allclose(there.force[0], turn @ here.force[0], atol=1e-12)
+        np.testing.assert_allclose(there.tangent[0], turn @ here.tangent[0] @ turn.T, atol=1e-9)
+        np.testing.assert_allclose(there.dissipated, here.dissipated, atol=1e-12)
+        state, turned = here.state, there.state
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_splitting_an_increment_changes_nothing(seed):
+    path = random_path(seed, 40)
+    whole = lead(LAW, path)
+    for parts in (2, 3, 17):
+        pieces = lead(LAW, split(path, parts))
+        np.testing.assert_allclose(pieces.force[parts - 1 :: parts], whole.force, atol=1e-12)
+        energies = pieces.dissipated.reshape(len(path), parts).sum(axis=1)
+        np.testing.assert_allclose(energies, whole.dissipated[:, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_tiny_steps_of_radial_return_converge_to_it(seed):
+    path = random_path(100 + seed, 10)
+    history = lead(LAW, path)
+    errors = []
+    for steps in (100, 1000, 10_000):
+        forces, lost = brute_force(path, steps)
+        off = np.abs(forces - history.force[:, 0, :2]).max()
+        errors.append((off, abs(lost - history.dissipated.sum())))
+    force_errors, energy_errors = np.array(errors).T
+    # First order: ten times as many steps, a tenth of the error.
+    assert np.all(force_errors[1:] < 0.2 * force_errors[:-1])
+    assert np.all(energy_errors[1:] < 0.2 * energy_errors[:-1])
+    assert force_errors[-1] < 2e-4 * MU * LOAD
+    assert energy_errors[-1] < 1e-3 * history.dissipated.sum()
+
+
+def orbit(steps):
+    """A smooth closed path that sticks, slips, lifts off and touches, in equal times."""
+    t = 2.0 * np.pi * np.arange(steps + 1) / steps
+    x, y = 2.0 * REACH * np.sin(t), 1.5 * REACH * np.sin(2.0 * t + 0.4)
+    z = 1.2 * LIFT * np.sin(t + 1.0)
+    return np.column_stack([x, y, z])
+
+
+def test_a_smooth_orbit_converges_with_the_square_of_the_step():
+    steps = np.array([64, 128, 256, 512, 1024])
+    fine = 32768
+
+    def run(count):
+        path = orbit(count)
+        history = lead(LAW, path[1:], [0.0, 0.0, path[0, 2]], path[0])
+        return history.force[count // 64 - 1 :: count // 64, 0], history.dissipated.sum()
+
+    forces, lost = run(fine)
+    runs = [run(count) for count in steps]
+    errors = [np.abs(force - forces).max() for force, _ in runs]
+    energies = [abs(energy - lost) for _, energy in runs]
+    assert -np.polyfit(np.log(steps), np.log(errors), 1)[0] == pytest.approx(2.0, abs=0.1)
+    assert -np.polyfit(np.log(steps), np.log(energies), 1)[0] == pytest.approx(2.0, abs=0.1)
+
+
+def kinks(state, increment):
+    """Where on a path the force may have a kink: touch, lift-off, begin of slip."""
+    pull, limit = KT * increment[:2], MU * np.array([KN * increment[2], LOAD + KN * state[2]])
+    stuck = sum(np.polymul([k, t], [k, t]) for k, t in zip(pull, KT * state[:2], strict=True))
+    roots = np.append(np.roots(limit), np.roots(np.polysub(stuck, np.polymul(limit, limit))))
+    real = roots[np.isreal(roots)].real
+    return real[(real > 0.0) & (real < 1.0)]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_energy_lost_is_work_less_what_is_stored(seed):
+    path = random_path(200 + seed, 12)
+    state, here = LAW.rest(1)[0], np.zeros(3)
+
+    def stored(state):
+        return 0.5 * KT * (state[0] ** 2 + state[1] ** 2) + (
+            0.5 * max(LOAD + KN * state[2], 0.0) ** 2 / KN
+        )
+
+    for there in path:
+        increment = there - here
+
+        def power(s, state=state, increment=increment):
+            return one(LAW, state, s * increment)[0] @ increment
+
+        work = quad(power, 0.0, 1.0, epsabs=0.0, epsrel=1e-13, points=kinks(state, increment))[0]
+        _, end, lost, _ = one(LAW, state, increment)
+        assert lost >= 0.0
+        assert lost == pytest.approx(work - stored(end) + stored(state), abs=1e-10)
+        state, here = end, there
+
+
+# --- derivatives ------------------------------------------------------------------------------
+
+ON_CIRCLE = np.array([0.6 * REACH, 0.8 * REACH, 0.0])
+SITUATIONS = {
+    "sticks": ([0.1, 0.2, 0.0], [0.2, -0.3, 0.1]),
+    "sticks, just": ([0.0, 0.0, 0.0], [0.5999, 0.7999, 0.0]),
+    "slips, just": ([0.0, 0.0, 0.0], [0.6001, 0.8001, 0.0]),
+    "sticks, then slips": ([0.1, 0.2, 0.1], [1.5, 0.4, -0.2]),
+    "sticks, then slips as the load grows": ([0.1, 0.2, 0.1], [1.5, 0.4, 0.6]),
+    "slips": ([0.6 - 1e-4, 0.8 - 1e-4, 0.0], [1.0, -0.1, 0.03]),
+    "slips, load nearly constant": ([0.5999, 0.7999, 0.0], [1.0, 0.2, 1e-3]),
+    "slips, load constant": ([0.5999, 0.7999, 0.0], [1.0, 0.2, 0.0]),
+    "slips far": ([0.1, 0.7, 0.0], [30.0, 5.0, 0.5]),
+    "slips without a pull": ([0.6, 0.7, 0.0], [0.0, 0.0, -0.5]),
+    "slips against the pull": ([0.6, 0.7, 0.0], [-0.1, -0.12, -0.6]),
+    "turned back": ([0.5999, 0.7999, 0.0], [-0.3, -0.3, 0.1]),
+    "turned back, then slips": ([0.5999, 0.7999, 0.0], [-2.3, -0.9, 0.1]),
+    "caught by the load": ([0.5999, 0.7999, 0.0], [0.2, 0.1, 0.9]),
+    "outside, sticks": ([1.0, 0.8, 0.0], [-0.3, -0.2, 0.2]),
+    "outside, slips": ([1.0, 0.8, 0.0], [0.7, -0.2, 0.2]),
+    "lifts off": ([0.3, 0.4, 0.2], [0.5, 0.3, -1.6]),
+    "lifts off, nearly": ([0.3, 0.4, 0.2], [0.5, 0.3, -1.1995]),
+    "lifts off, just": ([0.3, 0.4, 0.2], [0.5, 0.3, -1.2005]),
+    "apart": ([0.0, 0.0, -1.4], [0.5, 0.3, -0.2]),
+    "apart, nearly touches": ([0.0, 0.0, -1.4], [0.5, 0.3, 0.3995]),
+    "touches, just, slips": ([0.0, 0.0, -1.4], [0.5, 0.3, 0.4005]),
+    "touches, slips": ([0.0, 0.0, -1.4], [1.5, 0.3, 0.9]),
+    "touches, sticks": ([0.0, 0.0, -1.4], [0.5, 0.3, 0.9]),
+    "touches, sticks, just": ([0.0, 0.0, -1.5], [0.8, 0.0, 0.8005]),
+    "touches, slips, just": ([0.0, 0.0, -1.5], [0.8, 0.0, 0.7995]),
+}
+
+
+@pytest.mark.parametrize("name", SITUATIONS)
+def test_derivatives_in_every_state_and_beside_every_switch(name):
+    state, increment = (np.array(part) * [REACH, REACH, LIFT] for part in SITUATIONS[name])
+    force, jacobian = derivative(LAW, state, increment)
+    np.testing.assert_array_equal(force, one(LAW, state, increment)[0])
+    np.testing.assert_array_equal(jacobian[:, 3:], one(LAW, state, increment)[3])
+    largest = max(1.0, np.abs(jacobian).max() / KT)
+    np.testing.assert_allclose(
+        jacobian, central(LAW, state, increment), atol=1e-6 * KT * largest**2
+    )
+
+
+def test_derivatives_of_random_increments():
+    rng = np.random.default_rng(7)
+    for _ in range(400):
+        state = rng.uniform(-1.0, 1.0, 3) * [REACH, REACH, 1.5 * LIFT]
+        increment = rng.uniform(-1.0, 1.0, 3) * [3.0 * REACH, 3.0 * REACH, 2.0 * LIFT]
+        _, jacobian = derivative(LAW, state, increment)
+        expected = central(LAW, state, increment)
+        np.testing.assert_allclose(jacobian, expected, rtol=1e-6, atol=1e-6 * KT)
+
+
+def test_derivative_of_a_whole_march():
+    """The chain of the kernel's derivatives is that of all forces by all displacements."""
+    path, shift = orbit(24), 1e-7 * REACH
+    start = np.array([0.0, 0.0, path[0, 2]])
+    rng = np.random.default_rng(3)
+    change = rng.normal(size=path.shape)
+
+    def run(displacement):
+        first = [0.0, 0.0, displacement[0, 2]]
+        return lead(LAW, displacement[1:], first, displacement[0]).force[:, 0]
+
+    state, moved = start.copy(), np.array([0.0, 0.0, change[0, 2]])
+    directional, end = [], np.empty(3)
+    for increment, further in zip(np.diff(path, axis=0), np.diff(change, axis=0), strict=True):
+        force, jacobian = np.empty(3), np.empty((3, 6))
+        advance(LAW.parameters[0], state, increment, force, end, jacobian)
+        slope = jacobian @ np.concatenate([moved, further])
+        moved = np.array([slope[0] / KT, slope[1] / KT, moved[2] + further[2]])
+        directional.append(slope)
+        state[:] = end
+    expected = (run(path + shift * change) - run(path - shift * change)) / (2.0 * shift)
+    np.testing.assert_allclose(directional, expected, atol=1e-5 * KT)
+
+
+# --- separation and touch ---------------------------------------------------------------------
+
+
+def test_a_gap_closes_before_anything_is_felt():
+    gap = 0.02
+    law = FrictionContact(KT, KN, MU, gap=gap)
+    force, state, lost, tangent = one(law, law.rest(1), [0.3, -0.2, 0.9 * gap])
+    assert not force.any()
+    assert not tangent.any()
+    assert lost == 0.0
+    # From a gap of 0.1 to a pressing of 0.2: two thirds of the path count.
+    pressing = 0.2 * gap
+    small = 0.9 * MU * KN * pressing / KT / (2.0 / 3.0)
+    force, end, lost, _ = one(law, state, [small, 0.0, 0.1 * gap + pressing])
+    np.testing.assert_allclose(force, [KT * small * 2.0 / 3.0, 0.0, KN * pressing], rtol=1e-12)
+    assert lost == 0.0
+    np.testing.assert_allclose(end, [small * 2.0 / 3.0, 0.0, gap + pressing], rtol=1e-12)
+    # A longer way slips from the touch on, in the direction of the path.
+    way = np.array([0.3, 0.4])
+    force, _, lost, _ = one(law, state, [*way, 0.1 * gap + pressing])
+    limit = MU * KN * pressing
+    np.testing.assert_allclose(force[:2], limit * way / 0.5, rtol=1e-12)
+    assert lost == pytest.approx(0.5 * limit * (0.5 * 2.0 / 3.0 - limit / KT), rel=1e-12)
+
+
+def test_a_preload_is_a_gap_of_the_other_sign():
+    path = random_path(11, 60)
+    loaded = lead(LAW, path)
+    gap = 2.0 * LIFT
+    gapped = FrictionContact(KT, KN, MU, gap=gap)
+    raised = np.array([0.0, 0.0, gap + LIFT])
+    same = lead(gapped, path + raised, raised, raised)
+    np.testing.assert_allclose(same.force, loaded.force, atol=1e-12)
+    np.testing.assert_allclose(same.dissipated, loaded.dissipated, atol=1e-12)
+
+
+def test_lift_off_forgets_the_slider_and_loses_what_the_spring_held():
+    _, held, _, _ = one(LAW, LAW.rest(1), [0.5 * REACH, 0.0, 0.0])
+    force, apart, lost, tangent = one(LAW, held, [0.0, 0.0, -2.0 * LIFT])
+    assert not force.any()
+    assert not tangent.any()
+    assert not apart[:2].any()
+    assert lost == pytest.approx(0.5 * KT * (0.5 * REACH) ** 2, rel=1e-12)
+    force, _, _, _ = one(LAW, apart, [0.0, 0.0, 2.0 * LIFT])
+    np.testing.assert_allclose(force, [0.0, 0.0, LOAD], atol=1e-14)
+
+
+def test_the_force_is_continuous_where_contact_is_lost_and_found():
+    state = np.array([0.3 * REACH, 0.4 * REACH, 0.0])
+    for left in (1e-3, 1e-6, 1e-9, 0.0, -1e-9):
+        force, _, lost, _ = one(LAW, state, [REACH, 0.2 * REACH, -LIFT * (1.0 - left)])
+        assert np.hypot(*force[:2]) <= MU * LOAD * max(left, 0.0) * (1.0 + 1e-6) + 1e-15
+        near = one(LAW, state, [REACH, 0.2 * REACH, -LIFT])[2]
+        assert lost == pytest.approx(near, abs=3.0 * abs(left) * MU * LOAD * REACH + 1e-15)
+    apart = np.array([0.0, 0.0, -2.0 * LIFT])
+    for left in (1e-3, 1e-6, 1e-9, 0.0, -1e-9):
+        force, _, _, _ = one(LAW, apart, [REACH, 0.2 * REACH, LIFT * (1.0 + left)])
+        assert np.hypot(*force[:2]) <= MU * LOAD * max(left, 0.0) * (1.0 + 1e-6) + 1e-15
+
+
+@pytest.mark.parametrize("left", [1e-9, 1e-12, 1e-15])
+@pytest.mark.parametrize("pull", [0.0, 1e-15, 1e-9, 1e-3, 1.0, 1e4])
+@pytest.mark.parametrize("held", [0.0, 1e-6, 1.0])
+def test_a_limit_that_all_but_vanishes(left, pull, held):
+    """The begin of slip and the end of the path are then one rounding error apart."""
+    state = [0.6 * held * REACH, 0.8 * held * REACH, 0.0]
+    for way in ([1.0, 0.0], [-0.6, -0.8]):
+        increment = np.array([*(pull * REACH * np.array(way)), -LIFT * (1.0 - left)])
+        force, jacobian = derivative(LAW, state, increment)
+        assert np.all(np.isfinite(jacobian))
+        assert np.hypot(*force[:2]) <= MU * force[2] + 1e-15 * MU * LOAD
+        lost = one(LAW, state, increment)[2]
+        _, near, first, _ = one(LAW, state, 0.3 * increment)
+        assert lost == pytest.approx(first + one(LAW, near, 0.7 * increment)[2], rel=1e-10)
+
+
+def test_grazing():
+    # The pressure vanishes at the very end of an increment, and comes back.
+    _, state, _, _ = one(LAW, LAW.rest(1), [0.5 * REACH, 0.0, 0.0])
+    force, state, _, tangent = one(LAW, state, [0.1 * REACH, 0.0, -LIFT])
+    assert np.all(np.isfinite(tangent))
+    np.testing.assert_allclose(force, 0.0, atol=1e-15)
+    force, _, _, _ = one(LAW, state, [0.1 * REACH, 0.0, LIFT])
+    np.testing.assert_allclose(force, [0.1 * KT * REACH, 0.0, LOAD], atol=1e-14)
+    # Along the circle: the limit grows exactly as fast as the spring is pulled.
+    start = np.array([REACH, 0.0, 0.0])
+    pull = 0.7 * REACH
+    force, _, lost, tangent = one(LAW, start, [pull, 0.0, KT * pull / (MU * KN)])
+    assert force[0] == pytest.approx(MU * LOAD + KT * pull, rel=1e-14)
+    assert lost == pytest.approx(0.0, abs=1e-14)
+    assert np.all(np.isfinite(tangent))
+    # Square to the force: neither held nor moving at the first moment, slipping after it.
+    force, _, lost, tangent = one(LAW, start, [0.0, pull, 0.0])
+    assert np.hypot(*force[:2]) == pytest.approx(MU * LOAD, rel=1e-14)
+    assert force[1] == pytest.approx(MU * LOAD * np.tanh(0.7), rel=1e-13)
+    assert lost == pytest.approx((MU * LOAD) ** 2 / KT * np.log(np.cosh(0.7)), rel=1e-12)
+
+
+def test_without_friction_only_the_normal_spring_is_left():
+    law = FrictionContact(KT, KN, 0.0, LOAD)
+    state = law.rest(1)
+    for increment in [[0.1, 0.2, 0.1], [0.0, 0.0, 0.0], [-0.3, 0.1, -1.0], [0.2, 0.2, 1.5]]:
+        answer = law.respond(state, np.array([increment]))
+        state = answer.state
+        normal = max(LOAD + KN * state[0, 2], 0.0)
+        np.testing.assert_array_equal(answer.force[0], [0.0, 0.0, normal])
+        expected = np.diag([0.0, 0.0, KN if normal > 0.0 else 0.0])
+        np.testing.assert_array_equal(answer.tangent[0], expected)
+        assert answer.dissipated[0] == 0.0
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_zero_increments_change_nothing(seed):
+    path = random_path(300 + seed, 30)
+    plain, patient = lead(LAW, path), lead(LAW, np.repeat(path, 3, axis=0))
+    np.testing.assert_allclose(patient.force[2::3], plain.force, atol=1e-13)
+    np.testing.assert_allclose(patient.dissipated[1::3], 0.0, atol=1e-15)
+    _, _, lost, tangent = one(LAW, LAW.rest(1), np.zeros(3))
+    assert lost == 0.0
+    np.testing.assert_array_equal(tangent, np.diag([KT, KT, KN]))
+
+
+def test_steps_far_too_large_end_in_sliding_along_the_path():
+    state = np.array([0.6 * REACH, -0.8 * REACH, 0.0])
+    way = np.array([3.0, 4.0])
+    for size in 10.0 ** np.arange(2.0, 13.0, 2.0):
+        for normal in (0.0, 0.3, size):
+            force, _, lost, tangent = one(LAW, state, [*(size * way), normal])
+            limit = MU * (LOAD + KN * normal)
+            np.testing.assert_allclose(force[:2], limit * way / 5.0, rtol=1e-12)
+            assert np.all(np.isfinite(tangent))
+            mean = 0.5 * (limit + MU * LOAD)
+            straight = mean * (5.0 * size - (limit - MU * LOAD) / KT)
+            assert lost == pytest.approx(straight, rel=2.0 * REACH / size)  # it turns on REACH
+
+
+# --- many joints, compiled loops, parameters --------------------------------------------------
+
+
+def test_many_joints_answer_as_each_alone():
+    rng = np.random.default_rng(5)
+    joints = 121
+    values = rng.uniform(0.5, 2.0, (5, joints)) * np.array([KT, KN, MU, LOAD, LIFT])[:, None]
+    open_gap = rng.random(joints) < 0.3
+    values[3, open_gap], values[4, ~open_gap] = 0.0, 0.0
+    law = FrictionContact(*values)
+    state = rng.uniform(-1.0, 1.0, (joints, 3)) * [REACH, REACH, 2.0 * LIFT]
+    increment = rng.uniform(-1.0, 1.0, (joints, 3)) * [2.0 * REACH, 2.0 * REACH, 3.0 * LIFT]
+    kept = state.copy()
+    together = law.respond(state, increment)
+    np.testing.assert_array_equal(state, kept)
+    for joint in range(joints):
+        alone = FrictionContact(*(float(value[joint]) for value in values))
+        force, end, lost, tangent = one(alone, state[joint], increment[joint])
+        np.testing.assert_array_equal(together.force[joint], force)
+        np.testing.assert_array_equal(together.state[joint], end)
+        np.testing.assert_array_equal(together.tangent[joint], tangent)
+        assert together.dissipated[joint] == lost
+
+
+@njit
+def compiled_march(parameters, state, increments, forces):
+    """A march in one compiled loop, the state advanced in place."""
+    lost, jacobian = 0.0, np.empty((3, 6))
+    for step in range(len(increments)):
+        lost += advance(parameters, state, increments[step], forces[step], state, jacobian)
+    return lost
+
+
+def test_a_compiled_loop_marches_in_place():
+    path = random_path(9, 50)
+    increments = np.diff(path, axis=0, prepend=np.zeros((1, 3)))
+    forces, state = np.empty((50, 3)), np.zeros(3)
+    lost = compiled_march(LAW.parameters[0], state, increments, forces)
+    history = lead(LAW, path)
+    np.testing.assert_array_equal(forces, history.force[:, 0])
+    np.testing.assert_array_equal(state, history.state[0])
+    assert lost == pytest.approx(history.dissipated.sum(), rel=1e-13)
+
+
+def test_a_worn_limit_lets_the_slider_slip_and_counts_what_it_loses():
+    _, state, _, _ = one(LAW, LAW.rest(1), [0.8 * REACH, 0.6 * REACH, 0.0])
+    worn = replace(LAW, normal_load=0.25 * LOAD)
+    force, _, lost, _ = one(worn, state, np.zeros(3))
+    limit = 0.25 * MU * LOAD
+    np.testing.assert_allclose(force, [0.8 * limit, 0.6 * limit, 0.25 * LOAD], rtol=1e-12)
+    assert lost == pytest.approx(0.5 * ((MU * LOAD) ** 2 - limit**2) / KT, rel=1e-12)
+    for gone in (replace(LAW, normal_load=0.0), replace(LAW, normal_load=0.0, gap=0.01)):
+        force, end, lost, tangent = one(gone, state, np.zeros(3))
+        assert not force.any()
+        assert not end.any()
+        assert not tangent.any()
+        assert lost == pytest.approx(0.5 * (MU * LOAD) ** 2 / KT, rel=1e-12)
+
+
+def test_parameters_that_cannot_be_are_refused():
+    with pytest.raises(JointError, match="stiffness"):
+        FrictionContact(0.0, KN, MU, LOAD)
+    with pytest.raises(JointError, match="friction"):
+        FrictionContact(KT, KN, np.array([0.1, -0.1]), LOAD)
+    with pytest.raises(JointError, match="gap"):
+        FrictionContact(KT, KN, MU, LOAD, 0.01)
+    law = FrictionContact(np.full(2, KT), KN, MU, LOAD)
+    assert law.directions == 3
+    with pytest.raises(JointError, match="increment"):
+        law.respond(law.rest(2), np.zeros((2, 1)))
+    with pytest.raises(JointError, match="2 joints"):
+        law.respond(law.rest(3), np.zeros((3, 3)))

@@ -1,0 +1,69 @@
+"""What the laws along one direction share: checked parameters, and a compiled kernel's answer.
+
+A kernel takes the parameters of ``n`` joints as one array ``(m, p)``, a row per joint or a single
+row for all of them, and loops over the joints: a call for a few of them then costs microseconds,
+most of it in making the arrays it returns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from sa_solver.types import Array
+from wear.joints.law import JointResponse, State
+
+Parameter = float | Array
+Kernel = Callable[[Array, Array, Array], tuple[Array, Array, Array, Array]]
+
+
+class JointError(ValueError):
+    """Parameters that a joint law cannot have, or arrays that do not fit its joints."""
+
+
+def require_positive(**values: Parameter) -> None:
+    """Raise :class:`JointError` naming the first of ``values`` that is not above 0 throughout."""
+    for name, value in values.items():
+        given = np.asarray(value)
+        if not ((given > 0.0) & (given < np.inf)).all():
+            raise JointError(f"{name} of a joint is {value}: it must be finite and above 0")
+
+
+def require_not_negative(**values: Parameter) -> None:
+    """Raise :class:`JointError` naming the first of ``values`` that is somewhere below 0."""
+    for name, value in values.items():
+        given = np.asarray(value)
+        if not ((given >= 0.0) & (given < np.inf)).all():
+            raise JointError(f"{name} of a joint is {value}: it must be finite and 0 or more")
+
+
+def require_one_each(*values: Parameter) -> None:
+    """Raise :class:`JointError` unless ``values`` are numbers or arrays of one length."""
+    shapes = {np.shape(value) for value in values} - {()}
+    if len(shapes) > 1 or any(len(shape) > 1 for shape in shapes):
+        given = ", ".join(str(shape) for shape in sorted(shapes))
+        raise JointError(
+            f"parameters have the shapes {given}: each must be a number or one per joint"
+        )
+
+
+def side_by_side(*values: Parameter) -> Array:
+    """Parameters, numbers or ``(n,)``, as columns ``(m, p)``; one row where all are numbers."""
+    columns = np.empty((max(np.size(value) for value in values), len(values)))
+    for place, value in enumerate(values):
+        columns[:, place] = value
+    return columns
+
+
+def answer(kernel: Kernel, parameters: Array, state: State, increment: Array) -> JointResponse:
+    """Lead the joints of ``state`` by ``increment`` ``(n, 1)`` [mm].
+
+    Raises :class:`JointError` where shapes differ: the kernel itself checks no bounds.
+    """
+    joints = len(state)
+    if increment.shape != (joints, 1):
+        raise JointError(f"the increment has shape {increment.shape}: it must be ({joints}, 1)")
+    if len(parameters) not in (1, joints):
+        raise JointError(f"the law is that of {len(parameters)} joints, the state of {joints}")
+    return JointResponse(*kernel(parameters, state, np.ascontiguousarray(increment, float)))
