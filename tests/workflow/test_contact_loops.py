@@ -1,5 +1,6 @@
-"""Tangential loops of a wear run: what is imposed, kept, written, drawn, and read again."""
+"""Tangential loops of a wear run: what is imposed, kept, written, and drawn."""
 
+from contextlib import nullcontext
 from types import SimpleNamespace
 
 import h5py
@@ -11,33 +12,65 @@ from sa_solver.contact import FrictionalContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Grid, Material
+from tests.workflow.conftest import Run, invoke
 from wear.stepping import ContactFailure
 from workflow.case import load_case
 from workflow.case.loops import Loops
 from workflow.contact_loops import (
-    COLUMNS,
     MEASURED,
     kept_loops,
     loop_path,
     loops_due,
-    read_loop_table,
     warn_of_border,
     worn_loop,
     write_loops,
-    write_table,
 )
+from workflow.contact_stage import ContactStage
 from workflow.errors import CaseError, UserError
 from workflow.figures import loops as loops_figure
 from workflow.figures import wear as figures
 from workflow.folder import OutputFolder
+from workflow.loop_table import read_loop_table
 from workflow.store import ResultsWriter, write_arrays
 
 BODY = Material(115e3, 0.0)
 SPHERE = ShearedSphere(400.0, 10.0, BODY, BODY, 0.7)
 FORCE = 0.5 * SPHERE.sliding_force
 
-# Loops of the small dovetail, few and coarse: they are to be kept, not to be accurate.
-ASKED = "loops.amplitude=30 um", "loops.increments=3"
+# Two balls under loads of a table: no structure to condense, whose friction would take the time.
+LOADS = """\
+interface, P, Qx, Qy, Mx, My, Mz, Edx, Edy
+left,  400, -160, 0, 0, 0, 0, 3, 0
+left,  400,  160, 0, 0, 0, 0, 3, 0
+right, 300, -120, 0, 0, 0, 0, 2, 0
+right, 300,  120, 0, 0, 0, 0, 2, 0
+"""
+BALLS = """\
+title: Two balls that wear under loads of a table
+analysis: wear
+structure:
+  kind: resultants
+  file: loads.csv
+  dimension: 3
+  size: [1 mm, 1 mm]
+  gap: {shape: paraboloid, radius_x: 10 mm, radius_y: 10 mm}
+materials:
+  body_1: {young: 115 GPa, poisson: 0.29, density: 4430 kg/m^3}
+  body_2: {young: 115 GPa, poisson: 0.29, density: 4430 kg/m^3}
+friction: {coefficient: 0.4}
+contact: {grid: [16, 16]}
+wear:
+  law: energy
+  body_1: {coefficient: 1e4 um^3/J}
+  body_2: {coefficient: 1e4 um^3/J}
+  cycles: 3e4
+  step: {kind: implicit, cycles: 1e4}
+stress: {section: none, life: {parameter: none}}
+output: {paraview: false, figures: false}
+"""
+AMPLITUDE = 0.01
+# Coarse loops: they are to be kept, not to be accurate.
+ASKED = f"loops.amplitude={AMPLITUDE} mm", "loops.increments=3"
 
 
 def state(P=400.0, Mx=0.0, My=0.0, grid=None):
@@ -204,91 +237,54 @@ def test_warning_of_a_contact_that_outgrows_its_grid():
     assert "2.0%" in said[0]
 
 
-# --- the table ----------------------------------------------------------------------------------
-
-
-def rows(count):
-    numbers = np.random.default_rng(4).random((count, len(COLUMNS)))
-    numbers[:, 1].sort()
-    return [dict(zip([c.name for c in COLUMNS], own, strict=True)) for own in numbers]
-
-
-@pytest.mark.parametrize("per_length", [False, True])
-def test_table_reads_back_equal(tmp_path, per_length):
-    path = tmp_path / "loops_face.csv"
-    given = rows(5)
-    write_table(path, given, per_length)
-    table = read_loop_table(path)
-    assert table.per_length is per_length
-    for column in COLUMNS:
-        expected = [row[column.name] for row in given]
-        np.testing.assert_allclose(getattr(table, column.name), expected, rtol=1e-11)
-
-
-def test_table_names_everyday_units(tmp_path):
-    path = tmp_path / "loops_face.csv"
-    write_table(path, [dict.fromkeys((c.name for c in COLUMNS), 1000.0)])
-    headings, first = path.read_text().splitlines()
-    assert headings.startswith("cycles [1],energy [J],P [N],kt [N/mm],mu [1],energy_per_loop [mJ],")
-    assert first.split(",")[:2] == ["1000", "1"]
-
-
-def test_measured_tables_may_have_units_of_their_own(tmp_path):
-    path = tmp_path / "measured.csv"
-    path.write_text("mu,kt [N/um],energy [kJ],P\n0.5,26.5,0,60\n0.9,60,2.8,60\n\n")
-    table = read_loop_table(path)
-    np.testing.assert_allclose(table.kt, [26500.0, 60000.0])
-    np.testing.assert_allclose(table.energy, [0.0, 2.8e6])
-    np.testing.assert_allclose(table.mu, [0.5, 0.9])
-    assert np.all(np.isnan(table.area))
-
-
-@pytest.mark.parametrize(
-    ("text", "complaint"),
-    [
-        ("", "no table"),
-        ("energy,P,kt,mu\n", "no table"),
-        ("energy,P,kt,mu,colour\n0,1,1,1,1\n", "'colour': no column; allowed: cycles, energy"),
-        ("energy,P,kt\n0,1,1\n", "no column mu; allowed: at least energy, P, kt, mu"),
-        ("energy,P,kt,mu,mu\n0,1,1,1,1\n", "two columns mu"),
-        ("energy,P,kt [s],mu\n0,1,1,1\n", "kt: unit 's' cannot be converted to N/mm"),
-        ("energy [J/mm],P,kt,mu\n0,1,1,1\n", "energy: unit 'J/mm' cannot be converted"),
-        ("energy,P,kt,mu\n0,1,1\n", ":2: 3 cells; allowed: 4"),
-        ("energy,P,kt,mu\n0,1,one,1\n", ":2: 'one'; allowed: numbers"),
-        ("energy,P,kt,mu\n0,1,nan,1\n", ":2: a number that is not finite"),
-        ("energy,P,kt,mu\n2,1,1,1\n1,1,1,1\n", "the energy falls"),
-    ],
-)
-def test_what_is_no_table_is_refused_in_one_line(tmp_path, text, complaint):
-    path = tmp_path / "table.csv"
-    path.write_text(text)
-    with pytest.raises(UserError) as refusal:
-        read_loop_table(path)
-    (line,) = str(refusal.value).splitlines()
-    assert line.startswith(str(path))
-    assert complaint in line
-
-
-def test_missing_file_is_refused(tmp_path):
-    with pytest.raises(UserError, match="cannot be read"):
-        read_loop_table(tmp_path / "none.csv")
-
-
 # --- runs ---------------------------------------------------------------------------------------
 
 
 @pytest.fixture(scope="module")
-def rubbed(start, tmp_path_factory):
-    """The small dovetail with a loop after every jump, not to be changed."""
-    run = start(tmp_path_factory.mktemp("rubbed") / "out", *ASKED)
+def start_balls(tmp_path_factory):
+    """Runs the two balls with overrides."""
+    case = tmp_path_factory.mktemp("balls") / "balls.yaml"
+    case.write_text(BALLS, encoding="utf-8")
+    (case.parent / "loads.csv").write_text(LOADS, encoding="utf-8")
+
+    def run(folder, *overrides):
+        settings = [part for entry in overrides for part in ("--set", entry)]
+        return Run(invoke("run", case, "--out", folder, *settings), folder)
+
+    return run
+
+
+@pytest.fixture(scope="module")
+def rubbed(start_balls, tmp_path_factory):
+    """The balls with a loop after every jump, run by workers; not to be changed."""
+    run = start_balls(tmp_path_factory.mktemp("rubbed") / "out", *ASKED)
     assert run.ending.exit_code == 0, run.ending.stderr
     return run
+
+
+class Here:
+    """Contact stages in this process instead of workers, whose start takes longer than the run."""
+
+    def __init__(self, settings):
+        self._stages = [ContactStage(own) for own in settings]
+
+    def call(self, method, *arguments):
+        shares = zip(self._stages, zip(*arguments, strict=True), strict=True)
+        return [getattr(stage, method)(*own) for stage, own in shares]
+
+
+@pytest.fixture
+def here(monkeypatch):
+    """Runs without workers."""
+    monkeypatch.setattr(
+        workflow.wear_run, "contact_workers", lambda settings: nullcontext(Here(settings))
+    )
 
 
 def test_run_writes_a_table_for_every_interface(rubbed):
     """Cycles, energy, load and area are those of the run; the loop slides, so µ is the case's."""
     summary = rubbed.summary
-    for name in ("intrados", "extrados"):
+    for name in ("left", "right"):
         table = read_loop_table(rubbed.folder / f"loops_{name}.csv")
         kinetics = summary["kinetics"][name]
         np.testing.assert_allclose(table.cycles, summary["kinetics"]["cycles"])
@@ -301,7 +297,7 @@ def test_run_writes_a_table_for_every_interface(rubbed):
         assert table.area[-1] > table.area[0]
         assert table.kt[-1] > table.kt[0]
         # Sliding as a whole costs less than a rectangle, and more than what is stuck gives back.
-        largest = 4.0 * 0.4 * table.P * 0.03
+        largest = 4.0 * 0.4 * table.P * AMPLITUDE
         assert np.all(table.energy_per_loop < largest)
         assert np.all(table.energy_per_loop > largest - 4.0 * 1.5 * (0.4 * table.P) ** 2 / table.kt)
         assert summary[name]["loops"]["worn"]["kt"] == pytest.approx(table.kt[-1])
@@ -309,14 +305,21 @@ def test_run_writes_a_table_for_every_interface(rubbed):
         assert summary[name]["worn_area"] > 0.0
 
 
-def test_loops_change_nothing_else(rubbed, whole):
-    for name, height in whole.heights().items():
+@pytest.mark.usefixtures("here")
+def test_loops_change_nothing_else(start_balls, rubbed, tmp_path):
+    plain = start_balls(tmp_path / "out")
+    for name, height in plain.heights().items():
         np.testing.assert_array_equal(rubbed.heights()[name], height, err_msg=name)
-    assert rubbed.summary["kinetics"] == whole.summary["kinetics"]
-    assert not list(whole.folder.glob("loops_*"))
+    assert rubbed.summary["kinetics"] == plain.summary["kinetics"]
+    assert not list(plain.folder.glob("loops_*"))
 
 
-def test_resumed_run_keeps_its_earlier_loops(start, resume, rubbed, tmp_path, monkeypatch):
+@pytest.mark.usefixtures("here")
+@pytest.mark.parametrize("every", ["end", "jump"])
+def test_resumed_run_keeps_its_earlier_loops(
+    start_balls, resume, rubbed, tmp_path, monkeypatch, every
+):
+    """The same loops as without the interruption; with ``end`` the first and the last of them."""
     keep = workflow.wear_run.WearLoop.keep
 
     def interrupting(loop, state):
@@ -326,21 +329,16 @@ def test_resumed_run_keeps_its_earlier_loops(start, resume, rubbed, tmp_path, mo
 
     with monkeypatch.context() as patch:
         patch.setattr(workflow.wear_run.WearLoop, "keep", interrupting)
-        assert start(tmp_path / "out", *ASKED).ending.exit_code == 130
+        begun = start_balls(tmp_path / "out", *ASKED, f"loops.every={every}")
+        assert begun.ending.exit_code == 130
     run = resume(tmp_path / "out")
     assert run.ending.exit_code == 0, run.ending.stderr
-    for table in ("loops_intrados.csv", "loops_extrados.csv"):
-        assert (run.folder / table).read_bytes() == (rubbed.folder / table).read_bytes()
-
-
-def test_loops_only_at_the_end(start, rubbed, tmp_path):
-    run = start(tmp_path / "out", *ASKED, "loops.every=end")
-    table = read_loop_table(run.folder / "loops_intrados.csv")
-    expected = read_loop_table(rubbed.folder / "loops_intrados.csv")
-    np.testing.assert_array_equal(table.kt, expected.kt[[0, -1]])
-    np.testing.assert_array_equal(table.cycles, expected.cycles[[0, -1]])
+    for name in ("loops_left.csv", "loops_right.csv"):
+        headings, *rows = (rubbed.folder / name).read_bytes().splitlines(keepends=True)
+        kept = rows if every == "jump" else [rows[0], rows[-1]]
+        assert (run.folder / name).read_bytes() == b"".join([headings, *kept])
 
 
 def test_linear_regime_says_where_it_leads(rubbed):
     """Three jumps are too few for a regime: the summary says so."""
-    assert rubbed.summary["intrados"]["linear_regime"] == {"depth": None, "volume": None}
+    assert rubbed.summary["left"]["linear_regime"] == {"depth": None, "volume": None}

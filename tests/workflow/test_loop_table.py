@@ -1,0 +1,74 @@
+"""The table of tangential loops: written, read back, and refused where it is none."""
+
+import numpy as np
+import pytest
+
+from workflow.errors import UserError
+from workflow.loop_table import COLUMNS, read_loop_table, write_table
+
+
+def rows(count):
+    numbers = np.random.default_rng(4).random((count, len(COLUMNS)))
+    numbers[:, 1].sort()
+    return [dict(zip([c.name for c in COLUMNS], own, strict=True)) for own in numbers]
+
+
+@pytest.mark.parametrize("per_length", [False, True])
+def test_table_reads_back_equal(tmp_path, per_length):
+    path = tmp_path / "loops_face.csv"
+    given = rows(5)
+    write_table(path, given, per_length)
+    table = read_loop_table(path)
+    assert table.per_length is per_length
+    for column in COLUMNS:
+        expected = [row[column.name] for row in given]
+        np.testing.assert_allclose(getattr(table, column.name), expected, rtol=1e-11)
+
+
+def test_table_names_everyday_units(tmp_path):
+    path = tmp_path / "loops_face.csv"
+    write_table(path, [dict.fromkeys((c.name for c in COLUMNS), 1000.0)])
+    headings, first = path.read_text().splitlines()
+    assert headings.startswith("cycles [1],energy [J],P [N],kt [N/mm],mu [1],energy_per_loop [mJ],")
+    assert first.split(",")[:2] == ["1000", "1"]
+
+
+def test_measured_tables_may_have_units_of_their_own(tmp_path):
+    path = tmp_path / "measured.csv"
+    path.write_text("mu,kt [N/um],energy [kJ],P\n0.5,26.5,0,60\n0.9,60,2.8,60\n\n")
+    table = read_loop_table(path)
+    np.testing.assert_allclose(table.kt, [26500.0, 60000.0])
+    np.testing.assert_allclose(table.energy, [0.0, 2.8e6])
+    np.testing.assert_allclose(table.mu, [0.5, 0.9])
+    assert np.all(np.isnan(table.area))
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("", "no table"),
+        ("energy,P,kt,mu\n", "no table"),
+        ("energy,P,kt,mu,colour\n0,1,1,1,1\n", "'colour': no column; allowed: cycles, energy"),
+        ("energy,P,kt\n0,1,1\n", "no column mu; allowed: at least energy, P, kt, mu"),
+        ("energy,P,kt,mu,mu\n0,1,1,1,1\n", "two columns mu"),
+        ("energy,P,kt [s],mu\n0,1,1,1\n", "kt: unit 's' cannot be converted to N/mm"),
+        ("energy [J/mm],P,kt,mu\n0,1,1,1\n", "energy: unit 'J/mm' cannot be converted"),
+        ("energy,P,kt,mu\n0,1,1\n", ":2: 3 cells; allowed: 4"),
+        ("energy,P,kt,mu\n0,1,one,1\n", ":2: 'one'; allowed: numbers"),
+        ("energy,P,kt,mu\n0,1,nan,1\n", ":2: a number that is not finite"),
+        ("energy,P,kt,mu\n2,1,1,1\n1,1,1,1\n", "the energy falls"),
+    ],
+)
+def test_what_is_no_table_is_refused_in_one_line(tmp_path, text, complaint):
+    path = tmp_path / "table.csv"
+    path.write_text(text)
+    with pytest.raises(UserError) as refusal:
+        read_loop_table(path)
+    (line,) = str(refusal.value).splitlines()
+    assert line.startswith(str(path))
+    assert complaint in line
+
+
+def test_missing_file_is_refused(tmp_path):
+    with pytest.raises(UserError, match="cannot be read"):
+        read_loop_table(tmp_path / "none.csv")

@@ -1,0 +1,466 @@
+"""Long tests by jumps in energy: how many cycles a joint takes to dissipate so much.
+
+The parameters of a joint change at the end of a cycle only, so its cumulative energy obeys
+
+    E(N + 1) = E(N) + e(E(N))
+
+with e(E) the energy of a cycle at the parameters that belong to E. A jump takes many cycles as one
+panel of energy, in which the smooth curve through these points has
+
+    dN/dE = 1/e + e'/(2 e) - (e'' + e'²/e)/12 + ...
+
+(put it into N(E + e) = N(E) + 1 and compare powers of e). The second term is the half cycle by
+which counting differs from integrating; the third is left out and counts as an error. The first
+two are integrated over the panel by Chebyshev polynomials, whose last coefficients estimate the
+quadrature's error. Because e depends on E alone, an error of N made once is carried on unchanged:
+those of the panels add up, and their sum is stated. Where a panel as good as the tolerance asks for
+would hold a few cycles only, these are counted instead, without error: so begin tests whose
+friction rises within tens of cycles, and so are kinks passed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+import numpy as np
+from numpy.polynomial import Chebyshev, chebyshev
+from scipy.optimize import brentq
+
+from sa_solver.types import Array
+from wear.joints.evolution import JointEvolution
+from wear.joints.law import JointLaw
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+DEGREE = 16
+"""Of the polynomials of a panel: friction that rises as ln E is then met to 1e-8 in panels whose
+ends are as 1 to 4."""
+
+TAIL = 3
+"""Last coefficients that estimate the error: of a kink, every second may vanish."""
+
+GROWTH, SHRINKAGE = 4.0, 0.5
+"""Of a panel after one that was good enough, or was not."""
+
+FEWEST = 8
+"""Cycles of the smallest panel, and those counted instead of a smaller one, twice as many each time
+that no panel is good enough: trying one takes 17 energies of a cycle, counting one for each."""
+
+REACH = 1.5
+"""Most energy of a panel, over that which is left, if need be at the present energy per cycle."""
+
+MOST_EVALUATIONS = 2_000_000
+"""Energies of a cycle evaluated before giving up: what is not smooth can only be counted."""
+
+SMALLEST_TOLERANCE = 1e-12
+"""Rounding of a panel's polynomials is a hundredth of it."""
+
+SMALLEST = 1e-300
+"""Energies are found to their last digit: a joint may dissipate ever so little."""
+
+EnergyPerCycle = Callable[[float], float]
+"""Energy that a cycle dissipates [N mm] where the joint has dissipated so much before [N mm]."""
+
+
+class AgeingError(RuntimeError):
+    """The energy per cycle makes no sense, or is not smooth enough to be jumped."""
+
+
+class NeverReachedError(AgeingError):
+    """The joint dissipates nothing any more before it has come to the energy asked for."""
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A stretch of a long test.
+
+    It goes from ``start`` to ``end`` [N mm] and begins after ``cycles``; ``count`` are the cycles
+    since, a polynomial of the energy, and ``error`` how many they may be wrong anywhere in it. With
+    no polynomial it is a single cycle, counted.
+    """
+
+    start: float
+    end: float
+    cycles: float
+    count: Chebyshev | None
+    error: float
+
+    @property
+    def length(self) -> float:
+        """Its cycles."""
+        return self.since(self.end)
+
+    def since(self, energy: float) -> float:
+        """Cycles from its start to an ``energy`` in it [N mm]."""
+        if self.count is None:
+            return (energy - self.start) / (self.end - self.start)
+        return float(self.count(energy))
+
+    def energy_at(self, cycles: float) -> float:
+        """Energy after ``cycles`` of the test, which lie in this jump [N mm]."""
+        since = cycles - self.cycles
+        if since <= 0.0:
+            return self.start
+        if since >= self.length:
+            return self.end
+        if self.count is None:
+            return self.start + since * (self.end - self.start)
+        root = brentq(
+            lambda energy: self.since(energy) - since, self.start, self.end, xtol=SMALLEST
+        )
+        return float(root)
+
+
+@dataclass(frozen=True)
+class LongTest:
+    """Energy against cycles of a long test, from ``energy_before`` [N mm] on, as its ``jumps``.
+
+    It lasted ``total_cycles``. ``evaluations`` are the energies of a cycle that it took.
+    """
+
+    energy_before: float
+    total_cycles: float
+    jumps: tuple[Jump, ...]
+    evaluations: int
+
+    @property
+    def cycles(self) -> Array:
+        """At the ends of all jumps, from 0 to the end of the test ``(k,)``."""
+        inner = [jump.cycles for jump in self.jumps if 0.0 < jump.cycles < self.total_cycles]
+        return np.array([0.0, *inner, self.total_cycles])
+
+    @property
+    def energy(self) -> Array:
+        """Dissipated by then ``(k,)`` [N mm]."""
+        return self.energy_at(self.cycles)
+
+    @property
+    def error(self) -> float:
+        """Cycles by which :meth:`cycles_at` may be wrong at the end: the sum over all jumps."""
+        return sum(jump.error for jump in self.jumps)
+
+    @property
+    def final_energy(self) -> float:
+        """At the end of the test [N mm]."""
+        return float(self.energy_at(self.total_cycles))
+
+    def energy_at(self, cycles: Array | float) -> Array:
+        """Energy after ``cycles``, of their shape [N mm].
+
+        Raises ValueError for cycles that the test does not have.
+        """
+        cycles = np.asarray(cycles, dtype=np.float64)
+        if np.any((cycles < 0.0) | (cycles > self.total_cycles)):
+            raise ValueError(f"cycles outside a test of {self.total_cycles:g}; allowed: within it")
+        starts = [jump.cycles for jump in self.jumps]
+        places = np.searchsorted(starts, cycles, side="right") - 1
+        pairs = zip(places.ravel(), cycles.ravel(), strict=True)
+        found = [self._energy(int(place), float(own)) for place, own in pairs]
+        return np.array(found).reshape(cycles.shape)
+
+    def cycles_at(self, energy: Array | float) -> Array:
+        """Cycles after which the joint has dissipated ``energy`` [N mm], of its shape.
+
+        NaN where it has not by the end of the test. Raises ValueError below the energy before it.
+        """
+        energy = np.asarray(energy, dtype=np.float64)
+        if np.any(energy < self.energy_before):
+            raise ValueError(
+                f"energies below {self.energy_before:g} N mm, which were there before the test"
+            )
+        starts = [jump.start for jump in self.jumps]
+        places = np.searchsorted(starts, energy, side="right") - 1
+        pairs = zip(places.ravel(), energy.ravel(), strict=True)
+        found = [self._cycles(int(place), float(own)) for place, own in pairs]
+        return np.array(found).reshape(energy.shape)
+
+    def _energy(self, place: int, cycles: float) -> float:
+        return self.jumps[place].energy_at(cycles) if self.jumps else self.energy_before
+
+    def _cycles(self, place: int, energy: float) -> float:
+        if not self.jumps:
+            return 0.0 if energy == self.energy_before else np.nan
+        jump = self.jumps[place]
+        cycles = jump.cycles + jump.since(energy)
+        return cycles if energy <= jump.end and cycles <= self.total_cycles else np.nan
+
+
+# --- jumping ------------------------------------------------------------------------------------
+
+
+def long_test(
+    energy_per_cycle: EnergyPerCycle,
+    cycles: float = np.inf,
+    *,
+    until: float = np.inf,
+    start: float = 0.0,
+    tolerance: float = 1e-6,
+    breaks: Sequence[float] = (),
+) -> LongTest:
+    """Run ``cycles`` of a joint that has dissipated ``start`` [N mm] before.
+
+    With ``until`` it ends where the joint has dissipated so much [N mm], if that comes earlier.
+    ``tolerance`` is the error allowed in the number of cycles after which any energy is reached,
+    relative to it. ``breaks`` [N mm] are energies at which ``energy_per_cycle`` has a kink
+    (:attr:`~wear.joints.evolution.JointEvolution.breaks`): cycles across it are counted. Where a
+    cycle dissipates nothing the energy stays for good. Raises ValueError for cycles, energies or a
+    tolerance that make no sense, AgeingError for an energy per cycle that is negative, not finite
+    or too rough to be jumped, NeverReachedError for an energy never reached, cycles not limited.
+    """
+    if not cycles > 0.0:
+        raise ValueError(f"{cycles:g} cycles; allowed: more than 0")
+    if not 0.0 <= start < np.inf:
+        raise ValueError(f"{start:g} N mm dissipated before; allowed: 0 or more")
+    if not until > start:
+        raise ValueError(f"until {until:g} N mm; allowed: above {start:g}, there before the test")
+    if cycles == until == np.inf:
+        raise ValueError("a test without end; allowed: a number of cycles or an energy that end it")
+    if not SMALLEST_TOLERANCE <= tolerance < 1.0:
+        raise ValueError(f"tolerance {tolerance:g}; allowed: {SMALLEST_TOLERANCE:g} to 1")
+    return _Jumper(energy_per_cycle, (cycles, until), tolerance, sorted(breaks)).run(start)
+
+
+class _Jumper:
+    """A long test under way."""
+
+    def __init__(
+        self,
+        rate: EnergyPerCycle,
+        ends: tuple[float, float],
+        tolerance: float,
+        breaks: list[float],
+    ) -> None:
+        self._own_rate = rate
+        self._total, self._until = ends
+        self._tolerance = tolerance
+        self._breaks = breaks
+        self._jumps: list[Jump] = []
+        self._cycles = 0.0
+        self._evaluations = 0
+
+    def run(self, start: float) -> LongTest:
+        """From ``start`` to the last cycle."""
+        energy, width, block = start, 0.0, FEWEST
+        while self._cycles < self._total and energy < self._until:
+            rate = self._rate(energy)
+            # Too little for the sum to change is nothing.
+            if energy + rate == energy:
+                break
+            to_break = self._to_break(energy)
+            width = min(max(width, 2 * FEWEST * rate), self._left(energy, rate), to_break)
+            jump = self._panel(energy, width, FEWEST * rate)
+            if jump is None:
+                energy = self._count(self._last_whole(energy), block)
+                width, block = 0.0, 2 * block
+                continue
+            self._add(jump)
+            energy, width, block = jump.end, GROWTH * (jump.end - jump.start), FEWEST
+            if jump.end - jump.start == to_break:
+                energy = self._count(self._last_whole(energy), FEWEST)
+        return LongTest(start, self._end(energy), tuple(self._jumps), self._evaluations)
+
+    def _left(self, energy: float, rate: float) -> float:
+        """Energy that a panel may have at most."""
+        return REACH * min((self._total - self._cycles) * rate, self._until - energy)
+
+    def _end(self, energy: float) -> float:
+        """Cycles of the whole test, which has come to ``energy``."""
+        if energy >= self._until:
+            jump = next(jump for jump in reversed(self._jumps) if jump.start < self._until)
+            return min(self._total, jump.cycles + jump.since(self._until))
+        if self._total == np.inf:
+            raise NeverReachedError(
+                f"{self._until:g} N mm are never reached: after {self._cycles:.6g} cycles and "
+                f"{energy:g} N mm a cycle dissipates nothing any more"
+            )
+        return self._total
+
+    def _add(self, jump: Jump) -> None:
+        self._jumps.append(jump)
+        self._cycles += jump.length
+
+    def _last_whole(self, energy: float) -> float:
+        """Go back from ``energy`` to the end of a cycle; the energy there.
+
+        Which energies are ends of cycles matters at a kink, and counting is exact from them only.
+        """
+        whole = float(np.floor(self._cycles))
+        if whole == self._cycles:
+            return energy
+        last = self._jumps[-1]
+        self._jumps[-1] = replace(last, end=last.energy_at(whole))
+        self._cycles = whole
+        return self._jumps[-1].end
+
+    def _panel(self, energy: float, width: float, least: float) -> Jump | None:
+        """The longest good panel from ``energy`` on, none if shorter than ``least`` [N mm]."""
+        while width >= least:
+            jump = self._attempt(energy, energy + width)
+            if jump is not None and jump.error <= self._tolerance * jump.length:
+                return jump
+            width *= SHRINKAGE
+        return None
+
+    def _attempt(self, start: float, end: float) -> Jump | None:
+        """The panel from ``start`` to ``end``; none if a cycle dissipates nothing in it."""
+        nodes = chebyshev.chebpts1(DEGREE + 1)
+        energies = start + 0.5 * (end - start) * (nodes + 1.0)
+        rates = np.array([self._rate(float(energy)) for energy in energies])
+        if np.any(rates <= 0.0):
+            return None
+        fitted = _through(rates, (start, end))
+        slopes, curvatures = fitted.deriv(1)(energies), fitted.deriv(2)(energies)
+        density = _through((1.0 + 0.5 * slopes) / rates, (start, end))
+        quadrature = float(np.abs(density.coef[-TAIL:]).max())
+        counting = float(np.mean(np.abs(curvatures + slopes**2 / rates))) / 12.0
+        error = (quadrature + counting) * (end - start)
+        return Jump(start, end, self._cycles, density.integ(lbnd=start), error)
+
+    def _count(self, energy: float, cycles: int) -> float:
+        """Count ``cycles``, no more than are left; the energy after them."""
+        for _ in range(cycles):
+            after = energy + self._rate(energy)
+            if after == energy or self._cycles >= self._total:
+                break
+            self._add(Jump(energy, after, self._cycles, None, 0.0))
+            energy = after
+        return energy
+
+    def _rate(self, energy: float) -> float:
+        self._evaluations += 1
+        if self._evaluations > MOST_EVALUATIONS:
+            raise AgeingError(
+                f"{self._cycles:.6g} of {self._total:.6g} cycles after {MOST_EVALUATIONS} energies "
+                "of a cycle: they are not smooth to the tolerance; allow a larger one, or name "
+                "the energies at which they have kinks"
+            )
+        rate = float(self._own_rate(energy))
+        if not 0.0 <= rate < np.inf:
+            raise AgeingError(
+                f"a cycle dissipates {rate:g} N mm where {energy:g} were before; allowed: 0 or more"
+            )
+        return rate
+
+    def _to_break(self, energy: float) -> float:
+        place = int(np.searchsorted(self._breaks, energy, side="right"))
+        return self._breaks[place] - energy if place < len(self._breaks) else np.inf
+
+
+def _through(values: Array, domain: tuple[float, float]) -> Chebyshev:
+    """The polynomial through ``values`` at the Chebyshev points of the ``domain``."""
+    count = len(values)
+    matrix = chebyshev.chebvander(chebyshev.chebpts1(count), count - 1)
+    coefficients = matrix.T @ values * (2.0 / count)
+    coefficients[0] *= 0.5
+    return Chebyshev(coefficients, domain=domain)
+
+
+# --- a joint at a prescribed stroke -------------------------------------------------------------
+
+
+class LoopLaw(Protocol):
+    """A joint law whose steady loop has an energy in closed form."""
+
+    def loop_energy(self, amplitude: Array | float) -> Array | float:
+        """Energy of a steady cycle between ±``amplitude`` [mm] at constant parameters [N mm]."""
+        ...
+
+
+if TYPE_CHECKING:
+
+    class _EvolvingLoop(LoopLaw, DataclassInstance, Protocol): ...
+
+    class _EvolvingLaw(JointLaw, DataclassInstance, Protocol): ...
+
+    Loop = TypeVar("Loop", bound=_EvolvingLoop)
+
+
+def steady_stroke(law: Loop, evolution: JointEvolution, amplitude: float) -> EnergyPerCycle:
+    """Energy per cycle of one joint between ±``amplitude`` [mm], from its law's closed form."""
+
+    def energy_per_cycle(energy: float) -> float:
+        return float(np.asarray(evolution.at(law, energy).loop_energy(amplitude)).item())
+
+    return energy_per_cycle
+
+
+class MarchedStroke:
+    """The same, marched: cycle after cycle with the memory of the ones before.
+
+    One joint goes from +``amplitude`` [mm] to -``amplitude`` and back in ``increments`` each way
+    (one, where the law is exact along a straight path), with the parameters that belong to the
+    energy at the cycle's begin. It is brought to +``amplitude`` without counting what that takes.
+    """
+
+    def __init__(
+        self,
+        law: _EvolvingLaw,
+        evolution: JointEvolution,
+        amplitude: float,
+        increments: int = 1,
+        start: float = 0.0,
+    ) -> None:
+        self._law, self._evolution = law, evolution
+        self._steps = np.full(increments, 2.0 * amplitude / increments)
+        begun = evolution.at(law, start)
+        response = begun.respond(begun.rest(1), np.array([[amplitude]]))
+        self._state = response.state
+
+    def __call__(self, energy: float) -> float:
+        """Energy of the next cycle [N mm] where ``energy`` [N mm] was dissipated before."""
+        law, total = self._evolution.at(self._law, energy), 0.0
+        for step in (*-self._steps, *self._steps):
+            response = law.respond(self._state, np.array([[step]]))
+            self._state = response.state
+            total += float(response.dissipated[0])
+        return total
+
+
+# --- checking -----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Stretch:
+    """Cycles of a long test integrated one after the other.
+
+    ``energy`` ``(k + 1,)`` [N mm] is that of ``k`` cycles from ``first`` on and ``jumped`` that of
+    the test after the same cycles; ``difference`` is that of their last, in cycles, and ``stated``
+    the one that the test allows for.
+    """
+
+    first: float
+    energy: Array
+    jumped: Array
+    difference: float
+    stated: float
+
+
+def integrated_stretch(
+    test: LongTest, energy_per_cycle: EnergyPerCycle, first: float, cycles: int
+) -> Stretch:
+    """Integrate ``cycles`` of a long test directly, from cycle ``first`` on, and compare.
+
+    ``energy_per_cycle`` is called once for every cycle, in order: it may be that of the test or an
+    independent one with a memory of its own. Raises ValueError for cycles the test does not have.
+    """
+    if cycles < 1:
+        raise ValueError(f"{cycles} cycles; allowed: a stretch of one or more")
+    numbers = np.arange(cycles + 1, dtype=np.float64) + first
+    jumped = test.energy_at(numbers)
+    energy = np.empty(cycles + 1)
+    energy[0] = jumped[0]
+    for cycle in range(cycles):
+        energy[cycle + 1] = energy[cycle] + energy_per_cycle(float(energy[cycle]))
+    last = energy[-1] - energy[-2]
+    difference = float((energy[-1] - jumped[-1]) / last) if last > 0.0 else 0.0
+    touched = [
+        jump
+        for jump in test.jumps
+        if jump.cycles <= numbers[-1] and jump.cycles + jump.length >= numbers[0]
+    ]
+    # A jump errs by this at either end of the stretch.
+    stated = 2.0 * sum(jump.error for jump in touched)
+    return Stretch(float(first), energy, jumped, difference, stated)

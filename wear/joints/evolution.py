@@ -1,0 +1,186 @@
+"""How the parameters of a joint law follow the energy that the joint has dissipated so far.
+
+The forms are those of two papers; E is the cumulative energy in N mm (1 J = 1e3, 1 kJ = 1e6 N mm),
+and all but tables are factors of the initial value:
+
+- Fantetti et al. 2019, Tribology International 138, 111, doi:10.1016/j.triboint.2019.05.023, table
+  4.2: :class:`Logarithmic` friction, :class:`Arrhenius` contact stiffness, :class:`Linear`
+  macroslip slope;
+- Li et al. 2020, table 3: :class:`Exponentials`, a single one for the bolt's preload;
+- :class:`Table`: values themselves, measured or of a wear computation.
+
+Misprints, and what holds here:
+
+- Fantetti's E is in J, but the macroslip slope, 0.88 N/µm (1 + 0.24 E), would then pass the contact
+  stiffness at 210 J of a test of 2800 J. Its 0.24 is taken per kJ, 2.4e-7 per N mm; friction
+  (b = 1.3e9 per J) and stiffness (b = 150 J) do give the measured curves in J. Their "log" is the
+  natural one.
+- Li's curve of first loading is printed with sliding from 2 µN / (kt + kr) on, where it would jump;
+  without a jump it slides from 2 µN / kt on, and so does :mod:`wear.joints.iwan`. Their c and d are
+  per kJ. The residual stiffness does not evolve.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Protocol, TypeVar
+
+import numpy as np
+
+from sa_solver.types import Array
+from wear.evolution import EnergyTable
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+    Law = TypeVar("Law", bound=DataclassInstance)
+
+
+class WearFunction(Protocol):
+    """A factor, or for a :class:`Table` a value, against cumulative energy."""
+
+    def __call__(self, energy: Array | float) -> Array:
+        """At an ``energy`` >= 0 [N mm] of any shape."""
+        ...
+
+
+@dataclass(frozen=True)
+class Logarithmic:
+    """1 + a ln(1 + b E): ``change`` a, ``rate`` b [1/(N mm)], not negative."""
+
+    change: float
+    rate: float
+
+    def __post_init__(self) -> None:
+        if not self.rate >= 0.0:
+            raise ValueError(f"rate = {self.rate:g}: a logarithm of energies needs 0 or more")
+
+    def __call__(self, energy: Array | float) -> Array:
+        return np.asarray(1.0 + self.change * np.log1p(self.rate * np.asarray(energy)))
+
+
+@dataclass(frozen=True)
+class Arrhenius:
+    """1 + a exp(-b / E): ``change`` a, reached late; ``scale`` b [N mm], above 0. 1 for E = 0."""
+
+    change: float
+    scale: float
+
+    def __post_init__(self) -> None:
+        if not self.scale > 0.0:
+            raise ValueError(f"scale = {self.scale:g}: an energy scale is above 0")
+
+    def __call__(self, energy: Array | float) -> Array:
+        energy = np.asarray(energy, dtype=np.float64)
+        ratio = np.full_like(energy, np.inf)
+        # A quotient too large for a float says the same as infinity: nothing has changed yet.
+        with np.errstate(over="ignore"):
+            np.divide(self.scale, energy, out=ratio, where=energy > 0.0)
+        return np.asarray(1.0 + self.change * np.exp(-ratio))
+
+
+@dataclass(frozen=True)
+class Linear:
+    """1 + a E: ``slope`` a [1/(N mm)]."""
+
+    slope: float
+
+    def __call__(self, energy: Array | float) -> Array:
+        return np.asarray(1.0 + self.slope * np.asarray(energy))
+
+
+@dataclass(frozen=True)
+class Exponentials:
+    """a + (1 - a) [b exp(c E) + (1 - b) exp(d E)], from 1 to ``final`` a.
+
+    ``share`` b is that of the ``rate`` c [1/(N mm)], the rest that of ``second_rate`` d; with all
+    of it, as by default, it is a single exponential. Rates are not above 0.
+    """
+
+    final: float
+    rate: float
+    share: float = 1.0
+    second_rate: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("rate", "second_rate"):
+            if not getattr(self, name) <= 0.0:
+                raise ValueError(f"{name} = {getattr(self, name):g}: wear dies out at 0 or below")
+
+    def __call__(self, energy: Array | float) -> Array:
+        energy = np.asarray(energy)
+        first, second = np.exp(self.rate * energy), np.exp(self.second_rate * energy)
+        decay = self.share * first + (1.0 - self.share) * second
+        return np.asarray(self.final + (1.0 - self.final) * decay)
+
+
+@dataclass(frozen=True)
+class Table:
+    """``values`` of a parameter at ``energies`` [N mm], which ascend.
+
+    Linear between them, hence as monotone as they are, and constant beyond both ends. Raises
+    ValueError for no or unequal columns or energies that do not ascend.
+    """
+
+    energies: tuple[float, ...]
+    values: tuple[float, ...]
+
+    def __post_init__(self) -> None:
+        _ = self._table
+
+    def __call__(self, energy: Array | float) -> Array:
+        return self._table.at(energy)
+
+    @cached_property
+    def _table(self) -> EnergyTable:
+        return EnergyTable(self.energies, self.values)
+
+
+@dataclass(frozen=True)
+class JointEvolution:
+    """Which parameters of a joint law follow which function of the joint's energy.
+
+    A function multiplies the initial value; a table replaces it. Those of None stay. No parameter
+    falls below 0: what is worn to nothing stays so.
+    """
+
+    stiffness: WearFunction | None = None
+    residual_stiffness: WearFunction | None = None
+    friction: WearFunction | None = None
+    normal_load: WearFunction | None = None
+
+    def at(self, law: Law, energy: Array | float) -> Law:
+        """The ``law``, whose parameters are the initial ones, after an ``energy`` [N mm].
+
+        ``energy`` is one of all joints, or ``(n,)``, one of each. Raises ValueError for a law
+        without a parameter that is to evolve.
+        """
+        values = self.values(law, energy)
+        # A law of plain numbers keeps plain numbers.
+        return replace(law, **{k: v if v.ndim else float(v) for k, v in values.items()})
+
+    def values(self, law: object, energy: Array | float) -> dict[str, Array]:
+        """Evolving parameters by name, of ``energy`` broadcast with the initial ones."""
+        found = {}
+        for name, function in self._functions():
+            initial = getattr(law, name, None)
+            if initial is None:
+                raise ValueError(f"{type(law).__name__} has no {name} that could evolve")
+            value = function(energy)
+            scale = np.ones_like(initial) if isinstance(function, Table) else np.asarray(initial)
+            found[name] = np.maximum(value * scale, 0.0)
+        return {name: np.asarray(value) for name, value in found.items()}
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        """Energies at which a parameter has a kink: those of the tables, ascending [N mm]."""
+        tables = [own for _, own in self._functions() if isinstance(own, Table)]
+        return tuple(sorted({energy for table in tables for energy in table.energies}))
+
+    def _functions(self) -> Iterator[tuple[str, WearFunction]]:
+        for field in fields(self):
+            function = getattr(self, field.name)
+            if function is not None:
+                yield field.name, function

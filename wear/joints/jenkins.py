@@ -1,0 +1,128 @@
+"""Jenkins's element: a spring in series with a Coulomb slider, and a residual slope beside both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from math import copysign
+
+import numpy as np
+from numba import njit
+
+from sa_solver.types import Array
+from wear.joints.law import JointResponse, State
+from wear.joints.parameters import (
+    Parameter,
+    answer,
+    require_not_negative,
+    require_one_each,
+    require_positive,
+    side_by_side,
+)
+
+
+@njit(cache=True)
+def advance(
+    stiffness: float,
+    residual: float,
+    limit: float,
+    displacement: float,
+    stretch: float,
+    increment: float,
+) -> tuple[float, float, float, float, float]:
+    """One joint by one increment: force, tangent, displacement, stretch and energy lost."""
+    reach = limit / stiffness
+    lost = 0.0
+    if abs(stretch) > reach:
+        # The limit has shrunk since: the slider slips, and what the spring held beyond is lost.
+        lost = 0.5 * stiffness * (stretch * stretch - reach * reach)
+        stretch = copysign(reach, stretch)
+    displacement += increment
+    stretch += increment
+    slope = residual
+    if abs(stretch) < reach:
+        slope += stiffness
+    else:
+        lost += limit * (abs(stretch) - reach)
+        stretch = copysign(reach, stretch)
+    return stiffness * stretch + residual * displacement, slope, displacement, stretch, lost
+
+
+@njit(cache=True)
+def _respond(
+    parameters: Array, state: State, increment: Array
+) -> tuple[Array, Array, Array, Array]:
+    joints = len(state)
+    force, tangent = np.empty((joints, 1)), np.empty((joints, 1, 1))
+    new, lost = np.empty((joints, 2)), np.empty(joints)
+    for j in range(joints):
+        own = parameters[j % len(parameters)]
+        force[j, 0], tangent[j, 0, 0], new[j, 0], new[j, 1], lost[j] = advance(
+            own[0], own[1], own[2], state[j, 0], state[j, 1], increment[j, 0]
+        )
+    return force, tangent, new, lost
+
+
+@dataclass(frozen=True)
+class Jenkins:
+    """Jenkins's element.
+
+    ``stiffness`` kt [N/mm] of the spring, ``friction`` µ and ``normal_load`` N [N], whose product
+    is the slider's limit, and ``residual_stiffness`` kr [N/mm], which is left when it slides: all
+    numbers or ``(n,)``. Raises :class:`wear.joints.parameters.JointError`.
+
+    A state's columns are displacement and stretch of the spring [mm], displacement less the
+    position of the slider. Both outlive a change of the parameters: with a smaller limit the slider
+    slips at the beginning of the next increment, and the energy that frees is dissipated in it.
+    At the limit the tangent is that of sliding on.
+    """
+
+    stiffness: Parameter
+    friction: Parameter
+    normal_load: Parameter
+    residual_stiffness: Parameter = 0.0
+
+    def __post_init__(self) -> None:
+        require_one_each(self.stiffness, self.friction, self.normal_load, self.residual_stiffness)
+        require_positive(stiffness=self.stiffness)
+        require_not_negative(
+            friction=self.friction,
+            normal_load=self.normal_load,
+            residual_stiffness=self.residual_stiffness,
+        )
+
+    @property
+    def directions(self) -> int:
+        return 1
+
+    @cached_property
+    def _parameters(self) -> Array:
+        limit = np.multiply(self.friction, self.normal_load)
+        return side_by_side(self.stiffness, self.residual_stiffness, limit)
+
+    def rest(self, joints: int) -> State:
+        return np.zeros((joints, 2))
+
+    def respond(self, state: State, increment: Array) -> JointResponse:
+        return answer(_respond, self._parameters, state, increment)
+
+    def loop_energy(self, amplitude: Parameter) -> Array:
+        """Energy lost in a cycle between ± ``amplitude`` [mm]: 4 µN (A - µN/kt) [N mm] or 0."""
+        limit = np.multiply(self.friction, self.normal_load)
+        energy: Array = 4.0 * limit * np.maximum(np.subtract(amplitude, limit / self.stiffness), 0)
+        return energy
+
+    def first_harmonic(self, amplitude: Parameter) -> tuple[Array, Array]:
+        """Force of the settled cycle A cos θ, to first order: a cos θ + b sin θ [N].
+
+        With cos θs = 1 - 2 µN/(kt A) where the slider slips, a = A kr + A kt (θs - sin θs cos θs)/π
+        and b = -4 µN (1 - µN/(kt A))/π, which is minus the energy of the loop over π A.
+        """
+        amplitude = np.asarray(amplitude, float)
+        reach = np.multiply(self.friction, self.normal_load) / self.stiffness
+        moving = np.where(amplitude > 0.0, amplitude, 1.0)
+        sticking = np.arccos(1.0 - 2.0 * np.minimum(reach / moving, 1.0))
+        share = (sticking - np.sin(sticking) * np.cos(sticking)) / np.pi
+        cosine: Array = amplitude * (self.residual_stiffness + self.stiffness * share)
+        sine: Array = -self.loop_energy(amplitude) / (np.pi * moving)
+        return cosine, sine

@@ -1,0 +1,237 @@
+"""Masing's rule on the curve of spread sliders: loops with memory, without the sliders.
+
+A joint of sliders whose limits are spread (Iwan 1966) follows a curve T(d) when it is first loaded,
+d being the distance from rest. After a reversal at d1 with the force F1 it follows the same curve
+doubled, F = F1 ∓ 2 T(|d - d1|/2); an inner loop that closes is forgotten, and the curve it left
+goes on as if it had not been (Masing 1926; for sliders Iwan, J. Appl. Mech. 33, 1966, 893). So the
+turning points of the loops still open are all the memory there is.
+
+The energy lost is exact too. A loop of amplitude d encloses 8 W - 4 d T, with W = ∫ T. A slider
+that slips by s on the first way slips by 2 s on each of the two ways of the loop: on the first
+curve the loss is a quarter of the loop's, L(d) = 2 W - d T, and on a doubled one 2 L(|d - d1|/2).
+
+Here T is that of sliders spread by a power law, up to a largest of reach φ where all that are left
+slip at once; with x = d/φ < 1
+
+    T = K φ (x - c x^m / m),   φ = limit / (K (1 - c/m)),
+    L = K φ² c x^(m+1) (m - 1) / (m (m + 1)),
+
+and T = limit, L = L(φ) + limit (d - φ) beyond. K is the stiffness when all stick, c the share of
+it that the spread sliders have, m > 1 how they are spread. c = 1, m = 2 is the uniform Iwan joint,
+c = 0 Jenkins's element.
+"""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from dataclasses import dataclass
+from functools import cached_property
+from math import copysign
+
+import numpy as np
+from numba import njit, vectorize
+
+from sa_solver.types import Array
+from wear.joints.law import JointResponse, State
+from wear.joints.parameters import (
+    Parameter,
+    answer,
+    require_not_negative,
+    require_one_each,
+    require_positive,
+    side_by_side,
+)
+
+Curve = tuple[float, float, float, float]
+"""K, limit, c, m."""
+
+# Columns of a state: displacement; number of turning points; the curve (K, limit, c, m) that the
+# forces below belong to; then displacement and force of each turning point.
+DISPLACEMENT, DEPTH, CURVE, POINTS = 0, 1, 2, 6
+# A state begins with room for this many turning points: a steady cycle needs two.
+FEWEST_POINTS = 4
+
+
+@njit(cache=True)
+def first_curve(curve: Curve, distance: float) -> tuple[float, float, float]:
+    """T, T' and L at ``distance`` >= 0 of the curve (K, limit, c, m)."""
+    stiffness, limit, share, exponent = curve
+    reach = limit / (stiffness * (1.0 - share / exponent))
+    x, beyond = 1.0, distance - reach
+    if beyond < 0.0:
+        x, beyond = distance / reach, 0.0
+    # A power takes longer than all the rest, and the uniform joint needs none.
+    power = share * (x if exponent == 2.0 else x ** (exponent - 1.0))
+    lost = (
+        stiffness * reach * reach * power * x * x * (exponent - 1.0) / (exponent * (exponent + 1.0))
+    )
+    if x < 1.0:
+        return stiffness * distance * (1.0 - power / exponent), stiffness * (1.0 - power), lost
+    return limit, 0.0, lost + limit * beyond
+
+
+@njit(cache=True)
+def _on_curve(
+    curve: Curve, memory: Array, depth: int, displacement: float
+) -> tuple[float, float, float]:
+    """Force, slope and energy lost since the last of ``depth`` turning points, or since rest."""
+    if depth == 0:
+        force, slope, lost = first_curve(curve, abs(displacement))
+        return copysign(force, displacement), slope, lost
+    place = POINTS + 2 * (depth - 1)
+    distance = displacement - memory[place]
+    force, slope, lost = first_curve(curve, 0.5 * abs(distance))
+    return memory[place + 1] + copysign(2.0 * force, distance), slope, 2.0 * lost
+
+
+@njit(cache=True)
+def _renew(curve: Curve, memory: Array) -> None:
+    """Compute the forces at the turning points anew where they belong to other parameters."""
+    if (memory[CURVE], memory[CURVE + 1], memory[CURVE + 2], memory[CURVE + 3]) == curve:
+        return
+    for depth in range(int(memory[DEPTH])):
+        place = POINTS + 2 * depth
+        memory[place + 1] = _on_curve(curve, memory, depth, memory[place])[0]
+    for i in range(4):
+        memory[CURVE + i] = curve[i]
+
+
+@njit(cache=True)
+def _turns(memory: Array, depth: int, end: float) -> bool:
+    """Whether going to ``end`` leaves the present curve backwards."""
+    start: float = memory[DISPLACEMENT]
+    origin: float = 0.0 if depth == 0 else memory[POINTS + 2 * (depth - 1)]
+    return start != origin and (end > start) != (start > origin)
+
+
+@njit(cache=True)
+def _closing(memory: Array, depth: int) -> float:
+    """Where the present curve, the last of ``depth``, joins the one that it will go on as."""
+    closing: float = -memory[POINTS] if depth == 1 else memory[POINTS + 2 * (depth - 2)]
+    return closing
+
+
+@njit(cache=True)
+def advance(
+    curve: Curve, residual: float, memory: Array, increment: float
+) -> tuple[float, float, float]:
+    """One joint by one increment, its ``memory`` changed in place: force, tangent, energy lost.
+
+    ``memory`` is the row of a state and must have room for one more turning point. Each increment
+    adds at most one, and each is taken away once: the effort per increment is constant on average.
+    """
+    _renew(curve, memory)
+    here, depth, lost = memory[DISPLACEMENT], int(memory[DEPTH]), 0.0
+    end = here + increment
+    if end == here:
+        force, slope, _ = _on_curve(curve, memory, depth, end)
+        return force + residual * end, slope + residual, 0.0
+    if _turns(memory, depth, end):
+        place = POINTS + 2 * depth
+        memory[place + 1] = _on_curve(curve, memory, depth, here)[0]
+        memory[place] = here
+        depth += 1
+    sign = copysign(1.0, increment)
+    while depth > 0:
+        closing = _closing(memory, depth)
+        if sign * (closing - end) > 0.0:
+            break
+        lost += _on_curve(curve, memory, depth, closing)[2]
+        lost -= _on_curve(curve, memory, depth, here)[2]
+        here, depth = closing, max(depth - 2, 0)
+    force, slope, since = _on_curve(curve, memory, depth, end)
+    lost += since - _on_curve(curve, memory, depth, here)[2]
+    memory[DISPLACEMENT], memory[DEPTH] = end, depth
+    # A sum of differences of an increasing function: below zero by rounding alone.
+    return force + residual * end, slope + residual, max(lost, 0.0)
+
+
+@njit(cache=True)
+def _columns_for(state: State) -> int:
+    """Columns with room for a turning point more: doubled when full, halved when mostly empty."""
+    needed = 0
+    for j in range(len(state)):
+        needed = max(needed, POINTS + 2 * (int(state[j, DEPTH]) + 1))
+    columns: int = state.shape[1]
+    if needed > columns:
+        return 2 * columns
+    if 4 * needed < columns:
+        return columns // 2
+    return columns
+
+
+@njit(cache=True)
+def _respond(
+    parameters: Array, state: State, increment: Array
+) -> tuple[Array, Array, Array, Array]:
+    joints = len(state)
+    force, tangent = np.empty((joints, 1)), np.empty((joints, 1, 1))
+    new, lost = np.zeros((joints, _columns_for(state))), np.empty(joints)
+    for j in range(joints):
+        own = parameters[j % len(parameters)]
+        used = POINTS + 2 * int(state[j, DEPTH])
+        new[j, :used] = state[j, :used]
+        curve = (own[0], own[2], own[3], own[4])
+        force[j, 0], tangent[j, 0, 0], lost[j] = advance(curve, own[1], new[j], increment[j, 0])
+    return force, tangent, new, lost
+
+
+@vectorize(cache=True)  # type: ignore[no-untyped-call]
+def _loop_energy(
+    amplitude: float, stiffness: float, limit: float, share: float, exponent: float
+) -> float:
+    return 4.0 * first_curve((stiffness, limit, share, exponent), amplitude)[2]
+
+
+@dataclass(frozen=True)
+class MasingLaw(ABC):
+    """A joint of spread sliders, whichever way they are spread.
+
+    ``stiffness`` K [N/mm] when all of them stick, ``friction`` µ and ``normal_load`` N [N], whose
+    product is the force when all of them slide, and ``residual_stiffness`` kr [N/mm], added
+    throughout: all numbers or ``(n,)``. Raises :class:`wear.joints.parameters.JointError`.
+
+    A state remembers displacements. With other parameters its forces become those of a joint that
+    had them all along; what the change itself releases is not counted as dissipated. Any number of
+    open loops is remembered: each costs a call the copying of 16 bytes, and nothing else.
+    """
+
+    stiffness: Parameter
+    friction: Parameter
+    normal_load: Parameter
+    residual_stiffness: Parameter = 0.0
+
+    def __post_init__(self) -> None:
+        require_one_each(self.stiffness, self.friction, self.normal_load, self.residual_stiffness)
+        require_positive(stiffness=self.stiffness)
+        require_not_negative(
+            friction=self.friction,
+            normal_load=self.normal_load,
+            residual_stiffness=self.residual_stiffness,
+        )
+
+    @property
+    @abstractmethod
+    def spread(self) -> tuple[Parameter, Parameter]:
+        """Share c of the spread sliders in the stiffness, and exponent m of their spread."""
+
+    @property
+    def directions(self) -> int:
+        return 1
+
+    @cached_property
+    def _parameters(self) -> Array:
+        limit = np.multiply(self.friction, self.normal_load)
+        return side_by_side(self.stiffness, self.residual_stiffness, limit, *self.spread)
+
+    def rest(self, joints: int) -> State:
+        return np.zeros((joints, POINTS + 2 * FEWEST_POINTS))
+
+    def respond(self, state: State, increment: Array) -> JointResponse:
+        return answer(_respond, self._parameters, state, increment)
+
+    def loop_energy(self, amplitude: Parameter) -> Array:
+        """Energy lost in a cycle between ± ``amplitude`` [mm]: 4 L(A) [N mm]."""
+        limit = np.multiply(self.friction, self.normal_load)
+        energy: Array = _loop_energy(amplitude, self.stiffness, limit, *self.spread)
+        return energy
