@@ -100,7 +100,7 @@ class Harmonic(Force):
 
     def signal(self, time: float) -> Signal:
         a, angular = self.amplitude, 2.0 * np.pi * self.frequency
-        if time >= self.ramp:
+        if time >= self.ramp or self.ramp == 0.0:
             return Signal(waves=(Wave(a, angular, self.phase),))
         if time < 0.0:
             return Signal()

@@ -1,0 +1,129 @@
+"""What an integrator keeps of a march in small steps: rows, and the energies summed until each.
+
+The energies are those of the trapezoidal rule, with which the balance of average acceleration
+closes: forces and velocities of a step are the means of its ends.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from fe_models.dynamics.model import DynamicModel, Response
+from fe_models.dynamics.motion import Energies, Motion, accelerations, quadratic
+from sa_solver.types import Array
+
+
+class Point(NamedTuple):
+    """A time on the way: displacements and velocities ``(2 n,)``, and the joints.
+
+    ``missing`` ``(j d,)`` [mm] is how far the joints are behind the structure, what was left of
+    the ``residual``; ``step`` [s] led here.
+    """
+
+    time: float
+    motion: Array
+    force: Array
+    response: Response
+    missing: Array
+    step: float
+    residual: float
+
+
+class Record:
+    """Rows of the result, and the energies summed until each."""
+
+    def __init__(self, model: DynamicModel, directions: int, every: int, first: Point) -> None:
+        self._model, self._directions, self._every = model, directions, every
+        self._before, self._kept = first, first
+        self._sums = np.zeros((1, 3 + len(model.connection) // directions))
+        self._rows = [(*_columns([first]), self._sums)]
+        self._largest_jump = self._largest_motion = self._residual = 0.0
+        self._taken = self._steps = 0
+
+    def add(self, block: list[list[Point]]) -> None:
+        """Sum the energies of whole steps, each of one or more points, and keep rows."""
+        points = [point for whole in block for point in whole]
+        if not points:
+            return
+        ends = np.cumsum([len(whole) for whole in block]) - 1
+        kept = ends[(self._taken + 1 + np.arange(len(block))) % self._every == 0]
+        sums = self._sums[-1] + np.cumsum(self._flows([self._before, *points]), axis=0)
+        if len(kept):
+            self._rows.append((*_columns([points[row] for row in kept]), sums[kept]))
+            self._kept = points[kept[-1]]
+        self._before, self._sums = points[-1], sums
+        self._taken += len(block)
+        self._steps += len(points)
+        self._residual = max(self._residual, *(point.residual for point in points))
+
+    def _flows(self, points: list[Point]) -> Array:
+        """Energies of each step ``(s, 3 + j)``: brought in, damped, into joints, lost in each."""
+        model = self._model
+        _, motion, force, joint_force = _columns(points)
+        steps = np.array([point.step for point in points[1:]])[:, None]
+        velocity = np.split(0.5 * (motion[1:] + motion[:-1]), 2, axis=1)[1]
+        travel = steps * velocity
+        pairs = (
+            (0.5 * (force[1:] + force[:-1]), travel),
+            (velocity @ model.damping.T, travel),
+            (0.5 * (joint_force[1:] + joint_force[:-1]), travel @ model.connection.T),
+        )
+        works = np.stack([np.einsum("ti,ti->t", *pair) for pair in pairs], axis=1)
+        self._judge(motion, accelerations(model, motion, force, joint_force), steps)
+        dissipated = np.array([point.response.dissipated for point in points[1:]])
+        return np.hstack([works, dissipated])
+
+    def _judge(self, motion: Array, acceleration: Array, steps: Array) -> None:
+        """Note the largest displacement, and the largest error of it that a step adds."""
+        mass = self._model.mass
+        jumps = steps**2 / 12.0 * np.diff(acceleration, axis=0)
+        displacement = motion[:, : len(mass)]
+        jump, moved = (float(quadratic(mass, part).max()) for part in (jumps, displacement))
+        self._largest_jump = max(self._largest_jump, jump)
+        self._largest_motion = max(self._largest_motion, moved)
+
+    @property
+    def largest_displacement(self) -> float:
+        """As a norm weighted by mass [t^0.5 mm]."""
+        return float(np.sqrt(2.0 * self._largest_motion))
+
+    def motion(self, message: str) -> Motion:
+        """All rows kept so far; ``message`` says why they end early, if they do."""
+        model, directions = self._model, self._directions
+        times, motion, force, joint_force, sums = (
+            np.concatenate(parts) for parts in zip(*self._rows, strict=True)
+        )
+        displacement, velocity = np.split(motion, 2, axis=1)
+        shape = (len(motion), len(model.connection) // directions, directions)
+        moved = self._largest_motion
+        return Motion(
+            times=times,
+            displacement=displacement,
+            velocity=velocity,
+            acceleration=accelerations(model, motion, force, joint_force),
+            joint_displacement=(displacement @ model.connection.T).reshape(shape),
+            joint_force=joint_force.reshape(shape),
+            joint_state=self._kept.response.state,
+            energies=Energies(
+                kinetic=quadratic(model.mass, velocity),
+                elastic=quadratic(model.stiffness, displacement),
+                excitation=sums[:, 0],
+                damping=sums[:, 1],
+                joint_work=sums[:, 2],
+                joints=sums[:, 3:],
+            ),
+            error=float(np.sqrt(self._largest_jump / moved)) if moved > 0.0 else 0.0,
+            residual=self._residual,
+            steps=self._steps,
+            message=message,
+        )
+
+
+def _columns(points: list[Point]) -> tuple[Array, Array, Array, Array]:
+    """Times ``(t,)``, motion ``(t, 2 n)``, force ``(t, n)``, joint force ``(t, j d)`` of points."""
+    times = np.array([point.time for point in points])
+    motion = np.array([point.motion for point in points])
+    force = np.array([point.force for point in points])
+    return times, motion, force, np.array([point.response.force.ravel() for point in points])

@@ -1,0 +1,89 @@
+"""Forces in time: their values, and that the smooth stretches they are made of are the same."""
+
+import numpy as np
+import pytest
+
+from fe_models.dynamics.excitation import (
+    ExcitationError,
+    HammerBlow,
+    Harmonic,
+    Recorded,
+    Together,
+)
+
+SHAPE = np.array([0.0, 2.0])
+FORCES = {
+    "harmonic": Harmonic(SHAPE, 75.0, 100.0, phase=0.3),
+    "ramped": Harmonic(SHAPE, 75.0, 100.0, phase=0.3, ramp=0.013),
+    "blow": HammerBlow(SHAPE, 100.0, 4e-3, start=2e-3),
+    "recorded": Recorded(SHAPE, np.array([1e-3, 2e-3, 9e-3]), np.array([1.0, -3.0, 8.0])),
+    "constant": Recorded(SHAPE, np.array([0.0]), np.array([6.0])),
+}
+
+
+@pytest.mark.parametrize("force", FORCES.values(), ids=FORCES)
+def test_smooth_stretches_are_the_force(force):
+    times = np.linspace(-5e-3, 30e-3, 71) + 1e-5
+    stretches = [force.signal(time) for time in times]
+    lines = [s.value + s.slope * (t - s.origin) for s, t in zip(stretches, times, strict=True)]
+    waves = [
+        sum(w.amplitude * np.sin(w.angular * t + w.phase) for w in s.waves)
+        for s, t in zip(stretches, times, strict=True)
+    ]
+    found = force(times)
+    assert found.shape == (71, 2)
+    np.testing.assert_array_equal(found[:, 0], 0.0)
+    np.testing.assert_allclose(found[:, 1], 2.0 * np.add(lines, waves), atol=1e-11)
+
+
+@pytest.mark.parametrize("force", FORCES.values(), ids=FORCES)
+def test_a_stretch_goes_on_until_the_next_break(force):
+    for early, late in [(-1.0, -1e-9), (1e-9, 0.99e-3), (1e-3, 2e-3), (2e-3, 6e-3), (9e-3, 1.3e-2)]:
+        between = [time for time in force.breaks if early < time < late]
+        share = 1e-3 * (late - early)
+        if not between:
+            assert force.signal(early + share) == force.signal(late - share)
+
+
+def test_a_blow_is_half_a_sine():
+    blow = HammerBlow(np.ones(1), 100.0, 4e-3)
+    times = np.linspace(-1e-3, 6e-3, 70001)
+    force = blow(times)[:, 0]
+    assert force.max() == pytest.approx(100.0, rel=1e-9)
+    assert np.trapezoid(force, times) == pytest.approx(2.0 * 100.0 * 4e-3 / np.pi, rel=1e-6)
+    assert np.all(force[(times < 0.0) | (times > 4e-3)] == 0.0)
+
+
+def test_a_ramp_starts_without_force_or_slope_and_ends_in_the_harmonic():
+    ramped, full = FORCES["ramped"], FORCES["harmonic"]
+    h = 1e-9
+    start = ramped(np.array([0.0, h]))[:, 1]
+    assert start[0] == 0.0
+    assert abs(start[1]) / h < 1e-3 * 150.0 * 2.0 * np.pi * 100.0
+    late = np.linspace(0.013, 0.05, 99)
+    np.testing.assert_array_equal(ramped(late), full(late))
+
+
+def test_forces_add_up():
+    both = Together((FORCES["blow"], FORCES["constant"]))
+    times = np.linspace(0.0, 0.01, 11)
+    wanted = FORCES["blow"](times) + np.array([0.0, 12.0])
+    np.testing.assert_allclose(both(times), wanted, rtol=1e-15)
+    assert both.breaks == (0.0, 2e-3, 6e-3)
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Harmonic(SHAPE, 1.0, 0.0), "frequency 0 Hz"),
+        (lambda: Harmonic(SHAPE, 1.0, 1.0, ramp=-1.0), "ramp -1 s"),
+        (lambda: HammerBlow(SHAPE, 1.0, 0.0), "a blow of 0 s"),
+        (lambda: Recorded(SHAPE, np.array([]), np.array([])), "0 times and 0 forces"),
+        (lambda: Recorded(SHAPE, np.zeros(2), np.zeros(3)), "2 times and 3 forces"),
+        (lambda: Recorded(SHAPE, np.array([1.0, 1.0]), np.zeros(2)), "do not ascend"),
+        (lambda: Recorded(SHAPE, np.array([1.0]), np.array([np.nan])), "not a number"),
+    ],
+)
+def test_signals_that_cannot_be_are_refused(make, message):
+    with pytest.raises(ExcitationError, match=message):
+        make()

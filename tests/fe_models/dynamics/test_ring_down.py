@@ -1,0 +1,143 @@
+"""Ring-downs of known damping: linear ones, and one of a uniform Iwan joint."""
+
+import numpy as np
+import pytest
+
+from fe_models.dynamics.frequency_response import SignalError
+from fe_models.dynamics.ring_down import FLOOR, ring_down
+
+FREQUENCY, STEP = 100.0, 1.0 / 10e3
+
+
+def decay(ratio, seconds=2.0, phase=0.0, frequency=FREQUENCY):
+    time, natural = STEP * np.arange(int(seconds / STEP)), 2.0 * np.pi * frequency
+    damped = natural * np.sqrt(1.0 - ratio**2)
+    return np.exp(-ratio * natural * time) * np.cos(damped * time + phase)
+
+
+@pytest.mark.parametrize("band", [(50.0, 150.0), (70.0, 150.0), (80.0, 120.0)])
+@pytest.mark.parametrize("ratio", [1e-3, 0.01, 0.03])
+@pytest.mark.parametrize("phase", [0.0, 1.0])
+def test_linear_mode_gives_its_damping_and_frequency(ratio, phase, band):
+    """To what the filter may hold of the ends (1e-4 of the amplitude, less in its slope)."""
+    found = ring_down(decay(ratio, phase=phase), STEP, band)
+    assert found.damping_ratio == pytest.approx(ratio, rel=5e-4)
+    damped = FREQUENCY * np.sqrt(1.0 - ratio**2)
+    assert found.frequency == pytest.approx(damped, rel=5e-6)
+    amplitude = np.exp(-ratio * 2.0 * np.pi * FREQUENCY * found.time)
+    # An exponential has a wider spectrum than its frequency: what the filter's gain bends of it.
+    assert found.amplitude == pytest.approx(amplitude, rel=1e-4 + 10.0 * ratio**2)
+    assert found.amplitude[-1] >= 0.99 * FLOOR * found.amplitude[0]
+
+
+def test_other_modes_are_left_out():
+    found = ring_down(decay(0.005) + 0.3 * decay(0.005, frequency=650.0), STEP, (60.0, 140.0))
+    assert found.damping_ratio == pytest.approx(0.005, rel=0.01)
+    assert found.frequency == pytest.approx(FREQUENCY, rel=1e-3)
+
+
+def test_noise_scatters_but_does_not_bias():
+    generator = np.random.default_rng(2)
+    signal = decay(0.005)
+    found = ring_down(signal + 0.01 * generator.standard_normal(signal.size), STEP, (60.0, 140.0))
+    loud = found.amplitude > 0.1
+    assert np.mean(found.damping_ratio[loud]) == pytest.approx(0.005, rel=0.02)
+
+
+# --- Iwan ---------------------------------------------------------------------------------------
+
+# Beside the joint a spring twice as stiff; loops of up to a tenth of full slip are
+# looked at: the averaged law is of first order in the amplitude.
+MASS, SPRING, JOINT, SLIP = 1e-3, 400.0, 200.0, 0.05
+START = 0.15 * SLIP
+
+
+def iwan_ring_down(periods=900, steps=200):
+    """Displacement from rest at START, by Verlet's steps; reversals follow Masing's rule.
+
+    Each amplitude is below the last, so that no loop closes and the last reversal is all that
+    counts. Returns displacement and step.
+    """
+    step = 2.0 * np.pi * np.sqrt(MASS / (SPRING + JOINT)) / steps
+    moved, speed, displacement = START, 0.0, []
+    turn, sense = START, -1.0
+    held = JOINT * START - JOINT * START**2 / (2.0 * SLIP)
+    force = held
+    for _ in range(periods * steps):
+        displacement.append(moved)
+        speed -= 0.5 * step / MASS * (SPRING * moved + force)
+        moved += step * speed
+        gone = abs(moved - turn)
+        force = held + sense * JOINT * gone * (1.0 - gone / (4.0 * SLIP))
+        speed -= 0.5 * step / MASS * (SPRING * moved + force)
+        if speed * sense < 0.0:
+            turn, sense, held = moved, -sense, force
+    return np.array(displacement), step
+
+
+def iwan_law(amplitude):
+    """Frequency [Hz] and damping ratio of a slowly decaying vibration of ``amplitude``.
+
+    Averaged over a period (first harmonic): k(A) = K + kt (1 - A / 2φ) and a' = -E / (2π m ω A),
+    E = 2 kt A³ / (3 φ); so ζ = -a'/(a ω) = E / (4π · k A²/2), the energy lost over 4π that stored.
+    """
+    stiffness = SPRING + JOINT * (1.0 - amplitude / (2.0 * SLIP))
+    energy = 2.0 * JOINT * amplitude**3 / (3.0 * SLIP)
+    frequency = np.sqrt(stiffness / MASS) / (2.0 * np.pi)
+    return frequency, energy / (2.0 * np.pi * stiffness * amplitude**2)
+
+
+@pytest.fixture(scope="module")
+def iwan():
+    displacement, step = iwan_ring_down()
+    return displacement, step, ring_down(displacement, step, (70.0, 180.0))
+
+
+def test_iwan_ring_down_gives_its_law(iwan):
+    """Within 2 % up to a tenth of full slip, in proportion: the law is of first order."""
+    *_, found = iwan
+    frequency, ratio = iwan_law(found.amplitude)
+    assert 0.08 * SLIP < found.amplitude[0] < 0.1 * SLIP
+    assert found.amplitude[-1] < 0.02 * SLIP
+    wrong = np.abs(found.damping_ratio / ratio - 1.0)
+    assert wrong.max() < 0.02
+    assert wrong[found.amplitude < 0.03 * SLIP].max() < 0.006
+    assert np.abs(found.frequency / frequency - 1.0).max() < 1e-3
+
+
+def test_iwan_ring_down_agrees_with_its_decrement(iwan):
+    """Successive maxima, each the top of a parabola, decay by 2πζ; no filter, no law."""
+    displacement, step, found = iwan
+    inner = displacement[1:-1]
+    tops = 1 + np.flatnonzero((inner > displacement[:-2]) & (inner >= displacement[2:]))
+    before, at, after = displacement[tops - 1], displacement[tops], displacement[tops + 1]
+    height = at - (after - before) ** 2 / (8.0 * (before - 2.0 * at + after))
+    ratio = np.log(height[:-1] / height[1:]) / (2.0 * np.pi)
+    time = 0.5 * step * (tops[1:] + tops[:-1])
+    seen = (time > found.time[0]) & (time < found.time[-1])
+    measured = np.interp(time[seen], found.time, found.damping_ratio)
+    assert measured == pytest.approx(ratio[seen], rel=5e-3)
+
+
+# --- nonsense -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("signal", "band", "words"),
+    [
+        (decay(0.01), (0.0, 50.0), "within 0"),
+        (decay(0.01), (150.0, 50.0), "within 0"),
+        (decay(0.01), (90.0, 6000.0), "within 0"),
+        (decay(0.01), (1500.0, 2000.0), "samples a period"),
+        (decay(0.01, seconds=0.05), (50.0, 150.0), "over before"),
+        (decay(0.08), (95.0, 105.0), "wider band"),
+        (0.0 * decay(0.01), (50.0, 150.0), "not all 0"),
+        (np.nan * decay(0.01), (50.0, 150.0), "finite"),
+        (np.ones((2, 9000)), (50.0, 150.0), "finite"),
+    ],
+)
+def test_what_cannot_be_measured_is_refused(signal, band, words):
+    with pytest.raises(SignalError, match=words):
+        ring_down(signal, STEP, band)
+    with pytest.raises(SignalError, match="at least 1"):
+        ring_down(decay(0.01), STEP, (50.0, 150.0), periods=0.1)
