@@ -1,0 +1,257 @@
+"""Loops of known laws, synthesised with noise, give their parameters back.
+
+Noise, in standard deviations over the range, is on displacement and force alike.
+"""
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from sa_solver.reference.mindlin import ShearedSphere
+from sa_solver.types import Material
+from wear.joints.bouc_wen import BoucWen
+from wear.joints.iwan import UniformIwan
+from wear.joints.jenkins import Jenkins
+from wear.joints.law import march
+from wear.joints.loop_record import reversals
+from wear.joints.measured_loops import MeasuredLoopError, estimate, measure_loops
+
+STIFFNESS, RESIDUAL, FRICTION, LOAD = 60e3, 900.0, 0.9, 60.0
+LIMIT = FRICTION * LOAD
+LAWS = {
+    "jenkins": Jenkins(STIFFNESS, FRICTION, LOAD, RESIDUAL),
+    "iwan": UniformIwan(STIFFNESS, FRICTION, LOAD, RESIDUAL),
+    "bouc_wen": BoucWen(STIFFNESS, FRICTION, LOAD, RESIDUAL),
+}
+# What Bouc-Wen calls stiffness is the whole initial slope.
+STICK = {"jenkins": 60900.0, "iwan": 60900.0, "bouc_wen": 60000.0}
+# Strokes over the displacement µN/kt that a stuck contact can give one way: Fantetti's loops at
+# 14 µm have 16, those of Li's test 4 have 10.
+AMPLITUDE = 4.0 * LIMIT / STIFFNESS
+NOISE = 0.005
+
+
+def harmonic(amplitude, samples, cycles):
+    """From amid a branch, so that first loading and a part of a cycle at the end are there too."""
+    return amplitude * np.sin(2.0 * np.pi * np.arange(int((cycles + 0.9) * samples)) / samples)
+
+
+def triangular(amplitude, samples, cycles):
+    return 2.0 / np.pi * amplitude * np.arcsin(harmonic(1.0, samples, cycles))
+
+
+def forces(law, displacement):
+    marched = march(law, law.rest(1), np.zeros((1, 1)), displacement[:, None, None])
+    return marched.force[:, 0, 0]
+
+
+def noisy(values, noise, generator):
+    return values + noise * np.ptp(values) * generator.standard_normal(len(values))
+
+
+@cache
+def clean(name, motion, amplitude, samples, cycles):
+    displacement = motion(amplitude, samples, cycles)
+    return displacement, forces(LAWS[name], displacement)
+
+
+def loops(
+    name, seed=None, noise=NOISE, motion=harmonic, amplitude=AMPLITUDE, samples=400, cycles=30
+):
+    displacement, force = clean(name, motion, amplitude, samples, cycles)
+    if seed is None:
+        return measure_loops(displacement, force, LOAD)
+    generator = np.random.default_rng(seed)
+    return measure_loops(
+        noisy(displacement, noise, generator), noisy(force, noise, generator), LOAD
+    )
+
+
+# --- round trips --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize("motion", [harmonic, triangular])
+def test_clean_loops_give_the_parameters(name, motion):
+    found = loops(name, motion=motion, cycles=3)
+    # The windows end at samples, not where sticking does: of Iwan a bit of a parabola is left.
+    assert found.stick_stiffness == pytest.approx(STICK[name], rel=2e-3)
+    # Bouc-Wen's ξ only tends to 1.
+    assert found.friction == pytest.approx(FRICTION, rel=2e-3)
+    assert found.residual_stiffness == pytest.approx(RESIDUAL, rel=0.03)
+    assert found.stroke == pytest.approx(2.0 * AMPLITUDE, rel=1e-12)
+
+
+# Cycles that bring the standard error of kt to a third of a percent: four times as many where the
+# tangent is of a parabola, whose bend has to be found too.
+CYCLES = {"jenkins": 30, "iwan": 120, "bouc_wen": 30}
+
+
+@pytest.mark.parametrize("name", LAWS)
+@pytest.mark.parametrize(
+    ("seed", "noise", "samples"),
+    [*((seed, 0.005, 400) for seed in range(6)), *((seed, 0.01, 1000) for seed in range(3))],
+)
+def test_noisy_loops_give_friction_and_stiffness_within_a_percent(name, seed, noise, samples):
+    found = loops(name, seed, noise, samples=samples, cycles=CYCLES[name])
+    stick = found.stick_estimate
+    assert stick.value == pytest.approx(STICK[name], rel=0.01)
+    assert stick.error < 0.005 * stick.value
+    assert abs(stick.value - STICK[name]) < 4.0 * stick.error
+    assert estimate(found.friction).value == pytest.approx(FRICTION, rel=0.01)
+    # Of the height of a loop, 1 % is what kr may be wrong by over the stroke.
+    allowed = 0.01 * 2.0 * LIMIT / (2.0 * AMPLITUDE)
+    assert estimate(found.residual_stiffness).value == pytest.approx(RESIDUAL, abs=allowed)
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_errors_are_as_large_as_stated(name):
+    """Over seeds the estimates scatter by their standard errors, within a factor of two."""
+    sticks = [loops(name, seed, samples=200, cycles=8).stick_estimate for seed in range(20)]
+    away = [(stick.value - STICK[name]) / stick.error for stick in sticks]
+    assert 0.5 < np.std(away) < 2.0
+    assert abs(np.mean(away)) < 1.0
+
+
+@pytest.mark.parametrize("name", LAWS)
+def test_energy_is_that_dissipated(name):
+    displacement = harmonic(AMPLITUDE, 4000, 3)
+    law = LAWS[name]
+    marched = march(law, law.rest(1), np.zeros((1, 1)), displacement[:, None, None])
+    found = measure_loops(displacement, marched.force[:, 0, 0])
+    for energy, (begin, _, end) in zip(found.energy, found.reversals, strict=True):
+        # Trapezoids of the step: second order, 4e-7 of a loop here, and more at Jenkins's corners.
+        dissipated = marched.dissipated[begin + 1 : end + 1].sum()
+        assert energy == pytest.approx(dissipated, rel=1e-5)
+
+
+def test_noise_does_not_bias_the_energy():
+    exact, found = loops("jenkins", cycles=3), loops("jenkins", 1, 0.01)
+    measured = estimate(found.energy)
+    assert measured.value == pytest.approx(exact.energy[0], abs=4.0 * measured.error)
+    assert measured.error < 2e-3 * measured.value
+
+
+def test_contact_stiffness_of_parallel_laws_is_without_the_residual_one():
+    assert loops("jenkins", cycles=3).contact_stiffness == pytest.approx(STIFFNESS, rel=1e-6)
+
+
+def test_tangent_of_spheres():
+    """Mindlin's loop is no parabola; the tangent misses the 0.4 % that is stated."""
+    body = Material(115e3, 0.3)
+    sphere = ShearedSphere(400.0, 10.0, body, body, 0.7)
+    fall = np.linspace(0.0, 0.95 * sphere.sliding_force, 4000)
+    moved = np.array([sphere.displacement(force) for force in fall])
+    tangent = fall[1] / moved[1]
+    force = np.concatenate([fall[-1] - 2.0 * fall, -fall[-1] + 2.0 * fall[1:]])
+    path = np.concatenate([moved[-1] - 2.0 * moved, -moved[-1] + 2.0 * moved[1:]])
+    found = measure_loops(path, force, 400.0)
+    assert 1.003 < found.stick_stiffness[0] / tangent < 1.005
+    assert not found.slides
+
+
+# --- what slides --------------------------------------------------------------------------------
+
+
+def test_stuck_and_partly_slipping_loops_say_so():
+    """Up to 2 µN/kt, where the last slider of Iwan's goes, friction is only bounded."""
+    for share in (0.3, 0.6, 0.9, 1.0):
+        amplitude = share * 2.0 * LIMIT / STIFFNESS
+        for seed in (None, 0):
+            found = loops("iwan", seed, amplitude=amplitude, cycles=3 if seed is None else 30)
+            assert not found.slides, share
+            assert found.stick_estimate.value == pytest.approx(STICK["iwan"], rel=0.01)
+            assert np.isnan(found.friction_force).all()
+            with pytest.raises(MeasuredLoopError, match=r"lower bound of 0.* larger stroke"):
+                _ = found.friction
+            bound = (LIMIT * share * (2.0 - share) + RESIDUAL * amplitude) / LOAD
+            assert estimate(found.mobilised).value == pytest.approx(bound, rel=0.01)
+
+
+def test_barely_sliding_loops_are_found():
+    found = loops("jenkins", 0, amplitude=1.5 * LIMIT / STIFFNESS)
+    assert found.slides
+    assert estimate(found.friction).value == pytest.approx(FRICTION, rel=0.01)
+
+
+def test_normal_load_is_the_mean_of_each_cycle():
+    displacement = harmonic(AMPLITUDE, 400, 4)
+    force = forces(LAWS["jenkins"], displacement)
+    loads = LOAD * (1.0 + 0.1 * np.arange(len(force)) / 400.0)
+    found = measure_loops(displacement, force, loads)
+    assert np.diff(found.normal_load) == pytest.approx(0.1 * LOAD, rel=1e-9)
+    assert found.friction * found.normal_load == pytest.approx(LIMIT, rel=1e-6)
+    assert np.isnan(measure_loops(displacement, force).normal_load).all()
+    with pytest.raises(MeasuredLoopError, match="needs the normal load"):
+        _ = measure_loops(displacement, force).friction
+
+
+# --- splitting ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("motion", [harmonic, triangular])
+@pytest.mark.parametrize("noise", [0.0, 0.002, 0.01])
+def test_reversals_are_found_in_noise(motion, noise):
+    generator = np.random.default_rng(5)
+    displacement = noisy(motion(1.0, 500, 20), noise, generator)
+    found = reversals(displacement)[1:-1]
+    # 2.5 % of a cycle is 1 % of the stroke, at its turn. The first of 42 may be no reversal.
+    assert len(found) in (40, 41)
+    away = found - 250 * np.arange(41 - len(found), 41) - 125
+    assert np.abs(away).max() <= (12 if noise else 0)
+
+
+@pytest.mark.parametrize("start", [0.0, 0.1, 0.25, 0.4, 0.5, 0.75, 0.9])
+@pytest.mark.parametrize("repeated", [True, False])
+def test_one_closed_period_may_begin_anywhere(start, repeated):
+    long = harmonic(AMPLITUDE, 400, 4)
+    begin = 800 + int(400 * start)
+    period = slice(begin, begin + 400 + repeated)
+    found = measure_loops(long[period], forces(LAWS["jenkins"], long)[period], LOAD)
+    assert found.stick_stiffness == pytest.approx(STICK["jenkins"], rel=1e-6)
+    assert found.friction == pytest.approx(FRICTION, rel=1e-6)
+    assert found.energy == pytest.approx(4.0 * LIMIT * (AMPLITUDE - LIMIT / STIFFNESS), rel=1e-3)
+    assert np.isnan(found.stick_estimate.error)
+
+
+def test_uneven_times_are_evened():
+    time = np.cumsum(np.random.default_rng(3).uniform(0.5, 1.5, 4000)) / 400.0
+    displacement = AMPLITUDE * np.sin(2.0 * np.pi * time)
+    found = measure_loops(displacement, forces(LAWS["iwan"], displacement), LOAD, time)
+    assert found.stick_estimate.value == pytest.approx(STICK["iwan"], rel=0.01)
+    assert estimate(found.friction).value == pytest.approx(FRICTION, rel=1e-3)
+
+
+def test_displacement_may_drift():
+    """A vibrometer's displacement, an integral, drifts: half a stroke over the record."""
+    displacement, force = clean("jenkins", harmonic, AMPLITUDE, 400, 30)
+    drift = AMPLITUDE * np.linspace(0.0, 1.0, len(force))
+    found = measure_loops(displacement + drift, force, LOAD)
+    assert len(found.energy) >= 29
+    assert estimate(found.friction).value == pytest.approx(FRICTION, rel=0.01)
+    assert found.stick_estimate.value == pytest.approx(STICK["jenkins"], rel=0.01)
+
+
+# --- nonsense -----------------------------------------------------------------------------------
+
+
+def test_records_without_loops_are_refused():
+    displacement = harmonic(AMPLITUDE, 400, 3)
+    force = forces(LAWS["jenkins"], displacement)
+    for wrong, words in [
+        ((np.zeros(100), np.zeros(100)), "never changes"),
+        (([], []), "never changes"),
+        (([0.0, 1.0], [0.0, 1.0]), "no complete cycle"),
+        (([0.0, 1.0, 0.0, 1.0], [0.0, 1.0, -1.0, 1.0]), "sampled faster"),
+        ((displacement[:250], force[:250]), "no complete cycle"),
+        ((displacement, force[:-1]), "force has the shape"),
+        ((displacement, force, LOAD * np.ones(3)), "normal load has the shape"),
+        ((displacement, force * np.nan), "not finite"),
+        ((displacement, force, 0.0), "not above 0"),
+        ((displacement, force, LOAD, displacement), "does not grow"),
+        ((displacement, -force), "change the sign"),
+        ((displacement[::40], force[::40]), "sampled faster"),
+    ]:
+        with pytest.raises(MeasuredLoopError, match=words):
+            measure_loops(*wrong)
