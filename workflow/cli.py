@@ -140,8 +140,8 @@ def chart(
     """Chart error against cost for each approximation of CASE.
 
     Each AXIS has a ladder of runs about the settings of CASE: grid, tolerance, method, stepper,
-    dimension, coupling, history, mesh, order; by default all that apply. Finished runs are kept:
-    the same command goes on where it was interrupted.
+    dimension, coupling, history, mesh, order, step; by default all that apply. Finished runs are
+    kept: the same command goes on where it was interrupted.
     """
     from workflow.chart import accuracy_of, chart_case
     from workflow.chart.report import show, write_chart
@@ -215,6 +215,30 @@ def resultants(case: str, out: Path, overrides: tuple[str, ...], force: bool) ->
 
 @cli.command()
 @click.argument("file", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for a table and a figure.")
+@click.option("--normal-load", metavar="FORCE", help="Such as '60 N', if FILE has no column of it.")
+@click.option("--column", "columns", multiple=True, metavar="KEY=NAME", help="Another heading.")
+@click.option("--force", is_flag=True, help="Overwrite what is there.")
+def loops(
+    file: Path, out: Path | None, normal_load: str | None, columns: tuple[str, ...], force: bool
+) -> None:
+    """Measure friction, stiffness and energy of the hysteresis loops in FILE.
+
+    FILE is CSV with headings such as `displacement [um], force [N]`, and `time [s]` where samples
+    are not evenly spaced, and `normal_load [N]` where it is known.
+    """
+    from workflow.loops_command import loops_of_file, report, write_loops
+
+    found = loops_of_file(file, columns, normal_load)
+    for line in report(found):
+        click.echo(line)
+    if out is not None:
+        for path in write_loops(found, out, file.name, force):
+            click.echo(path)
+
+
+@cli.command()
+@click.argument("file", type=click.Path(path_type=Path))
 @click.option("--size", metavar="LENGTH", help="Of the elements, for a CAD file, such as '2 mm'.")
 def describe(file: Path, size: str | None) -> None:
     """List bodies, boundaries and node sets of a mesh or CAD FILE, as a case may name them."""
@@ -230,7 +254,8 @@ def describe(file: Path, size: str | None) -> None:
 def new(kind: str, file: Path | None) -> None:
     """Write a commented case of KIND to FILE, or print it.
 
-    KIND is dovetail, mesh, resultants, specimens, bodies, line, bodies_wear or line_wear.
+    KIND is dovetail, mesh, resultants, specimens, bodies, line, bodies_wear, line_wear, joint or
+    rig.
     """
     from workflow.case import KINDS, template
 
@@ -258,9 +283,9 @@ def schema() -> None:
 
 def _outline(case: Case) -> list[tuple[str, str]]:
     """What would run, in a few rows."""
-    from workflow.case import SpecimensCase, WearCase
+    from workflow.case import JointCase, RigCase, SpecimensCase, WearCase
 
-    if isinstance(case, SpecimensCase):
+    if isinstance(case, SpecimensCase | JointCase | RigCase):
         return case.outline()
     return _wear_outline(case) if isinstance(case, WearCase) else _contact_outline(case)
 

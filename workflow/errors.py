@@ -42,3 +42,8 @@ class OutOfMemory(FretscaleError):
     """The case needs more memory than there is."""
 
     exit_code = 4
+
+
+def one_line(said: object) -> str:
+    """What an error or a process said, its line breaks and runs of spaces as single spaces."""
+    return " ".join(str(said).split())

@@ -13,9 +13,13 @@ from workflow.errors import UserError
 from workflow.store import PARTIAL, replacing
 
 FILES = ("case.yaml", "summary.json", "results.h5", "worn.msh", "checkpoint.h5", "run.log")
-# Worn surfaces at the nodes of another code, and tangential loops, by interface.
-TABLES = ("worn_nodes_*.csv", "loops_*.csv")
-FOLDERS = ("jumps", "reduced", "paraview", "figures")
+# Worn surfaces at the nodes of another code, and tangential loops, by interface; and the curves of
+# a case in time, by state.
+TABLES = (
+    *("worn_nodes_*.csv", "loops_*.csv", "evolution.csv", "loop_*.csv"),
+    *("frequency_response_*.csv", "ring_down_*.csv"),
+)
+FOLDERS = ("jumps", "reduced", "paraview", "figures", "wear")
 
 
 class OutputFolder:
@@ -32,6 +36,7 @@ class OutputFolder:
         self.reduced = root / "reduced"
         self.paraview = root / "paraview"
         self.figures = root / "figures"
+        self.wear = root / "wear"  # a run of its own
 
     def jump(self, number: int) -> Path:
         """File of one jump's fields."""

@@ -5,7 +5,15 @@ from __future__ import annotations
 from math import prod
 
 from fe_models.memory import available_bytes as _available_bytes
-from workflow.case import Case, DovetailCase, LineContactCase, SpecimensCase, WearCase
+from workflow.case import (
+    Case,
+    DovetailCase,
+    JointCase,
+    LineContactCase,
+    RigCase,
+    SpecimensCase,
+    WearCase,
+)
 from workflow.errors import OutOfMemory
 
 # Dense interface matrices alive at once while the joint is condensed.
@@ -14,6 +22,9 @@ DENSE_MATRICES = 6
 FIELDS = 12
 # A contact case: fields kept of a state, and spectra and iterates alive during a solve, per cell.
 STATE_FIELDS, SPECTRA = 6, 300
+# A rig in time: displacement, velocity, acceleration, forces, energies and what is made of them,
+# per mass and step, with the objects that hold a step while it is found.
+STEP_COLUMNS = 60
 # Sparse factors of a structure with this many nodes took this much; they grow with this power.
 FACTOR_BYTES, FACTOR_NODES, FACTOR_POWER = 3.5e9, 1e5, 1.4
 # Meshes, plots and the interpreter with its libraries.
@@ -28,6 +39,8 @@ def required_bytes(
 
     ``structure_nodes`` of both bodies and ``interface_nodes`` of all contacts, once known.
     """
+    if isinstance(case, JointCase | RigCase):
+        return BYTES * _kept_in_time(case) + REST
     if isinstance(case, SpecimensCase):
         pad = 3 * (case.mesh.pad_elements + 1) ** 2
         factors = FACTOR_BYTES * (structure_nodes / FACTOR_NODES) ** FACTOR_POWER
@@ -47,6 +60,14 @@ def required_bytes(
     return BYTES * (DENSE_MATRICES * (3 * interface_nodes) ** 2 + contact) + factors + REST
 
 
+def _kept_in_time(case: JointCase | RigCase) -> float:
+    """Numbers kept of all motions of a rig: every step, with all its columns, at every energy."""
+    if isinstance(case, JointCase):
+        return 0.0
+    columns = STEP_COLUMNS * len(case.structure.masses)
+    return columns * len(case.energies) * case.steps
+
+
 def check_memory(case: WearCase | Case, structure_nodes: int = 0, interface_nodes: int = 0) -> None:
     """Raise :class:`OutOfMemory` if the machine has less than the case needs."""
     required = required_bytes(case, structure_nodes, interface_nodes)
@@ -60,6 +81,8 @@ def check_memory(case: WearCase | Case, structure_nodes: int = 0, interface_node
 
 def _remedy(case: WearCase | Case) -> str:
     """What makes a case smaller."""
+    if isinstance(case, JointCase | RigCase):
+        return "raise integration.step, or shorten what is recorded"
     if isinstance(case, SpecimensCase):
         return "lower mesh.pad_elements, mesh.order or contact.grid, or raise mesh.size"
     if isinstance(case, DovetailCase):

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workflow.case import Case
-from workflow.errors import FretscaleError
+from workflow.errors import FretscaleError, one_line
 from workflow.runs_job import Finished, Job, Kept, cores_of, finished, kept_in, run_job
 
 __all__ = ["Finished", "Job", "Kept", "kept_in", "run_jobs"]
@@ -54,7 +54,7 @@ def run_jobs(
         try:
             case = job.load()
         except FretscaleError as error:
-            end(job, " ".join(str(error).split()))
+            end(job, one_line(error))
             continue
         if kept_in(out / job.name, case) == "finished":
             end(job, "")

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from workflow.case import Case, dump_case
-from workflow.errors import UserError
+from workflow.errors import UserError, one_line
 from workflow.runs_job import Job, run_job
 
 # Times a run is tried again where it could not even be started; how often its worker may die is
@@ -34,12 +34,12 @@ def run_on_cluster(
         from distributed import Client, as_completed
     except ImportError as error:
         raise UserError(
-            f"--dask needs the package distributed ({_one_line(error)}): install fretscale[cluster]"
+            f"--dask needs the package distributed ({one_line(error)}): install fretscale[cluster]"
         ) from error
     try:
         client = Client(address, timeout=PATIENCE)
     except (OSError, ValueError) as error:
-        raise UserError(f"--dask {address}: no scheduler answers: {_one_line(error)}") from error
+        raise UserError(f"--dask {address}: no scheduler answers: {one_line(error)}") from error
     with client:
         futures = {}
         for job, case in jobs:
@@ -75,8 +75,4 @@ def _error_of(future: Any) -> str:
     try:
         return str(future.result())
     except Exception as error:
-        return f"lost by the cluster: {type(error).__name__}: {_one_line(error)}"
-
-
-def _one_line(error: Exception) -> str:
-    return " ".join(str(error).split())
+        return f"lost by the cluster: {type(error).__name__}: {one_line(error)}"

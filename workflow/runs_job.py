@@ -29,7 +29,7 @@ from workflow.case import (
     dump_case,
     load_case,
 )
-from workflow.errors import FretscaleError, MethodFailed, UserError
+from workflow.errors import FretscaleError, MethodFailed, UserError, one_line
 from workflow.folder import OutputFolder
 from workflow.workers import THREAD_SETTINGS
 
@@ -244,7 +244,7 @@ def _wait(process: subprocess.Popen[str], unwanted: Callable[[], bool]) -> tuple
 def _ending(process: subprocess.Popen[str], answer: str, said: str) -> str:
     """Why the job failed, in one line; "" if it did not."""
     if process.returncode == 0:
-        return " ".join(json.loads(answer)["error"].split())
+        return one_line(json.loads(answer)["error"])
     if process.returncode < 0:
         number = -process.returncode
         return str(MethodFailed(f"the process of this run got signal {number}: for its memory?"))

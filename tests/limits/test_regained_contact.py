@@ -11,25 +11,9 @@ from sa_solver.contact import FrictionalContact, Load
 from sa_solver.half_space import HalfSpace
 from sa_solver.history import LoadPath, march
 from sa_solver.reference.mindlin import ShearedSphere
-from sa_solver.types import ElasticPair, Grid, LoadHistory, Material
+from sa_solver.types import ElasticPair, Grid, LoadHistory
+from tests.limits.scenes import ALIKE, BOTH, FRICTION, RADIUS, SOLVED, P, sphere
 from wear.full_cycle import full_cycle
-
-P, RADIUS, FRICTION = 100.0, 10.0, 0.4
-SOLVED = 1e-8
-ALIKE = Material(70e3, 0.0)
-PAIRS = {
-    "alike": ElasticPair(ALIKE, ALIKE),
-    "unlike": ElasticPair(Material(np.inf, 0.3), Material(70e3, 0.3)),
-}
-BOTH = pytest.mark.parametrize("kind", PAIRS)
-
-
-def contact_of(kind, cells=32):
-    pair = PAIRS[kind]
-    size = 3.0 * (0.75 * P * RADIUS / pair.contact_modulus) ** (1 / 3)
-    grid = Grid.covering((size, size), (cells, cells))
-    height = (grid.x**2 + grid.y**2) / (2.0 * RADIUS)
-    return FrictionalContact(HalfSpace(grid, pair), FRICTION, SOLVED), height
 
 
 def follow(contact, height, *loads):
@@ -44,7 +28,7 @@ def follow(contact, height, *loads):
 
 def test_while_pressed_it_remembers_as_in_mindlins_solution():
     """Shear locked in when Q returns to 0, to 2 % of µp0 (rms; single cells at its kinks 6 %)."""
-    contact, height = contact_of("alike", 48)
+    contact, height = sphere("alike", 48)
     state = follow(contact, height, (P, 0.0), (P, 30.0), (P, 0.0))
     exact = ShearedSphere(P, RADIUS, ALIKE, ALIKE, FRICTION)
     grid, largest = contact.grid, FRICTION * exact.contact.peak_pressure
@@ -60,7 +44,7 @@ def test_while_pressed_it_remembers_as_in_mindlins_solution():
 def test_a_load_that_falls_far_enough_forgets_too(left, trace):
     """Where the contact that is left, a (P'/P)^(1/3), lies within what never slipped, c = a (1 -
     Q/µP)^(1/3), nothing has moved there and no shear is locked in: below P' = P - Q/µ."""
-    contact, height = contact_of("alike", 48)
+    contact, height = sphere("alike", 48)
     assert trace == (left > 1.0 - 30.0 / (FRICTION * P))
     fresh = follow(contact, height, (P, 0.0))
     again = follow(contact, height, (P, 0.0), (P, 30.0), (left * P, 0.0), (P, 0.0))
@@ -71,7 +55,7 @@ def test_a_load_that_falls_far_enough_forgets_too(left, trace):
 
 @BOTH
 def test_bodies_that_part_touch_again_as_new(kind):
-    contact, height = contact_of(kind)
+    contact, height = sphere(kind)
     apart = follow(contact, height, (P, 0.0), (P, 30.0), (0.0, 0.0))
     assert not apart.traction.any()
     assert not apart.slip.any()
@@ -91,7 +75,7 @@ def test_bodies_that_part_touch_again_as_new(kind):
 @BOTH
 def test_a_bulk_strain_while_apart_is_not_felt(kind):
     """What the surfaces stretch while they are apart shears nothing when they touch again."""
-    contact, height = contact_of(kind)
+    contact, height = sphere(kind)
     fresh = follow(contact, height, (P, 0.0))
     state = contact.apart(height)
     for load, strain in ((P, 0.0), (0.0, 1e-3), (P, 1e-3)):
@@ -104,7 +88,7 @@ def test_a_bulk_strain_while_apart_is_not_felt(kind):
 @BOTH
 def test_motions_that_part_the_bodies_and_join_them(kind):
     """The same by an approach that is taken back and imposed again."""
-    contact, height = contact_of(kind)
+    contact, height = sphere(kind)
     depth = follow(contact, height, (P, 0.0)).rigid[0]
     state, states = contact.apart(height), []
     for dz in (depth, -depth, 0.5 * depth, depth):
@@ -122,7 +106,7 @@ def test_motions_that_part_the_bodies_and_join_them(kind):
 @BOTH
 def test_legs_are_not_taken_in_one_step_across_a_parting(kind):
     """The short way through a history does not apply, and is not taken."""
-    contact, height = contact_of(kind, 16)
+    contact, height = sphere(kind, 16)
     values = np.zeros((6, 6))
     values[:, 0] = [P, P, 0.0, P, P, P]
     values[:, 1] = [0.0, 30.0, 0.0, 0.0, 15.0, 30.0]
@@ -155,7 +139,7 @@ def cycle(load, shear, energy=0.0):
 
 @BOTH
 def test_what_a_cycle_did_before_it_parted_does_not_matter_after(kind):
-    contact, height = contact_of(kind, 16)
+    contact, height = sphere(kind, 16)
     one = full_cycle(contact, height, cycle([P, P, 0.0, 0.5 * P, P], [5.0, 30.0, 0.0, 3.0, -9.0]))
     other = full_cycle(
         contact, height, cycle([P, P, 0.0, 0.5 * P, P], [0.0, -20.0, 0.0, 3.0, -9.0])
@@ -196,7 +180,7 @@ def test_a_flat_that_sticks_dissipates_nothing_and_one_that_slides_does():
 @BOTH
 def test_an_energy_of_zero_leaves_the_force_to_be_carried(kind):
     """Zero energy at a force near sliding is no gross slip: the contact creeps under its force."""
-    contact, height = contact_of(kind, 16)
+    contact, height = sphere(kind, 16)
     pressed = follow(contact, height, (P, 0.0))
     values = np.array([P, 0.995 * FRICTION * P, 0.0, 0.0, 0.0, 0.0])
     zero = contact.advance(pressed, height, Load(values, energy=np.zeros(2)))

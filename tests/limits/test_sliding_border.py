@@ -14,36 +14,22 @@ from sa_solver.normal import NormalContact
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.reference.torsion import TwistedSphere
 from sa_solver.tangential import FrictionLimitError
-from sa_solver.types import ElasticPair, Grid, Material
+from sa_solver.types import Grid
 from tests.limits.conditions import frictional_error
-
-FRICTION, P, RADIUS = 0.4, 100.0, 10.0
-SOLVED = 1e-8
-ALIKE = Material(70e3, 0.0)
-"""With ν = 0 slip keeps its direction, and Mindlin's solution is exact."""
-PAIRS = {
-    "alike": ElasticPair(ALIKE, ALIKE),
-    "unlike": ElasticPair(Material(np.inf, 0.3), Material(70e3, 0.3)),
-}
-BOTH = pytest.mark.parametrize("kind", PAIRS)
-
-
-def sphere(kind, cells=32):
-    """A contact of about two thirds of the grid, its gap, and the state under P."""
-    pair = PAIRS[kind]
-    radius = (0.75 * P * RADIUS / pair.contact_modulus) ** (1 / 3)
-    grid = Grid.covering((3.0 * radius, 3.0 * radius), (cells, cells))
-    height = (grid.x**2 + grid.y**2) / (2.0 * RADIUS)
-    contact = FrictionalContact(HalfSpace(grid, pair), FRICTION, SOLVED)
-    return contact, height, contact.advance(contact.apart(height), height, load())
+from tests.limits.scenes import ALIKE, BOTH, FRICTION, PAIRS, RADIUS, SOLVED, P, sphere
 
 
 def cylinder(kind, cells=128):
+    """A line contact that takes two thirds of its grid under P, and its gap."""
     pair = PAIRS[kind]
     half = np.sqrt(4.0 * P * RADIUS / (np.pi * pair.contact_modulus))
     grid = Grid.strips(3.0 * half, cells)
-    height = grid.x**2 / (2.0 * RADIUS)
-    contact = FrictionalContact(HalfSpace(grid, pair), FRICTION, SOLVED)
+    return FrictionalContact(HalfSpace(grid, pair), FRICTION, SOLVED), grid.x**2 / (2.0 * RADIUS)
+
+
+def pressed_on(scene, kind, *cells):
+    """The contact of a scene, its gap, and the state under P."""
+    contact, height = scene(kind, *cells)
     return contact, height, contact.advance(contact.apart(height), height, load())
 
 
@@ -57,7 +43,7 @@ def load(Qx=0.0, Mz=0.0, energy=None):
 @BOTH
 @pytest.mark.parametrize("build", [sphere, cylinder])
 def test_below_the_friction_of_the_load_the_contact_holds(build, kind):
-    contact, height, pressed = build(kind)
+    contact, height, pressed = pressed_on(build, kind)
     given = load(Qx=0.999 * FRICTION * P)
     state = contact.advance(pressed, height, given)
     assert state.converged
@@ -69,7 +55,7 @@ def test_below_the_friction_of_the_load_the_contact_holds(build, kind):
 @BOTH
 @pytest.mark.parametrize("build", [sphere, cylinder])
 def test_above_it_the_load_is_refused_with_the_largest(build, kind):
-    contact, height, pressed = build(kind)
+    contact, height, pressed = pressed_on(build, kind)
     with pytest.raises(FrictionLimitError, match=r"cannot carry .*lower the force") as info:
         contact.advance(pressed, height, load(Qx=1.001 * FRICTION * P))
     assert info.value.share == pytest.approx(1.0 / 1.001, rel=1e-7)
@@ -80,7 +66,7 @@ def test_the_stick_zone_closes_as_in_mindlins_solution():
 
     At Q = µP itself every cell is at its limit and the displacement is the last finite one.
     """
-    contact, height, pressed = sphere("alike", 64)
+    contact, height, pressed = pressed_on(sphere, "alike", 64)
     exact = ShearedSphere(P, RADIUS, ALIKE, ALIKE, FRICTION)
     shifts = []
     for share in (0.9, 0.999, 1.0):
@@ -97,7 +83,7 @@ def test_the_stick_zone_closes_as_in_mindlins_solution():
 
 
 def test_unlike_bodies_at_the_friction_of_the_load_solve_it_or_say_why():
-    contact, height, pressed = sphere("unlike", 16)
+    contact, height, pressed = pressed_on(sphere, "unlike", 16)
     given = load(Qx=(1.0 - 1e-9) * FRICTION * P)
     state = contact.advance(pressed, height, given)
     if state.converged:
@@ -111,7 +97,7 @@ def test_unlike_bodies_at_the_friction_of_the_load_solve_it_or_say_why():
 @pytest.mark.parametrize("share", [0.98, 1.001])
 def test_with_its_energy_known_it_slides_past_the_border(kind, share):
     """Inside, the force counts and not the energy; from 0.99 on it slides by the energy."""
-    contact, height, pressed = sphere(kind)
+    contact, height, pressed = pressed_on(sphere, kind)
     energy = np.array([0.5, 0.0])
     given = load(Qx=share * FRICTION * P, energy=energy)
     state = contact.advance(pressed, height, given)
@@ -154,7 +140,7 @@ def grid_limit(contact, height):
 
 def test_the_limit_of_the_moment_is_that_of_hertz():
     """3πµPa/16, to 1e-3 at 21 cells across the radius (midpoint rule of √ at the edge)."""
-    contact, height, _ = sphere("alike", 64)
+    contact, height, _ = pressed_on(sphere, "alike", 64)
     exact = TwistedSphere(P, RADIUS, ALIKE, ALIKE, FRICTION)
     assert grid_limit(contact, height) == pytest.approx(exact.sliding_moment, rel=1e-3)
 
@@ -164,7 +150,7 @@ def test_below_the_largest_moment_the_twist_is_lubkins():
 
     Single cells at the kink of the stick radius are off by 4 %; with twice the cells all is half.
     """
-    contact, height, pressed = sphere("alike", 64)
+    contact, height, pressed = pressed_on(sphere, "alike", 64)
     exact = TwistedSphere(P, RADIUS, ALIKE, ALIKE, FRICTION)
     moment = 0.99 * exact.sliding_moment
     given = load(Mz=moment)
@@ -186,7 +172,7 @@ def test_below_the_largest_moment_the_twist_is_lubkins():
 @pytest.mark.parametrize("distance", [1e-2, 1e-4])
 def test_the_border_of_the_moment_is_sharp(distance):
     """On a centred contact the cells' own limit is exact: the slip velocity is a rotation."""
-    contact, height, pressed = sphere("alike")
+    contact, height, pressed = pressed_on(sphere, "alike")
     limit = grid_limit(contact, height)
     inside = contact.advance(pressed, height, load(Mz=(1.0 - distance) * limit))
     assert inside.converged
@@ -199,7 +185,7 @@ def test_the_border_of_the_moment_is_sharp(distance):
 def test_unlike_bodies_share_that_border():
     """A pressure that depends on shear is known when it has been found: then the moment is refused,
     but not within 0.1 % of the border."""
-    contact, height, pressed = sphere("unlike")
+    contact, height, pressed = pressed_on(sphere, "unlike")
     limit = grid_limit(contact, height)
     given = load(Mz=0.999 * limit)
     inside = contact.advance(pressed, height, given)
@@ -214,7 +200,7 @@ def test_unlike_bodies_share_that_border():
 @BOTH
 def test_a_moment_uses_up_what_the_force_may_be(kind):
     """Half the moment and all of the force are too much, half of both is not."""
-    contact, height, pressed = sphere(kind)
+    contact, height, pressed = pressed_on(sphere, kind)
     limit = grid_limit(contact, height)
     given = load(Qx=0.5 * FRICTION * P, Mz=0.5 * limit)
     state = contact.advance(pressed, height, given)
@@ -230,7 +216,7 @@ def test_a_moment_uses_up_what_the_force_may_be(kind):
 @BOTH
 @pytest.mark.parametrize("shear", [{"Qx": 1.0}, {"Mz": 1.0}])
 def test_bodies_apart_carry_neither(kind, shear):
-    contact, height, pressed = sphere(kind, 12)
+    contact, height, pressed = pressed_on(sphere, kind, 12)
     values = load(**shear).values
     values[0] = 0.0
     with pytest.raises(FrictionLimitError, match=r"no cell is in contact|µP = 0 N"):

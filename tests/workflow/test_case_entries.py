@@ -115,6 +115,39 @@ GIVEN |= {
     | {"structure": GIVEN[kind]["structure"] | {"flat": flat}}
     for kind, flat in FLATS.items()
 }
+# Cases in time: other joints, factors of their parameters, and other excitations.
+JOINT = {"normal_load": 60, "friction": 0.1, "stiffness": 1e4}
+JOINTS = {
+    law: {"law": law, **JOINT}
+    for law in ("jenkins", "uniform_iwan", "four_parameter_iwan", "friction_contact")
+}
+TOLD = [{"quantity": "a.b", "value": "3 um", "source": "a test"}]
+JOINTS["four_parameter_iwan"] |= {"chi": -0.5, "beta": 1.0}
+FACTORS = {
+    "logarithmic": {"kind": "logarithmic", "change": 0.1, "rate": 1},
+    "arrhenius": {"kind": "arrhenius", "change": 0.1, "scale": 1},
+    "linear": {"kind": "linear", "slope": 0},
+    "exponential": {"kind": "exponential", "final": 1, "rate": 1},
+    "table": {"kind": "table", "energy": [0, 1000], "factor": [1, 1]},
+}
+EVOLUTION = {
+    f"evolution.{name}": FACTORS
+    for name in ("friction", "stiffness", "residual_stiffness", "normal_load")
+}
+GIVEN["joint"] = {"joint": JOINTS, **EVOLUTION, "reported": {ALWAYS: TOLD}}
+GIVEN["rig"] = GIVEN["joint"] | {
+    "ageing": {ALWAYS: {"cycles": 1000}},
+    "excitation": {
+        "hammer": {
+            "kind": "hammer",
+            "force": 1,
+            "duration": 1e-3,
+            "record": 1,
+            "band": [1, 500],
+        },
+        "recorded": {"kind": "recorded", "file": "force.csv"},
+    },
+}
 # A CAD file in the place of the template's mesh; gmsh writes no names into it.
 CAD = [
     "structure.file=joint.step",
@@ -210,6 +243,8 @@ def folders(tmp_path_factory, template_files) -> dict[str, Folder]:
         shutil.copytree(template_files, made[kind], dirs_exist_ok=True)
         np.save(made[kind] / "gap.npy", np.zeros(CELLS.get(kind, (0, 0))))
         (made[kind] / "history.csv").write_text("P,Qx\n1,0\n1,0.1\n", encoding="utf-8")
+        (made[kind] / "force.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
+        (made[kind] / "loops.csv").write_text("energy,P,kt,mu\n0,1,1,1\n", encoding="utf-8")
     return made
 
 
@@ -303,6 +338,8 @@ def stated(leaf):
             return ["wear.law=energy_amplitude", plain]
         case "wear.energy":
             return ["wear.cycles=", plain]
+        case "ageing.energy":
+            return ["ageing.cycles=", plain]
         case "load_path.file":
             return [f"load_path={{file: {example}}}"]
         case "structure.size" if leaf.kind == "mesh":

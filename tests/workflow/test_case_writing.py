@@ -110,6 +110,8 @@ def uncommented(text, *sections):
         ("line_wear", ["stop"], {"wear.stop.volume": 10.0, "contact.grid.1": 1}),
         ("bodies", [], {}),
         ("line", [], {}),
+        ("joint", ["reported"], {"reported.0.value": 0.9}),
+        ("rig", ["reported"], {"excitation.force": 75.0}),
     ],
 )
 def test_template_works_without_its_comment_signs(kind, sections, values, template_files):

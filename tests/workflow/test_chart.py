@@ -288,9 +288,11 @@ def test_depths_in_the_plane_are_not_compared_with_those_in_space():
 # --- axes ---------------------------------------------------------------------------------------
 
 CASES = sorted((Path(__file__).parents[2] / "cases").glob("*.yaml"))
+# Of a joint alone nothing can be charted: its test is as good as it is asked to be.
+CHARTED = [path for path in CASES if load_case(path).structure.kind != "joint"]
 
 
-@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", CHARTED, ids=lambda path: path.stem)
 def test_every_rung_of_every_case_is_another_case_and_finer(path: Path):
     own = dump_case(load_case(path))
     for axis, settings in axes_of(path, (), ()).items():

@@ -18,6 +18,7 @@ from click.testing import CliRunner, Result
 
 import workflow.chart.run
 from sa_solver.reference.hertz import Sphere
+from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
 from workflow.case import DovetailCase
 from workflow.chart import axes, chart_case
 from workflow.chart.ladder import Ladder
@@ -28,16 +29,7 @@ from workflow.run import run_case
 from workflow.runs import Finished, Job
 
 HERTZ = Sphere(load=400.0, radius=10.0, contact_modulus=0.5 * 115e3 / (1.0 - 0.29**2))
-SPHERE = f"""\
-title: Sphere pressed on a flat
-analysis: contact
-structure: {{kind: bodies, shape: sphere, radius: 10 mm}}
-materials:
-  body_1: {{young: 115 GPa, poisson: 0.29}}
-  body_2: {{young: 115 GPa, poisson: 0.29}}
-friction: {{coefficient: 0.7}}
-load_path: {{legs: [{{P: 400 N}}]}}
-contact: {{grid: [32, 32], size: [1 mm, 1 mm]}}
+HERTZ_EXPECTED = f"""\
 expect:
   - quantity: states.-1.approach
     value: {HERTZ.approach!r}
@@ -50,25 +42,6 @@ expect:
     source: Hertz
     exact: true
 """
-LINE = """\
-title: Line contact that wears
-analysis: wear
-structure:
-  {kind: resultants, dimension: 2, file: loads.csv, size: [1.6 mm],
-   gap: {shape: paraboloid, radius_x: 10 mm}}
-materials:
-  body_1: {young: 115 GPa, poisson: 0.29, density: 4430 kg/m^3}
-  body_2: {young: 115 GPa, poisson: 0.29, density: 4430 kg/m^3}
-friction: {coefficient: 0.4}
-contact: {grid: [32, 8]}
-wear:
-  law: energy
-  body_1: {coefficient: 1e4 um^3/J}
-  body_2: {coefficient: 1e4 um^3/J}
-  cycles: 1e5
-  step: {kind: implicit, cycles: 1e4}
-"""
-LOADS = "P, Qx, My, Edx\n400, 150, 0, 0.3\n400, -150, 0, 3\n400, 150, 0, 3\n"
 PATIENCE = 120.0  # seconds that a chart of the sphere may take on a busy machine
 
 RunJobs = Callable[..., list[Finished]]
@@ -77,7 +50,8 @@ RunJobs = Callable[..., list[Finished]]
 @pytest.fixture
 def ball(tmp_path: Path) -> Path:
     path = tmp_path / "sphere.yaml"
-    path.write_text(SPHERE, encoding="utf-8")
+    pressed = BALL.replace("    - {Qx: 210 N, increments: 4}\n", "").replace("[16, 16]", "[32, 32]")
+    path.write_text(pressed + HERTZ_EXPECTED, encoding="utf-8")
     return path
 
 
@@ -318,8 +292,8 @@ def test_quantities_can_be_picked(
 @pytest.mark.slow
 def test_steppers_of_a_line_contact(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """Implicit steps are of first order, those of second order better at the same length."""
-    (tmp_path / "line.yaml").write_text(LINE, encoding="utf-8")
-    (tmp_path / "loads.csv").write_text(LOADS, encoding="utf-8")
+    (tmp_path / "line.yaml").write_text(ROLLER_WEAR, encoding="utf-8")
+    (tmp_path / "loads.csv").write_text(ROLLER_LOADS, encoding="utf-8")
     monkeypatch.setattr(axes, "JUMPS", (10, 20, 40))
     monkeypatch.setattr(axes, "ERRORS", ())
     monkeypatch.setattr(axes, "EXPLICIT", ())

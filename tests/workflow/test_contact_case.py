@@ -7,93 +7,72 @@ import numpy as np
 import pytest
 
 from sa_solver.types import Material
+from tests.workflow.scenes import BALL
 from workflow.bodies import bulk_strain, grid_of, height_of
 from workflow.case import CaseError, ContactCase, LineContactCase, dump_case, parse_case
 from workflow.case.input_files import InputFileError, read_heights
 from workflow.case.load_table import FORCES, LoadTable
 
-AREA = """\
-title: Ball
-analysis: contact
-structure: {kind: bodies, shape: sphere, radius: 10 mm}
-materials:
-  body_1: {young: 115 GPa, poisson: 0.29}
-  body_2: {young: 115 GPa, poisson: 0.29}
-friction: {coefficient: 0.7}
-load_path:
-  legs:
-    - {P: 400 N}
-    - {Qx: 210 N, increments: 4}
-contact: {grid: [16, 16], size: [1 mm, 1 mm]}
-"""
-LINE = """\
-title: Roller
-analysis: contact
-structure: {kind: bodies, shape: cylinder, radius: 10 mm}
-materials:
-  body_1: {young: 115 GPa, poisson: 0.29}
-  body_2: {young: 115 GPa, poisson: 0.29}
-friction: {coefficient: 0.7}
-load_path:
-  legs:
-    - {P: 400 N/mm}
-    - {Qx: 210 N/mm, bulk_stress_2: 100 MPa, increments: 4}
-contact: {grid: 64, size: 2 mm}
-"""
+ROLLER = (
+    BALL.replace("shape: sphere", "shape: cylinder")
+    .replace("400 N", "400 N/mm")
+    .replace("210 N", "210 N/mm, bulk_stress_2: 100 MPa")
+    .replace("grid: [16, 16], size: [1 mm, 1 mm]", "grid: 64, size: 2 mm")
+)
 RIGID_2 = "  body_2: {young: 115 GPa, poisson: 0.29}", "  body_2: rigid"
 
 # Name, base, text to replace, its replacement, key in the message, words in it.
 WRONG = [
-    ("unknown analysis", AREA, "analysis: contact", "analysis: touch", "analysis", "wear, contact"),
-    ("structure of another analysis", AREA, "kind: bodies", "kind: dovetail", "structure.kind",
+    ("unknown analysis", BALL, "analysis: contact", "analysis: touch", "analysis", "wear, contact"),
+    ("structure of another analysis", BALL, "kind: bodies", "kind: dovetail", "structure.kind",
      "allowed: bodies"),
-    ("no structure", AREA, "structure: {kind: bodies, shape: sphere, radius: 10 mm}\n", "",
+    ("no structure", BALL, "structure: {kind: bodies, shape: sphere, radius: 10 mm}\n", "",
      "structure.kind", "missing; allowed: bodies"),
-    ("no shape", AREA, "shape: sphere, ", "", "structure.shape", "missing; allowed: sphere, "),
-    ("unknown shape", AREA, "sphere", "torus", "structure.shape", "flat_rounded, heights"),
-    ("entry of another shape", AREA, "sphere", "ellipsoid", "structure.radius",
+    ("no shape", BALL, "shape: sphere, ", "", "structure.shape", "missing; allowed: sphere, "),
+    ("unknown shape", BALL, "sphere", "torus", "structure.shape", "flat_rounded, heights"),
+    ("entry of another shape", BALL, "sphere", "ellipsoid", "structure.radius",
      "did you mean 'radius_"),
-    ("unknown key", AREA, "radius:", "radios:", "structure.radios", "'radius'"),
-    ("unknown key of a leg", AREA, "Qx: 210 N", "Fx: 210 N", "load_path.legs.1.Fx", "unknown key"),
-    ("unknown key of a body", AREA, "{young: 115 GPa,", "{yuong: 115 GPa,",
+    ("unknown key", BALL, "radius:", "radios:", "structure.radios", "'radius'"),
+    ("unknown key of a leg", BALL, "Qx: 210 N", "Fx: 210 N", "load_path.legs.1.Fx", "unknown key"),
+    ("unknown key of a body", BALL, "{young: 115 GPa,", "{yuong: 115 GPa,",
      "materials.body_1.yuong", "'young'"),
-    ("unknown body", AREA, *RIGID_2[:1], "  body_2: steel", "materials.body_2", "'rigid'"),
-    ("number for a body", AREA, *RIGID_2[:1], "  body_2: 3", "materials.body_2", "section"),
-    ("both rigid", AREA.replace(*RIGID_2), "body_1: {young: 115 GPa, poisson: 0.29}",
+    ("unknown body", BALL, *RIGID_2[:1], "  body_2: steel", "materials.body_2", "'rigid'"),
+    ("number for a body", BALL, *RIGID_2[:1], "  body_2: 3", "materials.body_2", "section"),
+    ("both rigid", BALL.replace(*RIGID_2), "body_1: {young: 115 GPa, poisson: 0.29}",
      "body_1: rigid", "materials.body_2", "both bodies are rigid"),
-    ("bulk stress in a rigid body", LINE, *RIGID_2, "materials.body_2", "bulk_stress_2"),
-    ("P per length on an area", AREA, "400 N", "400 N/mm", "load_path.legs.0.P",
+    ("bulk stress in a rigid body", ROLLER, *RIGID_2, "materials.body_2", "bulk_stress_2"),
+    ("P per length on an area", BALL, "400 N", "400 N/mm", "load_path.legs.0.P",
      "cannot be converted to N;"),
-    ("P in all on a line", LINE, "400 N/mm", "400 N", "load_path.legs.0.P",
+    ("P in all on a line", ROLLER, "400 N/mm", "400 N", "load_path.legs.0.P",
      "cannot be converted to N/mm"),
-    ("Mz on a line", LINE, "Qx: 210 N/mm", "Mz: 1 N", "load_path.legs.1.Mz", "unknown key"),
-    ("pulling", AREA, "P: 400 N", "P: -400 N", "load_path.legs.0.P", "0 to 1e6 kN"),
-    ("P and approach in one leg", AREA, "P: 400 N", "P: 400 N, approach: 1 um",
+    ("Mz on a line", ROLLER, "Qx: 210 N/mm", "Mz: 1 N", "load_path.legs.1.Mz", "unknown key"),
+    ("pulling", BALL, "P: 400 N", "P: -400 N", "load_path.legs.0.P", "0 to 1e6 kN"),
+    ("P and approach in one leg", BALL, "P: 400 N", "P: 400 N, approach: 1 um",
      "load_path.legs.0.approach", "beside P"),
-    ("force and motion in two legs", AREA, "- {P: 400 N}", "- {P: 400 N, shift_x: 1 um}",
+    ("force and motion in two legs", BALL, "- {P: 400 N}", "- {P: 400 N, shift_x: 1 um}",
      "load_path.legs.0.shift_x", "beside Qx"),
-    ("neither P nor approach", AREA, "P: 400 N", "Qy: 1 N", "load_path.legs",
+    ("neither P nor approach", BALL, "P: 400 N", "Qy: 1 N", "load_path.legs",
      "neither P nor approach"),
-    ("no legs", AREA, AREA[AREA.index("\n  legs:"):AREA.index("\ncontact")], " {legs: []}",
+    ("no legs", BALL, BALL[BALL.index("\n  legs:"):BALL.index("\ncontact")], " {legs: []}",
      "load_path.legs", "neither given"),
-    ("legs that are no list", AREA, AREA[AREA.index("\n    - {P"):AREA.index("\ncontact")], " 3",
+    ("legs that are no list", BALL, BALL[BALL.index("\n    - {P"):BALL.index("\ncontact")], " 3",
      "load_path.legs", "not a list"),
-    ("no increments", AREA, "increments: 4", "increments: 0", "load_path.legs.1.increments",
+    ("no increments", BALL, "increments: 4", "increments: 0", "load_path.legs.1.increments",
      "from 1"),
-    ("one size on an area", AREA, "size: [1 mm, 1 mm]", "size: 1 mm", "contact.size", "not a list"),
-    ("two sizes on a line", LINE, "size: 2 mm", "size: [2 mm, 2 mm]", "contact.size",
+    ("one size on an area", BALL, "size: [1 mm, 1 mm]", "size: 1 mm", "contact.size", "not a list"),
+    ("two sizes on a line", ROLLER, "size: 2 mm", "size: [2 mm, 2 mm]", "contact.size",
      "not a number"),
-    ("datum in the grid", LINE, "size: 2 mm", "size: 2 mm, datum: 1 mm", "contact.datum",
+    ("datum in the grid", ROLLER, "size: 2 mm", "size: 2 mm, datum: 1 mm", "contact.datum",
      "at least the size, 2 mm"),
-    ("datum of an area", AREA, "size:", "datum: 50 mm, size:", "contact.datum", "unknown key"),
-    ("unknown history", AREA, "grid:", "history: half, grid:", "contact.history", "'reversals'"),
-    ("path that is not there", AREA, AREA[AREA.index("\n  legs:"):AREA.index("\ncontact")],
+    ("datum of an area", BALL, "size:", "datum: 50 mm, size:", "contact.datum", "unknown key"),
+    ("unknown history", BALL, "grid:", "history: half, grid:", "contact.history", "'reversals'"),
+    ("path that is not there", BALL, BALL[BALL.index("\n  legs:"):BALL.index("\ncontact")],
      " {file: none.csv}", "load_path.file", "no such file"),
-    ("heights that are not there", AREA, "shape: sphere, radius: 10 mm",
+    ("heights that are not there", BALL, "shape: sphere, radius: 10 mm",
      "shape: heights, file: none.npy", "structure.file", "no such file"),
-    ("heights of another kind", AREA, "shape: sphere, radius: 10 mm",
+    ("heights of another kind", BALL, "shape: sphere, radius: 10 mm",
      "shape: heights, file: none.tif", "structure.file", ".npy, .csv, .h5"),
-    ("wear in a contact case", AREA, "contact:", "wear: {law: energy}\ncontact:", "wear",
+    ("wear in a contact case", BALL, "contact:", "wear: {law: energy}\ncontact:", "wear",
      "unknown key"),
 ]  # fmt: skip
 
@@ -127,14 +106,14 @@ def test_wrong_entry_is_told_in_one_line(base, old, new, key, words):
 
 
 def test_bases_are_cases_that_read_back_equal():
-    for text, kind in ((AREA, ContactCase), (LINE, LineContactCase)):
+    for text, kind in ((BALL, ContactCase), (ROLLER, LineContactCase)):
         case = parse_case(text, "case.yaml")
         assert isinstance(case, kind)
         assert parse_case(dump_case(case), "dump") == case
 
 
 def test_rigid_body_is_written_as_a_word():
-    case = parse_case(AREA.replace(*RIGID_2), "case.yaml")
+    case = parse_case(BALL.replace(*RIGID_2), "case.yaml")
     assert "body_2: rigid " in dump_case(case)
     assert parse_case(dump_case(case), "dump") == case
 
@@ -143,7 +122,7 @@ def test_rigid_body_is_written_as_a_word():
 
 
 def test_legs_are_passed_at_equal_steps_and_keep_what_they_do_not_name():
-    text = AREA.replace(
+    text = BALL.replace(
         "    - {P: 400 N}\n", "    - {P: 400 N, increments: 2}\n    - {shift_y: 1 um}\n"
     )
     table = parse_case(text, "case.yaml").load_path.table()
@@ -157,7 +136,7 @@ def test_legs_are_passed_at_equal_steps_and_keep_what_they_do_not_name():
 def test_returning_legs_return_exactly():
     """The loop is found by equal loads: 0.1 + 0.2 must not come in between."""
     legs = "".join(f"    - {{Qx: {q}, increments: 7}}\n" for q in (0.3, -0.1, 0.3))
-    text = AREA.replace("    - {Qx: 210 N, increments: 4}\n", legs)
+    text = BALL.replace("    - {Qx: 210 N, increments: 4}\n", legs)
     force = parse_case(text, "case.yaml").load_path.table()["Qx"]
     assert force[7] == force[21] == 0.3
 
@@ -180,8 +159,8 @@ def with_file(base):
 def test_file_and_legs_are_the_same_path(tmp_path):
     rows = "".join(f"400,{q}\n" for q in (0, 52.5, 105, 157.5, 210))
     (tmp_path / "history.csv").write_text(f"P, Qx\n{rows}", encoding="utf-8")
-    by_file = parse_case(with_file(AREA), str(tmp_path / "case.yaml"))
-    by_legs = parse_case(AREA, "case.yaml")
+    by_file = parse_case(with_file(BALL), str(tmp_path / "case.yaml"))
+    by_legs = parse_case(BALL, "case.yaml")
     np.testing.assert_array_equal(
         by_file.load_path.table().imposed, by_legs.load_path.table().imposed
     )
@@ -212,7 +191,7 @@ def test_file_and_legs_are_the_same_path(tmp_path):
 def test_wrong_path_file_is_told_with_both_lines(tmp_path, content, line, words):
     file = tmp_path / "history.csv"
     file.write_text(content, encoding="utf-8")
-    told = refusal(with_file(AREA), tmp_path / "case.yaml")
+    told = refusal(with_file(BALL), tmp_path / "case.yaml")
     assert told.startswith(f"{tmp_path / 'case.yaml'}:8: load_path.file: {file}:{line}: "), told
     assert words in told
 
@@ -223,14 +202,14 @@ def test_wrong_path_file_is_told_with_both_lines(tmp_path, content, line, words)
 )
 def test_columns_of_a_path_file_must_agree(tmp_path, content, words):
     (tmp_path / "history.csv").write_text(content, encoding="utf-8")
-    told = refusal(with_file(AREA), tmp_path / "case.yaml")
+    told = refusal(with_file(BALL), tmp_path / "case.yaml")
     assert f"{tmp_path / 'case.yaml'}:8: load_path.file: " in told
     assert words in told
 
 
 def test_path_file_of_a_line_has_no_moment_about_x(tmp_path):
     (tmp_path / "history.csv").write_text("P,Mx\n1,0\n", encoding="utf-8")
-    assert "'Mx': unknown column" in refusal(with_file(LINE), tmp_path / "case.yaml")
+    assert "'Mx': unknown column" in refusal(with_file(ROLLER), tmp_path / "case.yaml")
 
 
 # --- shapes -------------------------------------------------------------------------------------
@@ -243,15 +222,15 @@ def gap(text, **changes):
 
 
 def test_gaps_of_the_shapes():
-    height, (x, y) = gap(AREA)
+    height, (x, y) = gap(BALL)
     np.testing.assert_allclose(height, (x**2 + y**2) / 20.0)
     sphere = "shape: sphere, radius: 10 mm"
-    height, (x, y) = gap(AREA.replace(sphere, "shape: ellipsoid, radius_x: 5 mm, radius_y: 20 mm"))
+    height, (x, y) = gap(BALL.replace(sphere, "shape: ellipsoid, radius_x: 5 mm, radius_y: 20 mm"))
     np.testing.assert_allclose(height, x**2 / 10.0 + y**2 / 40.0)
-    height, (x, y) = gap(LINE)
+    height, (x, y) = gap(ROLLER)
     np.testing.assert_allclose(height, x**2 / 20.0)
     flat = "shape: flat_rounded, half_width: 0.5 mm, edge_radius: 3 mm"
-    height, (x, y) = gap(LINE.replace("shape: cylinder, radius: 10 mm", flat))
+    height, (x, y) = gap(ROLLER.replace("shape: cylinder, radius: 10 mm", flat))
     np.testing.assert_allclose(height, np.maximum(abs(x) - 0.5, 0.0) ** 2 / 6.0)
     assert (height == 0.0).sum() == 32
 
@@ -269,7 +248,7 @@ def heights(tmp_path):
 
 @pytest.mark.parametrize("name", ["gap.npy", "gap.csv", "gap.h5:scan/gap"])
 def test_heights_are_read_as_written(tmp_path, heights, name):
-    text = AREA.replace("shape: sphere, radius: 10 mm", f"shape: heights, file: '{name}'")
+    text = BALL.replace("shape: sphere, radius: 10 mm", f"shape: heights, file: '{name}'")
     case = parse_case(text, str(tmp_path / "case.yaml"))
     np.testing.assert_array_equal(height_of(case, grid_of(case)), heights)
     assert parse_case(dump_case(case), "elsewhere/case.yaml") == case
@@ -277,14 +256,14 @@ def test_heights_are_read_as_written(tmp_path, heights, name):
 
 def test_heights_of_one_column_are_a_line_contact(tmp_path):
     np.save(tmp_path / "gap.npy", np.arange(64.0))
-    text = LINE.replace("shape: cylinder, radius: 10 mm", "shape: heights, file: gap.npy")
+    text = ROLLER.replace("shape: cylinder, radius: 10 mm", "shape: heights, file: gap.npy")
     case = parse_case(text, str(tmp_path / "case.yaml"))
     assert isinstance(case, LineContactCase)
     assert height_of(case, grid_of(case)).shape == (64, 1)
 
 
 def test_heights_on_another_grid_are_refused(tmp_path, heights):
-    text = AREA.replace("shape: sphere, radius: 10 mm", "shape: heights, file: gap.npy")
+    text = BALL.replace("shape: sphere, radius: 10 mm", "shape: heights, file: gap.npy")
     told = refusal(text.replace("[16, 16]", "[16, 32]"), tmp_path / "case.yaml")
     assert "contact.grid: 16 x 32 cells: the file of heights has 16 x 16; allowed: [16, 16]" in told
 
@@ -303,7 +282,7 @@ def test_heights_on_another_grid_are_refused(tmp_path, heights):
 )
 def test_wrong_heights_are_told(tmp_path, name, content, words):
     (tmp_path / name.split(":")[0]).write_bytes(content)
-    text = AREA.replace("shape: sphere, radius: 10 mm", f"shape: heights, file: '{name}'")
+    text = BALL.replace("shape: sphere, radius: 10 mm", f"shape: heights, file: '{name}'")
     told = refusal(text, tmp_path / "case.yaml")
     assert words in told
     assert ":3: structure.file: " in told

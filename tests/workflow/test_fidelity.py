@@ -200,6 +200,20 @@ def test_steps_are_automatic_with_their_share_as_tolerance(case, tmp_path):
     assert read_again(chosen, tmp_path) == chosen
 
 
+@pytest.mark.slow
+def test_steps_leave_no_more_than_their_tolerance(plane_path, tmp_path):
+    """Of depth and volume, over a long run of flanks that carry differently."""
+    uneven = "load_path.aerodynamic_moment=3e4", "friction.coefficient=0.25"
+    long = "wear.cycles=1e6", "coupling.resultants=constant"
+    case = load_case(plane_path, [*COARSE, *QUIET, *uneven, *long])
+    fine = changed(case, {"wear.step": Step(kind="second_order", cycles=2e4)})
+    limit = worn(summary_of(fine, tmp_path / "fine"))
+    for tolerance in (0.1, 0.01, 0.001):
+        steps = axes.choose_steps(case, tolerance)
+        own = worn(summary_of(changed(case, steps.chosen), tmp_path / f"{tolerance}"))
+        assert np.max(np.abs(own / limit - 1.0)) <= steps.error == tolerance
+
+
 @pytest.mark.parametrize("tolerance", [1e-3, 2e-4])
 def test_tolerance_leaves_half_of_itself(case, tolerance):
     """Of depth and volume, on a case where flanks carry differently."""

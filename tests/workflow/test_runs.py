@@ -13,55 +13,16 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
 from workflow import runs_job
 from workflow.case import load_case
 from workflow.errors import UserError
 from workflow.folder import OutputFolder
 from workflow.runs import Job, kept_in, run_jobs
 
-CONTACT = """\
-title: Sphere
-analysis: contact
-structure: {kind: bodies, shape: sphere, radius: 10 mm}
-materials:
-  body_1: {young: 115 GPa, poisson: 0.29}
-  body_2: {young: 115 GPa, poisson: 0.29}
-friction: {coefficient: 0.7}
-load_path: {legs: [{P: 400 N}, {Qx: 210 N, increments: 3}]}
-contact: {grid: [16, 16], size: [1 mm, 1 mm], history: full}
-output: {paraview: false, figures: false}
-"""
-LOADS = """\
-P [kN/m], Qx [kN/m], My [N], Edx [mJ/mm]
-200, 80, 40, 0.3
-1000, 400, 100, 3
-1000, -400, 100, 8
-"""
-WEAR = """\
-title: Strip under loads of a table
-analysis: wear
-structure:
-  kind: resultants
-  file: loads.csv
-  dimension: 2
-  size: [10 mm]
-  gap: {shape: rounded, edge_width: 1 mm, edge_radius: 30 mm}
-materials:
-  body_1: {young: 115 GPa, poisson: 0.29, density: 4430 kg/m^3}
-  body_2: {young: 115 GPa, poisson: 0.29, density: 4430 kg/m^3}
-friction: {coefficient: 0.5}
-contact: {grid: [32, 8]}
-wear:
-  law: energy
-  body_1: {coefficient: 1e4 um^3/J}
-  body_2: {coefficient: 1e4 um^3/J}
-  cycles: 3e4
-  step: {kind: implicit, cycles: 1e4}
-stress: {section: none, life: {parameter: none}}
-output: {paraview: false, figures: false}
-"""
+QUIET = "output: {paraview: false, figures: false}\n"
 # Jumps of some hundredths of a second each, so that a moment among them is easily met.
-MANY = "wear.step.cycles=1000"
+MANY = "wear.step.cycles=3000"
 # Seconds within which everything must have ended.
 PATIENCE = 120.0
 
@@ -71,15 +32,15 @@ posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 @pytest.fixture
 def contact(tmp_path):
     path = tmp_path / "contact.yaml"
-    path.write_text(CONTACT, encoding="utf-8")
+    path.write_text(f"{BALL}{QUIET}", encoding="utf-8")
     return path
 
 
 @pytest.fixture
 def wear(tmp_path):
-    (tmp_path / "loads.csv").write_text(LOADS, encoding="utf-8")
+    (tmp_path / "loads.csv").write_text(ROLLER_LOADS, encoding="utf-8")
     path = tmp_path / "wear.yaml"
-    path.write_text(WEAR, encoding="utf-8")
+    path.write_text(ROLLER_WEAR, encoding="utf-8")
     return path
 
 

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+from tests.workflow.scenes import BALL
 from workflow.case import CaseError
 from workflow.cli import cli
 from workflow.runs import Finished
@@ -22,22 +23,11 @@ from workflow.sweep.schema import load_sweep
 from workflow.sweep.table import Row, columns_of, unit_of, varied_in
 
 CASES = Path(__file__).parents[2] / "cases"
-CONTACT = """\
-title: Sphere
-analysis: contact
-structure: {kind: bodies, shape: sphere, radius: 10 mm}
-materials:
-  body_1: {young: 115 GPa, poisson: 0.29}
-  body_2: {young: 115 GPa, poisson: 0.29}
-friction: {coefficient: 0.7}
-load_path: {legs: [{P: 400 N}, {Qx: 210 N, increments: 2}]}
-contact: {grid: [16, 16], size: [1 mm, 1 mm], history: full}
-"""
 PATIENCE = 120.0
 
 
 def write(folder, text):
-    (folder / "contact.yaml").write_text(CONTACT, encoding="utf-8")
+    (folder / "contact.yaml").write_text(BALL, encoding="utf-8")
     path = folder / "sweep.yaml"
     path.write_text(text, encoding="utf-8")
     return path

@@ -9,6 +9,7 @@ from workflow.case.resultants_case import ResultantsCase
 from workflow.case.schema import Case, json_schema
 from workflow.case.specimens_case import SpecimensCase
 from workflow.case.template import KINDS, template
+from workflow.case.time_case import JointCase, RigCase, TimeCase
 from workflow.case.wear_case import WearCase
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError
@@ -20,11 +21,14 @@ __all__ = [
     "CaseError",
     "ContactCase",
     "DovetailCase",
+    "JointCase",
     "LineBodiesWearCase",
     "LineContactCase",
     "MeshCase",
     "ResultantsCase",
+    "RigCase",
     "SpecimensCase",
+    "TimeCase",
     "WearCase",
     "dump_case",
     "json_schema",

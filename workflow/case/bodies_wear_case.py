@@ -135,12 +135,10 @@ class BodiesWearCase(WearCase):
 
     @model_validator(mode="after")
     def _can_run(self) -> BodiesWearCase:
-        if isinstance(self.structure, Heights):
-            require_shape(self.structure.file, self.contact.grid)
         x, y = self.contact.size
         across, along = abs(cos(self.load_path.direction)), abs(sin(self.load_path.direction))
         room = min(x / across if across > 0.0 else inf, y / along if along > 0.0 else inf)
-        _require_room(self.load_path.stroke, room, self.wear.motion)
+        _require_fit(self, room)
         return self
 
     def outline(self) -> list[tuple[str, str]]:
@@ -162,9 +160,7 @@ class LineBodiesWearCase(WearCase):
 
     @model_validator(mode="after")
     def _can_run(self) -> LineBodiesWearCase:
-        if isinstance(self.structure, Heights):
-            require_shape(self.structure.file, self.contact.grid)
-        _require_room(self.load_path.stroke, self.contact.size, self.wear.motion)
+        _require_fit(self, self.contact.size)
         return self
 
     def outline(self) -> list[tuple[str, str]]:
@@ -172,9 +168,15 @@ class LineBodiesWearCase(WearCase):
         return _outline(self.structure.shape, "line contact", path, f"{path.P:g} N/mm")
 
 
-def _require_room(stroke: float, room: float, motion: str) -> None:
-    """Raise where the grid has no ``room`` [mm] for the stroke that is to be followed on it."""
-    if stroke >= room and motion != "neglect":
+def _require_fit(case: BodiesWearCase | LineBodiesWearCase, room: float) -> None:
+    """Raise unless the grid is that of the heights and has room for the stroke.
+
+    ``room`` is its length along the stroke [mm], which matters where the stroke is to be followed.
+    """
+    if isinstance(case.structure, Heights):
+        require_shape(case.structure.file, case.contact.grid)
+    stroke = case.load_path.stroke
+    if stroke >= room and case.wear.motion != "neglect":
         raise disagreement(
             f"{stroke:g} mm: the grid reaches over {room:g} mm along it; allowed: shorter strokes, "
             "a larger contact.size, or wear.motion: neglect",

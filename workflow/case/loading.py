@@ -23,6 +23,7 @@ from workflow.case.resultants_case import ResultantsCase
 from workflow.case.schema import Case
 from workflow.case.source import KeyPath, Source, dotted, read_text
 from workflow.case.specimens_case import SpecimensCase
+from workflow.case.time_case import JointCase, RigCase
 from workflow.errors import CaseError
 
 
@@ -57,9 +58,16 @@ WEAR_CASES: dict[str, type[Case]] = {
 }
 
 
+# Cases in time by what holds the joint.
+TIME_CASES: dict[str, type[Case]] = {"joint": JointCase, "rig": RigCase}
+
+
 def _kind_of_case(source: Source) -> type[Case]:
     """The kind that the source means by its analysis and structure, whatever else is wrong."""
-    if _choice(source, ("analysis",), ("wear", "contact")) == "wear":
+    analysis = _choice(source, ("analysis",), ("wear", "contact", "time"))
+    if analysis == "time":
+        return TIME_CASES[_choice(source, ("structure", "kind"), tuple(TIME_CASES))]
+    if analysis == "wear":
         kind = _choice(source, ("structure", "kind"), (*WEAR_CASES, "bodies"))
         if kind != "bodies":
             return WEAR_CASES[kind]

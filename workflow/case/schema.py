@@ -12,6 +12,7 @@ from workflow.case.dovetail_case import DovetailCase
 from workflow.case.mesh_case import MeshCase
 from workflow.case.resultants_case import ResultantsCase
 from workflow.case.specimens_case import SpecimensCase
+from workflow.case.time_case import JointCase, RigCase
 
 Case = (
     DovetailCase
@@ -22,6 +23,8 @@ Case = (
     | LineBodiesWearCase
     | ContactCase
     | LineContactCase
+    | JointCase
+    | RigCase
 )
 
 

@@ -88,8 +88,9 @@ class Expectation(Section):
 # The sections of a case, of whatever kind, in the order in which they are written.
 SCENE_ORDER = (
     *("title", "analysis", "structure", "materials", "friction", "load_path", "mesh"),
+    *("joint", "evolution", "drive", "excitation", "energies", "ageing", "integration"),
     *("nonlinearity", "reduction", "contact", "wear", "coupling", "accuracy", "fidelity"),
-    *("loops", "stress", "output", "assumed", "expect"),
+    *("loops", "stress", "output", "assumed", "reported", "expect"),
 )
 
 

@@ -14,6 +14,7 @@ from workflow.case.mesh_case import MeshCase
 from workflow.case.resultants_case import ResultantsCase
 from workflow.case.sections import Section, entries_of, sections_of
 from workflow.case.specimens_case import SpecimensCase
+from workflow.case.time_case import JointCase, RigCase, SteadyAgeing
 from workflow.case.wear_sections import Step
 from workflow.case.writing import Row, render
 
@@ -27,6 +28,8 @@ KINDS: dict[str, type[Section]] = {
     "line_wear": LineBodiesWearCase,
     "bodies": ContactCase,
     "line": LineContactCase,
+    "joint": JointCase,
+    "rig": RigCase,
 }
 
 HEADER = """\
@@ -36,8 +39,9 @@ HEADER = """\
 # Optional entries the template fills in: a material that can yield, the length of a run, legs that
 # press, and a face that is rounded all round.
 FILLED_IN = ("yield_stress", "cycles", "legs", "P", "gap", "end_width", "end_radius")
-# And sections in which it does not: wear steps have the length that their error allows.
-NOT_FILLED_IN = (Step,)
+# And sections in which it does not: wear steps have the length that their error allows, and a rig
+# that is shaken need not age.
+NOT_FILLED_IN = (Step, SteadyAgeing)
 
 
 def template(kind: str) -> str:

@@ -33,6 +33,8 @@ MESHES_2D = 0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0, 2.0**1.5, 4.0
 JUMPS = 5, 10, 20, 40, 80, 160
 ERRORS = 0.1, 0.03, 0.01, 3e-3, 1e-3
 EXPLICIT = 0.9, 0.45
+# Multiples of a step of time.
+TIME_STEPS = 4.0, 2.0, 1.0, 0.5, 0.25
 # Where a cycle takes seconds: so many rungs of jumps and errors fewer, and the longest explicit.
 COARSER_3D = 2
 
@@ -255,6 +257,19 @@ def _couplings(case: Case) -> Iterator[Rung]:
     yield Rung("every jump", (f"coupling={{resultants: every, drift: {own.drift!r}}}",))
 
 
+# --- time ---------------------------------------------------------------------------------------
+
+
+def _time_steps(case: Case) -> Iterator[Rung]:
+    """Longer and shorter steps; those in which the excitation is not seen are refused."""
+    own = _entry(case, "integration.step")
+    if own is None:
+        return
+    for factor in TIME_STEPS:
+        step = factor * own
+        yield Rung(f"{1e6 * step:.3g} us", (f"integration.step={step!r}",), factor)
+
+
 # --- structure ----------------------------------------------------------------------------------
 
 
@@ -300,4 +315,5 @@ AXES = (
     Axis("history", "increments of the load path", _histories, order=1.0, moves_states=True),
     Axis("mesh", "finite elements of the structure", _meshes, order=2.0),
     Axis("order", "order of the finite elements", _orders),
+    Axis("step", "step of the motion in time", _time_steps, order=2.0),
 )

@@ -11,7 +11,7 @@ from types import ModuleType
 
 import h5py
 
-from workflow.figures import contact, specimens, wear
+from workflow.figures import contact, specimens, time, wear
 from workflow.figures.style import STYLE, save
 
 
@@ -32,6 +32,8 @@ def write_figures(results: Path, folder: Path) -> list[Path]:
 
 def _kind(file: h5py.File) -> ModuleType:
     """The module that draws this kind of results."""
+    if "states" in file:
+        return time
     if "specimens" in file:
         return specimens
     return contact if "history" in file else wear

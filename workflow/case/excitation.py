@@ -1,0 +1,106 @@
+"""What drives a joint, or the rig that holds it."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from workflow.case.fields import File, Quantity, Whole
+from workflow.case.input_files import InputFileError, read_columns
+from workflow.case.sections import Length, Section, disagreement, entry
+
+# Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual rig.
+Frequency = Annotated[float, Quantity("Hz", above=0.0, at_most=1e7)]
+Time = Annotated[float, Quantity("s", above=0.0, at_most=1e5)]
+DrivingForce = Annotated[
+    float, Quantity("N", above=0.0, at_most=1e9, range_text="above 0 to 1e6 kN")
+]
+Change = Annotated[float, Quantity("1", above=0.0, at_most=0.1)]
+MassNumber = Annotated[int, Whole(1, 20)]
+
+# Columns of a recorded excitation.
+RECORDED = {
+    "time": Quantity("s", at_least=0.0, at_most=1e6),
+    "force": Quantity("N", at_least=-1e9, at_most=1e9),
+}
+
+
+class Drive(Section):
+    """A displacement to and fro that is imposed on the joint."""
+
+    stroke: Length = entry("of the joint, peak to peak [mm]", "14 um")
+    frequency: Frequency = entry("of the cycles [Hz]", "100 Hz")
+
+
+class Harmonic(Section):
+    """A force f sin(2π frequency t), until the answer repeats itself."""
+
+    kind: Literal["harmonic"] = entry("harmonic, hammer or recorded", "harmonic")
+    mass: MassNumber = entry("that is driven, counted from the ground", 1, default=1)
+    force: DrivingForce = entry("amplitude [N]", "75 N")
+    frequency: Frequency = entry("of the force [Hz]", "100 Hz")
+    steady: Change = entry(
+        "change of the energy and the stroke from one cycle to the next that counts as none [1]",
+        1e-4,
+        default=1e-4,
+    )
+    periods: Annotated[int, Whole(2, 100_000)] = entry(
+        "after which there is no steady state", 2000, default=2000
+    )
+
+
+class Hammer(Section):
+    """A blow: half a sine of force, and the answer to it."""
+
+    kind: Literal["hammer"] = entry("half a sine of force", "hammer")
+    mass: MassNumber = entry("that is hit, counted from the ground", 1, default=1)
+    force: DrivingForce = entry("largest [N]", "100 N")
+    duration: Time = entry("of the blow [s]", "0.5 ms")
+    record: Time = entry("length of what is recorded [s]", "1 s")
+    band: tuple[Frequency, Frequency] = entry(
+        "about the first mode, for its frequency and damping against amplitude [Hz]",
+        ["20 Hz", "500 Hz"],
+    )
+    highest: Frequency = entry("of the frequency response [Hz]", "3 kHz", default=3000.0)
+
+    @model_validator(mode="after")
+    def _can_be_seen(self) -> Hammer:
+        if self.record <= 2.0 * self.duration:
+            raise disagreement(
+                f"{self.record:g} s: over with the blow; allowed: many times the duration",
+                *("record", "duration"),
+            )
+        low, high = self.band
+        if low >= high:
+            raise disagreement("not ascending; allowed: lower, then upper end", "band")
+        return self
+
+
+class Recorded(Section):
+    """A force from a file."""
+
+    kind: Literal["recorded"] = entry("a force from a file", "recorded")
+    mass: MassNumber = entry("that it acts on, counted from the ground", 1, default=1)
+    file: Annotated[str, File((".csv",))] = entry(
+        "columns time and force, in s and N; linear between rows", "force.csv"
+    )
+
+    @model_validator(mode="after")
+    def _is_a_record(self) -> Recorded:
+        try:
+            columns = read_columns(self.file, RECORDED)
+        except InputFileError as error:
+            raise disagreement(str(error), "file") from error
+        missing = [name for name in RECORDED if name not in columns]
+        if missing:
+            raise disagreement(f"no column {missing[0]}; allowed: {', '.join(RECORDED)}", "file")
+        times = columns["time"]
+        if len(times) < 2 or not (times[1:] > times[:-1]).all():
+            raise disagreement(
+                "times that do not ascend; allowed: two or more, each after the last", "file"
+            )
+        return self
+
+
+Excitation = Annotated[Harmonic | Hammer | Recorded, Field(discriminator="kind")]

@@ -1,0 +1,99 @@
+"""A joint as a case gives it: its law with the parameters that it begins with."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from workflow.case.fields import Quantity
+from workflow.case.sections import Section, entry
+
+# Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual joint.
+JointStiffness = Annotated[
+    float, Quantity("N/mm", above=0.0, at_most=1e12, range_text="above 0 to 1e6 kN/um")
+]
+ResidualStiffness = Annotated[
+    float, Quantity("N/mm", at_least=0.0, at_most=1e12, range_text="0 to 1e6 kN/um")
+]
+Preload = Annotated[float, Quantity("N", at_least=0.0, at_most=1e9, range_text="0 to 1e6 kN")]
+Coefficient = Annotated[float, Quantity("1", at_least=0.0, at_most=10.0)]
+
+
+class Joint(Section):
+    """What all laws have: a friction limit, stiff as long as it sticks."""
+
+    law: str  # named first; each law narrows it to its own name
+    normal_load: Preload = entry("that presses the joint [N]", "60 N")
+    friction: Coefficient = entry("limit of the friction force over the normal load [1]", 0.11)
+    stiffness: JointStiffness = entry("of the stuck joint [N/mm]", "27.3 N/um")
+
+
+class RisingJoint(Joint):
+    """A joint whose force goes on rising when all of it slides."""
+
+    residual_stiffness: ResidualStiffness = entry(
+        "slope when all of it slides [N/mm]", "0.88 N/um", default=0.0
+    )
+
+
+class BoucWenJoint(RisingJoint):
+    """Bouc and Wen's law, normalised: force µN ξ and the residual slope."""
+
+    law: Literal["bouc_wen"] = entry(
+        "bouc_wen, jenkins, uniform_iwan, four_parameter_iwan or friction_contact", "bouc_wen"
+    )
+    stiffness: JointStiffness = entry(
+        "initial slope, the residual one included [N/mm]", "27.3 N/um"
+    )
+    sigma: Annotated[float, Quantity("1", at_least=0.5, at_most=1.0)] = entry(
+        "shape of the unloading branch: straight at first with 0.5 [1]", 0.5, default=0.5
+    )
+    exponent: Annotated[float, Quantity("1", at_least=1.0, at_most=100.0)] = entry(
+        "how sharply sticking turns into sliding [1]", 2, default=2.0
+    )
+
+
+class JenkinsJoint(RisingJoint):
+    """A spring with a slider, and the residual slope beside it."""
+
+    law: Literal["jenkins"] = entry("a spring with a slider", "jenkins")
+    stiffness: JointStiffness = entry(
+        "of the spring; the residual one is added [N/mm]", "27.3 N/um"
+    )
+
+
+class UniformIwanJoint(RisingJoint):
+    """Iwan's sliders, their limits spread evenly from nothing."""
+
+    law: Literal["uniform_iwan"] = entry("sliders with limits spread evenly", "uniform_iwan")
+    stiffness: JointStiffness = entry(
+        "of all sliders stuck; the residual one is added [N/mm]", "115 N/um"
+    )
+
+
+class FourParameterIwanJoint(RisingJoint):
+    """Segalman's Iwan joint: sliders spread by a power law, and a rest that slips at once."""
+
+    law: Literal["four_parameter_iwan"] = entry("Segalman 2005", "four_parameter_iwan")
+    stiffness: JointStiffness = entry(
+        "of all sliders stuck; the residual one is added [N/mm]", "115 N/um"
+    )
+    chi: Annotated[float, Quantity("1", above=-1.0, at_most=10.0)] = entry(
+        "energy of a small cycle goes with the amplitude to the power of chi + 3 [1]", -0.5
+    )
+    beta: Annotated[float, Quantity("1", at_least=0.0, at_most=1e3)] = entry(
+        "stiffness lost at once in full slip over that of the spread sliders [1]", 1.0
+    )
+
+
+class FrictionContactJoint(Joint):
+    """One node of a contact: Coulomb's cone about its normal; in line it is Jenkins's element."""
+
+    law: Literal["friction_contact"] = entry("one node of a contact", "friction_contact")
+
+
+JointLaw = Annotated[
+    BoucWenJoint | JenkinsJoint | UniformIwanJoint | FourParameterIwanJoint | FrictionContactJoint,
+    Field(discriminator="law"),
+]

@@ -1,0 +1,306 @@
+"""Cases in time: a joint that wears while it is driven, alone or in a vibrating rig."""
+
+from __future__ import annotations
+
+import math
+from itertools import pairwise
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from workflow.case.evolution import TotalEnergy
+from workflow.case.excitation import (
+    RECORDED,
+    Drive,
+    Excitation,
+    Hammer,
+    Harmonic,
+    Recorded,
+    Time,
+)
+from workflow.case.fields import Quantity
+from workflow.case.input_files import read_columns
+from workflow.case.joint_evolution import JointEvolution
+from workflow.case.joint_sections import JointLaw
+from workflow.case.sections import (
+    DottedPath,
+    Expectation,
+    Output,
+    Scene,
+    Section,
+    Title,
+    disagreement,
+    entry,
+)
+from workflow.case.wear_sections import Cycles
+
+Mass = Annotated[float, Quantity("t", above=0.0, at_most=1e3, range_text="above 0 to 1e6 kg")]
+Spring = Annotated[float, Quantity("N/mm", at_least=0.0, at_most=1e12, range_text="0 to 1e6 kN/um")]
+DampingRatio = Annotated[float, Quantity("1", at_least=0.0, below=1.0)]
+EndEnergy = Annotated[
+    float,
+    Quantity("N*mm", above=0.0, at_most=1e15, range_text="above 0 and at most 1e12 J"),
+]
+JumpError = Annotated[float, Quantity("1", at_least=1e-10, at_most=0.1)]
+
+
+class SingleJoint(Section):
+    """Nothing but the joint."""
+
+    kind: Literal["joint"] = entry("what the structure is", "joint")
+
+
+class Rig(Section):
+    """Masses in a row on springs from the ground on; the joint holds the last to the ground."""
+
+    kind: Literal["rig"] = entry("what the structure is", "rig")
+    masses: Annotated[tuple[Mass, ...], Field(min_length=1, max_length=20)] = entry(
+        "from the ground on [t]", ["21.2 kg", "1.2 kg"]
+    )
+    springs: Annotated[tuple[Spring, ...], Field(min_length=1, max_length=20)] = entry(
+        "each between its mass and the one before, or the ground [N/mm]",
+        ["1.4 N/um", "273 N/um"],
+    )
+    damping_ratio: DampingRatio = entry("of every mode without the joint [1]", 0.001)
+
+    @model_validator(mode="after")
+    def _a_spring_per_mass(self) -> Rig:
+        if len(self.springs) != len(self.masses):
+            raise disagreement(
+                f"{len(self.springs)} springs for {len(self.masses)} masses; allowed: as many",
+                *("springs", "masses"),
+            )
+        return self
+
+
+class Ageing(Section):
+    """How long the joint is driven: by energy or by cycles."""
+
+    energy: EndEnergy | None = entry("dissipated until the end [N*mm]", "2800 J", default=None)
+    cycles: Cycles | None = entry("until the end [1]", 1.08e6, default=None)
+    tolerance: JumpError = entry("of the cycles, for the jumps in energy [1]", 1e-4, default=1e-4)
+
+    @model_validator(mode="after")
+    def _one_end(self) -> Ageing:
+        if self.energy is not None and self.cycles is not None:
+            raise disagreement("both given; allowed: energy or cycles", "cycles", "energy")
+        return self
+
+    @property
+    def wanted(self) -> bool:
+        """Whether there is any."""
+        return self.energy is not None or self.cycles is not None
+
+
+class SteadyAgeing(Ageing):
+    """How long the joint is driven in steady states: by energy, by cycles, or not at all."""
+
+
+class Integration(Section):
+    """Newmark's method, implicit in the force of the joint."""
+
+    step: Time = entry("of time [s]", "10 us", default=1e-5)
+
+
+class Reported(Section):
+    """A value that the source reports, told beside what the run finds: nothing is asked of it."""
+
+    quantity: DottedPath = entry("path into summary.json", "states.-1.friction")
+    value: Annotated[float, Quantity(None)] = entry("in base units or with any unit", 0.9)
+    source: Title = entry("where the value comes from", "measured")
+
+
+class TimeCase(Scene):
+    """A joint that changes with the energy it dissipates."""
+
+    title: Title = entry("one line", "Bouc-Wen joint at a prescribed stroke")
+    analysis: Literal["time"] = entry("what is computed", "time")
+    structure: Section = entry("what holds the joint")
+    joint: JointLaw = entry("its law, and the parameters that it begins with")
+    evolution: JointEvolution = entry(
+        "of the parameters with dissipated energy; without it none", default=JointEvolution()
+    )
+    energies: tuple[TotalEnergy, ...] = entry(
+        "dissipated so far, ascending, at which the joint is looked at [N*mm]",
+        ["0 J", "2800 J"],
+        default=(0.0,),
+    )
+    output: Output = entry("files beside summary and results", default=Output())
+    assumed: tuple[DottedPath, ...] = entry(
+        "inputs that are ours because the source does not print them",
+        ["joint", "evolution"],
+        default=(),
+    )
+    reported: tuple[Reported, ...] = entry("values to be told beside those computed", default=())
+    expect: tuple[Expectation, ...] = entry("values the run must reproduce", default=())
+
+    @model_validator(mode="after")
+    def _evolves_what_there_is(self) -> TimeCase:
+        for name in ("friction", "stiffness", "residual_stiffness", "normal_load"):
+            if getattr(self.evolution, name) is not None and not hasattr(self.joint, name):
+                raise disagreement(
+                    f"{self.joint.law} has no {name}; allowed: those of the joint",
+                    f"evolution.{name}",
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _energies_ascend(self) -> TimeCase:
+        if not self.energies:
+            raise disagreement("none; allowed: one or more", "energies")
+        if any(after <= before for before, after in pairwise(self.energies)):
+            raise disagreement("not ascending; allowed: each energy above the last", "energies")
+        return self
+
+    @model_validator(mode="after")
+    def _assumed_exist(self) -> TimeCase:
+        self.require_entries(self.assumed)
+        return self
+
+
+class JointCase(TimeCase):
+    """A joint alone, moved to and fro until it is worn."""
+
+    structure: SingleJoint = entry("what holds the joint: nothing but its drive")
+    drive: Drive = entry("motion that is imposed on the joint")
+    ageing: Ageing = entry("how long it is driven")
+
+    @model_validator(mode="after")
+    def _ends_after_them(self) -> JointCase:
+        if not self.ageing.wanted:
+            raise disagreement("no end given; allowed: energy or cycles", "ageing.cycles", "ageing")
+        check_within(self.energies, self.ageing)
+        return self
+
+    def outline(self) -> list[tuple[str, str]]:
+        """What would run, in a few rows of name and text."""
+        drive = self.drive
+        return [
+            ("structure", "none: the joint alone"),
+            ("joint", joint_outline(self)),
+            ("drive", f"stroke {drive.stroke:g} mm at {drive.frequency:g} Hz"),
+            ("ageing", ageing_outline(self.ageing)),
+        ]
+
+
+class RigCase(TimeCase):
+    """A rig with a joint that is shaken, hit, or driven by a recorded force."""
+
+    title: Title = entry("one line", "Friction rig driven by a force")
+    structure: Rig = entry("what holds the joint")
+    excitation: Excitation = entry("what drives the rig")
+    ageing: SteadyAgeing = entry(
+        "for a harmonic force: how long the joint is worn in steady states; without an end not "
+        "at all",
+        default=SteadyAgeing(),
+    )
+    integration: Integration = entry("of the motion in time", default=Integration())
+
+    @model_validator(mode="after")
+    def _drives_a_mass(self) -> RigCase:
+        count = len(self.structure.masses)
+        if self.excitation.mass > count:
+            raise disagreement(
+                f"{self.excitation.mass}: no such mass; allowed: 1 to {count}", "excitation.mass"
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _ages_in_steady_states(self) -> RigCase:
+        if not self.ageing.wanted:
+            return self
+        if not isinstance(self.excitation, Harmonic):
+            raise disagreement(
+                f"given beside {self.excitation.kind}; allowed: with a harmonic force", "ageing"
+            )
+        check_within(self.energies, self.ageing)
+        return self
+
+    @model_validator(mode="after")
+    def _step_resolves(self) -> RigCase:
+        longest = _longest_step(self.excitation)
+        if self.integration.step > longest:
+            raise disagreement(
+                f"{self.integration.step:g} s: too long for the excitation; "
+                f"allowed: up to {longest:g} s",
+                "integration.step",
+                "integration",
+            )
+        return self
+
+    @property
+    def steps(self) -> float:
+        """Steps of time that are kept of each motion."""
+        return _kept_time(self.excitation) / self.integration.step
+
+    def outline(self) -> list[tuple[str, str]]:
+        """What would run, in a few rows of name and text."""
+        masses = ", ".join(f"{1e3 * mass:g}" for mass in self.structure.masses)
+        rows = [
+            ("structure", f"rig of {masses} kg, damping ratio {self.structure.damping_ratio:g}"),
+            ("joint", joint_outline(self)),
+            ("excitation", excitation_outline(self.excitation)),
+            ("steps", f"of {self.integration.step:g} s"),
+        ]
+        if self.ageing.wanted:
+            rows.append(("ageing", ageing_outline(self.ageing)))
+        return rows
+
+
+# Steps in a period or a blow: with fewer the excitation itself is not seen.
+FEWEST_STEPS = 20
+
+
+def _longest_step(excitation: Harmonic | Hammer | Recorded) -> float:
+    """The longest step of time in which the excitation is still seen [s]."""
+    if isinstance(excitation, Harmonic):
+        return 1.0 / (FEWEST_STEPS * excitation.frequency)
+    if isinstance(excitation, Hammer):
+        return min(excitation.duration / FEWEST_STEPS, 0.5 / excitation.highest)
+    return math.inf
+
+
+def _kept_time(excitation: Harmonic | Hammer | Recorded) -> float:
+    """Length of the motion that is kept [s]."""
+    if isinstance(excitation, Harmonic):
+        return 1.0 / excitation.frequency
+    if isinstance(excitation, Hammer):
+        return excitation.record
+    times = read_columns(excitation.file, RECORDED)["time"]
+    return float(times[-1] - times[0])
+
+
+def check_within(energies: tuple[float, ...], ageing: Ageing) -> None:
+    """Refuse energies beyond the end of the ageing."""
+    if ageing.energy is not None and energies[-1] > ageing.energy:
+        raise disagreement(
+            f"{energies[-1]:g} N mm: beyond the end; allowed: up to {ageing.energy:g} N mm",
+            f"energies.{len(energies) - 1}",
+        )
+
+
+def joint_outline(case: TimeCase) -> str:
+    """Law and normal load of the joint, and whether it evolves."""
+    evolves = "fixed" if case.evolution.is_empty else "evolving with energy"
+    count = len(case.energies)
+    looked_at = f"looked at {count} energies" if count > 1 else "looked at one energy"
+    return f"{case.joint.law} under {case.joint.normal_load:g} N, {evolves}, {looked_at}"
+
+
+def excitation_outline(excitation: Harmonic | Hammer | Recorded) -> str:
+    """What drives a rig, in a line."""
+    if isinstance(excitation, Harmonic):
+        return f"{excitation.force:g} N at {excitation.frequency:g} Hz on mass {excitation.mass}"
+    if isinstance(excitation, Hammer):
+        return (
+            f"blow of {excitation.force:g} N and {excitation.duration:g} s on mass "
+            f"{excitation.mass}, {excitation.record:g} s recorded"
+        )
+    return f"{excitation.file} on mass {excitation.mass}"
+
+
+def ageing_outline(ageing: Ageing) -> str:
+    """The end of the ageing."""
+    if ageing.cycles is not None:
+        return f"to {ageing.cycles:g} cycles"
+    return f"to {ageing.energy:g} N mm"
