@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TypeVar
 
 from workflow.case import Case, CaseError, JointCase, RigCase, WearCase, load_case
 from workflow.errors import UserError
 from workflow.folder import OutputFolder
 from workflow.reporter import Reporter
 
-InTime = TypeVar("InTime", bound=JointCase | RigCase)
 
-
-def with_computed_wear(case: InTime, folder: OutputFolder, reporter: Reporter) -> InTime:
+def with_computed_wear(
+    case: JointCase | RigCase, folder: OutputFolder, reporter: Reporter
+) -> JointCase | RigCase:
     """The case with the table of loops that its wear case leaves; as it is if it names none.
 
     The wear case runs into ``wear`` in the folder. Raises UserError if it cannot be read, is not
