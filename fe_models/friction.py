@@ -72,15 +72,26 @@ class FrictionalJoint:
         loads = amplitudes @ self._loads.T
         floor = LOAD_FLOOR * np.linalg.norm(loads, axis=1).max()
         displacement = np.zeros((3, len(gap))) if previous is None else previous
+        heaviest = loads[np.argmax(np.linalg.norm(loads, axis=1))]
         found: list[Array] = []
         for increment, load in enumerate(loads):
-            scale = max(float(np.linalg.norm(load)), floor)
             starts = _starts(found, guess, loads[: increment + 1], gap)
-            problem = _Problem(self._inverse, self._rho, self._friction, load, gap, displacement)
-            state = problem.solve(starts, scale)
+            state = self._solve(load, gap, displacement, starts, floor)
+            if not state.converged and not found:
+                # A light first load would take a body long to where worn faces meet: pressed hard
+                # it is there at once, and from there what the light load does is near.
+                pressed = self._solve(heaviest, gap, displacement, starts, floor)
+                state = self._solve(load, gap, displacement, [pressed.state], floor)
             found.append(state.state)
             displacement = state.displacement
             yield state
+
+    def _solve(
+        self, load: Array, gap: Array, previous: Array, starts: list[Array], floor: float
+    ) -> FrictionState:
+        """One increment, its residual relative to the load, which counts as ``floor`` at least."""
+        problem = _Problem(self._inverse, self._rho, self._friction, load, gap, previous)
+        return problem.solve(starts, max(float(np.linalg.norm(load)), floor))
 
 
 class _Problem:

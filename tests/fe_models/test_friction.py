@@ -293,3 +293,20 @@ def test_sticking_nodes_have_no_slip_and_none_gains_energy(structure, joint, mis
         pressed = state.force[2] > 0.0
         inside = np.hypot(*state.force[:2]) < 0.4 * state.force[2] * (1.0 - 1e-12)
         assert not state.slip[:, pressed & inside].any()
+
+
+def test_worn_faces_meet_under_a_light_load(structure, joint, mission):
+    """A first load of 1/5000 of the largest, on faces worn by more than it presses together."""
+    amplitudes, gap = mission.amplitudes(), structure.gap()
+    frictional = FrictionalJoint(joint.resolvent(), 0.4)
+    light = np.concatenate([2e-4 * amplitudes[7:8], amplitudes])
+    before = list(frictional.march(light, gap))
+    worn = gap + 6e-3 * (1.0 - 0.5 * gap / gap.max())
+    first = next(frictional.march(light, worn, before[-1].displacement, [s.state for s in before]))
+    assert first.converged
+    pressing = frictional.march(
+        light[:1], worn, before[-1].displacement, [next(frictional.march(light[8:9], worn)).state]
+    )
+    np.testing.assert_allclose(
+        first.force, next(pressing).force, atol=1e-4 * np.abs(first.force).max()
+    )
