@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
@@ -170,8 +171,13 @@ class SupportedBody:
         return rigid_body_modes(elastic.nodes, elastic.body.axes, self._transformation)
 
     def _reduced(self) -> tuple[sp.csr_matrix, Array]:
+        return self._stiffness, self._transformation.T @ self.nodal_loads()
+
+    @cached_property
+    def _stiffness(self) -> sp.csr_matrix:
+        """On the displacements that supports leave, those of the interface in its frames."""
         t = self._transformation
-        return (t.T @ self.elastic.stiffness @ t).tocsr(), t.T @ self.nodal_loads()
+        return (t.T @ self.elastic.stiffness @ t).tocsr()
 
     def _all(self, free: Array, amplitudes: Array) -> Array:
         displacement = self._transformation @ free

@@ -15,15 +15,18 @@ from workflow.figures import contact, specimens, time, wear
 from workflow.figures.style import STYLE, save
 
 
-def write_figures(results: Path, folder: Path) -> list[Path]:
-    """Draw the figures of ``results`` (a ``results.h5``) as PNG files; returns their paths."""
+def write_figures(results: Path, folder: Path, first: int = 0, every: int = 1) -> list[Path]:
+    """Draw the figures of ``results`` (a ``results.h5``) as PNG files; returns their paths.
+
+    ``every`` so many of them from the ``first`` on, so that several processes may share them.
+    """
     import matplotlib
 
     folder.mkdir(parents=True, exist_ok=True)
     written = []
     with h5py.File(results) as file, matplotlib.rc_context(STYLE):
         kind = _kind(file)
-        for name, draw in kind.figures_of(file).items():
+        for name, draw in list(kind.figures_of(file).items())[first::every]:
             path = folder / f"{name}.png"
             save(draw(file), path)
             written.append(path)
