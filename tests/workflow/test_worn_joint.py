@@ -1,0 +1,81 @@
+"""A joint that follows the wear of its contact, computed before it: from half-space to loop."""
+
+import json
+
+import pytest
+
+from tests.workflow.conftest import invoke
+from tests.workflow.scenes import BALL
+from workflow.loop_table import read_loop_table
+
+WEAR = """\
+title: Ball that wears
+analysis: wear
+structure: {kind: bodies, shape: sphere, radius: 10 mm}
+materials:
+  body_1: {young: 115 GPa, poisson: 0.29}
+  body_2: {young: 115 GPa, poisson: 0.29}
+friction: {coefficient: 0.5}
+load_path: {P: 50 N, stroke: 20 um, increments: 2}
+contact: {grid: [16, 16], size: [0.6 mm, 0.6 mm]}
+wear:
+  law: energy
+  body_1: {coefficient: 5e3 um^3/J}
+  body_2: {coefficient: 5e3 um^3/J}
+  cycles: 2e4
+  step: {kind: implicit, cycles: 1e4}
+loops: {amplitude: 10 um}
+stress: {section: none, life: {parameter: none}}
+output: {paraview: false, figures: false}
+"""
+JOINT = """\
+title: Joint of the ball
+analysis: time
+structure: {kind: joint}
+joint: {law: jenkins, normal_load: 50 N, friction: 0.1, stiffness: 1 N/um}
+evolution: {file: wear.yaml}
+drive: {stroke: 20 um, frequency: 10 Hz}
+energies: [0 J, 5 J]
+ageing: {energy: 5 J}
+output: {figures: false}
+"""
+
+
+def run(folder, wear, joint=JOINT):
+    (folder / "wear.yaml").write_text(wear, encoding="utf-8")
+    (folder / "joint.yaml").write_text(joint, encoding="utf-8")
+    return invoke("run", folder / "joint.yaml", "--out", folder / "out")
+
+
+def test_stiffness_and_friction_of_the_joint_are_those_of_the_worn_contact(tmp_path):
+    ended = run(tmp_path, WEAR)
+    assert ended.exit_code == 0, ended.output
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
+    (file,) = (tmp_path / "out" / "wear").glob("loops_*.csv")
+    table = read_loop_table(file)
+    unworn, worn = summary["states"]
+    assert unworn["stiffness"] == pytest.approx(table.kt[0], rel=1e-9)
+    # 5 J are between the first two loops, and what is between is straight.
+    share = 5e3 / table.energy[1]
+    between = (1.0 - share) * table.kt[0] + share * table.kt[1]
+    assert 0.0 < share < 1.0
+    assert worn["stiffness"] == pytest.approx(between, rel=1e-9)
+    assert worn["stiffness"] > 1.02 * unworn["stiffness"]
+    assert worn["friction"] == pytest.approx(0.5, rel=1e-6)
+    # The joint dissipates what its contact does: 4 µP (A - µP/kt), within their shapes of loop.
+    assert unworn["energy_per_cycle"] == pytest.approx(table.energy_per_loop[0], rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("wear", "words"),
+    [
+        (BALL, "leaves no table of loops"),
+        (WEAR.replace("loops: {amplitude: 10 um}\n", ""), "leaves no table of loops"),
+        (WEAR.replace("P: 50 N", "P: 50 mm"), "load_path.P"),
+    ],
+)
+def test_a_case_without_loops_is_refused(tmp_path, wear, words):
+    ended = run(tmp_path, wear)
+    assert ended.exit_code == 2
+    assert words in ended.output.replace("\n", " ")
+    assert not (tmp_path / "out" / "wear").exists()
