@@ -62,8 +62,9 @@ def test_stiffness_and_friction_of_the_joint_are_those_of_the_worn_contact(tmp_p
     assert worn["stiffness"] == pytest.approx(between, rel=1e-9)
     assert worn["stiffness"] > 1.02 * unworn["stiffness"]
     assert worn["friction"] == pytest.approx(0.5, rel=1e-6)
-    # The joint dissipates what its contact does: 4 µP (A - µP/kt), within their shapes of loop.
-    assert unworn["energy_per_cycle"] == pytest.approx(table.energy_per_loop[0], rel=0.01)
+    # A spring and slider lose 4 µP (A - µP/kt), a sphere (Mindlin 1953) 4 µP (A - 6/5 µP/kt).
+    corner = 4.0 * 25.0 * 0.2 * 25.0 / table.kt[0]
+    assert unworn["energy_per_cycle"] - corner == pytest.approx(table.energy_per_loop[0], rel=0.005)
 
 
 @pytest.mark.parametrize(
