@@ -10,9 +10,10 @@ part by wear itself, the short waves first: see :meth:`wear.stepping.WearingCont
 Shampine & Baca 1984, doi:10.1007/BF01934907. So the estimated error of the depth is carried from
 step to step. In root mean square it came within 50 % of the true one where that was 0.3 % or more
 of the depth, on two rounded flats under three and nine loads (without damping it was ten times too
-large); in long runs of short steps it was up to three times too small, six where flanks carry unevenly,
-since edges that are pressed part of the time are damped less. Steps of second order are measured by a quarter of the error of a
-first-order step between the same ends, and by what their second pass with other slips has changed.
+large); in long runs of short steps it was up to three times too small, six where flanks carry
+unevenly, since edges that are pressed part of the time are damped less. Steps of second order are
+measured by a quarter of the error of a first-order step between the same ends, and by what their
+second pass with other slips has changed.
 
 Errors count by their root mean square over the worn cells: the few at a moving contact edge are
 worn by jumps however short the steps, and say little about depth or volume. The volume counts for

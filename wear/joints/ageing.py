@@ -58,6 +58,9 @@ MOST_EVALUATIONS = 2_000_000
 SMALLEST_TOLERANCE = 1e-12
 """Rounding of a panel's polynomials is a hundredth of it."""
 
+ROUNDING = 1e-12
+"""Of an energy: the end of a test and the energy there belong together to so much."""
+
 SMALLEST = 1e-300
 """Energies are found to their last digit: a joint may dissipate ever so little."""
 
@@ -183,9 +186,10 @@ class LongTest:
     def _cycles(self, place: int, energy: float) -> float:
         if not self.jumps:
             return 0.0 if energy == self.energy_before else np.nan
+        if energy > self.final_energy * (1.0 + ROUNDING):
+            return np.nan
         jump = self.jumps[place]
-        cycles = jump.cycles + jump.since(energy)
-        return cycles if energy <= jump.end and cycles <= self.total_cycles else np.nan
+        return min(jump.cycles + jump.since(energy), self.total_cycles)
 
 
 # --- jumping ------------------------------------------------------------------------------------

@@ -40,6 +40,10 @@ ROUNDED = 4.0
 """Smoothing rounds the reversals if it takes off them more than this many standard errors."""
 
 
+SIGNAL = 0.5
+"""Share of what smoothing takes that may go from sample to sample alike: motion then, not noise."""
+
+
 class MeasuredLoopError(ValueError):
     """A record that holds no loop, or not what is asked of it."""
 
@@ -240,13 +244,15 @@ def _begun_at(record: LoopRecord, start: int) -> LoopRecord:
 
 
 def _smoothed(motion: Array, found: Sequence[Branch]) -> Array:
-    """The displacement without some of its noise, or as it is if that would round the reversals."""
+    """The displacement without some of its noise, or as it is if that would bend the motion."""
     period = 2.0 * float(np.median([branch.end - branch.begin for branch in found]))
     half = int(0.5 * SMOOTHING * period)
     if 2 * half + 1 < FEWEST_SMOOTHED:
         return motion
     smooth: Array = savgol_filter(motion, 2 * half + 1, 3)
     taken = motion - smooth
+    if taken[1:] @ taken[:-1] > SIGNAL * (taken @ taken):
+        return motion
     turns = np.array([[branch.end, branch.sense] for branch in found[:-1]])
     near = turns[:, :1] + np.arange(-half // 4, half // 4 + 1)
     rounding = turns[:, 1] * taken[near].mean(axis=1)

@@ -363,3 +363,11 @@ def test_bolted_joint_loses_preload_over_the_cycles(test) -> None:
     assert 0.25 < lost[-1] < 0.30
     assert np.all(np.diff(values["friction"]) > 0.0)
     assert np.all(np.diff(values["stiffness"]) > 0.0)
+
+
+@pytest.mark.parametrize("cycles", np.geomspace(100.0, 2e6, 12).round())
+def test_the_end_of_a_test_is_found_again(cycles) -> None:
+    """Its energy at the last cycle, and its cycles at that energy."""
+    test = long_test(lambda e: 1.0 + 0.3 * np.log1p(e), float(cycles))
+    assert float(test.cycles_at(test.final_energy)) == pytest.approx(cycles, rel=1e-9)
+    assert np.isnan(test.cycles_at(1.001 * test.final_energy))

@@ -255,3 +255,15 @@ def test_records_without_loops_are_refused():
     ]:
         with pytest.raises(MeasuredLoopError, match=words):
             measure_loops(*wrong)
+
+
+def test_a_motion_that_is_not_harmonic_is_not_smoothed_away() -> None:
+    """A joint that sticks for 4 % of the cycle, in a rig whose 25th harmonic answers too."""
+    law = Jenkins(stiffness=3e4, friction=0.1, normal_load=60.0)
+    angle = np.linspace(0.0, 6.0 * np.pi, 3001)
+    moved = 0.012 * (np.cos(angle) + 0.003 * np.cos(25.0 * angle))
+    settled = march(law, law.rest(1), np.zeros((1, 1)), moved[:1000, None, None])
+    cycles = march(law, settled.state, moved[999:1000, None], moved[1000:, None, None])
+    found = measure_loops(moved[1000:], cycles.force[:, 0, 0], 60.0)
+    assert found.stick_estimate.value == pytest.approx(3e4, rel=1e-3)
+    assert np.mean(found.friction) == pytest.approx(0.1, rel=1e-3)
