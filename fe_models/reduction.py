@@ -40,7 +40,11 @@ DATASETS = {
     "loads": ("N", "load cases on kept displacements, then modes (modes: N/t^0.5)"),
     "mode_shapes": ("1/t^0.5", "fixed-interface modes over all displacements of the full model"),
     "frequencies": ("Hz", "natural frequencies of the fixed-interface modes"),
+    "names": ("1", "of the kept displacements: point and direction, such as pad 17 x"),
+    "places": ("mm", "x, y, z of the point of each kept displacement"),
 }
+# Those that a stored model may lack.
+OPTIONAL = "mass", "names", "places"
 
 
 @dataclass(frozen=True)
@@ -49,7 +53,9 @@ class ReducedModel:
 
     ``stiffness`` and ``mass`` ``(c + m, c + m)`` (no mass: None), ``loads`` ``(c + m, cases)``;
     ``mode_shapes`` ``(n, m)`` of unit modal mass, zero where kept; their ``frequencies`` [Hz]. With
-    mm, N, s and t a modal coordinate has the unit t^0.5 mm.
+    mm, N, s and t a modal coordinate has the unit t^0.5 mm. Where they are known, ``names``
+    ``(c,)`` of the kept displacements, point and direction as in ``pad 17 x``, and ``places``
+    ``(c, 3)`` of their points [mm].
     """
 
     kept: Indices
@@ -58,6 +64,8 @@ class ReducedModel:
     loads: Array
     mode_shapes: Array
     frequencies: Array
+    names: tuple[str, ...] | None = None
+    places: Array | None = None
 
     @property
     def static_stiffness(self) -> Array:
@@ -157,9 +165,17 @@ def save_reduced(path: Path, model: ReducedModel) -> None:
 
 
 def load_reduced(path: Path) -> ReducedModel:
-    """Read a model that :func:`save_reduced` has written."""
+    """Read a model that :func:`save_reduced` has written.
+
+    Raises ``OSError`` for a file that is not HDF5, ``ValueError`` for one that holds no model.
+    """
     with h5py.File(path, "r") as file:
         found: dict[str, Any] = {name: file[name][()] for name in DATASETS if name in file}
+    missing = [name for name in DATASETS if name not in found and name not in OPTIONAL]
+    if missing:
+        raise ValueError(f"{path}: no dataset {missing[0]}: not a reduced model")
+    if "names" in found:
+        found["names"] = tuple(name.decode() for name in found["names"])
     return ReducedModel(**({"mass": None} | found))
 
 

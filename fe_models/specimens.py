@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
@@ -18,6 +18,8 @@ from sa_solver.types import Array, Indices, Material
 # Fixed-interface modes of each specimen ("Dynamics simulations of fretting wear for aero-engine
 # applications", thesis, section 4.2).
 MODES = 20
+# Kinds of kept points.
+PAD, RING = "pad", "ring"
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,11 @@ def reduced_specimens(
     tied_ring: bool = True,
     modes: int = MODES,
 ) -> tuple[ReducedModel, ReducedModel]:
-    """Both specimens on pad and ring, body 1 first."""
+    """Both specimens on pad and ring, body 1 first.
+
+    Their points are ``pad 1``, ``pad 2``, ... in the interface's order, and ``ring 1``, ... by
+    angle from the X axis.
+    """
     (face,) = mesh.interfaces
     models = []
     for body, pad, material in zip(
@@ -83,8 +89,22 @@ def reduced_specimens(
     ):
         full = specimen_matrices(specimen, body, pad, material, order, tied_ring)
         mass = full.mass if modes > 0 else None
-        models.append(reduce_body(full.stiffness, mass, full.kept, modes))
+        model = reduce_body(full.stiffness, mass, full.kept, modes)
+        ring = specimen.ring(body)
+        places = body.mesh.p.T[np.concatenate([pad, ring])]
+        names = _displacement_names({PAD: len(pad), RING: len(ring)})
+        models.append(replace(model, names=names, places=np.repeat(places, 3, axis=0)))
     return models[0], models[1]
+
+
+def _displacement_names(counts: dict[str, int]) -> tuple[str, ...]:
+    """Names of the three displacements of so many points of each kind."""
+    return tuple(
+        f"{kind} {number} {axis}"
+        for kind, count in counts.items()
+        for number in range(1, count + 1)
+        for axis in "xyz"
+    )
 
 
 def pad_stiffness(model: ReducedModel, specimen: Specimen) -> Array:

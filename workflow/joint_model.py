@@ -2,99 +2,74 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import numpy as np
-
-from sa_solver.types import Array
 from wear.joints import evolution as forms
 from wear.joints.bouc_wen import BoucWen
 from wear.joints.evolution import JointEvolution, WearFunction
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.iwan import FourParameterIwan, UniformIwan
 from wear.joints.jenkins import Jenkins
-from wear.joints.law import JointResponse, State
 from workflow.case import TimeCase
 from workflow.case import joint_evolution as given
+from workflow.case.joint_sections import BoucWenJoint
 from workflow.errors import UserError
 from workflow.loop_table import read_loop_table
 from workflow.time_outcome import PARAMETERS
 
-if TYPE_CHECKING:
-    from wear.joints.parameters import Parameter
-
-
-@dataclass(frozen=True)
-class FrictionContactInLine:
-    """A friction contact of three directions that moves along one, under a constant normal load.
-
-    ``stiffness`` kt [N/mm], ``friction`` µ and ``normal_load`` N [N].
-    """
-
-    stiffness: Parameter
-    friction: Parameter
-    normal_load: Parameter
-
-    @property
-    def directions(self) -> int:
-        return 1
-
-    @cached_property
-    def _contact(self) -> FrictionContact:
-        return FrictionContact(self.stiffness, 0.0, self.friction, self.normal_load)
-
-    def rest(self, joints: int) -> State:
-        return self._contact.rest(joints)
-
-    def respond(self, state: State, increment: Array) -> JointResponse:
-        moved = np.zeros((len(increment), self._contact.directions))
-        moved[:, :1] = increment
-        full = self._contact.respond(state, moved)
-        return JointResponse(
-            full.force[:, :1], full.tangent[:, :1, :1], full.state, full.dissipated
-        )
-
-    def loop_energy(self, amplitude: Parameter) -> Array:
-        """Energy of a settled cycle between ± ``amplitude`` [mm]: that of Jenkins's element."""
-        return Jenkins(self.stiffness, self.friction, self.normal_load).loop_energy(amplitude)
-
-
-Law = BoucWen | Jenkins | UniformIwan | FourParameterIwan | FrictionContactInLine
+LineLaw = BoucWen | Jenkins | UniformIwan | FourParameterIwan
+Law = LineLaw | FrictionContact
 # What a case calls them.
 LAWS: dict[str, type[Law]] = {
     "bouc_wen": BoucWen,
     "jenkins": Jenkins,
     "uniform_iwan": UniformIwan,
     "four_parameter_iwan": FourParameterIwan,
-    "friction_contact": FrictionContactInLine,
+    "friction_contact": FrictionContact,
 }
+# What joints with the same parameters share: friction and gap are those of each.
+SHARED = ("stiffness", "residual_stiffness", "normal_stiffness", "normal_load")
 
 
 @dataclass(frozen=True)
 class JointModel:
-    """A joint that wears: its ``law`` with the parameters that ``evolution`` begins with."""
+    """A joint that wears: its ``law`` with the parameters that ``evolution`` begins with.
+
+    They are those of all ``joints`` together, which share stiffness and load evenly.
+    """
 
     law: Law
     evolution: JointEvolution
+    joints: int = 1
 
     @classmethod
-    def of(cls, case: TimeCase) -> JointModel:
+    def of(cls, case: TimeCase, joints: int = 1) -> JointModel:
         """The joint of a case. Raises UserError where its table of loops cannot be taken."""
         parameters: dict[str, Any] = case.joint.model_dump(exclude={"law"})
-        return cls(LAWS[case.joint.law](**parameters), _evolution(case))
+        return cls(LAWS[case.joint.law](**parameters), _evolution(case), joints)
+
+    @property
+    def line_law(self) -> LineLaw:
+        """The law of a joint alone, which has one direction."""
+        assert not isinstance(self.law, FrictionContact)
+        return self.law
 
     def at(self, energy: float) -> Law:
-        """The law after so much dissipated ``energy`` [N mm]."""
-        law: Law = self.evolution.at(self.law, energy)
-        return law
+        """The law of each joint after so much ``energy`` dissipated in all of them [N mm]."""
+        law = self._whole(energy)
+        shares = {name: getattr(law, name) / self.joints for name in SHARED if hasattr(law, name)}
+        return replace(law, **shares) if self.joints > 1 else law
 
     def parameters(self, energy: float) -> dict[str, float]:
         """Parameters after so much dissipated ``energy`` [N mm], by name."""
-        law = self.at(energy)
+        law = self._whole(energy)
         return {name: float(getattr(law, name)) for name in PARAMETERS if hasattr(law, name)}
+
+    def _whole(self, energy: float) -> Law:
+        law: Law = self.evolution.at(self.law, energy)
+        return law
 
 
 def _evolution(case: TimeCase) -> JointEvolution:
@@ -106,7 +81,7 @@ def _evolution(case: TimeCase) -> JointEvolution:
         if (factor := getattr(section, name)) is not None
     }
     if section.file is not None:
-        functions |= _measured(section.file)
+        functions |= _measured(section.file, case)
     return JointEvolution(**functions)
 
 
@@ -123,16 +98,22 @@ def _function(factor: given.Factor, initial: float) -> WearFunction:
     return forms.Table(factor.energy, tuple(initial * own for own in factor.factor))
 
 
-def _measured(file: str) -> dict[str, WearFunction]:
-    """Friction and stiffness of a table of loops."""
+def _measured(file: str, case: TimeCase) -> dict[str, WearFunction]:
+    """Friction and stiffness of a table of loops.
+
+    A table's stiffness is the whole slope of the stuck joint, the residual one included.
+    """
     table = read_loop_table(Path(file))
     if table.per_length:
         raise UserError(f"{file}: loops of a line contact, per mm; allowed: those of a whole joint")
     energy = tuple(table.energy.tolist())
+    beside = 0.0
+    if not isinstance(case.joint, BoucWenJoint):
+        beside = getattr(case.joint, "residual_stiffness", 0.0)
     try:
         return {
             "friction": forms.Table(energy, tuple(table.mu.tolist())),
-            "stiffness": forms.Table(energy, tuple(table.kt.tolist())),
+            "stiffness": forms.Table(energy, tuple((table.kt - beside).tolist())),
         }
     except ValueError as error:
         raise UserError(f"{file}: {error}") from error

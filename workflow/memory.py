@@ -14,6 +14,7 @@ from workflow.case import (
     SpecimensCase,
     WearCase,
 )
+from workflow.case.rig_structure import ReducedBody
 from workflow.errors import OutOfMemory
 
 # Dense interface matrices alive at once while the joint is condensed.
@@ -25,6 +26,8 @@ STATE_FIELDS, SPECTRA = 6, 300
 # A rig in time: displacement, velocity, acceleration, forces, energies and what is made of them,
 # per mass and step, with the objects that hold a step while it is found.
 STEP_COLUMNS = 60
+# The same per displacement of a reduced body, whose numbers are in large arrays.
+REDUCED_COLUMNS = 20
 # Sparse factors of a structure with this many nodes took this much; they grow with this power.
 FACTOR_BYTES, FACTOR_NODES, FACTOR_POWER = 3.5e9, 1e5, 1.4
 # Meshes, plots and the interpreter with its libraries.
@@ -37,10 +40,11 @@ def required_bytes(
 ) -> float:
     """Upper estimate of the memory a run takes.
 
-    ``structure_nodes`` of both bodies and ``interface_nodes`` of all contacts, once known.
+    ``structure_nodes`` of both bodies, or displacements of a reduced one in a rig, and
+    ``interface_nodes`` of all contacts, once known.
     """
     if isinstance(case, JointCase | RigCase):
-        return BYTES * _kept_in_time(case) + REST
+        return BYTES * _kept_in_time(case, structure_nodes) + REST
     if isinstance(case, SpecimensCase):
         pad = 3 * (case.mesh.pad_elements + 1) ** 2
         factors = FACTOR_BYTES * (structure_nodes / FACTOR_NODES) ** FACTOR_POWER
@@ -60,12 +64,14 @@ def required_bytes(
     return BYTES * (DENSE_MATRICES * (3 * interface_nodes) ** 2 + contact) + factors + REST
 
 
-def _kept_in_time(case: JointCase | RigCase) -> float:
+def _kept_in_time(case: JointCase | RigCase, displacements: int) -> float:
     """Numbers kept of all motions of a rig: every step, with all its columns, at every energy."""
     if isinstance(case, JointCase):
         return 0.0
-    columns = STEP_COLUMNS * len(case.structure.masses)
-    return columns * len(case.energies) * case.steps
+    if isinstance(case.structure, ReducedBody):
+        # Of these motions little is kept once they are found.
+        return REDUCED_COLUMNS * displacements * case.steps
+    return STEP_COLUMNS * len(case.structure.masses) * len(case.energies) * case.steps
 
 
 def check_memory(case: WearCase | Case, structure_nodes: int = 0, interface_nodes: int = 0) -> None:

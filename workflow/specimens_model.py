@@ -115,4 +115,5 @@ def _lowest(stiffness: Any, mass: Any) -> Array:
 def _model(arrays: dict[str, Any], number: int) -> ReducedModel:
     prefix = f"{number}/"
     own = {name.removeprefix(prefix): v for name, v in arrays.items() if name.startswith(prefix)}
-    return ReducedModel(**own | {"kept": np.asarray(own["kept"])})
+    names = tuple(name if isinstance(name, str) else name.decode() for name in own["names"])
+    return ReducedModel(**own | {"kept": np.asarray(own["kept"]), "names": names})

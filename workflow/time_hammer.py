@@ -13,9 +13,8 @@ from fe_models.dynamics.frequency_response import (
     SignalError,
     frequency_response,
 )
-from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.motion import Motion
-from fe_models.dynamics.newmark import StepControl, integrate
+from fe_models.dynamics.newmark import StepControl
 from fe_models.dynamics.ring_down import ring_down
 from sa_solver.types import Array
 from workflow.case import RigCase
@@ -23,9 +22,10 @@ from workflow.case import excitation as given
 from workflow.errors import MethodFailed
 from workflow.joint_model import JointModel
 from workflow.reporter import Reporter
+from workflow.rig_model import RigModel
 from workflow.time_joint import evolution_curve
 from workflow.time_outcome import MOTION, RESPONSE, RING_DOWN, State, TimeOutcome
-from workflow.time_rig import check_motion, force_on, free_modes, modes, motion_curves
+from workflow.time_rig import motion_curves, motion_numbers, motion_of
 
 # The second mode is looked for between these shares of its frequencies without the joint and with
 # all of it stuck.
@@ -42,73 +42,59 @@ DECAYED = 0.9
 RING_DOWN_POINTS = 400
 
 
-def run_hammer(
-    case: RigCase, model: DynamicModel, joint: JointModel, reporter: Reporter
-) -> TimeOutcome:
+def run_hammer(case: RigCase, rig: RigModel, joint: JointModel, reporter: Reporter) -> TimeOutcome:
     """Hit the rig at every energy, which stays what it is during the record.
 
     Raises MethodFailed where a motion is not found, or shows no resonance.
     """
     assert isinstance(case.excitation, given.Hammer)
+    hammer, control = case.excitation, StepControl(case.integration.step)
+    blow = HammerBlow(rig.driven, hammer.force, hammer.duration)
     states = []
     for energy in case.energies:
         with reporter.stage("motion"):
-            motion = _motion(case, case.excitation, model, joint, energy)
+            motion = motion_of(rig, joint, energy, blow, hammer.record, control)
         with reporter.stage("signals"):
-            states.append(_state(case.excitation, model, joint, energy, motion, reporter))
+            states.append(_state(hammer, blow, rig, joint, energy, motion, reporter))
     curve = evolution_curve(joint, case.energies[-1])
     return TimeOutcome(case, tuple(states), curve, _trend(states))
 
 
-def _blow(hammer: given.Hammer, model: DynamicModel) -> HammerBlow:
-    return HammerBlow(force_on(model, hammer.mass), hammer.force, hammer.duration)
-
-
-def _motion(
-    case: RigCase, hammer: given.Hammer, model: DynamicModel, joint: JointModel, energy: float
-) -> Motion:
-    control = StepControl(case.integration.step)
-    motion = integrate(model, joint.at(energy), _blow(hammer, model), hammer.record, control)
-    check_motion(motion, energy)
-    return motion
-
-
 def _state(
     hammer: given.Hammer,
-    model: DynamicModel,
+    blow: HammerBlow,
+    rig: RigModel,
     joint: JointModel,
     energy: float,
     motion: Motion,
     reporter: Reporter,
 ) -> State:
-    blow, bounds = _blow(hammer, model), modes(model, joint.at(energy))
-    step = float(motion.times[1] - motion.times[0])
-    response = frequency_response(blow.value(motion.times), motion.acceleration[:, -1], step)
+    bounds, step = rig.modes(joint.at(energy)), float(motion.times[1] - motion.times[0])
+    acceleration = rig.looked_at(motion.acceleration)
+    response = frequency_response(blow.value(motion.times), acceleration, step)
     if response.remaining > AT_REST:
         reporter.warn(
             f"at {energy:g} N mm {response.remaining:.0%} of the response is left when the record "
             "ends, which blurs its peaks: raise excitation.record"
         )
     peaks = _peak("first", response, *hammer.band, energy)
-    if len(bounds["stuck"]) > 1:
-        ends = BELOW_FREE * free_modes(model)[1], ABOVE_STUCK * bounds["stuck"][1]
+    if rig.in_a_row and len(bounds["stuck"]) > 1:
+        ends = BELOW_FREE * rig.free()[1], ABOVE_STUCK * bounds["stuck"][1]
         if ends[1] < hammer.highest:
             peaks |= _peak("second", response, *ends, energy)
-    decay = _ring_down(motion, hammer, energy, reporter)
+    decay = _ring_down(rig, motion, hammer, energy, reporter)
     numbers: dict[str, Any] = {
         **bounds,
         **peaks,
         "ring_down": _ends(decay),
-        "dissipated": float(motion.energies.joints[-1, 0]),
         "decay_time": _decay_time(motion),
-        "largest_displacement": float(np.abs(motion.displacement[:, -1]).max()),
         "remaining": response.remaining,
         "resolution": float(response.frequency[0]),
-        "step_error": motion.error,
+        **motion_numbers(rig, motion),
     }
     seen = response.frequency <= hammer.highest
     curves = {
-        MOTION: motion_curves(motion, blow),
+        MOTION: motion_curves(rig, motion, blow),
         RESPONSE: {
             "frequency": response.frequency[seen],
             "magnitude": np.abs(response.value[seen]),
@@ -139,14 +125,14 @@ def _peak(
 
 
 def _decay_time(motion: Motion) -> float:
-    """Time in which the joint dissipates most of what it will [s]."""
-    dissipated = motion.energies.joints[:, 0]
+    """Time in which the joints dissipate most of what they will [s]."""
+    dissipated = motion.energies.joints.sum(axis=1)
     place = int(np.searchsorted(dissipated, DECAYED * dissipated[-1]))
     return float(motion.times[place] - motion.times[0])
 
 
 def _ring_down(
-    motion: Motion, hammer: given.Hammer, energy: float, reporter: Reporter
+    rig: RigModel, motion: Motion, hammer: given.Hammer, energy: float, reporter: Reporter
 ) -> dict[str, Array] | None:
     """Frequency and damping of the first mode against its amplitude; None of a dead beat.
 
@@ -155,12 +141,12 @@ def _ring_down(
     free = motion.times > hammer.duration
     step = float(motion.times[1] - motion.times[0])
     try:
-        found = ring_down(motion.acceleration[free, -1], step, hammer.band)
+        found = ring_down(rig.looked_at(motion.acceleration)[free], step, hammer.band)
     except SignalError as error:
         reporter.warn(f"no ring-down at {energy:g} N mm: {error}")
         return None
     amplitude = found.amplitude / (2.0 * np.pi * found.frequency) ** 2
-    if amplitude[0] < NOTHING_LEFT * np.abs(motion.displacement[:, -1]).max():
+    if amplitude[0] < NOTHING_LEFT * np.abs(rig.looked_at(motion.displacement)).max():
         reporter.warn(f"no ring-down at {energy:g} N mm: over before the filter has settled")
         return None
     kept = np.unique(np.linspace(0, len(amplitude) - 1, RING_DOWN_POINTS).astype(int))

@@ -48,7 +48,7 @@ def run_joint(case: JointCase, reporter: Reporter) -> TimeOutcome:
     """
     model, amplitude = JointModel.of(case), 0.5 * case.drive.stroke
     with reporter.stage("ageing"):
-        rate = steady_stroke(model.law, model.evolution, amplitude)
+        rate = steady_stroke(model.line_law, model.evolution, amplitude)
         test = aged(rate, case.ageing, model.evolution.breaks)
     last = test_end(test, case.ageing)
     with reporter.stage("loops"):
@@ -58,7 +58,7 @@ def run_joint(case: JointCase, reporter: Reporter) -> TimeOutcome:
         )
     with reporter.stage("check of the jumps"):
         numbers = _ageing_numbers(model, test, amplitude)
-    cycles = float(test.cycles_at(last))
+    cycles = cycles_of(test, case.ageing)
     ended = {"cycles": cycles, "energy": last, "duration": cycles / case.drive.frequency}
     curve = evolution_curve(model, last, test, rate)
     return TimeOutcome(case, states, curve, ended | {"ageing": numbers})
@@ -162,6 +162,11 @@ def test_end(test: LongTest, ageing: Ageing) -> float:
     return test.final_energy if ageing.energy is None else ageing.energy
 
 
+def cycles_of(test: LongTest, ageing: Ageing) -> float:
+    """Cycles of a test, to its energy or as many as were asked for, whatever they dissipate."""
+    return test.total_cycles if ageing.energy is None else float(test.cycles_at(ageing.energy))
+
+
 def energies_within(
     energies: tuple[float, ...], last: float, reporter: Reporter
 ) -> Iterator[float]:
@@ -204,7 +209,7 @@ def _ageing_numbers(model: JointModel, test: LongTest, amplitude: float) -> dict
     if cycles < 1:
         return numbers
     begin = float(test.energy_at(first))
-    marched = MarchedStroke(model.law, model.evolution, amplitude, start=begin)
+    marched = MarchedStroke(model.line_law, model.evolution, amplitude, start=begin)
     stretch = integrated_stretch(test, marched, first, cycles)
     return numbers | {
         "stretch": {

@@ -56,24 +56,27 @@ DATASETS: dict[str, dict[str, tuple[str, str]]] = {
         "normal_load": ("N", "normal load"),
     },
     LOOP: {
-        "displacement": ("mm", "displacement of the joint over a closed cycle"),
+        "displacement": ("mm", "displacement of the joint, or the mean of several, in a cycle"),
         "force": ("N", "force that resists it"),
     },
     MOTION: {
         "time": ("s", "time"),
         "excitation": ("N", "force of the excitation"),
-        "displacement": ("mm", "displacements of the masses, from the ground on"),
-        "acceleration": ("mm/s^2", "accelerations of the masses, from the ground on"),
-        "joint_force": ("N", "force of the joint, resisting"),
+        "displacement": ("mm", "displacements of the masses, from the ground on, or that seen"),
+        "acceleration": ("mm/s^2", "accelerations of the masses, from the ground on, or that seen"),
+        "joint_force": ("N", "force of the joint, or the sum of several, resisting"),
         "dissipated": ("N mm", "energy that the joint has dissipated since the beginning"),
     },
     RESPONSE: {
         "frequency": ("Hz", "frequency"),
-        "magnitude": ("mm/(s^2 N)", "acceleration of the last mass over the excitation"),
+        "magnitude": (
+            "mm/(s^2 N)",
+            "acceleration of the last mass, or seen, over the excitation",
+        ),
         "phase": ("rad", "of the acceleration before the excitation"),
     },
     RING_DOWN: {
-        "amplitude": ("mm", "amplitude of the last mass in its first mode"),
+        "amplitude": ("mm", "amplitude of the last mass, or of what is seen, in its first mode"),
         "frequency": ("Hz", "instantaneous frequency"),
         "damping_ratio": ("1", "instantaneous damping ratio"),
     },

@@ -10,20 +10,26 @@ import numpy as np
 from scipy.interpolate import PchipInterpolator
 
 from fe_models.dynamics.excitation import Force, Harmonic, Recorded
-from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.motion import Motion, Start
 from fe_models.dynamics.newmark import StepControl, integrate
-from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
 from sa_solver.types import Array
 from wear.joints.ageing import LongTest
 from workflow.case import RigCase
 from workflow.case import excitation as given
 from workflow.case.input_files import read_columns
-from workflow.case.time_case import Ageing, Rig
+from workflow.case.time_case import Ageing
 from workflow.errors import MethodFailed
-from workflow.joint_model import JointModel, Law
+from workflow.joint_model import JointModel
 from workflow.reporter import Reporter
-from workflow.time_joint import aged, energies_within, evolution_curve, extracted, test_end
+from workflow.rig_model import RigModel, rig_model
+from workflow.time_joint import (
+    aged,
+    cycles_of,
+    energies_within,
+    evolution_curve,
+    extracted,
+    test_end,
+)
 from workflow.time_outcome import LOOP, MOTION, State, TimeOutcome
 
 # Cycles in a row that must change little before a state is steady: one alone may change little
@@ -40,15 +46,17 @@ FIRST_STATE = 1e-6
 class SteadyCycle:
     """The last of ``periods`` cycles, and where to go on from.
 
-    ``displacement`` ``(k, n)`` of the masses [mm]; of the joint ``stretch`` [mm] and ``force`` [N]
-    ``(k,)``, and ``energy`` [N mm] that it dissipates. ``change`` is that of energy and stroke from
-    the cycle before, ``error`` what one step may add to the displacement, both relative.
+    ``amplitudes`` ``(k,)`` of what is seen [mm]; of the joints ``stretch`` [mm] and ``force`` [N]
+    ``(t,)``, ``energy`` [N mm] that they dissipate, and how they press, ``contact``. ``change`` is
+    that of energy and stroke from the cycle before, ``error`` what one step may add to the
+    displacement, both relative.
     """
 
-    displacement: Array
+    amplitudes: Array
     stretch: Array
     force: Array
     energy: float
+    contact: dict[str, Any]
     periods: int
     change: float
     error: float
@@ -61,55 +69,47 @@ def run_rig(case: RigCase, reporter: Reporter) -> TimeOutcome:
     Raises MethodFailed where a motion is not found or not steady, UserError where the joint can
     never dissipate what it is to be aged by.
     """
-    model, joint = rig_model(case.structure), JointModel.of(case)
+    rig = rig_model(case, reporter)
+    joint = JointModel.of(case, rig.joints)
     if isinstance(case.excitation, given.Hammer):
         from workflow.time_hammer import run_hammer
 
-        outcome = run_hammer(case, model, joint, reporter)
+        outcome = run_hammer(case, rig, joint, reporter)
     elif isinstance(case.excitation, given.Recorded):
-        outcome = _run_recorded(case, case.excitation, model, joint, reporter)
+        outcome = _run_recorded(case, case.excitation, rig, joint, reporter)
     else:
-        outcome = _run_harmonic(case, case.excitation, model, joint, reporter)
-    return replace(outcome, numbers={"free": free_modes(model), **outcome.numbers})
+        outcome = _run_harmonic(case, case.excitation, rig, joint, reporter)
+    return replace(outcome, numbers={"free": rig.free(), **outcome.numbers})
 
 
-def rig_model(rig: Rig) -> DynamicModel:
-    """Masses m1, m2, ... in a row from the ground on, the last held to the ground by the joint."""
-    names = [f"m{number}" for number in range(1, len(rig.masses) + 1)]
-    links = [Link(name, before) for name, before in zip(names, [None, *names], strict=False)]
-    return lumped_rig(
-        dict(zip(names, rig.masses, strict=True)),
-        dict(zip(links, rig.springs, strict=True)),
-        [[Link(names[-1])]],
-        rig.damping_ratio,
-    )
+def motion_of(
+    rig: RigModel,
+    joint: JointModel,
+    energy: float,
+    force: Force,
+    duration: float,
+    control: StepControl,
+    start: Start | None = None,
+) -> Motion:
+    """Motion of a rig whose joints have dissipated so much ``energy`` [N mm] before.
 
-
-def force_on(model: DynamicModel, mass: int) -> Array:
-    """A force of 1 N on the mass of that number, ``(n,)``."""
-    return unit_force(model, f"m{mass}")
-
-
-def free_modes(model: DynamicModel) -> list[float]:
-    """Natural frequencies without the joint [Hz]."""
-    found: list[float] = natural_frequencies(model).tolist()
-    return found
-
-
-def modes(model: DynamicModel, law: Law) -> dict[str, list[float]]:
-    """Natural frequencies with the joint stuck, and with all of it sliding [Hz]."""
-    stuck = law.respond(law.rest(1), np.zeros((1, 1))).tangent
-    sliding = getattr(law, "residual_stiffness", 0.0)
-    return {
-        "stuck": natural_frequencies(model, stuck).tolist(),
-        "sliding": natural_frequencies(model, sliding).tolist(),
-    }
-
-
-def check_motion(motion: Motion, energy: float) -> None:
-    """Raise MethodFailed for a motion that was not found to its end."""
+    Raises MethodFailed for one that was not found to its end.
+    """
+    law = joint.at(energy)
+    motion = integrate(rig.model, law, rig.shaken(law, force), duration, control, start)
     if not motion.converged:
         raise MethodFailed(f"motion at {energy:g} N mm: {motion.message}; lower integration.step")
+    return motion
+
+
+def motion_numbers(rig: RigModel, motion: Motion) -> dict[str, Any]:
+    """What a motion comes to."""
+    return {
+        "dissipated": float(motion.energies.joints[-1].sum()),
+        "largest_displacement": float(np.abs(rig.looked_at(motion.displacement)).max()),
+        **rig.contact(motion),
+        "step_error": motion.error,
+    }
 
 
 # --- recorded -----------------------------------------------------------------------------------
@@ -118,41 +118,34 @@ def check_motion(motion: Motion, energy: float) -> None:
 def _run_recorded(
     case: RigCase,
     excitation: given.Recorded,
-    model: DynamicModel,
+    rig: RigModel,
     joint: JointModel,
     reporter: Reporter,
 ) -> TimeOutcome:
     columns = read_columns(excitation.file, given.RECORDED)
     times = columns["time"]
-    force = Recorded(force_on(model, excitation.mass), times, columns["force"])
+    force = Recorded(rig.driven, times, columns["force"])
+    control, begin = StepControl(case.integration.step), Start(time=float(times[0]))
     states = []
     for energy in case.energies:
-        law = joint.at(energy)
         with reporter.stage("motion"):
-            control, begin = StepControl(case.integration.step), Start(time=float(times[0]))
-            motion = integrate(model, law, force, float(np.ptp(times)), control, begin)
-        check_motion(motion, energy)
-        last = motion.displacement[:, -1]
-        numbers = modes(model, law) | {
-            "dissipated": float(motion.energies.joints[-1, 0]),
-            "largest_displacement": float(np.abs(last).max()),
-            "largest_force": float(np.abs(motion.joint_force).max()),
-            "step_error": motion.error,
-        }
-        curves = {MOTION: motion_curves(motion, force)}
+            motion = motion_of(rig, joint, energy, force, float(np.ptp(times)), control, begin)
+        largest = {"largest_force": float(np.abs(rig.loop(motion)[1]).max())}
+        numbers = rig.modes(joint.at(energy)) | motion_numbers(rig, motion) | largest
+        curves = {MOTION: motion_curves(rig, motion, force)}
         states.append(State(energy, None, joint.parameters(energy), numbers, curves))
     return TimeOutcome(case, tuple(states), evolution_curve(joint, case.energies[-1]))
 
 
-def motion_curves(motion: Motion, force: Force) -> dict[str, Array]:
+def motion_curves(rig: RigModel, motion: Motion, force: Force) -> dict[str, Array]:
     """What is kept of a motion."""
     return {
         "time": motion.times,
         "excitation": force.value(motion.times),
-        "displacement": motion.displacement,
-        "acceleration": motion.acceleration,
-        "joint_force": motion.joint_force[:, 0, 0],
-        "dissipated": motion.energies.joints[:, 0],
+        "displacement": motion.displacement @ rig.seen.T,
+        "acceleration": motion.acceleration @ rig.seen.T,
+        "joint_force": rig.loop(motion)[1],
+        "dissipated": motion.energies.joints.sum(axis=1),
     }
 
 
@@ -162,11 +155,11 @@ def motion_curves(motion: Motion, force: Force) -> dict[str, Array]:
 def _run_harmonic(
     case: RigCase,
     excitation: given.Harmonic,
-    model: DynamicModel,
+    rig: RigModel,
     joint: JointModel,
     reporter: Reporter,
 ) -> TimeOutcome:
-    steady = _SteadyStates(case, excitation, model, joint)
+    steady = _SteadyStates(case, excitation, rig, joint)
     energies, cycles, rate, test = list(case.energies), None, None, None
     numbers: dict[str, Any] = {}
     if case.ageing.wanted:
@@ -176,25 +169,26 @@ def _run_harmonic(
         cycles = test.cycles_at(np.array(energies)).tolist()
     with reporter.stage("steady states"):
         states = tuple(
-            _steady_state(model, joint, energy, steady.at(energy), cycles and cycles[number])
+            _steady_state(rig, joint, energy, steady.at(energy), cycles and cycles[number])
             for number, energy in enumerate(energies)
         )
     return TimeOutcome(case, states, evolution_curve(joint, energies[-1], test, rate), numbers)
 
 
 def _steady_state(
-    model: DynamicModel,
+    rig: RigModel,
     joint: JointModel,
     energy: float,
     cycle: SteadyCycle,
     cycles: float | None,
 ) -> State:
     parameters = joint.parameters(energy)
-    numbers: dict[str, Any] = modes(model, joint.at(energy)) | {
+    numbers: dict[str, Any] = rig.modes(joint.at(energy)) | {
         "stroke": float(np.ptp(cycle.stretch)),
         "energy_per_cycle": cycle.energy,
         "force": 0.5 * float(np.ptp(cycle.force)),
-        "amplitudes": (0.5 * np.ptp(cycle.displacement, axis=0)).tolist(),
+        "amplitudes": cycle.amplitudes.tolist(),
+        **cycle.contact,
         "extracted": extracted(cycle.stretch, cycle.force, parameters["normal_load"]),
         "periods": cycle.periods,
         "change": cycle.change,
@@ -211,10 +205,10 @@ class _SteadyStates:
         self,
         case: RigCase,
         excitation: given.Harmonic,
-        model: DynamicModel,
+        rig: RigModel,
         joint: JointModel,
     ) -> None:
-        self._excitation, self._model, self._joint = excitation, model, joint
+        self._excitation, self._rig, self._joint = excitation, rig, joint
         self._steps = int(np.ceil(1.0 / (excitation.frequency * case.integration.step) - 1e-9))
         self._found: dict[float, SteadyCycle] = {}
 
@@ -227,30 +221,29 @@ class _SteadyStates:
         return self._found[energy]
 
     def _settle(self, energy: float, start: Start | None) -> SteadyCycle:
-        excitation, law = self._excitation, self._joint.at(energy)
+        excitation, rig = self._excitation, self._rig
         period = 1.0 / excitation.frequency
-        shape = force_on(self._model, excitation.mass)
-        force = Harmonic(shape, excitation.force, excitation.frequency)
+        force = Harmonic(rig.driven, excitation.force, excitation.frequency)
         control = StepControl(period / self._steps)
         if start is not None:
             # Where a period begins, whatever came before: times must not lose their digits.
             start = replace(start, time=0.0)
         before, in_a_row = np.full(2, np.inf), 0
         for periods in range(1, excitation.periods + 1):
-            motion = integrate(self._model, law, force, period, control, start)
-            check_motion(motion, energy)
+            motion = motion_of(rig, self._joint, energy, force, period, control, start)
             start = replace(motion.end, time=0.0)
-            dissipated = float(motion.energies.joints[-1, 0])
-            stretch = motion.joint_displacement[:, 0, 0]
+            dissipated = float(motion.energies.joints[-1].sum())
+            stretch, joint_force = rig.loop(motion)
             now = np.array([dissipated, np.ptp(stretch)])
             change = _change(now, before)
             in_a_row = in_a_row + 1 if change <= excitation.steady else 0
             if in_a_row == IN_A_ROW:
                 return SteadyCycle(
-                    motion.displacement,
+                    0.5 * np.ptp(motion.displacement @ rig.seen.T, axis=0),
                     stretch,
-                    motion.joint_force[:, 0, 0],
+                    joint_force,
                     dissipated,
+                    rig.contact(motion),
                     periods,
                     change,
                     motion.error,
@@ -289,7 +282,7 @@ def _aged(
         rate = _between(nodes, [steady.at(energy).energy for energy in nodes])
         test = aged(rate, ageing, (*breaks, *nodes[1:-1]))
         last = test_end(test, ageing)
-        cycles = float(test.cycles_at(last))
+        cycles = cycles_of(test, ageing)
         # By energy the cycles change, by cycles the energy.
         now = cycles if ageing.energy is not None else last
         change = abs(now - before) / now

@@ -17,10 +17,11 @@ def run_time(case: JointCase | RigCase, folder: OutputFolder, reporter: Reporter
     # Imported here: joint laws are compiled when they are first needed.
     from wear.joints.parameters import JointError
     from workflow.time_output import write_time_output
-    from workflow.worn_joint import with_computed_wear
+    from workflow.worn_joint import warn_of_table, with_computed_wear
 
     reporter.say(f"run: {case.title}")
     case = with_computed_wear(case, folder, reporter)
+    warn_of_table(case, reporter)
     try:
         if isinstance(case, JointCase):
             from workflow.time_joint import run_joint

@@ -4,10 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
+
 from workflow.case import Case, CaseError, JointCase, RigCase, WearCase, load_case
 from workflow.errors import UserError
 from workflow.folder import OutputFolder
+from workflow.loop_table import read_loop_table
 from workflow.reporter import Reporter
+
+# A joint is under the load of its table when they differ by less than this share.
+SAME_LOAD = 0.01
 
 
 def with_computed_wear(
@@ -36,6 +42,25 @@ def with_computed_wear(
         )
     evolution = case.evolution.model_copy(update={"file": str(tables[0])})
     return case.model_copy(update={"evolution": evolution})
+
+
+def warn_of_table(case: JointCase | RigCase, reporter: Reporter) -> None:
+    """Say where a table of loops is used beyond its energies, or under another load than its own."""
+    if case.evolution.file is None:
+        return
+    table = read_loop_table(Path(case.evolution.file))
+    last = max(case.energies[-1], case.ageing.energy or 0.0)
+    if last > table.energy[-1]:
+        reporter.warn(
+            f"evolution.file: its loops end at {1e-3 * table.energy[-1]:g} J; beyond, up to "
+            f"{1e-3 * last:g} J, the last one holds"
+        )
+    load = case.joint.normal_load
+    if np.any(np.abs(table.P - load) > SAME_LOAD * load):
+        reporter.warn(
+            f"evolution.file: its loops are under {table.P.min():g} to {table.P.max():g} N, the "
+            f"joint is under {load:g} N: stiffness depends on the load"
+        )
 
 
 def _wear_case(file: str) -> Case:

@@ -17,6 +17,8 @@ from fe_models.reduction import ReducedModel
 from sa_solver.types import Array
 
 NOTHING: Mapping[str, float] = {}
+# Names that fit into a message.
+MOST_TOLD = 12
 
 
 class RigError(ValueError):
@@ -25,9 +27,9 @@ class RigError(ValueError):
 
 @dataclass(frozen=True)
 class Link:
-    """What stretches by the displacement of ``second`` relative to ``first``, or to the ground."""
+    """What stretches by the displacement of ``second`` relative to ``first``; None is ground."""
 
-    second: str
+    second: str | None
     first: str | None = None
 
 
@@ -174,13 +176,15 @@ def _connection(names: tuple[str, ...], joints: Sequence[Sequence[Link]]) -> Arr
 def _stretch(names: tuple[str, ...], link: Link) -> Array:
     """The row that takes the displacements of all points to the stretch of a link."""
     row = np.zeros(len(names))
-    row[_place(names, link.second)] += 1.0
-    if link.first is not None:
-        row[_place(names, link.first)] -= 1.0
+    for name, sign in ((link.second, 1.0), (link.first, -1.0)):
+        if name is not None:
+            row[_place(names, name)] += sign
     return row
 
 
 def _place(names: tuple[str, ...], name: str) -> int:
     if name not in names:
-        raise RigError(f"there is no point {name!r}: the rig has {', '.join(names)}")
+        more = ", ..." if len(names) > MOST_TOLD else ""
+        told = ", ".join(names[:MOST_TOLD]) + more
+        raise RigError(f"there is no point {name!r}: the rig has {told}")
     return names.index(name)

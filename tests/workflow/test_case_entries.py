@@ -117,10 +117,7 @@ GIVEN |= {
 }
 # Cases in time: other joints, factors of their parameters, and other excitations.
 JOINT = {"normal_load": 60, "friction": 0.1, "stiffness": 1e4}
-JOINTS = {
-    law: {"law": law, **JOINT}
-    for law in ("jenkins", "uniform_iwan", "four_parameter_iwan", "friction_contact")
-}
+JOINTS = {law: {"law": law, **JOINT} for law in ("jenkins", "uniform_iwan", "four_parameter_iwan")}
 TOLD = [{"quantity": "a.b", "value": "3 um", "source": "a test"}]
 JOINTS["four_parameter_iwan"] |= {"chi": -0.5, "beta": 1.0}
 FACTORS = {
@@ -135,13 +132,26 @@ EVOLUTION = {
     for name in ("friction", "stiffness", "residual_stiffness", "normal_load")
 }
 GIVEN["joint"] = {"joint": JOINTS, **EVOLUTION, "reported": {ALWAYS: TOLD}}
+CONTACT = {"law": "friction_contact", **JOINT, "normal_load": 0, "normal_stiffness": 1e4}
+REDUCED = {
+    "kind": "reduced",
+    "file": "body_2.h5",
+    "joints": [{"points": "pad", "direction": "-z"}],
+    "masses": [{"points": "ring", "mass": 1}],
+    "springs": [{"points": "ring", "direction": "x", "stiffness": 1}],
+    "damping_ratio": 0.1,
+    "driven": {"points": "ring", "direction": "x"},
+    "seen": {"points": "pad", "direction": "x"},
+}
 GIVEN["rig"] = GIVEN["joint"] | {
+    "structure": {"reduced": REDUCED},
+    "joint": JOINTS | {"friction_contact": CONTACT},
     "ageing": {ALWAYS: {"cycles": 1000}},
     "excitation": {
         "hammer": {
             "kind": "hammer",
             "force": 1,
-            "duration": 1e-3,
+            "duration": 4e-4,
             "record": 1,
             "band": [1, 500],
         },
@@ -188,6 +198,8 @@ class Leaf:
             if self.key.startswith(f"{section}."):
                 chosen = [kinds[tag] for tag in (*self.tags, ALWAYS) if tag in kinds]
                 found += [f"{section}={value}" for value in chosen[:1]]
+        if "friction_contact" in self.tags:
+            found.append(f"structure={REDUCED}")
         return found
 
     @property
@@ -244,6 +256,8 @@ def folders(tmp_path_factory, template_files) -> dict[str, Folder]:
         np.save(made[kind] / "gap.npy", np.zeros(CELLS.get(kind, (0, 0))))
         (made[kind] / "history.csv").write_text("P,Qx\n1,0\n1,0.1\n", encoding="utf-8")
         (made[kind] / "force.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
+        for file in ("body_2.h5", "specimens.yaml"):
+            (made[kind] / file).touch()
         (made[kind] / "loops.csv").write_text("energy,P,kt,mu\n0,1,1,1\n", encoding="utf-8")
     return made
 
@@ -340,6 +354,8 @@ def stated(leaf):
             return ["wear.cycles=", plain]
         case "ageing.energy":
             return ["ageing.cycles=", plain]
+        case "structure.body":
+            return ["structure.file=specimens.yaml", plain]
         case "load_path.file":
             return [f"load_path={{file: {example}}}"]
         case "structure.size" if leaf.kind == "mesh":

@@ -19,7 +19,7 @@ from workflow.time_joint import steady_loop
 from workflow.verify import verify_cases
 
 CASES = Path(__file__).parents[2] / "cases"
-LAWS = ("bouc_wen", "jenkins", "uniform_iwan", "four_parameter_iwan", "friction_contact")
+LAWS = ("bouc_wen", "jenkins", "uniform_iwan", "four_parameter_iwan")
 # What closed forms and marched cycles leave: rounding.
 ROUNDING = 1e-12
 
@@ -100,7 +100,7 @@ def receptance(frequency: float, joint_stiffness: float) -> np.ndarray:
         (JOINT, "drive.stroke=0 um", "above 0"),
         (JOINT, "joint.law=coulomb", "bouc_wen, jenkins"),
         (JOINT, "joint.chi=0", "unknown key"),
-        (JOINT, "structure.kind=beam", "allowed: joint, rig"),
+        (JOINT, "structure.kind=beam", "allowed: joint, rig, reduced"),
         (JOINT, "joint={law: bouc_wen, sigma: 0.2}", "at least 0.5"),
         (RIG, "structure.springs=[1]", "1 springs for 2 masses"),
         (RIG, "excitation.mass=3", "no such mass; allowed: 1 to 2"),
@@ -119,9 +119,10 @@ def test_a_wrong_case_is_refused(text, override, words):
 
 
 def test_evolution_of_what_the_joint_has_not_is_refused():
-    overrides = ["joint.law=friction_contact", "evolution.residual_stiffness={kind: table}"]
+    contact = "joint={law: friction_contact, normal_load: 1, friction: 1, stiffness: 1, "
+    overrides = [f"{contact}normal_stiffness: 1}}", "evolution.residual_stiffness={kind: table}"]
     with pytest.raises(CaseError, match="friction_contact has no residual_stiffness"):
-        parse_case(JOINT, "case.yaml", overrides)
+        parse_case(RIG, "case.yaml", overrides)
 
 
 def test_a_file_beside_a_factor_is_refused(tmp_path):
@@ -351,15 +352,6 @@ def test_a_sliding_rig_dissipates_what_its_loop_encloses(tmp_path):
         4.0 * LIMIT * (amplitude - LIMIT / STIFFNESS), rel=1e-3
     )
     assert found["extracted"]["friction"] == pytest.approx(0.5, rel=1e-3)
-
-
-def test_a_friction_contact_in_line_is_a_jenkins_joint(tmp_path):
-    jenkins, contact = (
-        run(tmp_path / law, RIG, f"joint.law={law}", "excitation.force=200 N")["states"][0]
-        for law in ("jenkins", "friction_contact")
-    )
-    for name in ("stroke", "energy_per_cycle", "force"):
-        assert contact[name] == pytest.approx(jenkins[name], rel=1e-9)
 
 
 def test_a_rig_without_steady_state_fails(tmp_path):

@@ -19,6 +19,10 @@ DrivingForce = Annotated[
 Change = Annotated[float, Quantity("1", above=0.0, at_most=0.1)]
 MassNumber = Annotated[int, Whole(1, 20)]
 
+# Times 1/duration: below the first zero of a half sine's spectrum, at 1.5, by so much that the
+# quotient of the spectra is still good.
+SEEN = 1.4
+
 # Columns of a recorded excitation.
 RECORDED = {
     "time": Quantity("s", at_least=0.0, at_most=1e6),
@@ -37,7 +41,9 @@ class Harmonic(Section):
     """A force f sin(2π frequency t), until the answer repeats itself."""
 
     kind: Literal["harmonic"] = entry("harmonic, hammer or recorded", "harmonic")
-    mass: MassNumber = entry("that is driven, counted from the ground", 1, default=1)
+    mass: MassNumber | None = entry(
+        "of a row, that is driven, counted from the ground; without it the first", 1, default=None
+    )
     force: DrivingForce = entry("amplitude [N]", "75 N")
     frequency: Frequency = entry("of the force [Hz]", "100 Hz")
     steady: Change = entry(
@@ -54,9 +60,11 @@ class Hammer(Section):
     """A blow: half a sine of force, and the answer to it."""
 
     kind: Literal["hammer"] = entry("half a sine of force", "hammer")
-    mass: MassNumber = entry("that is hit, counted from the ground", 1, default=1)
+    mass: MassNumber | None = entry(
+        "of a row, that is hit, counted from the ground; without it the first", 1, default=None
+    )
     force: DrivingForce = entry("largest [N]", "100 N")
-    duration: Time = entry("of the blow [s]", "0.5 ms")
+    duration: Time = entry("of the blow [s]", "0.4 ms")
     record: Time = entry("length of what is recorded [s]", "1 s")
     band: tuple[Frequency, Frequency] = entry(
         "about the first mode, for its frequency and damping against amplitude [Hz]",
@@ -74,6 +82,14 @@ class Hammer(Section):
         low, high = self.band
         if low >= high:
             raise disagreement("not ascending; allowed: lower, then upper end", "band")
+        if self.highest > SEEN / self.duration:
+            raise disagreement(
+                f"{self.highest:g} Hz: nothing of 1.5/duration is in a blow of {self.duration:g} s; "
+                f"allowed: up to {SEEN / self.duration:g} Hz, or a shorter blow",
+                *("highest", "duration"),
+            )
+        if high > self.highest:
+            raise disagreement(f"up to {high:g} Hz; allowed: up to highest", "band", "highest")
         return self
 
 
@@ -81,7 +97,9 @@ class Recorded(Section):
     """A force from a file."""
 
     kind: Literal["recorded"] = entry("a force from a file", "recorded")
-    mass: MassNumber = entry("that it acts on, counted from the ground", 1, default=1)
+    mass: MassNumber | None = entry(
+        "of a row, that it acts on, counted from the ground; without it the first", 1, default=None
+    )
     file: Annotated[str, File((".csv",))] = entry(
         "columns time and force, in s and N; linear between rows", "force.csv"
     )

@@ -83,8 +83,9 @@ class JointEvolution(Section):
     residual_stiffness: Factor | None = entry("of joint.residual_stiffness", default=None)
     normal_load: Factor | None = entry("of joint.normal_load", default=None)
     file: Annotated[str, File((".csv", ".yaml"))] | None = entry(
-        "loops_<interface>.csv of a wear run, or measured: its kt and mu against energy take the "
-        "place of joint.stiffness and joint.friction; or the wear case itself, which is run first",
+        "loops_<interface>.csv of a wear run, or measured: its kt (all of the stuck slope, "
+        "joint.residual_stiffness included) and mu against energy take the place of "
+        "joint.stiffness and joint.friction; or the wear case itself, which is run first",
         "loops.csv",
         default=None,
     )

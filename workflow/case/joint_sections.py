@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
-from pydantic import Field
+from pydantic import Field, model_validator
 
 from workflow.case.fields import Quantity
-from workflow.case.sections import Section, entry
+from workflow.case.sections import Section, disagreement, entry
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual joint.
 JointStiffness = Annotated[
@@ -17,6 +17,7 @@ ResidualStiffness = Annotated[
     float, Quantity("N/mm", at_least=0.0, at_most=1e12, range_text="0 to 1e6 kN/um")
 ]
 Preload = Annotated[float, Quantity("N", at_least=0.0, at_most=1e9, range_text="0 to 1e6 kN")]
+Gap = Annotated[float, Quantity("mm", at_least=0.0, at_most=1e3)]
 Coefficient = Annotated[float, Quantity("1", at_least=0.0, at_most=10.0)]
 
 
@@ -41,7 +42,9 @@ class BoucWenJoint(RisingJoint):
     """Bouc and Wen's law, normalised: force µN ξ and the residual slope."""
 
     law: Literal["bouc_wen"] = entry(
-        "bouc_wen, jenkins, uniform_iwan, four_parameter_iwan or friction_contact", "bouc_wen"
+        "bouc_wen, jenkins, uniform_iwan or four_parameter_iwan; at the points of a reduced body "
+        "friction_contact too",
+        "bouc_wen",
     )
     stiffness: JointStiffness = entry(
         "initial slope, the residual one included [N/mm]", "27.3 N/um"
@@ -52,6 +55,15 @@ class BoucWenJoint(RisingJoint):
     exponent: Annotated[float, Quantity("1", at_least=1.0, at_most=100.0)] = entry(
         "how sharply sticking turns into sliding [1]", 2, default=2.0
     )
+
+    @model_validator(mode="after")
+    def _stiffer_than_its_rest(self) -> BoucWenJoint:
+        if self.residual_stiffness >= self.stiffness:
+            raise disagreement(
+                f"{self.residual_stiffness:g} N/mm: not below stiffness; allowed: less",
+                *("residual_stiffness", "stiffness"),
+            )
+        return self
 
 
 class JenkinsJoint(RisingJoint):
@@ -88,12 +100,29 @@ class FourParameterIwanJoint(RisingJoint):
 
 
 class FrictionContactJoint(Joint):
-    """One node of a contact: Coulomb's cone about its normal; in line it is Jenkins's element."""
+    """A point of a contact: Coulomb's cone about its normal, on a spring that lifts off."""
 
-    law: Literal["friction_contact"] = entry("one node of a contact", "friction_contact")
+    law: Literal["friction_contact"] = entry("a point of a contact", "friction_contact")
+    stiffness: JointStiffness = entry("along the surface, stuck [N/mm]", "100 N/um")
+    normal_stiffness: JointStiffness = entry("in contact [N/mm]", "100 N/um")
+    gap: Gap = entry("instead of a normal load: open by so much at rest [mm]", "1 um", default=0.0)
+
+    @model_validator(mode="after")
+    def _pressed_or_open(self) -> FrictionContactJoint:
+        if self.gap > 0.0 and self.normal_load > 0.0:
+            raise disagreement(
+                f"{self.gap:g} mm: given beside a normal load; allowed: one of them above 0",
+                *("gap", "normal_load"),
+            )
+        return self
 
 
 JointLaw = Annotated[
+    BoucWenJoint | JenkinsJoint | UniformIwanJoint | FourParameterIwanJoint,
+    Field(discriminator="law"),
+]
+# Those of a structure that moves in three directions too.
+ContactLaw = Annotated[
     BoucWenJoint | JenkinsJoint | UniformIwanJoint | FourParameterIwanJoint | FrictionContactJoint,
     Field(discriminator="law"),
 ]

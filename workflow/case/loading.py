@@ -59,7 +59,11 @@ WEAR_CASES: dict[str, type[Case]] = {
 
 
 # Cases in time by what holds the joint.
-TIME_CASES: dict[str, type[Case]] = {"joint": JointCase, "rig": RigCase}
+TIME_CASES: dict[str, type[Case]] = {
+    "joint": JointCase,
+    "rig": RigCase,
+    "reduced": RigCase,
+}
 
 
 def _kind_of_case(source: Source) -> type[Case]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-import math
 from itertools import pairwise
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
 from workflow.case.evolution import TotalEnergy
@@ -21,7 +21,8 @@ from workflow.case.excitation import (
 from workflow.case.fields import Quantity
 from workflow.case.input_files import read_columns
 from workflow.case.joint_evolution import JointEvolution
-from workflow.case.joint_sections import JointLaw
+from workflow.case.joint_sections import ContactLaw, FrictionContactJoint, Joint, JointLaw
+from workflow.case.rig_structure import ReducedBody, Rig
 from workflow.case.sections import (
     DottedPath,
     Expectation,
@@ -34,9 +35,6 @@ from workflow.case.sections import (
 )
 from workflow.case.wear_sections import Cycles
 
-Mass = Annotated[float, Quantity("t", above=0.0, at_most=1e3, range_text="above 0 to 1e6 kg")]
-Spring = Annotated[float, Quantity("N/mm", at_least=0.0, at_most=1e12, range_text="0 to 1e6 kN/um")]
-DampingRatio = Annotated[float, Quantity("1", at_least=0.0, below=1.0)]
 EndEnergy = Annotated[
     float,
     Quantity("N*mm", above=0.0, at_most=1e15, range_text="above 0 and at most 1e12 J"),
@@ -48,29 +46,6 @@ class SingleJoint(Section):
     """Nothing but the joint."""
 
     kind: Literal["joint"] = entry("what the structure is", "joint")
-
-
-class Rig(Section):
-    """Masses in a row on springs from the ground on; the joint holds the last to the ground."""
-
-    kind: Literal["rig"] = entry("what the structure is", "rig")
-    masses: Annotated[tuple[Mass, ...], Field(min_length=1, max_length=20)] = entry(
-        "from the ground on [t]", ["21.2 kg", "1.2 kg"]
-    )
-    springs: Annotated[tuple[Spring, ...], Field(min_length=1, max_length=20)] = entry(
-        "each between its mass and the one before, or the ground [N/mm]",
-        ["1.4 N/um", "273 N/um"],
-    )
-    damping_ratio: DampingRatio = entry("of every mode without the joint [1]", 0.001)
-
-    @model_validator(mode="after")
-    def _a_spring_per_mass(self) -> Rig:
-        if len(self.springs) != len(self.masses):
-            raise disagreement(
-                f"{len(self.springs)} springs for {len(self.masses)} masses; allowed: as many",
-                *("springs", "masses"),
-            )
-        return self
 
 
 class Ageing(Section):
@@ -116,7 +91,7 @@ class TimeCase(Scene):
     title: Title = entry("one line", "Bouc-Wen joint at a prescribed stroke")
     analysis: Literal["time"] = entry("what is computed", "time")
     structure: Section = entry("what holds the joint")
-    joint: JointLaw = entry("its law, and the parameters that it begins with")
+    joint: Joint = entry("its law, and the parameters that it begins with")
     evolution: JointEvolution = entry(
         "of the parameters with dissipated energy; without it none", default=JointEvolution()
     )
@@ -162,6 +137,7 @@ class JointCase(TimeCase):
     """A joint alone, moved to and fro until it is worn."""
 
     structure: SingleJoint = entry("what holds the joint: nothing but its drive")
+    joint: JointLaw = entry("its law, and the parameters that it begins with")
     drive: Drive = entry("motion that is imposed on the joint")
     ageing: Ageing = entry("how long it is driven")
 
@@ -187,7 +163,12 @@ class RigCase(TimeCase):
     """A rig with a joint that is shaken, hit, or driven by a recorded force."""
 
     title: Title = entry("one line", "Friction rig driven by a force")
-    structure: Rig = entry("what holds the joint")
+    structure: Annotated[Rig | ReducedBody, Field(discriminator="kind")] = entry(
+        "what holds the joint"
+    )
+    joint: ContactLaw = entry(
+        "its law, and the parameters that it begins with; several joints share them evenly"
+    )
     excitation: Excitation = entry("what drives the rig")
     ageing: SteadyAgeing = entry(
         "for a harmonic force: how long the joint is worn in steady states; without an end not "
@@ -198,10 +179,25 @@ class RigCase(TimeCase):
 
     @model_validator(mode="after")
     def _drives_a_mass(self) -> RigCase:
-        count = len(self.structure.masses)
-        if self.excitation.mass > count:
+        mass = self.excitation.mass
+        if isinstance(self.structure, ReducedBody):
+            if mass is not None:
+                raise disagreement(
+                    f"{mass}: given beside a reduced body; allowed: structure.driven",
+                    "excitation.mass",
+                )
+        elif mass is not None and mass > len(self.structure.masses):
+            count = len(self.structure.masses)
+            raise disagreement(f"{mass}: no such mass; allowed: 1 to {count}", "excitation.mass")
+        return self
+
+    @model_validator(mode="after")
+    def _has_the_directions(self) -> RigCase:
+        if isinstance(self.joint, FrictionContactJoint) and isinstance(self.structure, Rig):
             raise disagreement(
-                f"{self.excitation.mass}: no such mass; allowed: 1 to {count}", "excitation.mass"
+                "friction_contact: has three directions; allowed: in a reduced structure, or "
+                "jenkins, which it is along one",
+                "joint.law",
             )
         return self
 
@@ -219,7 +215,7 @@ class RigCase(TimeCase):
     @model_validator(mode="after")
     def _step_resolves(self) -> RigCase:
         longest = _longest_step(self.excitation)
-        if self.integration.step > longest:
+        if self.integration.step > (1.0 + ROUNDING) * longest:
             raise disagreement(
                 f"{self.integration.step:g} s: too long for the excitation; "
                 f"allowed: up to {longest:g} s",
@@ -235,11 +231,11 @@ class RigCase(TimeCase):
 
     def outline(self) -> list[tuple[str, str]]:
         """What would run, in a few rows of name and text."""
-        masses = ", ".join(f"{1e3 * mass:g}" for mass in self.structure.masses)
+        structure = self.structure
         rows = [
-            ("structure", f"rig of {masses} kg, damping ratio {self.structure.damping_ratio:g}"),
+            ("structure", f"{structure.text}, damping ratio {structure.damping_ratio:g}"),
             ("joint", joint_outline(self)),
-            ("excitation", excitation_outline(self.excitation)),
+            ("excitation", excitation_outline(self)),
             ("steps", f"of {self.integration.step:g} s"),
         ]
         if self.ageing.wanted:
@@ -247,6 +243,8 @@ class RigCase(TimeCase):
         return rows
 
 
+# Of the difference of two recorded times.
+ROUNDING = 1e-9
 # Steps in a period or a blow: with fewer the excitation itself is not seen.
 FEWEST_STEPS = 20
 
@@ -257,7 +255,7 @@ def _longest_step(excitation: Harmonic | Hammer | Recorded) -> float:
         return 1.0 / (FEWEST_STEPS * excitation.frequency)
     if isinstance(excitation, Hammer):
         return min(excitation.duration / FEWEST_STEPS, 0.5 / excitation.highest)
-    return math.inf
+    return float(np.diff(read_columns(excitation.file, RECORDED)["time"]).min())
 
 
 def _kept_time(excitation: Harmonic | Hammer | Recorded) -> float:
@@ -287,16 +285,20 @@ def joint_outline(case: TimeCase) -> str:
     return f"{case.joint.law} under {case.joint.normal_load:g} N, {evolves}, {looked_at}"
 
 
-def excitation_outline(excitation: Harmonic | Hammer | Recorded) -> str:
+def excitation_outline(case: RigCase) -> str:
     """What drives a rig, in a line."""
+    excitation, structure = case.excitation, case.structure
+    place = f"mass {excitation.mass or 1}"
+    if isinstance(structure, ReducedBody):
+        place = f"{structure.driven.points} along {structure.driven.direction}"
     if isinstance(excitation, Harmonic):
-        return f"{excitation.force:g} N at {excitation.frequency:g} Hz on mass {excitation.mass}"
+        return f"{excitation.force:g} N at {excitation.frequency:g} Hz on {place}"
     if isinstance(excitation, Hammer):
         return (
-            f"blow of {excitation.force:g} N and {excitation.duration:g} s on mass "
-            f"{excitation.mass}, {excitation.record:g} s recorded"
+            f"blow of {excitation.force:g} N and {excitation.duration:g} s on {place}, "
+            f"{excitation.record:g} s recorded"
         )
-    return f"{excitation.file} on mass {excitation.mass}"
+    return f"{excitation.file} on {place}"
 
 
 def ageing_outline(ageing: Ageing) -> str:

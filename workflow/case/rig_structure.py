@@ -1,0 +1,126 @@
+"""What holds the joints of a rig: masses in a row, or a body reduced to a few points."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from workflow.case.fields import File, Quantity, Whole
+from workflow.case.sections import Section, Title, disagreement, entry
+
+Mass = Annotated[float, Quantity("t", above=0.0, at_most=1e3, range_text="above 0 to 1e6 kg")]
+Spring = Annotated[float, Quantity("N/mm", at_least=0.0, at_most=1e12, range_text="0 to 1e6 kN/um")]
+DampingRatio = Annotated[float, Quantity("1", at_least=0.0, below=1.0)]
+Direction = Literal["x", "y", "z", "-x", "-y", "-z"]
+
+
+class Rig(Section):
+    """Masses in a row on springs from the ground on; the joint holds the last to the ground."""
+
+    kind: Literal["rig"] = entry("rig or reduced", "rig")
+    masses: Annotated[tuple[Mass, ...], Field(min_length=1, max_length=20)] = entry(
+        "from the ground on [t]", ["21.2 kg", "1.2 kg"]
+    )
+    springs: Annotated[tuple[Spring, ...], Field(min_length=1, max_length=20)] = entry(
+        "each between its mass and the one before, or the ground [N/mm]",
+        ["1.4 N/um", "273 N/um"],
+    )
+    damping_ratio: DampingRatio = entry("of every mode without the joint [1]", 0.001)
+
+    @model_validator(mode="after")
+    def _a_spring_per_mass(self) -> Rig:
+        if len(self.springs) != len(self.masses):
+            raise disagreement(
+                f"{len(self.springs)} springs for {len(self.masses)} masses; allowed: as many",
+                *("springs", "masses"),
+            )
+        return self
+
+    @property
+    def text(self) -> str:
+        """The rig in a few words."""
+        return f"rig of {', '.join(f'{1e3 * mass:g}' for mass in self.masses)} kg"
+
+
+class Points(Section):
+    """Kept points of a reduced body."""
+
+    points: Title = entry("one, such as pad 17, or all of a kind, such as pad", "pad")
+
+
+class Moved(Points):
+    """Kept points of a reduced body, and a direction."""
+
+    direction: Direction = entry("x, y, z, -x, -y or -z", "x")
+
+
+class Against(Moved):
+    """What connects kept points with others or with the ground."""
+
+    against: Title | None = entry(
+        "other points, as many, or one for all; without it the ground", "ring", default=None
+    )
+
+
+class JointPlaces(Against):
+    """A joint at each of some points."""
+
+    direction: Direction = entry(
+        "in which the points move when the joint stretches; those of a friction contact move so to "
+        "close it, and slide across",
+        "-z",
+    )
+
+
+class AddedMass(Points):
+    """A mass that points share evenly."""
+
+    mass: Mass = entry("of all of them together [t]", "1.2 kg")
+
+
+class AddedSpring(Against):
+    """A spring that points share evenly."""
+
+    stiffness: Spring = entry("of all of them together [N/mm]", "273 N/um")
+
+
+class ReducedBody(Section):
+    """A body on a few points and its lowest modes, with joints, masses and springs there."""
+
+    kind: Literal["reduced"] = entry("a Craig-Bampton model with joints at its points", "reduced")
+    file: Annotated[str, File((".h5", ".yaml"))] = entry(
+        "body_1.h5 or body_2.h5 of a specimens run; or the specimens case itself, whose body is "
+        "reduced first; its points are pad 1, pad 2, ... and ring 1, ring 2, ...",
+        "body_2.h5",
+    )
+    body: Annotated[int, Whole(1, 2)] | None = entry(
+        "of a specimens case: 1 below its pad, or 2 above", 2, default=None
+    )
+    joints: tuple[JointPlaces, ...] = entry("where they are")
+    masses: tuple[AddedMass, ...] = entry("added, moving in x, y and z", default=())
+    springs: tuple[AddedSpring, ...] = entry("added", default=())
+    damping_ratio: DampingRatio = entry("of every mode without the joints [1]", 0.001)
+    driven: Moved = entry("points that share the force of the excitation evenly")
+    seen: Moved = entry("points whose mean displacement is looked at")
+
+    @model_validator(mode="after")
+    def _body_of_a_case(self) -> ReducedBody:
+        of_a_case = self.file.endswith(".yaml")
+        if of_a_case != (self.body is not None):
+            wrong = "missing" if of_a_case else f"{self.body}: given beside a single body"
+            raise disagreement(f"{wrong}; allowed: with a case of specimens, 1 or 2", "body")
+        return self
+
+    @model_validator(mode="after")
+    def _has_joints(self) -> ReducedBody:
+        if not self.joints:
+            raise disagreement("none; allowed: one or more", "joints")
+        return self
+
+    @property
+    def text(self) -> str:
+        """The structure in a few words."""
+        places = ", ".join(own.points for own in self.joints)
+        return f"reduced body of {Path(self.file).name}, joints at {places}"

@@ -1,0 +1,192 @@
+"""A rig made of a reduced body: joints, masses and springs at the points that it is reduced to."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from fe_models.dynamics.rig import Link, RigError, reduced_rig, unit_force
+from fe_models.mesh import MeshError
+from fe_models.reduction import ReducedModel, load_reduced
+from workflow.case import CaseError, RigCase, SpecimensCase, load_case
+from workflow.case.joint_sections import FrictionContactJoint
+from workflow.case.rig_structure import Against, JointPlaces, Moved, ReducedBody
+from workflow.errors import UserError
+from workflow.memory import check_memory
+from workflow.reporter import Reporter
+from workflow.rig_model import RigModel
+from workflow.specimens_model import SpecimensModel
+
+AXES = "xyz"
+
+
+def reduced_rig_model(case: RigCase, body: ReducedBody, reporter: Reporter) -> RigModel:
+    """The rig that a reduced body makes, with its joints.
+
+    Raises UserError for a file without such a body, and for points that it does not have.
+    """
+    with reporter.stage("reduction"):
+        reduced = _reduced_body(body, reporter)
+    check_memory(case, len(reduced.stiffness))
+    points = _Points(reduced)
+    directions = 3 if isinstance(case.joint, FrictionContactJoint) else 1
+    joints = [
+        joint
+        for number, own in enumerate(body.joints)
+        for joint in points.joints(own, directions, f"joints.{number}")
+    ]
+    try:
+        model = reduced_rig(
+            reduced,
+            points.names,
+            joints,
+            points.masses(body),
+            points.springs(body),
+            body.damping_ratio,
+        )
+        driven, seen = (
+            np.sum([share * unit_force(model, name) for name, share in points.shared(own, key)], 0)
+            for own, key in ((body.driven, "driven"), (body.seen, "seen"))
+        )
+    except RigError as error:
+        raise UserError(f"structure: {error}") from error
+    return RigModel(model, driven, seen[None], directions, _along(case, body), in_a_row=False)
+
+
+def _along(case: RigCase, body: ReducedBody) -> int:
+    """The joints' direction that is looked at: their only one, or of two across the one seen."""
+    if not isinstance(case.joint, FrictionContactJoint):
+        return 0
+    across = _across(body.joints[0].direction)
+    axis = body.seen.direction[-1]
+    return across.index(axis) if axis in across else 0
+
+
+def _across(direction: str) -> list[str]:
+    """The two axes across a direction."""
+    return [axis for axis in AXES if axis != direction[-1]]
+
+
+# --- the body -----------------------------------------------------------------------------------
+
+
+def _reduced_body(body: ReducedBody, reporter: Reporter) -> ReducedModel:
+    if body.body is None:
+        try:
+            return load_reduced(Path(body.file))
+        except (OSError, ValueError) as error:
+            raise UserError(f"structure.file: {error}") from error
+    try:
+        case = load_case(Path(body.file))
+    except CaseError as error:
+        raise UserError(f"structure.file: {error}") from error
+    if not isinstance(case, SpecimensCase):
+        raise UserError(
+            f"structure.file: {body.file} reduces no body; allowed: a case of specimens"
+        )
+    model = SpecimensModel(case)
+    try:
+        check_memory(case, model.node_count())
+        found = model.reduction.models[body.body - 1]
+    except MeshError as error:
+        raise UserError(f"structure.file: {body.file}: {error}") from error
+    if model.from_cache:
+        reporter.log("reduction: from the cache")
+    return found
+
+
+# --- its points ---------------------------------------------------------------------------------
+
+
+class _Points:
+    """The kept points of a body by name, and what is put there."""
+
+    def __init__(self, reduced: ReducedModel) -> None:
+        if reduced.names is None:
+            raise UserError(
+                "structure.file: a model whose kept displacements have no names; allowed: one of a "
+                "specimens run, or written with names"
+            )
+        self.names = reduced.names
+        # Each once, in order.
+        self._points = list(dict.fromkeys(name.rpartition(" ")[0] for name in self.names))
+
+    def of(self, wanted: str, key: str) -> list[str]:
+        """The point of that name, or all of that kind."""
+        if wanted in self._points:
+            return [wanted]
+        found = [point for point in self._points if _kind(point) == wanted]
+        if not found:
+            kinds = Counter(map(_kind, self._points))
+            known = [f"{kind}, {kind} 1 to {kind} {count}" for kind, count in kinds.items() if kind]
+            known += [point for point in self._points if not _kind(point)]
+            raise UserError(
+                f"structure.{key}: '{wanted}': no such point; allowed: {', '.join(known)}"
+            )
+        return found
+
+    def pairs(self, own: Against, key: str) -> list[tuple[str, str | None]]:
+        """Each point and that against which it moves, None for the ground."""
+        points = self.of(own.points, f"{key}.points")
+        if own.against is None:
+            return [(point, None) for point in points]
+        others = self.of(own.against, f"{key}.against")
+        if len(others) == 1:
+            others *= len(points)
+        if len(others) != len(points):
+            raise UserError(
+                f"structure.{key}.against: {len(others)} points for {len(points)}; allowed: as "
+                "many, or one"
+            )
+        pairs = list(zip(points, others, strict=True))
+        for point, other in pairs:
+            if point == other:
+                raise UserError(f"structure.{key}.against: {point} against itself; allowed: others")
+        return [(point, other) for point, other in pairs]
+
+    def joints(self, own: JointPlaces, directions: int, key: str) -> Iterator[list[Link]]:
+        """The links of every joint: that along its direction; three with it as the last."""
+        across = _across(own.direction) if directions > 1 else []
+        for point, other in self.pairs(own, key):
+            yield [_link(point, other, axis) for axis in (*across, own.direction)]
+
+    def masses(self, body: ReducedBody) -> dict[str, float]:
+        """Masses added to displacements [t]."""
+        added: defaultdict[str, float] = defaultdict(float)
+        for number, own in enumerate(body.masses):
+            points = self.of(own.points, f"masses.{number}.points")
+            for name in self.names:
+                if name.rpartition(" ")[0] in points:
+                    added[name] += own.mass / len(points)
+        return added
+
+    def springs(self, body: ReducedBody) -> dict[Link, float]:
+        """Springs added between displacements [N/mm]."""
+        added: defaultdict[Link, float] = defaultdict(float)
+        for number, own in enumerate(body.springs):
+            pairs = self.pairs(own, f"springs.{number}")
+            for point, other in pairs:
+                added[_link(point, other, own.direction)] += own.stiffness / len(pairs)
+        return added
+
+    def shared(self, own: Moved, key: str) -> list[tuple[str, float]]:
+        """Displacements along a direction, and the even share of each with its sign."""
+        points = self.of(own.points, f"{key}.points")
+        sign = -1.0 if own.direction.startswith("-") else 1.0
+        return [(f"{point} {own.direction[-1]}", sign / len(points)) for point in points]
+
+
+def _kind(point: str) -> str:
+    """What a point's name begins with, before its number; nothing where it has none."""
+    kind, _, number = point.rpartition(" ")
+    return kind if number.isdecimal() else ""
+
+
+def _link(point: str, other: str | None, direction: str) -> Link:
+    """What stretches when a point moves in a direction, from another or the ground."""
+    axis = direction[-1]
+    ends = f"{point} {axis}", None if other is None else f"{other} {axis}"
+    return Link(*reversed(ends)) if direction.startswith("-") else Link(*ends)
