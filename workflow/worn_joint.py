@@ -45,7 +45,7 @@ def with_computed_wear(
 
 
 def warn_of_table(case: JointCase | RigCase, reporter: Reporter) -> None:
-    """Say where a table of loops is used beyond its energies, or under another load than its own."""
+    """Say where a table of loops is used beyond its energies, or under another load."""
     if case.evolution.file is None:
         return
     table = read_loop_table(Path(case.evolution.file))

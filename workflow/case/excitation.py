@@ -84,7 +84,7 @@ class Hammer(Section):
             raise disagreement("not ascending; allowed: lower, then upper end", "band")
         if self.highest > SEEN / self.duration:
             raise disagreement(
-                f"{self.highest:g} Hz: nothing of 1.5/duration is in a blow of {self.duration:g} s; "
+                f"{self.highest:g} Hz: 1.5/duration is not in a blow of {self.duration:g} s; "
                 f"allowed: up to {SEEN / self.duration:g} Hz, or a shorter blow",
                 *("highest", "duration"),
             )
