@@ -49,7 +49,7 @@ SERIES_BELOW = 1e-2
 
 
 @njit(cache=True)
-def _rate(eta: float, exponent: float, gain: float) -> float:
+def xi_rate(eta: float, exponent: float, gain: float) -> float:
     """dη/ds."""
     power: float = abs(eta) ** exponent
     return 1.0 - power if eta > 0.0 else 1.0 + gain * power
@@ -98,16 +98,16 @@ def _step_finely(eta: float, s: float, exponent: float, gain: float) -> tuple[fl
     """From η over s by the fourth-order rule: η there, and the loss."""
     lost = 0.0
     while s > 0.0 and eta < SATURATED:
-        rate = _rate(eta, exponent, gain)
+        rate = xi_rate(eta, exponent, gain)
         step = min(s, SUBSTEP / exponent, max(GRADING * abs(eta), FIRST_SUBSTEP))
         if eta < 0.0:
             # Falls short of ξ = 0, where the rate has a corner, by ever less.
             step = min(step, -eta / rate)
-        second = _rate(eta + 0.5 * step * rate, exponent, gain)
-        third = _rate(eta + 0.5 * step * second, exponent, gain)
-        fourth = _rate(eta + step * third, exponent, gain)
+        second = xi_rate(eta + 0.5 * step * rate, exponent, gain)
+        third = xi_rate(eta + 0.5 * step * second, exponent, gain)
+        fourth = xi_rate(eta + step * third, exponent, gain)
         end = eta + step * (rate + 2.0 * second + 2.0 * third + fourth) / 6.0
-        middle = 0.5 * (eta + end) + step * (rate - _rate(end, exponent, gain)) / 8.0
+        middle = 0.5 * (eta + end) + step * (rate - xi_rate(end, exponent, gain)) / 8.0
         # Simpson's rule on η, at the middle of Hermite's cubic.
         lost += step * (eta + 4.0 * middle + end) / 6.0 - 0.5 * (end * end - eta * eta)
         s -= step
@@ -161,7 +161,7 @@ def advance(
     xi = sign * eta
     return (
         limit * xi + residual * displacement,
-        residual + spring * _rate(eta, exponent, gain),
+        residual + spring * xi_rate(eta, exponent, gain),
         displacement,
         xi,
         limit * (limit / spring) * max(lost, 0.0),

@@ -97,7 +97,7 @@ def _renew(curve: Curve, memory: Array) -> None:
 
 
 @njit(cache=True)
-def _turns(memory: Array, depth: int, end: float) -> bool:
+def turns(memory: Array, depth: int, end: float) -> bool:
     """Whether going to ``end`` leaves the present curve backwards."""
     start: float = memory[DISPLACEMENT]
     origin: float = 0.0 if depth == 0 else memory[POINTS + 2 * (depth - 1)]
@@ -126,7 +126,7 @@ def advance(
     if end == here:
         force, slope, _ = _on_curve(curve, memory, depth, end)
         return force + residual * end, slope + residual, 0.0
-    if _turns(memory, depth, end):
+    if turns(memory, depth, end):
         place = POINTS + 2 * depth
         memory[place + 1] = _on_curve(curve, memory, depth, here)[0]
         memory[place] = here

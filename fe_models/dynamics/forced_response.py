@@ -1,0 +1,219 @@
+"""Forced response of a structure with joints: its periodic motions along frequency or force."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from fe_models.dynamics.continuation import (
+    Curve,
+    Equations,
+    Point,
+    Refinement,
+    StepControl,
+    first_point,
+    follow,
+    solve,
+)
+from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance, HarmonicSolution
+from fe_models.dynamics.harmonics import Resolution
+from sa_solver.types import Array
+
+# A harmonic left out is added where it has this share of the tolerance: many may sum up.
+ADDED = 0.2
+# Samples per period of the highest harmonic, at least: a corner of a joint's force is then seen.
+SAMPLES_PER_PERIOD = 8
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """How accurate motions are to be: ``tolerance`` of ``left_out`` and ``sampling`` each.
+
+    Harmonics and samples grow as needed up to the ``highest`` harmonic and ``most_samples``; what
+    then is left is in the solutions.
+    """
+
+    tolerance: float
+    highest: int = 63
+    most_samples: int = 4096
+
+
+@dataclass(frozen=True)
+class Branch:
+    """Motions in the order in which they were found, the first one included.
+
+    ``message`` is empty if the branch reached an end of its span. ``points`` are those of the
+    curve, and ``problem`` is what it ended with, to go on from its last point.
+    """
+
+    solutions: tuple[HarmonicSolution, ...]
+    curve: Curve
+    problem: HarmonicBalance
+
+    @property
+    def message(self) -> str:
+        return self.curve.message
+
+    @property
+    def frequencies(self) -> Array:
+        return np.array([solution.frequency for solution in self.solutions])
+
+    @property
+    def forces(self) -> Array:
+        return np.array([solution.force for solution in self.solutions])
+
+    def first_amplitudes(self, place: int) -> Array:
+        """Size of harmonic 1 of a degree of freedom ``(s,)`` [mm]."""
+        return np.array([abs(solution.amplitude(place)) for solution in self.solutions])
+
+
+def along_frequency(
+    problem: HarmonicBalance,
+    force: float,
+    span: tuple[float, float],
+    start: HarmonicSolution | Branch | None = None,
+    *,
+    upward: bool = True,
+    control: StepControl | None = None,
+    accuracy: Accuracy | None = None,
+) -> Branch:
+    """Motions under a force for the frequencies of ``span`` [Hz], folds included.
+
+    From its lower end upward or from its upper end downward; from a ``start`` if there is one: a
+    solution as a first guess, or a branch, to go on from its last point. Without ``accuracy`` the
+    resolution is that of the problem.
+    """
+    return _branch(problem, _Along("frequency", force), span, start, upward, control, accuracy)
+
+
+def along_force(
+    problem: HarmonicBalance,
+    frequency: float,
+    span: tuple[float, float],
+    start: HarmonicSolution | Branch | None = None,
+    *,
+    upward: bool = True,
+    control: StepControl | None = None,
+    accuracy: Accuracy | None = None,
+) -> Branch:
+    """Motions at a frequency [Hz] for the forces of ``span``; see :func:`along_frequency`."""
+    return _branch(problem, _Along("force", frequency), span, start, upward, control, accuracy)
+
+
+@dataclass(frozen=True)
+class _Along:
+    """What varies along a branch, and the value of the other."""
+
+    varies: Literal["frequency", "force"]
+    other: float
+
+    def equations(self, problem: HarmonicBalance) -> Equations[Balance]:
+        if self.varies == "frequency":
+            return problem.by_frequency(self.other)
+        return problem.by_force(self.other)
+
+    def frequency_and_force(self, parameter: float) -> tuple[float, float]:
+        return (parameter, self.other) if self.varies == "frequency" else (self.other, parameter)
+
+
+class _Recorder:
+    """Describes every new point of a branch, and asks for finer equations where needed."""
+
+    def __init__(self, problem: HarmonicBalance, along: _Along, accuracy: Accuracy | None) -> None:
+        self.problem, self._along, self._accuracy = problem, along, accuracy
+        self.solutions: list[HarmonicSolution] = []
+
+    def __call__(self, point: Point, at: Balance) -> Refinement[Balance] | None:
+        solution = replace(
+            self.problem.describe(
+                point.unknowns,
+                at,
+                *self._along.frequency_and_force(point.parameter),
+                check=self._accuracy is not None,
+            ),
+            iterations=point.iterations,
+        )
+        if self._accuracy is not None:
+            finer = finer_resolution(self.problem, solution, self._accuracy)
+            if finer is not None:
+                return self._refine(finer)
+        self.solutions.append(solution)
+        return None
+
+    def _refine(self, finer: Resolution) -> Refinement[Balance]:
+        coarse, self.problem = self.problem.resolution, self.problem.refined(finer)
+        size = coarse.size, self.problem.joints.directions
+
+        def lift(unknowns: Array) -> Array:
+            return finer.adopt(unknowns.reshape(-1, *size), coarse).ravel()
+
+        return Refinement(self._along.equations(self.problem), lift)
+
+
+def finer_resolution(
+    problem: HarmonicBalance, solution: HarmonicSolution, accuracy: Accuracy
+) -> Resolution | None:
+    """The resolution that a solution asks for, None if its own will do or is the finest allowed."""
+    own, tolerance = problem.resolution, accuracy.tolerance
+    harmonics, samples = own.harmonics, own.samples
+    if solution.left_out > tolerance:
+        shares = problem.left_out(solution.coefficients, solution.cycle, solution.frequency)
+        missing = np.flatnonzero(shares > ADDED * tolerance)
+        added = set(missing[missing <= accuracy.highest].tolist())
+        harmonics = tuple(sorted(added.union(harmonics)))
+    if solution.sampling is not None and solution.sampling > tolerance:
+        samples *= 2
+    while samples < SAMPLES_PER_PERIOD * harmonics[-1]:
+        samples *= 2
+    finer = Resolution(harmonics, min(samples, max(accuracy.most_samples, own.samples)))
+    return None if finer == own else finer
+
+
+def _branch(
+    problem: HarmonicBalance,
+    along: _Along,
+    span: tuple[float, float],
+    start: HarmonicSolution | Branch | None,
+    upward: bool,
+    control: StepControl | None,
+    accuracy: Accuracy | None,
+) -> Branch:
+    control = control or StepControl()
+    if isinstance(start, Branch):
+        record, point = _Recorder(start.problem, along, accuracy), start.curve.points[-1]
+    else:
+        record = _Recorder(problem, along, accuracy)
+        found = _first(record, along, span[0 if upward else 1], start, upward, control)
+        if isinstance(found, str):
+            return Branch((), Curve((), found), problem)
+        point = found
+    # Steps are shares of the vibration: the displacement under the constant load may be far larger.
+    rest = record.problem.guess(None)
+    curve = follow(along.equations(record.problem), point, span, control, record, rest)
+    return Branch(tuple(record.solutions), curve, record.problem)
+
+
+def _first(
+    record: _Recorder,
+    along: _Along,
+    parameter: float,
+    start: HarmonicSolution | None,
+    upward: bool,
+    control: StepControl,
+) -> Point | str:
+    """The first point of a branch, recorded; or why there is none."""
+    frequency, force = along.frequency_and_force(parameter)
+    problem, unknowns = record.problem, record.problem.guess(start)
+    while True:
+        found = problem.find(frequency, force, unknowns, control)
+        if not found.converged:
+            return found.message
+        if along.varies == "force":
+            found = solve(along.equations(problem), found.unknowns, parameter)
+        point = first_point(found, parameter, upward, control.first)
+        finer = record(point, found.at)
+        if finer is None:
+            return point
+        problem, unknowns = record.problem, finer.lift(found.unknowns)

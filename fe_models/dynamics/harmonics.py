@@ -1,0 +1,120 @@
+"""Harmonics of a periodic motion: functions of time, and complex amplitudes.
+
+Coefficients of a motion are ordered by joint, function of time and direction. The functions are 1
+for harmonic 0, and cos kωt, sin kωt for each other harmonic k.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sa_solver.types import Array
+
+ComplexArray = np.ndarray
+
+
+class HarmonicBalanceError(ValueError):
+    """Harmonics, samples or forces that do not make a problem."""
+
+
+@dataclass(frozen=True)
+class Resolution:
+    """``harmonics`` of the motion, ascending from 0 or above, and ``samples`` of a period.
+
+    Raises :class:`HarmonicBalanceError` for harmonics out of order, or for fewer samples than show
+    the highest of them: two per period of it, and one more.
+    """
+
+    harmonics: tuple[int, ...]
+    samples: int
+
+    def __post_init__(self) -> None:
+        given = self.harmonics
+        if not given or given[0] < 0 or list(given) != sorted(set(given)) or given[-1] == 0:
+            raise HarmonicBalanceError(
+                f"harmonics {given}: give them ascending, each once, from 0 or above, one above 0"
+            )
+        if self.samples <= 2 * given[-1]:
+            raise HarmonicBalanceError(
+                f"{self.samples} samples of a period cannot show harmonic {given[-1]}: give more "
+                f"than {2 * given[-1]}, better ten times as many"
+            )
+
+    @property
+    def size(self) -> int:
+        """Functions of time m."""
+        return 2 * len(self.harmonics) - (0 in self.harmonics)
+
+    @cached_property
+    def places(self) -> tuple[np.ndarray, np.ndarray]:
+        """Function of time that is the cosine, and the sine, of each harmonic; -1 for no sine."""
+        still = int(0 in self.harmonics)
+        cosine = 2 * np.arange(len(self.harmonics)) - still
+        cosine[0] = 0
+        sine = cosine + 1
+        if still:
+            sine[0] = -1
+        return cosine, sine
+
+    def functions(self, samples: int) -> Array:
+        """The functions of time ``(t, m)`` at equal times in a period, from its beginning on."""
+        values = np.empty((samples, self.size))
+        turns = np.outer(np.arange(samples), self.harmonics) % samples * (2.0 * np.pi / samples)
+        cosine, sine = self.places
+        values[:, cosine] = np.cos(turns)
+        values[:, sine[sine >= 0]] = np.sin(turns[:, sine >= 0])
+        return values
+
+    @cached_property
+    def basis(self) -> Array:
+        return self.functions(self.samples)
+
+    @cached_property
+    def weights(self) -> Array:
+        """From samples to coefficients ``(m, t)``."""
+        weights = 2.0 / self.samples * self.basis.T
+        if 0 in self.harmonics:
+            weights[0] *= 0.5
+        return np.ascontiguousarray(weights)
+
+    @cached_property
+    def lead(self) -> Array:
+        """Joints are led to the mean displacement first, then to that at the first time."""
+        mean = np.eye(1, self.size) if 0 in self.harmonics else self.basis[:0]
+        return np.vstack([mean, self.basis[:1]])
+
+    @cached_property
+    def _combination(self) -> ComplexArray:
+        """From coefficients to complex amplitudes ``(k, m)``."""
+        combination = np.zeros((len(self.harmonics), self.size), dtype=complex)
+        cosine, sine = self.places
+        rows = np.arange(len(self.harmonics))
+        combination[rows, cosine] = 1.0
+        combination[rows[sine >= 0], sine[sine >= 0]] = -1j
+        return combination
+
+    def amplitudes(self, coefficients: Array) -> ComplexArray:
+        """Complex amplitudes ``(k, j d)`` of coefficients ``(j, m, d)``."""
+        by_joint = self._combination @ coefficients
+        return np.asarray(by_joint.transpose(1, 0, 2).reshape(len(self.harmonics), -1))
+
+    def coefficients(self, amplitudes: ComplexArray, directions: int) -> Array:
+        """The inverse of :meth:`amplitudes`."""
+        by_joint = amplitudes.reshape(len(self.harmonics), -1, directions).transpose(1, 0, 2)
+        return np.asarray((self._combination.conj().T @ by_joint).real)
+
+    def adopt(self, coefficients: Array, other: Resolution) -> Array:
+        """Coefficients ``(j, m, d)`` for these harmonics of those for others; 0 where it has none.
+
+        Harmonics that only the other has are dropped.
+        """
+        adopted = np.zeros((len(coefficients), self.size, coefficients.shape[2]))
+        for own, theirs in zip(self.places, other.places, strict=True):
+            for place, harmonic in zip(own, self.harmonics, strict=True):
+                if place >= 0 and harmonic in other.harmonics:
+                    there = theirs[other.harmonics.index(harmonic)]
+                    adopted[:, place] = coefficients[:, there]
+        return adopted

@@ -1,0 +1,124 @@
+"""Steady motion of a structure under harmonic forces: (K + iωC - ω²M)⁻¹, by its modes.
+
+In the coordinates of its modes without joints the structure is diagonal if its damping is that of
+the modes, and small otherwise: none is left out. Complex amplitudes x stand for Re x exp(iωt), and
+``k`` frequencies ω [rad/s] ascend from 0 or above.
+
+At ω = 0 a structure that only its joints hold is singular. It is then solved with springs of one
+stiffness κ, ``held``, in every direction of the joints, and whoever uses it takes κ times the
+joints' displacement off their force: the same equations, but regular.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.linalg as sl
+
+from fe_models.dynamics.model import DynamicModel
+from sa_solver.types import Array
+
+ComplexArray = np.ndarray
+
+# Square of a natural frequency, over the largest one, below which a mode is a rigid motion: above
+# rounding, and far below what any elastic body's first mode is.
+RIGID = 1e-13
+# Damping between different modes, over the largest, below which there is none: rounding.
+DIAGONAL = 1e-10
+
+
+class ReceptanceError(ValueError):
+    """A structure without a steady motion."""
+
+
+class SteadyMotion:
+    """The structure at frequencies ``(k,)`` that ascend from 0 or above: one inverse for all uses.
+
+    Displacements and forces are those of the modes ``(k, n)``.
+    """
+
+    def __init__(self, structure: Receptance, angular: Array) -> None:
+        self._of, self._angular = structure, angular
+        # The first frequency that is not 0.
+        self._moving = int(angular[0] == 0.0)
+        moving, damping, squares = angular[self._moving :], structure.damping, structure.squares
+        if damping.ndim == 1:
+            turning = moving[:, None]
+            self._stiffness = squares - turning * turning + 1j * (turning * damping)
+        else:
+            turning = moving[:, None, None]
+            inertia = np.diag(squares) - turning * turning * np.eye(len(squares))
+            self._stiffness = inertia + 1j * turning * damping
+
+    def respond(self, force: ComplexArray) -> ComplexArray:
+        """Displacements under forces; held at ω = 0."""
+        moving, response = self._moving, np.empty(force.shape, dtype=complex)
+        if moving:
+            response[0] = sl.cho_solve(self._of.still, force[0].real)
+        if self._stiffness.ndim == 2:
+            np.divide(force[moving:], self._stiffness, out=response[moving:])
+        else:
+            response[moving:] = np.linalg.solve(self._stiffness, force[moving:, :, None])[..., 0]
+        return response
+
+    def turned(self, motion: ComplexArray) -> ComplexArray:
+        """Forces that a motion needs more per rad/s."""
+        damping = self._of.damping
+        own = motion * damping if damping.ndim == 1 else motion @ damping.T
+        return np.asarray(1j * own - 2.0 * self._angular[:, None] * motion)
+
+    def between_joints(self) -> ComplexArray:
+        """Displacements of joints by forces on joints ``(k, j d, j d)`` [mm/N]; held at ω = 0."""
+        at_joints, moving = self._of.at_joints, self._moving
+        size = len(at_joints)
+        between = np.empty((len(self._angular), size, size), dtype=complex)
+        if moving:
+            between[0] = self._of.still_joints
+        if self._stiffness.ndim == 2:
+            inverse = 1.0 / self._stiffness[:, None, :]
+            # Two real products cost half of a complex one.
+            between.real[moving:] = (at_joints * inverse.real) @ at_joints.T
+            between.imag[moving:] = (at_joints * inverse.imag) @ at_joints.T
+        else:
+            between[moving:] = at_joints @ np.linalg.solve(self._stiffness, at_joints.T)
+        return between
+
+
+class Receptance:
+    """What harmonic forces do to a structure, in displacements and forces of its modes."""
+
+    def __init__(self, model: DynamicModel) -> None:
+        try:
+            squares, shapes = sl.eigh(model.stiffness, model.mass)
+        except np.linalg.LinAlgError:
+            raise ReceptanceError(
+                "the mass matrix is not positive definite: give every point mass"
+            ) from None
+        # Rows are points and joints, columns modes (n, n) and (j d, n).
+        self.at_points, self.at_joints = shapes, model.connection @ shapes
+        rigid = squares < RIGID * squares[-1]
+        self.squares = np.where(rigid, 0.0, squares)
+        damping = shapes.T @ model.damping @ shapes
+        own = np.diag(damping)
+        across = np.abs(damping - np.diag(own)).max()
+        # Of the modes: (n,), or (n, n) where it mixes them.
+        self.damping = own.copy() if across <= DIAGONAL * np.abs(damping).max() else damping
+        self.held = self._holding() if rigid.any() else 0.0
+        try:
+            self.still = sl.cho_factor(
+                np.diag(self.squares) + self.held * self.at_joints.T @ self.at_joints
+            )
+        except np.linalg.LinAlgError:
+            raise ReceptanceError(
+                "the structure moves freely without moving a joint: hold it"
+            ) from None
+        # Displacements of joints by constant forces on joints (j d, j d), held.
+        self.still_joints = self.at_joints @ sl.cho_solve(self.still, self.at_joints.T)
+
+    def at(self, angular: Array) -> SteadyMotion:
+        """The structure at ``k`` frequencies [rad/s]."""
+        return SteadyMotion(self, angular)
+
+    def _holding(self) -> float:
+        """κ, of the size of what the structure itself opposes to its joints."""
+        joints = np.square(self.at_joints).sum()
+        return float(self.squares.sum() / joints) if joints > 0.0 else 0.0

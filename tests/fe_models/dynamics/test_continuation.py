@@ -1,0 +1,220 @@
+"""Curves with known folds, corners and ends."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fe_models.dynamics.bordered import solve_alone, solve_bordered
+from fe_models.dynamics.continuation import (
+    Linearised,
+    NewtonControl,
+    Refinement,
+    StepControl,
+    first_point,
+    follow,
+    solve,
+)
+
+EXACT = 1e-9
+
+
+def scalar(value, by_unknown, by_parameter):
+    """One equation in one unknown."""
+
+    def equations(unknowns, parameter):
+        u = float(unknowns[0])
+        return Linearised(
+            np.array([value(u, parameter)]),
+            np.array([[by_unknown(u, parameter)]]),
+            np.array([by_parameter(u, parameter)]),
+            1.0 + abs(u),
+        )
+
+    return equations
+
+
+class Products:
+    """A matrix known by its products only."""
+
+    def __init__(self, matrix):
+        self._matrix, self.asked = matrix, False
+
+    def __matmul__(self, vector):
+        return self._matrix @ vector
+
+    def assembled(self):
+        self.asked = True
+        return self._matrix
+
+
+# λ = u³ - 3 u + 5, with folds at u = ∓1, λ = 7 and 3.
+S_CURVE = scalar(
+    lambda u, p: u**3 - 3.0 * u + 5.0 - p, lambda u, p: 3.0 * u**2 - 3.0, lambda u, p: -1.0
+)
+
+
+def start(equations, guess, parameter, upward=True, step=0.02):
+    solution = solve(equations, np.array([guess]), parameter)
+    assert solution.converged
+    return first_point(solution, parameter, upward, step)
+
+
+def test_newton_ends_at_the_solution_or_says_so():
+    solution = solve(S_CURVE, np.array([-3.0]), 1.0)
+    assert solution.converged
+    assert solution.unknowns[0] ** 3 - 3.0 * solution.unknowns[0] == pytest.approx(-4.0, abs=EXACT)
+    lost = solve(
+        scalar(lambda u, p: u * u + p, lambda u, p: 2.0 * u, lambda u, p: 1.0),
+        np.array([1.0]),
+        1.0,
+        NewtonControl(max_iterations=8),
+    )
+    assert not lost.converged
+    assert "start from a solution nearby" in lost.message
+
+
+@pytest.mark.parametrize("upward", [True, False])
+def test_both_folds_are_passed_both_ways(upward):
+    first = start(S_CURVE, -3.0 if upward else 3.0, 1.0 if upward else 9.0, upward)
+    curve = follow(S_CURVE, first, (0.5, 9.5))
+    assert curve.message == ""
+    assert curve.parameters[-1] == (9.5 if upward else 0.5)
+    places = np.array([point.unknowns[0] for point in curve.points])
+    np.testing.assert_allclose(places**3 - 3.0 * places + 5.0, curve.parameters, atol=EXACT)
+    assert np.all(np.diff(places) * (1 if upward else -1) > 0.0)
+    at_folds = [places[i - 1 : i + 1] for i in curve.folds]
+    assert len(at_folds) == 2
+    for pair, fold in zip(at_folds, (-1.0, 1.0) if upward else (1.0, -1.0), strict=True):
+        assert pair.min() < fold + 0.3
+        assert pair.max() > fold - 0.3
+
+
+def test_a_curve_is_taken_up_again_from_any_point():
+    whole = follow(S_CURVE, start(S_CURVE, -3.0, 1.0), (0.5, 9.5))
+    middle = whole.points[len(whole.points) // 2]
+    rest = follow(S_CURVE, middle, (0.5, 9.5))
+    assert rest.parameters[-1] == 9.5
+    assert len(rest.folds) == sum(i > len(whole.points) // 2 for i in whole.folds)
+    again = np.array([point.unknowns[0] for point in rest.points])
+    np.testing.assert_allclose(again**3 - 3.0 * again + 5.0, rest.parameters, atol=EXACT)
+    assert np.all(np.diff(again, prepend=middle.unknowns) > 0.0)
+
+
+def test_a_closed_curve_ends_by_the_number_of_points():
+    circle = scalar(
+        lambda u, p: u * u + (p - 2.0) ** 2 - 1.0,
+        lambda u, p: 2.0 * u,
+        lambda u, p: 2.0 * (p - 2.0),
+    )
+    curve = follow(circle, start(circle, 1.0, 2.0), (0.0, 4.0), StepControl(max_points=200))
+    assert "200 points" in curve.message
+    assert len(curve.folds) >= 4
+    places = np.array([point.unknowns[0] for point in curve.points])
+    np.testing.assert_allclose(np.hypot(places, curve.parameters - 2.0), 1.0, atol=1e-8)
+
+
+@pytest.mark.parametrize("beyond", [0.2, 30.0, -1.5])
+def test_corners_are_passed(beyond):
+    """The slope changes at λ = 2, even its sign: there the curve turns back."""
+
+    def value(u, p):
+        return p - (1.0 + u if u < 1.0 else 2.0 + beyond * (u - 1.0))
+
+    corner = scalar(value, lambda u, p: -1.0 if u < 1.0 else -beyond, lambda u, p: 1.0)
+    curve = follow(corner, start(corner, 0.5, 1.5), (0.5, 3.0))
+    assert curve.message == ""
+    assert curve.parameters[-1] == (3.0 if beyond > 0.0 else 0.5)
+    assert curve.points[-1].unknowns[0] == pytest.approx(
+        1.0 + (curve.parameters[-1] - 2.0) / beyond, abs=EXACT
+    )
+
+
+def test_a_narrow_peak_is_not_jumped_over():
+    """A resonance of damping ratio 1e-4: two unknowns, phase and size turn within 1e-4 of λ."""
+
+    def equations(unknowns, parameter):
+        z = 1.0 - parameter**2
+        c = 2e-4 * parameter
+        matrix = np.array([[z, c], [-c, z]])
+        slope = np.array([[-2.0 * parameter, 2e-4], [-2e-4, -2.0 * parameter]]) @ unknowns
+        residual = matrix @ unknowns - np.array([1.0, 0.0])
+        return Linearised(residual, matrix, slope, 1.0 + np.linalg.norm(unknowns))
+
+    solution = solve(equations, np.zeros(2), 0.5)
+    curve = follow(equations, first_point(solution, 0.5, True, 0.02), (0.5, 2.0))
+    assert curve.message == ""
+    assert curve.folds == ()
+    largest = max(float(np.linalg.norm(point.unknowns)) for point in curve.points)
+    assert largest > 0.99 * 5000.0
+    assert len(curve.points) < 150
+
+
+def test_a_curve_that_ends_says_where():
+    """Beyond λ = 1 there is nothing."""
+
+    def root(u, p):
+        return u - 1.0 - (np.sqrt(1.0 - p) if p <= 1.0 else np.nan) - 0.5 * p
+
+    def slope(u, p):
+        return 0.5 / np.sqrt(1.0 - p) - 0.5 if p < 1.0 else np.inf
+
+    ending = scalar(root, lambda u, p: 1.0, slope)
+    curve = follow(ending, start(ending, 2.0, 0.5), (0.0, 2.0))
+    assert "the curve ends at " in curve.message
+    assert "go on from another point" in curve.message
+    assert curve.parameters.max() == pytest.approx(1.0, abs=1e-2)
+
+
+def test_finer_equations_take_over_on_the_way():
+    """From λ = 3 on a second unknown is asked for, which is the square of the first."""
+    coarse = scalar(lambda u, p: u - p, lambda u, p: 1.0, lambda u, p: -1.0)
+
+    def fine(unknowns, parameter):
+        u, v = unknowns
+        return Linearised(
+            np.array([u - parameter, v - u * u]),
+            np.array([[1.0, 0.0], [-2.0 * u, 1.0]]),
+            np.array([-1.0, 0.0]),
+            1.0 + abs(u) + abs(v),
+        )
+
+    def on_point(point, at):
+        if len(point.unknowns) == 1 and point.parameter > 3.0:
+            return Refinement(fine, lambda unknowns: np.append(unknowns, 0.0))
+        return None
+
+    curve = follow(coarse, start(coarse, 1.0, 1.0), (0.0, 9.0), None, on_point)
+    assert curve.message == ""
+    assert {len(point.unknowns) for point in curve.points} == {1, 2}
+    for point in curve.points:
+        assert len(point.unknowns) == 2 or point.parameter <= 3.0
+    np.testing.assert_allclose(curve.points[-1].unknowns, [9.0, 81.0], rtol=EXACT)
+
+
+def test_a_step_is_never_shorter_than_asked():
+    first = replace(start(S_CURVE, -3.0, 1.0), step=10.0)
+    curve = follow(S_CURVE, first, (0.5, 9.5), StepControl(most=0.05))
+    assert curve.message == ""
+    assert all(1e-6 <= point.step <= 0.05 for point in curve.points)
+
+
+@pytest.mark.parametrize("compact", [True, False])
+def test_bordered_systems_by_products_are_those_of_the_matrix(compact):
+    """1 and something compact is solved by products; noise of 200 unknowns has to be assembled."""
+    rng = np.random.default_rng(1)
+    noise = rng.standard_normal((200, 200))
+    matrix = np.eye(200) + noise[:, :5] @ noise[:5] if compact else noise
+    column, row, wanted = noise[0], noise[1], rng.standard_normal((201, 2))
+    bordered = np.block([[matrix, column[:, None]], [np.append(row, 0.5)]])
+    products = Products(matrix)
+    found, _ = solve_bordered(products, column, np.append(row, 0.5), wanted)
+    assert products.asked != compact
+    assert np.linalg.norm(bordered @ found - wanted) <= 1e-5 * np.linalg.norm(wanted)
+    exact, sign = solve_bordered(matrix, column, np.append(row, 0.5), wanted)
+    np.testing.assert_allclose(exact, np.linalg.solve(bordered, wanted), atol=1e-9)
+    assert sign == np.linalg.slogdet(bordered)[0]
+    alone = solve_alone(Products(matrix), wanted[:-1, 0])
+    assert np.linalg.norm(matrix @ alone - wanted[:-1, 0]) <= 1e-5 * np.linalg.norm(wanted[:, 0])

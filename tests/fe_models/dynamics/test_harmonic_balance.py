@@ -1,0 +1,438 @@
+"""Harmonic balance against closed forms, linear limits and exact integration in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from fe_models.dynamics import harmonic_balance
+from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
+from fe_models.dynamics.excitation import Harmonic
+from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.model import DynamicModel
+from fe_models.dynamics.receptance import Receptance, ReceptanceError
+from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, two_mass_rig, unit_force
+from wear.joints.friction_contact import FrictionContact
+from wear.joints.jenkins import Jenkins
+from wear.joints.periodic import SEPARATED, SLIP, STICK, PeriodicMarch
+
+EXACT = 1e-9
+KT, MU, LOAD = 45e3, 0.88, 60.0
+REACH = MU * LOAD / KT
+JENKINS = PeriodicMarch(Jenkins(KT, MU, LOAD))
+ODD = tuple(range(1, 16, 2))
+
+
+def rig(ratio=0.001):
+    """The thesis's rig."""
+    return two_mass_rig((21.152e-3, 1.189e-3), (1.3469e3, 273e3), ratio)
+
+
+def sine(model, name="m1"):
+    return PeriodicLoad({1: -1j * unit_force(model, name)})
+
+
+def balance(model, joints=JENKINS, harmonics=ODD, samples=256, load=None):
+    return HarmonicBalance(model, joints, load or sine(model), Resolution(harmonics, samples))
+
+
+@dataclass(frozen=True)
+class CubicCycle:
+    force: np.ndarray
+    jacobian: np.ndarray
+    samples: np.ndarray
+    states: np.ndarray
+    dissipated: np.ndarray
+    change: np.ndarray
+
+
+@dataclass(frozen=True)
+class CubicSprings:
+    """F = k u³ at every joint."""
+
+    stiffness: float
+    directions = 1
+
+    def settle(self, coefficients, basis, weights, lead):
+        way = (basis @ coefficients)[..., 0]
+        force = self.stiffness * way**3
+        slopes = 3.0 * self.stiffness * way**2
+        jacobian = np.einsum("mt,jt,tn->jmn", weights, slopes, basis)
+        return CubicCycle(
+            np.einsum("mt,jt->jm", weights, force)[..., None],
+            jacobian[:, :, None, :, None],
+            force.T[..., None],
+            np.zeros(force.T.shape, dtype=np.int8),
+            np.zeros(len(force)),
+            np.zeros(len(force)),
+        )
+
+
+def mixed_rig():
+    """One joint of three directions, damping that mixes modes, and nothing else along z."""
+    names = ("x", "y", "z")
+    model = lumped_rig(
+        dict(zip(names, (2e-3, 3e-3, 1e-3), strict=True)),
+        {Link("x"): 500.0, Link("y", "x"): 800.0},
+        [[Link(name) for name in names]],
+        0.01,
+    )
+    return replace(model, damping=model.damping + np.diag([0.05, 0.0, 0.02]))
+
+
+def mixed_problem():
+    model = mixed_rig()
+    load = PeriodicLoad(
+        {1: unit_force(model, "x") * (1.0 - 2j), 2: unit_force(model, "z") * 3.0},
+        4.0 * unit_force(model, "z"),
+    )
+    joints = PeriodicMarch(FrictionContact(300.0, 400.0, 0.5, gap=0.001))
+    return balance(model, joints, (0, 1, 2, 3), 64, load)
+
+
+# --- Receptances
+
+
+@pytest.mark.parametrize("damping", ["modal", "mixed"])
+def test_receptances_are_the_inverse_of_the_dynamic_stiffness(damping):
+    model = rig(0.02)
+    if damping == "mixed":
+        model = replace(model, damping=model.damping + np.diag([0.3, 0.0]))
+    receptance = Receptance(model)
+    angular = np.array([0.0, 100.0, 1300.0, 16000.0])
+    load = unit_force(model, "m1")
+    modal = np.tile(load @ receptance.at_points, (4, 1)).astype(complex)
+    steady = receptance.at(angular)
+    motion = steady.respond(modal) @ receptance.at_points.T
+    between = steady.between_joints()
+    for place, omega in enumerate(angular):
+        stiffness = model.stiffness + 1j * omega * model.damping - omega**2 * model.mass
+        inverse = np.linalg.inv(stiffness)
+        np.testing.assert_allclose(motion[place], inverse @ load, rtol=EXACT)
+        wanted = model.connection @ inverse @ model.connection.T
+        np.testing.assert_allclose(between[place], wanted, rtol=EXACT)
+
+
+def test_a_structure_that_nothing_holds_is_refused():
+    free = lumped_rig({"a": 1e-3, "b": 1e-3}, {}, [[Link("a")]])
+    with pytest.raises(ReceptanceError, match="hold it"):
+        Receptance(free)
+    with pytest.raises(ReceptanceError, match="give every point mass"):
+        Receptance(replace(rig(), mass=np.diag([1.0, 0.0])))
+
+
+# --- The equations
+
+
+@pytest.mark.parametrize("varies", ["frequency", "force"])
+@pytest.mark.parametrize("case", ["rig", "mixed"])
+def test_derivatives_of_the_equations(case, varies):
+    if case == "rig":
+        problem, size = balance(rig(), harmonics=(1, 3, 5), samples=64), 3.0 * REACH
+    else:
+        problem, size = mixed_problem(), 0.02
+    unknowns = size * np.random.default_rng(3).standard_normal(problem.size)
+    step = 1e-7 * size
+    at = problem.evaluate(unknowns, 47.0, 2.0, varies)
+    wanted = np.empty_like(at.jacobian)
+    for place in range(problem.size):
+        change = np.zeros(problem.size)
+        change[place] = step
+        upper = problem.evaluate(unknowns + change, 47.0, 2.0, varies).residual
+        lower = problem.evaluate(unknowns - change, 47.0, 2.0, varies).residual
+        wanted[:, place] = (upper - lower) / (2.0 * step)
+    np.testing.assert_allclose(at.jacobian, wanted, atol=1e-6 * np.abs(wanted).max())
+    ends = [(47.0, 2.0 + d) if varies == "force" else (47.0 + d, 2.0) for d in (1e-4, -1e-4)]
+    upper, lower = (problem.evaluate(unknowns, *end, varies).residual for end in ends)
+    slope = (upper - lower) / 2e-4
+    np.testing.assert_allclose(at.slope, slope, atol=1e-7 * np.abs(slope).max())
+
+
+@pytest.mark.parametrize("case", ["rig", "mixed"])
+def test_products_with_the_jacobian_are_those_of_the_matrix(case, monkeypatch):
+    """Large problems never assemble it: the motion they find is the same."""
+    problem = balance(rig(0.02)) if case == "rig" else mixed_problem()
+    motion = 0.01 * np.random.default_rng(5).standard_normal(problem.size)
+    force = 60.0 if case == "rig" else 1.0
+    matrix = problem.evaluate(motion, 90.0, force, "frequency").jacobian
+    wanted = problem.solve(90.0, force)
+    assert wanted.converged
+    monkeypatch.setattr(harmonic_balance, "DENSE", 0)
+    products = problem.evaluate(motion, 90.0, force, "frequency").jacobian
+    assert not isinstance(products, np.ndarray)
+    vector = np.random.default_rng(6).standard_normal(problem.size)
+    np.testing.assert_allclose(
+        products @ vector, matrix @ vector, atol=1e-12 * np.abs(matrix @ vector).max()
+    )
+    found = problem.solve(90.0, force)
+    assert found.converged
+    np.testing.assert_allclose(
+        found.coefficients, wanted.coefficients, atol=1e-8 * np.abs(wanted.coefficients).max()
+    )
+    branch = along_frequency(problem, force, (85.0, 95.0))
+    assert branch.message == ""
+
+
+# --- Linear limits
+
+
+@pytest.mark.parametrize(("friction", "held", "peak"), [(0.0, 0.0, 39.08), (1e9, KT, 214.38)])
+def test_free_and_stuck_rig_are_linear(friction, held, peak):
+    model = rig()
+    problem = balance(model, PeriodicMarch(Jenkins(KT, friction, LOAD)))
+    branch = along_frequency(problem, 10.0, (20.0, 400.0))
+    assert branch.message == ""
+    sizes = branch.first_amplitudes(1)
+    stiffness = model.stiffness + held * model.connection.T @ model.connection
+    for solution in branch.solutions:
+        omega = 2.0 * np.pi * solution.frequency
+        dynamic = stiffness + 1j * omega * model.damping - omega**2 * model.mass
+        wanted = np.linalg.solve(dynamic, -10j * unit_force(model, "m1"))
+        # A residual of 1e-10 on both sides; a resonance makes 1/2ζ = 500 times as much of it.
+        np.testing.assert_allclose(solution.motion[0], wanted, rtol=2e-7)
+        assert np.abs(solution.motion[1:]).max() <= 1e-9 * np.abs(wanted).max()
+        assert solution.left_out <= 1e-12
+    assert branch.frequencies[np.argmax(sizes)] == pytest.approx(peak, rel=1e-3)
+    assert natural_frequencies(model, held)[0] == pytest.approx(peak, abs=5e-3)
+
+
+def test_without_force_nothing_moves():
+    solution = balance(rig()).solve(50.0, 0.0)
+    assert solution.converged
+    assert not solution.motion.any()
+    assert solution.left_out == 0.0
+
+
+# --- Closed forms of one harmonic
+
+
+@pytest.mark.parametrize("reaches", [0.5, 1.5, 4.0, 50.0])
+def test_jenkins_oscillator_of_one_harmonic(reaches):
+    """From the amplitude the closed form gives the force; balance gives the amplitude back."""
+    model = lumped_rig({"m": 2e-3}, {Link("m"): 800.0}, [[Link("m")]], 0.02)
+    law = Jenkins(1500.0, 0.5, 10.0, 30.0)
+    amplitude, frequency = reaches * 5.0 / 1500.0, 120.0
+    omega = 2.0 * np.pi * frequency
+    cosine, sine_part = law.first_harmonic(amplitude)
+    dynamic = 800.0 - 2e-3 * omega**2 + 1j * omega * model.damping[0, 0]
+    force = abs(dynamic * amplitude + cosine - 1j * sine_part)
+    problem = balance(model, PeriodicMarch(law), (1,), 65536, sine(model, "m"))
+    solution = problem.solve(frequency, float(force))
+    assert solution.converged
+    assert abs(solution.amplitude(0)) == pytest.approx(amplitude, rel=1e-8)
+    assert solution.cycle.dissipated[0] == pytest.approx(law.loop_energy(amplitude), rel=1e-7)
+
+
+@pytest.mark.parametrize("upward", [True, False])
+def test_duffing_oscillator_of_one_harmonic_folds_both_ways(upward):
+    """((k + ¾ κ a² - m ω²)² + c² ω²) a² = F² at every point, folds included."""
+    model = lumped_rig({"m": 1e-3}, {Link("m"): 40.0}, [[Link("m")]], 0.02)
+    problem = balance(model, CubicSprings(100.0), (1,), 16, sine(model, "m"))
+    force = 1.5
+    branch = along_frequency(problem, force, (10.0, 100.0), upward=upward)
+    assert branch.message == ""
+    assert len(branch.curve.folds) == 2
+    for solution in branch.solutions:
+        omega, a = 2.0 * np.pi * solution.frequency, abs(solution.amplitude(0))
+        elastic = 40.0 + 75.0 * a * a - 1e-3 * omega**2
+        found = a * np.hypot(elastic, omega * model.damping[0, 0])
+        assert found == pytest.approx(force, rel=1e-8)
+    again = along_frequency(problem, force, (10.0, 100.0), upward=not upward)
+    highest = (max(b.first_amplitudes(0)) for b in (branch, again))
+    assert next(highest) == pytest.approx(next(highest), rel=2e-3)
+
+
+def test_force_is_followed_through_folds_too():
+    model = lumped_rig({"m": 1e-3}, {Link("m"): 40.0}, [[Link("m")]], 0.02)
+    problem = balance(model, CubicSprings(100.0), (1,), 16, sine(model, "m"))
+    branch = along_force(problem, 45.0, (0.0, 15.0))
+    assert branch.message == ""
+    assert len(branch.curve.folds) == 2
+    assert branch.forces[-1] == 15.0
+    half = along_frequency(problem, 1.5, (10.0, 100.0))
+    resumed = along_frequency(
+        problem,
+        1.5,
+        (10.0, 100.0),
+        replace(half, curve=replace(half.curve, points=half.curve.points[:20])),
+    )
+    assert resumed.message == ""
+    assert resumed.frequencies[-1] == half.frequencies[-1]
+
+
+# --- Against time integration
+
+
+@pytest.mark.parametrize(("frequency", "force"), [(100.0, 75.0), (150.0, 40.0)])
+def test_rig_against_its_exact_steady_state(frequency, force):
+    """Event-driven integration, settled to 1e-12; error falls below 1e-4 with the harmonics."""
+    model, samples = rig(0.02), 256
+    motion = integrate_exactly(
+        model,
+        SliderJoints(np.array([KT]), np.array([MU * LOAD]), np.zeros(1)),
+        Harmonic(unit_force(model, "m1"), force, frequency),
+        50.0 / frequency,
+        1.0 / (samples * frequency),
+    )
+    wanted = motion.displacement[-samples - 1 : -1]
+    scale = np.abs(wanted).max()
+    assert np.abs(motion.displacement[-2 * samples - 1 : -samples - 1] - wanted).max() < EXACT
+    errors = []
+    for highest, count in ((15, 512), (61, 2048)):
+        solution = balance(model, harmonics=tuple(range(1, highest + 1, 2)), samples=count).solve(
+            frequency, force
+        )
+        assert solution.converged
+        errors.append(np.abs(solution.displacement(samples) - wanted).max() / scale)
+        assert solution.left_out < errors[-1] < 20.0 * solution.left_out
+    assert errors[1] <= 1e-4
+    lost = np.diff(motion.energies.joints[[-samples - 1, -1], 0])[0]
+    assert solution.cycle.dissipated[0] == pytest.approx(lost, rel=1e-4)
+
+
+# --- Accuracy
+
+
+def test_too_few_samples_are_seen_by_twice_as_many():
+    coarse, fine = balance(rig(), samples=64), balance(rig(), samples=4096)
+    rough, exact = coarse.solve(100.0, 75.0), fine.solve(100.0, 75.0)
+
+    def checked(problem, solution):
+        unknowns = solution.coefficients.ravel()
+        return problem.sampling(unknowns, solution.frequency, solution.force)
+
+    error = np.linalg.norm(rough.coefficients - exact.coefficients)
+    error /= np.linalg.norm(exact.coefficients)
+    estimate = checked(coarse, rough)
+    assert estimate > 1e-3
+    assert 0.4 * error < estimate < 2.5 * error
+    assert checked(fine, exact) < 1e-5
+
+
+def test_harmonics_and_samples_grow_to_a_tolerance():
+    model = rig(0.02)
+    start = balance(model, harmonics=(1,), samples=64)
+    branch = along_frequency(start, 60.0, (80.0, 130.0), accuracy=Accuracy(2e-3))
+    assert branch.message == ""
+    assert all(max(s.left_out, s.sampling) <= 2e-3 for s in branch.solutions)
+    assert len(branch.problem.resolution.harmonics) > 3
+    assert all(k % 2 == 1 for k in branch.problem.resolution.harmonics)
+    fine = balance(model, harmonics=tuple(range(1, 62, 2)), samples=2048)
+    last = branch.solutions[-1]
+    exact = fine.solve(last.frequency, 60.0, last)
+    assert abs(last.amplitude(1)) == pytest.approx(abs(exact.amplitude(1)), rel=1e-2)
+
+
+def test_resonance_falls_from_stuck_to_sliding_as_the_force_grows():
+    peaks, heights = [], []
+    for force in (1.0, 10.0, 30.0, 50.0, 90.0):
+        branch = along_frequency(balance(rig()), force, (20.0, 400.0))
+        assert branch.message == ""
+        sizes = branch.first_amplitudes(1) / force
+        peaks.append(branch.frequencies[np.argmax(sizes)])
+        heights.append(sizes.max())
+    assert np.all(np.diff(peaks) < 0.0)
+    assert peaks[0] == pytest.approx(214.38, abs=0.5)
+    assert peaks[-1] == pytest.approx(39.08, abs=0.1)
+    assert 0 < np.argmin(heights) < len(heights) - 1
+
+
+# --- Contacts in three dimensions
+
+
+def contact_rig():
+    """A mass free but for its contact along z, on springs along x and y."""
+    return lumped_rig(
+        {"x": 2e-3, "y": 2e-3, "z": 2e-3},
+        {Link("x"): 500.0, Link("y"): 700.0},
+        [[Link("x"), Link("y"), Link("z")]],
+        0.01,
+    )
+
+
+def pressed(model, load, tangential, normal=0.0):
+    waves = {1: tangential * unit_force(model, "x") + normal * unit_force(model, "z")}
+    return PeriodicLoad(waves, load * unit_force(model, "z"))
+
+
+def test_preload_alone_closes_the_gap():
+    """z is held by the contact only: gap plus load over kn, whatever the frequency."""
+    model, law = contact_rig(), FrictionContact(300.0, 400.0, 0.5, gap=0.01)
+    problem = balance(model, PeriodicMarch(law), (0, 1, 2, 3), 64, pressed(model, 8.0, 1.0))
+    still = problem.solve(30.0, 0.0)
+    assert still.converged
+    assert still.coefficients[0, 0, 2] == pytest.approx(0.01 + 8.0 / 400.0, rel=EXACT)
+    stuck = problem.solve(30.0, 0.5)
+    omega = 2.0 * np.pi * 30.0
+    model_damping = model.damping[0, 0]
+    wanted = 0.5 / (800.0 - 2e-3 * omega**2 + 1j * omega * model_damping)
+    assert stuck.amplitude(0) == pytest.approx(wanted, rel=1e-8)
+    assert np.all(stuck.cycle.states == STICK)
+    slipping = problem.solve(30.0, 30.0)
+    assert slipping.converged
+    assert np.any(slipping.cycle.states == SLIP)
+
+
+def test_contact_that_opens_and_closes_balances_in_the_mean():
+    """All that carries the mean load is the contact: its mean force is the load."""
+    model, law = contact_rig(), FrictionContact(300.0, 400.0, 0.5)
+    load = pressed(model, 8.0, 12.0, 2.0)
+    problem = balance(model, PeriodicMarch(law), tuple(range(12)), 512, load)
+    branch = along_force(problem, 40.0, (0.0, 3.0))
+    assert branch.message == ""
+    last = branch.solutions[-1]
+    assert {SLIP, SEPARATED} <= set(np.unique(last.cycle.states))
+    assert last.cycle.samples[:, 0, 2].mean() == pytest.approx(8.0, rel=1e-8)
+    assert last.cycle.samples[:, 0, 2].min() == 0.0
+
+
+def test_an_open_contact_leaves_the_structure_linear():
+    model = replace(contact_rig(), stiffness=np.diag([500.0, 700.0, 900.0]))
+    law = FrictionContact(300.0, 400.0, 0.5, gap=1.0)
+    problem = balance(
+        model, PeriodicMarch(law), (0, 1, 3), 64, PeriodicLoad({1: unit_force(model, "x")})
+    )
+    solution = problem.solve(60.0, 2.0)
+    omega = 2.0 * np.pi * 60.0
+    wanted = 2.0 / (500.0 - 2e-3 * omega**2 + 1j * omega * model.damping[0, 0])
+    assert solution.amplitude(0) == pytest.approx(wanted, rel=EXACT)
+    assert np.all(solution.cycle.states == SEPARATED)
+
+
+def test_joints_apart_do_not_see_each_other():
+    """Two rigs in one model move as each alone, with its own load."""
+    one = rig(0.02)
+    pair = DynamicModel(
+        *(np.kron(np.eye(2), part) for part in (one.mass, one.damping, one.stiffness)),
+        np.kron(np.eye(2), one.connection),
+        ("a1", "a2", "b1", "b2"),
+    )
+    load = PeriodicLoad({1: -1j * np.array([1.0, 0.0, 0.6, 0.0])})
+    both = balance(pair, harmonics=(1, 3, 5), load=load).solve(100.0, 70.0)
+    for place, force in ((0, 70.0), (2, 42.0)):
+        alone = balance(one, harmonics=(1, 3, 5)).solve(100.0, force)
+        np.testing.assert_allclose(
+            both.motion[:, place : place + 2], alone.motion, rtol=1e-7, atol=1e-12
+        )
+
+
+# --- Mistakes
+
+
+@pytest.mark.parametrize("harmonics", [(), (0,), (3, 1), (1, 1), (-1, 1)])
+def test_harmonics_out_of_order_are_refused(harmonics):
+    with pytest.raises(HarmonicBalanceError, match="ascending"):
+        Resolution(harmonics, 64)
+
+
+def test_resolutions_that_cannot_show_the_motion_are_refused():
+    with pytest.raises(HarmonicBalanceError, match="cannot show harmonic 7"):
+        Resolution((1, 7), 14)
+    with pytest.raises(HarmonicBalanceError, match=r"harmonics \[2\]"):
+        balance(rig(), load=PeriodicLoad({2: unit_force(rig(), "m1")}))
+    with pytest.raises(HarmonicBalanceError, match=r"harmonics \[0\]"):
+        balance(rig(), load=PeriodicLoad({1: unit_force(rig(), "m1")}, np.ones(2)))

@@ -1,0 +1,165 @@
+"""Joints led round a given period until their forces repeat, and the derivative of these forces.
+
+The displacement of a joint is a combination of functions of time, sampled over one period: u = Φ c
+with the basis Φ ``(t, m)`` and coefficients c ``(m, d)``. The joint is led along straight paths
+from sample to sample, round and round, until what it remembers is the same after a period as
+before. Its forces are then projected, F = W f with the weights W ``(m, t)``, and so is their exact
+derivative with respect to c, which passes through everything the joint remembers: where its slider
+is, where it turned round, when it touched. What the functions are is the caller's affair.
+
+A joint is led into the period from rest, through the points Φ_lead c: the rows ``lead`` ``(p, m)``,
+of which the last is the first sample. This decides between the many periodic forces of a joint that
+does not slip fully; where it does, it makes no difference.
+
+Derivatives are those of the forces on these paths, so that a Newton iteration on the coefficients
+converges as fast as it can. On a switch between two states they are those of one side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sa_solver.types import Array
+from wear.joints.bouc_wen import BoucWen
+from wear.joints.friction_contact import FrictionContact
+from wear.joints.jenkins import Jenkins
+from wear.joints.masing import MasingLaw
+from wear.joints.parameters import JointError, side_by_side
+from wear.joints.periodic_contact import settle_contacts
+from wear.joints.periodic_sliders import BOUC_WEN, JENKINS, settle_curves, settle_sliders
+
+STICK, SLIP, SEPARATED = 0, 1, 2
+"""States of a joint at a sample. A spread or smooth joint slips where less than half of the
+stiffness that it may lose is left."""
+
+Kernel = Callable[..., None]
+
+
+@dataclass(frozen=True)
+class SettledCycle:
+    """What ``j`` joints of ``d`` directions do in a period of ``t`` samples that repeats.
+
+    ``force`` ``(j, m, d)`` is W f [N], ``jacobian`` ``(j, m, d, m, d)`` its derivative with respect
+    to the coefficients; ``samples`` ``(t, j, d)`` [N] are the forces, ``states`` ``(t, j)`` one of
+    ``STICK``, ``SLIP`` and ``SEPARATED`` each, ``dissipated`` ``(j,)`` [N mm] is lost per period.
+    ``change`` ``(j,)`` is by how much the force at the first sample still differed after the last
+    period, over the largest force.
+    """
+
+    force: Array
+    jacobian: Array
+    samples: Array
+    states: np.ndarray
+    dissipated: Array
+    change: Array
+
+
+@dataclass(frozen=True)
+class PeriodicMarch:
+    """A joint law over whole periods.
+
+    ``threads`` march so many shares of the joints at once.
+    """
+
+    law: Jenkins | BoucWen | MasingLaw | FrictionContact
+    threads: int = 1
+
+    @property
+    def directions(self) -> int:
+        return self.law.directions
+
+    def settle(
+        self, coefficients: Array, basis: Array, weights: Array, lead: Array | None = None
+    ) -> SettledCycle:
+        """The settled period of joints with the ``coefficients`` ``(j, m, d)`` [mm].
+
+        ``basis`` ``(t, m)``, ``weights`` ``(m, t)`` and ``lead`` ``(p, m)`` as in the module;
+        without ``lead`` joints are led from rest straight to the first sample. Raises
+        :class:`JointError` for shapes that do not fit.
+        """
+        lead = basis[:1] if lead is None else lead
+        self._require(coefficients, basis, weights, lead)
+        joints, size, directions = coefficients.shape
+        samples = len(basis)
+        kernel, parameters = self._kernel
+        force, states = (
+            np.empty((joints, samples, directions)),
+            np.empty((joints, samples), np.int8),
+        )
+        projected, jacobian = (
+            np.empty((joints, size, directions)),
+            np.empty((joints, size, directions, size, directions)),
+        )
+        lost, change = np.empty(joints), np.empty(joints)
+        arrays = (
+            np.ascontiguousarray(basis @ coefficients),
+            np.ascontiguousarray(lead @ coefficients),
+            force,
+            states,
+            projected,
+            jacobian,
+            lost,
+            change,
+        )
+        if len(parameters) < joints:
+            parameters = np.repeat(parameters, joints, axis=0)
+
+        def work(share: slice) -> None:
+            kernel(basis, weights, lead, parameters[share], *(part[share] for part in arrays))
+
+        self._in_shares(joints, work)
+        return SettledCycle(projected, jacobian, force.transpose(1, 0, 2), states.T, lost, change)
+
+    @cached_property
+    def _kernel(self) -> tuple[Kernel, Array]:
+        return _kernel_of(self.law)
+
+    def _in_shares(self, joints: int, work: Callable[[slice], None]) -> None:
+        """Do the work for all joints, in a share per thread."""
+        shares = min(self.threads, joints)
+        if shares <= 1:
+            work(slice(0, joints))
+            return
+        ends = [joints * share // shares for share in range(shares + 1)]
+        with ThreadPoolExecutor(shares) as pool:
+            list(pool.map(work, map(slice, ends[:-1], ends[1:])))
+
+    def _require(self, coefficients: Array, basis: Array, weights: Array, lead: Array) -> None:
+        joints, size, directions = coefficients.shape
+        if directions != self.directions:
+            raise JointError(
+                f"coefficients of {directions} directions for joints of {self.directions}"
+            )
+        if basis.shape[1] != size or weights.shape != basis.T.shape or lead.shape[1] != size:
+            raise JointError(
+                f"{size} coefficients with a basis {basis.shape}, weights {weights.shape} and "
+                f"lead {lead.shape}: they must be (t, {size}), ({size}, t) and (p, {size})"
+            )
+        laws = len(self._kernel[1])
+        if laws not in (1, joints):
+            raise JointError(f"the law is that of {laws} joints, the coefficients of {joints}")
+
+
+def _kernel_of(law: Jenkins | BoucWen | MasingLaw | FrictionContact) -> tuple[Kernel, Array]:
+    """The compiled march of a law, and its parameters ``(1 or j, p)``."""
+    if isinstance(law, FrictionContact):
+        return settle_contacts, law.parameters
+    limit = np.multiply(law.friction, law.normal_load)
+    if isinstance(law, MasingLaw):
+        return settle_curves, side_by_side(
+            law.stiffness, law.residual_stiffness, limit, *law.spread
+        )
+    if isinstance(law, Jenkins):
+        return settle_sliders, side_by_side(
+            JENKINS, law.stiffness, law.residual_stiffness, limit, 1.0, 0.0
+        )
+    spring = np.subtract(law.stiffness, law.residual_stiffness)
+    gain = np.multiply(2.0, law.sigma) - 1.0
+    return settle_sliders, side_by_side(
+        BOUC_WEN, spring, law.residual_stiffness, limit, law.exponent, gain
+    )

@@ -1,0 +1,287 @@
+"""Compiled march of contacts in three dimensions round a period; see :mod:`wear.joints.periodic`.
+
+What a contact remembers is the stretch s of its tangential spring, two numbers. Its derivative S
+with respect to the coefficients is led along, and with it A, the derivative of the stretch after a
+period with respect to that before. Where periods go on to change the stretch, they will by
+(1 - A)⁻¹ times the change of one: Newton's step, of which few are needed where slip is so little
+that the contact would take thousands of periods.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numba import njit
+
+from sa_solver.types import Array
+from wear.joints.friction_contact import advance
+from wear.joints.periodic_sliders import (
+    DERIVATIVE_REPEATED,
+    FORGETTING,
+    MAX_PERIODS,
+    PLAIN_PERIODS,
+    REPEATED,
+    differences,
+)
+
+# A force below the circle by no more than this share of it slips: rounding.
+ON_CIRCLE = 1e-12
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _to_the_limit(a: Array) -> tuple[float, float, float, float]:
+    """1 + A + A² + ... = (1 - A)⁻¹ by rows, A ``(2, 2)``; 1 where a period forgets nothing."""
+    p, q, r, s = 1.0 - a[0, 0], -a[0, 1], -a[1, 0], 1.0 - a[1, 1]
+    determinant = p * s - q * r
+    if determinant < FORGETTING:
+        return 1.0, 0.0, 0.0, 1.0
+    return s / determinant, -q / determinant, -r / determinant, p / determinant
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _carry(slopes: Array, stiffness: float, start: Array, step: Array, derivative: Array) -> bool:
+    """Lead the derivative ``(2, 3, m)`` of the stretch along one increment: whether it sticks.
+
+    ``slopes`` ``(3, 6)`` are those of the forces by stretch, approach and increment; ``start`` and
+    ``step`` ``(m,)`` the derivatives of a displacement before the increment and of its change.
+    """
+    scale = 1.0 / stiffness
+    xx, xy, yx, yy = slopes[0, 0], slopes[0, 1], slopes[1, 0], slopes[1, 1]
+    xx, xy, yx, yy = xx * scale, xy * scale, yx * scale, yy * scale
+    if xx == 1.0 and yy == 1.0 and xy == 0.0 and yx == 0.0:
+        # It sticks: by far the most frequent case.
+        for c in range(step.size):
+            derivative[0, 0, c] += step[c]
+            derivative[1, 1, c] += step[c]
+        return True
+    for direction in range(3):
+        x_follows, y_follows = slopes[0, 3 + direction] * scale, slopes[1, 3 + direction] * scale
+        for c in range(step.size):
+            x, y = derivative[0, direction, c], derivative[1, direction, c]
+            derivative[0, direction, c] = xx * x + xy * y + x_follows * step[c]
+            derivative[1, direction, c] = yx * x + yy * y + y_follows * step[c]
+    x_follows, y_follows = slopes[0, 2] * scale, slopes[1, 2] * scale
+    for c in range(step.size):
+        derivative[0, 2, c] += x_follows * start[c]
+        derivative[1, 2, c] += y_follows * start[c]
+    return False
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _chain(slopes: Array, stiffness: float, total: Array) -> None:
+    """Multiply the derivative ``(2, 2)`` of a stretch by that of one increment."""
+    for c in range(2):
+        x, y = total[0, c] / stiffness, total[1, c] / stiffness
+        total[0, c] = slopes[0, 0] * x + slopes[0, 1] * y
+        total[1, c] = slopes[1, 0] * x + slopes[1, 1] * y
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _state_of(own: Array, force: Array) -> int:
+    """0 stick, 1 slip, 2 separated."""
+    if force[2] <= 0.0:
+        return 2
+    limit = own[2] * force[2] * (1.0 - ON_CIRCLE)
+    return 1 if force[0] ** 2 + force[1] ** 2 >= limit * limit else 0
+
+
+class Memory(NamedTuple):
+    """A contact on its way, changed in place.
+
+    ``state`` ``(3,)`` is that of the law, ``derivative`` ``(2, 3, m)`` that of its stretch; the
+    others are room for an increment ``(3,)``, a force ``(3,)`` and slopes ``(3, 6)``.
+    """
+
+    state: Array
+    derivative: Array
+    increment: Array
+    force: Array
+    slopes: Array
+
+
+class Record(NamedTuple):
+    """What is written of a period: ``gradient`` ``(t, 2, 3, m)`` of the stretch, and the rest."""
+
+    force: Array
+    states: Array
+    gradient: Array
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _move(own: Array, memory: Memory, end: Array) -> float:
+    """One increment to the displacement ``end`` ``(3,)``; return the energy lost.
+
+    ``memory.increment`` has the tangential part of it already.
+    """
+    memory.increment[2] = end[2] - memory.state[2]
+    lost: float = advance(
+        own, memory.state, memory.increment, memory.force, memory.state, memory.slopes
+    )
+    memory.state[2] = end[2]
+    return lost
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _lead_in(own: Array, memory: Memory, before: Array, lead: Array) -> None:
+    """Lead a contact from rest to the first sample."""
+    memory.state[:], memory.derivative[:] = 0.0, 0.0
+    start, step = np.zeros(lead.shape[1]), np.empty(lead.shape[1])
+    for i in range(len(lead)):
+        there = before[i]
+        for direction in range(2):
+            here = before[i - 1, direction] if i > 0 else 0.0
+            memory.increment[direction] = there[direction] - here
+        _move(own, memory, there)
+        step[:] = lead[i] - start
+        _carry(memory.slopes, own[0], start, step, memory.derivative)
+        start[:] = lead[i]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _round(
+    own: Array, memory: Memory, way: Array, basis: Array, steps: Array, record: Record, total: Array
+) -> tuple[float, bool]:
+    """One period: energy lost, and whether it sticks throughout.
+
+    ``total`` ``(2, 2)`` becomes the derivative of the stretch at its end by that at its start.
+    """
+    samples = len(basis)
+    total[0, 0] = total[1, 1] = 1.0
+    total[0, 1] = total[1, 0] = 0.0
+    lost, sticks = 0.0, True
+    for step in range(1, samples + 1):
+        at = step if step < samples else 0
+        for direction in range(2):
+            memory.increment[direction] = way[at, direction] - way[step - 1, direction]
+        lost += _move(own, memory, way[at])
+        if not _carry(memory.slopes, own[0], basis[step - 1], steps[at], memory.derivative):
+            sticks = False
+            _chain(memory.slopes, own[0], total)
+        record.gradient[at] = memory.derivative
+        record.force[at] = memory.force
+        record.states[at] = _state_of(own, memory.force)
+    return lost, sticks
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _settle_contact(
+    own: Array, memory: Memory, way: Array, basis: Array, steps: Array, record: Record
+) -> tuple[float, float, bool]:
+    """March until stretch and derivative repeat: energy lost, change of force, all stuck."""
+    total, stretch, derivative = np.empty((2, 2)), np.empty(2), np.empty_like(memory.derivative)
+    span = max(np.max(np.abs(way[:, 0])), np.max(np.abs(way[:, 1])))
+    lost, change, sticks = 0.0, 0.0, True
+    for period in range(MAX_PERIODS):
+        stretch[:], derivative[:] = memory.state[:2], memory.derivative
+        lost, sticks = _round(own, memory, way, basis, steps, record, total)
+        x, y = memory.state[0] - stretch[0], memory.state[1] - stretch[1]
+        change = max(abs(x), abs(y))
+        turned = np.max(np.abs(memory.derivative - derivative))
+        if change <= REPEATED * span and turned <= DERIVATIVE_REPEATED:
+            break
+        if period < PLAIN_PERIODS:
+            continue
+        g, h, k, m = _to_the_limit(total)
+        memory.state[0], memory.state[1] = stretch[0] + g * x + h * y, stretch[1] + k * x + m * y
+        memory.derivative[:] -= derivative
+        for direction in range(3):
+            for c in range(len(steps[0])):
+                x, y = memory.derivative[0, direction, c], memory.derivative[1, direction, c]
+                memory.derivative[0, direction, c] = g * x + h * y
+                memory.derivative[1, direction, c] = k * x + m * y
+        memory.derivative[:] += derivative
+    return lost, own[0] * change, sticks
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _project_stuck(
+    stiffness: float, basis: Array, weights: Array, shares: Array, record: Record, jacobian: Array
+) -> None:
+    """Tangential part of the derivative where all samples stick.
+
+    The stretch at a sample is that at the first one and the displacement since.
+    """
+    size = basis.shape[1]
+    first = record.gradient[0]
+    for row in range(size):
+        weight = np.sum(weights[row])
+        for direction in range(2):
+            for by in range(3):
+                for c in range(size):
+                    slope = weight * first[direction, by, c]
+                    if by == direction:
+                        slope += shares[row, c] - weight * basis[0, c]
+                    jacobian[row, direction, c, by] = stiffness * slope
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _project(stiffness: float, weights: Array, record: Record, jacobian: Array) -> None:
+    """Tangential part of the derivative."""
+    size = weights.shape[0]
+    flat = record.gradient.reshape(len(record.gradient), 6 * size)
+    slopes = np.dot(weights, flat)
+    for row in range(size):
+        for direction in range(2):
+            for by in range(3):
+                place = (3 * direction + by) * size
+                for c in range(size):
+                    jacobian[row, direction, c, by] = stiffness * slopes[row, place + c]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _project_normal(
+    stiffness: float, basis: Array, weights: Array, shares: Array, states: Array, jacobian: Array
+) -> None:
+    """Normal part of the derivative: kn as long as there is contact."""
+    size = basis.shape[1]
+    apart = np.count_nonzero(states == 2)
+    pressed = shares
+    if apart > 0:
+        touching = np.zeros_like(basis)
+        for at in range(len(basis)):
+            if states[at] != 2:
+                touching[at] = basis[at]
+        pressed = np.dot(weights, touching)
+    for row in range(size):
+        for c in range(size):
+            jacobian[row, 2, c, 0] = jacobian[row, 2, c, 1] = 0.0
+            jacobian[row, 2, c, 2] = stiffness * pressed[row, c]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def settle_contacts(
+    basis: Array,
+    weights: Array,
+    lead: Array,
+    parameters: Array,
+    way: Array,
+    before: Array,
+    force: Array,
+    states: Array,
+    projected: Array,
+    jacobian: Array,
+    dissipated: Array,
+    change: Array,
+) -> None:
+    """Settle contacts: ``parameters`` ``(j, 5)`` are those of the law.
+
+    ``way`` ``(j, t, 3)`` and ``before`` ``(j, p, 3)`` [mm] are led, the last of
+    ``before`` being the first of ``way``. The others are written.
+    """
+    samples, size = basis.shape
+    gradient = np.empty((samples, 2, 3, size))
+    steps, shares = differences(basis), np.dot(weights, basis)
+    memory = Memory(np.empty(3), np.empty((2, 3, size)), np.empty(3), np.empty(3), np.empty((3, 6)))
+    for j in range(len(parameters)):
+        own, record = parameters[j], Record(force[j], states[j], gradient)
+        _lead_in(own, memory, before[j], lead)
+        dissipated[j], missing, sticks = _settle_contact(own, memory, way[j], basis, steps, record)
+        largest = np.max(np.abs(force[j]))
+        change[j] = missing / largest if largest > 0.0 else 0.0
+        projected[j] = np.dot(weights, force[j])
+        if sticks:
+            _project_stuck(own[0], basis, weights, shares, record, jacobian[j])
+        else:
+            _project(own[0], weights, record, jacobian[j])
+        _project_normal(own[1], basis, weights, shares, states[j], jacobian[j])

@@ -1,0 +1,304 @@
+"""Compiled marches of joints along one direction round a period; see :mod:`wear.joints.periodic`.
+
+Jenkins's and Bouc-Wen's joints remember one number, here the stretch z of a spring that gives the
+force K z + kr u, and carry its derivative with it. A joint of spread sliders remembers turning
+points, which are samples: the derivatives of displacement and force there are kept in a stack
+beside the one of the law itself.
+"""
+
+from __future__ import annotations
+
+from math import copysign, exp
+
+import numpy as np
+from numba import njit
+
+from sa_solver.types import Array
+from wear.joints.bouc_wen import NO_FRICTION, xi_rate
+from wear.joints.bouc_wen import advance as advance_bouc_wen
+from wear.joints.jenkins import advance as advance_jenkins
+from wear.joints.masing import DEPTH, DISPLACEMENT, POINTS, turns
+from wear.joints.masing import advance as advance_masing
+
+JENKINS, BOUC_WEN = 0.0, 1.0
+"""First parameter of a joint with one number of memory; K, kr, µN, n and 2 σ - 1 follow."""
+
+# Periods after which a joint that still changes is given up. Newton's steps on the memory double
+# its digits in each: more mean that it has no attractor.
+MAX_PERIODS = 40
+# Memory repeats when it changes in a period by less than this share of the largest it can be, and
+# its derivative, which is of the order of 1, when it changes by less than this: ten to a thousand
+# times what rounding leaves of some thousand samples.
+REPEATED, DERIVATIVE_REPEATED = 1e-13, 1e-10
+# Periods before the first Newton step: a joint that slips on its way in, and never again, stays
+# where that has brought it.
+PLAIN_PERIODS = 2
+# Share of its memory that a period must forget for Newton's step to be more than rounding.
+FORGETTING = 1e-9
+# dη/ds below which sliding is complete: there the memory decays as exp(-n s).
+COMPLETE = 1e-12
+# A joint slips where less than this share of its stiffness K is left.
+LEFT_IN_SLIP = 0.5
+# Periods of a joint of spread sliders: its largest displacement wipes out what was before it.
+CURVE_PERIODS = 2
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _move(own: Array, stretch: float, increment: float) -> tuple[float, float, float, float]:
+    """One increment: stretch at its end, derivatives by stretch and increment, energy lost."""
+    kind, spring, limit = own[0], own[1], own[3]
+    if kind == JENKINS:
+        _, slope, _, end, lost = advance_jenkins(spring, 0.0, limit, 0.0, stretch, increment)
+        held = 1.0 if slope > 0.0 else 0.0
+        return end, held, held, lost
+    exponent, gain, way = own[4], own[5], spring * abs(increment)
+    if limit <= NO_FRICTION * way:
+        return 0.0, 0.0, 0.0, 0.0
+    xi = spring * stretch / limit
+    _, slope, _, end, lost = advance_bouc_wen(
+        spring, 0.0, limit, exponent, gain, 0.0, xi, increment
+    )
+    kept = 1.0
+    if increment != 0.0:
+        # dη/ds does not contain s: two paths keep their distance in s.
+        rate = xi_rate(copysign(xi, xi * increment), exponent, gain)
+        kept = slope / (spring * rate) if rate > COMPLETE else exp(-exponent * way / limit)
+    return end * limit / spring, kept, slope / spring, lost
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _lead_in(own: Array, before: Array, lead: Array, derivative: Array) -> float:
+    """Stretch at the first sample, to which it is led from rest; ``derivative`` is written."""
+    stretch, here = 0.0, 0.0
+    derivative[:] = 0.0
+    for i in range(len(lead)):
+        there = before[i]
+        stretch, kept, follows, _ = _move(own, stretch, there - here)
+        for c in range(derivative.size):
+            change = lead[i, c] - (lead[i - 1, c] if i > 0 else 0.0)
+            derivative[c] = kept * derivative[c] + follows * change
+        here = there
+    return stretch
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _round(
+    own: Array,
+    stretch: float,
+    way: Array,
+    steps: Array,
+    derivative: Array,
+    force: Array,
+    states: Array,
+    gradient: Array,
+) -> tuple[float, float, float]:
+    """One period: stretch at its end, its derivative by that at the start, energy lost.
+
+    ``steps`` ``(t, m)`` are the differences of the basis from the sample before; written are
+    forces K z and ``states`` ``(t,)`` and the ``gradient`` ``(t, m)`` of z.
+    """
+    samples, size = steps.shape
+    total, lost = 1.0, 0.0
+    for step in range(1, samples + 1):
+        at = step if step < samples else 0
+        stretch, kept, follows, loss = _move(own, stretch, way[at] - way[step - 1])
+        total *= kept
+        lost += loss
+        for c in range(size):
+            derivative[c] = kept * derivative[c] + follows * steps[at, c]
+            gradient[at, c] = derivative[c]
+        force[at] = own[1] * stretch
+        states[at] = 1 if follows < LEFT_IN_SLIP else 0
+    return stretch, total, lost
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _settle_slider(
+    own: Array,
+    stretch: float,
+    way: Array,
+    steps: Array,
+    derivative: Array,
+    force: Array,
+    states: Array,
+    gradient: Array,
+) -> tuple[float, float]:
+    """March until stretch and derivative repeat: energy lost, last change of the stretch."""
+    size = steps.shape[1]
+    before = np.empty(size)
+    repeated = REPEATED * min(own[3] / own[1], np.max(np.abs(way)))
+    lost, change = 0.0, 0.0
+    for period in range(MAX_PERIODS):
+        before[:] = derivative
+        end, total, lost = _round(own, stretch, way, steps, derivative, force, states, gradient)
+        change = end - stretch
+        if abs(change) <= repeated and _furthest(derivative, before) <= DERIVATIVE_REPEATED:
+            break
+        part = 1.0
+        if period >= PLAIN_PERIODS and 1.0 - total > FORGETTING:
+            part = 1.0 / (1.0 - total)
+        stretch += part * change
+        for c in range(size):
+            derivative[c] = before[c] + part * (derivative[c] - before[c])
+    return lost, change
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _furthest(one: Array, other: Array) -> float:
+    """Largest distance of two arrays ``(m,)``."""
+    furthest = 0.0
+    for c in range(one.size):
+        furthest = max(furthest, abs(one[c] - other[c]))
+    return furthest
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _relative_change(change: float, force: Array) -> float:
+    """A change of force over the largest force."""
+    largest = np.max(np.abs(force))
+    return abs(change) / largest if largest > 0.0 else 0.0
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def differences(basis: Array) -> Array:
+    """Differences ``(t, m)`` of a basis from the sample before, round the period."""
+    steps = np.empty_like(basis)
+    for at in range(len(basis)):
+        for c in range(basis.shape[1]):
+            steps[at, c] = basis[at, c] - basis[at - 1 if at > 0 else len(basis) - 1, c]
+    return steps
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def settle_sliders(
+    basis: Array,
+    weights: Array,
+    lead: Array,
+    parameters: Array,
+    way: Array,
+    before: Array,
+    force: Array,
+    states: Array,
+    projected: Array,
+    jacobian: Array,
+    dissipated: Array,
+    change: Array,
+) -> None:
+    """Settle Jenkins's and Bouc-Wen's joints.
+
+    ``parameters`` ``(j, 6)``: kind, K, kr, µN, n, 2 σ - 1. ``way`` ``(j, t, 1)`` and ``before``
+    ``(j, p, 1)`` [mm] are led, the last of ``before`` being the first of ``way``. The others are
+    written.
+    """
+    samples, size = basis.shape
+    gradient, derivative, steps = np.empty((samples, size)), np.empty(size), differences(basis)
+    # Needed for residual stiffness only: for one joint as much work as all the rest.
+    beside = np.any(parameters[:, 2] != 0.0)
+    shares = np.dot(weights, basis) if beside else np.zeros((size, size))
+    own_force, own_way = np.empty(samples), np.empty(samples)
+    for j in range(len(parameters)):
+        own = parameters[j]
+        own_way[:] = way[j, :, 0]
+        start = _lead_in(own, before[j, :, 0], lead, derivative)
+        dissipated[j], missing = _settle_slider(
+            own, start, own_way, steps, derivative, own_force, states[j], gradient
+        )
+        change[j] = _relative_change(own[1] * missing, own_force)
+        slopes = np.dot(weights, gradient)
+        for at in range(samples):
+            own_force[at] += own[2] * own_way[at]
+            force[j, at, 0] = own_force[at]
+        projected[j, :, 0] = np.dot(weights, own_force)
+        for row in range(size):
+            for c in range(size):
+                jacobian[j, row, 0, c, 0] = own[1] * slopes[row, c] + own[2] * shares[row, c]
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def _follow_curve(
+    own: Array,
+    memory: Array,
+    places: Array,
+    forces: Array,
+    here: Array,
+    there: Array,
+    end: float,
+    gradient: Array,
+) -> tuple[float, float, float]:
+    """Lead a joint of spread sliders to ``end``: force, share of stiffness left, energy lost.
+
+    ``here`` and ``there`` ``(m,)`` are the derivatives of displacement at both ends; ``gradient``
+    that of the force, read and written. ``places`` and ``forces`` ``(depth, m)`` are those of
+    displacement and force at the turning points.
+    """
+    increment = end - memory[DISPLACEMENT]
+    depth = int(memory[DEPTH])
+    if increment != 0.0 and turns(memory, depth, memory[DISPLACEMENT] + increment):
+        places[depth], forces[depth] = here, gradient
+    force, slope, lost = advance_masing((own[0], own[2], own[3], own[4]), 0.0, memory, increment)
+    # Set anew: sums of increments round, and a period must return to the same numbers.
+    memory[DISPLACEMENT] = end
+    depth = int(memory[DEPTH])
+    for c in range(there.size):
+        gradient[c] = slope * there[c]
+        if depth > 0:
+            gradient[c] += forces[depth - 1, c] - slope * places[depth - 1, c]
+    return force, slope / own[0], lost
+
+
+@njit(cache=True, nogil=True, error_model="numpy")
+def settle_curves(
+    basis: Array,
+    weights: Array,
+    lead: Array,
+    parameters: Array,
+    way: Array,
+    before: Array,
+    force: Array,
+    states: Array,
+    projected: Array,
+    jacobian: Array,
+    dissipated: Array,
+    change: Array,
+) -> None:
+    """Settle joints of spread sliders: ``parameters`` ``(j, 5)``, K, kr, µN, c and m.
+
+    The others as in :func:`settle_sliders`.
+    """
+    samples, size = basis.shape
+    # Turning points that may be open at once: those of the way in, and of a period and its first
+    # samples again.
+    depth = len(lead) + 2 * samples
+    memory = np.empty(POINTS + 2 * depth)
+    places, forces = np.empty((depth, size)), np.empty((depth, size))
+    gradients, gradient, nowhere = np.empty((samples, size)), np.empty(size), np.zeros(size)
+    shares = np.dot(weights, basis)
+    own_force = np.empty(samples)
+    for j in range(len(parameters)):
+        own = parameters[j]
+        memory[:], gradient[:], here = 0.0, 0.0, nowhere
+        for i in range(len(lead)):
+            end = before[j, i, 0]
+            own_force[0], _, _ = _follow_curve(
+                own, memory, places, forces, here, lead[i], end, gradient
+            )
+            here = lead[i]
+        for _ in range(CURVE_PERIODS):
+            start, dissipated[j] = own_force[0], 0.0
+            for step in range(1, samples + 1):
+                at = step if step < samples else 0
+                own_force[at], left, lost = _follow_curve(
+                    own, memory, places, forces, basis[step - 1], basis[at], way[j, at, 0], gradient
+                )
+                gradients[at] = gradient
+                dissipated[j] += lost
+                states[j, at] = 1 if left < LEFT_IN_SLIP else 0
+            change[j] = _relative_change(own_force[0] - start, own_force)
+        slopes = np.dot(weights, gradients)
+        for at in range(samples):
+            own_force[at] += own[1] * way[j, at, 0]
+            force[j, at, 0] = own_force[at]
+        projected[j, :, 0] = np.dot(weights, own_force)
+        for row in range(size):
+            for c in range(size):
+                jacobian[j, row, 0, c, 0] = slopes[row, c] + own[1] * shares[row, c]
