@@ -59,12 +59,20 @@ def _normal_load(path: Path, record: LoopFile, text: str | None) -> Array | floa
     if record.normal_load is not None:
         raise UserError(f"{path}: has a column of the normal load; allowed: it or --normal-load")
     try:
-        load = float(text) if text.replace(".", "", 1).isdecimal() else to_base(text, "N")
+        load = _number(text) or to_base(text, "N")
     except UnitError as error:
         raise UserError(f"--normal-load {text}: {error}; allowed: a force such as 60 N") from error
     if not load > 0.0:
         raise UserError(f"--normal-load {text}: not above 0; allowed: a force such as 60 N")
     return load
+
+
+def _number(text: str) -> float | None:
+    """A bare number; None of anything else."""
+    try:
+        return float(text)
+    except ValueError:
+        return None
 
 
 # --- what is printed ----------------------------------------------------------------------------

@@ -14,18 +14,18 @@ from fe_models.dynamics.frequency_response import (
     frequency_response,
 )
 from fe_models.dynamics.motion import Motion
-from fe_models.dynamics.newmark import StepControl
 from fe_models.dynamics.ring_down import ring_down
 from sa_solver.types import Array
 from workflow.case import RigCase
 from workflow.case import excitation as given
+from workflow.case.time_case import joules
 from workflow.errors import MethodFailed
 from workflow.joint_model import JointModel
 from workflow.reporter import Reporter
 from workflow.rig_model import RigModel
 from workflow.time_joint import evolution_curve
 from workflow.time_outcome import MOTION, RESPONSE, RING_DOWN, State, TimeOutcome
-from workflow.time_rig import motion_curves, motion_numbers, motion_of
+from workflow.time_rig import motion_curves, motion_numbers, motion_of, step_control
 
 # The second mode is looked for between these shares of its frequencies without the joint and with
 # all of it stuck.
@@ -48,7 +48,7 @@ def run_hammer(case: RigCase, rig: RigModel, joint: JointModel, reporter: Report
     Raises MethodFailed where a motion is not found, or shows no resonance.
     """
     assert isinstance(case.excitation, given.Hammer)
-    hammer, control = case.excitation, StepControl(case.integration.step)
+    hammer, control = case.excitation, step_control(case)
     blow = HammerBlow(rig.driven, hammer.force, hammer.duration)
     states = []
     for energy in case.energies:
@@ -74,7 +74,7 @@ def _state(
     response = frequency_response(blow.value(motion.times), acceleration, step)
     if response.remaining > AT_REST:
         reporter.warn(
-            f"at {energy:g} N mm {response.remaining:.0%} of the response is left when the record "
+            f"at {joules(energy)} {response.remaining:.0%} of the response is left when the record "
             "ends, which blurs its peaks: raise excitation.record"
         )
     peaks = _peak("first", response, *hammer.band, energy)
@@ -118,7 +118,7 @@ def _peak(
     top = int(np.argmax(heights)) if len(heights) else 0
     if not 0 < top < len(lines) - 1:
         raise MethodFailed(
-            f"at {energy:g} N mm the response has no peak from {lowest:.4g} to {highest:.4g} Hz: "
+            f"at {joules(energy)} the response has no peak from {lowest:.4g} to {highest:.4g} Hz: "
             "change excitation.band, or raise excitation.record"
         )
     return {f"{name}_frequency": float(lines[top]), f"{name}_peak": float(heights[top])}
@@ -143,11 +143,11 @@ def _ring_down(
     try:
         found = ring_down(rig.looked_at(motion.acceleration)[free], step, hammer.band)
     except SignalError as error:
-        reporter.warn(f"no ring-down at {energy:g} N mm: {error}")
+        reporter.warn(f"no ring-down at {joules(energy)}: {error}")
         return None
     amplitude = found.amplitude / (2.0 * np.pi * found.frequency) ** 2
     if amplitude[0] < NOTHING_LEFT * np.abs(rig.looked_at(motion.displacement)).max():
-        reporter.warn(f"no ring-down at {energy:g} N mm: over before the filter has settled")
+        reporter.warn(f"no ring-down at {joules(energy)}: over before the filter has settled")
         return None
     kept = np.unique(np.linspace(0, len(amplitude) - 1, RING_DOWN_POINTS).astype(int))
     return {
@@ -173,10 +173,10 @@ def _trend(states: Sequence[State]) -> dict[str, Any]:
     Its damping is that of the largest amplitude that the ring-downs show. A joint that dissipates
     nothing has no trend.
     """
-    first, last = (_first_mode(state) for state in (states[0], states[-1]))
-    both = [name for name in first if name in last and first[name] > 0.0]
     if len(states) < 2:
         return {}
+    first, last = (_first_mode(state) for state in (states[0], states[-1]))
+    both = [name for name in first if name in last and first[name] > 0.0]
     return {
         "ratio": {name: last[name] / first[name] for name in both},
         "trend": {name: float(np.sign(last[name] - first[name])) for name in both},

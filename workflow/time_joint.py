@@ -12,6 +12,7 @@ from wear.joints.ageing import (
     AgeingError,
     LongTest,
     MarchedStroke,
+    NeverReachedError,
     integrated_stretch,
     long_test,
     steady_stroke,
@@ -19,7 +20,7 @@ from wear.joints.ageing import (
 from wear.joints.law import march
 from wear.joints.measured_loops import MeasuredLoopError, measure_loops
 from workflow.case import JointCase
-from workflow.case.time_case import Ageing
+from workflow.case.time_case import Ageing, joules
 from workflow.errors import MethodFailed, UserError
 from workflow.joint_model import JointModel, Law
 from workflow.reporter import Reporter
@@ -35,10 +36,6 @@ STRETCH = 1000
 # Points of the evolution over the energy: evenly, and as many evenly over its logarithm from this
 # share on, as friction changes within a few cycles.
 CURVE_POINTS, CURVE_BEGIN = 101, 1e-6
-# A test by energy is first tried with this many cycles over those at its last energy per cycle,
-# then with as many times more.
-MARGIN = 2.0
-MOST_TRIALS = 40
 
 
 def run_joint(case: JointCase, reporter: Reporter) -> TimeOutcome:
@@ -58,7 +55,7 @@ def run_joint(case: JointCase, reporter: Reporter) -> TimeOutcome:
         )
     with reporter.stage("check of the jumps"):
         numbers = _ageing_numbers(model, test, amplitude)
-    cycles = cycles_of(test, case.ageing)
+    cycles = test.total_cycles
     ended = {"cycles": cycles, "energy": last, "duration": cycles / case.drive.frequency}
     curve = evolution_curve(model, last, test, rate)
     return TimeOutcome(case, states, curve, ended | {"ageing": numbers})
@@ -119,52 +116,22 @@ def aged(rate: Callable[[float], float], ageing: Ageing, breaks: tuple[float, ..
     Raises UserError where so much energy is never dissipated, MethodFailed where jumps fail.
     """
     try:
-        if ageing.cycles is not None:
-            return long_test(rate, ageing.cycles, tolerance=ageing.tolerance, breaks=breaks)
-        assert ageing.energy is not None
-        return _aged_to(ageing.energy, rate, ageing.tolerance, breaks)
+        return long_test(
+            rate,
+            np.inf if ageing.cycles is None else ageing.cycles,
+            until=np.inf if ageing.energy is None else ageing.energy,
+            tolerance=ageing.tolerance,
+            breaks=breaks,
+        )
+    except NeverReachedError as error:
+        raise UserError(f"ageing.energy: {error}; allowed: less, or a joint that slides") from error
     except AgeingError as error:
         raise MethodFailed(f"ageing: {error}") from error
-
-
-def _aged_to(
-    end: float, rate: Callable[[float], float], tolerance: float, breaks: tuple[float, ...]
-) -> LongTest:
-    """A test that dissipates at least ``end`` [N mm]; what comes after is of no interest."""
-    last = rate(end)
-
-    def held(energy: float) -> float:
-        return rate(energy) if energy < end else last
-
-    rates = last, rate(0.0)
-    if min(rates) <= 0.0:
-        raise UserError(
-            "ageing.energy: never dissipated: a cycle dissipates "
-            f"{rates[1]:g} N mm at first and {rates[0]:g} N mm then; allowed: a joint that slides"
-        )
-    cycles = MARGIN * end / max(rates)
-    for _ in range(MOST_TRIALS):
-        test = long_test(held, cycles, tolerance=tolerance, breaks=(*breaks, end))
-        reached = test.final_energy
-        if reached >= end:
-            return test
-        if reached + held(reached) == reached:
-            break
-        cycles *= MARGIN
-    raise UserError(
-        f"ageing.energy: never dissipated, {reached:g} N mm at most in {cycles:g} cycles; allowed: "
-        "less, or a joint that slides"
-    )
 
 
 def test_end(test: LongTest, ageing: Ageing) -> float:
     """Energy at the end of a test [N mm]."""
     return test.final_energy if ageing.energy is None else ageing.energy
-
-
-def cycles_of(test: LongTest, ageing: Ageing) -> float:
-    """Cycles of a test, to its energy or as many as were asked for, whatever they dissipate."""
-    return test.total_cycles if ageing.energy is None else float(test.cycles_at(ageing.energy))
 
 
 def energies_within(
@@ -176,7 +143,7 @@ def energies_within(
             yield energy
         elif energy > last:
             reporter.warn(
-                f"energies: {energy:g} N mm are not reached: the test ends at {last:g} N mm"
+                f"energies: {joules(energy)} are not reached: the test ends at {joules(last)}"
             )
     yield last
 

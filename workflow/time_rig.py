@@ -17,14 +17,13 @@ from wear.joints.ageing import LongTest
 from workflow.case import RigCase
 from workflow.case import excitation as given
 from workflow.case.input_files import read_columns
-from workflow.case.time_case import Ageing
+from workflow.case.time_case import Ageing, joules
 from workflow.errors import MethodFailed
 from workflow.joint_model import JointModel
 from workflow.reporter import Reporter
 from workflow.rig_model import RigModel, rig_model
 from workflow.time_joint import (
     aged,
-    cycles_of,
     energies_within,
     evolution_curve,
     extracted,
@@ -82,6 +81,11 @@ def run_rig(case: RigCase, reporter: Reporter) -> TimeOutcome:
     return replace(outcome, numbers={"free": rig.free(), **outcome.numbers})
 
 
+def step_control(case: RigCase) -> StepControl:
+    """Steps as the case asks for."""
+    return StepControl(case.integration.step, case.integration.tolerance)
+
+
 def motion_of(
     rig: RigModel,
     joint: JointModel,
@@ -98,7 +102,7 @@ def motion_of(
     law = joint.at(energy)
     motion = integrate(rig.model, law, rig.shaken(law, force), duration, control, start)
     if not motion.converged:
-        raise MethodFailed(f"motion at {energy:g} N mm: {motion.message}; lower integration.step")
+        raise MethodFailed(f"motion at {joules(energy)}: {motion.message}")
     return motion
 
 
@@ -109,6 +113,8 @@ def motion_numbers(rig: RigModel, motion: Motion) -> dict[str, Any]:
         "largest_displacement": float(np.abs(rig.looked_at(motion.displacement)).max()),
         **rig.contact(motion),
         "step_error": motion.error,
+        "joint_residual": motion.residual,
+        "balance_error": motion.energies.balance_error,
     }
 
 
@@ -125,7 +131,7 @@ def _run_recorded(
     columns = read_columns(excitation.file, given.RECORDED)
     times = columns["time"]
     force = Recorded(rig.driven, times, columns["force"])
-    control, begin = StepControl(case.integration.step), Start(time=float(times[0]))
+    control, begin = step_control(case), Start(time=float(times[0]))
     states = []
     for energy in case.energies:
         with reporter.stage("motion"):
@@ -210,6 +216,7 @@ class _SteadyStates:
     ) -> None:
         self._excitation, self._rig, self._joint = excitation, rig, joint
         self._steps = int(np.ceil(1.0 / (excitation.frequency * case.integration.step) - 1e-9))
+        self._tolerance = case.integration.tolerance
         self._found: dict[float, SteadyCycle] = {}
 
     def at(self, energy: float) -> SteadyCycle:
@@ -224,7 +231,7 @@ class _SteadyStates:
         excitation, rig = self._excitation, self._rig
         period = 1.0 / excitation.frequency
         force = Harmonic(rig.driven, excitation.force, excitation.frequency)
-        control = StepControl(period / self._steps)
+        control = StepControl(period / self._steps, self._tolerance)
         if start is not None:
             # Where a period begins, whatever came before: times must not lose their digits.
             start = replace(start, time=0.0)
@@ -251,7 +258,7 @@ class _SteadyStates:
                 )
             before = now
         raise MethodFailed(
-            f"no steady state at {energy:g} N mm after {excitation.periods} cycles: they still "
+            f"no steady state at {joules(energy)} after {excitation.periods} cycles: they still "
             f"change by {change:.1e}; raise excitation.periods or excitation.steady"
         )
 
@@ -282,7 +289,7 @@ def _aged(
         rate = _between(nodes, [steady.at(energy).energy for energy in nodes])
         test = aged(rate, ageing, (*breaks, *nodes[1:-1]))
         last = test_end(test, ageing)
-        cycles = cycles_of(test, ageing)
+        cycles = test.total_cycles
         # By energy the cycles change, by cycles the energy.
         now = cycles if ageing.energy is not None else last
         change = abs(now - before) / now
@@ -296,7 +303,7 @@ def _aged(
             f"ageing: {len(nodes)} steady states leave an error of about {change:.1e}, above "
             f"ageing.tolerance {ageing.tolerance:g}"
         )
-    numbers = {"error": change * cycles, "steady_states": len(nodes)}
+    numbers = {"relative_error": change, "steady_states": len(nodes)}
     return rate, test, {"cycles": cycles, "energy": last, "ageing": numbers}
 
 

@@ -21,7 +21,6 @@ def run_time(case: JointCase | RigCase, folder: OutputFolder, reporter: Reporter
 
     reporter.say(f"run: {case.title}")
     case = with_computed_wear(case, folder, reporter)
-    warn_of_table(case, reporter)
     try:
         if isinstance(case, JointCase):
             from workflow.time_joint import run_joint
@@ -33,4 +32,5 @@ def run_time(case: JointCase | RigCase, folder: OutputFolder, reporter: Reporter
             outcome = run_rig(case, reporter)
     except JointError as error:
         raise UserError(f"{folder.case}: joint: {error}") from error
+    warn_of_table(case, float(outcome.evolution["energy"][-1]), reporter)
     write_time_output(outcome, folder, reporter)

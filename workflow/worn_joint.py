@@ -44,19 +44,21 @@ def with_computed_wear(
     return case.model_copy(update={"evolution": evolution})
 
 
-def warn_of_table(case: JointCase | RigCase, reporter: Reporter) -> None:
-    """Say where a table of loops is used beyond its energies, or under another load."""
+def warn_of_table(case: JointCase | RigCase, last: float, reporter: Reporter) -> None:
+    """Say where a table of loops is used beyond its energies, or under another load.
+
+    ``last`` is the largest energy that the joint came to [N mm].
+    """
     if case.evolution.file is None:
         return
     table = read_loop_table(Path(case.evolution.file))
-    last = max(case.energies[-1], case.ageing.energy or 0.0)
     if last > table.energy[-1]:
         reporter.warn(
             f"evolution.file: its loops end at {1e-3 * table.energy[-1]:g} J; beyond, up to "
             f"{1e-3 * last:g} J, the last one holds"
         )
     load = case.joint.normal_load
-    if np.any(np.abs(table.P - load) > SAME_LOAD * load):
+    if load > 0.0 and np.any(np.abs(table.P - load) > SAME_LOAD * load):
         reporter.warn(
             f"evolution.file: its loops are under {table.P.min():g} to {table.P.max():g} N, the "
             f"joint is under {load:g} N: stiffness depends on the load"

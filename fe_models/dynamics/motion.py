@@ -49,10 +49,17 @@ class Energies:
     joints: Array
 
     @property
-    def balance_error(self) -> Array:
+    def missing(self) -> Array:
         """What is missing ``(t,)`` [N mm] of what the excitation and the start have brought in."""
         held = self.kinetic + self.elastic
         return self.excitation - (held - held[0]) - self.damping - self.joint_work
+
+    @property
+    def balance_error(self) -> float:
+        """The largest of what is missing, relative to the largest energy there is."""
+        terms = (self.kinetic, self.elastic, self.excitation, self.damping, self.joint_work)
+        largest = max(float(np.abs(term).max(initial=0.0)) for term in terms)
+        return float(np.abs(self.missing).max(initial=0.0)) / largest if largest > 0.0 else 0.0
 
 
 @dataclass(frozen=True)

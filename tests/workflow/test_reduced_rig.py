@@ -246,7 +246,7 @@ def test_energies_balance_while_the_contact_slides_and_lifts_off(specimen, direc
     motion = motion_of(rig, joint, 0.0, blow, 0.02, StepControl(2e-5))
     energies = motion.energies
     brought = np.abs(np.diff(energies.excitation)).sum()
-    assert np.abs(energies.balance_error).max() < ROUNDING * brought
+    assert np.abs(energies.missing).max() < ROUNDING * brought
     assert np.diff(energies.joints, axis=0).min() >= 0.0
     told = rig.contact(motion)
     assert told["largest_normal_force"] > LOAD > told["smallest_normal_force"]

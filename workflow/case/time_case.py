@@ -39,6 +39,7 @@ EndEnergy = Annotated[
     float,
     Quantity("N*mm", above=0.0, at_most=1e15, range_text="above 0 and at most 1e12 J"),
 ]
+StepError = Annotated[float, Quantity("1", above=0.0, at_most=0.1)]
 JumpError = Annotated[float, Quantity("1", at_least=1e-10, at_most=0.1)]
 
 
@@ -75,6 +76,12 @@ class Integration(Section):
     """Newmark's method, implicit in the force of the joint."""
 
     step: Time = entry("of time [s]", "10 us", default=1e-5)
+    tolerance: StepError | None = entry(
+        "error of the displacement that a step may add before it is taken in parts, relative to "
+        "the largest displacement; without it none is [1]",
+        1e-5,
+        default=None,
+    )
 
 
 class Reported(Section):
@@ -268,11 +275,16 @@ def _kept_time(excitation: Harmonic | Hammer | Recorded) -> float:
     return float(times[-1] - times[0])
 
 
+def joules(energy: float) -> str:
+    """An energy [N mm] as it is told."""
+    return f"{1e-3 * energy:.5g} J"
+
+
 def check_within(energies: tuple[float, ...], ageing: Ageing) -> None:
     """Refuse energies beyond the end of the ageing."""
     if ageing.energy is not None and energies[-1] > ageing.energy:
         raise disagreement(
-            f"{energies[-1]:g} N mm: beyond the end; allowed: up to {ageing.energy:g} N mm",
+            f"{joules(energies[-1])}: beyond the end; allowed: up to {joules(ageing.energy)}",
             f"energies.{len(energies) - 1}",
         )
 
@@ -305,4 +317,4 @@ def ageing_outline(ageing: Ageing) -> str:
     """The end of the ageing."""
     if ageing.cycles is not None:
         return f"to {ageing.cycles:g} cycles"
-    return f"to {ageing.energy:g} N mm"
+    return f"to {joules(ageing.energy or 0.0)}"
