@@ -49,6 +49,9 @@ AT_REST = 1e-9
 """A residual that changes by less than this share of itself is that of a body in free motion, at
 constant speed until it meets something: differences are rounding, and would throw it far off."""
 
+ROUNDING = float(np.finfo(np.float64).eps)
+"""A state this much larger than the steps that are to be told says nothing of them."""
+
 TINY = np.finfo(float).tiny
 """Keeps divisions by a vanishing size finite."""
 
@@ -101,6 +104,10 @@ def douglas_rachford(
         step = solution - elastic
         size = scale or max(np.linalg.norm(solution), np.linalg.norm(elastic), TINY)
         residual = float(np.linalg.norm(step) / size)
+        if ROUNDING * np.linalg.norm(state) > tolerance * size:
+            # Thrown so far off that steps of this size are lost in its digits: no solution, though
+            # nothing may seem to be left.
+            residual = np.inf
         if residual <= tolerance or not np.isfinite(residual):
             break
         state = memory.next_state(state.ravel(), relaxation * step.ravel()).reshape(state.shape)

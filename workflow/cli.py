@@ -283,9 +283,9 @@ def schema() -> None:
 
 def _outline(case: Case) -> list[tuple[str, str]]:
     """What would run, in a few rows."""
-    from workflow.case import JointCase, RigCase, SpecimensCase, WearCase
+    from workflow.case import JointCase, RigCase, SpecimensCase, VibrationCase, WearCase
 
-    if isinstance(case, SpecimensCase | JointCase | RigCase):
+    if isinstance(case, SpecimensCase | JointCase | RigCase | VibrationCase):
         return case.outline()
     return _wear_outline(case) if isinstance(case, WearCase) else _contact_outline(case)
 

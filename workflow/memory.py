@@ -12,6 +12,7 @@ from workflow.case import (
     LineContactCase,
     RigCase,
     SpecimensCase,
+    VibrationCase,
     WearCase,
 )
 from workflow.case.rig_structure import ReducedBody
@@ -28,6 +29,9 @@ STATE_FIELDS, SPECTRA = 6, 300
 STEP_COLUMNS = 60
 # The same per displacement of a reduced body, whose numbers are in large arrays.
 REDUCED_COLUMNS = 20
+# Points of a forced response: samples and derivatives of the joint's force are kept of each until
+# the curve is found.
+CURVE_POINTS = 2000
 # Sparse factors of a structure with this many nodes took this much; they grow with this power.
 FACTOR_BYTES, FACTOR_NODES, FACTOR_POWER = 3.5e9, 1e5, 1.4
 # Meshes, plots and the interpreter with its libraries.
@@ -45,6 +49,10 @@ def required_bytes(
     """
     if isinstance(case, JointCase | RigCase):
         return BYTES * _kept_in_time(case, structure_nodes) + REST
+    if isinstance(case, VibrationCase):
+        own = case.resolution
+        kept = 2 * own.samples + (2 * len(own.harmonics)) ** 2
+        return BYTES * CURVE_POINTS * kept + REST
     if isinstance(case, SpecimensCase):
         pad = 3 * (case.mesh.pad_elements + 1) ** 2
         factors = FACTOR_BYTES * (structure_nodes / FACTOR_NODES) ** FACTOR_POWER
@@ -89,6 +97,8 @@ def _remedy(case: WearCase | Case) -> str:
     """What makes a case smaller."""
     if isinstance(case, JointCase | RigCase):
         return "raise integration.step, or shorten what is recorded"
+    if isinstance(case, VibrationCase):
+        return "lower resolution.samples or resolution.harmonics"
     if isinstance(case, SpecimensCase):
         return "lower mesh.pad_elements, mesh.order or contact.grid, or raise mesh.size"
     if isinstance(case, DovetailCase):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from workflow import fidelity
-from workflow.case import Case, JointCase, RigCase, SpecimensCase, WearCase
+from workflow.case import Case, JointCase, RigCase, SpecimensCase, VibrationCase, WearCase
 from workflow.errors import UserError
 from workflow.folder import OutputFolder
 from workflow.memory import check_memory
@@ -57,6 +57,10 @@ def _run(case: Case, folder: OutputFolder, resume: bool) -> None:
             from workflow.time_run import run_time
 
             run_time(case, folder, reporter)
+        elif isinstance(case, VibrationCase):
+            from workflow.vibration_run import run_vibration
+
+            run_vibration(case, folder, reporter)
         else:
             from workflow.contact_run import run_contact
 

@@ -109,3 +109,13 @@ def test_free_motion_is_no_solution():
     assert not found.converged
     assert found.residual > 0.0
     assert np.abs(found.state).max() < 1.0
+
+
+def test_what_is_thrown_far_off_has_not_converged():
+    """A free body under a load, so far off that its steps are lost in the digits of its place."""
+    load = 1.0
+    result = douglas_rachford(
+        lambda s: s - load, lambda t: t, np.array([1e17]), scale=1.0, tolerance=1e-8
+    )
+    assert not result.converged
+    assert result.residual == np.inf

@@ -112,6 +112,7 @@ def uncommented(text, *sections):
         ("line", [], {}),
         ("joint", ["reported"], {"reported.0.value": 0.9}),
         ("rig", ["reported"], {"excitation.force": 75.0}),
+        ("vibration", ["tolerance"], {"forces": (10.0, 40.0), "resolution.tolerance": 0.01}),
     ],
 )
 def test_template_works_without_its_comment_signs(kind, sections, values, template_files):

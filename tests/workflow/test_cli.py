@@ -87,6 +87,7 @@ def test_check_says_what_would_run(dovetail_path):
         ("line", "512 strips of 0.003906 mm"),
         ("joint", "bouc_wen under 60 N, fixed, looked at 2 energies"),
         ("rig", "75 N at 100 Hz on mass 1"),
+        ("vibration", "10, 40 N on mass 1, 20 to 400 Hz"),
     ],
 )
 def test_new_writes_a_case_that_checks(tmp_path, template_files, kind, words):

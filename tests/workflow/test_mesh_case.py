@@ -261,6 +261,7 @@ def test_parts_and_instances_run(blocks, tmp_path):
 
 def test_worn_faces_come_back_at_the_users_nodes(blocks, tmp_path):
     """By the numbers of the file: the top of the base and the bottom of the foot."""
+    edit(blocks, "4 N", "18 N")  # of the 20 N at which all of the foot slides: some of it does
     summary = run(blocks, tmp_path / "out")["foot"]
     for body, numbers, into in ((1, range(19, 28), -1.0), (2, range(1, 10), 1.0)):
         told = summary["worn_nodes"][f"body_{body}"]
@@ -268,7 +269,7 @@ def test_worn_faces_come_back_at_the_users_nodes(blocks, tmp_path):
         assert sorted(rows[:, 0].astype(int)) == list(numbers)
         np.testing.assert_allclose(rows[:, 1:3], 0.0, atol=1e-15)
         assert np.all(into * rows[:, 3] >= 0.0)
-        assert np.any(into * rows[:, 3] > 0.0)
+        assert np.max(into * rows[:, 3]) > 1e-10
         assert told["volume_share"] == pytest.approx(1.0, abs=1e-12)
     ending = invoke("resultants", blocks, "--out", tmp_path / "files")
     assert ending.exit_code == 0, ending.stderr

@@ -10,6 +10,7 @@ from workflow.case.schema import Case, json_schema
 from workflow.case.specimens_case import SpecimensCase
 from workflow.case.template import KINDS, template
 from workflow.case.time_case import JointCase, RigCase, TimeCase
+from workflow.case.vibration_case import VibrationCase
 from workflow.case.wear_case import WearCase
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError
@@ -29,6 +30,7 @@ __all__ = [
     "RigCase",
     "SpecimensCase",
     "TimeCase",
+    "VibrationCase",
     "WearCase",
     "dump_case",
     "json_schema",

@@ -24,6 +24,7 @@ from workflow.case.schema import Case
 from workflow.case.source import KeyPath, Source, dotted, read_text
 from workflow.case.specimens_case import SpecimensCase
 from workflow.case.time_case import JointCase, RigCase
+from workflow.case.vibration_case import VibrationCase
 from workflow.errors import CaseError
 
 
@@ -68,9 +69,12 @@ TIME_CASES: dict[str, type[Case]] = {
 
 def _kind_of_case(source: Source) -> type[Case]:
     """The kind that the source means by its analysis and structure, whatever else is wrong."""
-    analysis = _choice(source, ("analysis",), ("wear", "contact", "time"))
+    analysis = _choice(source, ("analysis",), ("wear", "contact", "time", "vibration"))
     if analysis == "time":
         return TIME_CASES[_choice(source, ("structure", "kind"), tuple(TIME_CASES))]
+    if analysis == "vibration":
+        _choice(source, ("structure", "kind"), ("rig",))
+        return VibrationCase
     if analysis == "wear":
         kind = _choice(source, ("structure", "kind"), (*WEAR_CASES, "bodies"))
         if kind != "bodies":

@@ -13,6 +13,7 @@ from workflow.case.mesh_case import MeshCase
 from workflow.case.resultants_case import ResultantsCase
 from workflow.case.specimens_case import SpecimensCase
 from workflow.case.time_case import JointCase, RigCase
+from workflow.case.vibration_case import VibrationCase
 
 Case = (
     DovetailCase
@@ -25,6 +26,7 @@ Case = (
     | LineContactCase
     | JointCase
     | RigCase
+    | VibrationCase
 )
 
 

@@ -15,6 +15,7 @@ from workflow.case.resultants_case import ResultantsCase
 from workflow.case.sections import Section, entries_of, sections_of
 from workflow.case.specimens_case import SpecimensCase
 from workflow.case.time_case import JointCase, RigCase, SteadyAgeing
+from workflow.case.vibration_case import VibrationCase
 from workflow.case.wear_sections import Step
 from workflow.case.writing import Row, render
 
@@ -30,6 +31,7 @@ KINDS: dict[str, type[Section]] = {
     "line": LineContactCase,
     "joint": JointCase,
     "rig": RigCase,
+    "vibration": VibrationCase,
 }
 
 HEADER = """\

@@ -37,6 +37,9 @@ EXPLICIT = 0.9, 0.45
 TIME_STEPS = 4.0, 2.0, 1.0, 0.5, 0.25
 # Where a cycle takes seconds: so many rungs of jumps and errors fewer, and the longest explicit.
 COARSER_3D = 2
+# Of a forced response; the finest harmonic is seen in so many samples per odd one.
+ODD_HARMONICS, SAMPLES_PER_HARMONIC = (1, 2, 3, 5, 8, 15, 30), 32
+SAMPLES = (32, 64, 128, 256, 512, 1024, 2048)
 
 
 @dataclass(frozen=True)
@@ -270,6 +273,30 @@ def _time_steps(case: Case) -> Iterator[Rung]:
         yield Rung(f"{1e6 * step:.3g} us", (f"integration.step={step!r}",), factor)
 
 
+# --- vibration ----------------------------------------------------------------------------------
+
+
+def _harmonics(case: Case) -> Iterator[Rung]:
+    """Fewer and more odd harmonics, in samples that show the highest."""
+    samples = _entry(case, "resolution.samples")
+    if samples is None:
+        return
+    for count in ODD_HARMONICS:
+        fine = max(samples, SAMPLES_PER_HARMONIC * count)
+        resolution = f"resolution={{harmonics: {count}, samples: {fine}}}"
+        yield Rung(f"{count} odd harmonics", (resolution,), 1.0 / count)
+
+
+def _samples(case: Case) -> Iterator[Rung]:
+    """Fewer and more samples of the case's harmonics; too few of them are refused."""
+    harmonics = _entry(case, "resolution.harmonics")
+    if harmonics is None:
+        return
+    for samples in SAMPLES:
+        resolution = f"resolution={{harmonics: {list(harmonics)}, samples: {samples}}}"
+        yield Rung(f"{samples} samples", (resolution,), 1.0 / samples)
+
+
 # --- structure ----------------------------------------------------------------------------------
 
 
@@ -316,4 +343,6 @@ AXES = (
     Axis("mesh", "finite elements of the structure", _meshes, order=2.0),
     Axis("order", "order of the finite elements", _orders),
     Axis("step", "step of the motion in time", _time_steps, order=2.0),
+    Axis("harmonics", "odd harmonics of the motion", _harmonics, order=2.0),
+    Axis("samples", "samples of a period", _samples, order=2.0),
 )

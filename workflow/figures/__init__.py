@@ -11,7 +11,7 @@ from types import ModuleType
 
 import h5py
 
-from workflow.figures import contact, specimens, time, wear
+from workflow.figures import contact, specimens, time, vibration, wear
 from workflow.figures.style import STYLE, save
 
 
@@ -37,6 +37,8 @@ def _kind(file: h5py.File) -> ModuleType:
     """The module that draws this kind of results."""
     if "states" in file:
         return time
+    if "responses" in file:
+        return vibration
     if "specimens" in file:
         return specimens
     return contact if "history" in file else wear

@@ -1,0 +1,197 @@
+"""Vibration cases from the command line: linear limits, closed forms, mistakes, what they leave."""
+
+import csv
+from functools import partial
+
+import h5py
+import numpy as np
+import pytest
+
+from fe_models.dynamics.continuation import StepControl
+from tests.workflow.conftest import invoke
+from tests.workflow.test_time_cases import MASS, linear_rig, receptance, refused, run
+from wear.joints.jenkins import Jenkins
+from workflow import vibration_run
+from workflow.case import VibrationCase, dump_case, parse_case
+from workflow.memory import required_bytes
+
+RIG = """\
+title: Rig
+analysis: vibration
+structure: {kind: rig, masses: [20 kg, 1 kg], springs: [1 N/um, 200 N/um], damping_ratio: 0.1}
+joint: {law: jenkins, normal_load: 100 N, friction: 0.5, stiffness: 10 N/um}
+forces: [2 N, 60 N]
+frequencies: [20 Hz, 300 Hz]
+output: {figures: false}
+"""
+ONE_MASS = """\
+title: One mass
+analysis: vibration
+structure: {kind: rig, masses: [2 kg], springs: [800 N/mm], damping_ratio: 0.02}
+joint: {law: jenkins, normal_load: 10 N, friction: 0.5, stiffness: 1500, residual_stiffness: 30}
+forces: [10 N]
+frequencies: [80 Hz, 200 Hz]
+resolution: {harmonics: 1, samples: 4096}
+output: {figures: false}
+"""
+STIFFNESS = 1e4
+# Of the solver, over a resonance of moderate damping.
+SOLVED = 1e-7
+# Half of the way to and fro is taken at 1024 times of a period: at most (π/1024)²/2 too small.
+SAMPLED = 5e-6
+
+
+def curves(folder, number=0):
+    """The datasets of a force of a finished run."""
+    with h5py.File(folder / "out" / "results.h5") as file:
+        group = file[f"responses/{number:05d}"]
+        return {name: group[name][()] for name in group}
+
+
+# --- against closed forms -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("friction", "held"), [(0.0, 0.0), (10.0, STIFFNESS)])
+def test_free_and_stuck_joints_leave_the_rig_linear(tmp_path, friction, held):
+    summary = run(tmp_path, RIG, f"joint.friction={friction}", "forces=[2 N]")
+    found = curves(tmp_path)
+    for frequency, amplitude, phase in zip(
+        found["frequency"], found["amplitude"], found["phase"], strict=True
+    ):
+        wanted = 2.0 * receptance(frequency, held)
+        np.testing.assert_allclose(amplitude, np.abs(wanted), rtol=SAMPLED + SOLVED)
+        assert np.cos(phase - np.angle(wanted[-1])) == pytest.approx(1.0, abs=1e-12)
+    (response,) = summary["responses"]
+    assert response["message"] == ""
+    assert response["left_out"] < 1e-12
+    assert found["frequency"][[0, -1]].tolist() == [20.0, 300.0]
+    squares = np.linalg.eigvals(np.linalg.solve(MASS, linear_rig(held)[0]))
+    natural = np.sqrt(np.sort(squares.real)) / (2.0 * np.pi)
+    np.testing.assert_allclose(summary["stuck" if held else "free"], natural, rtol=1e-12)
+    assert found["slip"].max() == (0.0 if held else 1.0)
+    # It lies between the points of the curve, higher than both.
+    grid = np.linspace(0.99, 1.01, 2001) * response["resonance"]
+    sizes = [abs(receptance(frequency, held)[-1]) for frequency in grid]
+    assert response["receptance"] == pytest.approx(max(sizes), rel=2.0 * SAMPLED)
+    assert response["resonance"] == pytest.approx(grid[np.argmax(sizes)], rel=2e-3)
+
+
+def test_single_harmonic_of_one_mass_is_the_closed_form(tmp_path):
+    """Amplitude a under force F: |(k - m ω² + i c ω) a + cosine - i sine| = F."""
+    summary = run(tmp_path, ONE_MASS)
+    law = Jenkins(1500.0, 0.5, 10.0, 30.0)
+    damping = 2.0 * 0.02 * np.sqrt(800.0 * 2e-3)
+    found = curves(tmp_path)
+    amplitude = found["amplitude"][:, 0]
+    assert amplitude.max() > 3.0 * 5.0 / 1500.0
+    omega = 2.0 * np.pi * found["frequency"]
+    cosine, sine = law.first_harmonic(amplitude)
+    force = np.abs(
+        (800.0 - 2e-3 * omega**2 + 1j * damping * omega) * amplitude + cosine - 1j * sine
+    )
+    # Amplitudes are SAMPLED; the joint's force, of second order in 1/4096, adds less.
+    np.testing.assert_allclose(force, 10.0, rtol=2e-5)
+    np.testing.assert_allclose(
+        found["energy_per_cycle"], law.loop_energy(amplitude), rtol=2e-5, atol=1e-6
+    )
+    assert summary["responses"][0]["sampling"] < 1e-5
+
+
+def test_resonance_falls_from_stuck_to_free(tmp_path):
+    overrides = ("structure.damping_ratio=0.01", "forces=[0.2 N, 20 N, 300 N]")
+    summary = run(tmp_path, RIG, *overrides, "resolution.tolerance=1 %")
+    assert summary["trend"]["resonance"] == -1.0
+    assert summary["least_receptance_force"] == 20.0
+    first, middle, last = summary["responses"]
+    assert first["resonance"] == pytest.approx(summary["stuck"][0], rel=1e-3)
+    assert last["resonance"] == pytest.approx(summary["free"][0], rel=1e-2)
+    assert (first["slip"], last["slip"] > 0.9) == (0.0, True)
+    assert len(middle["harmonics"]) > len(first["harmonics"]) - 1
+    for own in summary["responses"]:
+        assert max(own["left_out"], own["sampling"]) <= 0.01
+        assert own["amplitude"] == pytest.approx(own["receptance"] * own["force"])
+    assert summary["warnings"] == []
+
+
+def test_a_curve_that_ends_early_or_has_no_peak_is_told(tmp_path, monkeypatch):
+    summary = run(tmp_path, RIG, "forces=[2 N]", "frequencies=[20 Hz, 25 Hz]")
+    assert summary["warnings"] == [
+        "2 N: no resonance, the largest motion is at an end of the curve"
+    ]
+    monkeypatch.setattr(vibration_run, "StepControl", partial(StepControl, max_points=5))
+    summary = run(tmp_path, RIG, "forces=[2 N]")
+    message = summary["responses"][0]["message"]
+    assert "the curve has 5 points" in message
+    assert f"2 N: {message}" in summary["warnings"]
+    assert summary["responses"][0]["points"] == 6
+
+
+# --- what is left -------------------------------------------------------------------------------
+
+
+def test_files_of_a_run(tmp_path):
+    run(tmp_path, RIG, "output.figures=true")
+    out = tmp_path / "out"
+    assert (out / "figures" / "frequency_response.png").exists()
+    found = curves(tmp_path, 1)
+    with (out / "frf_00001.csv").open(encoding="utf-8", newline="") as file:
+        header, *rows = csv.reader(file)
+    assert header[:4] == ["frequency [Hz]", "amplitude_1 [mm]", "amplitude_2 [mm]", "phase [rad]"]
+    table = np.array(rows, dtype=float)
+    np.testing.assert_allclose(table[:, 0], found["frequency"], rtol=1e-8)
+    np.testing.assert_allclose(table[:, 1:3], found["amplitude"], rtol=1e-8)
+    with h5py.File(out / "results.h5") as file:
+        free = file["linear/free"][()], file["linear/frequency"][()]
+    wanted = [abs(receptance(frequency, 0.0)[-1]) for frequency in free[1][::200]]
+    np.testing.assert_allclose(free[0][::200], wanted, rtol=1e-9)
+    run(tmp_path, RIG, "forces=[2 N]")
+    assert not (out / "frf_00001.csv").exists()
+
+
+# --- the case -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("override", "words"),
+    [
+        ("forces=[40 N, 10 N]", "forces=[40 N, 10 N]: not ascending"),
+        ("forces=[]", "forces"),
+        ("frequencies=[400 Hz, 20 Hz]", "not ascending"),
+        ("mass=3", "no such mass; allowed: 1 to 2"),
+        ("structure.kind=reduced", "not known; allowed: rig"),
+        ("joint.law=friction_contact", "bouc_wen, jenkins"),
+        ("resolution.harmonics=[1, 1]", "not ascending"),
+        ("resolution.harmonics=[3, 5]", "1 among them"),
+        ("resolution.harmonics=[1, 2.5]", "not all of them harmonics"),
+        ("resolution.harmonics=0", "out of range"),
+        ("resolution.samples=30", "too few for harmonic 15; allowed: above 30"),
+        ("resolution.tolerance=50 %", "out of range"),
+        ("assumed=[excitation]", "no such entry"),
+    ],
+)
+def test_mistakes_are_told_in_one_line(tmp_path, override, words):
+    code, message = refused(tmp_path, RIG, override)
+    assert code == 2
+    assert words in message
+
+
+def test_new_writes_a_case_that_runs(tmp_path):
+    path = tmp_path / "mine.yaml"
+    assert invoke("new", "vibration", path).exit_code == 0
+    case = parse_case(path.read_text(encoding="utf-8"), str(path))
+    assert isinstance(case, VibrationCase)
+    assert tuple(case.resolution.harmonics) == (1, 3, 5, 7, 9, 11, 13, 15)
+    settings = ("--set", "forces=[10 N]", "--set", "output.figures=false")
+    assert invoke("run", path, "--out", tmp_path / "out", *settings).exit_code == 0
+
+
+def test_harmonics_are_a_number_of_odd_ones_or_a_list():
+    for given, wanted in (("3", (1, 3, 5)), ("[0, 1, 2]", (0, 1, 2))):
+        case = parse_case(RIG, "case", [f"resolution.harmonics={given}"])
+        assert case.resolution.harmonics == wanted
+        assert parse_case(dump_case(case), "dump") == case
+
+
+def test_memory_grows_with_the_samples():
+    few, many = (parse_case(RIG, "case", [f"resolution.samples={n}"]) for n in (256, 65536))
+    assert required_bytes(many) - required_bytes(few) == 8 * 2000 * 2 * (65536 - 256)
