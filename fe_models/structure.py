@@ -94,12 +94,12 @@ class Structure:
         ``like`` is a joint that differs little from this one and lends it its ρ.
         """
         held_1, held_2 = self.body_1.held, self.body_2.held
-        projection = self.projection
-        if like is None and projection is None and not held_1.any() and not held_2.any():
+        projection, held = self.projection, held_1.any() or held_2.any()
+        if like is None and projection is None and not held:
             halves = self._condense_halves()
             if halves is not None:
                 return halves
-        if held_1.any() or held_2.any():
+        if held:
             every = sp.identity(len(held_2), format="csr") if projection is None else projection
             projection = every[~held_2][:, ~held_1]
         return join(self.body_1.condense(), self.body_2.condense(), projection, held_2, like)
@@ -113,8 +113,8 @@ class Structure:
             on_1 = self.body_1.on_interface(mirrors[0])
             if on_1 is None or on_1 != self.body_2.on_interface(mirrors[1]):
                 continue
-            halves_1 = self.body_1.condense_halves(mirrors[0])
-            halves_2 = None if halves_1 is None else self.body_2.condense_halves(mirrors[1])
+            halves_1 = self.body_1.condense_halves(mirrors[0], on_1)
+            halves_2 = None if halves_1 is None else self.body_2.condense_halves(mirrors[1], on_1)
             if halves_1 is not None and halves_2 is not None:
                 return join_halves(halves_1, halves_2, on_1)
         return None

@@ -85,16 +85,17 @@ class SupportedBody:
         """What a mirror of all displacements does to the interface's; None if it leaves them."""
         return mirror.restricted(self._interface)
 
-    def condense_halves(self, mirror: Mirror) -> tuple[tuple[Array, Array], ...] | None:
+    def condense_halves(
+        self, mirror: Mirror, on_interface: Mirror
+    ) -> tuple[tuple[Array, Array], ...] | None:
         """As :meth:`condense`, but what the mirror keeps and what it turns round apart.
 
-        The coordinates are those of the bases of the mirror on the interface. None if the stiffness
-        is not its own mirror image.
+        The coordinates are those of the bases of ``on_interface``, the mirror there. None if the
+        stiffness is not its own mirror image.
         """
         stiffness, loads = self._reduced()
         stiffnesses = halves(stiffness, mirror)
-        on_interface = self.on_interface(mirror)
-        if stiffnesses is None or on_interface is None:
+        if stiffnesses is None:
             return None
         condensed = []
         for part, basis, coordinates in zip(

@@ -166,7 +166,8 @@ def _run_harmonic(
     reporter: Reporter,
 ) -> TimeOutcome:
     steady = _SteadyStates(case, excitation, rig, joint)
-    energies, cycles, rate, test = list(case.energies), None, None, None
+    energies, rate, test = list(case.energies), None, None
+    cycles: list[float | None] = [None] * len(energies)
     numbers: dict[str, Any] = {}
     if case.ageing.wanted:
         with reporter.stage("ageing"):
@@ -175,8 +176,8 @@ def _run_harmonic(
         cycles = test.cycles_at(np.array(energies)).tolist()
     with reporter.stage("steady states"):
         states = tuple(
-            _steady_state(rig, joint, energy, steady.at(energy), cycles and cycles[number])
-            for number, energy in enumerate(energies)
+            _steady_state(rig, joint, energy, steady.at(energy), reached)
+            for energy, reached in zip(energies, cycles, strict=True)
         )
     return TimeOutcome(case, states, evolution_curve(joint, energies[-1], test, rate), numbers)
 

@@ -27,15 +27,7 @@ from numba import njit, vectorize
 
 from sa_solver.types import Array
 from wear.joints.law import JointResponse, State
-from wear.joints.parameters import (
-    JointError,
-    Parameter,
-    answer,
-    require_not_negative,
-    require_one_each,
-    require_positive,
-    side_by_side,
-)
+from wear.joints.parameters import JointError, LineLaw, Parameter, answer, side_by_side
 
 # Largest step n s of the fourth-order rule, and the largest as a share of |ξ| or, by ξ = 0, at all:
 # there |ξ|^n has few derivatives. ξ and the loss of a branch are then within 2e-9 of the solution.
@@ -209,7 +201,7 @@ def _loop_energy(
 
 
 @dataclass(frozen=True)
-class BoucWen:
+class BoucWen(LineLaw):
     """Bouc and Wen's joint with a macroslip slope.
 
     ``stiffness`` kt [N/mm], the whole initial slope, ``friction`` µ and ``normal_load`` N [N],
@@ -221,28 +213,11 @@ class BoucWen:
     the mean of the tangents forwards and backwards.
     """
 
-    stiffness: Parameter
-    friction: Parameter
-    normal_load: Parameter
-    residual_stiffness: Parameter = 0.0
     sigma: Parameter = 0.5
     exponent: Parameter = 2.0
 
     def __post_init__(self) -> None:
-        require_one_each(
-            self.stiffness,
-            self.friction,
-            self.normal_load,
-            self.residual_stiffness,
-            self.sigma,
-            self.exponent,
-        )
-        require_positive(stiffness=self.stiffness)
-        require_not_negative(
-            friction=self.friction,
-            normal_load=self.normal_load,
-            residual_stiffness=self.residual_stiffness,
-        )
+        super().__post_init__()
         if not np.all(np.less(self.residual_stiffness, self.stiffness)):
             raise JointError(
                 f"residual_stiffness of a Bouc-Wen joint is {self.residual_stiffness}: it must be "
@@ -260,15 +235,10 @@ class BoucWen:
                 f"exponent of a joint is {self.exponent}: it must be finite, 1 or more"
             )
 
-    @property
-    def directions(self) -> int:
-        return 1
-
     @cached_property
     def _constants(self) -> tuple[Parameter, ...]:
-        limit = np.multiply(self.friction, self.normal_load)
         gain = np.multiply(2.0, self.sigma) - 1.0
-        return self.stiffness, self.residual_stiffness, limit, self.exponent, gain
+        return self.stiffness, self.residual_stiffness, self.limit, self.exponent, gain
 
     @cached_property
     def _parameters(self) -> Array:

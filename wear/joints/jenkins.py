@@ -11,14 +11,7 @@ from numba import njit
 
 from sa_solver.types import Array
 from wear.joints.law import JointResponse, State
-from wear.joints.parameters import (
-    Parameter,
-    answer,
-    require_not_negative,
-    require_one_each,
-    require_positive,
-    side_by_side,
-)
+from wear.joints.parameters import LineLaw, Parameter, answer, side_by_side
 
 
 @njit(cache=True)
@@ -64,7 +57,7 @@ def _respond(
 
 
 @dataclass(frozen=True)
-class Jenkins:
+class Jenkins(LineLaw):
     """Jenkins's element.
 
     ``stiffness`` kt [N/mm] of the spring, ``friction`` µ and ``normal_load`` N [N], whose product
@@ -77,28 +70,9 @@ class Jenkins:
     At the limit the tangent is that of sliding on.
     """
 
-    stiffness: Parameter
-    friction: Parameter
-    normal_load: Parameter
-    residual_stiffness: Parameter = 0.0
-
-    def __post_init__(self) -> None:
-        require_one_each(self.stiffness, self.friction, self.normal_load, self.residual_stiffness)
-        require_positive(stiffness=self.stiffness)
-        require_not_negative(
-            friction=self.friction,
-            normal_load=self.normal_load,
-            residual_stiffness=self.residual_stiffness,
-        )
-
-    @property
-    def directions(self) -> int:
-        return 1
-
     @cached_property
     def _parameters(self) -> Array:
-        limit = np.multiply(self.friction, self.normal_load)
-        return side_by_side(self.stiffness, self.residual_stiffness, limit)
+        return side_by_side(self.stiffness, self.residual_stiffness, self.limit)
 
     def rest(self, joints: int) -> State:
         return np.zeros((joints, 2))
@@ -108,7 +82,7 @@ class Jenkins:
 
     def loop_energy(self, amplitude: Parameter) -> Array:
         """Energy lost in a cycle between ± ``amplitude`` [mm]: 4 µN (A - µN/kt) [N mm] or 0."""
-        limit = np.multiply(self.friction, self.normal_load)
+        limit = self.limit
         energy: Array = 4.0 * limit * np.maximum(np.subtract(amplitude, limit / self.stiffness), 0)
         return energy
 
@@ -119,7 +93,7 @@ class Jenkins:
         and b = -4 µN (1 - µN/(kt A))/π, which is minus the energy of the loop over π A.
         """
         amplitude = np.asarray(amplitude, float)
-        reach = np.multiply(self.friction, self.normal_load) / self.stiffness
+        reach = self.limit / self.stiffness
         moving = np.where(amplitude > 0.0, amplitude, 1.0)
         sticking = np.arccos(1.0 - 2.0 * np.minimum(reach / moving, 1.0))
         share = (sticking - np.sin(sticking) * np.cos(sticking)) / np.pi

@@ -33,14 +33,7 @@ from numba import njit, vectorize
 
 from sa_solver.types import Array
 from wear.joints.law import JointResponse, State
-from wear.joints.parameters import (
-    Parameter,
-    answer,
-    require_not_negative,
-    require_one_each,
-    require_positive,
-    side_by_side,
-)
+from wear.joints.parameters import LineLaw, Parameter, answer, side_by_side
 
 Curve = tuple[float, float, float, float]
 """K, limit, c, m."""
@@ -184,7 +177,7 @@ def _loop_energy(
 
 
 @dataclass(frozen=True)
-class MasingLaw(ABC):
+class MasingLaw(LineLaw, ABC):
     """A joint of spread sliders, whichever way they are spread.
 
     ``stiffness`` K [N/mm] when all of them stick, ``friction`` µ and ``normal_load`` N [N], whose
@@ -196,33 +189,14 @@ class MasingLaw(ABC):
     open loops is remembered: each costs a call the copying of 16 bytes, and nothing else.
     """
 
-    stiffness: Parameter
-    friction: Parameter
-    normal_load: Parameter
-    residual_stiffness: Parameter = 0.0
-
-    def __post_init__(self) -> None:
-        require_one_each(self.stiffness, self.friction, self.normal_load, self.residual_stiffness)
-        require_positive(stiffness=self.stiffness)
-        require_not_negative(
-            friction=self.friction,
-            normal_load=self.normal_load,
-            residual_stiffness=self.residual_stiffness,
-        )
-
     @property
     @abstractmethod
     def spread(self) -> tuple[Parameter, Parameter]:
         """Share c of the spread sliders in the stiffness, and exponent m of their spread."""
 
-    @property
-    def directions(self) -> int:
-        return 1
-
     @cached_property
     def _parameters(self) -> Array:
-        limit = np.multiply(self.friction, self.normal_load)
-        return side_by_side(self.stiffness, self.residual_stiffness, limit, *self.spread)
+        return side_by_side(self.stiffness, self.residual_stiffness, self.limit, *self.spread)
 
     def rest(self, joints: int) -> State:
         return np.zeros((joints, POINTS + 2 * FEWEST_POINTS))
@@ -232,6 +206,5 @@ class MasingLaw(ABC):
 
     def loop_energy(self, amplitude: Parameter) -> Array:
         """Energy lost in a cycle between ± ``amplitude`` [mm]: 4 L(A) [N mm]."""
-        limit = np.multiply(self.friction, self.normal_load)
-        energy: Array = _loop_energy(amplitude, self.stiffness, limit, *self.spread)
+        energy: Array = _loop_energy(amplitude, self.stiffness, self.limit, *self.spread)
         return energy

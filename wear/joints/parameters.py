@@ -8,6 +8,7 @@ most of it in making the arrays it returns.
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -67,3 +68,36 @@ def answer(kernel: Kernel, parameters: Array, state: State, increment: Array) ->
     if len(parameters) not in (1, joints):
         raise JointError(f"the law is that of {len(parameters)} joints, the state of {joints}")
     return JointResponse(*kernel(parameters, state, np.ascontiguousarray(increment, float)))
+
+
+@dataclass(frozen=True)
+class LineLaw:
+    """What the laws along one direction have in common: parameters, as numbers or ``(n,)``.
+
+    ``stiffness`` [N/mm] of the stuck joint, ``friction`` µ, ``normal_load`` N [N] and
+    ``residual_stiffness`` [N/mm], what is left of the slope when all of it slides. Raises
+    :class:`JointError` for what they cannot be.
+    """
+
+    stiffness: Parameter
+    friction: Parameter
+    normal_load: Parameter
+    residual_stiffness: Parameter = 0.0
+
+    def __post_init__(self) -> None:
+        require_one_each(*(getattr(self, own.name) for own in fields(self)))
+        require_positive(stiffness=self.stiffness)
+        require_not_negative(
+            friction=self.friction,
+            normal_load=self.normal_load,
+            residual_stiffness=self.residual_stiffness,
+        )
+
+    @property
+    def directions(self) -> int:
+        return 1
+
+    @property
+    def limit(self) -> Array:
+        """µN [N], the force when all of it slides."""
+        return np.multiply(self.friction, self.normal_load)
