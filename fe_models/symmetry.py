@@ -32,7 +32,7 @@ ROUNDED = 9
 UNCOUPLED = 1e-12
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Mirror:
     """A mirror of unknowns: entry ``i`` of the image is ``sign[i]`` times entry ``partner[i]``.
 
@@ -83,6 +83,7 @@ class Mirror:
         return sp.csr_matrix((values, (rows, np.append(columns, columns[: len(pairs)]))), shape)
 
     def __eq__(self, other: object) -> bool:
+        # That of a dataclass cannot compare arrays.
         return (
             isinstance(other, Mirror)
             and np.array_equal(self.partner, other.partner)
@@ -90,7 +91,7 @@ class Mirror:
         )
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class SplitMatrix:
     """The symmetric matrix ``(n, n)`` Q₊ A₊ Q₊ᵀ + Q₋ A₋ Q₋ᵀ of dense ``blocks`` A₊ and A₋."""
 

@@ -45,6 +45,7 @@ class OutputFolder:
     def claim(self, case: Case, force: bool) -> None:
         """Make the folder this run's own, removing what an earlier run left.
 
+        Of an unfinished run of this case the wear that it had computed first stays.
         Raises :class:`UserError` if it holds anything of another case, or an unfinished run, and
         ``force`` is not given.
         """
@@ -53,13 +54,15 @@ class OutputFolder:
         if self.root.is_dir() and any(self.root.iterdir()) and not force:
             self._refuse_foreign(case)
         self.root.mkdir(parents=True, exist_ok=True)
+        broken_off = self._holds(case) and not self.summary.exists()
         for name in FILES:
             (self.root / name).unlink(missing_ok=True)
         for pattern in TABLES:
             for path in self.root.glob(pattern):
                 path.unlink()
         for name in FOLDERS:
-            shutil.rmtree(self.root / name, ignore_errors=True)
+            if not (broken_off and name == self.wear.name):
+                shutil.rmtree(self.root / name, ignore_errors=True)
         self.clear_partial()
         if isinstance(case, WearCase):
             self.jumps.mkdir()
@@ -81,7 +84,7 @@ class OutputFolder:
             raise UserError(
                 f"{self.root}: not empty and no run of fretscale; give another folder, or --force"
             )
-        if self.case.read_text(encoding="utf-8") != dump_case(case):
+        if not self._holds(case):
             raise UserError(
                 f"{self.root}: holds the results of another case; give another folder, or --force"
             )
@@ -90,6 +93,10 @@ class OutputFolder:
                 f"{self.root}: holds an unfinished run of this case; continue it with "
                 f"`fretscale resume {self.root}`, or start again with --force"
             )
+
+    def _holds(self, case: Case) -> bool:
+        """Whether the folder was claimed for this case."""
+        return self.case.exists() and self.case.read_text(encoding="utf-8") == dump_case(case)
 
     def load_case(self) -> Case:
         """The case this folder was claimed for."""

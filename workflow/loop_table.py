@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import csv
-import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from sa_solver.types import Array
+from workflow.case.fields import Quantity, shown
+from workflow.case.input_files import InputFileError
+from workflow.case.table_file import TableFile, read_table_file
 from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
 from workflow.store import replacing
@@ -55,7 +57,6 @@ COLUMNS = (
 )
 # Without these a table is none.
 NEEDED = ("energy", "P", "kt", "mu")
-HEADING = re.compile(r"\s*(\w+)\s*(?:\[(.*)\])?\s*")
 
 
 @dataclass(frozen=True)
@@ -81,18 +82,21 @@ class LoopTable:
     per_length: bool
 
 
-def write_table(path: Path, rows: Iterable[dict[str, float]], per_length: bool = False) -> None:
-    """Write a table of loops, whose ``rows`` are in base units."""
-    factors = {
-        column.name: to_base(f"1 {shown}", unit) if shown != unit else 1.0
-        for column in COLUMNS
-        for unit, shown in [column.units(per_length)]
-    }
+def write_table(path: Path, rows: Iterable[Mapping[str, float]], per_length: bool = False) -> None:
+    """Write a table of loops, whose ``rows`` are in base units and have the same columns."""
+    rows = list(rows)
+    columns = [column for column in COLUMNS if column.name in rows[0]]
+    factors = {column.name: _factor(*column.units(per_length)) for column in columns}
     with replacing(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
         writer = csv.writer(file)
-        writer.writerow([column.heading(per_length) for column in COLUMNS])
+        writer.writerow([column.heading(per_length) for column in columns])
         for row in rows:
             writer.writerow([f"{row[name] / factor:.12g}" for name, factor in factors.items()])
+
+
+def _factor(base: str, written: str) -> float:
+    """Base units in the unit that is written."""
+    return to_base(f"1 {written}", base) if written != base else 1.0
 
 
 def read_loop_table(path: Path) -> LoopTable:
@@ -102,73 +106,41 @@ def read_loop_table(path: Path) -> LoopTable:
     base unit without. Raises UserError for a file that is no such table.
     """
     try:
-        lines = list(csv.reader(path.read_text(encoding="utf-8").splitlines()))
-    except (OSError, UnicodeError, csv.Error) as error:
-        raise UserError(f"{path}: cannot be read ({error}); allowed: a table of loops") from error
-    rows = [(number, line) for number, line in enumerate(lines, start=1) if "".join(line).strip()]
-    if len(rows) < 2:
-        raise UserError(f"{path}: no table; allowed: headings and a row for every loop")
-    headings = _headings(path, rows[0][1])
-    numbers = np.array([_numbers(path, number, line, len(headings)) for number, line in rows[1:]])
-    per_length = _per_length(path, headings)
-    columns = {column.name: np.full(len(numbers), np.nan) for column in COLUMNS}
-    for values, (column, unit) in zip(numbers.T, headings, strict=True):
-        columns[column.name] = values * _factor(path, column, unit, per_length)
-    if np.any(np.diff(columns["energy"]) < 0.0):
-        raise UserError(f"{path}: the energy falls; allowed: rows in the order of their energy")
+        table = read_table_file(path)
+        _refuse_unknown(table)
+        for name in NEEDED:
+            table.require(name, f"at least {', '.join(NEEDED)}")
+        per_length = _per_length(table)
+        columns = {
+            column.name: table.column(column.name, Quantity(column.units(per_length)[0]))
+            if column.name in table.names
+            else np.full(len(table.rows), np.nan)
+            for column in COLUMNS
+        }
+    except InputFileError as error:
+        raise UserError(str(error)) from error
+    falls = np.flatnonzero(np.diff(columns["energy"]) < 0.0)
+    if falls.size:
+        line = table.rows[falls[0] + 1][0]
+        raise UserError(f"{path}:{line}: the energy falls; allowed: rows in order of their energy")
     return LoopTable(**columns, per_length=per_length)
 
 
-def _headings(path: Path, cells: Sequence[str]) -> list[tuple[Column, str]]:
-    """Column and unit of every heading; an empty unit for the base unit."""
-    known = {column.name: column for column in COLUMNS}
-    found: list[tuple[Column, str]] = []
-    for cell in cells:
-        match = HEADING.fullmatch(cell)
-        if match is None or match[1] not in known:
-            raise UserError(f"{path}:1: {cell!r}: no column; allowed: {', '.join(known)}")
-        found.append((known[match[1]], (match[2] or "").strip()))
-    names = [column.name for column, _ in found]
-    for name in NEEDED:
-        if names.count(name) == 0:
-            raise UserError(f"{path}:1: no column {name}; allowed: at least {', '.join(NEEDED)}")
-    for name in names:
-        if names.count(name) > 1:
-            raise UserError(f"{path}:1: two columns {name}; allowed: one")
-    return found
+def _refuse_unknown(table: TableFile) -> None:
+    """Refuse other columns, which may be slips of the pen for those that need not be given."""
+    known = [column.name for column in COLUMNS]
+    for name, heading in zip(table.names, table.headings, strict=True):
+        if name not in known:
+            raise InputFileError(
+                f"{table.place}: {shown(heading)}: no column; allowed: {', '.join(known)}"
+            )
 
 
-def _numbers(path: Path, number: int, cells: Sequence[str], count: int) -> list[float]:
-    """One row of finite numbers."""
-    if len(cells) != count:
-        raise UserError(f"{path}:{number}: {len(cells)} cells; allowed: {count}, as headings")
-    values = []
-    for cell in cells:
-        try:
-            values.append(float(cell))
-        except ValueError as error:
-            raise UserError(f"{path}:{number}: {cell!r}; allowed: numbers") from error
-    if not np.all(np.isfinite(values)):
-        raise UserError(f"{path}:{number}: a number that is not finite; allowed: finite numbers")
-    return values
-
-
-def _per_length(path: Path, headings: Sequence[tuple[Column, str]]) -> bool:
+def _per_length(table: TableFile) -> bool:
     """Whether the table is of a line contact: by the unit of its stiffness."""
-    ((column, unit),) = [own for own in headings if own[0].name == "kt"]
+    (kt,) = (column for column in COLUMNS if column.name == "kt")
     try:
-        to_base(f"1 {unit or column.unit}", column.units(True)[0])
+        to_base(f"1 {table.unit('kt') or kt.unit}", kt.units(True)[0])
     except UnitError:
         return False
     return True
-
-
-def _factor(path: Path, column: Column, unit: str, per_length: bool) -> float:
-    """Base units in a unit of the table."""
-    base, _ = column.units(per_length)
-    if unit in ("", base):
-        return 1.0
-    try:
-        return to_base(f"1 {unit}", base)
-    except UnitError as error:
-        raise UserError(f"{path}:1: {column.name}: {error}; allowed: units of {base}") from error

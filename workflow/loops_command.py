@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,8 +13,7 @@ from wear.joints.measured_loops import Estimate, MeasuredLoops, estimate, measur
 from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
 from workflow.loop_file import BASE_UNITS, LoopFile, read_loop_file
-from workflow.loop_table import COLUMNS
-from workflow.store import replacing
+from workflow.loop_table import write_table
 
 TABLE, FIGURE = "loops.csv", "loops.png"
 # More cycles than this are not all printed.
@@ -86,9 +84,9 @@ def report(found: MeasuredLoops) -> list[str]:
     for cycle in _few(count):
         values = [values[cycle] for values, _ in columns.values()]
         rows.append([str(cycle + 1), *(f"{value:.4g}" for value in values)])
-    means = [f"{own.value:.4g}" for _, own in columns.values()]
-    errors = [f"{own.error:.1g}" if count > 1 else "" for _, own in columns.values()]
-    rows += [["mean", *means], ["+-", *errors]]
+    rows.append(["mean", *(f"{own.value:.4g}" for _, own in columns.values())])
+    if count > 1:
+        rows.append(["+-", *(f"{own.error:.1g}" for _, own in columns.values())])
     lines = ["".join(f"{cell:>{WIDTH}}" for cell in row) for row in rows]
     return [*lines, *_notes(found)]
 
@@ -160,15 +158,15 @@ def write_loops(found: MeasuredLoops, out: Path, title: str, force: bool) -> lis
     if there and not force:
         raise UserError(f"{there[0]}: exists; give another folder, or --force")
     out.mkdir(parents=True, exist_ok=True)
-    _write_table(found, paths[0])
+    write_table(paths[0], _rows(found))
     from workflow.figures.measured_loops import write_figure
 
     write_figure(found, title, paths[1])
     return paths
 
 
-def _write_table(found: MeasuredLoops, path: Path) -> None:
-    """Columns of ``workflow.loop_table``; those that the record does not tell are left out."""
+def _rows(found: MeasuredLoops) -> Iterator[dict[str, float]]:
+    """A row per cycle, in base units; columns that the record does not tell are left out."""
     values: dict[str, Array] = {
         "cycles": np.arange(1.0, len(found.energy) + 1.0),
         # Since the first cycle of the record began.
@@ -184,12 +182,5 @@ def _write_table(found: MeasuredLoops, path: Path) -> None:
         values["P"] = found.normal_load
         if found.slides:
             values["mu"] = found.friction
-    columns = [column for column in COLUMNS if column.name in values]
-    with replacing(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow([column.heading(per_length=False) for column in columns])
-        for cycle in range(len(found.energy)):
-            writer.writerow(
-                f"{values[own.name][cycle] / to_base(f'1 {own.shown}', own.unit):.12g}"
-                for own in columns
-            )
+    for cycle in zip(*values.values(), strict=True):
+        yield dict(zip(values, map(float, cycle), strict=True))

@@ -35,13 +35,15 @@ class TimeOutcome:
     """Everything a case in time has found.
 
     ``evolution`` are columns ``(k,)`` over the energy, from nothing to the last; ``numbers`` go
-    into the summary as they are.
+    into the summary as they are. ``seen`` names the displacements that are kept of a rig, the last
+    of which is looked at.
     """
 
     case: JointCase | RigCase
     states: tuple[State, ...]
     evolution: Mapping[str, Array]
     numbers: Mapping[str, Any] = field(default_factory=dict)
+    seen: tuple[str, ...] = ()
 
 
 # Unit and description of every dataset, by group and name.
@@ -62,8 +64,8 @@ DATASETS: dict[str, dict[str, tuple[str, str]]] = {
     MOTION: {
         "time": ("s", "time"),
         "excitation": ("N", "force of the excitation"),
-        "displacement": ("mm", "displacements of the masses, from the ground on, or that seen"),
-        "acceleration": ("mm/s^2", "accelerations of the masses, from the ground on, or that seen"),
+        "displacement": ("mm", "displacements of what is seen"),
+        "acceleration": ("mm/s^2", "accelerations of what is seen"),
         "joint_force": ("N", "force of the joint, or the sum of several, resisting"),
         "dissipated": ("N mm", "energy that the joint has dissipated since the beginning"),
     },
@@ -71,12 +73,12 @@ DATASETS: dict[str, dict[str, tuple[str, str]]] = {
         "frequency": ("Hz", "frequency"),
         "magnitude": (
             "mm/(s^2 N)",
-            "acceleration of the last mass, or seen, over the excitation",
+            "acceleration of what is looked at, over the excitation",
         ),
         "phase": ("rad", "of the acceleration before the excitation"),
     },
     RING_DOWN: {
-        "amplitude": ("mm", "amplitude of the last mass, or of what is seen, in its first mode"),
+        "amplitude": ("mm", "amplitude of what is looked at, in its first mode"),
         "frequency": ("Hz", "instantaneous frequency"),
         "damping_ratio": ("1", "instantaneous damping ratio"),
     },

@@ -46,6 +46,8 @@ def _write_results(outcome: TimeOutcome, path: Path) -> None:
     with replacing(path) as partial, h5py.File(partial, "w") as file:
         case = outcome.case
         file.attrs.update({"title": case.title, "analysis": case.analysis, "law": case.joint.law})
+        if outcome.seen:
+            file.attrs["seen"] = outcome.seen
         file.create_group("case").attrs.update({"text": dump_case(case)} | versions())
         _put(file, EVOLUTION, EVOLUTION, outcome.evolution)
         for number, state in enumerate(outcome.states):

@@ -16,7 +16,6 @@ from sa_solver.types import Array
 from wear.joints.ageing import LongTest
 from workflow.case import RigCase
 from workflow.case import excitation as given
-from workflow.case.input_files import read_columns
 from workflow.case.time_case import Ageing, joules
 from workflow.errors import MethodFailed
 from workflow.joint_model import JointModel
@@ -78,7 +77,8 @@ def run_rig(case: RigCase, reporter: Reporter) -> TimeOutcome:
         outcome = _run_recorded(case, case.excitation, rig, joint, reporter)
     else:
         outcome = _run_harmonic(case, case.excitation, rig, joint, reporter)
-    return replace(outcome, numbers={"free": rig.free(), **outcome.numbers})
+    numbers = {"free": rig.free(), **outcome.numbers}
+    return replace(outcome, numbers=numbers, seen=rig.labels)
 
 
 def step_control(case: RigCase) -> StepControl:
@@ -128,9 +128,8 @@ def _run_recorded(
     joint: JointModel,
     reporter: Reporter,
 ) -> TimeOutcome:
-    columns = read_columns(excitation.file, given.RECORDED)
-    times = columns["time"]
-    force = Recorded(rig.driven, times, columns["force"])
+    times, samples = excitation.read()
+    force = Recorded(rig.driven, times, samples)
     control, begin = step_control(case), Start(time=float(times[0]))
     states = []
     for energy in case.energies:

@@ -11,6 +11,7 @@ from workflow.errors import UserError
 from workflow.folder import OutputFolder
 from workflow.loop_table import read_loop_table
 from workflow.reporter import Reporter
+from workflow.runs_job import Job, compute, kept_in
 
 # A joint is under the load of its table when they differ by less than this share.
 SAME_LOAD = 0.01
@@ -21,18 +22,17 @@ def with_computed_wear(
 ) -> JointCase | RigCase:
     """The case with the table of loops that its wear case leaves; as it is if it names none.
 
-    The wear case runs into ``wear`` in the folder. Raises UserError if it cannot be read, is not
-    one of a single contact, or asks for no loops.
+    The wear case runs into ``wear`` in the folder, from where an earlier run of it there has got
+    to. Raises UserError if it cannot be read, is not one of a single contact, or asks for no loops.
     """
     file = case.evolution.file
     if file is None or not file.endswith(".yaml"):
         return case
     wear = _wear_case(file)
+    if kept_in(folder.wear, wear) == "finished":
+        reporter.say(f"wear of the contact: as an earlier run has left it in {folder.wear}")
     with reporter.stage("wear of the contact"):
-        # Imported here: it is what runs this case.
-        from workflow.run import run_case
-
-        run_case(wear, folder.wear, force=True)
+        compute(Job(folder.wear.name, Path(file)), folder.root)
     tables = sorted(folder.wear.glob("loops_*.csv"))
     if len(tables) != 1:
         names = ", ".join(path.stem.removeprefix("loops_") for path in tables)

@@ -1,4 +1,4 @@
-"""Forces that shake a structure: harmonic, a hammer's blow, a recorded signal, and sums of them.
+"""Forces on a structure: constant, harmonic, a hammer's blow, a recorded signal, and their sums.
 
 An excitation is called with times ``(t,)`` [s] and answers with forces ``(t, n)`` [N]. Every one
 of them is, between its :attr:`breaks`, a straight line and harmonics, which the event-driven
@@ -66,6 +66,21 @@ class Force(ABC):
     @abstractmethod
     def signal(self, time: float) -> Signal:
         """The smooth stretch around a time between two breaks."""
+
+
+@dataclass(frozen=True)
+class Constant(Force):
+    """A signal that is always 1: ``shape`` is the force [N]."""
+
+    @property
+    def breaks(self) -> tuple[float, ...]:
+        return ()
+
+    def value(self, times: Array) -> Array:
+        return np.ones_like(times)
+
+    def signal(self, time: float) -> Signal:
+        return Signal(value=1.0)
 
 
 @dataclass(frozen=True)
@@ -145,8 +160,8 @@ class HammerBlow(Force):
 class Recorded(Force):
     """Samples ``force`` ``(s,)`` [N] at ``times`` ``(s,)`` [s]: linear between, constant beyond.
 
-    One sample is a constant force. Raises :class:`ExcitationError` for no or unequal samples, for
-    values that are not finite, or for times that do not ascend.
+    Raises :class:`ExcitationError` for no or unequal samples, for values that are not finite, or
+    for times that do not ascend.
     """
 
     times: Array

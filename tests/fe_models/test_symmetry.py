@@ -82,3 +82,13 @@ def test_restriction_to_what_is_not_closed_is_none():
     mirror = Mirror(np.array([1, 0, 2]), np.ones(3))
     assert mirror.restricted(np.array([0, 2])) is None
     assert mirror.restricted(np.array([1, 0])) == Mirror(np.array([1, 0]), np.ones(2))
+
+
+def test_mirrors_are_equal_by_what_they_do():
+    mirror = Mirror(np.array([1, 0]), np.ones(2))
+    assert mirror == Mirror(np.array([1, 0]), np.ones(2))
+    assert mirror != Mirror(np.array([1, 0]), -np.ones(2))
+    assert mirror != Mirror(np.array([1, 0, 2]), np.ones(3))
+    assert mirror != "mirror"
+    with pytest.raises(TypeError, match="unhashable"):
+        hash(mirror)

@@ -133,6 +133,7 @@ EVOLUTION = {
 }
 GIVEN["joint"] = {"joint": JOINTS, **EVOLUTION, "reported": {ALWAYS: TOLD}}
 GIVEN["vibration"] = {"joint": JOINTS}
+GIVEN["worn_vibration"] = {}
 CONTACT = {"law": "friction_contact", **JOINT, "normal_load": 0, "normal_stiffness": 1e4}
 REDUCED = {
     "kind": "reduced",
@@ -257,7 +258,7 @@ def folders(tmp_path_factory, template_files) -> dict[str, Folder]:
         np.save(made[kind] / "gap.npy", np.zeros(CELLS.get(kind, (0, 0))))
         (made[kind] / "history.csv").write_text("P,Qx\n1,0\n1,0.1\n", encoding="utf-8")
         (made[kind] / "force.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
-        for file in ("body_2.h5", "specimens.yaml"):
+        for file in ("body_2.h5", "specimens.yaml", "specimens_wear.yaml"):
             (made[kind] / file).touch()
         (made[kind] / "loops.csv").write_text("energy,P,kt,mu\n0,1,1,1\n", encoding="utf-8")
     return made
@@ -355,6 +356,8 @@ def stated(leaf):
             return ["wear.cycles=", plain]
         case "ageing.energy":
             return ["ageing.cycles=", plain]
+        case "evolution.file":
+            return [f"evolution={{file: {example}}}"]
         case "structure.body":
             return ["structure.file=specimens.yaml", plain]
         case "load_path.file":

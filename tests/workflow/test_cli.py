@@ -85,7 +85,7 @@ def test_check_says_what_would_run(dovetail_path):
         ("line_wear", "50 N/mm, stroke 0.05 mm in 8 increments"),
         ("bodies", "128 x 128 cells of 0.007812 x 0.007812 mm, history auto"),
         ("line", "512 strips of 0.003906 mm"),
-        ("joint", "bouc_wen under 60 N, fixed, looked at 2 energies"),
+        ("joint", "bouc_wen under 60 N, evolving with energy, looked at 2 energies"),
         ("rig", "75 N at 100 Hz on mass 1"),
         ("vibration", "10, 40 N on mass 1, 20 to 400 Hz"),
     ],

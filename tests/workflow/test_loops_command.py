@@ -84,6 +84,18 @@ def test_columns_may_have_other_names_units_and_company(measured, tmp_path):
     assert done.stdout == plain.stdout
 
 
+def test_a_single_cycle_has_no_standard_error(tmp_path):
+    _, displacement, force = record()
+    # From one upper reversal to the next, and a little on both sides.
+    one = slice(40, 270)
+    headings = ["displacement [mm]", "force [N]"]
+    done = invoke(written(tmp_path / "one.csv", headings, displacement[one], force[one]))
+    assert done.exit_code == 0, done.stderr
+    first = [line.split()[0] for line in done.stdout.splitlines()[:3]]
+    assert first == ["cycle", "1", "mean"]
+    assert "+-" not in done.stdout
+
+
 def test_loops_that_do_not_slide_bound_the_friction(tmp_path):
     _, displacement, force = record(stroke=1.5e-3)
     path = written(tmp_path / "c.csv", ["displacement [mm]", "force [N]"], displacement, force)
@@ -110,7 +122,7 @@ GOOD = "displacement [um],force [N]\n" + "".join(f"{k % 7},{k % 5}\n" for k in r
 @pytest.mark.parametrize(
     ("text", "options", "words"),
     [
-        ("", [], "no column displacement"),
+        ("", [], ":1: no rows"),
         ("displacement [um]\n1\n", [], "no column force"),
         ("displacement [um];force [N]\n1;2\n", [], "this file has 'displacement [um];force [N]'"),
         ("displacement [um],force [N]\n", [], "no rows"),
@@ -118,7 +130,7 @@ GOOD = "displacement [um],force [N]\n" + "".join(f"{k % 7},{k % 5}\n" for k in r
         ("displacement [furlongz],force [N]\n1,2\n", [], ":1: displacement"),
         ("displacement,displacement,force\n1,2,3\n", [], "given twice"),
         ("displacement,force\n1,2\n\n1,2,3\n", [], ":4: 3 values; allowed: 2"),
-        ("displacement,force\n1,two\n", [], ":2: force: 'two': no number"),
+        ("displacement,force\n1,two\n", [], ":2: force: 'two': not a number"),
         ("displacement,force\n1,nan\n", [], "finite"),
         ("displacement,force\n1,1_000\n", [], "1_000"),
         ("displacement,force\n1,2\n1,2\n", [], "never changes"),

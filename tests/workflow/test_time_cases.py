@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from tests.workflow.conftest import invoke
-from workflow.case import CaseError, parse_case
+from workflow.case import CaseError, parse_case, template
 from workflow.case.loading import load_case
 from workflow.chart.axes import axes_of
 from workflow.errors import UserError
@@ -102,6 +102,7 @@ def receptance(frequency: float, joint_stiffness: float) -> np.ndarray:
         (JOINT, "joint.chi=0", "unknown key"),
         (JOINT, "structure.kind=beam", "allowed: joint, rig, reduced"),
         (JOINT, "joint={law: bouc_wen, sigma: 0.2}", "at least 0.5"),
+        (JOINT, "output.paraview=true", "nothing to show in ParaView; allowed: false"),
         (RIG, "structure.springs=[1]", "1 springs for 2 masses"),
         (RIG, "excitation.mass=3", "no such mass; allowed: 1 to 2"),
         (RIG, "integration.step=1 ms", "too long for the excitation; allowed: up to 0.000625 s"),
@@ -137,7 +138,9 @@ def test_a_file_beside_a_factor_is_refused(tmp_path):
     [
         ("time,force\n0,0\n0,1\n", "times that do not ascend"),
         ("time\n0\n1\n", "no column force"),
-        ("time,velocity\n0,0\n1,1\n", "unknown column"),
+        ("time,velocity\n0,0\n1,1\n", "no column force; this file has 'time', 'velocity'"),
+        ("time [ms],force [mm]\n0,0\n1,1\n", "force.csv:1: force: unit 'mm' cannot be"),
+        ("time,force\n-1,0\n1,1\n", "force.csv:2: time: -1: out of range; allowed: at least 0"),
     ],
 )
 def test_a_wrong_record_is_refused(tmp_path, rows, words):
@@ -195,12 +198,21 @@ def test_a_table_of_loops_takes_the_place_of_friction_and_stiffness(tmp_path):
     assert found["normal_load"] == 100.0
 
 
-def test_a_table_of_line_contacts_is_refused(tmp_path):
-    rows = "energy [J/mm],P [N/mm],kt [N/mm/mm],mu [1]\n0,60,1e4,0.2\n"
+@pytest.mark.parametrize(
+    ("rows", "words"),
+    [
+        ("energy [J/mm],P [N/mm],kt [N/mm/mm],mu [1]\n0,60,1e4,0.2\n", "per mm"),
+        ("energy,P,kt\n0,60,1e4\n", "loops.csv:1: no column mu"),
+    ],
+)
+def test_a_table_that_is_not_of_a_whole_joint_is_refused_before_the_run(tmp_path, rows, words):
     (tmp_path / "loops.csv").write_text(rows, encoding="utf-8")
-    case = parse_case(JOINT, str(tmp_path / "case.yaml"), ["evolution={file: loops.csv}"])
-    with pytest.raises(UserError, match="per mm"):
-        JointModel.of(case)
+    (tmp_path / "case.yaml").write_text(JOINT, encoding="utf-8")
+    ended = invoke("check", tmp_path / "case.yaml", "--set", "evolution={file: loops.csv}")
+    assert ended.exit_code == 2
+    (line,) = ended.stderr.splitlines()
+    assert "evolution.file: " in line
+    assert words in line
 
 
 @pytest.mark.parametrize("law", LAWS)
@@ -410,6 +422,8 @@ def test_wear_changes_the_response_to_a_blow(tmp_path):
     names = {path.stem for path in (tmp_path / "out" / "figures").iterdir()}
     assert {"frequency_response", "ring_down", "evolution"} <= names
     assert (tmp_path / "out" / "ring_down_00001.csv").exists()
+    with h5py.File(tmp_path / "out" / "results.h5") as file:
+        assert file.attrs["seen"].tolist() == ["m1", "m2"]
 
 
 def test_a_recorded_blow_moves_the_rig_as_a_hammer_does(tmp_path):
@@ -431,6 +445,15 @@ def test_a_recorded_blow_moves_the_rig_as_a_hammer_does(tmp_path):
     assert recorded["states"][0]["dissipated"] == pytest.approx(
         hit["states"][0]["dissipated"], rel=5e-3, abs=1e-12
     )
+
+
+@pytest.mark.parametrize("kind", ["joint", pytest.param("rig", marks=pytest.mark.slow)])
+def test_what_new_writes_wears_without_a_warning(tmp_path, kind):
+    """All energies that it asks for are reached, and friction has risen between them."""
+    found = run(tmp_path, template(kind), "output.figures=false")
+    assert found["warnings"] == []
+    assert [state["energy"] for state in found["states"]][:2] == [0.0, 1e6]
+    assert found["states"][1]["friction"] > 2.0 * found["states"][0]["friction"]
 
 
 # --- commands -----------------------------------------------------------------------------------

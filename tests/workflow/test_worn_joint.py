@@ -47,11 +47,18 @@ def run(folder, wear, joint=JOINT):
     return invoke("run", folder / "joint.yaml", "--out", folder / "out")
 
 
-def test_stiffness_and_friction_of_the_joint_are_those_of_the_worn_contact(tmp_path):
-    ended = run(tmp_path, WEAR)
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory):
+    """The folder of a finished run."""
+    folder = tmp_path_factory.mktemp("worn")
+    ended = run(folder, WEAR)
     assert ended.exit_code == 0, ended.output
-    summary = json.loads((tmp_path / "out" / "summary.json").read_text())
-    (file,) = (tmp_path / "out" / "wear").glob("loops_*.csv")
+    return folder
+
+
+def test_stiffness_and_friction_of_the_joint_are_those_of_the_worn_contact(folder):
+    summary = json.loads((folder / "out" / "summary.json").read_text())
+    (file,) = (folder / "out" / "wear").glob("loops_*.csv")
     table = read_loop_table(file)
     unworn, worn = summary["states"]
     assert unworn["stiffness"] == pytest.approx(table.kt[0], rel=1e-9)
@@ -65,6 +72,18 @@ def test_stiffness_and_friction_of_the_joint_are_those_of_the_worn_contact(tmp_p
     # A spring and slider lose 4 µP (A - µP/kt), a sphere (Mindlin 1953) 4 µP (A - 6/5 µP/kt).
     corner = 4.0 * 25.0 * 0.2 * 25.0 / table.kt[0]
     assert unworn["energy_per_cycle"] - corner == pytest.approx(table.energy_per_loop[0], rel=0.005)
+
+
+def test_a_run_that_was_broken_off_takes_its_finished_wear(folder):
+    """In the same files, and to the same end."""
+    summary, wear = (folder / "out" / name / "summary.json" for name in ("", "wear"))
+    finished, first = wear.stat().st_mtime_ns, json.loads(summary.read_text())
+    summary.unlink()
+    ended = run(folder, WEAR)
+    assert ended.exit_code == 0, ended.output
+    assert "as an earlier run has left it" in ended.output
+    assert wear.stat().st_mtime_ns == finished
+    assert json.loads(summary.read_text())["states"] == first["states"]
 
 
 @pytest.mark.parametrize(

@@ -6,9 +6,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from sa_solver.types import Array
 from workflow.case.fields import File, Quantity, Whole
-from workflow.case.input_files import InputFileError, read_columns
+from workflow.case.input_files import InputFileError
 from workflow.case.sections import Length, Section, disagreement, entry
+from workflow.case.table_file import read_table_file
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual rig.
 Frequency = Annotated[float, Quantity("Hz", above=0.0, at_most=1e7)]
@@ -23,7 +25,7 @@ MassNumber = Annotated[int, Whole(1, 20)]
 # quotient of the spectra is still good.
 SEEN = 1.4
 
-# Columns of a recorded excitation.
+# Columns of a recorded force.
 RECORDED = {
     "time": Quantity("s", at_least=0.0, at_most=1e6),
     "force": Quantity("N", at_least=-1e9, at_most=1e9),
@@ -101,24 +103,29 @@ class Recorded(Section):
         "of a row, that it acts on, counted from the ground; without it the first", 1, default=None
     )
     file: Annotated[str, File((".csv",))] = entry(
-        "columns time and force, in s and N; linear between rows", "force.csv"
+        "columns time and force, with a unit in brackets or in s and N; linear between rows",
+        "force.csv",
     )
 
     @model_validator(mode="after")
     def _is_a_record(self) -> Recorded:
         try:
-            columns = read_columns(self.file, RECORDED)
+            times, _ = self.read()
         except InputFileError as error:
             raise disagreement(str(error), "file") from error
-        missing = [name for name in RECORDED if name not in columns]
-        if missing:
-            raise disagreement(f"no column {missing[0]}; allowed: {', '.join(RECORDED)}", "file")
-        times = columns["time"]
         if len(times) < 2 or not (times[1:] > times[:-1]).all():
             raise disagreement(
                 "times that do not ascend; allowed: two or more, each after the last", "file"
             )
         return self
+
+    def read(self) -> tuple[Array, Array]:
+        """Times [s] and forces [N] ``(s,)`` of the file. Raises InputFileError."""
+        table = read_table_file(self.file)
+        for name in RECORDED:
+            table.require(name, " and ".join(RECORDED))
+        times, forces = (table.column(name, quantity) for name, quantity in RECORDED.items())
+        return times, forces
 
 
 Excitation = Annotated[Harmonic | Hammer | Recorded, Field(discriminator="kind")]

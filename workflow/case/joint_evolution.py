@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
@@ -9,6 +10,7 @@ from pydantic import Field, model_validator
 from workflow.case.evolution import Table, TotalEnergy
 from workflow.case.fields import File, Quantity
 from workflow.case.sections import Section, disagreement, entry
+from workflow.errors import UserError
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual material.
 Change = Annotated[float, Quantity("1", at_least=-1.0, at_most=1e6)]
@@ -95,6 +97,23 @@ class JointEvolution(Section):
         for key in ("friction", "stiffness"):
             if self.file is not None and getattr(self, key) is not None:
                 raise disagreement(f"given beside {key}; allowed: one of them", "file", key)
+        return self
+
+    @model_validator(mode="after")
+    def _file_is_of_a_whole_joint(self) -> JointEvolution:
+        if self.file is None or not self.file.endswith(".csv"):
+            return self
+        # Imported here: it reads units, which are of this package.
+        from workflow.loop_table import read_loop_table
+
+        try:
+            table = read_loop_table(Path(self.file))
+        except UserError as error:
+            raise disagreement(str(error), "file") from error
+        if table.per_length:
+            raise disagreement(
+                "loops of a line contact, per mm; allowed: those of a whole joint", "file"
+            )
         return self
 
     @property

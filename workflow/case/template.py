@@ -17,6 +17,7 @@ from workflow.case.specimens_case import SpecimensCase
 from workflow.case.time_case import JointCase, RigCase, SteadyAgeing
 from workflow.case.vibration_case import VibrationCase
 from workflow.case.wear_sections import Step
+from workflow.case.worn_vibration_case import WornVibrationCase
 from workflow.case.writing import Row, render
 
 # What `fretscale new` can write.
@@ -32,6 +33,7 @@ KINDS: dict[str, type[Section]] = {
     "joint": JointCase,
     "rig": RigCase,
     "vibration": VibrationCase,
+    "worn_vibration": WornVibrationCase,
 }
 
 HEADER = """\
@@ -39,8 +41,8 @@ HEADER = """\
 # wrong with a case, `fretscale run` runs it. Entries behind a # are optional.
 """
 # Optional entries the template fills in: a material that can yield, the length of a run, legs that
-# press, and a face that is rounded all round.
-FILLED_IN = ("yield_stress", "cycles", "legs", "P", "gap", "end_width", "end_radius")
+# press, a face that is rounded all round, and a joint whose friction rises.
+FILLED_IN = ("yield_stress", "cycles", "legs", "P", "gap", "end_width", "end_radius", "friction")
 # And sections in which it does not: wear steps have the length that their error allows, and a rig
 # that is shaken need not age.
 NOT_FILLED_IN = (Step, SteadyAgeing)

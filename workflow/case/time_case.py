@@ -6,11 +6,11 @@ from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, StrictBool, field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
 from workflow.case.evolution import TotalEnergy
 from workflow.case.excitation import (
-    RECORDED,
     Drive,
     Excitation,
     Hammer,
@@ -19,7 +19,6 @@ from workflow.case.excitation import (
     Time,
 )
 from workflow.case.fields import Quantity
-from workflow.case.input_files import read_columns
 from workflow.case.joint_evolution import JointEvolution
 from workflow.case.joint_sections import ContactLaw, FrictionContactJoint, Joint, JointLaw
 from workflow.case.rig_structure import ReducedBody, Rig
@@ -92,6 +91,21 @@ class Reported(Section):
     source: Title = entry("where the value comes from", "measured")
 
 
+class TimeOutput(Output):
+    """What is written beside summary and results."""
+
+    paraview: StrictBool = entry("files for ParaView: there are none", False, default=False)
+
+    @field_validator("paraview")
+    @classmethod
+    def _has_no_fields(cls, paraview: bool) -> bool:
+        if paraview:
+            raise PydanticCustomError(
+                "entry", "true: a case in time has nothing to show in ParaView; allowed: false"
+            )
+        return paraview
+
+
 class TimeCase(Scene):
     """A joint that changes with the energy it dissipates."""
 
@@ -104,10 +118,10 @@ class TimeCase(Scene):
     )
     energies: tuple[TotalEnergy, ...] = entry(
         "dissipated so far, ascending, at which the joint is looked at [N*mm]",
-        ["0 J", "2800 J"],
+        ["0 J", "1 kJ"],
         default=(0.0,),
     )
-    output: Output = entry("files beside summary and results", default=Output())
+    output: TimeOutput = entry("files beside summary and results", default=TimeOutput())
     assumed: tuple[DottedPath, ...] = entry(
         "inputs that are ours because the source does not print them",
         ["joint", "evolution"],
@@ -262,7 +276,7 @@ def _longest_step(excitation: Harmonic | Hammer | Recorded) -> float:
         return 1.0 / (FEWEST_STEPS * excitation.frequency)
     if isinstance(excitation, Hammer):
         return min(excitation.duration / FEWEST_STEPS, 0.5 / excitation.highest)
-    return float(np.diff(read_columns(excitation.file, RECORDED)["time"]).min())
+    return float(np.diff(excitation.read()[0]).min())
 
 
 def _kept_time(excitation: Harmonic | Hammer | Recorded) -> float:
@@ -271,8 +285,7 @@ def _kept_time(excitation: Harmonic | Hammer | Recorded) -> float:
         return 1.0 / excitation.frequency
     if isinstance(excitation, Hammer):
         return excitation.record
-    times = read_columns(excitation.file, RECORDED)["time"]
-    return float(times[-1] - times[0])
+    return float(np.ptp(excitation.read()[0]))
 
 
 def joules(energy: float) -> str:

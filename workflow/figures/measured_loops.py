@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-MICRO = 1e3  # mm to µm, N/µm to N/mm
+TO_MICRONS, PER_MICRON = 1e3, 1e-3  # mm to µm, N/mm to N/µm
 # More loops than this are drawn as every so many.
 MOST_LOOPS = 40
 HEADROOM = 1.15
@@ -35,7 +35,7 @@ def figure(found: MeasuredLoops, name: str) -> Figure:
     left, right = drawn.subfigures(1, 2, squeeze=False, width_ratios=(1.4, 1.0))[0]
     _draw_loops(left.subplots(), found)
     panels = right.subplots(3, 1, sharex=True)
-    _draw_values(panels[0], found.stick_stiffness / MICRO, "kt [N/µm]", BLUE)
+    _draw_values(panels[0], PER_MICRON * found.stick_stiffness, "kt [N/µm]", BLUE)
     _draw_values(panels[1], *_friction(found), ORANGE)
     _draw_values(panels[2], found.energy, "energy [mJ]", GREEN)
     panels[2].set_xlabel("cycle of the record")
@@ -46,12 +46,12 @@ def _draw_loops(axis: Axes, found: MeasuredLoops) -> None:
     record, count = found.record, len(found.energy)
     for begin, _, end in found.reversals[:: -(-count // MOST_LOOPS)]:
         here = slice(begin, end + 1)
-        axis.plot(MICRO * record.displacement[here], record.force[here], color="0.7", lw=0.8)
+        axis.plot(TO_MICRONS * record.displacement[here], record.force[here], color="0.7", lw=0.8)
     middle = count // 2
     begin, turn, end = found.reversals[middle]
     here = slice(begin, end + 1)
     axis.plot(
-        MICRO * record.displacement[here],
+        TO_MICRONS * record.displacement[here],
         record.force[here],
         color=BLACK,
         lw=1.2,
@@ -78,7 +78,7 @@ def _draw_stick(
     start, other = record.force[place], forces.sum() - record.force[place]
     height = np.sign(other - start) * np.array([0.0, found.force[cycle]])
     motion = record.displacement[place] + height / found.stick_stiffness[cycle]
-    axis.plot(MICRO * motion, start + height, color=BLUE, lw=2.5, label=label)
+    axis.plot(TO_MICRONS * motion, start + height, color=BLUE, lw=2.5, label=label)
 
 
 def _draw_sliding(axis: Axes, found: MeasuredLoops, cycle: int) -> None:
@@ -94,7 +94,7 @@ def _draw_sliding(axis: Axes, found: MeasuredLoops, cycle: int) -> None:
         ends = np.array([reach, record.displacement[stop]])
         line = force[there].mean() + slope * (ends - motion[there].mean())
         label = None if number else "sliding, slope kr"
-        axis.plot(MICRO * ends, line, color=ORANGE, lw=2.5, label=label)
+        axis.plot(TO_MICRONS * ends, line, color=ORANGE, lw=2.5, label=label)
 
 
 def _friction(found: MeasuredLoops) -> tuple[Array, str]:
@@ -112,7 +112,7 @@ def _draw_values(axis: Axes, values: Array, label: str, colour: str) -> None:
 
 def _title(found: MeasuredLoops, name: str) -> str:
     values, label = _friction(found)
-    stick = found.stick_estimate.value / MICRO
+    stick = PER_MICRON * found.stick_estimate.value
     called, _, unit = label.partition(" [")
     unit = f" {unit.rstrip(']')}" if unit else ""
     equals = " " if called.endswith("least") else " = "

@@ -22,12 +22,13 @@ MOST_CURVES = 6
 ENERGY_COLOURS = "viridis"
 # Of panels that begin at 0, over the largest value.
 HEADROOM = 1.1
-MICRO, KILO = 1e3, 1e-3  # mm to µm, N/mm to N/µm the other way round; N mm to J
+# mm to µm, N/mm to N/µm, N mm to J, and mm/s² to m/s².
+TO_MICRONS, PER_MICRON, TO_JOULES, TO_METRES = 1e3, 1e-3, 1e-3, 1e-3
 # Colour, file's unit to shown one, and label of the parameters.
 SHOWN = {
     "friction": (BLUE, 1.0, "coefficient of friction µ [1]"),
-    "stiffness": (ORANGE, KILO, "stiffness kt [N/µm]"),
-    "residual_stiffness": (PURPLE, KILO, "residual stiffness [N/µm]"),
+    "stiffness": (ORANGE, PER_MICRON, "stiffness kt [N/µm]"),
+    "residual_stiffness": (PURPLE, PER_MICRON, "residual stiffness [N/µm]"),
     "normal_load": (GREEN, 1.0, "normal load [N]"),
 }
 LAW_NAMES = {
@@ -80,7 +81,7 @@ def _states(file: h5py.File, group: str) -> list[tuple[str, Any, h5py.Group]]:
 
 
 def _label(state: h5py.Group) -> str:
-    energy = KILO * float(state.attrs["energy"])
+    energy = TO_JOULES * float(state.attrs["energy"])
     text = f"{energy:,.4g} J" if energy else "unworn"
     if cycles := float(state.attrs.get("cycles", 0.0)):
         text += f", {cycles:,.0f} cycles"
@@ -96,7 +97,7 @@ def loops(file: h5py.File) -> Figure:
     figure = new_figure(_loops_title(file), 7.0)
     axis = figure.subplots()
     for label, colour, loop in shown:
-        displacement, force = MICRO * _column(loop, "displacement"), _column(loop, "force")
+        displacement, force = TO_MICRONS * _column(loop, "displacement"), _column(loop, "force")
         axis.plot(displacement, force, color=colour, label=label)
     axis.set_xlabel("displacement of the joint [µm]")
     axis.set_ylabel("force of the joint [N]")
@@ -139,9 +140,9 @@ def evolution(file: h5py.File) -> Figure:
 def _draw_parameter(axis: Axes, file: h5py.File, name: str) -> None:
     colour, factor, label = SHOWN[name]
     group = file["evolution"]
-    axis.plot(KILO * _column(group, "energy"), factor * _column(group, name), color=colour)
+    axis.plot(TO_JOULES * _column(group, "energy"), factor * _column(group, name), color=colour)
     states = list(file["states"].values())
-    energies = [KILO * float(state.attrs["energy"]) for state in states]
+    energies = [TO_JOULES * float(state.attrs["energy"]) for state in states]
     values = [factor * float(state.attrs[name]) for state in states]
     axis.plot(energies, values, "o", color=BLACK, mfc="none", label="looked at")
     axis.set_ylim(0.0, HEADROOM * max(axis.dataLim.y1, 1e-300))
@@ -153,7 +154,7 @@ def _draw_parameter(axis: Axes, file: h5py.File, name: str) -> None:
 def _draw_ageing(left: Axes, right: Axes, file: h5py.File) -> None:
     """Energy of a cycle, and the cycles it has taken, over the energy."""
     group = file["evolution"]
-    energy = KILO * _column(group, "energy")
+    energy = TO_JOULES * _column(group, "energy")
     left.plot(energy, _column(group, "energy_per_cycle"), color=BLUE)
     left.set_ylabel("energy of a cycle [mJ]")
     left.set_ylim(0.0, HEADROOM * left.dataLim.y1)
@@ -188,7 +189,7 @@ def frequency_response(file: h5py.File) -> Figure:
     top, bottom = figure.subplots(2, 1)
     first = max(_first(own, "frequency") for _, _, own in shown)
     for label, colour, own in shown:
-        frequency, magnitude = _column(own, "frequency"), KILO * _column(own, "magnitude")
+        frequency, magnitude = _column(own, "frequency"), TO_METRES * _column(own, "magnitude")
         for axis in (top, bottom):
             axis.semilogy(frequency, magnitude, color=colour, label=label)
     top.set_xlim(0.0, FIRST_MODE * first)
@@ -208,7 +209,7 @@ def frequency_response(file: h5py.File) -> Figure:
 def _within(own: h5py.Group, lowest: float, highest: float) -> Array:
     """Magnitudes between two frequencies."""
     frequency = _column(own, "frequency")
-    return KILO * _column(own, "magnitude")[(frequency > lowest) & (frequency < highest)]
+    return TO_METRES * _column(own, "magnitude")[(frequency > lowest) & (frequency < highest)]
 
 
 def _first(own: h5py.Group, name: str) -> float:
@@ -218,7 +219,7 @@ def _first(own: h5py.Group, name: str) -> float:
 
 def _response_title(shown: list[tuple[str, Any, h5py.Group]]) -> str:
     peaks = [_first(own, "frequency") for _, _, own in shown]
-    heights = [KILO * _first(own, "peak") for _, _, own in shown]
+    heights = [TO_METRES * _first(own, "peak") for _, _, own in shown]
     if len(shown) == 1:
         return f"First mode at {peaks[0]:.4g} Hz"
     return (
@@ -238,29 +239,29 @@ def ring_down(file: h5py.File) -> Figure:
         moved = own.parent[MOTION]
         stuck = float(own.parent.attrs["stuck"][0])
         _draw_history(history, moved, colour, f"{label}: stuck {stuck:.4g} Hz")
-        amplitude = MICRO * _column(own, "amplitude")
+        amplitude = TO_MICRONS * _column(own, "amplitude")
         softened = 100.0 * (_column(own, "frequency") / stuck - 1.0)
         left.semilogx(amplitude, softened, color=colour)
         right.loglog(amplitude, 100.0 * np.abs(_column(own, "damping_ratio")), color=colour)
     history.set_xlabel("time [s]")
-    history.set_ylabel("last mass [µm]")
+    history.set_ylabel(f"displacement of {_seen(file)} [µm]")
     history.legend(loc="upper right", title="dissipated so far")
     left.set_ylabel("frequency over that of the stuck joint [%]")
     right.set_ylabel("damping ratio [%]")
     for axis in (left, right):
-        axis.set_xlabel("amplitude of the last mass [µm]")
+        axis.set_xlabel(f"amplitude of {_seen(file)} [µm]")
     return figure
 
 
 def _draw_history(axis: Axes, moved: h5py.Group, colour: Any, label: str) -> None:
-    """Displacement of the last mass until it has faded."""
+    """The displacement that is looked at, until it has faded."""
     end = _faded(moved)
-    displacement = MICRO * moved["displacement"][:end, -1]
+    displacement = TO_MICRONS * moved["displacement"][:end, -1]
     axis.plot(moved["time"][:end], displacement, color=colour, label=label, linewidth=1.0)
 
 
 def _faded(moved: h5py.Group) -> int:
-    """Samples until the last mass no longer moves."""
+    """Samples until what is looked at no longer moves."""
     displacement = moved["displacement"][:, -1]
     away = np.abs(displacement - displacement[-1])
     large = np.flatnonzero(away > FADED * away.max())
@@ -271,7 +272,7 @@ def _faded(moved: h5py.Group) -> int:
 
 
 def motion(file: h5py.File) -> Figure:
-    """Force, displacement of the last mass and what the joint has dissipated, over time."""
+    """Force, displacement and what the joint has dissipated, over time."""
     shown = _states(file, MOTION)
     figure = new_figure("Motion of the rig under its excitation", 9.0)
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
@@ -282,14 +283,19 @@ def motion(file: h5py.File) -> Figure:
         look = {"color": colour, "label": label, "linewidth": 1.0}
         if label == shown[0][0]:
             top.plot(time, own["excitation"][:longest:every], color=BLACK, linewidth=1.0)
-        middle.plot(time, MICRO * own["displacement"][:longest:every, -1], **look)
+        middle.plot(time, TO_MICRONS * own["displacement"][:longest:every, -1], **look)
         bottom.plot(time, own["dissipated"][:longest:every], **look)
     top.set_ylabel("excitation [N]")
-    middle.set_ylabel("last mass [µm]")
+    middle.set_ylabel(f"displacement of {_seen(file)} [µm]")
     bottom.set_ylabel("dissipated by the joint [mJ]")
     bottom.set_xlabel("time [s]")
     middle.legend(loc="upper right", title="dissipated before")
     return figure
+
+
+def _seen(file: h5py.File) -> str:
+    """What is looked at: the last of what is kept of a motion."""
+    return str(file.attrs["seen"][-1])
 
 
 def _column(group: h5py.Group, name: str) -> Array:

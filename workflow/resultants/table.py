@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-import csv
 import difflib
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
-from typing import TextIO
 
 import numpy as np
 
@@ -16,9 +12,7 @@ from sa_solver.types import Array
 from workflow.case import units
 from workflow.case.fields import shown
 from workflow.case.input_files import InputFileError
-
-COMMENT = "#"
-HEADER = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[(?P<unit>[^\[\]]*)\])?")
+from workflow.case.table_file import TableFile, read_table_file
 
 
 @dataclass(frozen=True)
@@ -54,24 +48,16 @@ def read_table(file: str, base_units: Mapping[str, str | None], required: Sequen
     ``base_units`` are those of all columns that may be given: ``"1"`` is a bare number, None is
     text. Lines that begin with ``#`` are comments. Raises InputFileError.
     """
-    rows = _rows(file)
-    if len(rows) < 2:
-        raise InputFileError(f"{file}:1: no rows; allowed: a header and at least one row")
-    (header_line, header), *rest = rows
-    written = _columns(f"{file}:{header_line}", header, base_units)
+    table = read_table_file(file)
+    written = _columns(table, base_units)
     missing = [name for name in required if name not in written]
     if missing:
         raise InputFileError(
-            f"{file}:{header_line}: {', '.join(missing)}: missing; "
+            f"{table.place}: {', '.join(missing)}: missing; "
             f"allowed: {', '.join(required)} in every file; this one has {', '.join(written)}"
         )
-    for line, row in rest:
-        if len(row) != len(header):
-            raise InputFileError(
-                f"{file}:{line}: {len(row)} values; allowed: {len(header)}, as the header"
-            )
-    cells = {name: [row[k] for _, row in rest] for k, name in enumerate(written)}
-    lines = tuple(line for line, _ in rest)
+    cells = {name: [row[k] for _, row in table.rows] for k, name in enumerate(written)}
+    lines = tuple(line for line, _ in table.rows)
     numbers = {}
     for name, unit in written.items():
         base = base_units[name]
@@ -83,42 +69,19 @@ def read_table(file: str, base_units: Mapping[str, str | None], required: Sequen
     return Table(file, lines, numbers, cells)
 
 
-def _rows(file: str) -> list[tuple[int, list[str]]]:
-    """Line number and cells of every row that is neither empty nor a comment."""
-    try:
-        with Path(file).open(newline="", encoding="utf-8-sig") as stream:
-            reader = csv.reader(_without_comments(stream))
-            return [
-                (reader.line_num, [cell.strip() for cell in row])
-                for row in reader
-                if any(cell.strip() for cell in row)
-            ]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputFileError(f"{file}: cannot be read ({' '.join(str(error).split())})") from error
-
-
-def _without_comments(stream: TextIO) -> Iterator[str]:
-    """The lines, empty in place of comments so that they still count."""
-    return ("\n" if line.lstrip().startswith(COMMENT) else line for line in stream)
-
-
-def _columns(
-    place: str, header: list[str], base_units: Mapping[str, str | None]
-) -> dict[str, str | None]:
+def _columns(table: TableFile, base_units: Mapping[str, str | None]) -> dict[str, str | None]:
     """Unit as written, or None, by name of the column."""
     found: dict[str, str | None] = {}
-    for cell in header:
-        match = HEADER.fullmatch(cell)
-        name, unit = (match["name"], match["unit"]) if match else (cell, None)
+    for name in table.names:
         if name not in base_units:
             near = difflib.get_close_matches(name, list(base_units), n=1)
             hint = f"did you mean '{near[0]}'?" if near else f"allowed: {', '.join(base_units)}"
-            raise InputFileError(f"{place}: {shown(name)}: unknown column; {hint}")
+            raise InputFileError(f"{table.place}: {shown(name)}: unknown column; {hint}")
         if name in found:
-            raise InputFileError(f"{place}: {name}: column given twice; allowed: once")
-        base = base_units[name]
+            raise InputFileError(f"{table.place}: {name}: column given twice; allowed: once")
+        unit = table.unit(name) or None
         if unit is not None:
-            check_unit(f"{place}: {name}", unit, base or "1")
+            check_unit(f"{table.place}: {name}", unit, base_units[name] or "1")
         found[name] = unit
     return found
 

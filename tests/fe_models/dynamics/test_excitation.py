@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 from fe_models.dynamics.excitation import (
+    Constant,
     ExcitationError,
     HammerBlow,
     Harmonic,
@@ -17,7 +18,8 @@ FORCES = {
     "ramped": Harmonic(SHAPE, 75.0, 100.0, phase=0.3, ramp=0.013),
     "blow": HammerBlow(SHAPE, 100.0, 4e-3, start=2e-3),
     "recorded": Recorded(SHAPE, np.array([1e-3, 2e-3, 9e-3]), np.array([1.0, -3.0, 8.0])),
-    "constant": Recorded(SHAPE, np.array([0.0]), np.array([6.0])),
+    "sample": Recorded(SHAPE, np.array([0.0]), np.array([6.0])),
+    "constant": Constant(SHAPE),
 }
 
 
@@ -67,9 +69,10 @@ def test_a_ramp_starts_without_force_or_slope_and_ends_in_the_harmonic():
 def test_forces_add_up():
     both = Together((FORCES["blow"], FORCES["constant"]))
     times = np.linspace(0.0, 0.01, 11)
-    wanted = FORCES["blow"](times) + np.array([0.0, 12.0])
+    wanted = FORCES["blow"](times) + SHAPE
     np.testing.assert_allclose(both(times), wanted, rtol=1e-15)
-    assert both.breaks == (0.0, 2e-3, 6e-3)
+    assert both.breaks == (2e-3, 6e-3)
+    assert Together((FORCES["blow"], FORCES["sample"])).breaks == (0.0, 2e-3, 6e-3)
 
 
 @pytest.mark.parametrize(

@@ -1,0 +1,86 @@
+"""One dialect of CSV for tables of loops, records of loops and recorded forces."""
+
+import numpy as np
+import pytest
+
+from workflow.case.excitation import RECORDED, Recorded
+from workflow.case.fields import Quantity
+from workflow.case.input_files import InputFileError
+from workflow.case.table_file import read_table_file
+from workflow.loop_file import read_loop_file
+from workflow.loop_table import read_loop_table
+
+# A byte-order mark, comments before and among the rows, empty lines, quotes, spaces and units.
+AWKWARD = '\ufeff# rig 1, run 7\r\n\r\n"{}" , {}{}\r\n 0.5 ,2{}\r\n  # paused, "here\r\n1,"3"{}\r\n'
+
+
+def awkward(path, first, second, more=("", "", "")):
+    path.write_bytes(AWKWARD.format(first, second, *more).encode("utf-8"))
+    return path
+
+
+def test_every_reader_takes_the_same_files(tmp_path):
+    path = awkward(tmp_path / "loops.csv", "energy [J]", "kt [N/um]", (",P,mu", ",1,1", ",1,1"))
+    table = read_loop_table(path)
+    np.testing.assert_allclose(table.energy, [500.0, 1000.0], rtol=1e-15)
+    np.testing.assert_allclose(table.kt, [2e3, 3e3], rtol=1e-15)
+    record = read_loop_file(awkward(tmp_path / "record.csv", "displacement [um]", "force [kN]"), {})
+    np.testing.assert_allclose(record.displacement, [5e-4, 1e-3], rtol=1e-15)
+    np.testing.assert_allclose(record.force, [2e3, 3e3], rtol=1e-15)
+    path = awkward(tmp_path / "force.csv", "time [ms]", "force [kN]")
+    times, force = Recorded(kind="recorded", file=str(path)).read()
+    np.testing.assert_allclose(times, [5e-4, 1e-3], rtol=1e-15)
+    np.testing.assert_allclose(force, [2e3, 3e3], rtol=1e-15)
+
+
+def test_other_columns_of_a_record_are_left_alone(tmp_path):
+    more = (",note,note", ",a,b", ",,")
+    path = awkward(tmp_path / "force.csv", "time", "force", more)
+    times, _ = Recorded(kind="recorded", file=str(path)).read()
+    assert times.tolist() == [0.5, 1.0]
+
+
+def forces(path):
+    table = read_table_file(path)
+    table.require("force", "both")
+    return table.column("force", RECORDED["force"])
+
+
+@pytest.mark.parametrize(
+    ("text", "complaint"),
+    [
+        ("", ":1: no rows; allowed: a header and at least one row"),
+        ("# nothing\n\ntime,force\n", ":3: no rows"),
+        ("# a\ntime\n1\n", ":2: no column force; this file has 'time'; allowed: both"),
+        ("time,force,force\n1,2,3\n", ":1: force: column given twice; allowed: once"),
+        ("time,force [s]\n1,2\n", ":1: force: unit 's' cannot be converted to N; allowed: units"),
+        ("time,force\n1,2\n#\n\n1,2,3\n", ":5: 3 values; allowed: 2, as the header"),
+        ("time,force\n1,two\n", ":2: force: 'two': not a number; allowed: numbers"),
+        ("time,force\n1,1_0\n", ":2: force: '1_0': not a number"),
+        ("time,force\n1,\n", ":2: force: '': not a number"),
+        ("time,force\n1,inf\n", ":2: force: inf: not a finite number"),
+        ("time,force [MN]\n1,2\n1,2e9\n", ":3: force: 2e9: out of range; allowed: at least"),
+    ],
+)
+def test_what_is_wrong_is_told_with_its_line(tmp_path, text, complaint):
+    path = tmp_path / "force.csv"
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(InputFileError) as refusal:
+        forces(path)
+    (line,) = str(refusal.value).splitlines()
+    assert line.startswith(f"{path}{complaint}")
+
+
+def test_what_is_no_text_is_refused_in_one_line(tmp_path):
+    path = tmp_path / "force.csv"
+    path.write_bytes(bytes(range(256)))
+    for file in (path, tmp_path / "none.csv", tmp_path):
+        with pytest.raises(InputFileError, match="cannot be read") as refusal:
+            read_table_file(file)
+        assert "\n" not in str(refusal.value)
+
+
+def test_a_ratio_may_be_in_percent(tmp_path):
+    path = tmp_path / "table.csv"
+    path.write_text("mu [%]\n50\n", encoding="utf-8")
+    assert read_table_file(path).column("mu", Quantity("1")).tolist() == [0.5]
