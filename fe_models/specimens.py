@@ -19,7 +19,9 @@ from sa_solver.types import Array, Indices, Material
 # applications", thesis, section 4.2).
 MODES = 20
 # Kinds of kept points.
-PAD, RING = "pad", "ring"
+PAD, RING, TARGET = "pad", "ring", "target"
+
+NONE: Indices = np.empty(0, dtype=np.int64)
 
 
 @dataclass(frozen=True)
@@ -28,7 +30,7 @@ class SpecimenMatrices:
 
     ``stiffness`` and ``mass`` ``(n, n)`` on the displacements that are left, ``transformation``
     ``(all, n)`` to those of all nodes; ``kept`` are the three displacements of each pad node, in
-    the interface's order, and then of each ring node.
+    the interface's order, then of each ring node, and of further points.
     """
 
     stiffness: sp.csr_matrix
@@ -44,8 +46,11 @@ def specimen_matrices(
     material: Material,
     order: int = 2,
     tied_ring: bool = True,
+    further: Indices | None = None,
 ) -> SpecimenMatrices:
     """Matrices of one free specimen, ``pad`` its vertices in the interface's order.
+
+    ``further`` vertices are kept beside pad and ring.
 
     With ``tied_ring`` the circumference moves linearly from each ring node to the next, so that
     held ring nodes hold a line. Held points would give way the more the finer the mesh is: 90, 86
@@ -59,7 +64,7 @@ def specimen_matrices(
         edges = np.stack([ring, np.roll(ring, -1)], axis=1)
         middle = elastic.nodes[edges].mean(axis=1)
         constraints.average(cKDTree(elastic.nodes).query(middle)[1].astype(np.int64), edges)
-    nodes = np.concatenate([pad, ring])
+    nodes = np.concatenate([pad, ring, NONE if further is None else further])
     t = constraints.transformation()
     return SpecimenMatrices(
         stiffness=(t.T @ elastic.stiffness @ t).tocsr(),
@@ -76,23 +81,27 @@ def reduced_specimens(
     order: int = 2,
     tied_ring: bool = True,
     modes: int = MODES,
+    target_distance: float | None = None,
 ) -> tuple[ReducedModel, ReducedModel]:
     """Both specimens on pad and ring, body 1 first.
 
     Their points are ``pad 1``, ``pad 2``, ... in the interface's order, and ``ring 1``, ... by
-    angle from the X axis.
+    angle from the X axis; with a ``target_distance`` [mm] also ``target 1``, the vertex closest to
+    the point at X = R on the cylinder's side, so far from the contact plane: where a laser looks
+    along X.
     """
     (face,) = mesh.interfaces
     models = []
     for body, pad, material in zip(
         (mesh.body_1, mesh.body_2), (face.nodes_1, face.nodes_2), materials, strict=True
     ):
-        full = specimen_matrices(specimen, body, pad, material, order, tied_ring)
+        target = NONE if target_distance is None else specimen.target(body, target_distance)
+        full = specimen_matrices(specimen, body, pad, material, order, tied_ring, target)
         mass = full.mass if modes > 0 else None
         model = reduce_body(full.stiffness, mass, full.kept, modes)
         ring = specimen.ring(body)
-        places = body.mesh.p.T[np.concatenate([pad, ring])]
-        names = _displacement_names({PAD: len(pad), RING: len(ring)})
+        places = body.mesh.p.T[np.concatenate([pad, ring, target])]
+        names = _displacement_names({PAD: len(pad), RING: len(ring), TARGET: len(target)})
         models.append(replace(model, names=names, places=np.repeat(places, 3, axis=0)))
     return models[0], models[1]
 
@@ -108,6 +117,6 @@ def _displacement_names(counts: dict[str, int]) -> tuple[str, ...]:
 
 
 def pad_stiffness(model: ReducedModel, specimen: Specimen) -> Array:
-    """Stiffness ``(3 n, 3 n)`` [N/mm] of the pad's nodes with the ring held."""
+    """Stiffness ``(3 n, 3 n)`` [N/mm] of the pad's nodes with the ring held, nothing else kept."""
     count = len(model.kept) - 3 * specimen.ring_nodes
     return model.static_stiffness[:count, :count]

@@ -58,9 +58,7 @@ class JointModel:
 
     def at(self, energy: float) -> Law:
         """The law of each joint after so much ``energy`` dissipated in all of them [N mm]."""
-        law = self._whole(energy)
-        shares = {name: getattr(law, name) / self.joints for name in SHARED if hasattr(law, name)}
-        return replace(law, **shares) if self.joints > 1 else law
+        return shared_out(self._whole(energy), self.joints)
 
     def parameters(self, energy: float) -> dict[str, float]:
         """Parameters after so much dissipated ``energy`` [N mm], by name."""
@@ -70,6 +68,12 @@ class JointModel:
     def _whole(self, energy: float) -> Law:
         law: Law = self.evolution.at(self.law, energy)
         return law
+
+
+def shared_out(law: Law, joints: int) -> Law:
+    """The law of each of so many joints that share stiffness and load of ``law`` evenly."""
+    shares = {name: getattr(law, name) / joints for name in SHARED if hasattr(law, name)}
+    return replace(law, **shares) if joints > 1 else law
 
 
 def _evolution(case: TimeCase) -> JointEvolution:

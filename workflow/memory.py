@@ -14,6 +14,7 @@ from workflow.case import (
     SpecimensCase,
     VibrationCase,
     WearCase,
+    WornVibrationCase,
 )
 from workflow.case.rig_structure import ReducedBody
 from workflow.errors import OutOfMemory
@@ -29,9 +30,9 @@ STATE_FIELDS, SPECTRA = 6, 300
 STEP_COLUMNS = 60
 # The same per displacement of a reduced body, whose numbers are in large arrays.
 REDUCED_COLUMNS = 20
-# Points of a forced response: samples and derivatives of the joint's force are kept of each until
-# the curve is found.
-CURVE_POINTS = 2000
+# Points of a forced response, of each of which the samples of the joints' forces and the motion are
+# kept until the curve is found; derivatives of the forces are held by so many of them at once.
+CURVE_POINTS, SLOPES = 2000, 20
 # Sparse factors of a structure with this many nodes took this much; they grow with this power.
 FACTOR_BYTES, FACTOR_NODES, FACTOR_POWER = 3.5e9, 1e5, 1.4
 # Meshes, plots and the interpreter with its libraries.
@@ -45,14 +46,14 @@ def required_bytes(
     """Upper estimate of the memory a run takes.
 
     ``structure_nodes`` of both bodies, or displacements of a reduced one in a rig, and
-    ``interface_nodes`` of all contacts, once known.
+    ``interface_nodes`` of all contacts, or joints, once known.
     """
     if isinstance(case, JointCase | RigCase):
         return BYTES * _kept_in_time(case, structure_nodes) + REST
     if isinstance(case, VibrationCase):
-        own = case.resolution
-        kept = 2 * own.samples + (2 * len(own.harmonics)) ** 2
-        return BYTES * CURVE_POINTS * kept + REST
+        return BYTES * _kept_of_motions(case, structure_nodes, max(interface_nodes, 1)) + REST
+    if isinstance(case, WornVibrationCase):
+        return required_bytes(case.with_joint(1.0, 1.0, 1.0))
     if isinstance(case, SpecimensCase):
         pad = 3 * (case.mesh.pad_elements + 1) ** 2
         factors = FACTOR_BYTES * (structure_nodes / FACTOR_NODES) ** FACTOR_POWER
@@ -82,6 +83,16 @@ def _kept_in_time(case: JointCase | RigCase, displacements: int) -> float:
     return STEP_COLUMNS * len(case.structure.masses) * len(case.energies) * case.steps
 
 
+def _kept_of_motions(case: VibrationCase, displacements: int, joints: int) -> float:
+    """Numbers kept of all motions under a force, and those held while one is found."""
+    directions = 3 if case.contacts else 1
+    functions = 2 * len(case.harmonics)
+    motion = functions * (displacements + joints * directions)
+    slopes = joints * (functions * directions) ** 2
+    samples = case.resolution.samples * joints * (directions + 1)
+    return CURVE_POINTS * (samples + motion) + SLOPES * slopes
+
+
 def check_memory(case: WearCase | Case, structure_nodes: int = 0, interface_nodes: int = 0) -> None:
     """Raise :class:`OutOfMemory` if the machine has less than the case needs."""
     required = required_bytes(case, structure_nodes, interface_nodes)
@@ -97,7 +108,7 @@ def _remedy(case: WearCase | Case) -> str:
     """What makes a case smaller."""
     if isinstance(case, JointCase | RigCase):
         return "raise integration.step, or shorten what is recorded"
-    if isinstance(case, VibrationCase):
+    if isinstance(case, VibrationCase | WornVibrationCase):
         return "lower resolution.samples or resolution.harmonics"
     if isinstance(case, SpecimensCase):
         return "lower mesh.pad_elements, mesh.order or contact.grid, or raise mesh.size"

@@ -11,7 +11,7 @@ import numpy as np
 from fe_models.dynamics.rig import Link, RigError, reduced_rig, unit_force
 from fe_models.mesh import MeshError
 from fe_models.reduction import ReducedModel, load_reduced
-from workflow.case import CaseError, RigCase, SpecimensCase, load_case
+from workflow.case import CaseError, RigCase, SpecimensCase, VibrationCase, load_case
 from workflow.case.joint_sections import FrictionContactJoint
 from workflow.case.rig_structure import Against, JointPlaces, Moved, ReducedBody
 from workflow.errors import UserError
@@ -23,7 +23,9 @@ from workflow.specimens_model import SpecimensModel
 AXES = "xyz"
 
 
-def reduced_rig_model(case: RigCase, body: ReducedBody, reporter: Reporter) -> RigModel:
+def reduced_rig_model(
+    case: RigCase | VibrationCase, body: ReducedBody, reporter: Reporter
+) -> RigModel:
     """The rig that a reduced body makes, with its joints.
 
     Raises UserError for a file without such a body, and for points that it does not have.
@@ -53,10 +55,12 @@ def reduced_rig_model(case: RigCase, body: ReducedBody, reporter: Reporter) -> R
         )
     except RigError as error:
         raise UserError(f"structure: {error}") from error
-    return RigModel(model, driven, seen[None], directions, _along(case, body), in_a_row=False)
+    label = f"{body.seen.points} {body.seen.direction}"
+    along = _along(case, body)
+    return RigModel(model, driven, seen[None], (label,), directions, along, in_a_row=False)
 
 
-def _along(case: RigCase, body: ReducedBody) -> int:
+def _along(case: RigCase | VibrationCase, body: ReducedBody) -> int:
     """The joints' direction that is looked at: their only one, or of two across the one seen."""
     if not isinstance(case.joint, FrictionContactJoint):
         return 0

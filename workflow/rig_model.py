@@ -1,4 +1,4 @@
-"""The rig of a case in time: what vibrates, where it is driven, and what is seen of it."""
+"""The rig of a case: what vibrates, where it is driven, and what is seen of it."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.dynamics.excitation import Force, Recorded, Together
+from fe_models.dynamics.excitation import Constant, Force, Together
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.motion import Motion
 from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
-from workflow.case import RigCase
-from workflow.case.rig_structure import ReducedBody, Rig
+from workflow.case import RigCase, VibrationCase
+from workflow.case.rig_structure import FrictionRig, ReducedBody, Rig
 from workflow.joint_model import Law
 from workflow.reporter import Reporter
 
@@ -27,33 +27,55 @@ class RigModel:
     """A vibrating structure with joints of ``directions`` directions.
 
     ``driven`` ``(n,)`` are the forces of an excitation of 1 N; ``seen`` ``(k, n)`` takes
-    displacements to those that are kept, the last of which is looked at. Loops are those along the
-    joints' direction number ``along``. Of masses ``in_a_row`` the second mode is looked for too.
+    displacements to those that are kept, with ``labels`` ``(k,)``, the last of which is looked at.
+    Loops are those along the joints' direction number ``along``. Of masses ``in_a_row`` the second
+    mode is looked for too.
+
+    Two bodies that touch have ``pressing`` ``(n,)``, the forces of a normal load of 1 N (elsewhere
+    the load is the joints' own preload); ``stretch`` ``(n,)``, which takes displacements to the one
+    that loops are drawn over, not the joints' mean; and of each joint its place ``places``
+    ``(j, 2)`` on the contact plane [mm], the initial ``gap`` ``(j,)`` [mm] and ``area`` ``(j,)``
+    [mm²].
     """
 
     model: DynamicModel
     driven: Array
     seen: Array
+    labels: tuple[str, ...]
     directions: int = 1
     along: int = 0
     in_a_row: bool = True
+    pressing: Array | None = None
+    stretch: Array | None = None
+    places: Array | None = None
+    gap: Array | None = None
+    area: Array | None = None
 
     @property
     def joints(self) -> int:
         """How many there are."""
         return len(self.model.connection) // self.directions
 
-    def shaken(self, law: Law, force: Force) -> Together:
-        """An excitation, with the static load that balances the joints at rest.
+    @property
+    def still(self) -> Array:
+        """Joints ``(j, d)`` that have not moved [mm]."""
+        return np.zeros((self.joints, self.directions))
+
+    def preload(self, law: Law) -> Array:
+        """The static load ``(n,)`` that balances joints that have not moved [N].
 
         Displacements count from there: what the load has done to the structure before does not
         matter, as it is linear.
         """
-        still = np.zeros((self.joints, self.directions))
-        preload = law.respond(law.rest(self.joints), still).force.ravel() @ self.model.connection
+        force = law.respond(law.rest(self.joints), self.still).force
+        return np.asarray(force.ravel() @ self.model.connection)
+
+    def shaken(self, law: Law, force: Force) -> Together:
+        """An excitation, with the static load that balances the joints at rest."""
+        preload = self.preload(law)
         if not preload.any():
             return Together((force,))
-        return Together((force, Recorded(preload, np.zeros(1), np.ones(1))))
+        return Together((force, Constant(preload)))
 
     def loop(self, motion: Motion) -> tuple[Array, Array]:
         """Mean displacement [mm] and force [N] of all joints ``(t,)``, along one direction."""
@@ -82,10 +104,22 @@ class RigModel:
         """The lowest natural frequencies without the joints [Hz]."""
         return _lowest(natural_frequencies(self.model))
 
-    def modes(self, law: Law) -> dict[str, list[float]]:
-        """The lowest natural frequencies with all joints stuck, and with all sliding [Hz]."""
-        still = np.zeros((self.joints, self.directions))
-        stuck = law.respond(law.rest(self.joints), still).tangent
+    def stuck(self, law: Law, rest: Array | None = None) -> Array:
+        """Tangents ``(j, d, d)`` [N/mm] of joints that stick.
+
+        Where the load presses them, they are displaced by ``rest`` ``(j, d)`` [mm].
+        """
+        state, still = law.rest(self.joints), self.still
+        if rest is not None:
+            state = law.respond(state, rest).state
+        return law.respond(state, still).tangent
+
+    def modes(self, law: Law, rest: Array | None = None) -> dict[str, list[float]]:
+        """The lowest natural frequencies with all joints stuck, and with all sliding [Hz].
+
+        Those that are open at rest stay open; see :meth:`stuck`.
+        """
+        stuck = self.stuck(law, rest)
         sliding = np.zeros_like(stuck)
         if isinstance(law, FrictionContact):
             sliding[:, 2, 2] = stuck[:, 2, 2]
@@ -102,13 +136,19 @@ def _lowest(frequencies: Array) -> list[float]:
     return found
 
 
-def rig_model(case: RigCase, reporter: Reporter) -> RigModel:
-    """The rig of a case. Raises UserError where a reduced body cannot be what the case says."""
-    if isinstance(case.structure, ReducedBody):
+def rig_model(case: RigCase | VibrationCase, reporter: Reporter) -> RigModel:
+    """The rig of a case. Raises UserError where its bodies cannot be what the case says."""
+    structure = case.structure
+    if isinstance(structure, ReducedBody):
         from workflow.reduced_rig import reduced_rig_model
 
-        return reduced_rig_model(case, case.structure, reporter)
-    return row_of_masses(case.structure, case.excitation.mass or 1)
+        return reduced_rig_model(case, structure, reporter)
+    if isinstance(structure, FrictionRig):
+        from workflow.friction_rig import friction_rig_model
+
+        return friction_rig_model(structure, reporter)
+    driven = case.mass if isinstance(case, VibrationCase) else case.excitation.mass
+    return row_of_masses(structure, driven or 1)
 
 
 def row_of_masses(rig: Rig, driven: int = 1) -> RigModel:
@@ -121,4 +161,5 @@ def row_of_masses(rig: Rig, driven: int = 1) -> RigModel:
         [[Link(names[-1])]],
         rig.damping_ratio,
     )
-    return RigModel(model, unit_force(model, f"m{driven}"), np.eye(len(names)))
+    driving = unit_force(model, f"m{driven}")
+    return RigModel(model, driving, np.eye(len(names)), tuple(names))

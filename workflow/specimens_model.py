@@ -34,10 +34,13 @@ class SpecimenReduction:
 
 
 class SpecimensModel:
-    """The specimens as the case gives them."""
+    """The specimens as the case gives them.
 
-    def __init__(self, case: SpecimensCase) -> None:
-        self._case = case
+    Their reduced models keep a target too if its distance from the contact is given [mm].
+    """
+
+    def __init__(self, case: SpecimensCase, target_distance: float | None = None) -> None:
+        self._case, self._target = case, target_distance
         self.specimen: Specimen = case.geometry()
         self._materials = case.material(1), case.material(2)
         self.from_cache = False
@@ -62,7 +65,8 @@ class SpecimensModel:
         case = self._case
         flat = replace(self.specimen, radii=None)
         modes = case.reduction.modes
-        key = content_key("specimens", flat, self._materials, case.mesh, modes)
+        further = () if self._target is None else (self._target,)
+        key = content_key("specimens", flat, self._materials, case.mesh, modes, *further)
         found = load_arrays(f"specimens-{key}")
         self.from_cache = found is not None
         if found is None:
@@ -86,7 +90,14 @@ class SpecimensModel:
     def _reduce(self, modes: int) -> dict[str, Any]:
         """Everything that is worth keeping, by name."""
         order = self._case.mesh.order
-        models = reduced_specimens(self.specimen, self.mesh, self._materials, order, modes=modes)
+        models = reduced_specimens(
+            self.specimen,
+            self.mesh,
+            self._materials,
+            order,
+            modes=modes,
+            target_distance=self._target,
+        )
         arrays: dict[str, Any] = {}
         for number, model in enumerate(models, 1):
             arrays |= {f"{number}/{name}": values for name, values in vars(model).items()}

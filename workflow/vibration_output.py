@@ -1,4 +1,4 @@
-"""What a vibration case leaves: results, tables, a figure, and the summary."""
+"""What a vibration case leaves: results, tables, files for ParaView, figures, and the summary."""
 
 from __future__ import annotations
 
@@ -16,7 +16,20 @@ from workflow.folder import OutputFolder
 from workflow.reporter import Reporter
 from workflow.store import replacing
 from workflow.versions import versions
-from workflow.vibration_run import DATASETS, Response, VibrationOutcome
+from workflow.vibration_outcome import (
+    DATASETS,
+    LOOPS,
+    NODES,
+    RESONANCE,
+    Curves,
+    Response,
+    VibrationOutcome,
+)
+
+RESPONSES, CONTACT, LINEAR, BACKBONE = "responses", "contact", "linear", "backbone"
+# Datasets larger than this are worth packing.
+LARGE = 4096
+TO_MICRONS, PER_MICRON = 1e3, 1e-3  # mm to µm, N/mm to N/µm
 
 
 def write_vibration_output(
@@ -25,46 +38,94 @@ def write_vibration_output(
     """Write all files of a finished run; the summary comes last and marks it as finished."""
     with reporter.stage("results"):
         _write_results(outcome, folder.results)
-        for number, response in enumerate(outcome.responses):
-            _write_table(folder.root / f"frf_{number:05d}.csv", response.curves)
-    if outcome.case.output.figures:
-        from workflow.figures import write_figures
-
-        with reporter.stage("paraview and figures"):
-            write_figures(folder.results, folder.figures)
+        _write_tables(outcome, folder.root)
+    with reporter.stage("paraview and figures"):
+        _draw(outcome, folder)
     summary = _summary(outcome, reporter)
     folder.write_summary(summary)
     for response in outcome.responses:
-        reporter.say(f"  {_response_line(response)}")
+        for line in _lines(response, outcome.labels[-1]):
+            reporter.say(f"  {line}")
+    if outcome.backbone is not None:
+        reporter.say(f"  {_backbone_line(outcome.backbone)}")
     seconds = ", ".join(f"{name} {value:.1f}" for name, value in summary["seconds"].items())
     reporter.say(f"  seconds: {seconds}")
+
+
+def _draw(outcome: VibrationOutcome, folder: OutputFolder) -> None:
+    if outcome.case.output.paraview and outcome.contact is not None:
+        from workflow.paraview.vibration import write_vibration
+
+        with h5py.File(folder.results) as file:
+            write_vibration(file, folder.paraview)
+    if outcome.case.output.figures:
+        from workflow.figures import write_figures
+
+        write_figures(folder.results, folder.figures)
+
+
+# --- results ------------------------------------------------------------------------------------
 
 
 def _write_results(outcome: VibrationOutcome, path: Path) -> None:
     case = outcome.case
     with replacing(path) as partial, h5py.File(partial, "w") as file:
         file.attrs.update({"title": case.title, "analysis": case.analysis, "law": case.joint.law})
+        file.attrs["seen"] = list(outcome.labels)
         file.create_group("case").attrs.update({"text": dump_case(case)} | versions())
-        linear = _put(file, "linear", "linear", outcome.linear)
+        linear = _put(file, LINEAR, LINEAR, outcome.linear)
         linear.attrs.update({name: outcome.numbers[name] for name in ("free", "stuck", "sliding")})
+        if outcome.contact is not None:
+            _put(file, CONTACT, CONTACT, outcome.contact)
         for number, response in enumerate(outcome.responses):
-            group = _put(file, f"responses/{number:05d}", "responses", response.curves)
-            group.attrs.update({"force": response.force, **response.numbers})
+            _put_response(file, f"{RESPONSES}/{number:05d}", response)
+        if outcome.backbone is not None:
+            _put_curves(file, BACKBONE, BACKBONE, outcome.backbone)
+
+
+def _put_response(file: h5py.File, place: str, response: Response) -> None:
+    group = _put(file, place, RESPONSES, response.curves)
+    group.attrs.update({"force": response.force, **response.numbers})
+    for kind, values in ((NODES, response.nodes), (RESONANCE, response.resonance)):
+        if values is not None:
+            _put(file, f"{place}/{kind}", kind, values)
+    for number, loop in enumerate(response.loops):
+        _put_curves(file, f"{place}/{LOOPS}/{number:05d}", LOOPS, loop)
+
+
+def _put_curves(file: h5py.File, place: str, kind: str, curves: Curves) -> None:
+    """Curves and their numbers; those that there are not are left out."""
+    numbers = {name: value for name, value in curves.numbers.items() if value is not None}
+    _put(file, place, kind, curves.values).attrs.update(numbers)
 
 
 def _put(file: h5py.File, place: str, kind: str, curves: Mapping[str, Array]) -> h5py.Group:
     """Write the curves of one kind, each with its unit and description."""
     for name, values in curves.items():
-        dataset = file.create_dataset(f"{place}/{name}", data=values)
+        packed = {"compression": "gzip", "compression_opts": 1} if values.size > LARGE else {}
+        dataset = file.create_dataset(f"{place}/{name}", data=values, **packed)
         dataset.attrs["unit"], dataset.attrs["description"] = DATASETS[kind][name]
     return file[place]
 
 
-def _write_table(path: Path, curves: Mapping[str, Array]) -> None:
-    """The motions under a force as CSV in base units, a column of amplitudes for each mass."""
+# --- tables -------------------------------------------------------------------------------------
+
+
+def _write_tables(outcome: VibrationOutcome, root: Path) -> None:
+    """Responses, loops (the finest of each force) and backbone as CSV in base units."""
+    for number, response in enumerate(outcome.responses):
+        _write_table(root / f"frf_{number:05d}.csv", RESPONSES, response.curves)
+        if response.loops:
+            _write_table(root / f"loop_{number:05d}.csv", LOOPS, response.loops[-1].values)
+    if outcome.backbone is not None:
+        _write_table(root / f"{BACKBONE}.csv", BACKBONE, outcome.backbone.values)
+
+
+def _write_table(path: Path, kind: str, curves: Mapping[str, Array]) -> None:
+    """Curves as columns, of what has several values at a point one for each."""
     columns: dict[str, Array] = {}
     for name, values in curves.items():
-        unit = DATASETS["responses"][name][0]
+        unit = DATASETS[kind][name][0]
         if values.ndim == 1:
             columns[f"{name} [{unit}]"] = values
         else:
@@ -76,26 +137,62 @@ def _write_table(path: Path, curves: Mapping[str, Array]) -> None:
             writer.writerow([f"{value:.9g}" for value in row])
 
 
+# --- summary ------------------------------------------------------------------------------------
+
+
 def _summary(outcome: VibrationOutcome, reporter: Reporter) -> dict[str, Any]:
     case = outcome.case
-    return {
+    found: dict[str, Any] = {
         "title": case.title,
         "assumed": list(case.assumed),
         "law": case.joint.law,
         **outcome.numbers,
-        "responses": [{"force": own.force, **own.numbers} for own in outcome.responses],
+        "responses": [_response_summary(own) for own in outcome.responses],
+    }
+    if outcome.backbone is not None:
+        points = len(outcome.backbone.values["force"])
+        found[BACKBONE] = {"points": points, **outcome.backbone.numbers}
+    return found | {
         "warnings": reporter.warnings,
         "seconds": {name: round(value, 2) for name, value in reporter.seconds.items()},
         "versions": versions(),
     }
 
 
-def _response_line(response: Response) -> str:
-    """What a force does, in a line."""
+def _response_summary(response: Response) -> dict[str, Any]:
+    found = {"force": response.force, **response.numbers}
+    if response.loops:
+        found[LOOPS] = [dict(loop.numbers) for loop in response.loops]
+    return found
+
+
+def _lines(response: Response, label: str) -> list[str]:
+    """What a force does, in a line; and its loop, in another."""
     own = response.numbers
-    text = (
-        f"{response.force:g} N: resonance {own['resonance']:.5g} Hz, last mass "
-        f"{1e3 * own['amplitude']:.4g} um, slips {own['slip']:.0%} of the cycle, "
-        f"{own['points']} points, harmonics left out {own['left_out']:.1e}"
-    )
-    return text + (f"; {len(own['folds'])} folds" if own["folds"] else "")
+    parts = [
+        f"{response.force:g} N: resonance {own['resonance']:.5g} Hz",
+        f"{label} moves {TO_MICRONS * own['amplitude']:.4g} um",
+        f"slips {own['slip']:.0%} of the cycle",
+        f"{own['points']} points",
+        f"harmonics left out {own['left_out']:.1e}",
+    ]
+    if "damping" in own:
+        parts.insert(2, f"damping {own['damping']:.2%}")
+    text = ", ".join(parts) + (f"; {len(own['folds'])} folds" if own["folds"] else "")
+    return [text, *(_loop_line(loop) for loop in response.loops[-1:])]
+
+
+def _loop_line(loop: Curves) -> str:
+    own = loop.numbers
+    lost = f"{own['energy']:.4g} mJ" if own["slip"] > 0.0 else "no slip"
+    text = f"  loop at {own['frequency']:g} Hz: {lost}"
+    if own["stiffness"] is not None:
+        text += f", sticks with {PER_MICRON * own['stiffness']:.4g} N/um"
+    if own["friction"] is not None:
+        text += f", friction {own['friction']:.3g}"
+    return f"{text}, harmonics left out {own['left_out']:.1e}"
+
+
+def _backbone_line(backbone: Curves) -> str:
+    (first, last), (low, high) = (backbone.values[name][[0, -1]] for name in ("frequency", "force"))
+    return f"phase resonance: {first:.5g} Hz under {low:g} N, {last:.5g} Hz under {high:g} N"

@@ -61,7 +61,7 @@ def lumped_rig(
     Raises :class:`RigError` for a name that is not a mass, or a mass that is not above zero.
     """
     empty = np.zeros((0, 0))
-    return _rig(empty, empty, (), masses, springs, joints, damping_ratio)
+    return connected_rig(empty, empty, (), masses, springs, joints, damping_ratio)
 
 
 def reduced_rig(
@@ -88,8 +88,41 @@ def reduced_rig(
         )
     modes = tuple(f"mode {mode + 1}" for mode in range(len(reduced.frequencies)))
     named = (*names, *modes)
-    return _rig(
+    return connected_rig(
         reduced.mass, reduced.stiffness, named, masses, springs or {}, joints, damping_ratio
+    )
+
+
+def connected_rig(
+    mass: Array,
+    stiffness: Array,
+    names: tuple[str, ...],
+    masses: Mapping[str, float],
+    springs: Mapping[Link, float],
+    joints: Sequence[Sequence[Link]],
+    damping_ratio: float | Array = 0.0,
+) -> DynamicModel:
+    """Masses and springs added to the matrices ``(c, c)`` of displacements ``names``, and joints.
+
+    As :func:`reduced_rig`, whatever the matrices come from.
+    """
+    every = names + tuple(name for name in masses if name not in names)
+    if len(set(every)) < len(every):
+        raise RigError("two points have the same name: give each its own")
+    added = len(every) - len(names)
+    mass, stiffness = (np.pad(matrix, (0, added)) for matrix in (mass, stiffness))
+    for name, value in masses.items():
+        place = _place(every, name)
+        mass[place, place] += value
+    for link, value in springs.items():
+        stretch = _stretch(every, link)
+        stiffness += value * np.outer(stretch, stretch)
+    return DynamicModel(
+        mass=mass,
+        damping=modal_damping(mass, stiffness, damping_ratio),
+        stiffness=stiffness,
+        connection=_connection(every, joints),
+        names=every,
     )
 
 
@@ -133,36 +166,6 @@ def unit_force(model: DynamicModel, name: str) -> Array:
     force = np.zeros(len(model.names))
     force[_place(model.names, name)] = 1.0
     return force
-
-
-def _rig(
-    mass: Array,
-    stiffness: Array,
-    names: tuple[str, ...],
-    masses: Mapping[str, float],
-    springs: Mapping[Link, float],
-    joints: Sequence[Sequence[Link]],
-    damping_ratio: float | Array,
-) -> DynamicModel:
-    """Add masses and springs to the matrices of the points ``names``, and connect the joints."""
-    every = names + tuple(name for name in masses if name not in names)
-    if len(set(every)) < len(every):
-        raise RigError("two points have the same name: give each its own")
-    added = len(every) - len(names)
-    mass, stiffness = (np.pad(matrix, (0, added)) for matrix in (mass, stiffness))
-    for name, value in masses.items():
-        place = _place(every, name)
-        mass[place, place] += value
-    for link, value in springs.items():
-        stretch = _stretch(every, link)
-        stiffness += value * np.outer(stretch, stretch)
-    return DynamicModel(
-        mass=mass,
-        damping=modal_damping(mass, stiffness, damping_ratio),
-        stiffness=stiffness,
-        connection=_connection(every, joints),
-        names=every,
-    )
 
 
 def _connection(names: tuple[str, ...], joints: Sequence[Sequence[Link]]) -> Array:

@@ -118,6 +118,17 @@ class Specimen:
             raise MeshError(f"{body.name} has no nodes on the ring: mesh it with Specimen.mesh")
         return nodes.astype(np.int64)
 
+    def target(self, body: Body, distance: float) -> Indices:
+        """The vertex ``(1,)`` closest to X = R, Y = 0, so far from the contact plane [mm].
+
+        Vertices on the boundary of the body lie there; the ring's own are left out.
+        """
+        side = np.sign(body.mesh.p[2].mean())
+        wanted = np.array([0.5 * self.diameter, 0.0, side * distance])
+        free = np.setdiff1d(body.mesh.boundary_nodes(), self.ring(body))
+        away = np.linalg.norm(body.mesh.p[:, free].T - wanted, axis=1)
+        return free[[away.argmin()]].astype(np.int64)
+
     def _mesh(self, size: float, growth: float) -> Any:
         """Mesh of body 1: a quarter, mirrored about X = 0 and Y = 0."""
         with gmsh_model("specimen") as gmsh:

@@ -1,17 +1,14 @@
 """Vibration cases from the command line: linear limits, closed forms, mistakes, what they leave."""
 
 import csv
-from functools import partial
 
 import h5py
 import numpy as np
 import pytest
 
-from fe_models.dynamics.continuation import StepControl
 from tests.workflow.conftest import invoke
 from tests.workflow.test_time_cases import MASS, linear_rig, receptance, refused, run
 from wear.joints.jenkins import Jenkins
-from workflow import vibration_run
 from workflow.case import VibrationCase, dump_case, parse_case
 from workflow.memory import required_bytes
 
@@ -113,13 +110,12 @@ def test_resonance_falls_from_stuck_to_free(tmp_path):
     assert summary["warnings"] == []
 
 
-def test_a_curve_that_ends_early_or_has_no_peak_is_told(tmp_path, monkeypatch):
+def test_a_curve_that_ends_early_or_has_no_peak_is_told(tmp_path):
     summary = run(tmp_path, RIG, "forces=[2 N]", "frequencies=[20 Hz, 25 Hz]")
     assert summary["warnings"] == [
         "2 N: no resonance, the largest motion is at an end of the curve"
     ]
-    monkeypatch.setattr(vibration_run, "StepControl", partial(StepControl, max_points=5))
-    summary = run(tmp_path, RIG, "forces=[2 N]")
+    summary = run(tmp_path, RIG, "forces=[2 N]", "continuation.most_points=5")
     message = summary["responses"][0]["message"]
     assert "the curve has 5 points" in message
     assert f"2 N: {message}" in summary["warnings"]
@@ -158,8 +154,16 @@ def test_files_of_a_run(tmp_path):
         ("forces=[]", "forces"),
         ("frequencies=[400 Hz, 20 Hz]", "not ascending"),
         ("mass=3", "no such mass; allowed: 1 to 2"),
-        ("structure.kind=reduced", "not known; allowed: rig"),
-        ("joint.law=friction_contact", "bouc_wen, jenkins"),
+        ("structure.kind=joint", "not known; allowed: rig, reduced, friction_rig"),
+        (
+            "joint={law: friction_contact, normal_load: 1, friction: 0.5, stiffness: 1, "
+            "normal_stiffness: 1}",
+            "in a reduced structure or a friction_rig",
+        ),
+        ("loops={frequency: 10 Hz}", "outside; allowed: within frequencies, 20 to 300 Hz"),
+        ("loops={frequency: 100 Hz, harmonics: [0]}", "out of range"),
+        ("continuation.first_step=0.5", "not between the shortest and the longest step"),
+        ("continuation.largest_angle=120 deg", "above 0 to 90 deg"),
         ("resolution.harmonics=[1, 1]", "not ascending"),
         ("resolution.harmonics=[3, 5]", "1 among them"),
         ("resolution.harmonics=[1, 2.5]", "not all of them harmonics"),
@@ -195,3 +199,29 @@ def test_harmonics_are_a_number_of_odd_ones_or_a_list():
 def test_memory_grows_with_the_samples():
     few, many = (parse_case(RIG, "case", [f"resolution.samples={n}"]) for n in (256, 65536))
     assert required_bytes(many) - required_bytes(few) == 8 * 2000 * 2 * (65536 - 256)
+
+
+def test_phase_resonance_follows_the_peaks(tmp_path):
+    """Half of the way from peak to peak; force and answer 90 degrees apart at the driven mass."""
+    summary = run(tmp_path, RIG, "forces=[2 N, 20 N, 60 N]", "backbone=true", "mass=2")
+    with h5py.File(tmp_path / "out" / "results.h5") as file:
+        found = {name: file[f"backbone/{name}"][()] for name in file["backbone"]}
+    assert found["force"][[0, -1]].tolist() == [2.0, 60.0]
+    for own in summary["responses"][::2]:
+        place = int(np.abs(found["force"] - own["force"]).argmin())
+        # Damping ratio 0.1: the peak of the amplitude lies a little below.
+        assert found["frequency"][place] == pytest.approx(own["resonance"], rel=0.06)
+        assert found["amplitude"][place] == pytest.approx(own["amplitude"], rel=0.02)
+
+
+def test_loops_of_the_joint_at_one_frequency(tmp_path):
+    """A slider's loop: its spring's slope, µN, and 4 µN (a - µN/kt) of energy."""
+    run(tmp_path, RIG, "forces=[2 N, 60 N]", "loops={frequency: 60 Hz, harmonics: [1, 40]}")
+    with h5py.File(tmp_path / "out" / "results.h5") as file:
+        small, large = (dict(file[f"responses/0000{n}/loops/00001"].attrs) for n in (0, 1))
+    assert small["stiffness"] == pytest.approx(STIFFNESS, rel=1e-9)
+    assert "friction" not in small
+    assert large["stiffness"] == pytest.approx(STIFFNESS, rel=2e-2)
+    assert large["friction"] == pytest.approx(0.5, rel=1e-2)
+    energy = 4.0 * 50.0 * (0.5 * large["stroke"] - 50.0 / STIFFNESS)
+    assert large["energy"] == pytest.approx(energy, rel=2e-2)

@@ -25,6 +25,7 @@ from workflow.case.source import KeyPath, Source, dotted, read_text
 from workflow.case.specimens_case import SpecimensCase
 from workflow.case.time_case import JointCase, RigCase
 from workflow.case.vibration_case import VibrationCase
+from workflow.case.worn_vibration_case import WornVibrationCase
 from workflow.errors import CaseError
 
 
@@ -73,7 +74,10 @@ def _kind_of_case(source: Source) -> type[Case]:
     if analysis == "time":
         return TIME_CASES[_choice(source, ("structure", "kind"), tuple(TIME_CASES))]
     if analysis == "vibration":
-        _choice(source, ("structure", "kind"), ("rig",))
+        if source.at(("wear",)) is not None:
+            _choice(source, ("structure", "kind"), ("rig",))
+            return WornVibrationCase
+        _choice(source, ("structure", "kind"), ("rig", "reduced", "friction_rig"))
         return VibrationCase
     if analysis == "wear":
         kind = _choice(source, ("structure", "kind"), (*WEAR_CASES, "bodies"))

@@ -1,4 +1,4 @@
-"""What holds the joints of a rig: masses in a row, or a body reduced to a few points."""
+"""What holds the joints of a rig: masses in a row, a reduced body, or the rig's two specimens."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from workflow.case.fields import File, Quantity, Whole
-from workflow.case.sections import Section, Title, disagreement, entry
+from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 Mass = Annotated[float, Quantity("t", above=0.0, at_most=1e3, range_text="above 0 to 1e6 kg")]
 Spring = Annotated[float, Quantity("N/mm", at_least=0.0, at_most=1e12, range_text="0 to 1e6 kN/um")]
@@ -19,7 +19,7 @@ Direction = Literal["x", "y", "z", "-x", "-y", "-z"]
 class Rig(Section):
     """Masses in a row on springs from the ground on; the joint holds the last to the ground."""
 
-    kind: Literal["rig"] = entry("rig or reduced", "rig")
+    kind: Literal["rig"] = entry("rig, reduced or, for vibration, friction_rig", "rig")
     masses: Annotated[tuple[Mass, ...], Field(min_length=1, max_length=20)] = entry(
         "from the ground on [t]", ["21.2 kg", "1.2 kg"]
     )
@@ -124,3 +124,31 @@ class ReducedBody(Section):
         """The structure in a few words."""
         places = ", ".join(own.points for own in self.joints)
         return f"reduced body of {Path(self.file).name}, joints at {places}"
+
+
+class FrictionRig(Section):
+    """Two masses in a row, and the specimens that rub between the second mass and the ground."""
+
+    kind: Literal["friction_rig"] = entry("two reduced specimens in a rig", "friction_rig")
+    specimens: Annotated[str, File((".yaml",))] = entry(
+        "a case of specimens: bodies, form, materials, mesh and reduction are taken from it",
+        "specimens_rig.yaml",
+    )
+    masses: tuple[Mass, Mass] = entry(
+        "that which is driven, and that which holds the upper specimen [t]",
+        ["21.152 kg", "1.189 kg"],
+    )
+    springs: tuple[Spring, Spring] = entry(
+        "from the ground to the first mass, and on to the second [N/mm]",
+        ["1.3469e3 N/mm", "273e3 N/mm"],
+    )
+    damping_ratio: DampingRatio = entry("of every mode with the contact open [1]", 0.001)
+    target_distance: Length = entry(
+        "from the contact plane to where a laser looks at each specimen [mm]", "1 mm", default=1.0
+    )
+
+    @property
+    def text(self) -> str:
+        """The structure in a few words."""
+        masses = " and ".join(f"{1e3 * mass:g} kg" for mass in self.masses)
+        return f"specimens of {Path(self.specimens).name} in a rig of {masses}"

@@ -89,7 +89,7 @@ class Expectation(Section):
 SCENE_ORDER = (
     *("title", "analysis", "structure", "materials", "friction", "load_path", "mesh"),
     *("joint", "evolution", "drive", "excitation", "energies", "ageing", "integration"),
-    *("forces", "frequencies", "mass", "resolution"),
+    *("forces", "frequencies", "mass", "resolution", "continuation", "backbone"),
     *("nonlinearity", "reduction", "contact", "wear", "coupling", "accuracy", "fidelity"),
     *("loops", "stress", "output", "assumed", "reported", "expect"),
 )

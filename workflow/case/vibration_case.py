@@ -1,18 +1,19 @@
-"""Vibration cases: a rig with a joint under a harmonic force, its steady motions by harmonics."""
+"""Vibration cases: a structure with joints under a harmonic force, its steady motions."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import radians
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, model_validator
 
 from workflow.case.excitation import DrivingForce, Frequency, MassNumber
 from workflow.case.fields import Entry, Quantity, Whole
-from workflow.case.joint_sections import JointLaw
-from workflow.case.rig_structure import Rig
+from workflow.case.joint_sections import ContactLaw, FrictionContactJoint
+from workflow.case.rig_structure import FrictionRig, ReducedBody, Rig
 from workflow.case.sections import (
     DottedPath,
     Expectation,
@@ -26,6 +27,7 @@ from workflow.case.sections import (
 
 MOST_ODD, HIGHEST = 100, 999
 ODD = (1, 3, 5, 7, 9, 11, 13, 15)
+Step = Annotated[float, Quantity("1", at_least=1e-12, at_most=10.0)]
 
 
 @dataclass(frozen=True)
@@ -62,7 +64,8 @@ class MotionResolution(Section):
     """Harmonics of the motion, and samples of a period in which the joint's force is found."""
 
     harmonics: Annotated[Sequence[int], HarmonicNumbers()] = entry(
-        "how many odd ones, or a list of them; those to begin with if there is a tolerance",
+        "how many odd ones, or a list; those to begin with if there is a tolerance; for contacts "
+        "the mean, 0, is added",
         8,
         default=ODD,
     )
@@ -87,21 +90,81 @@ class MotionResolution(Section):
         return self
 
 
+class Continuation(Section):
+    """How a curve of motions is followed: steps are shares of the motion and of the frequency."""
+
+    first_step: Step = entry("[1]", 0.02, default=0.02)
+    shortest_step: Step = entry("at which the curve is given up [1]", 1e-6, default=1e-6)
+    longest_step: Step = entry("shorter ones draw a smoother curve [1]", 0.1, default=0.1)
+    iterations: Annotated[int, Whole(1, 50)] = entry(
+        "of Newton's method that are wanted in a step: with more it shrinks", 4, default=4
+    )
+    most_iterations: Annotated[int, Whole(1, 100)] = entry(
+        "after which a step is halved", 8, default=8
+    )
+    largest_angle: Annotated[
+        float, Quantity("rad", above=0.0, at_most=1.6, range_text="above 0 to 90 deg")
+    ] = entry("by which the curve may turn in a step [rad]", "30 deg", default=radians(30.0))
+    most_points: Annotated[int, Whole(2, 1_000_000)] = entry("of one curve", 2000, default=2000)
+    tolerance: Annotated[float, Quantity("1", at_least=1e-13, at_most=1e-3)] = entry(
+        "of the balance of forces at every point [1]", 1e-10, default=1e-10
+    )
+    start: Literal["lower", "upper"] = entry(
+        "end of the frequencies from which the curve is followed, lower or upper",
+        "lower",
+        default="lower",
+    )
+
+    @model_validator(mode="after")
+    def _steps_ascend(self) -> Continuation:
+        if not self.shortest_step <= self.first_step <= self.longest_step:
+            raise disagreement(
+                f"{self.first_step:g}: not between the shortest and the longest step",
+                *("first_step", "shortest_step", "longest_step"),
+            )
+        return self
+
+
+class LoopsAt(Section):
+    """Loops of the joints at one frequency, under each force."""
+
+    frequency: Frequency = entry("of the force [Hz]", "100 Hz")
+    harmonics: Annotated[
+        tuple[Annotated[Sequence[int], HarmonicNumbers()], ...], Field(max_length=10)
+    ] = entry(
+        "resolutions in which each loop is found, the finest last, such as [5, 15] odd harmonics; "
+        "none: that of the motion",
+        [5, 15],
+        default=(),
+    )
+
+
 class VibrationCase(Scene):
-    """A rig with a joint under forces a sin(2π frequency t), for all frequencies of a span."""
+    """A structure with joints under forces a sin(2π frequency t), for all frequencies of a span."""
 
     title: Title = entry("one line", "Forced response of a friction rig")
     analysis: Literal["vibration"] = entry("what is computed", "vibration")
-    structure: Rig = entry("what holds the joint")
-    joint: JointLaw = entry("its law and its parameters")
+    structure: Annotated[Rig | ReducedBody | FrictionRig, Field(discriminator="kind")] = entry(
+        "what holds the joints"
+    )
+    joint: ContactLaw = entry("its law and its parameters; of all joints together")
     forces: Annotated[tuple[DrivingForce, ...], Field(min_length=1, max_length=100)] = entry(
         "amplitudes, ascending, each followed through the frequencies [N]", ["10 N", "40 N"]
     )
     frequencies: tuple[Frequency, Frequency] = entry(
         "lower and upper end [Hz]", ["20 Hz", "400 Hz"]
     )
-    mass: MassNumber = entry("that is driven, counted from the ground", 1, default=1)
+    mass: MassNumber | None = entry(
+        "of a row, that is driven, counted from the ground; without it the first", 1, default=None
+    )
     resolution: MotionResolution = entry("of a period", default=MotionResolution())
+    continuation: Continuation = entry("of each curve", default=Continuation())
+    loops: LoopsAt | None = entry("of all joints together, at one frequency", default=None)
+    backbone: bool = entry(
+        "whether phase resonance, force and answer 90 degrees apart, is followed along the force",
+        False,
+        default=False,
+    )
     output: Output = entry("files beside summary and results", default=Output())
     assumed: tuple[DottedPath, ...] = entry(
         "inputs that are ours because the source does not print them",
@@ -110,19 +173,85 @@ class VibrationCase(Scene):
     )
     expect: tuple[Expectation, ...] = entry("values the run must reproduce", default=())
 
+    @property
+    def contacts(self) -> bool:
+        """Whether joints are contacts, with a normal direction."""
+        return isinstance(self.joint, FrictionContactJoint)
+
+    @property
+    def harmonics(self) -> tuple[int, ...]:
+        """Those of the motion: contacts need harmonic 0 too."""
+        return self.with_mean(self.resolution.harmonics)
+
+    def with_mean(self, harmonics: Sequence[int]) -> tuple[int, ...]:
+        """Harmonics, with 0 where joints are contacts."""
+        return tuple(sorted({0, *harmonics} if self.contacts else harmonics))
+
     @model_validator(mode="after")
     def _ascending(self) -> VibrationCase:
         if any(after <= before for before, after in pairwise(self.forces)):
             raise disagreement("not ascending; allowed: each force above the last", "forces")
         if self.frequencies[0] >= self.frequencies[1]:
             raise disagreement("not ascending; allowed: lower, then upper end", "frequencies")
+        if self.backbone and len(self.forces) < 2:
+            raise disagreement(
+                "a single force; allowed: two or more, between which phase resonance is followed",
+                *("forces", "backbone"),
+            )
         return self
 
     @model_validator(mode="after")
     def _drives_a_mass(self) -> VibrationCase:
-        count = len(self.structure.masses)
-        if self.mass > count:
+        if not isinstance(self.structure, Rig):
+            if self.mass is not None:
+                raise disagreement(
+                    f"{self.mass}: given beside {self.structure.kind}; allowed: for a rig", "mass"
+                )
+        elif self.mass is not None and self.mass > len(self.structure.masses):
+            count = len(self.structure.masses)
             raise disagreement(f"{self.mass}: no such mass; allowed: 1 to {count}", "mass")
+        return self
+
+    @model_validator(mode="after")
+    def _has_the_directions(self) -> VibrationCase:
+        if self.contacts and isinstance(self.structure, Rig):
+            raise disagreement(
+                "friction_contact: has three directions; allowed: in a reduced structure or a "
+                "friction_rig, or jenkins, which it is along one",
+                "joint.law",
+            )
+        if isinstance(self.structure, FrictionRig):
+            self._rubs()
+        return self
+
+    def _rubs(self) -> None:
+        """Refuse joints that are not those of two pads."""
+        joint = self.joint
+        if not isinstance(joint, FrictionContactJoint):
+            raise disagreement(
+                f"{joint.law}: between two pads; allowed: friction_contact", "joint.law"
+            )
+        if joint.gap > 0.0:
+            raise disagreement(
+                f"{joint.gap:g} mm: given beside specimens; allowed: their own form, "
+                "structure.form of their case",
+                "joint.gap",
+            )
+        if joint.normal_load == 0.0:
+            raise disagreement(
+                "0 N: nothing presses the specimens together; allowed: above 0",
+                "joint.normal_load",
+            )
+
+    @model_validator(mode="after")
+    def _loops_inside(self) -> VibrationCase:
+        low, high = self.frequencies
+        if self.loops is not None and not low <= self.loops.frequency <= high:
+            raise disagreement(
+                f"{self.loops.frequency:g} Hz: outside; allowed: within frequencies, {low:g} to "
+                f"{high:g} Hz",
+                "loops.frequency",
+            )
         return self
 
     @model_validator(mode="after")
@@ -135,12 +264,20 @@ class VibrationCase(Scene):
         structure, joint, own = self.structure, self.joint, self.resolution
         forces = ", ".join(f"{force:g}" for force in self.forces)
         low, high = self.frequencies
-        resolution = f"{len(own.harmonics)} harmonics to {own.harmonics[-1]}, {own.samples} samples"
+        harmonics = self.harmonics
+        resolution = f"{len(harmonics)} harmonics to {harmonics[-1]}, {own.samples} samples"
         if own.tolerance is not None:
             resolution += f", growing to a tolerance of {own.tolerance:g}"
         return [
             ("structure", f"{structure.text}, damping ratio {structure.damping_ratio:g}"),
             ("joint", f"{joint.law} under {joint.normal_load:g} N"),
-            ("forces", f"{forces} N on mass {self.mass}, {low:g} to {high:g} Hz"),
+            ("forces", f"{forces} N on {self._driven}, {low:g} to {high:g} Hz"),
             ("resolution", resolution),
         ]
+
+    @property
+    def _driven(self) -> str:
+        """Where the forces act, in a few words."""
+        if isinstance(self.structure, ReducedBody):
+            return f"{self.structure.driven.points} along {self.structure.driven.direction}"
+        return f"mass {self.mass or 1}"

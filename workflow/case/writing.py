@@ -29,7 +29,7 @@ class Row:
     """One entry to write; ``off`` leaves it in as a comment."""
 
     key: str
-    value: Any  # scalar, list of scalars, rows of a section, or a list of such rows
+    value: Any  # scalar, list of values, or rows of a section
     comment: str = ""
     off: bool = False
 
@@ -86,7 +86,9 @@ def _entry_lines(row: Row) -> Iterator[str]:
 
 def _is_section(value: Any) -> bool:
     """Whether ``value`` is rows, or a list of sections given as rows."""
-    return isinstance(value, list) and bool(value) and isinstance(value[0], Row | list)
+    if not isinstance(value, list) or not value:
+        return False
+    return isinstance(value[0], Row) or _is_section(value[0])
 
 
 def _commented(text: str, comment: str) -> str:

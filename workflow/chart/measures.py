@@ -13,7 +13,7 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array, Grid
-from workflow.case import Case, WearCase
+from workflow.case import Case, VibrationCase, WearCase
 from workflow.folder import OutputFolder
 from workflow.store import grid_of
 
@@ -35,6 +35,9 @@ CONTACT = (
     *("states.-1.approach", "states.-1.central_pressure", "states.-1.shift_x"),
     *("states.-1.stick_radius", "states.-1.stick_half_width", "loop.energy"),
 )
+# What the motions under every force are compared by: a resonance's frequency says little, where the
+# amplitude hardly changes with it.
+MOTIONS = "amplitude", "energy_per_cycle", "loops.-1.energy"
 # Quantities of a computed increment counted from the first, which is another one with other steps.
 FROM_THE_FIRST = re.compile(r"states\.\d")
 MIDDLE = "middle"
@@ -67,12 +70,15 @@ def number_at(summary: Mapping[str, Any], path: str) -> float | None:
 
 
 def default_quantities(case: Case, summary: Mapping[str, Any]) -> list[str]:
-    """What a case is compared by: depth and volume of wear, else what it expects to find.
+    """What a case is compared by: depth and volume of wear, motions, else what it expects to find.
 
     Quantities that are 0 are left out: nothing is relative to them.
     """
     if isinstance(case, WearCase):
         paths = [f"{name}.{worn}" for name, worn in product(interfaces(summary), WORN)]
+    elif isinstance(case, VibrationCase):
+        count = len(case.forces)
+        paths = [f"responses.{n}.{moved}" for n, moved in product(range(count), MOTIONS)]
     else:
         paths = [own.quantity for own in case.expect if own.value] or list(CONTACT)
     return [path for path in paths if number_at(summary, path)]

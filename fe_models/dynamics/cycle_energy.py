@@ -1,0 +1,88 @@
+"""Energies of a periodic motion: what the forces put in, what is lost, what moves, and the damping.
+
+Over a period of a motion with the amplitudes x_k under the forces a w_k, in the sense of
+Re (...) exp(ikωt), the forces do the work
+
+    W = -π a Σ k Im(w_kᴴ x_k),
+
+and the structure's own damping takes π ω Σ k² x_kᴴ C x_k; the joints say themselves what they take.
+With T the largest kinetic energy in the period, the equivalent damping ratio is
+
+    ζ = (energy lost in the period) / (4π T),
+
+which is that of an oscillator on a dashpot wherever its own resonance is driven: it then loses
+π c ω a², and T is m ω² a² / 2.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, HarmonicSolution
+from fe_models.dynamics.receptance import ComplexArray
+from sa_solver.types import Array
+
+# Times per period of the highest harmonic at which the kinetic energy is looked at: it has twice
+# that harmonic, and its largest maximum is then seen by a sample on either side.
+TIMES_PER_PERIOD = 16
+# Of the time of the largest kinetic energy, in shares of a step: the energy then is exact.
+TIME_TOLERANCE = 1e-7
+
+
+def work_of_forces(problem: HarmonicBalance, solution: HarmonicSolution) -> float:
+    """Work of the periodic forces in a period [N mm]. It balances :func:`energy_lost`."""
+    work = 0.0
+    for harmonic, wave in problem.load.waves.items():
+        moved = solution.motion[solution.resolution.harmonics.index(harmonic)]
+        work -= np.pi * harmonic * float(np.vdot(wave, moved).imag)
+    return solution.force * work
+
+
+def energy_lost(problem: HarmonicBalance, solution: HarmonicSolution) -> float:
+    """Energy that the joints and the damping of the structure take in a period [N mm].
+
+    What joints take is summed along their path from sample to sample, so that its balance with the
+    work of the forces is as good as the samples.
+    """
+    motion = solution.motion
+    orders = np.array(solution.resolution.harmonics, dtype=float)
+    of_harmonics = (motion.conj() * _times(motion, problem.model.damping)).real.sum(axis=1)
+    own = np.pi * 2.0 * np.pi * solution.frequency * float(orders**2 @ of_harmonics)
+    return own + float(np.sum(solution.cycle.dissipated))
+
+
+def largest_kinetic_energy(problem: HarmonicBalance, solution: HarmonicSolution) -> float:
+    """Largest kinetic energy in the period [N mm]."""
+    orders, mass = np.array(solution.resolution.harmonics), problem.model.mass
+    rates = 2j * np.pi * solution.frequency * orders[:, None] * solution.motion
+    # Energy at the turn τ is a sum over pairs of harmonics: their masses, once for all times.
+    moved = _times(rates, mass)
+    pairs, crossed = moved @ rates.T, moved @ rates.conj().T
+
+    def energy(turn: float) -> float:
+        turning = np.exp(2j * np.pi * turn * orders)
+        whole = turning @ pairs @ turning + turning @ crossed @ turning.conj()
+        return float(0.25 * whole.real)
+
+    times = TIMES_PER_PERIOD * int(orders[-1])
+    best = int(np.argmax([energy(time / times) for time in range(times)]))
+    found = minimize_scalar(
+        lambda step: -energy((best + step) / times),
+        bounds=(-1.0, 1.0),
+        method="bounded",
+        options={"xatol": TIME_TOLERANCE},
+    )
+    return max(energy(best / times), -float(found.fun))
+
+
+def damping_ratio(problem: HarmonicBalance, solution: HarmonicSolution) -> float:
+    """Equivalent damping ratio ζ of a motion; 0 where nothing moves."""
+    kinetic = largest_kinetic_energy(problem, solution)
+    lost = energy_lost(problem, solution)
+    return lost / (4.0 * np.pi * kinetic) if kinetic > 0.0 else 0.0
+
+
+def _times(motion: ComplexArray, matrix: Array) -> ComplexArray:
+    """Rows ``(k, n)`` times a symmetric matrix, which is not made complex for that."""
+    return motion.real @ matrix + 1j * (motion.imag @ matrix)

@@ -1,0 +1,434 @@
+"""Phase resonance of a structure with joints: the backbone of its forced responses.
+
+At phase resonance the first harmonic of a displacement lags that of the force by a quarter of a
+period. With x that displacement as a complex amplitude relative to the force (its real part in
+phase with it), this is one more equation for one more unknown, the frequency:
+
+    cot(phase of x) = Re x / Im x = 0.
+
+The cotangent is taken because it is linear in the frequency near the resonance of a mode, however
+little damped, where Re x itself turns back within the half-power width. By default x is that of the
+force's own points, wᴴ x with the complex amplitudes w of the force: all of its power is then spent
+(Peter and Leine, Mech. Syst. Signal Process. 96, 2017, 139, doi:10.1016/j.ymssp.2017.04.011).
+
+The unknowns are those of harmonic balance and ln(f / f0), in units of the size of the joints'
+vibration at the start, so that the two may be measured together. The structure's matrices are
+symmetric.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+
+from fe_models.dynamics.bordered import LinearMap, NearlySolved
+from fe_models.dynamics.continuation import (
+    NewtonControl,
+    Point,
+    Refinement,
+    Solution,
+    StepControl,
+    first_point,
+    follow,
+    solve,
+)
+from fe_models.dynamics.forced_response import Accuracy, Branch, finer_resolution
+from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance, HarmonicSolution
+from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.receptance import ComplexArray, SteadyMotion
+from sa_solver.types import Array
+
+# Frequencies are looked for up to this factor from the start's: Newton's method that goes farther
+# is lost, and must not overflow.
+FARTHEST = 1e3
+# Of the phases of a force's points: below it they push together, in one sense or the other.
+SAME_PHASE = 1e-9
+
+
+@dataclass(frozen=True)
+class PhaseBalance:
+    """The equations of phase resonance at one motion, and their derivatives when asked for.
+
+    ``balance`` is the motion's own, with the frequency as parameter, and ``seen`` the complex x of
+    the module, that ``frequency`` [Hz] and the motion have.
+    """
+
+    equations: PhaseResonance
+    balance: Balance
+    frequency: float
+    seen: complex
+
+    @property
+    def cotangent(self) -> float:
+        """Of the phase; infinite where no power is spent: no frequency has the phase then."""
+        return self.seen.real / self.seen.imag if self.seen.imag else np.inf
+
+    @cached_property
+    def residual(self) -> Array:
+        return np.append(self.balance.residual, self.equations.scale * self.cotangent)
+
+    @property
+    def size(self) -> float:
+        """That of the balance."""
+        return self.balance.size
+
+    @cached_property
+    def relative(self) -> float:
+        """What is left of the balance, relative to its terms, and of the phase, together."""
+        left = float(np.hypot(self.balance.relative, self.cotangent))
+        return left if np.isfinite(left) else np.inf
+
+    @cached_property
+    def jacobian(self) -> Array | LinearMap:
+        """∂r/∂u ``(n + 1, n + 1)``, a matrix where that of the balance is one."""
+        scale, inner = self.equations.scale, self.balance.jacobian
+        # Hz per unknown.
+        stretch = self.frequency / scale
+        by_frequency = complex(self._steady.turned(self._moved)[0] @ self._per_force)
+        corner = -2.0 * np.pi * stretch * self._of_phase(by_frequency)
+        border = _Border(self.balance.slope * stretch, self._of_phase(self._by_motion), corner)
+        return border.around(inner) if isinstance(inner, np.ndarray) else _Bordered(inner, border)
+
+    @cached_property
+    def slope(self) -> Array:
+        """∂r/∂a ``(n + 1,)`` by the force."""
+        by_force = replace(self.balance, over="force").slope
+        wave = self.equations.problem.wave[self.equations.first]
+        return np.append(by_force, self._of_phase(complex(wave @ self._per_force)))
+
+    def _of_phase(self, change: ComplexArray | complex) -> Array:
+        """By how much a change of x changes the last of the equations."""
+        turned = np.real(change) - self.cotangent * np.imag(change)
+        return np.asarray(self.equations.scale * turned / self.seen.imag)
+
+    @property
+    def _moved(self) -> ComplexArray:
+        """The modes at harmonic 1 ``(1, n)``."""
+        return self.balance.motion[self.equations.first][None]
+
+    @cached_property
+    def _steady(self) -> SteadyMotion:
+        """The structure at harmonic 1."""
+        return self.equations.problem.receptance.at(np.array([2.0 * np.pi * self.frequency]))
+
+    @cached_property
+    def _per_force(self) -> ComplexArray:
+        """x by forces on the modes ``(n,)``: what joins them is symmetric."""
+        return np.asarray(self._steady.respond(self.equations.of_modes[None])[0])
+
+    @property
+    def _by_motion(self) -> ComplexArray:
+        """x by the unknowns ``(n,)``, through what the joints answer to them."""
+        problem, first = self.equations.problem, self.equations.first
+        by_joint = problem.receptance.at_joints @ self._per_force
+        cosine, sine = (places[first] for places in problem.resolution.places)
+        slopes = self.balance.cycle.jacobian
+        pulls = slopes[:, cosine] - 1j * slopes[:, sine]
+        by_joint = by_joint.reshape(-1, problem.joints.directions)
+        return np.asarray(-np.einsum("jd,jdme->jme", by_joint, pulls).ravel())
+
+
+@dataclass(frozen=True)
+class Backbone:
+    """Motions at phase resonance, from the least force on; the curve may turn back in force.
+
+    ``message`` is empty if the curve reaches both ends of the forces. ``problem`` is at the
+    resolution of the last motion found upward.
+    """
+
+    solutions: tuple[HarmonicSolution, ...]
+    message: str
+    problem: HarmonicBalance
+
+    @property
+    def frequencies(self) -> Array:
+        return np.array([solution.frequency for solution in self.solutions])
+
+    @property
+    def forces(self) -> Array:
+        return np.array([solution.force for solution in self.solutions])
+
+    def first_amplitudes(self, place: int) -> Array:
+        """Size of harmonic 1 of a degree of freedom ``(s,)`` [mm]."""
+        return np.array([abs(solution.amplitude(place)) for solution in self.solutions])
+
+
+def along_phase_resonance(
+    problem: HarmonicBalance,
+    start: HarmonicSolution | Branch,
+    forces: tuple[float, float],
+    seen: Array | None = None,
+    *,
+    control: StepControl | None = None,
+    accuracy: Accuracy | None = None,
+) -> Backbone:
+    """Phase resonances for ``forces`` from a least to a largest, folds included.
+
+    They begin where a response ``start`` passes through the phase with the largest displacement, or
+    near one motion, best its peak. Newton's method finds the phase resonance under its force, from
+    which the curve is followed both ways. ``seen`` ``(n,)`` is the displacement whose phase counts,
+    as a combination of those of the structure; the force's own if it is not given. Without
+    ``accuracy`` the resolution is that of the problem.
+
+    Raises :class:`HarmonicBalanceError` for a load without a first harmonic, a ``seen`` that is
+    nothing or lags a force of several phases, and forces that are not above zero or do not include
+    the start's.
+    """
+    weights = _weights(problem, seen)
+    nearest = nearest_to_phase(start, weights) if isinstance(start, Branch) else start
+    if nearest is None:
+        return Backbone(
+            (), "the response does not pass through the phase: give one with its peak", problem
+        )
+    low, high = forces
+    if not 0.0 < low <= nearest.force <= high:
+        raise HarmonicBalanceError(
+            f"forces from {low:g} to {high:g} with a start at {nearest.force:g}: give two above 0 "
+            "that include the start's"
+        )
+    if nearest.message:
+        return Backbone((), f"the start is no solution: {nearest.message}", problem)
+    control = control or StepControl()
+    equations = PhaseResonance.near(problem, nearest, seen)
+    first = _first(_Recorder(equations, accuracy), nearest, control)
+    if isinstance(first, str):
+        return Backbone((), first, problem)
+    below = _half(first, False, forces, accuracy, control)
+    above = _half(first, True, forces, accuracy, control)
+    return Backbone(
+        (*reversed(below.solutions), first.solution, *above.solutions),
+        "; ".join(filter(None, (below.message, above.message))),
+        above.problem,
+    )
+
+
+def nearest_to_phase(branch: Branch, weights: ComplexArray) -> HarmonicSolution | None:
+    """The motion of a branch before or after which it passes through the phase, None if it never.
+
+    The larger displacement wᴴ x with the ``weights`` w ``(n,)`` decides if it passes more often:
+    between two resonances it also does.
+    """
+    seen = [
+        complex(np.vdot(weights, solution.motion[solution.resolution.harmonics.index(1)]))
+        for solution in branch.solutions
+    ]
+    passing = [
+        (abs(before) + abs(after), place)
+        for place, (before, after) in enumerate(pairwise(seen))
+        if before.real * after.real <= 0.0 < before.imag * after.imag
+    ]
+    if not passing:
+        return None
+    _, place = max(passing)
+    left = [abs(x.real / x.imag) for x in seen[place : place + 2]]
+    return branch.solutions[place + int(np.argmin(left))]
+
+
+@dataclass(frozen=True)
+class PhaseResonance:
+    """Equations for the unknowns of a balance and ``scale`` · ln(f / ``frequency``).
+
+    The force is their parameter. ``weights`` ``(n,)`` w make wᴴ x of the structure's amplitudes x;
+    ``scale`` [mm] is the size of the joints' vibration at the start.
+    """
+
+    problem: HarmonicBalance
+    weights: ComplexArray
+    frequency: float
+    scale: float
+
+    @classmethod
+    def near(
+        cls, problem: HarmonicBalance, start: HarmonicSolution, seen: Array | None = None
+    ) -> PhaseResonance:
+        """The equations near a motion; see :func:`along_phase_resonance`."""
+        vibration = problem.guess(start) - problem.guess(None)
+        # Where no joint moves there is nothing to be measured with the frequency.
+        scale = float(np.linalg.norm(vibration)) or 1.0
+        return cls(problem, _weights(problem, seen), start.frequency, scale)
+
+    @cached_property
+    def first(self) -> int:
+        """Row of harmonic 1."""
+        return self.problem.resolution.harmonics.index(1)
+
+    @cached_property
+    def of_modes(self) -> ComplexArray:
+        """x by the amplitudes of the modes at harmonic 1 ``(n,)``."""
+        return np.asarray(self.weights.conj() @ self.problem.receptance.at_points)
+
+    def frequency_of(self, unknowns: Array) -> float:
+        """[Hz]"""
+        share = np.clip(unknowns[-1] / self.scale, -np.log(FARTHEST), np.log(FARTHEST))
+        return float(self.frequency * np.exp(share))
+
+    def __call__(self, unknowns: Array, parameter: float) -> PhaseBalance:
+        frequency = self.frequency_of(unknowns)
+        balance = self.problem.evaluate(unknowns[:-1], frequency, parameter, "frequency")
+        seen = complex(self.of_modes @ balance.motion[self.first])
+        return PhaseBalance(self, balance, frequency, seen)
+
+
+@dataclass(frozen=True)
+class _Border:
+    """What makes [J c; r d] of J."""
+
+    column: Array
+    row: Array
+    corner: Array
+
+    def around(self, inner: Array) -> Array:
+        size = len(self.row)
+        whole = np.empty((size + 1, size + 1))
+        whole[:-1, :-1] = inner
+        whole[:-1, -1], whole[-1, :-1], whole[-1, -1] = self.column, self.row, self.corner
+        return whole
+
+
+@dataclass(frozen=True)
+class _Bordered:
+    """[J c; r d]: what it does to a vector, and its assembly."""
+
+    inner: LinearMap
+    border: _Border
+
+    def __matmul__(self, vector: Array) -> Array:
+        column, row, corner = self.border.column, self.border.row, self.border.corner
+        upper = self.inner @ vector[:-1] + column * vector[-1]
+        return np.append(upper, row @ vector[:-1] + corner * vector[-1])
+
+    def assembled(self) -> Array:
+        return self.border.around(self.inner.assembled())
+
+    def nearly_solved(self, vector: Array) -> Array:
+        """The inverse with that of a matrix like J, if one is known, or 1 for J, times a vector."""
+        upper = self._inner_nearly(vector[:-1])
+        last = (vector[-1] - self.border.row @ upper) / self._pivot
+        return np.append(upper - last * self._near_column, last)
+
+    def _inner_nearly(self, vector: Array) -> Array:
+        inner = self.inner
+        return inner.nearly_solved(vector) if isinstance(inner, NearlySolved) else vector
+
+    @cached_property
+    def _near_column(self) -> Array:
+        return self._inner_nearly(self.border.column)
+
+    @cached_property
+    def _pivot(self) -> float:
+        return float(self.border.corner - self.border.row @ self._near_column) or 1.0
+
+
+class _Recorder:
+    """Describes every new point of the curve, and asks for finer equations where needed."""
+
+    def __init__(self, equations: PhaseResonance, accuracy: Accuracy | None) -> None:
+        self.equations, self._accuracy = equations, accuracy
+        self.solutions: list[HarmonicSolution] = []
+
+    def __call__(self, point: Point, at: PhaseBalance) -> Refinement[PhaseBalance] | None:
+        problem, check = self.equations.problem, self._accuracy is not None
+        solution = problem.describe(
+            point.unknowns[:-1], at.balance, at.frequency, point.parameter, check=check
+        )
+        if self._accuracy is not None:
+            finer = finer_resolution(problem, solution, self._accuracy)
+            if finer is not None:
+                return self._refine(finer)
+        self.solutions.append(replace(solution, iterations=point.iterations, residual=at.relative))
+        return None
+
+    def _refine(self, finer: Resolution) -> Refinement[PhaseBalance]:
+        problem = self.equations.problem
+        coarse, directions = problem.resolution, problem.joints.directions
+        self.equations = replace(self.equations, problem=problem.refined(finer))
+
+        def lift(unknowns: Array) -> Array:
+            joints = unknowns[:-1].reshape(-1, coarse.size, directions)
+            return np.append(finer.adopt(joints, coarse), unknowns[-1])
+
+        return Refinement(self.equations, lift)
+
+
+@dataclass(frozen=True)
+class _First:
+    """The phase resonance from which the curve is followed both ways."""
+
+    equations: PhaseResonance
+    found: Solution[PhaseBalance]
+    solution: HarmonicSolution
+
+
+def _first(record: _Recorder, start: HarmonicSolution, control: StepControl) -> _First | str:
+    """The phase resonance under the start's force; or why there is none."""
+    unknowns = np.append(record.equations.problem.guess(start), 0.0)
+    while True:
+        found = solve(record.equations, unknowns, start.force, NewtonControl(control.tolerance))
+        if not found.converged:
+            return (
+                f"no phase resonance is found under {start.force:g} N from {start.frequency:.6g} "
+                f"Hz: Newton's method leaves {found.at.relative:.2g} after {found.iterations} "
+                "iterations; start from a motion nearer to the peak of the response"
+            )
+        point = first_point(found, start.force, True, control.first)
+        finer = record(point, found.at)
+        if finer is None:
+            return _First(record.equations, found, record.solutions[-1])
+        unknowns = finer.lift(found.unknowns)
+
+
+@dataclass(frozen=True)
+class _Half:
+    """Motions on one side of the first, in their order, and why there are not more."""
+
+    solutions: tuple[HarmonicSolution, ...]
+    message: str
+    problem: HarmonicBalance
+
+
+def _half(
+    first: _First,
+    upward: bool,
+    forces: tuple[float, float],
+    accuracy: Accuracy | None,
+    control: StepControl,
+) -> _Half:
+    force, problem = first.solution.force, first.equations.problem
+    if force == forces[upward]:
+        return _Half((), "", problem)
+    record = _Recorder(first.equations, accuracy)
+    point = first_point(first.found, force, upward, control.first)
+    # Steps are shares of the vibration, as those of forced responses.
+    rest = np.append(problem.guess(None), 0.0)
+    curve = follow(first.equations, point, forces, control, record, rest)
+    message = curve.message
+    if not message and curve.points[-1].parameter != forces[upward]:
+        message = f"the curve turns back to {curve.points[-1].parameter:g} N: give closer forces"
+    if message:
+        message = f"{'upward' if upward else 'downward'} in force, {message}"
+    return _Half(tuple(record.solutions), message, record.equations.problem)
+
+
+def _weights(problem: HarmonicBalance, seen: Array | None) -> ComplexArray:
+    """Weights ``(n,)`` whose product wᴴ x is the displacement seen, relative to the force."""
+    wave = problem.load.waves.get(1)
+    if wave is None or not np.any(wave):
+        raise HarmonicBalanceError("the load has no harmonic 1: no phase is relative to it")
+    if seen is None:
+        return np.asarray(wave, dtype=complex)
+    if np.shape(seen) != wave.shape or not np.any(seen):
+        raise HarmonicBalanceError(
+            f"the displacement seen has shape {np.shape(seen)}: give a combination, not zero, of "
+            f"the {len(wave)} of the structure"
+        )
+    largest = wave[np.argmax(np.abs(wave))]
+    turn = largest / abs(largest)
+    if np.abs((wave * np.conj(turn)).imag).max() > SAME_PHASE * abs(largest):
+        raise HarmonicBalanceError(
+            "the force has several phases, so that no displacement lags it by a quarter: leave out "
+            "what is seen"
+        )
+    return np.asarray(turn * seen)

@@ -1,0 +1,483 @@
+"""Phase resonance and damping of vibration against closed forms and exact integration in time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from fe_models.dynamics import harmonic_balance
+from fe_models.dynamics.continuation import StepControl
+from fe_models.dynamics.cycle_energy import (
+    damping_ratio,
+    energy_lost,
+    largest_kinetic_energy,
+    work_of_forces,
+)
+from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
+from fe_models.dynamics.excitation import Harmonic
+from fe_models.dynamics.forced_response import Accuracy, along_frequency
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.phase_resonance import PhaseResonance, along_phase_resonance
+from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, two_mass_rig, unit_force
+from wear.joints.friction_contact import FrictionContact
+from wear.joints.jenkins import Jenkins
+from wear.joints.periodic import SLIP, STICK, PeriodicMarch
+
+# What 1e-10 of the equations leaves of a motion with a joint that changes its state.
+SOLVED = 1e-8
+KT, LIMIT = 45e3, 0.88 * 60.0
+ODD = tuple(range(1, 16, 2))
+
+
+def rig(ratio=0.001):
+    """The thesis's rig."""
+    return two_mass_rig((21.152e-3, 1.189e-3), (1.3469e3, 273e3), ratio)
+
+
+def oscillator(ratio):
+    return lumped_rig({"m": 2e-3}, {Link("m"): 800.0}, [[Link("m")]], ratio)
+
+
+def balance(model, law, harmonics, samples, load=None):
+    load = load or PeriodicLoad({1: -1j * unit_force(model, model.names[0])})
+    joints = law if hasattr(law, "settle") else PeriodicMarch(law)
+    return HarmonicBalance(model, joints, load, Resolution(harmonics, samples))
+
+
+def on_rig(harmonics=ODD, samples=256, ratio=0.001):
+    return balance(rig(ratio), Jenkins(KT, 0.88, 60.0), harmonics, samples)
+
+
+def peak(problem, force, span, place=0):
+    """The motion of a response that moves a degree of freedom most."""
+    branch = along_frequency(problem, force, span)
+    return max(branch.solutions, key=lambda solution: abs(solution.amplitude(place)))
+
+
+def cotangent(problem, solution):
+    """Of the phase of the force's own points."""
+    seen = np.vdot(problem.load.waves[1], solution.motion[solution.resolution.harmonics.index(1)])
+    return seen.real / seen.imag
+
+
+@dataclass(frozen=True)
+class CubicCycle:
+    force: np.ndarray
+    jacobian: np.ndarray
+    samples: np.ndarray
+    states: np.ndarray
+    dissipated: np.ndarray
+    change: np.ndarray
+
+
+@dataclass(frozen=True)
+class CubicSpring:
+    """F = k u³ at one joint."""
+
+    stiffness: float
+    directions = 1
+
+    def settle(self, coefficients, basis, weights, lead):
+        way = basis @ coefficients[0, :, 0]
+        force = self.stiffness * way**3
+        jacobian = (weights * (3.0 * self.stiffness * way**2)) @ basis
+        return CubicCycle(
+            (weights @ force)[None, :, None],
+            jacobian[None, :, None, :, None],
+            force[:, None, None],
+            np.zeros((len(force), 1), dtype=np.int8),
+            np.zeros(1),
+            np.zeros(1),
+        )
+
+
+def pressed_block(joints=3):
+    """A block that only its contacts hold along z, which is pressed on them and shaken along x.
+
+    Its contacts sit on springs of their own; one more mode has its own damping.
+    """
+    masses = dict.fromkeys(("x", "y", "z"), 0.002)
+    springs = {Link("x"): 500.0, Link("y", "x"): 800.0}
+    links = []
+    for joint in range(joints):
+        own = [f"{name}{joint}" for name in ("x", "y", "z")]
+        masses |= dict.fromkeys(own, 2e-05)
+        springs |= {Link(point, point[0]): 900.0 + 100.0 * joint for point in own}
+        links.append([Link(point) for point in own])
+    model = lumped_rig(masses, springs, links, 0.01)
+    damping = model.damping.copy()
+    damping[0, 0] += 0.02
+    return replace(model, damping=damping)
+
+
+def block_problem(harmonics=(0, 1, 2, 3), samples=64, wave=1.0 - 2.0j):
+    model = pressed_block()
+    gaps = np.array([0.0, 0.001, 0.002])
+    law = FrictionContact(300.0, 400.0, 0.5, gap=gaps)
+    normal = unit_force(model, "z")
+    load = PeriodicLoad({1: wave * (unit_force(model, "x") + 0.05 * normal)}, 12.0 * normal)
+    return balance(model, law, harmonics, samples, load)
+
+
+# --- Derivatives
+
+
+@pytest.mark.parametrize(("case", "seen"), [("rig", None), ("rig", "m2"), ("block", "z1")])
+def test_derivatives_of_the_equations(case, seen):
+    if case == "rig":
+        problem, size, force = on_rig((1, 3, 5), 64, 0.02), 3.0 * LIMIT / KT, 60.0
+    else:
+        problem, size, force = block_problem(), 0.02, 9.0
+    seen = seen and unit_force(problem.model, seen)
+    start = problem.solve(70.0, force)
+    assert start.converged
+    equations = PhaseResonance.near(problem, start, seen)
+    rng = np.random.default_rng(3)
+    place = np.append(problem.guess(start), 0.1 * equations.scale)
+    place[:-1] += 0.3 * size * rng.standard_normal(problem.size)
+    at, step = equations(place, force), 1e-6 * size
+    for direction in np.eye(len(place)):
+        upper = equations(place + step * direction, force).residual
+        lower = equations(place - step * direction, force).residual
+        wanted, found = (upper - lower) / (2.0 * step), at.jacobian @ direction
+        np.testing.assert_allclose(found[:-1], wanted[:-1], atol=1e-6 * np.abs(wanted[:-1]).max())
+        np.testing.assert_allclose(found[-1], wanted[-1], atol=1e-6 * np.abs(at.jacobian[-1]).max())
+    rise = 1e-5 * force
+    ends = [equations(place, force + way).residual for way in (rise, -rise)]
+    wanted = (ends[0] - ends[1]) / (2.0 * rise)
+    np.testing.assert_allclose(at.slope[:-1], wanted[:-1], atol=1e-7 * np.abs(wanted[:-1]).max())
+    assert at.slope[-1] == pytest.approx(wanted[-1], rel=1e-7)
+
+
+def test_products_with_the_jacobian_are_those_of_the_matrix(monkeypatch):
+    """Several contacts: the backbone is the same where no matrix is assembled."""
+    problem = block_problem()
+    start = along_frequency(problem, 9.0, (40.0, 140.0))
+    wanted = along_phase_resonance(problem, start, (4.0, 12.0))
+    assert wanted.message == ""
+    states = [set(np.unique(solution.cycle.states)) for solution in wanted.solutions]
+    assert set.union(*states) == {STICK, SLIP}
+    first = wanted.solutions[len(wanted.solutions) // 2]
+    equations = PhaseResonance.near(problem, first)
+    place = np.append(problem.guess(first), 0.02 * equations.scale)
+    matrix = equations(place, 9.0).jacobian
+    monkeypatch.setattr(harmonic_balance, "DENSE", 0)
+    products = equations(place, 9.0).jacobian
+    assert not isinstance(products, np.ndarray)
+    np.testing.assert_allclose(products.assembled(), matrix, atol=1e-12 * np.abs(matrix).max())
+    vector = np.random.default_rng(6).standard_normal(len(place))
+    product = matrix @ vector
+    np.testing.assert_allclose(products @ vector, product, atol=1e-12 * np.abs(product).max())
+    # The border is undone exactly, whatever is known of the inverse of what it is around.
+    undone, inner = products.nearly_solved(vector), products.inner.nearly_solved
+    assert matrix[-1] @ undone == pytest.approx(vector[-1], rel=1e-9)
+    wanted_inner = inner(vector[:-1]) - undone[-1] * inner(matrix[:-1, -1])
+    np.testing.assert_allclose(undone[:-1], wanted_inner, atol=1e-12 * np.abs(undone).max())
+    found = along_phase_resonance(problem, start, (4.0, 12.0))
+    assert found.message == ""
+    for own, other in zip((0, -1), (0, -1), strict=True):
+        one, two = wanted.solutions[own], found.solutions[other]
+        assert two.frequency == pytest.approx(one.frequency, rel=SOLVED)
+        np.testing.assert_allclose(two.motion, one.motion, atol=1e-7 * np.abs(one.motion).max())
+
+
+# --- Closed forms
+
+
+@pytest.mark.parametrize(
+    ("ratio", "off"), [(1e-6, 1.02), (1e-6, 0.9999), (1e-3, 0.95), (1e-3, 1.05), (0.2, 1.3)]
+)
+def test_linear_oscillator(ratio, off):
+    """Its backbone is its natural frequency, also from many half-power widths beside the peak."""
+    model, force = oscillator(ratio), 2.0
+    natural = natural_frequencies(model)[0]
+    problem = balance(model, Jenkins(1500.0, 0.0, 10.0), (1, 3), 64)
+    start = problem.solve(off * natural, force)
+    backbone = along_phase_resonance(problem, start, (0.01, 300.0))
+    assert backbone.message == ""
+    assert backbone.forces[[0, -1]].tolist() == [0.01, 300.0]
+    assert np.all(np.diff(backbone.forces) > 0.0)
+    np.testing.assert_allclose(backbone.frequencies, natural, rtol=1e-11)
+    wanted = backbone.forces / (2.0 * ratio * 800.0)
+    np.testing.assert_allclose(backbone.first_amplitudes(0), wanted, rtol=1e-9)
+    for solution in backbone.solutions:
+        assert damping_ratio(problem, solution) == pytest.approx(ratio, rel=1e-9)
+        omega, amplitude = 2.0 * np.pi * natural, abs(solution.amplitude(0))
+        kinetic = 0.5 * 2e-3 * (omega * amplitude) ** 2
+        assert largest_kinetic_energy(problem, solution) == pytest.approx(kinetic, rel=1e-9)
+
+
+def test_duffing_oscillator():
+    """m ω² = k + ¾ κ a² and c ω a = F: the folds of its responses are not on the backbone."""
+    model = lumped_rig({"m": 1e-3}, {Link("m"): 40.0}, [[Link("m")]], 0.02)
+    problem = balance(model, CubicSpring(100.0), (1,), 16)
+    start = peak(problem, 1.5, (10.0, 60.0))
+    backbone = along_phase_resonance(problem, start, (0.05, 6.0))
+    assert backbone.message == ""
+    omega, sizes = 2.0 * np.pi * backbone.frequencies, backbone.first_amplitudes(0)
+    np.testing.assert_allclose(1e-3 * omega**2, 40.0 + 75.0 * sizes**2, rtol=SOLVED)
+    np.testing.assert_allclose(model.damping[0, 0] * omega * sizes, backbone.forces, rtol=SOLVED)
+    assert np.all(np.diff(backbone.frequencies) > 0.0)
+
+
+def test_jenkins_oscillator_of_one_harmonic():
+    """m ω² a = k a + A(a) and F = c ω a + B(a) with the law's first harmonic A cos - B sin.
+
+    The samples leave 1e-9 of these.
+    """
+    model, law = oscillator(0.02), Jenkins(1500.0, 0.5, 10.0, 30.0)
+    problem = balance(model, law, (1,), 65536)
+    start = peak(replaced(problem, 256), 6.0, (80.0, 200.0))
+    backbone = along_phase_resonance(problem, start, (0.1, 12.0), control=StepControl(most=0.1))
+    assert backbone.message == ""
+    omega, sizes = 2.0 * np.pi * backbone.frequencies, backbone.first_amplitudes(0)
+    cosine, sine = law.first_harmonic(sizes)
+    np.testing.assert_allclose(2e-3 * omega**2 * sizes, 800.0 * sizes + cosine, rtol=SOLVED)
+    lost = model.damping[0, 0] * omega * sizes - sine
+    np.testing.assert_allclose(lost, backbone.forces, rtol=1e-7)
+    stuck, sliding = (800.0 + 1530.0) / 2e-3, (800.0 + 30.0) / 2e-3
+    assert omega[0] == pytest.approx(np.sqrt(stuck), rel=SOLVED)
+    assert np.sqrt(sliding) < omega[-1] < 1.05 * np.sqrt(sliding)
+    for solution, way, speed in zip(backbone.solutions, sizes, omega, strict=True):
+        energy = np.pi * model.damping[0, 0] * speed * way**2 + law.loop_energy(way)
+        wanted = energy / (2.0 * np.pi * 2e-3 * (speed * way) ** 2)
+        assert damping_ratio(problem, solution) == pytest.approx(wanted, rel=1e-7)
+
+
+def replaced(problem, samples):
+    return problem.refined(Resolution(problem.resolution.harmonics, samples))
+
+
+def test_only_friction_damps():
+    """F = 4 µN (1 - µN/(kt a))/π: amplitudes grow without bound towards 4 µN/π, and end there."""
+    model, law = oscillator(0.0), Jenkins(1500.0, 0.5, 10.0)
+    problem, bound = balance(model, law, (1,), 4096), 4.0 * 5.0 / np.pi
+    start = peak(problem, 0.5 * bound, (80.0, 200.0))
+    backbone = along_phase_resonance(problem, start, (0.01 * bound, 0.95 * bound))
+    assert backbone.message == ""
+    wanted = (5.0 / 1500.0) / (1.0 - backbone.forces / bound)
+    # Of a corner of the force, twice per period: second order in the 4096 samples.
+    np.testing.assert_allclose(backbone.first_amplitudes(0), wanted, rtol=1e-5)
+    control = StepControl(max_points=60)
+    beyond = along_phase_resonance(problem, start, (0.5 * bound, 2.0 * bound), control=control)
+    assert "upward in force" in beyond.message
+    assert np.all(beyond.forces < 1.00001 * bound)
+
+
+# --- The rig
+
+
+def test_rig_of_one_harmonic_falls_from_stuck_to_sliding():
+    """The joint replaced by what its first harmonic is at its amplitude: a spring and a dashpot."""
+    problem, model, law = on_rig((1,), 4096), rig(), Jenkins(KT, 0.88, 60.0)
+    start = peak(problem, 50.0, (20.0, 400.0))
+    backbone = along_phase_resonance(problem, start, (1.0, 90.0))
+    assert backbone.message == ""
+    assert backbone.forces[[0, -1]].tolist() == [1.0, 90.0]
+    assert np.all(np.diff(backbone.forces) > 0.0)
+    assert np.all(np.diff(backbone.frequencies) < 0.0)
+    stuck, free = natural_frequencies(model, KT)[0], natural_frequencies(model)[0]
+    assert stuck > backbone.frequencies[0] > 0.998 * stuck
+    assert free < backbone.frequencies[-1] < 1.0001 * free
+
+    def motion(frequency, joint):
+        omega = 2.0 * np.pi * frequency
+        dynamic = model.stiffness + 1j * omega * model.damping - omega**2 * model.mass
+        return np.linalg.solve(dynamic + np.diag([0.0, joint]), [1.0, 0.0])
+
+    for solution in backbone.solutions:
+        amplitude = abs(solution.amplitude(1))
+        cosine, sine = law.first_harmonic(amplitude)
+        joint = (cosine - 1j * sine) / amplitude
+        ends = 0.99 * solution.frequency, 1.01 * solution.frequency
+        frequency = brentq(lambda f, k=joint: motion(f, k)[0].real, *ends, xtol=1e-12)
+        # The samples leave 1e-7 of the joint's force, over 2ζ = 0.002 at the least.
+        assert solution.frequency == pytest.approx(frequency, rel=1e-6)
+        force = amplitude / abs(motion(frequency, joint)[1])
+        assert solution.force == pytest.approx(force, rel=1e-4)
+
+
+@pytest.mark.parametrize("given", ["peak", "response"])
+@pytest.mark.parametrize("force", [10.0, 50.0, 90.0])
+def test_any_response_leads_to_the_backbone(force, given):
+    problem = on_rig((1, 3, 5))
+    response = along_frequency(problem, force, (20.0, 400.0))
+    highest = peak(problem, force, (20.0, 400.0))
+    start = response if given == "response" else highest
+    backbone = along_phase_resonance(problem, start, (1.0, 90.0))
+    assert backbone.message == ""
+    same = np.flatnonzero(backbone.forces == force)
+    assert len(same) == 1
+    assert backbone.frequencies[same[0]] == pytest.approx(highest.frequency, rel=0.03)
+    assert np.all(np.diff(backbone.frequencies) < 0.0)
+    for solution in backbone.solutions:
+        assert abs(cotangent(problem, solution)) <= 1e-8
+        assert solution.residual <= 1e-10
+
+
+def test_power_balances_with_the_samples():
+    """All power is spent: what the joint takes is summed sample by sample, to second order."""
+    left = []
+    for samples in (128, 256, 512, 1024):
+        problem = on_rig((1, 3, 5), samples)
+        backbone = along_phase_resonance(problem, peak(problem, 30.0, (20.0, 400.0)), (1.0, 90.0))
+        works = np.array([work_of_forces(problem, s) for s in backbone.solutions])
+        lost = np.array([energy_lost(problem, s) for s in backbone.solutions])
+        sizes = backbone.first_amplitudes(0)
+        np.testing.assert_allclose(works, np.pi * backbone.forces * sizes, rtol=1e-12)
+        left.append(np.abs(lost / works - 1.0).max())
+    assert left[-1] < 2e-5
+    rate = np.log2(left[0] / left[-1]) / 3.0
+    assert rate > 1.5
+
+
+@pytest.mark.parametrize("place", ["rising", "folded back"])
+def test_motion_in_time_has_the_phase(place):
+    """Event-driven integration of the rig under a force and a frequency of the backbone.
+
+    Where 5 f comes near the resonance of the stuck rig, the backbone folds, to forces that the rig
+    passed before: the motion there is as real as elsewhere.
+    """
+    model, samples = rig(0.02), 256
+    problem = on_rig(tuple(range(1, 32, 2)), 1024, 0.02)
+    start = peak(problem, 54.0, (20.0, 400.0))
+    backbone = along_phase_resonance(problem, start, (54.0, 70.0))
+    assert backbone.message == ""
+    solution = backbone.solutions[0]
+    if place == "folded back":
+        falling = np.flatnonzero(np.diff(backbone.forces) < 0.0)
+        solution = backbone.solutions[falling[len(falling) // 2]]
+        assert np.any(backbone.forces[: falling[0]] > solution.force)
+    fine = on_rig(tuple(range(1, 62, 2)), 2048, 0.02)
+    coarse, force = solution, solution.force
+    solution = along_phase_resonance(fine, coarse, (force, force)).solutions[0]
+    print(solution.frequency/coarse.frequency-1, solution.left_out, coarse.left_out, abs(coarse.amplitude(0))/abs(solution.amplitude(0))-1)
+    motion = integrate_exactly(
+        model,
+        SliderJoints(np.array([KT]), np.array([LIMIT]), np.zeros(1)),
+        Harmonic(unit_force(model, "m1"), solution.force, solution.frequency),
+        15.0 / solution.frequency,
+        1.0 / (samples * solution.frequency),
+    )
+    last = slice(-samples - 1, -1)
+    turns = np.exp(-2j * np.pi * np.arange(samples) / samples)
+    amplitude = 2.0 / samples * turns @ motion.displacement[last, 0]
+    print(amplitude.imag/amplitude.real, abs(amplitude)/abs(solution.amplitude(0))-1, np.diff(motion.energies.joints[[-samples - 1, -1], 0])[0]/solution.cycle.dissipated[0]-1)
+    # A sine: displacement that lags it by a quarter is a negative cosine.
+    assert amplitude.real < 0.0
+    assert abs(amplitude.imag / amplitude.real) < 1e-3
+    assert abs(amplitude) == pytest.approx(abs(solution.amplitude(0)), rel=1e-3)
+    lost = np.diff(motion.energies.joints[[-samples - 1, -1], 0])[0]
+    assert solution.cycle.dissipated[0] == pytest.approx(lost, rel=1e-3)
+    velocity = motion.velocity[last]
+    kinetic = 0.5 * np.einsum("ti,ij,tj->t", velocity, model.mass, velocity).max()
+    assert largest_kinetic_energy(problem, solution) == pytest.approx(kinetic, rel=1e-3)
+
+
+def test_what_is_seen_decides_on_the_phase():
+    """The force's own point is the default; another displacement lags by a quarter elsewhere."""
+    problem, model = on_rig((1, 3), ratio=0.05), rig(0.05)
+    start = peak(problem, 40.0, (20.0, 400.0))
+    wanted = along_phase_resonance(problem, start, (20.0, 60.0))
+    same = along_phase_resonance(problem, start, (20.0, 60.0), 3.0 * unit_force(model, "m1"))
+    np.testing.assert_allclose(same.frequencies, wanted.frequencies, rtol=1e-9)
+    other = along_phase_resonance(problem, start, (20.0, 60.0), unit_force(model, "m2"))
+    assert other.message == ""
+    for solution in other.solutions:
+        lag = solution.amplitude(1) / -1j
+        assert abs(lag.real / lag.imag) <= 1e-8
+        assert abs(cotangent(problem, solution)) > 1e-3
+
+
+def test_harmonics_and_samples_grow_to_a_tolerance():
+    problem = on_rig((1,), 64, 0.02)
+    start = peak(problem, 40.0, (20.0, 400.0))
+    backbone = along_phase_resonance(problem, start, (10.0, 50.0), accuracy=Accuracy(3e-3))
+    assert backbone.message == ""
+    assert all(max(s.left_out, s.sampling) <= 3e-3 for s in backbone.solutions)
+    fine = on_rig(tuple(range(1, 42, 2)), 2048, 0.02)
+    for solution in (backbone.solutions[0], backbone.solutions[-1]):
+        exact = along_phase_resonance(fine, solution, (solution.force, 50.0)).solutions[0]
+        assert solution.frequency == pytest.approx(exact.frequency, rel=1e-2)
+
+
+def test_a_response_starts_at_its_largest_passage():
+    """Between two resonances the phase is passed once more, where next to nothing moves."""
+    model = rig(0.01)
+    problem = balance(model, Jenkins(KT, 0.0, 60.0), (1,), 64)
+    natural = natural_frequencies(model)
+    response = along_frequency(problem, 1.0, (20.0, 3000.0))
+    sizes = response.first_amplitudes(0)
+    assert response.frequencies[np.argmin(sizes)] < natural[1]
+    backbone = along_phase_resonance(problem, response, (0.5, 2.0))
+    np.testing.assert_allclose(backbone.frequencies, natural[0], rtol=1e-5)
+    above = along_frequency(problem, 1.0, (60.0, 3000.0))
+    again = along_phase_resonance(problem, above, (0.5, 2.0))
+    assert again.message == ""
+    below = along_frequency(problem, 1.0, (10.0, 30.0))
+    nowhere = along_phase_resonance(problem, below, (0.5, 2.0))
+    assert nowhere.solutions == ()
+    assert "does not pass through the phase" in nowhere.message
+
+
+# --- Where there is none
+
+
+def test_starts_that_lead_nowhere_say_so():
+    undamped = balance(oscillator(0.0), Jenkins(1500.0, 0.0, 10.0), (1,), 64)
+    nothing = along_phase_resonance(undamped, undamped.solve(90.0, 1.0), (0.5, 2.0))
+    assert nothing.solutions == ()
+    assert "no phase resonance is found under 1 N from 90 Hz" in nothing.message
+    problem = balance(oscillator(1e-4), Jenkins(1500.0, 0.0, 10.0), (1,), 64)
+    far = along_phase_resonance(problem, problem.solve(5.0, 1.0), (0.5, 2.0))
+    assert far.solutions == ()
+    assert "nearer to the peak" in far.message
+    failed = replace(problem.solve(100.0, 1.0), message="it is not")
+    assert "the start is no solution: it is not" in (
+        along_phase_resonance(problem, failed, (0.5, 2.0)).message
+    )
+
+
+def test_mistakes_are_refused():
+    problem, model = on_rig((1, 3)), rig()
+    start = problem.solve(100.0, 10.0)
+    for forces in ((0.0, 20.0), (20.0, 30.0), (1.0, 5.0)):
+        with pytest.raises(HarmonicBalanceError, match="include the start's"):
+            along_phase_resonance(problem, start, forces)
+    for seen in (np.zeros(2), np.ones(3)):
+        with pytest.raises(HarmonicBalanceError, match="not zero"):
+            along_phase_resonance(problem, start, (1.0, 20.0), seen)
+    third = balance(model, Jenkins(KT, 0.88, 60.0), (1, 3), 64, PeriodicLoad({3: np.ones(2)}))
+    with pytest.raises(HarmonicBalanceError, match="no harmonic 1"):
+        along_phase_resonance(third, start, (1.0, 20.0))
+    turning = PeriodicLoad({1: np.array([1.0, 1j])})
+    spread = balance(model, Jenkins(KT, 0.88, 60.0), (1, 3), 64, turning)
+    with pytest.raises(HarmonicBalanceError, match="several phases"):
+        along_phase_resonance(spread, start, (1.0, 20.0), unit_force(model, "m1"))
+    found = along_phase_resonance(spread, peak(spread, 10.0, (150.0, 300.0)), (1.0, 20.0))
+    assert found.message == ""
+
+
+# --- Energies
+
+
+def test_largest_kinetic_energy_of_many_harmonics():
+    """Against its values at many times of a period, from below."""
+    problem = on_rig(ODD, 256)
+    solution = problem.solve(47.0, 60.0)
+    velocity = solution.velocity(20000)
+    energies = 0.5 * np.einsum("ti,ij,tj->t", velocity, problem.model.mass, velocity)
+    found = largest_kinetic_energy(problem, solution)
+    assert found >= energies.max() * (1.0 - 1e-12)
+    assert found == pytest.approx(energies.max(), rel=1e-5)
+
+
+def test_what_does_not_move_is_not_damped():
+    problem = on_rig((1, 3))
+    still = problem.solve(50.0, 0.0)
+    assert damping_ratio(problem, still) == 0.0
+    assert energy_lost(problem, still) == 0.0

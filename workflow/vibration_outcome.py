@@ -1,0 +1,116 @@
+"""What a vibration case has found: the motions under every force, and their backbone."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from sa_solver.types import Array
+from workflow.case import VibrationCase
+
+# Groups of a response, beside its own curves.
+NODES, RESONANCE, LOOPS = "nodes", "resonance", "loops"
+
+
+@dataclass(frozen=True)
+class Curves:
+    """Datasets by the names of :data:`DATASETS`, the first axis of each along the curve.
+
+    ``numbers`` are attributes beside them.
+    """
+
+    values: Mapping[str, Array]
+    numbers: Mapping[str, Any] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class Response:
+    """The motions under one ``force`` [N].
+
+    ``curves`` along the frequency, ``numbers`` for the summary; of joints with places ``nodes``,
+    along the frequency too, and ``resonance``, along the cycle there; ``loops``, along a cycle, by
+    the resolutions in which they were found, the finest last.
+    """
+
+    force: float
+    curves: Mapping[str, Array]
+    numbers: Mapping[str, Any]
+    nodes: Mapping[str, Array] | None = None
+    resonance: Mapping[str, Array] | None = None
+    loops: tuple[Curves, ...] = ()
+
+
+@dataclass(frozen=True)
+class VibrationOutcome:
+    """Everything a vibration case has found.
+
+    ``labels`` of what is seen, the last of which is looked at. ``linear`` are the limits of joints
+    that are free and stuck, over frequency; ``contact`` is where joints are and how they rest, if
+    they have places; ``backbone`` the curve of phase resonance, if it was asked for. ``numbers`` go
+    into the summary as they are.
+    """
+
+    case: VibrationCase
+    labels: tuple[str, ...]
+    responses: tuple[Response, ...]
+    linear: Mapping[str, Array]
+    numbers: Mapping[str, Any]
+    contact: Mapping[str, Array] | None = None
+    backbone: Curves | None = None
+
+
+# Unit and description of every dataset, by group and name.
+DATASETS: dict[str, dict[str, tuple[str, str]]] = {
+    "responses": {
+        "frequency": ("Hz", "frequency of the force, in the order of the curve"),
+        "amplitude": ("mm", "half of the way to and fro of what is seen, the last looked at"),
+        "phase": ("rad", "of harmonic 1 of what is looked at before the force"),
+        "energy_per_cycle": ("N mm", "energy that the joints dissipate in a cycle"),
+        "damping": ("1", "energy lost in a cycle over 4π times the largest kinetic energy"),
+        "slip": (
+            "1",
+            "share of the cycle in which a joint slips, mean of those that touch at rest",
+        ),
+        "separated": ("1", "share of the cycle in which they are apart"),
+        "left_out": ("1", "estimated share of the joints' vibration in harmonics left out"),
+    },
+    NODES: {
+        "slip": ("1", "share of the cycle in which each joint slips, by point of the curve"),
+        "separated": ("1", "share of the cycle in which each joint is apart"),
+        "energy": ("N mm", "energy that each joint dissipates in a cycle"),
+    },
+    RESONANCE: {
+        "displacement": ("mm", "of each joint along x, y and its closing, at times of a cycle"),
+        "force": ("N", "of each joint along x, y and its pressure"),
+        "state": ("1", "of each joint: 0 sticks, 1 slips, 2 is apart"),
+    },
+    LOOPS: {
+        "displacement": ("mm", "between the targets, or the mean of the joints, in a cycle"),
+        "force": ("N", "of all joints together along it"),
+    },
+    "contact": {
+        "x": ("mm", "of each joint on the contact plane"),
+        "y": ("mm", "of each joint on the contact plane"),
+        "gap": ("mm", "of the bodies without load"),
+        "area": ("mm^2", "that belongs to each joint"),
+        "normal_force": ("N", "of each joint at rest"),
+        "normal_displacement": ("mm", "closing of each joint by the load at rest"),
+    },
+    "backbone": {
+        "force": ("N", "amplitude of the force"),
+        "frequency": ("Hz", "of phase resonance: force and answer are 90 degrees apart"),
+        "amplitude": ("mm", "half of the way to and fro of what is looked at"),
+        "damping": ("1", "energy lost in a cycle over 4π times the largest kinetic energy"),
+        "energy_per_cycle": ("N mm", "energy that the joints dissipate in a cycle"),
+        "slip": (
+            "1",
+            "share of the cycle in which a joint slips, mean of those that touch at rest",
+        ),
+    },
+    "linear": {
+        "frequency": ("Hz", "frequency of the force"),
+        "free": ("mm/N", "amplitude of what is looked at over the force, without the joints"),
+        "stuck": ("mm/N", "amplitude of what is looked at over the force, all joints stuck"),
+    },
+}
