@@ -140,8 +140,8 @@ def chart(
     """Chart error against cost for each approximation of CASE.
 
     Each AXIS has a ladder of runs about the settings of CASE: grid, tolerance, method, stepper,
-    dimension, coupling, history, mesh, order, step; by default all that apply. Finished runs are
-    kept: the same command goes on where it was interrupted.
+    dimension, coupling, history, mesh, order, step, harmonics, samples; by default all that apply.
+    Finished runs are kept: the same command goes on where it was interrupted.
     """
     from workflow.chart import accuracy_of, chart_case
     from workflow.chart.report import show, write_chart
@@ -283,9 +283,17 @@ def schema() -> None:
 
 def _outline(case: Case) -> list[tuple[str, str]]:
     """What would run, in a few rows."""
-    from workflow.case import JointCase, RigCase, SpecimensCase, VibrationCase, WearCase
+    from workflow.case import (
+        JointCase,
+        RigCase,
+        SpecimensCase,
+        VibrationCase,
+        WearCase,
+        WornVibrationCase,
+    )
 
-    if isinstance(case, SpecimensCase | JointCase | RigCase | VibrationCase):
+    own = SpecimensCase | JointCase | RigCase | VibrationCase | WornVibrationCase
+    if isinstance(case, own):
         return case.outline()
     return _wear_outline(case) if isinstance(case, WearCase) else _contact_outline(case)
 

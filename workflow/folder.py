@@ -17,7 +17,7 @@ FILES = ("case.yaml", "summary.json", "results.h5", "worn.msh", "checkpoint.h5",
 # a case in time, by state.
 TABLES = (
     *("worn_nodes_*.csv", "loops_*.csv", "evolution.csv", "loop_*.csv"),
-    *("frequency_response_*.csv", "ring_down_*.csv", "frf_*.csv"),
+    *("frequency_response_*.csv", "ring_down_*.csv", "frf_*.csv", "backbone.csv"),
 )
 FOLDERS = ("jumps", "reduced", "paraview", "figures", "wear")
 

@@ -88,7 +88,8 @@ def response_under(
     if int(np.argmax(curves["amplitude"][:, -1])) in (0, len(branch.solutions) - 1):
         reporter.warn(f"{force:g} N: no resonance, the largest motion is at an end of the curve")
     peak = _resonance(model, branch, curves)
-    problem, resonance = _accurate(branch.problem, peak, accuracy)
+    # The peak may have been found before the resolution grew.
+    problem, resonance = _accurate(branch.problem.refined(peak.resolution), peak, accuracy)
     response = Response(
         force,
         curves,

@@ -11,7 +11,7 @@ from types import ModuleType
 
 import h5py
 
-from workflow.figures import contact, specimens, time, vibration, wear
+from workflow.figures import contact, specimens, time, vibration, wear, worn_vibration
 from workflow.figures.style import STYLE, save
 
 
@@ -35,6 +35,8 @@ def write_figures(results: Path, folder: Path, first: int = 0, every: int = 1) -
 
 def _kind(file: h5py.File) -> ModuleType:
     """The module that draws this kind of results."""
+    if "worn" in file:
+        return worn_vibration
     if "states" in file:
         return time
     if "responses" in file:

@@ -14,6 +14,7 @@ import h5py
 
 from workflow.paraview.contact import write_contact
 from workflow.paraview.specimens import write_specimens
+from workflow.paraview.vibration import write_vibration
 from workflow.paraview.wear import write_wear
 
 
@@ -26,5 +27,7 @@ def write_paraview(results: Path, folder: Path) -> list[Path]:
     with h5py.File(results) as file:
         if "specimens" in file:
             return write_specimens(file, folder)
+        if "responses" in file:
+            return write_vibration(file, folder)
         write = write_contact if "history" in file else write_wear
         return write(file, folder)

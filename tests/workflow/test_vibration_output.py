@@ -1,0 +1,366 @@
+"""What a vibration case leaves: datasets, tables, figures and files for ParaView, true to it."""
+
+import csv
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+import pyvista as pv
+
+from sa_solver.types import Array
+from tests.workflow.conftest import invoke
+from tests.workflow.vibration_pad import LOAD, ROWS, block, places, run_block
+from wear.joints.periodic import SEPARATED, SLIP
+from workflow.figures import vibration, vibration_loops, vibration_states, write_figures
+from workflow.figures.style import STYLE
+from workflow.pad_nodes import rows_and_columns
+from workflow.paraview.vibration import write_vibration
+from workflow.vibration_outcome import DATASETS
+
+FRICTION = 0.5
+SINGLE = 2e-7  # rounding of single precision
+NAMES = {"frequency_response", "resonance", "loops", "node_states", "pad_states"}
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The output of a run, not to be changed."""
+    scene = tmp_path_factory.mktemp("block")
+    result = run_block(scene)
+    assert result.exit_code == 0, result.output
+    return scene / "out"
+
+
+@pytest.fixture(scope="module")
+def summary(folder: Path) -> dict[str, Any]:
+    found: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    return found
+
+
+@pytest.fixture
+def results(folder: Path) -> Iterator[h5py.File]:
+    with h5py.File(folder / "results.h5") as file:
+        yield file
+
+
+@pytest.fixture
+def changed(folder: Path, tmp_path: Path) -> Iterator[h5py.File]:
+    """A copy to change."""
+    copy = tmp_path / "results.h5"
+    copy.write_bytes((folder / "results.h5").read_bytes())
+    with h5py.File(copy, "a") as file:
+        yield file
+
+
+def table(path: Path) -> dict[str, Array]:
+    """Columns of a CSV file by their headings."""
+    with path.open(encoding="utf-8", newline="") as file:
+        header, *rows = csv.reader(file)
+    return dict(zip(header, np.array(rows, dtype=float).T, strict=True))
+
+
+# --- results and tables -------------------------------------------------------------------------
+
+
+def test_every_dataset_has_its_unit_and_description(results: h5py.File) -> None:
+    described: list[str] = []
+
+    def check(name: str, item: Any) -> None:
+        if isinstance(item, h5py.Dataset):
+            assert item.attrs["unit"], name
+            assert item.attrs["description"], name
+            described.append(name)
+
+    results.visititems(check)
+    response = set(results["responses/00001"])
+    assert response == {*DATASETS["responses"], "nodes", "resonance", "loops"}
+    for group in ("nodes", "resonance"):
+        assert set(results[f"responses/00001/{group}"]) == set(DATASETS[group])
+    for group in ("contact", "backbone", "linear"):
+        assert set(results[group]) == set(DATASETS[group])
+    assert list(results["responses/00001/loops"]) == ["00000", "00001"]
+    assert len(described) > 40
+    assert list(results.attrs["seen"]) == ["block y", "block x"]
+
+
+def test_the_pad_at_rest_balances_the_load(results: h5py.File) -> None:
+    contact = results["contact"]
+    assert contact["normal_force"][()].sum() == pytest.approx(LOAD, rel=1e-9)
+    stiffness = 58500.0 / ROWS**2
+    closed = np.maximum(contact["normal_displacement"][()] - contact["gap"][()], 0.0)
+    np.testing.assert_allclose(contact["normal_force"], stiffness * closed, atol=1e-9 * LOAD)
+
+
+def test_tables_are_those_of_the_results(folder: Path, results: h5py.File) -> None:
+    response = table(folder / "frf_00001.csv")
+    np.testing.assert_allclose(
+        response["amplitude_2 [mm]"], results["responses/00001/amplitude"][:, 1], rtol=1e-8
+    )
+    np.testing.assert_allclose(
+        response["damping [1]"], results["responses/00001/damping"], rtol=1e-8
+    )
+    backbone = table(folder / "backbone.csv")
+    assert list(backbone) == [
+        f"{name} [{unit}]" for name, (unit, _) in DATASETS["backbone"].items()
+    ]
+    np.testing.assert_allclose(backbone["frequency [Hz]"], results["backbone/frequency"], rtol=1e-8)
+
+
+def test_loops_can_be_measured_again(folder: Path, summary: dict[str, Any], tmp_path: Path) -> None:
+    """``fretscale loops`` finds in the table what the run has found in the loop."""
+    result = invoke("loops", folder / "loop_00001.csv", "--out", tmp_path / "loops")
+    assert result.exit_code == 0, result.output
+    found = table(tmp_path / "loops" / "loops.csv")
+    finest = summary["responses"][1]["loops"][-1]
+    energy, stiffness = (
+        next(values[0] for name, values in found.items() if name.startswith(word))
+        for word in ("energy_per_loop", "kt")
+    )
+    # Of the loop the table has nine digits; its area is the part of the energy lost along x.
+    with h5py.File(folder / "results.h5") as file:
+        loop = file["responses/00001/loops/00001"]
+        area = np.trapezoid(loop["force"][()], loop["displacement"][()])
+    assert energy == pytest.approx(area, rel=1e-6)
+    assert 0.8 * finest["energy"] < energy < finest["energy"]
+    assert stiffness == pytest.approx(finest["stiffness"], rel=1e-6)
+
+
+def test_the_end_of_the_run_is_told_in_words(folder: Path, summary: dict[str, Any]) -> None:
+    log = (folder / "run.log").read_text(encoding="utf-8")
+    first, last = summary["responses"]
+    assert f"2 N: resonance {first['resonance']:.5g} Hz, block x moves" in log
+    assert f"sticks with {1e-3 * last['loops'][-1]['stiffness']:.4g} N/um" in log
+    assert "phase resonance: " in log
+    assert "Hz under 25 N" in log
+    assert summary["backbone"]["points"] > 2
+
+
+# --- figures ------------------------------------------------------------------------------------
+
+
+def title(figure: Any) -> str:
+    return str(figure.get_suptitle())
+
+
+def test_every_figure_is_written_and_not_blank(folder: Path) -> None:
+    from matplotlib.image import imread
+
+    written = list((folder / "figures").iterdir())
+    assert {path.stem for path in written} == NAMES
+    for path in written:
+        image = imread(path)
+        assert image.shape[1] == 1200
+        inked = np.any(image[..., :3] < 0.95, axis=-1)
+        assert all(part.any() for part in np.array_split(inked, 5, axis=0)), path
+        assert all(part.any() for part in np.array_split(inked, 5, axis=1)), path
+
+
+def test_titles_fit_the_width(results: h5py.File) -> None:
+    from matplotlib import rc_context
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+    with rc_context(STYLE):
+        for draw in vibration.figures_of(results).values():
+            figure = draw(results)
+            FigureCanvasAgg(figure).draw()
+            texts = [axis._left_title for axis in figure.axes] + [figure._suptitle]
+            for text in texts:
+                box = text.get_window_extent()
+                assert box.x0 >= 0, text.get_text()
+                assert box.x1 <= figure.bbox.x1, text.get_text()
+
+
+def test_responses_are_named_after_what_is_seen(
+    results: h5py.File, summary: dict[str, Any]
+) -> None:
+    (axis,) = vibration.frequency_response(results).axes
+    assert axis.get_ylabel() == "amplitude of block x / force [µm/N]"
+    lines = {str(line.get_label()): line for line in axis.lines}
+    own = results["responses/00001"]
+    label = f"25 N: {summary['responses'][1]['resonance']:.4g} Hz"
+    np.testing.assert_allclose(lines[label].get_ydata(), 1e3 * own["amplitude"][:, 1] / 25.0)
+
+
+def test_backbone_and_peaks_against_force(results: h5py.File, summary: dict[str, Any]) -> None:
+    curves, frequency, damping = vibration.resonance(results).axes
+    dashed = next(line for line in curves.lines if line.get_label() == "phase resonance")
+    np.testing.assert_allclose(dashed.get_ydata(), 1e3 * results["backbone/amplitude"][()])
+    for axis, name, factor in ((frequency, "resonance", 1.0), (damping, "damping", 1e2)):
+        (dots,) = (line for line in axis.lines if line.get_label() == "largest amplitude")
+        wanted = [factor * own[name] for own in summary["responses"]]
+        np.testing.assert_allclose(dots.get_ydata(), wanted)
+        assert dots.get_xdata().tolist() == [2.0, 25.0]
+
+
+def test_loops_and_their_branches(results: h5py.File, summary: dict[str, Any]) -> None:
+    figure = vibration_loops.loops(results)
+    left, right = figure.axes
+    # Of two forces, each in one and in three harmonics.
+    assert len(left.lines) == 4
+    assert left.get_title() == "100 Hz, 3 harmonics (thin: 1)"
+    names = [text.get_text() for text in right.get_legend().get_texts()]
+    slopes = [1e-3 * own["loops"][-1]["stiffness"] for own in summary["responses"]]
+    assert names == [
+        f"{force} N: {slope:.4g} N/µm" for force, slope in zip((2, 25), slopes, strict=True)
+    ]
+
+
+def test_rising_branch_starts_where_the_motion_turns() -> None:
+    turns = 2.0 * np.pi * np.arange(101) / 100
+    moved, gained = vibration_loops.rising_branch(np.cos(turns), np.cos(turns - 0.4))
+    assert len(moved) == 51
+    np.testing.assert_allclose([moved[0], moved[-1]], [0.0, 2.0])
+    np.testing.assert_allclose(gained, np.cos(turns[50:] - 0.4) - np.cos(np.pi - 0.4), atol=1e-14)
+
+
+def test_states_have_the_symmetry_of_the_block(results: h5py.File) -> None:
+    """Nodes at y and -y move alike; those at -x do so half a cycle later."""
+    numbers = rows_and_columns(*places().T)
+    assert numbers is not None
+    for own in results["responses"].values():
+        kinds = vibration_states._kinds(own)[:, numbers]
+        np.testing.assert_array_equal(kinds, kinds[:, :, ::-1])
+    # Without harmonics of even order nothing tells x from -x; one sample in two cycles may.
+    assert (kinds != kinds[:, ::-1]).mean() < 0.02
+
+
+def test_states_are_those_of_the_forces(results: h5py.File) -> None:
+    """By Coulomb's law, from the forces of the cycle at resonance."""
+    for own in results["responses"].values():
+        force, state = own["resonance/force"][()], own["resonance/state"][()]
+        pressed, pulled = force[..., 2], np.hypot(force[..., 0], force[..., 1])
+        np.testing.assert_array_equal(state == SEPARATED, pressed == 0.0)
+        on_circle = (pressed > 0.0) & (pulled >= (1.0 - 1e-9) * FRICTION * pressed)
+        np.testing.assert_array_equal(state == SLIP, on_circle)
+        assert (pulled <= FRICTION * pressed * (1.0 + 1e-9)).all()
+
+
+def test_low_forces_stick_and_high_ones_slip(results: h5py.File) -> None:
+    low, high = (vibration_states._kinds(own) for own in results["responses"].values())
+    open_kind, sticks = vibration_states.OPEN, vibration_states.STICKS
+    # Far below resonance all that touches sticks under the small force.
+    assert set(low[0].tolist()) == {open_kind, sticks}
+    corners = [0, ROWS - 1, -ROWS, -1]
+    assert (low[0, corners] == open_kind).all()
+    assert (high == sticks).sum(axis=1).min() == 0
+    figure = vibration_states.pad_states(results)
+    assert title(figure).endswith("under 25 N")
+    assert [axis.get_ylabel().split("\n")[0] for axis in figure.axes[::2]] == [
+        "below",
+        "at the peak",
+        "above",
+    ]
+
+
+def test_of_a_folded_curve_the_largest_motion_is_shown() -> None:
+    frequency = np.array([1.0, 2.0, 3.0, 2.0, 1.5, 2.5, 4.0])
+    amplitude = np.array([1.0, 4.0, 6.0, 3.0, 2.0, 1.0, 0.5])
+    wanted = np.array([1.0, 1.7, 1.9, 2.6, 3.1, 4.0])
+    found = vibration_states.largest_at(frequency, amplitude, wanted)
+    assert found.tolist() == [0, 1, 1, 2, 5, 6]
+
+
+def test_figures_without_data_are_left_out(changed: h5py.File, tmp_path: Path) -> None:
+    del changed["contact"], changed["backbone"], changed["responses/00000"]
+    del changed["responses/00001/loops"]
+    assert set(vibration.figures_of(changed)) == {"frequency_response"}
+    assert write_vibration(changed, tmp_path / "paraview") == []
+
+
+# --- ParaView -----------------------------------------------------------------------------------
+
+
+def series(folder: Path, number: int = 1) -> tuple[list[float], list[Any]]:
+    """Times and meshes of a cycle."""
+    reader = pv.PVDReader(folder / "paraview" / f"cycle_{number:05d}.pvd")
+    meshes = []
+    for time in reader.time_values:
+        reader.set_active_time_value(time)
+        meshes.append(reader.read()[0])
+    return reader.time_values, meshes
+
+
+def test_paraview_plays_a_cycle(folder: Path, results: h5py.File) -> None:
+    times, meshes = series(folder)
+    own = results["responses/00001"]
+    steps = len(own["resonance/state"])
+    np.testing.assert_allclose(times, np.arange(steps) / steps / own.attrs["resonance"])
+    for step, mesh in enumerate(meshes):
+        np.testing.assert_allclose(mesh.points[:, :2], places(), atol=1e-5)
+        quads = mesh.cells_dict[pv.CellType.QUAD]
+        assert quads.shape == ((ROWS - 1) ** 2, 4)
+        data, cycle = mesh.point_data, own["resonance"]
+        np.testing.assert_array_equal(data["state"], cycle["state"][step])
+        moved, pulled = cycle["displacement"][step], cycle["force"][step]
+        np.testing.assert_allclose(data["displacement"], moved * [1, 1, -1], rtol=SINGLE)
+        np.testing.assert_allclose(data["force"], pulled * [-1, -1, 1], rtol=SINGLE)
+        assert data["pressure"] @ results["contact/area"] == pytest.approx(pulled[:, 2].sum())
+        np.testing.assert_array_equal(data["gap"] < 0.0, pulled[:, 2] > 0.0)
+    assert mesh.compute_cell_sizes().cell_data["Area"].sum() == pytest.approx(100.0)
+    vibration_ = np.mean([mesh.point_data["vibration"] for mesh in meshes], axis=0)
+    np.testing.assert_allclose(vibration_, 0.0, atol=1e-9)
+
+
+def test_friction_takes_energy_from_the_upper_body(folder: Path, results: h5py.File) -> None:
+    """Work of the force on body 2 along its motion is what the nodes lose, less its sampling."""
+    _, meshes = series(folder)
+    moved, pulled = (
+        np.array([mesh.point_data[name] for mesh in meshes], dtype=float)
+        for name in ("displacement", "force")
+    )
+    step = np.roll(moved, -1, axis=0) - moved
+    work = float((0.5 * (np.roll(pulled, -1, axis=0) + pulled) * step).sum())
+    # By trapezoids of 32 samples: of second order, within (2π/32)²/2.
+    lost = results["responses/00001"].attrs["energy_per_cycle"]
+    assert -work == pytest.approx(lost, rel=0.02)
+
+
+def test_arrays_carry_their_units(folder: Path) -> None:
+    text = (folder / "paraview" / "cycle_00000" / "000.vtu").read_bytes().split(b"<AppendedData")[0]
+    for unit in (b"MPa", b"mm", b"N"):
+        assert b">" + unit + b"<" in text.replace(b"\n", b"").replace(b" ", b"")
+
+
+def test_nodes_out_of_rows_are_shown_as_points(changed: h5py.File, tmp_path: Path) -> None:
+    x = changed["contact/x"]
+    x[...] = x[()] * (1.0 + 0.05 * np.arange(len(x)))
+    assert rows_and_columns(x[()], changed["contact/y"][()]) is None
+    written = write_vibration(changed, tmp_path / "paraview")
+    mesh = pv.read(written[0])
+    assert mesh.n_cells == mesh.n_points == ROWS**2
+    axis = vibration_states.pad_states(changed).axes[0]
+    assert len(axis.collections[0].get_offsets()) == ROWS**2
+
+
+# --- rows and columns ---------------------------------------------------------------------------
+
+
+def test_rows_and_columns_of_shuffled_nodes() -> None:
+    order = np.random.default_rng(1).permutation(12)
+    x, y = (axis.ravel() for axis in np.meshgrid([0.0, 1.0, 3.0], np.arange(4.0), indexing="ij"))
+    noise = 1e-3 * np.sin(np.arange(12.0))
+    numbers = rows_and_columns(x[order] + noise, y[order])
+    assert numbers is not None
+    np.testing.assert_array_equal(order[numbers], np.arange(12).reshape(3, 4))
+    assert rows_and_columns(x[:5], y[:5]) is None
+    assert rows_and_columns(x[:4], y[:4]) is None
+
+
+def test_case_without_figures_and_paraview_has_none(tmp_path: Path) -> None:
+    overrides = (
+        *("output.figures=false", "output.paraview=false", "forces=[2 N]", "backbone=false"),
+        *("frequencies=[90 Hz, 110 Hz]", "loops=null"),
+    )
+    result = run_block(tmp_path, *overrides, rig=block())
+    assert result.exit_code == 0, result.output
+    out = tmp_path / "out"
+    assert (out / "frf_00000.csv").exists()
+    for name in ("figures", "paraview", "loop_00000.csv", "backbone.csv"):
+        assert not (out / name).exists()
+    assert {path.name for path in write_figures(out / "results.h5", tmp_path / "later")} == {
+        *("frequency_response.png", "node_states.png", "pad_states.png")
+    }
