@@ -5,7 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from workflow import fidelity
-from workflow.case import Case, JointCase, RigCase, SpecimensCase, VibrationCase, WearCase
+from workflow.case import (
+    Case,
+    JointCase,
+    RigCase,
+    SpecimensCase,
+    VibrationCase,
+    WearCase,
+    WornVibrationCase,
+)
 from workflow.errors import UserError
 from workflow.folder import OutputFolder
 from workflow.memory import check_memory
@@ -61,6 +69,10 @@ def _run(case: Case, folder: OutputFolder, resume: bool) -> None:
             from workflow.vibration_run import run_vibration
 
             run_vibration(case, folder, reporter)
+        elif isinstance(case, WornVibrationCase):
+            from workflow.worn_vibration_run import run_worn_vibration
+
+            run_worn_vibration(case, folder, reporter)
         else:
             from workflow.contact_run import run_contact
 

@@ -14,6 +14,7 @@ from workflow.case.resultants_case import ResultantsCase
 from workflow.case.specimens_case import SpecimensCase
 from workflow.case.time_case import JointCase, RigCase
 from workflow.case.vibration_case import VibrationCase
+from workflow.case.worn_vibration_case import WornVibrationCase
 
 Case = (
     DovetailCase
@@ -27,6 +28,7 @@ Case = (
     | JointCase
     | RigCase
     | VibrationCase
+    | WornVibrationCase
 )
 
 

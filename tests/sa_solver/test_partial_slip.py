@@ -1,0 +1,166 @@
+"""Contacts moved to and fro by normal problems alone: Mindlin, and the whole tangential problem."""
+
+import numpy as np
+import pytest
+
+from sa_solver.contact import FrictionalContact
+from sa_solver.half_space import HalfSpace
+from sa_solver.normal import NormalContact
+from sa_solver.partial_slip import PartialSlipError, partial_slip
+from sa_solver.reference.mindlin import ShearedSphere
+from sa_solver.tangential_loop import LoopPath, tangential_loop
+from sa_solver.types import ElasticPair, Grid, Material
+
+LOAD, RADIUS, FRICTION = 60.0, 47.619, 0.5
+PLAIN, STEEL, SOFT = Material(200e3, 0.0), Material(200e3, 0.3), Material(100e3, 0.3)
+CELLS = 48
+# What a grid of so many cells over a sphere's contact leaves of its stiffness and its curve.
+GRID_ERROR = 2e-3
+# Two solvers of the same discrete problem, each to 1e-8.
+SOLVED = 1e-6
+
+
+def sphere(material):
+    return ShearedSphere(LOAD, RADIUS, material, material, FRICTION)
+
+
+def grid_of(case, cells=CELLS):
+    size = 2.2 * case.contact.contact_radius
+    return Grid.covering((size, size), (cells, cells))
+
+
+def moved(case, cells=CELLS, height=None, **settings):
+    """The contact of a sphere, or of a ``height`` over the same grid, with its half-space."""
+    grid = grid_of(case, cells)
+    half_space = HalfSpace(grid, ElasticPair(case.body_1, case.body_2))
+    gap = case.contact.gap(grid.x, grid.y) if height is None else height(grid)
+    found = partial_slip(NormalContact(half_space), gap, LOAD, tolerance=1e-9, **settings)
+    return found, half_space, gap
+
+
+def dented(grid):
+    """A sphere with a shallow scar and a slope, of no symmetry."""
+    scar = 3e-4 * np.exp(-((grid.x - 0.05) ** 2 + 2.0 * grid.y**2) / 0.03)
+    return (grid.x**2 + grid.y**2) / (2.0 * RADIUS) + scar + 1e-4 * grid.x
+
+
+def travel_of(curve, *amplitudes):
+    """Travel of the sliders in loops of these amplitudes, for a coefficient of 1."""
+    return sum(4.0 * np.maximum(own - curve.reach, 0.0) for own in amplitudes)
+
+
+# --- against Mindlin ----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("material", [PLAIN, STEEL])
+def test_a_sphere_follows_mindlins_curve(material):
+    case = sphere(material)
+    curve, _, _ = moved(case)
+    assert curve.stiffness == pytest.approx(1.0 / case.tangential_compliance, rel=GRID_ERROR)
+    share = curve.force / LOAD
+    wanted = [case.displacement(FRICTION * LOAD * own) for own in share]
+    np.testing.assert_allclose(
+        FRICTION * curve.shift, wanted, atol=GRID_ERROR * wanted[-1], rtol=0.0
+    )
+
+
+def test_sliders_are_as_stiff_as_the_stuck_contact_and_carry_all_of_the_load():
+    curve, _, _ = moved(sphere(STEEL))
+    assert np.all(curve.slider_stiffness > 0.0)
+    assert curve.slider_stiffness.sum() == pytest.approx(curve.stiffness, rel=1e-12)
+    assert curve.slider_load.sum() == pytest.approx(LOAD, rel=1e-9)
+    assert np.all(np.diff(curve.reach) > 0.0)
+
+
+def test_loops_of_the_sliders_lose_what_mindlins_do():
+    case = sphere(STEEL)
+    curve, _, _ = moved(case, stages=48)
+    for share in (0.3, 0.6, 0.9):
+        force = share * FRICTION * LOAD
+        travel = travel_of(curve, case.displacement(force) / FRICTION)
+        lost = FRICTION**2 * float(curve.slider_load @ travel)
+        assert lost == pytest.approx(case.loop_energy(force), rel=0.01)
+
+
+# --- against the whole tangential problem -------------------------------------------------------
+
+
+@pytest.mark.parametrize("height", [None, dented])
+@pytest.mark.parametrize("share", [0.2, 0.7])
+def test_without_poissons_ratio_it_is_the_discrete_solution(height, share):
+    curve, half_space, gap = moved(sphere(PLAIN), 32, height)
+    stage = int(share * len(curve.shift)) + 1
+    path = LoopPath(LOAD, FRICTION * curve.shift[stage], increments=2)
+    loop = tangential_loop(FrictionalContact(half_space, FRICTION), gap, path)
+    force = loop.loading[1][-1]
+    assert force == pytest.approx(FRICTION * curve.force[stage], rel=1e-5)
+    # The energy of the grid itself, from the cells that have slipped.
+    pressure = curve.normal.pressure
+    cells = 4.0 * FRICTION**2 * np.vdot(pressure, curve.slip[stage]) * half_space.grid.cell_area
+    assert cells == pytest.approx(loop.energy, rel=1e-3)
+
+
+def test_with_poissons_ratio_loops_differ_little_from_the_whole_problem():
+    curve, half_space, gap = moved(sphere(STEEL), 32)
+    for share, allowed in ((0.5, 0.02), (2.0, 1e-3)):
+        amplitude = share * curve.shift[-1]
+        path = LoopPath(LOAD, FRICTION * amplitude)
+        loop = tangential_loop(FrictionalContact(half_space, FRICTION), gap, path)
+        lost = FRICTION**2 * float(curve.slider_load @ travel_of(curve, amplitude))
+        assert lost == pytest.approx(loop.energy, rel=allowed)
+
+
+# --- what cells slip ----------------------------------------------------------------------------
+
+
+def test_cells_dissipate_what_sliders_do_and_more_stages_say_so_better():
+    errors = []
+    for stages in (8, 16, 32):
+        curve, half_space, _ = moved(sphere(STEEL), stages=stages)
+        travel = travel_of(curve, 0.5 * curve.shift[-1], 0.2 * curve.shift[-1])
+        cells = float(np.vdot(curve.normal.pressure, curve.travelled(travel)))
+        cells *= half_space.grid.cell_area
+        errors.append(abs(cells / float(curve.slider_load @ travel) - 1.0))
+    # Stages by their number to the power 1.5, and curves taken for straight between them.
+    assert errors[2] < 0.3 * errors[1] < 0.1 * errors[0]
+
+
+def test_a_contact_that_slides_slips_everywhere_alike():
+    curve, _, _ = moved(sphere(STEEL))
+    less, more = (curve.travelled(travel_of(curve, k * curve.shift[-1])) for k in (1.5, 3.0))
+    pressed = curve.normal.pressure > 0.0
+    np.testing.assert_allclose((more - less)[pressed], 6.0 * curve.shift[-1], rtol=1e-9)
+    assert not more[~pressed].any()
+
+
+def test_what_has_not_reached_its_onset_has_not_slipped():
+    curve, _, _ = moved(sphere(STEEL))
+    amplitude = curve.shift[len(curve.shift) // 2]
+    path = curve.travelled(travel_of(curve, amplitude))
+    pressed = curve.normal.pressure > 0.0
+    assert np.all(path[pressed & (curve.onset >= amplitude)] < 1e-12 * path.max())
+    assert np.all(path[pressed & (curve.onset < amplitude * (1.0 - 1e-12))] > 0.0)
+    assert not curve.travelled(np.zeros(len(curve.reach))).any()
+
+
+def test_a_flat_punch_slips_all_at_once():
+    curve, half_space, _ = moved(sphere(STEEL), height=lambda grid: np.zeros(grid.shape))
+    assert len(curve.reach) == 1
+    assert curve.reach[0] == pytest.approx(LOAD / curve.stiffness, rel=1e-6)
+    travel = travel_of(curve, 2.0 * curve.reach[0])
+    cells = np.vdot(curve.normal.pressure, curve.travelled(travel)) * half_space.grid.cell_area
+    assert cells == pytest.approx(4.0 * LOAD * curve.reach[0], rel=1e-6)
+
+
+# --- what it cannot be --------------------------------------------------------------------------
+
+
+def test_unlike_bodies_and_no_load_are_refused():
+    grid = grid_of(sphere(STEEL), 16)
+    gap = (grid.x**2 + grid.y**2) / (2.0 * RADIUS)
+    unlike = NormalContact(HalfSpace(grid, ElasticPair(STEEL, SOFT)))
+    with pytest.raises(PartialSlipError, match="not alike"):
+        partial_slip(unlike, gap, LOAD, tolerance=1e-8)
+    alike = NormalContact(HalfSpace(grid, ElasticPair(STEEL, STEEL)))
+    with pytest.raises(PartialSlipError, match="a load of 0 N"):
+        partial_slip(alike, gap, 0.0, tolerance=1e-8)

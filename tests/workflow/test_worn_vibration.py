@@ -1,0 +1,286 @@
+"""A rig that wears its own contact: limits, balances, independent checks, mistakes, files."""
+
+import csv
+import json
+from dataclasses import replace
+
+import h5py
+import numpy as np
+import pytest
+
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonics import Resolution
+from tests.workflow.conftest import invoke
+from wear.joints.periodic import PeriodicMarch
+from wear.steppers import ErrorControl, Implicit, advance, first_cycles
+from workflow.case import WornVibrationCase, dump_case, parse_case
+from workflow.case.rig_structure import Rig
+from workflow.rig_model import row_of_masses
+from workflow.vibrating_contact import Shaking, VibratingContact
+from workflow.worn_vibration_run import contact_case
+
+WEAR = """\
+title: Ball that wears
+analysis: wear
+structure: {kind: bodies, shape: sphere, radius: 47.619 mm}
+materials:
+  body_1: {young: 200 GPa, poisson: 0.3}
+  body_2: {young: 200 GPa, poisson: 0.3}
+friction:
+  coefficient: 0.4
+  evolution: {energy: [0 J, 10 J], factor: [1, 2]}
+load_path: {P: 60 N, stroke: 14 um, increments: 2}
+contact: {grid: [16, 16], size: [0.9 mm, 0.9 mm]}
+wear:
+  law: energy
+  body_1: {coefficient: 500 um^3/J}
+  body_2: {coefficient: 1000 um^3/J}
+  cycles: 2e4
+  tolerance: 10 %
+output: {paraview: false, figures: false}
+"""
+RIG = """\
+title: Rig that wears its contact
+analysis: vibration
+structure:
+  kind: rig
+  masses: [21.152 kg, 1.189 kg]
+  springs: [1.3469e3 N/mm, 273e3 N/mm]
+  damping_ratio: 0.01
+contact: {file: wear.yaml}
+wear: {force: 75 N, frequency: 100 Hz, cycles: [100, 2e4]}
+forces: [5 N, 40 N]
+frequencies: [60 Hz, 350 Hz]
+resolution: {harmonics: 3, samples: 64}
+output: {paraview: false, figures: false}
+"""
+MASSES, SPRINGS, DAMPING = (21.152e-3, 1.189e-3), (1346.9, 273e3), 0.001
+RESOLUTION = Resolution((1, 3, 5, 7, 9), 256)
+# Motions found by Newton's method to 1e-10, and sums over the cells.
+BALANCED = 1e-9
+
+
+def run(folder, *settings, rig=RIG, wear=WEAR):
+    (folder / "wear.yaml").write_text(wear, encoding="utf-8")
+    (folder / "rig.yaml").write_text(rig, encoding="utf-8")
+    chosen = [part for own in settings for part in ("--set", own)]
+    return invoke("run", folder / "rig.yaml", "--out", folder / "out", *chosen)
+
+
+def refusal(folder, *settings, wear=WEAR):
+    ended = run(folder, *settings, wear=wear)
+    assert ended.exit_code != 0
+    return " ".join(ended.stderr.split())
+
+
+def contact_in_rig(folder, force=75.0, frequency=100.0):
+    (folder / "wear.yaml").write_text(WEAR, encoding="utf-8")
+    rig = row_of_masses(Rig(kind="rig", masses=MASSES, springs=SPRINGS, damping_ratio=DAMPING))
+    case = contact_case(str(folder / "wear.yaml"))
+    return rig, VibratingContact(case, rig, Shaking(force, frequency, RESOLUTION))
+
+
+def worn(contact, cycles, tolerance=0.1):
+    state = contact.unworn()
+    state = replace(state, next_cycles=first_cycles(contact.wearing(state), state, cycles))
+    stepper = Implicit(ErrorControl(tolerance))
+    return advance(stepper, state, cycles, cycles, contact.wearing).state
+
+
+@pytest.fixture(scope="module")
+def ended(tmp_path_factory):
+    """The small case from start to end, not to be changed."""
+    folder = tmp_path_factory.mktemp("rig")
+    result = run(folder)
+    assert result.exit_code == 0, result.output
+    return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def summary(ended):
+    return json.loads((ended / "summary.json").read_text(encoding="utf-8"))
+
+
+# --- what the contact is to the rig -------------------------------------------------------------
+
+
+def test_sliders_move_the_rig_as_so_many_joints_of_its_own_would(tmp_path):
+    rig, contact = contact_in_rig(tmp_path, force=30.0, frequency=180.0)
+    rubbing = contact.at(contact.unworn())
+    count = len(rubbing.by_slider)
+    rows = np.repeat(rig.model.connection, count, axis=0)
+    apart = HarmonicBalance(
+        replace(rig.model, connection=rows),
+        PeriodicMarch(rubbing.sliders),
+        PeriodicLoad({1: -1j * rig.driven}),
+        RESOLUTION,
+    ).solve(180.0, 30.0)
+    assert apart.converged
+    np.testing.assert_allclose(
+        rubbing.motion.motion, apart.motion, atol=1e-8 * np.abs(apart.motion).max()
+    )
+    np.testing.assert_allclose(
+        rubbing.by_slider, apart.cycle.dissipated, atol=1e-8 * apart.cycle.dissipated.sum()
+    )
+
+
+def test_cells_dissipate_exactly_what_harmonic_balance_does(tmp_path):
+    _, contact = contact_in_rig(tmp_path)
+    for state in (contact.unworn(), worn(contact, 1e4)):
+        rubbing = contact.at(state)
+        cells = float(rubbing.energy.sum()) * contact.grid.cell_area
+        assert cells == pytest.approx(float(rubbing.motion.cycle.dissipated.sum()), rel=BALANCED)
+        # By itself the slip of the half-space says the same but for the stages.
+        assert rubbing.adjusted == pytest.approx(1.0, abs=1e-3)
+
+
+def test_the_loop_is_that_of_the_whole_tangential_problem(tmp_path):
+    _, contact = contact_in_rig(tmp_path)
+    rubbing = contact.at(worn(contact, 1e4))
+    for amplitude, allowed in ((0.5 * rubbing.stroke, 1e-3), (0.5 * rubbing.full_slip, 0.03)):
+        loop = contact.loop(rubbing, amplitude)
+        own = float(rubbing.sliders.loop_energy(amplitude).sum())
+        assert own == pytest.approx(loop.energy, rel=allowed)
+
+
+# --- wear ---------------------------------------------------------------------------------------
+
+
+def test_the_volume_is_that_of_the_dissipated_energy(summary):
+    # 1500 µm³/J of both bodies are 1.5e-9 1/MPa.
+    assert summary["volume_per_energy"] == pytest.approx(1.5e-9, rel=BALANCED)
+
+
+def test_energy_adds_up_from_cycle_to_cycle(tmp_path):
+    """Wear dissipates what the motions on the way do: Simpson's rule over their energies."""
+    _, contact = contact_in_rig(tmp_path)
+    cycles, energies, spent = np.linspace(0.0, 4000.0, 5), [], []
+    state = contact.unworn()
+    state = replace(state, next_cycles=first_cycles(contact.wearing(state), state, cycles[-1]))
+    stepper = Implicit(ErrorControl(0.01))
+    for length in (0.0, *np.diff(cycles)):
+        if length:
+            state = advance(stepper, state, length, cycles[-1], contact.wearing).state
+        energies.append(float(contact.at(state).by_slider.sum()))
+        spent.append(state.energy)
+    weights = np.array([1.0, 4.0, 2.0, 4.0, 1.0]) / 3.0 * cycles[1]
+    assert spent[-1] == pytest.approx(float(weights @ energies), rel=0.01)
+
+
+def test_nothing_wears_where_nothing_slips(tmp_path):
+    _, contact = contact_in_rig(tmp_path, force=1e-6)
+    state = worn(contact, 1e4)
+    assert state.energy == 0.0
+    assert not state.surfaces.depth.any()
+
+
+def test_a_larger_force_wears_more_and_a_small_one_in_a_ring(tmp_path):
+    _, small = contact_in_rig(tmp_path, force=10.0)
+    _, large = contact_in_rig(tmp_path, force=75.0)
+    slipping, sliding = (own.at(own.unworn()) for own in (small, large))
+    assert slipping.stroke < 2.0 * slipping.full_slip < sliding.stroke
+    pressed = slipping.slipping.normal.pressure > 0.0
+    assert np.all(sliding.path[pressed] > 0.0)
+    middle = tuple(cells // 2 for cells in small.grid.shape)
+    assert slipping.path[middle] == 0.0
+    assert slipping.path[pressed].max() > 0.0
+
+
+def test_wear_stiffens_the_contact_and_raises_the_resonance(summary):
+    assert summary["trend"]["stiffness"] == 1.0
+    assert summary["trend"]["peak_pressure"] == -1.0
+    unworn, worn_out = summary["states"][0], summary["states"][-1]
+    for before, after in zip(unworn["responses"], worn_out["responses"], strict=True):
+        assert after["resonance"] > 1.05 * before["resonance"]
+    # 8 G* a of Mindlin's stuck sphere; 16 cells over 0.9 mm leave an error of some per cent.
+    assert unworn["stiffness"] == pytest.approx(48717.0, rel=0.05)
+    masses = np.diag(MASSES)
+    first, second = SPRINGS
+    held = np.array([[first + second, -second], [-second, second + unworn["stiffness"]]])
+    squares = np.sort(np.linalg.eigvals(np.linalg.solve(masses, held)).real)
+    np.testing.assert_allclose(unworn["stuck"], np.sqrt(squares) / (2.0 * np.pi), rtol=1e-9)
+
+
+# --- what it leaves -----------------------------------------------------------------------------
+
+
+def test_results_hold_fields_sliders_loops_and_responses(ended, summary):
+    with h5py.File(ended / "results.h5") as file:
+        assert sorted(file["worn"]) == ["00000", "00001", "00002"]
+        state, numbers = file["worn/00002"], summary["states"][2]
+        assert state["contact/pressure"].shape == (16, 16)
+        area = float(np.prod(file["grid"].attrs["pitch"]))
+        assert state["contact/energy"][()].sum() * area == pytest.approx(
+            numbers["energy_per_cycle"], rel=BALANCED
+        )
+        depth = state["contact/depth_1"][()] + state["contact/depth_2"][()]
+        assert depth.sum() * area == pytest.approx(numbers["volume"], rel=1e-12)
+        assert state["sliders/normal_load"][()].sum() == pytest.approx(60.0, rel=1e-6)
+        moved, force = (state[f"loop/{name}"][()] for name in ("displacement", "force"))
+        assert np.trapezoid(force, moved) == pytest.approx(numbers["energy_per_cycle"], rel=0.02)
+        assert state["responses/00001"].attrs["force"] == 40.0
+        for dataset in state["contact"].values():
+            assert dataset.attrs["unit"]
+
+
+def test_tables_hold_the_evolution_and_every_response(ended, summary):
+    with (ended / "evolution.csv").open(newline="", encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    assert [float(row["cycles [1]"]) for row in rows] == [0.0, 100.0, 20000.0]
+    assert float(rows[-1]["resonance_1 [Hz]"]) == pytest.approx(
+        summary["states"][-1]["responses"][0]["resonance"], rel=1e-8
+    )
+    assert len(list(ended.glob("frf_*.csv"))) == 6
+
+
+def test_figures_are_drawn(ended, tmp_path):
+    from workflow.figures import write_figures
+
+    drawn = {path.stem for path in write_figures(ended / "results.h5", tmp_path)}
+    assert drawn == {"frequency_response", "evolution", "scar", "loops"}
+
+
+def test_a_case_is_written_as_it_was_read(tmp_path):
+    (tmp_path / "wear.yaml").write_text(WEAR, encoding="utf-8")
+    case = parse_case(RIG, str(tmp_path / "rig.yaml"))
+    assert isinstance(case, WornVibrationCase)
+    assert parse_case(dump_case(case), str(tmp_path / "again.yaml")) == case
+    rows = dict(case.outline())
+    assert rows["wear"] == "20000 cycles of 75 N at 100 Hz"
+
+
+# --- mistakes -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("before", "after", "said"),
+    [
+        ("body_2: {young: 200 GPa", "body_2: {young: 100 GPa", "not alike"),
+        ("coefficient: 0.4", "coefficient: 0", "no friction"),
+        ("tolerance: 10 %", "step: {cycles: 100}", "wear.step of a given size"),
+        ("grid: [16, 16]", "grid: [16, 2000, 1]", "contact.file: "),
+    ],
+)
+def test_contacts_that_cannot_be_a_joint_are_refused(tmp_path, before, after, said):
+    assert before in WEAR
+    assert said in refusal(tmp_path, wear=WEAR.replace(before, after))
+
+
+def test_a_case_of_something_else_is_no_contact(tmp_path):
+    said = refusal(tmp_path, "contact.file=rig.yaml")
+    assert "no wear case of two bodies over an area" in said
+
+
+def test_cycles_and_forces_ascend_and_the_mass_is_there(tmp_path):
+    assert "wear.cycles" in refusal(tmp_path, "wear.cycles=[100, 100]")
+    assert "allowed: each force above the last" in refusal(tmp_path, "forces=[5 N, 4 N]")
+    assert "no such mass" in refusal(tmp_path, "mass=3")
+    assert "structure.kind" in refusal(tmp_path, "structure.kind=reduced")
+
+
+def test_a_force_without_a_contact_in_reach_of_its_grid_is_warned_of(tmp_path):
+    result = run(
+        tmp_path, "wear.cycles=[10]", wear=WEAR.replace("0.9 mm, 0.9 mm", "0.5 mm, 0.5 mm")
+    )
+    assert result.exit_code == 0, result.output
+    assert "reaches the border of its grid" in result.stderr

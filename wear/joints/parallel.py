@@ -1,0 +1,76 @@
+"""Sliders side by side on one displacement, as one joint that is led round a period.
+
+Sliders in parallel make up the joints of Masing and Iwan: together they follow any curve that bends
+one way. To a structure they are a single joint, whose force is their sum; each keeps its own
+dissipated energy.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sa_solver.types import Array
+from wear.joints.jenkins import Jenkins
+from wear.joints.parameters import JointError
+from wear.joints.periodic import SLIP, STICK, PeriodicMarch
+
+
+@dataclass(frozen=True)
+class SlidersCycle:
+    """The period of the joint: see :class:`wear.joints.periodic.SettledCycle`.
+
+    ``by_slider`` ``(n,)`` is the energy that each slider dissipates in it [N mm].
+    """
+
+    force: Array
+    jacobian: Array
+    samples: Array
+    states: np.ndarray
+    dissipated: Array
+    change: Array
+    by_slider: Array
+
+
+@dataclass(frozen=True)
+class ParallelSliders:
+    """One joint of the sliders of a ``law`` with ``(n,)`` parameters.
+
+    It slips where less than half of their stiffness is left.
+    """
+
+    law: Jenkins
+
+    @property
+    def directions(self) -> int:
+        return self.law.directions
+
+    @cached_property
+    def _march(self) -> PeriodicMarch:
+        return PeriodicMarch(self.law)
+
+    def settle(
+        self, coefficients: Array, basis: Array, weights: Array, lead: Array | None = None
+    ) -> SlidersCycle:
+        """The settled period of the joint with the ``coefficients`` ``(1, m, 1)`` [mm].
+
+        As :meth:`wear.joints.periodic.PeriodicMarch.settle`; raises :class:`JointError` for more
+        joints than one.
+        """
+        if len(coefficients) != 1:
+            raise JointError(f"coefficients of {len(coefficients)} joints for the sliders of one")
+        stiffness = np.atleast_1d(self.law.stiffness)
+        shared = np.repeat(coefficients, len(stiffness), axis=0)
+        own = self._march.settle(shared, basis, weights, lead)
+        held = np.where(own.states == STICK, stiffness, 0.0).sum(axis=1)
+        return SlidersCycle(
+            force=own.force.sum(axis=0, keepdims=True),
+            jacobian=own.jacobian.sum(axis=0, keepdims=True),
+            samples=own.samples.sum(axis=1, keepdims=True),
+            states=np.where(held < 0.5 * stiffness.sum(), SLIP, STICK)[:, None],
+            dissipated=own.dissipated.sum(keepdims=True),
+            change=own.change.max(keepdims=True),
+            by_slider=own.dissipated,
+        )
