@@ -88,6 +88,7 @@ DATASETS: dict[str, dict[str, tuple[str, str]]] = {
     LOOPS: {
         "displacement": ("mm", "between the targets, or the mean of the joints, in a cycle"),
         "force": ("N", "of all joints together along it"),
+        "expansion": ("N", "the same in the harmonics of the motion alone"),
     },
     "contact": {
         "x": ("mm", "of each joint on the contact plane"),

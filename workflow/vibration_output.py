@@ -54,10 +54,9 @@ def write_vibration_output(
 
 def _draw(outcome: VibrationOutcome, folder: OutputFolder) -> None:
     if outcome.case.output.paraview and outcome.contact is not None:
-        from workflow.paraview.vibration import write_vibration
+        from workflow.paraview import write_paraview
 
-        with h5py.File(folder.results) as file:
-            write_vibration(file, folder.paraview)
+        write_paraview(folder.results, folder.paraview)
     if outcome.case.output.figures:
         from workflow.figures import write_figures
 

@@ -65,8 +65,8 @@ def accuracy_of(case: VibrationCase) -> Accuracy | None:
 
 def response_under(
     case: VibrationCase, model: VibrationModel, force: float, reporter: Reporter
-) -> tuple[Response, HarmonicSolution]:
-    """What the structure does under a force, and its motion at resonance.
+) -> tuple[Response, Branch]:
+    """What the structure does under a force, and the branch of motions that it was taken from.
 
     Raises MethodFailed where there is no motion at all. A curve that ends before its span does is
     told as a warning.
@@ -104,7 +104,7 @@ def response_under(
             f"{force:g} N: the finest resolution leaves an error of {error:.1e}, above "
             f"resolution.tolerance {accuracy.tolerance:g}"
         )
-    return response, resonance
+    return response, branch
 
 
 def _numbers(
@@ -275,7 +275,13 @@ def _loop(case: VibrationCase, model: VibrationModel, motion: HarmonicSolution) 
         between = replace(motion, motion=(motion.motion @ rig.stretch)[:, None])
         displacement = between.displacement(motion.resolution.samples)[:, 0]
     force = motion.cycle.samples[:, :, rig.along].sum(axis=1)
-    values = {"displacement": _closed(displacement), "force": _closed(force)}
+    total = motion.cycle.force[:, :, rig.along].sum(axis=0)
+    expansion = motion.resolution.basis @ total
+    values = {
+        "displacement": _closed(displacement),
+        "force": _closed(force),
+        "expansion": _closed(expansion),
+    }
     numbers = {
         "frequency": motion.frequency,
         "harmonics": list(motion.resolution.harmonics),
@@ -284,9 +290,16 @@ def _loop(case: VibrationCase, model: VibrationModel, motion: HarmonicSolution) 
         "energy": float(motion.cycle.dissipated.sum()),
         "slip": share_of(model, motion, SLIP),
         "left_out": motion.left_out,
+        "deformation": _deformation(force, expansion),
         **_slopes(displacement, force, case.joint.normal_load),
     }
     return Curves(values, numbers)
+
+
+def _deformation(force: Array, expansion: Array) -> float:
+    """Largest force that the harmonics leave out, over half of the range of the force."""
+    half = 0.5 * float(np.ptp(force))
+    return float(np.abs(force - expansion).max()) / half if half > 0.0 else 0.0
 
 
 def _closed(values: Array) -> Array:

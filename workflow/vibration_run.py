@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from fe_models.dynamics.cycle_energy import damping_ratio
-from fe_models.dynamics.harmonic_balance import HarmonicSolution
+from fe_models.dynamics.forced_response import Branch
 from fe_models.dynamics.harmonics import HarmonicBalanceError
 from fe_models.dynamics.phase_resonance import along_phase_resonance
 from fe_models.dynamics.receptance import ReceptanceError
@@ -54,16 +53,16 @@ def _outcome(case: VibrationCase, reporter: Reporter) -> VibrationOutcome:
     with reporter.stage("rest and linear limits"):
         numbers, contact = model.numbers(), model.contact()
         linear = model.linear(case.frequencies)
-    responses, peaks = [], []
+    responses: list[Response] = []
+    backbone = None
     for force in case.forces:
         with reporter.stage("response"):
-            response, peak = response_under(case, model, force, reporter)
+            response, branch = response_under(case, model, force, reporter)
         responses.append(response)
-        peaks.append(peak)
-    backbone = None
-    if case.backbone:
-        with reporter.stage("backbone"):
-            backbone = _backbone(case, model, peaks, reporter)
+        if case.backbone and backbone is None:
+            # From the least force on which there is a phase resonance.
+            with reporter.stage("backbone"):
+                backbone = _backbone(case, model, branch, reporter)
     return VibrationOutcome(
         case,
         model.rig.labels,
@@ -87,25 +86,13 @@ def _across(responses: list[Response]) -> dict[str, Any]:
 
 
 def _backbone(
-    case: VibrationCase,
-    model: VibrationModel,
-    peaks: Sequence[HarmonicSolution],
-    reporter: Reporter,
+    case: VibrationCase, model: VibrationModel, branch: Branch, reporter: Reporter
 ) -> Curves | None:
-    """The curve of phase resonance through all forces, found from one of the peaks."""
+    """The curve of phase resonance through all forces, from the motions under one of them."""
     span = case.forces[0], case.forces[-1]
-    found = None
-    for peak in peaks:
-        found = along_phase_resonance(
-            model.problem.refined(peak.resolution),
-            peak,
-            span,
-            control=step_control(case),
-            accuracy=accuracy_of(case),
-        )
-        if found.solutions:
-            break
-    assert found is not None, "a case without forces"
+    found = along_phase_resonance(
+        model.problem, branch, span, control=step_control(case), accuracy=accuracy_of(case)
+    )
     if found.message:
         reporter.warn(f"backbone: {found.message}")
     if not found.solutions:

@@ -201,7 +201,7 @@ def test_loops_and_their_branches(results: h5py.File, summary: dict[str, Any]) -
     left, right = figure.axes
     # Of two forces, each in one and in three harmonics.
     assert len(left.lines) == 4
-    assert left.get_title() == "100 Hz, 3 harmonics (thin: 1)"
+    assert left.get_title() == "100 Hz, 3 harmonics; dashed: the force in 1 alone"
     names = [text.get_text() for text in right.get_legend().get_texts()]
     slopes = [1e-3 * own["loops"][-1]["stiffness"] for own in summary["responses"]]
     assert names == [

@@ -33,7 +33,8 @@ def has_loops(file: h5py.File) -> bool:
 def loops(file: h5py.File) -> Figure:
     """Force against displacement in a cycle, and the rising branches from one reversal on.
 
-    Loops of fewer harmonics than the last are thin and dashed.
+    Of coarser resolutions than the last the force is shown, thin and dashed, as their harmonics
+    alone give it: too few of them deform the loop.
     """
     responses = file["responses"]
     names = spread([name for name in sorted(responses) if "loops" in responses[name]], MOST_LOOPS)
@@ -42,7 +43,7 @@ def loops(file: h5py.File) -> Figure:
     left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
     for own, colour in zip(shown, _colours(len(shown)), strict=True):
         for coarse in _resolutions(own)[:-1]:
-            left.plot(*_curve(coarse), color=colour, **COARSE)
+            left.plot(*_curve(coarse, "expansion"), color=colour, **COARSE)
         left.plot(*_curve(_finest(own)), color=colour)
         _draw_branch(right, _finest(own), colour, f"{own.attrs['force']:g} N")
     _bound(right, [_finest(own) for own in shown])
@@ -54,7 +55,7 @@ def _label(left: Axes, right: Axes, own: h5py.Group) -> None:
     finest, coarse = _finest(own), _resolutions(own)[:-1]
     text = f"{finest.attrs['frequency']:.4g} Hz, {_harmonics(finest)} harmonics"
     if coarse:
-        text += f" (thin: {', '.join(map(_harmonics, coarse))})"
+        text += f"; dashed: the force in {', '.join(map(_harmonics, coarse))} alone"
     left.set_title(text)
     right.set_title("rising branches from one origin")
     left.set_xlabel("displacement [µm]")
@@ -84,8 +85,8 @@ def _colours(count: int) -> list[Any]:
     return [colormaps[FORCE_COLOURS](shade) for shade in np.linspace(0.0, 0.9, count)]
 
 
-def _curve(loop: h5py.Group) -> tuple[Array, Array]:
-    return TO_MICRONS * loop["displacement"][()], loop["force"][()]
+def _curve(loop: h5py.Group, force: str = "force") -> tuple[Array, Array]:
+    return TO_MICRONS * loop["displacement"][()], loop[force][()]
 
 
 def rising_branch(displacement: Array, force: Array) -> tuple[Array, Array]:
