@@ -1,0 +1,310 @@
+"""Harmonic balance against two integrators in time that know nothing of harmonics.
+
+A steady motion is a fixed point of what an integrator makes of a state in one period, however long
+a ring-down takes: at a damping ratio of 0.001 thousands of periods.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
+from fe_models.dynamics.excitation import Harmonic, Recorded, Together
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.motion import Start
+from fe_models.dynamics.newmark import StepControl, integrate
+from fe_models.dynamics.rig import Link, lumped_rig, two_mass_rig, unit_force
+from wear.joints.friction_contact import FrictionContact
+from wear.joints.jenkins import Jenkins
+from wear.joints.periodic import SEPARATED, SLIP, STICK, PeriodicMarch
+
+KT, MU, LOAD = 45e3, 0.88, 60.0
+JENKINS = Jenkins(KT, MU, LOAD)
+SAMPLES = 256  # at which motions are compared
+PERIODS = 6  # from rest, before a fixed point is looked for
+SETTLED = 1e-10  # change in a period of a fixed point, over the largest of a state
+WANTED = 1e-4  # agreement of the motions, over the largest displacement
+
+
+def rig(ratio):
+    """The thesis's rig."""
+    return two_mass_rig((21.152e-3, 1.189e-3), (1.3469e3, 273e3), ratio)
+
+
+def fixed_point(period, state):
+    """A state ``(n,)`` that a period leads back to itself, by Newton's method.
+
+    A derivative is kept while a step with it leaves a twentieth of the change at most.
+    """
+    moving, slopes, before = np.flatnonzero(state), None, np.inf
+    for _ in range(40):
+        end = period(state)
+        size = np.abs(end - state).max()
+        if size <= SETTLED * np.abs(state).max():
+            return state
+        if slopes is None or size > 0.05 * before:
+            slopes = np.array([slope(period, state, end, place)[moving] for place in moving]).T
+        before, state = size, state.copy()
+        state[moving] -= np.linalg.solve(slopes - np.eye(len(moving)), (end - state)[moving])
+    raise AssertionError(f"no fixed point: a period still changes it by {size:g}")
+
+
+def slope(period, state, end, place):
+    """Derivative of a period by one number of a state that it leads to ``end``."""
+    step = np.zeros(len(state))
+    step[place] = 1e-6 * abs(state[place])
+    return (period(state + step) - end) / step[place]
+
+
+@dataclass(frozen=True)
+class ExactPeriod:
+    """One period of a rig with a Jenkins joint, from event to event.
+
+    A state is displacements, velocities over ω, and where the slider is.
+    """
+
+    model: object
+    force: Harmonic
+
+    def motion(self, state, parts=1):
+        size, length = len(self.model.mass), 1.0 / self.force.frequency
+        sliders = SliderJoints(np.array([KT]), np.array([MU * LOAD]), np.zeros(1))
+        speed = 2.0 * np.pi * self.force.frequency
+        start = Start(state[:size], speed * state[size:-1], state[-1:, None])
+        return integrate_exactly(self.model, sliders, self.force, length, length / parts, start)
+
+    def __call__(self, state):
+        return self.packed(self.motion(state))
+
+    def packed(self, motion):
+        speed = 2.0 * np.pi * self.force.frequency
+        return np.concatenate(
+            [motion.displacement[-1], motion.velocity[-1] / speed, motion.joint_state[:, 0]]
+        )
+
+    def steady(self):
+        """The steady motion at :data:`SAMPLES` times, and the energy lost in a period."""
+        state = np.zeros(2 * len(self.model.mass) + 1)
+        for _ in range(PERIODS):
+            state = self(state)
+        motion = self.motion(fixed_point(self, state), SAMPLES)
+        return motion.displacement[:-1], motion.energies.joints[-1].sum()
+
+
+@dataclass(frozen=True)
+class NewmarkPeriod:
+    """One period in so many steps of average acceleration, with one joint.
+
+    A state is displacements, velocities over ω, and the stretch of the joint's tangential springs.
+    """
+
+    model: object
+    law: object
+    excitation: object
+    frequency: float
+    steps: int
+
+    def motion(self, state, every):
+        size, speed = len(self.model.mass), 2.0 * np.pi * self.frequency
+        apart = self.model.connection @ state[:size]
+        stretch = state[2 * size :]
+        # A slider remembers where it is and its stretch; a contact its stretch and how near it is.
+        own = [*stretch, apart[2]] if len(stretch) == 2 else [apart[0], *stretch]
+        start = Start(state[:size], speed * state[size : 2 * size], np.array([own]))
+        return integrate(
+            self.model,
+            self.law,
+            self.excitation,
+            1.0 / self.frequency,
+            StepControl(1.0 / self.frequency / self.steps, every=every),
+            start,
+        )
+
+    def __call__(self, state):
+        motion = self.motion(state, self.steps)
+        assert motion.converged, motion.message
+        own = motion.joint_state[0]
+        stretch = own[:2] if self.law.directions == 3 else own[1:]
+        speed = 2.0 * np.pi * self.frequency
+        return np.concatenate([motion.displacement[-1], motion.velocity[-1] / speed, stretch])
+
+
+def newmark_steady(periods, state=None):
+    """States, steady motions and energies lost in a period, of ever finer :class:`NewmarkPeriod`.
+
+    From rest, or from a ``state``.
+    """
+    if state is None:
+        size = 2 * len(periods[0].model.mass)
+        state = np.zeros(size + max(periods[0].law.directions - 1, 1))
+        for _ in range(PERIODS):
+            state = periods[0](state)
+    found = []
+    for period in periods:
+        state = fixed_point(period, state)
+        motion = period.motion(state, period.steps // SAMPLES)
+        found.append((state, motion.displacement[:-1], motion.energies.joints[-1].sum()))
+    return found
+
+
+def extrapolated(coarse, fine):
+    """Without the error of second order in the step."""
+    return (4.0 * fine - coarse) / 3.0
+
+
+def furthest(one, other):
+    """Largest difference of motions ``(t, n)``, over the largest displacement of each point."""
+    return (np.abs(one - other).max(axis=0) / np.abs(other).max(axis=0)).max()
+
+
+def odd_balance(model, highest, samples):
+    load = PeriodicLoad({1: -1j * unit_force(model, "m1")})
+    harmonics = tuple(range(1, highest + 1, 2))
+    return HarmonicBalance(model, PeriodicMarch(JENKINS), load, Resolution(harmonics, samples))
+
+
+# --- One Jenkins joint
+
+
+@pytest.mark.parametrize(
+    ("ratio", "frequency", "force", "highest"),
+    [
+        (0.001, 150.0, 40.0, 63),
+        (0.02, 150.0, 40.0, 63),
+        (0.001, 240.0, 200.0, 31),
+        # The second mode, at 2478 Hz with the joint free, is in the way of harmonic 63.
+        (0.02, 39.0, 60.0, 91),
+    ],
+)
+def test_jenkins_rig_is_the_fixed_point_of_event_driven_integration(
+    ratio, frequency, force, highest
+):
+    model = rig(ratio)
+    wanted, lost = ExactPeriod(model, Harmonic(unit_force(model, "m1"), force, frequency)).steady()
+    solution = odd_balance(model, highest, 4096).solve(frequency, force)
+    assert solution.converged
+    assert {STICK, SLIP} == set(np.unique(solution.cycle.states))
+    assert furthest(solution.displacement(SAMPLES), wanted) <= WANTED
+    assert solution.cycle.dissipated[0] == pytest.approx(lost, rel=WANTED)
+
+
+@pytest.mark.parametrize("ratio", [0.001, 0.02])
+def test_error_falls_with_the_third_power_of_the_harmonics(ratio):
+    """The slope of the joint's force jumps where it begins to slip, and its harmonics fall as k⁻².
+
+    Those of the displacement then fall as k⁻⁴ beyond the second mode, here at harmonic 17, and what
+    is left out in all as k⁻³: 3.4 is what these harmonics show.
+    """
+    model = rig(ratio)
+    wanted, _ = ExactPeriod(model, Harmonic(unit_force(model, "m1"), 40.0, 150.0)).steady()
+    highest, errors, estimates, solution = np.array([31, 63, 127]), [], [], None
+    for order in highest:
+        problem = odd_balance(model, int(order), 16384)
+        solution = problem.solve(150.0, 40.0, solution)
+        errors.append(furthest(solution.displacement(SAMPLES), wanted))
+        estimates.append(solution.left_out)
+    assert -4.0 < np.polyfit(np.log(highest), np.log(errors), 1)[0] < -2.9
+    # What a solution says of itself: the norm over time, not the largest, of the joint alone.
+    assert np.all(np.divide(errors, estimates) > 1.0)
+    assert np.all(np.divide(errors, estimates) < 10.0)
+
+
+@pytest.mark.parametrize("ratio", [0.001, 0.02])
+def test_jenkins_rig_is_the_fixed_point_of_newmark(ratio):
+    """Second order in the step: what is left after extrapolation is below 1e-4."""
+    model = rig(ratio)
+    force = Harmonic(unit_force(model, "m1"), 40.0, 150.0)
+    periods = [NewmarkPeriod(model, JENKINS, force, 150.0, steps) for steps in (1024, 2048)]
+    (_, coarse, lost), (_, fine, lost_fine) = newmark_steady(periods)
+    found = odd_balance(model, 63, 4096).solve(150.0, 40.0)
+    motion = found.displacement(SAMPLES)
+    assert 3.0 < furthest(coarse, motion) / furthest(fine, motion) < 5.0
+    assert furthest(extrapolated(coarse, fine), motion) <= WANTED
+    assert found.cycle.dissipated[0] == pytest.approx(extrapolated(lost, lost_fine), rel=WANTED)
+
+
+# --- One contact in three dimensions, under a normal load that varies until it lifts off
+
+
+# Amplitude [N] and phase of the force on each point.
+SHAKEN = {"m1": (75.0, 0.0), "y": (20.0, 1.9), "z": (110.0, 0.7)}
+
+
+class PressedRig:
+    """The rig, whose contact also moves across (y) and is pressed and lifted (z)."""
+
+    frequency = 100.0
+    law = FrictionContact(KT, 1.3 * KT, MU, LOAD)
+
+    def __init__(self, ratio):
+        self.model = lumped_rig(
+            {"m1": 21.152e-3, "m2": 1.189e-3, "y": 1.189e-3, "z": 1.189e-3},
+            {Link("m1"): 1.3469e3, Link("m2", "m1"): 273e3, Link("y"): 5e3, Link("z"): 20e3},
+            [[Link("m2"), Link("y"), Link("z")]],
+            ratio,
+        )
+        # More than balances the contact's own load: it is pressed by 0.1 µm more at rest.
+        self.static = (LOAD + 8.0) * unit_force(self.model, "z")
+
+    @property
+    def excitation(self):
+        waves = [
+            Harmonic(unit_force(self.model, name), amplitude, self.frequency, phase)
+            for name, (amplitude, phase) in SHAKEN.items()
+        ]
+        return Together((*waves, Recorded(self.static, np.zeros(1), np.ones(1))))
+
+    def balance(self, highest, samples):
+        wave = sum(
+            -1j * amplitude * np.exp(1j * phase) * unit_force(self.model, name)
+            for name, (amplitude, phase) in SHAKEN.items()
+        )
+        load = PeriodicLoad({1: wave}, self.static)
+        resolution = Resolution(tuple(range(highest + 1)), samples)
+        return HarmonicBalance(self.model, PeriodicMarch(self.law), load, resolution)
+
+    def newmark(self, *steps):
+        return [
+            NewmarkPeriod(self.model, self.law, self.excitation, self.frequency, count)
+            for count in steps
+        ]
+
+
+def check_pressed_rig(pressed, steady, resolutions, allowed):
+    (_, coarse, lost), (_, fine, lost_fine) = steady[-2:]
+    wanted = extrapolated(coarse, fine)
+    errors = []
+    for highest, samples in resolutions:
+        found = pressed.balance(highest, samples).solve(pressed.frequency, 1.0)
+        assert found.converged
+        errors.append(furthest(found.displacement(SAMPLES), wanted))
+    assert {STICK, SLIP, SEPARATED} == set(np.unique(found.cycle.states))
+    assert errors[-1] <= allowed
+    assert found.cycle.dissipated[0] == pytest.approx(extrapolated(lost, lost_fine), rel=allowed)
+    # The mean: spring and contact carry the load, and not as at rest, since lift-off cuts a part.
+    mean, pressing = found.amplitude(3, 0).real, found.cycle.samples[:, 0, 2].mean()
+    assert 20e3 * mean + pressing == pytest.approx(LOAD + 8.0, rel=1e-8)
+    assert abs(pressing - LOAD) > 5.0
+    return np.array(errors)
+
+
+def test_contact_that_lifts_off_is_the_fixed_point_of_newmark():
+    """31 harmonics and 1024 steps: both leave less than 1e-3, 15 harmonics ten times as much."""
+    pressed = PressedRig(0.02)
+    steady = newmark_steady(pressed.newmark(512, 1024))
+    errors = check_pressed_rig(pressed, steady, [(15, 512), (31, 1024)], 1e-3)
+    assert errors[0] > 8.0 * errors[1]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ratio", [0.001, 0.02])
+def test_contact_that_lifts_off_is_the_fixed_point_of_newmark_to_1e_4(ratio):
+    """With little damping it is found from the one with more."""
+    state = newmark_steady(PressedRig(0.02).newmark(512))[0][0]
+    pressed = PressedRig(ratio)
+    steady = newmark_steady(pressed.newmark(512, 2048, 4096), state)
+    check_pressed_rig(pressed, steady, [(63, 4096)], WANTED)

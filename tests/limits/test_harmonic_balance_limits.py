@@ -1,0 +1,504 @@
+"""Harmonic balance at its limits: a right answer, or a message that says what to do."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from fe_models.dynamics import continuation
+from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
+from fe_models.dynamics.excitation import Harmonic
+from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.motion import Start
+from fe_models.dynamics.newmark import StepControl, integrate
+from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, two_mass_rig, unit_force
+from wear.joints.friction_contact import FrictionContact
+from wear.joints.jenkins import Jenkins
+from wear.joints.periodic import SEPARATED, SLIP, STICK, PeriodicMarch
+
+SOLVED = 1e-8
+KT, KN, MU = 300.0, 400.0, 0.5
+ALONG = ("x", "y", "z")
+
+
+def body(normal=900.0, ratio=0.01):
+    """A mass on springs, with one contact; without ``normal`` spring only that holds it along z."""
+    springs = {Link("x"): 500.0, Link("y"): 700.0}
+    if normal:
+        springs[Link("z")] = normal
+    joint = [Link(name) for name in ALONG]
+    return lumped_rig(dict.fromkeys(ALONG, 2e-3), springs, [joint], ratio)
+
+
+def balance(model, law, waves, static=0.0, highest=5, samples=128):
+    """Shaken by cosines ``waves`` and pressed by ``static`` along z."""
+    wave = sum(amplitude * unit_force(model, name) for name, amplitude in waves.items())
+    load = PeriodicLoad({1: wave}, static * unit_force(model, "z"))
+    resolution = Resolution(tuple(range(highest + 1)), samples)
+    return HarmonicBalance(model, PeriodicMarch(law), load, resolution)
+
+
+def contact(load=0.0, gap=0.0):
+    return FrictionContact(KT, KN, MU, load, gap)
+
+
+def linear(model, held, frequency, force):
+    """Complex amplitudes ``(n,)`` of a structure whose joints are springs ``held`` ``(j d,)``."""
+    omega = 2.0 * np.pi * frequency
+    stiffness = model.stiffness + model.connection.T @ np.diag(held) @ model.connection
+    dynamic = stiffness + 1j * omega * model.damping - omega**2 * model.mass
+    return np.linalg.solve(dynamic, force)
+
+
+def rig(highest=15, samples=256):
+    """The thesis's rig with one Jenkins joint."""
+    model = two_mass_rig((21.152e-3, 1.189e-3), (1.3469e3, 273e3), 0.001)
+    load = PeriodicLoad({1: -1j * unit_force(model, "m1")})
+    harmonics = tuple(range(1, highest + 1, 2))
+    joints = PeriodicMarch(Jenkins(45e3, 0.88, 60.0))
+    return HarmonicBalance(model, joints, load, Resolution(harmonics, samples))
+
+
+# --- Resolution
+
+
+def lifting(highest, samples):
+    """Shaken along all directions until it lifts off for half of the cycle."""
+    waves = {"x": 10.0, "y": 4.0j, "z": 30.0 * np.exp(0.7j)}
+    return balance(body(ratio=0.03), contact(8.0), waves, 10.0, highest, samples)
+
+
+FREQUENCY = 60.0
+
+
+@pytest.fixture(scope="module")
+def resolved():
+    """The same with so many harmonics that 1e-5 is left out."""
+    solution = lifting(40, 2048).solve(FREQUENCY, 1.0)
+    assert solution.converged
+    assert {STICK, SLIP, SEPARATED} == set(np.unique(solution.cycle.states))
+    assert solution.left_out < 1e-5
+    return solution
+
+
+def distance(solution, resolved):
+    """Of motions, over the largest displacement."""
+    found, wanted = solution.displacement(256), resolved.displacement(256)
+    return np.abs(found - wanted).max() / np.abs(wanted).max()
+
+
+@pytest.mark.parametrize(("highest", "least"), [(1, 0.05), (2, 5e-3), (5, 5e-4)])
+def test_too_few_harmonics_for_lift_off_say_so(highest, least, resolved):
+    """The share left out is told, and it is not less than a fifth of the error."""
+    solution = lifting(highest, 512).solve(FREQUENCY, 1.0)
+    assert solution.converged
+    assert solution.left_out > least
+    assert distance(solution, resolved) < 5.0 * solution.left_out
+
+
+def test_too_few_harmonics_for_lift_off_are_added_if_asked(resolved):
+    branch = along_frequency(
+        lifting(1, 16), 1.0, (55.0, FREQUENCY), accuracy=Accuracy(1e-3, 31), upward=False
+    )
+    assert branch.message == ""
+    assert all(max(s.left_out, s.sampling) <= 1e-3 for s in branch.solutions)
+    assert distance(branch.solutions[0], resolved) < 5e-3
+
+
+@pytest.mark.parametrize("samples", [12, 16, 32])
+def test_too_few_samples_say_so(samples, resolved):
+    """With one sample more than the least allowed it still ends, and tells how wrong it is."""
+    problem = lifting(5, samples)
+    rough, fine = problem.solve(FREQUENCY, 1.0), lifting(5, 4096).solve(FREQUENCY, 1.0)
+    assert rough.converged
+    told = problem.sampling(rough.coefficients.ravel(), FREQUENCY, 1.0)
+    error = np.linalg.norm(rough.coefficients[:, 1:] - fine.coefficients[:, 1:])
+    error /= np.linalg.norm(fine.coefficients[:, 1:])
+    assert error > 1e-3
+    assert 0.3 * error < told < 3.0 * error
+
+
+def test_what_the_finest_resolution_allowed_leaves_is_told():
+    """Neither harmonics nor samples suffice for a tolerance of 1e-6: the branch still ends."""
+    accuracy = Accuracy(1e-6, highest=7, most_samples=64)
+    branch = along_frequency(lifting(1, 16), 1.0, (58.0, FREQUENCY), accuracy=accuracy)
+    assert branch.message == ""
+    resolution = branch.problem.resolution
+    assert resolution.harmonics[-1] <= 7
+    assert resolution.samples == 64
+    assert all(s.left_out > 1e-6 and s.sampling > 1e-6 for s in branch.solutions)
+
+
+# --- Linear limits
+
+
+def test_a_contact_that_sticks_is_its_springs_through_a_resonance():
+    """Pressed so hard that nothing slips: three springs, and all of it in harmonic 1."""
+    model, waves = body(), {"x": 1.0, "y": 0.5j, "z": 0.7}
+    problem = balance(model, contact(), waves, 5e4)
+    wave = problem.load.waves[1]
+    branch = along_frequency(problem, 1.0, (50.0, 180.0))
+    assert branch.message == ""
+    assert branch.curve.folds == ()
+    for solution in branch.solutions:
+        wanted = linear(model, np.array([KT, KT, KN]), solution.frequency, wave)
+        # The tolerance is one of the whole motion, whose mean is a thousand times the vibration.
+        scale = np.abs(solution.motion).max()
+        np.testing.assert_allclose(solution.motion[1], wanted, atol=SOLVED * scale)
+        assert np.abs(solution.motion[2:]).max() < SOLVED * scale
+        assert np.all(solution.cycle.states == STICK)
+        assert solution.motion[0, 2].real == pytest.approx(5e4 / (900.0 + KN), rel=SOLVED)
+    peak = branch.frequencies[np.argmax(branch.first_amplitudes(0))]
+    stuck = natural_frequencies(model, np.array([KT, KT, KN]))[0]
+    assert peak == pytest.approx(stuck, rel=0.02)
+
+
+def test_a_contact_with_a_gap_larger_than_the_motion_is_nothing_through_a_resonance():
+    model, waves = body(), {"x": 1.0, "y": 0.5j, "z": 0.7}
+    problem = balance(model, contact(gap=1.0), waves)
+    branch = along_frequency(problem, 1.0, (50.0, 180.0))
+    assert branch.message == ""
+    for solution in branch.solutions:
+        wanted = linear(model, np.zeros(3), solution.frequency, problem.load.waves[1])
+        np.testing.assert_allclose(solution.motion[1], wanted, rtol=1e-7)
+        assert not solution.motion[[0, 2, 3, 4, 5]].any()
+        assert np.all(solution.cycle.states == SEPARATED)
+        assert solution.left_out == 0.0
+        assert solution.cycle.dissipated[0] == 0.0
+
+
+def test_an_open_contact_that_alone_holds_the_structure():
+    """Nothing presses and nothing pulls: it floats in the gap where it was, and x moves freely."""
+    model = body(normal=0.0)
+    problem = balance(model, contact(gap=0.5), {"x": 1.0, "z": 0.01})
+    solution = problem.solve(30.0, 1.0)
+    assert solution.converged
+    assert np.all(solution.cycle.states == SEPARATED)
+    wanted = linear(model, np.zeros(3), 30.0, problem.load.waves[1])
+    np.testing.assert_allclose(solution.motion[1], wanted, rtol=SOLVED)
+    assert solution.motion[0, 2] == 0.0
+    branch = along_frequency(problem, 1.0, (20.0, 100.0))
+    assert branch.message == ""
+    assert not any(s.motion[0].any() for s in branch.solutions)
+
+
+@pytest.mark.parametrize("load", [-8.0, -1e-3])
+def test_a_static_load_that_lifts_the_structure_off_has_no_equilibrium(load):
+    """Only the contact holds it along z, and it is pulled away: there is no periodic motion."""
+    problem = balance(body(normal=0.0), contact(), {"x": 1.0}, load)
+    solution = problem.solve(30.0, 1.0)
+    assert not solution.converged
+    assert "no rest under the constant load" in solution.message
+    assert "give a load that does not pull all joints apart" in solution.message
+    branch = along_frequency(problem, 1.0, (30.0, 60.0))
+    assert branch.message == solution.message
+    assert branch.solutions == ()
+
+
+def test_a_static_load_that_lifts_a_held_structure_off_is_linear():
+    """The springs hold it: pulled off its contact by half of the motion more than it moves."""
+    model = body()
+    problem = balance(model, contact(8.0), {"x": 1.0, "z": 0.1}, -30.0)
+    solution = problem.solve(30.0, 1.0)
+    assert solution.converged
+    assert np.all(solution.cycle.states == SEPARATED)
+    wanted = linear(model, np.zeros(3), 30.0, problem.load.waves[1])
+    np.testing.assert_allclose(solution.motion[1], wanted, rtol=SOLVED)
+    assert solution.motion[0, 2].real == pytest.approx(-30.0 / 900.0, rel=SOLVED)
+
+
+# --- Without force
+
+
+@pytest.mark.parametrize(("load", "static"), [(0.0, 0.0), (0.0, 8.0), (8.0, 8.0), (8.0, 20.0)])
+@pytest.mark.parametrize("normal", [0.0, 900.0, 900.3])
+def test_without_force_it_rests(load, static, normal):
+    """Also where the preload is just what the load presses: rest is at 0 then, and found."""
+    problem = balance(body(normal), contact(load), {"x": 1.0, "z": 0.3}, static)
+    solution = problem.solve(30.0, 0.0)
+    assert solution.converged
+    rest = (static - load) / (normal + KN)
+    assert solution.motion[0, 2].real == pytest.approx(rest, abs=1e-12)
+    assert np.abs(solution.motion[1:]).max() < 1e-14
+    assert solution.left_out == 0.0
+    assert solution.cycle.dissipated[0] == 0.0
+    branch = along_frequency(problem, 0.0, (20.0, 200.0))
+    assert branch.message == ""
+    assert np.abs([s.motion[1:] for s in branch.solutions]).max() < 1e-14
+    assert all(s.left_out == 0.0 for s in branch.solutions)
+
+
+def test_without_force_nothing_is_refined():
+    """No vibration: what rounding makes of it is no reason for more harmonics or samples."""
+    problem = balance(body(), contact(8.0), {"x": 1.0}, 8.5, highest=1, samples=16)
+    branch = along_frequency(problem, 0.0, (20.0, 60.0), accuracy=Accuracy(1e-3))
+    assert branch.message == ""
+    assert branch.problem.resolution == Resolution((0, 1), 16)
+    rising = along_force(problem, 30.0, (0.0, 0.5), accuracy=Accuracy(1e-3))
+    assert rising.message == ""
+    assert rising.solutions[0].sampling == 0.0
+
+
+def test_a_force_that_falls_to_nothing_leaves_the_linear_answer():
+    """Down by fifteen orders the rig is its stuck springs: no term is lost, nothing is divided."""
+    problem = rig()
+    for force in (1.0, 1e-6, 1e-15):
+        solution = problem.solve(100.0, force)
+        wanted = linear(problem.model, np.array([45e3]), 100.0, problem.load.waves[1])
+        assert solution.converged
+        np.testing.assert_allclose(solution.motion[0] / force, wanted, rtol=SOLVED)
+
+
+# --- Grazing
+
+
+@pytest.mark.parametrize("closer", [0.0, 1e-9, -1e-9, 1e-4, -1e-4, 1e-2])
+def test_a_contact_that_is_only_just_touched(closer):
+    """The gap is the amplitude of the free motion, or less by a share: the answer is continuous.
+
+    At 20 Hz, a fifth of the first natural frequency, the mass moves as it is pushed.
+    """
+    model, waves = body(), {"x": 1.0, "z": 0.7}
+    free = linear(model, np.zeros(3), 20.0, 0.7 * unit_force(model, "z"))[2]
+    gap = abs(free) * (1.0 - closer)
+    solution = balance(model, contact(gap=gap), waves, highest=9, samples=2048).solve(20.0, 1.0)
+    assert solution.converged
+    pressing = solution.cycle.samples[:, 0, 2].max()
+    # The contact is in the way of no more than what it cuts off.
+    depth = max(closer, 0.0) * abs(free)
+    assert pressing <= KN * depth * (1.0 + SOLVED)
+    assert abs(solution.amplitude(2) - free) <= max(closer, 0.0) * abs(free) + SOLVED * abs(free)
+    if closer >= 1e-4:
+        assert 0.3 * KN * depth < pressing
+        assert solution.cycle.dissipated[0] > 0.0
+
+
+# --- Folds
+
+SHORT = continuation.StepControl(most=0.03)
+STOP = FrictionContact(KT, 1600.0, MU, gap=0.02)
+
+
+def stopped(highest=9, samples=1024):
+    """A mass that hits a stop at its resonance: a spring that hardens.
+
+    Each sample that begins to touch is a corner of the branch: of 256 samples they show as folds of
+    0.1 Hz beside the highest point, of 1024 no more.
+    """
+    model = body(normal=800.0, ratio=0.02)
+    load = PeriodicLoad({1: -1j * unit_force(model, "z")})
+    resolution = Resolution(tuple(range(highest + 1)), samples)
+    return HarmonicBalance(model, PeriodicMarch(STOP), load, resolution)
+
+
+@pytest.fixture(scope="module")
+def folded():
+    branch = along_frequency(stopped(), 1.0, (60.0, 200.0), control=SHORT)
+    assert branch.message == ""
+    return branch
+
+
+def test_folds_are_passed_and_told(folded):
+    """Up and down find the same two folds, 103.0 and 108.2 Hz, three motions between them."""
+    down = along_frequency(stopped(), 1.0, (60.0, 200.0), upward=False, control=SHORT)
+    assert down.message == ""
+    for branch in (folded, down):
+        assert len(branch.curve.folds) == 2
+        turned = [branch.frequencies[place - 1] for place in branch.curve.folds]
+        # The last point before a fold is nearer to it than a step.
+        assert sorted(turned) == pytest.approx([103.03, 108.16], abs=0.3)
+        assert np.count_nonzero(np.diff(np.sign(branch.frequencies - 106.0))) == 3
+    highest = [branch.first_amplitudes(2).max() for branch in (folded, down)]
+    assert highest[0] == pytest.approx(highest[1], rel=1e-3)
+
+
+def test_motions_that_coexist_are_those_that_time_integration_ends_in(folded):
+    """At 106 Hz: the largest and the smallest of three; the middle one repels."""
+    crossings = np.flatnonzero(np.diff(np.sign(folded.frequencies - 106.0)))
+    motions = [stopped(15, 512).solve(106.0, 1.0, folded.solutions[at]) for at in crossings]
+    assert all(solution.converged for solution in motions)
+    sizes = sorted(abs(solution.amplitude(2)) for solution in motions)
+    model, found = stopped().model, []
+    for speed in (0.0, 20.0):
+        motion = integrate(
+            model,
+            STOP,
+            Harmonic(unit_force(model, "z"), 1.0, 106.0),
+            80.0 / 106.0,
+            StepControl(1.0 / (128.0 * 106.0)),
+            Start(velocity=speed * unit_force(model, "z")),
+        )
+        last = motion.displacement[-129:-1, 2]
+        assert np.abs(last - motion.displacement[-257:-129, 2]).max() < 1e-5
+        turns = np.exp(-2j * np.pi * np.arange(128) / 128)
+        found.append(2.0 * abs((last * turns).mean()))
+    # 128 steps per period leave 2e-3 of the frequency's distance from resonance.
+    assert found == pytest.approx([sizes[0], sizes[2]], rel=5e-3)
+    assert sizes[1] > 1.5 * sizes[0]
+
+
+def highest_point(folded):
+    """The motion on the fold at 108 Hz, to 1e-9 of its frequency."""
+    problem, last = stopped(), folded.solutions[folded.curve.folds[0] - 1]
+    unknowns, below, above = last.coefficients.ravel(), last.frequency, last.frequency + 0.1
+    control = continuation.NewtonControl(max_iterations=8, max_shortened=1)
+    while above - below > 1e-9 * below:
+        middle = 0.5 * (below + above)
+        found = continuation.solve(problem.by_frequency(1.0), unknowns, middle, control)
+        # Beyond the fold Newton's method ends nowhere, or far away in the small motion.
+        far = np.linalg.norm(found.unknowns - unknowns) > 0.2 * np.linalg.norm(unknowns)
+        if found.converged and not far:
+            unknowns, below = found.unknowns, middle
+        else:
+            above = middle
+    return replace(last, frequency=below, coefficients=unknowns.reshape(last.coefficients.shape))
+
+
+def test_a_branch_that_starts_on_a_fold(folded):
+    """The frequency does not tell the two ways apart there; each is found, one on either side."""
+    start, problem = highest_point(folded), stopped()
+    found = problem.find(start.frequency, 1.0, start.coefficients.ravel())
+    ends = {}
+    for upward in (True, False):
+        point = continuation.first_point(found, start.frequency, upward, 0.02)
+        assert np.all(np.isfinite(point.tangent))
+        begun = replace(folded, curve=continuation.Curve((point,), ""))
+        branch = along_frequency(problem, 1.0, (60.0, 200.0), begun)
+        assert branch.message == ""
+        ends[branch.frequencies[-1]] = branch.solutions[-1].motion
+    assert set(ends) == {60.0, 200.0}
+    for solution in (folded.solutions[0], folded.solutions[-1]):
+        scale = np.abs(solution.motion).max()
+        wanted = ends[solution.frequency]
+        np.testing.assert_allclose(solution.motion, wanted, atol=SOLVED * scale)
+    # Nothing is above the fold: the branch leaves a span that begins there where it began.
+    above = along_frequency(problem, 1.0, (start.frequency, 200.0), start)
+    assert above.message == ""
+    assert above.frequencies[-1] == start.frequency
+
+
+def test_a_start_beyond_a_fold_says_so_or_lands_on_the_other_side(folded):
+    """The largest motion does not exist above the fold: what is found there is the small one."""
+    largest = max(folded.solutions, key=lambda solution: abs(solution.amplitude(2)))
+    beyond = stopped().solve(112.0, 1.0, largest)
+    assert beyond.converged
+    alone = along_frequency(stopped(), 1.0, (112.0, 200.0), upward=False).solutions[-1]
+    np.testing.assert_allclose(beyond.motion, alone.motion, atol=1e-9 * np.abs(alone.motion).max())
+
+
+@pytest.mark.parametrize("share", [0.25, 0.5, 0.75])
+def test_a_branch_taken_up_in_its_middle_is_the_rest_of_it(folded, share):
+    """Point by point, also where it folds, since a point keeps its tangent and its step."""
+    kept = round(share * len(folded.curve.points))
+    part = replace(folded, curve=replace(folded.curve, points=folded.curve.points[:kept]))
+    rest = along_frequency(part.problem, 1.0, (60.0, 200.0), part, control=SHORT)
+    assert rest.message == ""
+    wanted = folded.solutions[kept + 1 :]
+    np.testing.assert_allclose(rest.frequencies, [s.frequency for s in wanted], rtol=1e-6)
+    for solution, before in zip(rest.solutions, wanted, strict=True):
+        scale = np.abs(before.motion).max()
+        np.testing.assert_allclose(solution.motion, before.motion, atol=1e-5 * scale)
+
+
+# --- A harmonic meets the second mode
+
+FIRST, LIMIT = 500.0, 2.0
+# Springs for which, between equal masses, ω2 = 3 ω1: 9 (1 + 2 r)² = 100 r.
+RATIO = (64.0 + np.sqrt(2800.0)) / 72.0
+
+
+def pair(harmonics, samples):
+    model = lumped_rig(
+        {"a": 2e-3, "b": 2e-3},
+        {Link("a"): FIRST, Link("b", "a"): FIRST * RATIO},
+        [[Link("b")]],
+        0.02,
+    )
+    joints = PeriodicMarch(Jenkins(KT, MU, LIMIT / MU))
+    load = PeriodicLoad({1: -1j * unit_force(model, "a")})
+    return HarmonicBalance(model, joints, load, Resolution(harmonics, samples))
+
+
+@pytest.mark.parametrize("held", [0.0, KT])
+def test_the_third_harmonic_in_resonance_with_the_second_mode(held):
+    """Right with enough harmonics; one alone says what it leaves out, and more are found if asked.
+
+    With the joint free ω2 = 3 ω1: both modes are shaken at once where the joint slips far.
+    """
+    model = pair((1,), 64).model
+    modes = natural_frequencies(model)
+    assert modes[1] == pytest.approx(3.0 * modes[0], rel=1e-12)
+    frequency, force = natural_frequencies(model, held)[1] / 3.0, 3.0
+    motion = integrate_exactly(
+        model,
+        SliderJoints(np.array([KT]), np.array([LIMIT]), np.zeros(1)),
+        Harmonic(unit_force(model, "a"), force, frequency),
+        60.0 / frequency,
+        1.0 / (128.0 * frequency),
+    )
+    wanted = motion.displacement[-129:-1]
+    scale = np.abs(wanted).max()
+    assert np.abs(motion.displacement[-257:-129] - wanted).max() < 1e-7 * scale
+
+    def error(solution):
+        assert solution.converged
+        return np.abs(solution.displacement(128) - wanted).max() / scale
+
+    alone = pair((1,), 512).solve(frequency, force)
+    assert error(alone) > 0.1
+    assert alone.left_out > 0.05
+    enough = pair(tuple(range(1, 32, 2)), 2048).solve(frequency, force)
+    assert error(enough) < 1e-5
+    third = abs(enough.amplitude(1, 3)) / abs(enough.amplitude(1))
+    assert third > 0.05
+    grown = along_frequency(
+        pair((1,), 64), force, (frequency, 1.1 * frequency), accuracy=Accuracy(1e-3)
+    )
+    assert grown.message == ""
+    assert error(grown.solutions[0]) < 2e-3
+
+
+# --- What cannot be
+
+
+@pytest.mark.parametrize("frequency", [np.nan, np.inf, -100.0, 0.0])
+def test_frequencies_that_are_none_are_refused(frequency):
+    """At 0 Hz all harmonics are one: there is no cycle."""
+    with pytest.raises(HarmonicBalanceError, match="give a frequency above 0"):
+        rig().solve(frequency, 60.0)
+
+
+@pytest.mark.parametrize("force", [np.nan, np.inf])
+def test_forces_that_are_none_are_refused(force):
+    with pytest.raises(HarmonicBalanceError, match="both finite"):
+        rig().solve(100.0, force)
+    model, resolution = body(), Resolution((0, 1), 16)
+    good, bad = np.zeros(3), np.array([force, 0.0, 0.0])
+    for load in (PeriodicLoad({1: bad}), PeriodicLoad({1: good}, bad)):
+        with pytest.raises(HarmonicBalanceError, match="give finite ones"):
+            HarmonicBalance(model, PeriodicMarch(contact()), load, resolution)
+
+
+@pytest.mark.parametrize(
+    "span", [(np.nan, 200.0), (100.0, np.nan), (200.0, 100.0), (100.0, 100.0), (0.0, 100.0)]
+)
+def test_spans_that_are_none_are_refused(span):
+    with pytest.raises(HarmonicBalanceError, match="give its lower end first"):
+        along_frequency(rig(), 60.0, span)
+
+
+def test_a_force_that_is_never_reached_is_no_solution():
+    """Shaken by 2.5 times its weight the body would be thrown about: raising the force turns back.
+
+    By way of the free vibration, which nothing damps, it would go round for ever.
+    """
+    model = body(normal=0.0)
+    problem = balance(model, contact(), {"x": 1.0, "z": 20.0}, 8.0, highest=11, samples=512)
+    solution = problem.solve(30.0, 1.0)
+    assert not solution.converged
+    assert "turns back" in solution.message
+    assert "start from a solution nearby" in solution.message
