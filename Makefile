@@ -2,6 +2,7 @@
 PYTHON ?= python3
 BIN := .venv/bin
 STAMP := .venv/.installed
+PYHARM := .venv/pyharm/.installed
 # Tests run side by side in processes; threads inside each would only fight over the cores.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 
@@ -19,9 +20,17 @@ test-full: check lint
 
 bench: check
 	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[test,bench]'
+	-$(MAKE) $(PYHARM)
 	$(ONE_THREAD) $(BIN)/python -m pytest -q -s tests/benchmarks/test_tamaas.py
 	$(ONE_THREAD) $(BIN)/python -m pytest -q -s -m "slow or not slow" tests/benchmarks \
 	    --ignore tests/benchmarks/test_tamaas.py
+
+# A peer that is measured beside ours. It brings a hundred packages: an environment of its own.
+$(PYHARM):
+	$(PYTHON) -m venv $(@D)
+	$(@D)/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt \
+	    pyharm-os==1.2.2
+	@touch $@
 
 lint: install
 	$(BIN)/ruff check .

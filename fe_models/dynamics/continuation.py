@@ -11,11 +11,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
-from fe_models.dynamics.bordered import LinearMap, solve_alone, solve_bordered
+from fe_models.dynamics.bordered import (
+    LEFT,
+    Bordered,
+    LinearMap,
+    solve_alone,
+    solve_bordered,
+)
 from sa_solver.types import Array
 
 # Unknowns are measured by their norm, but at least by this share of the largest norm on the curve:
@@ -28,35 +35,61 @@ LEAST_PARAMETER = 0.1
 CORNER = 1e-3
 # A tangent whose orientation changes in a step shorter than this has passed where curves cross.
 CROSSING = 1e-5
-# How often corrections on a curve are halved: where that is not enough, a shorter step is cheaper.
-MAX_SHORTENED = 1
+# How often corrections on a curve are halved, and how many in a row may leave a residual above the
+# least so far: where that is not enough, a shorter step is cheaper.
+MAX_SHORTENED, PATIENCE = 1, 2
 # Factor by which a step grows or shrinks at most after a point.
 MOST_CHANGE = 2.0
+# Share of the residual that an iterative solver may leave. Newton's method squares a small relative
+# residual: more digits than that has are lost again.
+MOST_LEFT = 1e-2
+# The same of a tangent, which only begins the next step.
+TANGENT_LEFT = 1e-4
+
+
+class Linearisation(Protocol):
+    """r ``(n,)``, ∂r/∂u, ∂r/∂λ ``(n,)``, and the norm of the terms r is the sum of.
+
+    ∂r/∂u is a matrix ``(n, n)``, or what multiplies like one. ``relative`` is the residual's norm
+    over ``size``: 0 if it vanishes, infinite if it is not a number.
+    """
+
+    @property
+    def residual(self) -> Array: ...
+    @property
+    def jacobian(self) -> Array | LinearMap: ...
+    @property
+    def slope(self) -> Array: ...
+    @property
+    def size(self) -> float: ...
+    @property
+    def relative(self) -> float: ...
 
 
 @dataclass(frozen=True)
 class Linearised:
-    """r ``(n,)``, ∂r/∂u, ∂r/∂λ ``(n,)``, and the norm of the terms r is the sum of.
-
-    ∂r/∂u is a matrix ``(n, n)``, or what multiplies like one.
-    """
+    """A :class:`Linearisation` whose derivatives are there from the beginning."""
 
     residual: Array
     jacobian: Array | LinearMap
     slope: Array
     size: float
 
-    @property
+    @cached_property
     def relative(self) -> float:
-        """The residual's norm over ``size``: 0 if it vanishes, infinite if it is not a number."""
-        norm = float(np.linalg.norm(self.residual))
-        if not np.isfinite(norm):
-            return np.inf
-        return norm / self.size if norm > 0.0 else 0.0
+        return relative_norm(self.residual, self.size)
 
 
-L = TypeVar("L", bound=Linearised)
-L_co = TypeVar("L_co", bound=Linearised, covariant=True)
+def relative_norm(residual: Array, size: float) -> float:
+    """A residual's norm over ``size``: 0 if it vanishes, infinite if it is not a number."""
+    norm = float(np.linalg.norm(residual))
+    if not np.isfinite(norm):
+        return np.inf
+    return norm / size if norm > 0.0 else 0.0
+
+
+L = TypeVar("L", bound=Linearisation)
+L_co = TypeVar("L_co", bound=Linearisation, covariant=True)
 
 
 class Equations(Protocol[L_co]):
@@ -70,11 +103,13 @@ class NewtonControl:
     """When Newton's method has converged, and when it is given up.
 
     ``max_shortened``: how often a correction that does not lower the residual is halved.
+    ``patience``: so many iterations in a row without a new least residual end it; None: any number.
     """
 
     tolerance: float = 1e-10
     max_iterations: int = 25
     max_shortened: int = 5
+    patience: int | None = None
 
 
 @dataclass(frozen=True)
@@ -158,7 +193,7 @@ def solve(
     control = control or NewtonControl()
     found = _newton(
         lambda place: equations(place, parameter),
-        lambda at: solve_alone(at.jacobian, -at.residual),
+        lambda at: solve_alone(at.jacobian, -at.residual, _left(at)),
         unknowns,
         control,
     )
@@ -169,6 +204,11 @@ def solve(
         f"{found.iterations} iterations: start from a solution nearby"
     )
     return Solution(found.unknowns, found.at, found.iterations, message)
+
+
+def _left(at: Linearisation) -> float:
+    """Share of the residual that an iterative solver may leave of it."""
+    return min(max(at.relative, LEFT), MOST_LEFT)
 
 
 def _newton(
@@ -183,8 +223,11 @@ def _newton(
     corner of the equations is in the way, and the whole correction leads to its other side.
     """
     at = equations_at(place)
+    least, waited = at.relative, 0
     for iteration in range(control.max_iterations):
         if at.relative <= control.tolerance or not np.isfinite(at.relative):
+            return Solution(place, at, iteration, "")
+        if waited == control.patience:
             return Solution(place, at, iteration, "")
         try:
             correction = correction_of(at)
@@ -200,13 +243,19 @@ def _newton(
             place, at = place + 0.5**shortened * correction, trial
         else:
             place, at = whole, whole_at
+        waited = 0 if at.relative < least else waited + 1
+        least = min(least, at.relative)
     return Solution(place, at, control.max_iterations, "")
 
 
 class Measure:
-    """How long ways along a curve are: shares of the unknowns less ``origin``, and of λ."""
+    """How long ways along a curve are: shares of the unknowns less ``origin``, and of λ.
 
-    def __init__(self, farthest: float, origin: Array | None = None) -> None:
+    Unknowns of a norm below ``rounding`` have no size.
+    """
+
+    def __init__(self, farthest: float, origin: Array | None = None, rounding: float = 0.0) -> None:
+        self._rounding = rounding
         self._farthest, self._largest, self.unknowns, self.parameter = farthest, 0.0, 1.0, 1.0
         self.origin = origin
 
@@ -214,6 +263,7 @@ class Measure:
         """Measure from this point on by the size it has."""
         moved = point.unknowns if self.origin is None else point.unknowns - self.origin
         norm = float(np.linalg.norm(moved))
+        norm = norm if norm > self._rounding else 0.0
         self._largest = max(self._largest, norm)
         self.unknowns = max(norm, LEAST_SHARE * self._largest) or 1.0
         self.parameter = max(abs(point.parameter), LEAST_PARAMETER * self._farthest)
@@ -317,30 +367,30 @@ def _correct(
     equations: Equations[L], point: Point, step: Array, measure: Measure, control: StepControl
 ) -> tuple[Point, L, Array] | None:
     """Newton's method across the tangent: the point, the equations there, its tangent in shares."""
-    size = len(point.unknowns)
     first = step / np.linalg.norm(step)
-    wanted = np.zeros((size + 1, 2))
-    wanted[-1, 1] = 1.0
-    # Those of the last Jacobian but one: a last correction does not turn it.
-    along, orientation = first, point.orientation
+    system: Bordered | None = None
+
+    def system_of(at: L) -> Bordered:
+        return Bordered(at.jacobian, at.slope * (measure.parameter / measure.unknowns), first)
 
     def correction_of(at: L) -> Array:
-        nonlocal along, orientation
-        column = at.slope * (measure.parameter / measure.unknowns)
-        wanted[:-1, 0] = -at.residual / measure.unknowns
-        solved, orientation = solve_bordered(at.jacobian, column, first, wanted)
-        correction, tangent = solved.T
-        along = tangent / np.linalg.norm(tangent)
-        return measure.way(correction)
+        nonlocal system
+        system = system_of(at)
+        wanted = np.append(at.residual / -measure.unknowns, 0.0)
+        return measure.way(system.solve(wanted, _left(at)))
 
-    start = np.append(point.unknowns, point.parameter) + measure.way(step)
     found = _newton(
         lambda place: equations(place[:-1], float(place[-1])),
         correction_of,
-        start,
-        NewtonControl(control.tolerance, control.max_iterations, MAX_SHORTENED),
+        np.append(point.unknowns, point.parameter) + measure.way(step),
+        NewtonControl(control.tolerance, control.max_iterations, MAX_SHORTENED, PATIENCE),
     )
     if not found.at.relative <= control.tolerance:
+        return None
+    try:
+        # That of the last Jacobian but one: a last correction does not turn it.
+        along, orientation = _tangent(system or system_of(found.at), len(first))
+    except np.linalg.LinAlgError:
         return None
     place = found.unknowns
     new = Point(
@@ -353,6 +403,14 @@ def _correct(
         relative=found.at.relative,
     )
     return new, found.at, along
+
+
+def _tangent(system: Bordered, size: int) -> tuple[Array, int]:
+    """Direction ``(size,)`` of the curve, and the sign of the determinant, 0 if not known."""
+    wanted = np.zeros(size)
+    wanted[-1] = 1.0
+    tangent = system.solve(wanted, TANGENT_LEFT)
+    return tangent / np.linalg.norm(tangent), system.sign
 
 
 def _adapted(step: float, iterations: int, angle: float, control: StepControl) -> float:
@@ -387,16 +445,17 @@ def follow(
     control: StepControl | None = None,
     on_point: Callable[[Point, L], Refinement[L] | None] | None = None,
     origin: Array | None = None,
+    rounding: float = 0.0,
 ) -> Curve:
     """Follow a curve from a point until λ leaves the ``span``; its last point lies on the end.
 
     ``on_point`` is told every new point; where it answers with finer equations, the point is
     forgotten, and found again with these. Steps are shares of what the unknowns differ from an
-    ``origin``, zero unless given. The start is not repeated among the points. A curve that does not
-    reach an end says why.
+    ``origin``, zero unless given; below a norm of ``rounding`` they do not differ. The start is not
+    repeated among the points. A curve that does not reach an end says why.
     """
     control = control or StepControl()
-    measure, point = Measure(max(map(abs, span)), origin), start
+    measure, point = Measure(max(map(abs, span)), origin, rounding), start
     points: list[Point] = []
     while len(points) < control.max_points:
         measure.take(point)

@@ -18,7 +18,7 @@ from fe_models.dynamics.continuation import (
     solve,
 )
 from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance, HarmonicSolution
-from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from sa_solver.types import Array
 
 # A harmonic left out is added where it has this share of the tolerance: many may sum up.
@@ -180,6 +180,12 @@ def _branch(
     control: StepControl | None,
     accuracy: Accuracy | None,
 ) -> Branch:
+    above = 0.0 if along.varies == "frequency" else -np.inf
+    if not above < span[0] < span[1] < np.inf:
+        raise HarmonicBalanceError(
+            f"a span from {span[0]:g} to {span[1]:g}: give its lower end first, and finite ends, "
+            "above 0 if they are frequencies"
+        )
     control = control or StepControl()
     if isinstance(start, Branch):
         record, point = _Recorder(start.problem, along, accuracy), start.curve.points[-1]
@@ -191,7 +197,15 @@ def _branch(
         point = found
     # Steps are shares of the vibration: the displacement under the constant load may be far larger.
     rest = record.problem.guess(None)
-    curve = follow(along.equations(record.problem), point, span, control, record, rest)
+    curve = follow(
+        along.equations(record.problem),
+        point,
+        span,
+        control,
+        record,
+        rest,
+        record.problem.rounding,
+    )
     return Branch(tuple(record.solutions), curve, record.problem)
 
 

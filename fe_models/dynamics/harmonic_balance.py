@@ -25,28 +25,26 @@ from numba import njit
 
 from fe_models.dynamics.bordered import LinearMap, solve_alone
 from fe_models.dynamics.continuation import (
-    Linearised,
     NewtonControl,
     Solution,
     StepControl,
     first_point,
     follow,
+    relative_norm,
     solve,
 )
-from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution, by_function, by_joint
+from fe_models.dynamics.joint_rest import Rest
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.receptance import ComplexArray, Receptance, SteadyMotion
 from sa_solver.types import Array
 
-# Of rest under a constant load, as shares of what loads and joints do to the joints: a guess that
-# Newton's method on all harmonics improves. More iterations mean that nothing closes.
-REST_TOLERANCE, REST_ITERATIONS = 1e-10, 60
-# First stiffness added to joints that hold nothing, over that of the structure they are held by.
-SOFT = 1e-3
 # Unknowns up to which a matrix is assembled and factorised; beyond, products with it are cheaper.
 DENSE = 400
-# Harmonics left out are looked for up to this multiple of the highest.
-LOOK_BEYOND = 4
+# Harmonics left out are looked for up to this multiple of the highest, and at least to this one.
+LOOK_BEYOND, LOOK_AT_LEAST = 4, 9
+# A vibration below this share of what balances in the mean is rounding: there is none.
+STILL = 1e-12
 
 
 class Cycle(Protocol):
@@ -99,13 +97,51 @@ class PeriodicLoad:
 
 
 @dataclass(frozen=True)
-class Balance(Linearised):
-    """The equations at one motion: the derivative ``by_force`` ``(n,)`` with respect to the force.
+class CycleRecord:
+    """What is kept of a :class:`Cycle`: all but its derivative."""
 
-    ``cycle`` is what the joints do.
+    force: Array
+    samples: Array
+    states: np.ndarray
+    dissipated: Array
+    change: Array
+
+
+@dataclass(frozen=True)
+class Balance:
+    """The equations at one motion: what is left of them ``(n,)``, and derivatives when asked for.
+
+    ``over`` is what varies, frequency or force; ``steady`` the structure at this frequency,
+    ``motion`` ``(k, n)`` that of its modes, ``cycle`` what the joints do, ``size`` the norm of the
+    terms that balance.
     """
 
+    problem: HarmonicBalance
+    over: str
+    steady: SteadyMotion
+    motion: ComplexArray
     cycle: Cycle
+    residual: Array
+    size: float
+
+    @cached_property
+    def relative(self) -> float:
+        return relative_norm(self.residual, self.size)
+
+    @cached_property
+    def jacobian(self) -> Array | LinearMap:
+        """∂r/∂u ``(n, n)``, a matrix up to :data:`DENSE` unknowns."""
+        products = _Jacobian(self.problem, self.steady, self.cycle.jacobian)
+        return products.assembled() if self.problem.size <= DENSE else products
+
+    @cached_property
+    def slope(self) -> Array:
+        """∂r/∂λ ``(n,)``."""
+        problem, steady = self.problem, self.steady
+        if self.over == "force":
+            return -problem.at_joints(steady.respond(problem.wave))
+        turned = steady.turned(self.motion) * (2.0 * np.pi * problem.orders[:, None])
+        return problem.at_joints(steady.respond(turned))
 
 
 @dataclass(frozen=True)
@@ -127,7 +163,7 @@ class HarmonicSolution:
     resolution: Resolution
     coefficients: Array
     motion: ComplexArray
-    cycle: Cycle
+    cycle: CycleRecord
     iterations: int
     residual: float
     left_out: float
@@ -168,6 +204,7 @@ class HarmonicBalance:
         load: PeriodicLoad,
         resolution: Resolution,
         receptance: Receptance | None = None,
+        rest: Rest | None = None,
     ) -> None:
         unknown = sorted(set(load.waves) - set(resolution.harmonics))
         still = load.static is not None and np.any(load.static)
@@ -175,18 +212,24 @@ class HarmonicBalance:
             raise HarmonicBalanceError(
                 f"the load has harmonics {unknown or [0]} that the motion has not: add them"
             )
+        given = [*load.waves.values(), *([] if load.static is None else [load.static])]
+        if not all(np.isfinite(part).all() for part in given):
+            raise HarmonicBalanceError("a force of the load is not a number: give finite ones")
         self.model, self.joints, self.load, self.resolution = model, joints, load, resolution
         self.receptance = receptance or Receptance(model)
         self._directions = joints.directions
         self._joints = len(model.connection) // joints.directions
-        self._orders = np.array(resolution.harmonics, dtype=float)
+        self.orders = np.array(resolution.harmonics, dtype=float)
         self.held = self.receptance.held if resolution.harmonics[0] == 0 else 0.0
-        self._wave = np.zeros((len(self._orders), len(model.mass)), dtype=complex)
+        # Forces on the modes (k, n): those that grow with the force, and the others.
+        self.wave = np.zeros((len(self.orders), len(model.mass)), dtype=complex)
         for harmonic, wave in load.waves.items():
-            self._wave[resolution.harmonics.index(harmonic)] = wave @ self.receptance.at_points
-        self._constant = np.zeros_like(self._wave)
-        if still:
+            self.wave[resolution.harmonics.index(harmonic)] = wave @ self.receptance.at_points
+        self._constant = np.zeros_like(self.wave)
+        if load.static is not None and still:
             self._constant[0] = load.static @ self.receptance.at_points
+        self.rest = rest or Rest(model, self.receptance, joints, self._constant[0].real)
+        self._beyond = _beyond(resolution)
 
     @property
     def size(self) -> int:
@@ -213,8 +256,8 @@ class HarmonicBalance:
         """Unknowns taken from another motion, or those of the structure at rest under its load."""
         if start is None:
             unknowns = np.zeros((self._joints, self.resolution.size, self._directions))
-            if self._constant.any():
-                unknowns[:, 0] = self._rest
+            if self.resolution.harmonics[0] == 0:
+                unknowns[:, 0] = self.rest.displacement
             return unknowns.ravel()
         return self.resolution.adopt(start.coefficients, start.resolution).ravel()
 
@@ -228,8 +271,14 @@ class HarmonicBalance:
         """Newton's method from given unknowns; if it fails, from rest, by raising the force.
 
         A branch is followed for the latter, with the steps of ``control``. The equations of the
-        solution are those with the frequency as parameter.
+        solution are those with the frequency as parameter. Raises :class:`HarmonicBalanceError` for
+        a frequency that is not above zero, and for numbers that are not finite.
         """
+        if not (0.0 < frequency < np.inf and np.isfinite(force)):
+            raise HarmonicBalanceError(
+                f"frequency {frequency:g} Hz, force {force:g}: give a frequency above 0, and both "
+                "finite"
+            )
         control = control or StepControl()
         newton = NewtonControl(control.tolerance)
         found = solve(self.by_frequency(force), unknowns, frequency, newton)
@@ -238,29 +287,46 @@ class HarmonicBalance:
         rising = self.by_force(frequency)
         still = solve(rising, self.guess(None), 0.0, newton)
         if not still.converged:
-            return still
+            return replace(
+                still,
+                message="there is no rest under the constant load, from which the force could be "
+                f"raised: {still.message}, or give a load that does not pull all joints apart",
+            )
         point = first_point(still, 0.0, force > 0.0, control.first)
-        span = -abs(force), abs(force)
-        curve = follow(rising, point, span, control, origin=self.guess(None))
+        # A curve that comes back to no force has turned back, or is closed.
+        span = min(force, 0.0), max(force, 0.0)
+        curve = follow(
+            rising, point, span, control, origin=self.guess(None), rounding=self.rounding
+        )
         if curve.message:
             return replace(found, message=f"raising the force from 0, {curve.message}")
-        return solve(self.by_frequency(force), curve.points[-1].unknowns, frequency, newton)
+        last = curve.points[-1]
+        if last.parameter != force:
+            reached = np.max(np.sign(force) * curve.parameters)
+            return replace(
+                found,
+                message=f"raising the force from 0, the curve turns back at {reached:.6g} and "
+                f"does not reach {abs(force):g}: give more harmonics and samples, or start from a "
+                "solution nearby",
+            )
+        return solve(self.by_frequency(force), last.unknowns, frequency, newton)
 
     def describe(
         self, unknowns: Array, at: Balance, frequency: float, force: float, *, check: bool = False
     ) -> HarmonicSolution:
         """The motion with these unknowns; ``check`` it with twice the samples."""
-        coefficients = self._shaped(unknowns)
-        steady = self.receptance.at(2.0 * np.pi * frequency * self._orders)
-        motion = self._modal_motion(steady, force, at.cycle, unknowns)
-        shares = self.left_out(coefficients, at.cycle, frequency)
+        coefficients, cycle = self._shaped(unknowns), at.cycle
+        record = CycleRecord(
+            cycle.force, cycle.samples, cycle.states, cycle.dissipated, cycle.change
+        )
+        shares = self.left_out(coefficients, record, frequency)
         return HarmonicSolution(
             frequency=frequency,
             force=force,
             resolution=self.resolution,
             coefficients=coefficients,
-            motion=motion @ self.receptance.at_points.T,
-            cycle=at.cycle,
+            motion=at.motion @ self.receptance.at_points.T,
+            cycle=record,
             iterations=0,
             residual=at.relative,
             left_out=float(np.linalg.norm(shares)),
@@ -268,132 +334,113 @@ class HarmonicBalance:
             message="",
         )
 
-    def left_out(self, coefficients: Array, cycle: Cycle, frequency: float) -> Array:
+    def left_out(self, coefficients: Array, cycle: CycleRecord, frequency: float) -> Array:
         """Share of the joints' vibration that each harmonic 0, 1, 2, ... left out would have."""
-        samples = len(cycle.samples)
-        highest = min((samples - 1) // 2, max(LOOK_BEYOND * self.resolution.harmonics[-1], 9))
-        spectrum = np.fft.rfft(cycle.samples.reshape(samples, -1), axis=0)[: highest + 1]
-        spectrum *= 2.0 / samples
-        spectrum[0] *= 0.5
-        spectrum[list(self.resolution.harmonics)] = 0.0
-        steady = self.receptance.at(2.0 * np.pi * frequency * np.arange(highest + 1.0))
-        moved = steady.respond(spectrum @ self.receptance.at_joints)
-        shares = np.linalg.norm(moved @ self.receptance.at_joints.T, axis=1)
-        vibration = _vibration(coefficients, self.resolution)
-        return shares / vibration if vibration > 0.0 else 0.0 * shares
+        beyond, vibration = self._beyond, self._vibration(coefficients)
+        harmonics = np.array(beyond.harmonics)
+        shares = np.zeros(harmonics[-1] + 1)
+        if vibration == 0.0:
+            return shares
+        pull = beyond.weights @ cycle.samples.reshape(beyond.samples, -1)
+        steady = self.receptance.at(2.0 * np.pi * frequency * harmonics)
+        moved = steady.respond(beyond.combined(pull @ self.receptance.at_joints))
+        rows = beyond.separated(moved) @ self.receptance.at_joints.T
+        cosine, sine = beyond.places
+        squares = np.square(rows).sum(axis=1)
+        shares[harmonics] = np.sqrt(squares[cosine] + np.where(sine < 0, 0.0, squares[sine]))
+        shares[list(self.resolution.harmonics)] = 0.0
+        return shares / vibration
 
     def sampling(self, unknowns: Array, frequency: float, force: float) -> float:
         """Change of the joints' vibration by twice the samples, to first order and relative."""
-        vibration = _vibration(self._shaped(unknowns), self.resolution)
+        vibration = self._vibration(self._shaped(unknowns))
         if vibration == 0.0:
             return 0.0
-        twice = self.refined(Resolution(self.resolution.harmonics, 2 * self.resolution.samples))
-        at = twice.evaluate(unknowns, frequency, force, "frequency")
+        at = self._twice.evaluate(unknowns, frequency, force, "frequency")
         change = solve_alone(at.jacobian, at.residual)
-        return _vibration(self._shaped(change), self.resolution) / vibration
+        return self._moved(self._shaped(change)) / vibration
+
+    @cached_property
+    def rounding(self) -> float:
+        """Norm of unknowns that only rounding leaves of what balances in the mean [mm]."""
+        rest, loaded = self.rest.displacement, self.rest.loaded
+        return STILL * float(np.linalg.norm(rest) + np.linalg.norm(loaded))
+
+    def _moved(self, coefficients: Array) -> float:
+        """Norm of coefficients ``(j, m, d)`` without the mean."""
+        return float(np.linalg.norm(coefficients[:, int(self.resolution.harmonics[0] == 0) :]))
+
+    def _vibration(self, coefficients: Array) -> float:
+        """The same, 0 where it is rounding."""
+        moved = self._moved(coefficients)
+        return moved if moved > self.rounding else 0.0
+
+    @cached_property
+    def _twice(self) -> HarmonicBalance:
+        """The same problem with twice the samples."""
+        return self.refined(Resolution(self.resolution.harmonics, 2 * self.resolution.samples))
 
     def refined(self, resolution: Resolution) -> HarmonicBalance:
         """The same problem at another resolution."""
-        return HarmonicBalance(self.model, self.joints, self.load, resolution, self.receptance)
+        return HarmonicBalance(
+            self.model, self.joints, self.load, resolution, self.receptance, self.rest
+        )
 
     def _shaped(self, unknowns: Array) -> Array:
         return unknowns.reshape(self._joints, self.resolution.size, self._directions)
 
-    def moved(self, steady: SteadyMotion, force: Array, unknowns: Array) -> ComplexArray:
-        """Displacements of the modes ``(k, n)`` by joints that pull with ``force`` ``(j, m, d)``.
-
-        It is their ``unknowns`` by which they are held at harmonic 0.
-        """
-        return steady.respond(self._pulled(force, unknowns))
-
-    def _pulled(self, force: Array, unknowns: Array) -> ComplexArray:
-        """Forces on the modes ``(k, n)``, with the opposite sign, of joints held at harmonic 0."""
-        pull = self.resolution.amplitudes(force)
-        if self.held:
-            pull[0] -= self.held * self._shaped(unknowns)[:, 0].ravel()
-        return np.asarray(pull @ self.receptance.at_joints)
-
-    def _modal_motion(
-        self, steady: SteadyMotion, force: float, cycle: Cycle, unknowns: Array
+    def pulled(
+        self, force: Array, unknowns: Array, structure: Receptance | None = None
     ) -> ComplexArray:
-        """Displacements of the modes ``(k, n)`` under the load and the joints' forces."""
-        pulled = self._pulled(cycle.force, unknowns)
-        return steady.respond(self._constant + force * self._wave - pulled)
+        """Forces on the modes ``(k, n)`` by joints that pull with ``force`` ``(j, m, d)``.
+
+        Of the opposite sign. It is their ``unknowns`` by which they are held at harmonic 0.
+        """
+        structure, pull = structure or self.receptance, by_function(force)
+        if self.held:
+            # Of one joint it is the joint's own force, which stays.
+            pull = pull.copy()
+            pull[0] -= self.held * self._shaped(unknowns)[:, 0].ravel()
+        return self.resolution.combined(pull @ structure.at_joints)
 
     def evaluate(self, unknowns: Array, frequency: float, force: float, over: str) -> Balance:
-        """The equations and their derivatives; ``over`` is what varies, frequency or force."""
+        """The equations; ``over`` is what varies in their derivatives, frequency or force."""
         resolution = self.resolution
         coefficients = self._shaped(unknowns)
         cycle = self.joints.settle(
             coefficients, resolution.basis, resolution.weights, resolution.lead
         )
-        steady = self.receptance.at(2.0 * np.pi * frequency * self._orders)
-        motion = self._modal_motion(steady, force, cycle, unknowns)
+        steady = self.receptance.at(2.0 * np.pi * frequency * self.orders)
+        pulled = self.pulled(cycle.force, unknowns)
+        motion = steady.respond(self._constant + force * self.wave - pulled)
         answer = self.at_joints(motion)
-        products = _Jacobian(self, steady, cycle.jacobian)
-        jacobian: Array | LinearMap = products.assembled() if self.size <= DENSE else products
-        if over == "force":
-            slope = -self.at_joints(steady.respond(self._wave))
-        else:
-            turned = steady.turned(motion) * (2.0 * np.pi * self._orders[:, None])
-            slope = self.at_joints(steady.respond(turned))
         size = self._size(coefficients, answer, cycle)
-        return Balance(unknowns - answer, jacobian, slope, size, cycle)
+        return Balance(self, over, steady, motion, cycle, unknowns - answer, size)
 
     def _size(self, coefficients: Array, answer: Array, cycle: Cycle) -> float:
         """Norm of the terms that balance.
 
-        Where only joints hold the structure, any mean displacement balances that of the springs
-        that hold it here: there the terms are what the forces themselves do.
+        Load and joints may cancel at rest: what each does to the mean displacement counts. Where
+        only joints hold the structure, any mean displacement balances that of the springs that
+        hold it here, and does not count.
         """
-        if not self.held:
-            return float(np.linalg.norm(coefficients) + np.linalg.norm(answer))
-        moving = np.linalg.norm(coefficients[:, 1:])
-        moving += np.linalg.norm(self._shaped(answer)[:, 1:])
-        by_joints = np.linalg.norm(self.receptance.still_joints @ cycle.force[:, 0].ravel())
-        return float(moving + by_joints + np.linalg.norm(self._loaded))
+        moving = int(self.held > 0.0)
+        size = np.linalg.norm(coefficients[:, moving:])
+        size += np.linalg.norm(self._shaped(answer)[:, moving:])
+        if self.resolution.harmonics[0] == 0:
+            still = self.receptance.still_joints
+            size += np.linalg.norm(still @ cycle.force[:, 0].ravel())
+            size += np.linalg.norm(self.rest.loaded)
+        return float(size)
 
-    @cached_property
-    def _loaded(self) -> Array:
-        """Mean displacement ``(j d,)`` of the joints under the load without them; held."""
-        still = self.receptance.at(np.zeros(1)).respond(self._constant[:1])
-        return np.asarray((still @ self.receptance.at_joints.T)[0].real)
+    def at_joints(self, motion: ComplexArray, structure: Receptance | None = None) -> Array:
+        """Coefficients ``(j m d,)`` of the joints' displacements, of a motion of the modes.
 
-    @cached_property
-    def _rest(self) -> Array:
-        """Displacement ``(j, d)`` of the joints at rest under the constant load, or a guess of it.
-
-        Newton's method on that alone. Where joints are open, nothing may hold the structure: a
-        spring added to each joint, ever softer, then lets it go as far as it must to close them.
+        The modes are those of this structure, or of another one.
         """
-        compliance, held = self.receptance.still_joints, self.held
-        one = np.ones((1, 1))
-        displacement = np.zeros(len(compliance))
-        softest = 1.0 / float(np.diagonal(compliance).mean())
-        previous, added = np.inf, 10.0 * SOFT * softest
-        for _ in range(REST_ITERATIONS):
-            shaped = displacement.reshape(self._joints, 1, self._directions)
-            cycle = self.joints.settle(shaped, one, one, one)
-            force = cycle.force.ravel() - held * displacement
-            residual = displacement - self._loaded + compliance @ force
-            norm = float(np.linalg.norm(residual))
-            by_joints = float(np.linalg.norm(compliance @ cycle.force.ravel()))
-            if norm <= REST_TOLERANCE * (np.linalg.norm(self._loaded) + by_joints):
-                break
-            added = 0.1 * added if norm < previous else SOFT * softest
-            previous = norm
-            tangents = cycle.jacobian.reshape(self._joints, self._directions, self._directions)
-            tangents = tangents + (added - held) * np.eye(self._directions)
-            by_joint = compliance.reshape(len(compliance), self._joints, self._directions)
-            product = np.einsum("pjd,jde->pje", by_joint, tangents)
-            matrix = np.eye(len(compliance)) + product.reshape(compliance.shape)
-            displacement = displacement - np.linalg.solve(matrix, residual)
-        return displacement.reshape(self._joints, self._directions)
-
-    def at_joints(self, motion: ComplexArray) -> Array:
-        """Coefficients ``(j m d,)`` of the joints' displacements, of a motion of the modes."""
-        moved = motion @ self.receptance.at_joints.T
-        return self.resolution.coefficients(moved, self._directions).ravel()
+        structure = structure or self.receptance
+        rows = self.resolution.separated(motion) @ structure.at_joints.T
+        return by_joint(rows, self._directions).ravel()
 
 
 @dataclass(frozen=True)
@@ -405,12 +452,28 @@ class _Jacobian:
     slopes: Array
 
     def __matmul__(self, vector: Array) -> Array:
-        problem, joints = self.problem, len(self.slopes)
+        joints = len(self.slopes)
         size = self.slopes.shape[1] * self.slopes.shape[2]
-        by_joint = vector.reshape(joints, size, 1)
-        force = (self.slopes.reshape(joints, size, size) @ by_joint).reshape(self.slopes.shape[:3])
-        motion = problem.moved(self.steady, force, vector)
-        return vector + problem.at_joints(motion)
+        columns = vector.reshape(joints, size, 1)
+        force = (self.slopes.reshape(joints, size, size) @ columns).reshape(self.slopes.shape[:3])
+        return vector + self._answer(self.steady, force, vector)
+
+    def nearly_solved(self, vector: Array) -> Array:
+        """The inverse with the joints' stiffness D at rest, for J, times a vector.
+
+        (1 + R (D - κ))⁻¹ = 1 - R' (D - κ), with receptances R' of the structure stiffened by D.
+        """
+        shaped = vector.reshape(self.slopes.shape[:3])
+        return vector - self._answer(self._stiffened, shaped @ self.problem.rest.tangents, vector)
+
+    @cached_property
+    def _stiffened(self) -> SteadyMotion:
+        return self.problem.rest.stiffened.at(self.steady.angular)
+
+    def _answer(self, steady: SteadyMotion, force: Array, vector: Array) -> Array:
+        problem, structure = self.problem, steady.structure
+        motion = steady.respond(problem.pulled(force, vector, structure))
+        return problem.at_joints(motion, structure)
 
     def assembled(self) -> Array:
         problem = self.problem
@@ -439,9 +502,12 @@ class _ByForce:
         return self.problem.evaluate(unknowns, self.frequency, parameter, "force")
 
 
-def _vibration(coefficients: Array, resolution: Resolution) -> float:
-    """Norm of coefficients ``(j, m, d)`` without the mean."""
-    return float(np.linalg.norm(coefficients[:, int(resolution.harmonics[0] == 0) :]))
+def _beyond(resolution: Resolution) -> Resolution:
+    """The harmonics that are left out, as far as they are looked for, and the highest own one."""
+    own = resolution.harmonics
+    highest = min((resolution.samples - 1) // 2, max(LOOK_BEYOND * own[-1], LOOK_AT_LEAST))
+    others = set(range(highest + 1)).difference(own[:-1])
+    return Resolution(tuple(sorted(others)), resolution.samples)
 
 
 @njit(cache=True, nogil=True)

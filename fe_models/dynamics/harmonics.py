@@ -16,6 +16,16 @@ from sa_solver.types import Array
 ComplexArray = np.ndarray
 
 
+def by_function(coefficients: Array) -> Array:
+    """Coefficients ``(j, m, d)`` as ``(m, j d)``."""
+    return coefficients.transpose(1, 0, 2).reshape(coefficients.shape[1], -1)
+
+
+def by_joint(rows: Array, directions: int) -> Array:
+    """The inverse of :func:`by_function`."""
+    return np.ascontiguousarray(rows.reshape(len(rows), -1, directions).transpose(1, 0, 2))
+
+
 class HarmonicBalanceError(ValueError):
     """Harmonics, samples or forces that do not make a problem."""
 
@@ -86,25 +96,32 @@ class Resolution:
         mean = np.eye(1, self.size) if 0 in self.harmonics else self.basis[:0]
         return np.vstack([mean, self.basis[:1]])
 
-    @cached_property
-    def _combination(self) -> ComplexArray:
-        """From coefficients to complex amplitudes ``(k, m)``."""
-        combination = np.zeros((len(self.harmonics), self.size), dtype=complex)
+    def combined(self, rows: Array) -> ComplexArray:
+        """Complex amplitudes ``(k, n)`` of coefficients ``(m, n)``: a cosine less i its sine."""
         cosine, sine = self.places
-        rows = np.arange(len(self.harmonics))
-        combination[rows, cosine] = 1.0
-        combination[rows[sine >= 0], sine[sine >= 0]] = -1j
-        return combination
+        still = int(sine[0] < 0)
+        amplitudes = np.empty((len(cosine), rows.shape[1]), dtype=complex)
+        amplitudes.real = rows[cosine]
+        amplitudes.imag[:still] = 0.0
+        np.negative(rows[sine[still:]], out=amplitudes.imag[still:])
+        return amplitudes
+
+    def separated(self, amplitudes: ComplexArray) -> Array:
+        """The inverse of :meth:`combined`."""
+        cosine, sine = self.places
+        still = int(sine[0] < 0)
+        rows = np.empty((self.size, amplitudes.shape[1]))
+        rows[cosine] = amplitudes.real
+        rows[sine[still:]] = -amplitudes.imag[still:]
+        return rows
 
     def amplitudes(self, coefficients: Array) -> ComplexArray:
         """Complex amplitudes ``(k, j d)`` of coefficients ``(j, m, d)``."""
-        by_joint = self._combination @ coefficients
-        return np.asarray(by_joint.transpose(1, 0, 2).reshape(len(self.harmonics), -1))
+        return self.combined(by_function(coefficients))
 
     def coefficients(self, amplitudes: ComplexArray, directions: int) -> Array:
         """The inverse of :meth:`amplitudes`."""
-        by_joint = amplitudes.reshape(len(self.harmonics), -1, directions).transpose(1, 0, 2)
-        return np.asarray((self._combination.conj().T @ by_joint).real)
+        return by_joint(self.separated(amplitudes), directions)
 
     def adopt(self, coefficients: Array, other: Resolution) -> Array:
         """Coefficients ``(j, m, d)`` for these harmonics of those for others; 0 where it has none.

@@ -22,6 +22,10 @@ ComplexArray = np.ndarray
 # Square of a natural frequency, over the largest one, below which a mode is a rigid motion: above
 # rounding, and far below what any elastic body's first mode is.
 RIGID = 1e-13
+# Stiffness that holds what only joints hold, over that of the structure: soft, so that the balance
+# of forces stands out of the rounding of what the springs take (with 1, 1e-11 of it is left, with
+# this 3e-13 on pads of 121 nodes).
+HELD = 1e-2
 # Damping between different modes, over the largest, below which there is none: rounding.
 DIAGONAL = 1e-10
 
@@ -37,13 +41,16 @@ class SteadyMotion:
     """
 
     def __init__(self, structure: Receptance, angular: Array) -> None:
-        self._of, self._angular = structure, angular
+        self.structure, self.angular = structure, angular
         # The first frequency that is not 0.
         self._moving = int(angular[0] == 0.0)
         moving, damping, squares = angular[self._moving :], structure.damping, structure.squares
-        if damping.ndim == 1:
+        # Whether damping mixes the modes: then their stiffnesses are matrices (k, n, n), and
+        # otherwise their flexibilities are numbers (k, n).
+        self._mixed = damping.ndim == 2
+        if not self._mixed:
             turning = moving[:, None]
-            self._stiffness = squares - turning * turning + 1j * (turning * damping)
+            self._flexibility = 1.0 / (squares - turning * turning + 1j * (turning * damping))
         else:
             turning = moving[:, None, None]
             inertia = np.diag(squares) - turning * turning * np.eye(len(squares))
@@ -53,28 +60,28 @@ class SteadyMotion:
         """Displacements under forces; held at ω = 0."""
         moving, response = self._moving, np.empty(force.shape, dtype=complex)
         if moving:
-            response[0] = sl.cho_solve(self._of.still, force[0].real)
-        if self._stiffness.ndim == 2:
-            np.divide(force[moving:], self._stiffness, out=response[moving:])
+            response[0] = sl.cho_solve(self.structure.still, force[0].real)
+        if not self._mixed:
+            np.multiply(force[moving:], self._flexibility, out=response[moving:])
         else:
             response[moving:] = np.linalg.solve(self._stiffness, force[moving:, :, None])[..., 0]
         return response
 
     def turned(self, motion: ComplexArray) -> ComplexArray:
         """Forces that a motion needs more per rad/s."""
-        damping = self._of.damping
+        damping = self.structure.damping
         own = motion * damping if damping.ndim == 1 else motion @ damping.T
-        return np.asarray(1j * own - 2.0 * self._angular[:, None] * motion)
+        return np.asarray(1j * own - 2.0 * self.angular[:, None] * motion)
 
     def between_joints(self) -> ComplexArray:
         """Displacements of joints by forces on joints ``(k, j d, j d)`` [mm/N]; held at ω = 0."""
-        at_joints, moving = self._of.at_joints, self._moving
+        at_joints, moving = self.structure.at_joints, self._moving
         size = len(at_joints)
-        between = np.empty((len(self._angular), size, size), dtype=complex)
+        between = np.empty((len(self.angular), size, size), dtype=complex)
         if moving:
-            between[0] = self._of.still_joints
-        if self._stiffness.ndim == 2:
-            inverse = 1.0 / self._stiffness[:, None, :]
+            between[0] = self.structure.still_joints
+        if not self._mixed:
+            inverse = self._flexibility[:, None, :]
             # Two real products cost half of a complex one.
             between.real[moving:] = (at_joints * inverse.real) @ at_joints.T
             between.imag[moving:] = (at_joints * inverse.imag) @ at_joints.T
@@ -84,9 +91,12 @@ class SteadyMotion:
 
 
 class Receptance:
-    """What harmonic forces do to a structure, in displacements and forces of its modes."""
+    """What harmonic forces do to a structure, in displacements and forces of its modes.
 
-    def __init__(self, model: DynamicModel) -> None:
+    With ``mixed`` false, damping between different modes is left out.
+    """
+
+    def __init__(self, model: DynamicModel, *, mixed: bool = True) -> None:
         try:
             squares, shapes = sl.eigh(model.stiffness, model.mass)
         except np.linalg.LinAlgError:
@@ -98,10 +108,11 @@ class Receptance:
         rigid = squares < RIGID * squares[-1]
         self.squares = np.where(rigid, 0.0, squares)
         damping = shapes.T @ model.damping @ shapes
-        own = np.diag(damping)
+        own = np.diag(damping).copy()
         across = np.abs(damping - np.diag(own)).max()
+        diagonal = not mixed or across <= DIAGONAL * np.abs(damping).max()
         # Of the modes: (n,), or (n, n) where it mixes them.
-        self.damping = own.copy() if across <= DIAGONAL * np.abs(damping).max() else damping
+        self.damping = own if diagonal else damping
         self.held = self._holding() if rigid.any() else 0.0
         try:
             self.still = sl.cho_factor(
@@ -119,6 +130,10 @@ class Receptance:
         return SteadyMotion(self, angular)
 
     def _holding(self) -> float:
-        """κ, of the size of what the structure itself opposes to its joints."""
-        joints = np.square(self.at_joints).sum()
-        return float(self.squares.sum() / joints) if joints > 0.0 else 0.0
+        """κ, a share of what the structure opposes to its joints where it strains."""
+        strained = self.squares > 0.0
+        at_joints = self.at_joints[:, strained]
+        flexibility = float((np.square(at_joints) / self.squares[strained]).sum())
+        if flexibility > 0.0:
+            return HELD * len(at_joints) / flexibility
+        return 1.0

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models.dynamics.bordered import solve_alone, solve_bordered
+from fe_models.dynamics.bordered import Bordered, NearlySolved, solve_alone, solve_bordered
 from fe_models.dynamics.continuation import (
     Linearised,
     NewtonControl,
@@ -40,14 +40,26 @@ class Products:
     """A matrix known by its products only."""
 
     def __init__(self, matrix):
-        self._matrix, self.asked = matrix, False
+        self._matrix, self.asked, self.products = matrix, False, 0
 
     def __matmul__(self, vector):
+        self.products += 1
         return self._matrix @ vector
 
     def assembled(self):
         self.asked = True
         return self._matrix
+
+
+class LikeAnother(Products):
+    """The same, with the inverse of a matrix that differs in little."""
+
+    def __init__(self, matrix, other):
+        super().__init__(matrix)
+        self._inverse = np.linalg.inv(other)
+
+    def nearly_solved(self, vector):
+        return self._inverse @ vector
 
 
 # λ = u³ - 3 u + 5, with folds at u = ∓1, λ = 7 and 3.
@@ -218,3 +230,77 @@ def test_bordered_systems_by_products_are_those_of_the_matrix(compact):
     assert sign == np.linalg.slogdet(bordered)[0]
     alone = solve_alone(Products(matrix), wanted[:-1, 0])
     assert np.linalg.norm(matrix @ alone - wanted[:-1, 0]) <= 1e-5 * np.linalg.norm(wanted[:, 0])
+
+
+def test_the_inverse_of_a_matrix_that_is_alike_saves_products():
+    """They differ in rank 2; a column and a row around them make it rank 4 at most."""
+    rng = np.random.default_rng(2)
+    noise = rng.standard_normal((200, 200))
+    other = noise + 40.0 * np.eye(200)
+    matrix = other + noise[:, :2] @ noise[:2]
+    column, row, wanted = noise[0], rng.standard_normal(201), rng.standard_normal(201)
+    exact, sign = solve_bordered(matrix, column, row, wanted[:, None])
+    alike, alone = LikeAnother(matrix, other), Products(matrix)
+    assert isinstance(alike, NearlySolved)
+    for products in (alike, alone):
+        found = Bordered(products, column, row).solve(wanted, 1e-9)
+        np.testing.assert_allclose(found, exact[:, 0], atol=1e-7 * np.abs(exact).max())
+        assert not products.asked
+    assert alike.products <= 8 < 20 < alone.products
+    found = solve_alone(alike, wanted[:-1], 1e-9)
+    np.testing.assert_allclose(found, np.linalg.solve(matrix, wanted[:-1]), atol=1e-7)
+    assert Bordered(matrix, column, row).sign == sign
+
+
+def test_an_inverse_that_is_of_no_use_is_done_without():
+    """One that forgets a direction never leads to a solution along it."""
+    rng = np.random.default_rng(4)
+    noise, wanted = rng.standard_normal((200, 2)), rng.standard_normal(200)
+    products = LikeAnother(np.eye(200) + noise @ noise.T, np.eye(200))
+    products._inverse[3, 3] = 0.0
+    found = solve_alone(products, wanted, 1e-9)
+    assert not products.asked
+    np.testing.assert_allclose(products @ found, wanted, atol=1e-7)
+
+
+def test_a_singular_matrix_has_its_smallest_solution():
+    """The second unknown is in no equation."""
+    singular = np.array([[2.0, 0.0], [0.0, 0.0]])
+    np.testing.assert_allclose(solve_alone(singular, np.array([4.0, 0.0])), [2.0, 0.0], atol=EXACT)
+    system = Bordered(singular, np.array([1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+    np.testing.assert_allclose(system.solve(np.array([4.0, 0.0, 1.0])), [1.5, 0.0, 1.0], atol=EXACT)
+    assert system.sign == 0
+
+
+def test_more_may_be_left_by_fewer_products():
+    rng = np.random.default_rng(3)
+    products = Products(np.eye(200) + 0.03 * rng.standard_normal((200, 200)))
+    wanted, asked = rng.standard_normal(200), []
+    for left in (1e-2, 1e-6):
+        products.products = 0
+        found = solve_alone(products, wanted, left)
+        assert np.linalg.norm(products @ found - wanted) <= 1.01 * left * np.linalg.norm(wanted)
+        asked.append(products.products)
+    assert 2 * asked[0] < asked[1]
+
+
+def test_newton_is_given_up_where_it_does_not_come_closer():
+    """It walks to and fro between two slopes."""
+    counted = [0]
+
+    def value(u, p):
+        counted[0] += 1
+        return np.sign(u) * np.sqrt(abs(u)) + 0.0 * p
+
+    # The root's own slope leads from u to -u.
+    to_and_fro = scalar(value, lambda u, p: 0.5 / np.sqrt(abs(u)), lambda u, p: 0.0)
+    for patience, most in ((None, 30), (3, 5)):
+        counted[0] = 0
+        lost = solve(
+            to_and_fro,
+            np.array([1.0]),
+            1.0,
+            NewtonControl(max_iterations=30, max_shortened=0, patience=patience),
+        )
+        assert not lost.converged
+        assert counted[0] <= most + 1

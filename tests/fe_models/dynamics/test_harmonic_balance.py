@@ -125,6 +125,24 @@ def test_a_structure_that_nothing_holds_is_refused():
         Receptance(replace(rig(), mass=np.diag([1.0, 0.0])))
 
 
+# --- Harmonics
+
+
+@pytest.mark.parametrize("harmonics", [(1,), (0, 1, 2), (1, 3, 7), (0, 5)])
+def test_coefficients_and_complex_amplitudes_are_the_same_function_of_time(harmonics):
+    resolution = Resolution(harmonics, 32)
+    rows = np.random.default_rng(9).standard_normal((resolution.size, 6))
+    amplitudes = resolution.combined(rows)
+    turns = 2.0 * np.pi * np.outer(np.arange(32), harmonics) / 32
+    in_time = (np.exp(1j * turns) @ amplitudes).real
+    np.testing.assert_allclose(resolution.basis @ rows, in_time, atol=1e-13)
+    np.testing.assert_allclose(resolution.weights @ in_time, rows, atol=1e-13)
+    np.testing.assert_array_equal(resolution.separated(amplitudes), rows)
+    by_joint = np.random.default_rng(10).standard_normal((3, resolution.size, 2))
+    again = resolution.coefficients(resolution.amplitudes(by_joint), 2)
+    np.testing.assert_array_equal(again, by_joint)
+
+
 # --- The equations
 
 
@@ -175,6 +193,52 @@ def test_products_with_the_jacobian_are_those_of_the_matrix(case, monkeypatch):
     )
     branch = along_frequency(problem, force, (85.0, 95.0))
     assert branch.message == ""
+
+
+@pytest.mark.parametrize("free", [False, True])
+def test_stuck_joints_are_undone_by_their_stiffness(free):
+    """Where joints do as at rest, the inverse that is known is that of the Jacobian."""
+    model = contact_rig()
+    if not free:
+        model = replace(model, stiffness=np.diag([500.0, 700.0, 900.0]))
+    load = pressed(model, 8.0, 1.0)
+    problem = balance(model, PeriodicMarch(FrictionContact(300.0, 400.0, 0.5)), (0, 1, 2), 64, load)
+    assert (problem.held > 0.0) == free
+    motion = problem.solve(30.0, 0.1)
+    assert np.all(motion.cycle.states == STICK)
+    at = problem.evaluate(motion.coefficients.ravel(), 30.0, 0.1, "frequency")
+    products = harmonic_balance._Jacobian(problem, at.steady, at.cycle.jacobian)
+    vector = np.random.default_rng(8).standard_normal(problem.size)
+    np.testing.assert_allclose(products.nearly_solved(products @ vector), vector, atol=1e-9)
+
+
+def test_a_solution_keeps_no_derivatives():
+    """They would be megabytes for each point of a curve."""
+    solution = balance(rig()).solve(90.0, 60.0)
+    assert not hasattr(solution.cycle, "jacobian")
+    assert solution.cycle.samples.shape == (256, 1, 1)
+
+
+def test_harmonics_left_out_are_what_their_forces_would_cause():
+    """Harmonic by harmonic, by the transform of the forces and the dynamic stiffness."""
+    model = replace(mixed_rig(), stiffness=np.diag([1300.0, 800.0, 700.0]))
+    load = PeriodicLoad({1: unit_force(model, "x") * (1.0 - 2j) + unit_force(model, "z") * 3.0})
+    joints = PeriodicMarch(FrictionContact(300.0, 400.0, 0.5, gap=0.001))
+    problem = balance(model, joints, (1, 3), 64, load)
+    motion = problem.solve(40.0, 2.0)
+    assert motion.converged
+    shares = problem.left_out(motion.coefficients, motion.cycle, 40.0)
+    spectrum = np.fft.rfft(motion.cycle.samples[:, 0], axis=0) / 32.0
+    spectrum[0] *= 0.5
+    vibration = np.linalg.norm(motion.coefficients)
+    assert len(shares) == 13
+    for harmonic, share in enumerate(shares):
+        omega = 2.0 * np.pi * 40.0 * harmonic
+        dynamic = model.stiffness + 1j * omega * model.damping - omega**2 * model.mass
+        moved = model.connection @ np.linalg.solve(dynamic, model.connection.T @ spectrum[harmonic])
+        wanted = 0.0 if harmonic in (1, 3) else np.linalg.norm(moved) / vibration
+        assert share == pytest.approx(wanted, rel=1e-9)
+    assert motion.left_out == pytest.approx(np.linalg.norm(shares), rel=EXACT)
 
 
 # --- Linear limits
@@ -387,6 +451,9 @@ def test_contact_that_opens_and_closes_balances_in_the_mean():
     last = branch.solutions[-1]
     assert {SLIP, SEPARATED} <= set(np.unique(last.cycle.states))
     assert last.cycle.samples[:, 0, 2].mean() == pytest.approx(8.0, rel=1e-8)
+    np.testing.assert_allclose(
+        last.cycle.force[0], problem.resolution.weights @ last.cycle.samples[:, 0], atol=1e-12
+    )
     assert last.cycle.samples[:, 0, 2].min() == 0.0
 
 

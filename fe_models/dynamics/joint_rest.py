@@ -1,0 +1,116 @@
+"""Joints of a structure at rest under a constant load, and the structure with their stiffness."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cached_property
+from typing import Protocol
+
+import numpy as np
+
+from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.model import DynamicModel
+from fe_models.dynamics.receptance import Receptance
+from sa_solver.types import Array
+
+# Of rest under a constant load, as shares of what loads and joints do to the joints: a guess that
+# Newton's method on all harmonics improves. More iterations mean that nothing closes.
+TOLERANCE, MAX_ITERATIONS = 1e-12, 60
+# First stiffness added to joints that hold nothing, over that of the structure they are held by.
+SOFT = 1e-3
+# Of a period without motion.
+SMALL_SAMPLES = 8
+
+
+class StillCycle(Protocol):
+    """Forces of joints and their derivative; see :class:`StillJoints`."""
+
+    @property
+    def force(self) -> Array: ...
+    @property
+    def jacobian(self) -> Array: ...
+
+
+class StillJoints(Protocol):
+    """Joints led round a period; :class:`fe_models.dynamics.harmonic_balance.PeriodicJoints`."""
+
+    @property
+    def directions(self) -> int: ...
+    def settle(
+        self, coefficients: Array, basis: Array, weights: Array, lead: Array | None
+    ) -> StillCycle: ...
+
+
+class Rest:
+    """The joints at rest under a constant load ``(n,)`` on the modes."""
+
+    def __init__(
+        self, model: DynamicModel, receptance: Receptance, joints: StillJoints, load: Array
+    ) -> None:
+        self._model, self._receptance, self._joints, self._load = model, receptance, joints, load
+        self._shape = len(model.connection) // joints.directions, joints.directions
+
+    @cached_property
+    def loaded(self) -> Array:
+        """Displacement ``(j d,)`` of the joints under the load without them; held."""
+        still = self._receptance.at(np.zeros(1)).respond(self._load[None])
+        return np.asarray((still @ self._receptance.at_joints.T)[0].real)
+
+    @cached_property
+    def displacement(self) -> Array:
+        """Displacement ``(j, d)`` of the joints at rest, or a guess of it; 0 without a load.
+
+        Newton's method. Where joints are open, nothing may hold the structure: a spring added to
+        each joint, ever softer, then lets it go as far as it must to close them.
+        """
+        if not self._load.any():
+            return np.zeros(self._shape)
+        compliance, held = self._receptance.still_joints, self._receptance.held
+        displacement = np.zeros(len(compliance))
+        softest = 1.0 / float(np.diagonal(compliance).mean())
+        previous, added = np.inf, 10.0 * SOFT * softest
+        for _ in range(MAX_ITERATIONS):
+            cycle = self._settled(displacement)
+            force = cycle.force.ravel() - held * displacement
+            residual = displacement - self.loaded + compliance @ force
+            norm = float(np.linalg.norm(residual))
+            by_joints = float(np.linalg.norm(compliance @ cycle.force.ravel()))
+            if norm <= TOLERANCE * (np.linalg.norm(self.loaded) + by_joints):
+                break
+            added = 0.1 * added if norm < previous else SOFT * softest
+            previous = norm
+            tangents = cycle.jacobian.reshape(*self._shape, self._shape[1])
+            springs = tangents + (added - held) * np.eye(self._shape[1])
+            by_joint = compliance.reshape(len(compliance), *self._shape)
+            product = np.einsum("pjd,jde->pje", by_joint, springs)
+            matrix = np.eye(len(compliance)) + product.reshape(compliance.shape)
+            displacement = displacement - np.linalg.solve(matrix, residual)
+        return displacement.reshape(self._shape)
+
+    @cached_property
+    def tangents(self) -> Array:
+        """Symmetric stiffness ``(j, d, d)`` [N/mm] of the joints against small motions from rest.
+
+        Not that of the way to rest, on which a joint may have touched last.
+        """
+        mean_and_wave = Resolution((0, 1), SMALL_SAMPLES)
+        coefficients = np.zeros((self._shape[0], mean_and_wave.size, self._shape[1]))
+        coefficients[:, 0] = self.displacement
+        cycle = self._joints.settle(
+            coefficients, mean_and_wave.basis, mean_and_wave.weights, mean_and_wave.lead
+        )
+        own = cycle.jacobian[:, 1, :, 1]
+        return np.asarray(0.5 * (own + own.transpose(0, 2, 1)))
+
+    @cached_property
+    def stiffened(self) -> Receptance:
+        """The structure with springs of these :attr:`tangents`; damping between modes left out."""
+        by_joint = self._model.connection.reshape(*self._shape, -1)
+        pulled = (self.tangents @ by_joint).reshape(self._model.connection.shape)
+        stiffness = self._model.stiffness + self._model.connection.T @ pulled
+        return Receptance(replace(self._model, stiffness=stiffness), mixed=False)
+
+    def _settled(self, displacement: Array) -> StillCycle:
+        one = np.ones((1, 1))
+        joints, directions = self._shape
+        return self._joints.settle(displacement.reshape(joints, 1, directions), one, one, one)
