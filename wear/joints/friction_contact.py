@@ -56,7 +56,7 @@ LONGEST = 300.0  # L: nothing is left of the angle long before, and exp(-2 L) is
 LAST = 1e-9  # of the limit at which a lift-off is taken to be over: its square is below rounding
 CLOSE = 0.03  # of (b - a)/(b + a): below it the logarithmic mean is a series
 TERMS = 5  # of this series: CLOSE**(2 TERMS) is below rounding
-NEGLIGIBLE = 40.0  # exponent: exp(-40) is below rounding
+NEGLIGIBLE = 36.0  # exponent: exp(-36) is rounding
 PANEL = 0.8  # of the exponent per panel: six points leave 1e-14 of tanh there
 PANELS = 1000  # more than any finite path asks for: a diverged one must still come to an end
 NODES, WEIGHTS = (0.5 * rule for rule in np.polynomial.legendre.leggauss(6))
@@ -221,10 +221,16 @@ def _lost_in_slip(path: Path, slip: Slip) -> float:
     """
     left = 1.0 - slip.held
     straight = 0.5 * (slip.limit + path.end) * (slip.pull - path.end + path.start) * left
-    if slip.away == 0.0 or slip.length == 0.0:
+    if slip.away == 0.0 or slip.length == 0.0 or straight <= 0.0:
         return max(straight, 0.0)
     growth, decay = 2.0 * log(path.end / slip.limit), 2.0 * slip.length
-    share = (NEGLIGIBLE + max(log(slip.away / slip.toward), 0.0)) / (decay - growth)
+    # What is left of the integral at η is at most R0² (1 - cos ψ0)/(1 + cos ψ0) exp((growth -
+    # decay) η). Up to where that is negligible beside the rest; for a force along the pull, nowhere.
+    most = slip.limit * slip.limit * slip.away / slip.toward
+    exponent = NEGLIGIBLE + log(most / straight)
+    if exponent <= 0.0:
+        return straight
+    share = exponent / (decay - growth)
     if not 0.0 < share < 1.0:
         share = 1.0
     asked = share * max(abs(growth), decay) / PANEL
