@@ -289,11 +289,12 @@ def _outline(case: Case) -> list[tuple[str, str]]:
         SpecimensCase,
         VibrationCase,
         WearCase,
+        WornFrictionRigCase,
         WornVibrationCase,
     )
 
-    own = SpecimensCase | JointCase | RigCase | VibrationCase | WornVibrationCase
-    if isinstance(case, own):
+    vibrating = VibrationCase | WornVibrationCase | WornFrictionRigCase
+    if isinstance(case, SpecimensCase | JointCase | RigCase | vibrating):
         return case.outline()
     return _wear_outline(case) if isinstance(case, WearCase) else _contact_outline(case)
 

@@ -14,6 +14,7 @@ from workflow.case import (
     SpecimensCase,
     VibrationCase,
     WearCase,
+    WornFrictionRigCase,
     WornVibrationCase,
 )
 from workflow.case.rig_structure import ReducedBody
@@ -54,6 +55,8 @@ def required_bytes(
         return BYTES * _kept_of_motions(case, structure_nodes, max(interface_nodes, 1)) + REST
     if isinstance(case, WornVibrationCase):
         return required_bytes(case.with_joint(1.0, 1.0, 1.0))
+    if isinstance(case, WornFrictionRigCase):
+        return required_bytes(case.unworn)
     if isinstance(case, SpecimensCase):
         pad = 3 * (case.mesh.pad_elements + 1) ** 2
         factors = FACTOR_BYTES * (structure_nodes / FACTOR_NODES) ** FACTOR_POWER
@@ -108,7 +111,7 @@ def _remedy(case: WearCase | Case) -> str:
     """What makes a case smaller."""
     if isinstance(case, JointCase | RigCase):
         return "raise integration.step, or shorten what is recorded"
-    if isinstance(case, VibrationCase | WornVibrationCase):
+    if isinstance(case, VibrationCase | WornVibrationCase | WornFrictionRigCase):
         return "lower resolution.samples or resolution.harmonics"
     if isinstance(case, SpecimensCase):
         return "lower mesh.pad_elements, mesh.order or contact.grid, or raise mesh.size"

@@ -12,6 +12,7 @@ from workflow.case import (
     SpecimensCase,
     VibrationCase,
     WearCase,
+    WornFrictionRigCase,
     WornVibrationCase,
 )
 from workflow.errors import UserError
@@ -73,6 +74,10 @@ def _run(case: Case, folder: OutputFolder, resume: bool) -> None:
             from workflow.worn_vibration_run import run_worn_vibration
 
             run_worn_vibration(case, folder, reporter)
+        elif isinstance(case, WornFrictionRigCase):
+            from workflow.worn_vibration_rig_run import run_worn_friction_rig
+
+            run_worn_friction_rig(case, folder, reporter)
         else:
             from workflow.contact_run import run_contact
 

@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import h5py
-import numpy as np
 
-from sa_solver.types import Array
 from workflow.case import dump_case
 from workflow.folder import OutputFolder
 from workflow.reporter import Reporter
@@ -25,10 +21,9 @@ from workflow.vibration_outcome import (
     Response,
     VibrationOutcome,
 )
+from workflow.vibration_store import put, write_table
 
 RESPONSES, CONTACT, LINEAR, BACKBONE = "responses", "contact", "linear", "backbone"
-# Datasets larger than this are worth packing.
-LARGE = 4096
 TO_MICRONS, PER_MICRON = 1e3, 1e-3  # mm to µm, N/mm to N/µm
 
 
@@ -72,10 +67,10 @@ def _write_results(outcome: VibrationOutcome, path: Path) -> None:
         file.attrs.update({"title": case.title, "analysis": case.analysis, "law": case.joint.law})
         file.attrs["seen"] = list(outcome.labels)
         file.create_group("case").attrs.update({"text": dump_case(case)} | versions())
-        linear = _put(file, LINEAR, LINEAR, outcome.linear)
+        linear = put(file, LINEAR, outcome.linear, DATASETS[LINEAR])
         linear.attrs.update({name: outcome.numbers[name] for name in ("free", "stuck", "sliding")})
         if outcome.contact is not None:
-            _put(file, CONTACT, CONTACT, outcome.contact)
+            put(file, CONTACT, outcome.contact, DATASETS[CONTACT])
         for number, response in enumerate(outcome.responses):
             _put_response(file, f"{RESPONSES}/{number:05d}", response)
         if outcome.backbone is not None:
@@ -83,11 +78,11 @@ def _write_results(outcome: VibrationOutcome, path: Path) -> None:
 
 
 def _put_response(file: h5py.File, place: str, response: Response) -> None:
-    group = _put(file, place, RESPONSES, response.curves)
+    group = put(file, place, response.curves, DATASETS[RESPONSES])
     group.attrs.update({"force": response.force, **response.numbers})
     for kind, values in ((NODES, response.nodes), (RESONANCE, response.resonance)):
         if values is not None:
-            _put(file, f"{place}/{kind}", kind, values)
+            put(file, f"{place}/{kind}", values, DATASETS[kind])
     for number, loop in enumerate(response.loops):
         _put_curves(file, f"{place}/{LOOPS}/{number:05d}", LOOPS, loop)
 
@@ -95,16 +90,7 @@ def _put_response(file: h5py.File, place: str, response: Response) -> None:
 def _put_curves(file: h5py.File, place: str, kind: str, curves: Curves) -> None:
     """Curves and their numbers; those that there are not are left out."""
     numbers = {name: value for name, value in curves.numbers.items() if value is not None}
-    _put(file, place, kind, curves.values).attrs.update(numbers)
-
-
-def _put(file: h5py.File, place: str, kind: str, curves: Mapping[str, Array]) -> h5py.Group:
-    """Write the curves of one kind, each with its unit and description."""
-    for name, values in curves.items():
-        packed = {"compression": "gzip", "compression_opts": 1} if values.size > LARGE else {}
-        dataset = file.create_dataset(f"{place}/{name}", data=values, **packed)
-        dataset.attrs["unit"], dataset.attrs["description"] = DATASETS[kind][name]
-    return file[place]
+    put(file, place, curves.values, DATASETS[kind]).attrs.update(numbers)
 
 
 # --- tables -------------------------------------------------------------------------------------
@@ -113,27 +99,11 @@ def _put(file: h5py.File, place: str, kind: str, curves: Mapping[str, Array]) ->
 def _write_tables(outcome: VibrationOutcome, root: Path) -> None:
     """Responses, loops (the finest of each force) and backbone as CSV in base units."""
     for number, response in enumerate(outcome.responses):
-        _write_table(root / f"frf_{number:05d}.csv", RESPONSES, response.curves)
+        write_table(root / f"frf_{number:05d}.csv", response.curves, DATASETS[RESPONSES])
         if response.loops:
-            _write_table(root / f"loop_{number:05d}.csv", LOOPS, response.loops[-1].values)
+            write_table(root / f"loop_{number:05d}.csv", response.loops[-1].values, DATASETS[LOOPS])
     if outcome.backbone is not None:
-        _write_table(root / f"{BACKBONE}.csv", BACKBONE, outcome.backbone.values)
-
-
-def _write_table(path: Path, kind: str, curves: Mapping[str, Array]) -> None:
-    """Curves as columns, of what has several values at a point one for each."""
-    columns: dict[str, Array] = {}
-    for name, values in curves.items():
-        unit = DATASETS[kind][name][0]
-        if values.ndim == 1:
-            columns[f"{name} [{unit}]"] = values
-        else:
-            columns |= {f"{name}_{n} [{unit}]": own for n, own in enumerate(values.T, start=1)}
-    with replacing(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        for row in np.column_stack(list(columns.values())):
-            writer.writerow([f"{value:.9g}" for value in row])
+        write_table(root / f"{BACKBONE}.csv", outcome.backbone.values, DATASETS[BACKBONE])
 
 
 # --- summary ------------------------------------------------------------------------------------

@@ -261,12 +261,13 @@ def _loops(
         if not motion.converged:
             reporter.warn(f"{start.force:g} N: no loop at {frequency:g} Hz: {motion.message}")
             continue
-        loops.append(_loop(case, model, motion))
+        loops.append(loop_of(case, model, motion))
         start = motion
     return tuple(loops)
 
 
-def _loop(case: VibrationCase, model: VibrationModel, motion: HarmonicSolution) -> Curves:
+def loop_of(case: VibrationCase, model: VibrationModel, motion: HarmonicSolution) -> Curves:
+    """The loop of all joints together in a motion."""
     rig = model.rig
     if rig.stretch is None:
         mean = motion.coefficients[:, :, rig.along].mean(axis=0)

@@ -9,13 +9,15 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array, Grid
-from workflow.case import WornVibrationCase
+from workflow.case.worn_vibration_case import WornResponse
 from workflow.vibration_outcome import DATASETS as VIBRATION
 from workflow.vibration_outcome import Response
 
 # Groups of a state, and the one that holds the states.
 CONTACT, SLIDERS, RESPONSES = "contact", "sliders", "responses"
 LOOP, HALF_SPACE = "loop", "half_space_loop"
+# The same of specimens, whose contact is at nodes, and the group of what does not wear.
+NODES, PLACES = "nodes", "places"
 WORN, EVOLUTION = "worn", "evolution"
 
 
@@ -34,15 +36,19 @@ class WornState:
 
 @dataclass(frozen=True)
 class WornVibrationOutcome:
-    """All states of a run, the unworn one first, and the ``grid`` of the contact."""
+    """All states of a run, the unworn one first.
 
-    case: WornVibrationCase
-    grid: Grid
+    The contact is on a ``grid``, or at nodes with ``places``: of :data:`DATASETS`.
+    """
+
+    case: WornResponse
     states: tuple[WornState, ...]
+    grid: Grid | None = None
+    places: Mapping[str, Array] | None = None
 
     @property
     def evolution(self) -> dict[str, Array]:
-        """Numbers that every state has, against cycles: of :data:`DATASETS`."""
+        """Numbers that every state of this kind has, against cycles: of :data:`DATASETS`."""
 
         def column(name: str) -> Array:
             return np.array([state.numbers[name] for state in self.states])
@@ -50,7 +56,7 @@ class WornVibrationOutcome:
         def by_force(name: str) -> Array:
             return np.array([[own.numbers[name] for own in s.responses] for s in self.states])
 
-        names = [name for name in DATASETS[EVOLUTION] if name not in BY_FORCE]
+        names = [name for name in DATASETS[EVOLUTION] if name in self.states[0].numbers]
         columns = {name: column(name) for name in names}
         return columns | {name: by_force(name) for name in BY_FORCE}
 
@@ -75,8 +81,21 @@ DATASETS: dict[str, dict[str, tuple[str, str]]] = {
         "normal_load": ("N", "that presses it"),
         "energy": ("N mm", "that it dissipates in a cycle under the force that wears"),
     },
+    PLACES: {
+        "x": ("mm", "of each node on the contact plane"),
+        "y": ("mm", "of each node on the contact plane"),
+        "area": ("mm^2", "that belongs to each node"),
+    },
+    NODES: {
+        "gap": ("mm", "of the worn bodies without load"),
+        "depth_1": ("mm", "worn from body 1"),
+        "depth_2": ("mm", "worn from body 2"),
+        "normal_force": ("N", "of each node at rest"),
+        "path": ("mm", "of slip in a cycle under the force that wears"),
+        "energy": ("N mm", "that each node dissipates in such a cycle"),
+    },
     LOOP: {
-        "displacement": ("mm", "of the joint in a cycle under the force that wears"),
+        "displacement": ("mm", "of the joint, or between the targets, under the force that wears"),
         "force": ("N", "of the joint along it"),
     },
     HALF_SPACE: {
@@ -90,9 +109,10 @@ DATASETS: dict[str, dict[str, tuple[str, str]]] = {
         "volume": ("mm^3", "worn from both bodies"),
         "depth": ("mm", "largest of both bodies together"),
         "area": ("mm^2", "in contact at rest"),
+        "touching": ("1", "nodes in contact at rest"),
         "peak_pressure": ("MPa", "at rest"),
         "friction": ("1", "coefficient"),
-        "stiffness": ("N/mm", "of the stuck contact"),
+        "stiffness": ("N/mm", "of the stuck contact; between targets, that of the loop"),
         "full_slip": ("mm", "motion of the joint from rest at which all of it slides"),
         "stroke": ("mm", "of the joint from end to end, under the force that wears"),
         "energy_per_cycle": ("N mm", "under the force that wears"),

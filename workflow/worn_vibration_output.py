@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -11,23 +10,24 @@ from typing import Any
 import h5py
 import numpy as np
 
-from sa_solver.types import Array
 from workflow.case import dump_case
 from workflow.folder import OutputFolder
 from workflow.reporter import Reporter
 from workflow.store import replacing
 from workflow.versions import versions
+from workflow.vibration_store import put, write_table
 from workflow.worn_vibration_outcome import (
     DATASETS,
     EVOLUTION,
+    PLACES,
     RESPONSES,
     WORN,
     WornState,
     WornVibrationOutcome,
 )
 
-# Datasets larger than this are worth packing.
-LARGE = 4096
+# What rises, falls, or neither, beside the resonance under the least force.
+TRENDS = ("stiffness", "peak_pressure", "touching")
 # N mm to J, N/mm to N/µm, mm to µm.
 JOULES, PER_MICRON, MICRONS = 1e-3, 1e-3, 1e3
 
@@ -56,32 +56,26 @@ def write_worn_vibration_output(
 
 
 def _write_results(outcome: WornVibrationOutcome, path: Path) -> None:
-    case, grid = outcome.case, outcome.grid
+    case = outcome.case
     with replacing(path) as partial, h5py.File(partial, "w") as file:
         file.attrs.update({"title": case.title, "analysis": case.analysis})
         file.attrs["forces"] = list(case.forces)
         file.create_group("case").attrs.update({"text": dump_case(case)} | versions())
-        file.create_group("grid").attrs.update({"shape": grid.shape, "pitch": grid.pitch})
-        _put(file, EVOLUTION, EVOLUTION, outcome.evolution)
+        if outcome.grid is not None:
+            own = {"shape": outcome.grid.shape, "pitch": outcome.grid.pitch}
+            file.create_group("grid").attrs.update(own)
+        if outcome.places is not None:
+            put(file, PLACES, outcome.places, DATASETS[PLACES])
+        put(file, EVOLUTION, outcome.evolution, DATASETS[EVOLUTION])
         for number, state in enumerate(outcome.states):
             place = f"{WORN}/{number:05d}"
             file.create_group(place).attrs.update(state.numbers)
             for kind, values in state.fields.items():
-                _put(file, f"{place}/{kind}", kind, values)
+                put(file, f"{place}/{kind}", values, DATASETS[kind])
             for response_number, response in enumerate(state.responses):
-                group = _put(
-                    file, f"{place}/{RESPONSES}/{response_number:05d}", RESPONSES, response.curves
-                )
+                within = f"{place}/{RESPONSES}/{response_number:05d}"
+                group = put(file, within, response.curves, DATASETS[RESPONSES])
                 group.attrs.update({"force": response.force, **response.numbers})
-
-
-def _put(file: h5py.File, place: str, kind: str, values: Mapping[str, Array]) -> h5py.Group:
-    """Write the datasets of one kind, each with its unit and description."""
-    for name, own in values.items():
-        packed = {"compression": "gzip", "compression_opts": 1} if own.size > LARGE else {}
-        dataset = file.create_dataset(f"{place}/{name}", data=own, **packed)
-        dataset.attrs["unit"], dataset.attrs["description"] = DATASETS[kind][name]
-    return file[place]
 
 
 # --- tables -------------------------------------------------------------------------------------
@@ -89,26 +83,11 @@ def _put(file: h5py.File, place: str, kind: str, values: Mapping[str, Array]) ->
 
 def _write_tables(outcome: WornVibrationOutcome, root: Path) -> None:
     """The evolution, and the responses of every state to every force, as CSV in base units."""
-    _write_table(root / f"{EVOLUTION}.csv", EVOLUTION, outcome.evolution)
+    write_table(root / f"{EVOLUTION}.csv", outcome.evolution, DATASETS[EVOLUTION])
     for number, state in enumerate(outcome.states):
         for force, response in enumerate(state.responses):
-            _write_table(root / f"frf_{number:05d}_{force:05d}.csv", RESPONSES, response.curves)
-
-
-def _write_table(path: Path, kind: str, curves: Mapping[str, Array]) -> None:
-    """Curves as columns, of what has several values at a point one for each."""
-    columns: dict[str, Array] = {}
-    for name, values in curves.items():
-        unit = DATASETS[kind][name][0]
-        if values.ndim == 1:
-            columns[f"{name} [{unit}]"] = values
-        else:
-            columns |= {f"{name}_{n} [{unit}]": own for n, own in enumerate(values.T, start=1)}
-    with replacing(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow(columns)
-        for row in np.column_stack(list(columns.values())):
-            writer.writerow([f"{value:.9g}" for value in row])
+            path = root / f"frf_{number:05d}_{force:05d}.csv"
+            write_table(path, response.curves, DATASETS[RESPONSES])
 
 
 # --- summary ------------------------------------------------------------------------------------
@@ -124,7 +103,8 @@ def _summary(outcome: WornVibrationOutcome, reporter: Reporter) -> dict[str, Any
         "states": [_of_state(state) for state in states],
         "trend": {
             name: _trend([state.numbers[name] for state in states])
-            for name in ("stiffness", "peak_pressure")
+            for name in TRENDS
+            if name in states[0].numbers
         }
         | {"resonance": _trend([state.responses[0].numbers["resonance"] for state in states])},
         "warnings": reporter.warnings,

@@ -88,7 +88,7 @@ def _outcome(case: WornVibrationCase, reporter: Reporter) -> WornVibrationOutcom
             state, done = worn.state, cycles
             states.append(keeper.keep(state, cycles, worn.steps))
             progress.update(cycles, len(states) - 1)
-    return WornVibrationOutcome(case, contact.grid, tuple(states))
+    return WornVibrationOutcome(case, tuple(states), grid=contact.grid)
 
 
 def contact_case(file: str) -> BodiesWearCase:

@@ -206,7 +206,8 @@ def template_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "loads.csv").write_text(LOADS, encoding="utf-8")
     for body in (1, 2):
         (folder / f"nodes_{body}.csv").write_text(NODES, encoding="utf-8")
-    (folder / "specimens_wear.yaml").touch()
+    for name in ("specimens_wear.yaml", "specimens_rig.yaml"):
+        (folder / name).touch()
     return folder
 
 

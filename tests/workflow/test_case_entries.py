@@ -133,7 +133,7 @@ EVOLUTION = {
 }
 GIVEN["joint"] = {"joint": JOINTS, **EVOLUTION, "reported": {ALWAYS: TOLD}}
 GIVEN["vibration"] = {"joint": JOINTS}
-GIVEN["worn_vibration"] = {}
+GIVEN["worn_vibration"] = GIVEN["worn_friction_rig"] = {}
 CONTACT = {"law": "friction_contact", **JOINT, "normal_load": 0, "normal_stiffness": 1e4}
 REDUCED = {
     "kind": "reduced",

@@ -12,7 +12,7 @@ from workflow.case.template import KINDS, template
 from workflow.case.time_case import JointCase, RigCase, TimeCase
 from workflow.case.vibration_case import VibrationCase
 from workflow.case.wear_case import WearCase
-from workflow.case.worn_vibration_case import WornVibrationCase
+from workflow.case.worn_vibration_case import WornFrictionRigCase, WornVibrationCase
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError
 
@@ -33,6 +33,7 @@ __all__ = [
     "TimeCase",
     "VibrationCase",
     "WearCase",
+    "WornFrictionRigCase",
     "WornVibrationCase",
     "dump_case",
     "json_schema",

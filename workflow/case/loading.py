@@ -25,7 +25,7 @@ from workflow.case.source import KeyPath, Source, dotted, read_text
 from workflow.case.specimens_case import SpecimensCase
 from workflow.case.time_case import JointCase, RigCase
 from workflow.case.vibration_case import VibrationCase
-from workflow.case.worn_vibration_case import WornVibrationCase
+from workflow.case.worn_vibration_case import WornFrictionRigCase, WornVibrationCase
 from workflow.errors import CaseError
 
 
@@ -66,6 +66,11 @@ TIME_CASES: dict[str, type[Case]] = {
     "rig": RigCase,
     "reduced": RigCase,
 }
+# Vibration cases with wear by what holds the contact.
+WORN_CASES: dict[str, type[Case]] = {
+    "rig": WornVibrationCase,
+    "friction_rig": WornFrictionRigCase,
+}
 
 
 def _kind_of_case(source: Source) -> type[Case]:
@@ -75,8 +80,7 @@ def _kind_of_case(source: Source) -> type[Case]:
         return TIME_CASES[_choice(source, ("structure", "kind"), tuple(TIME_CASES))]
     if analysis == "vibration":
         if source.at(("wear",)) is not None:
-            _choice(source, ("structure", "kind"), ("rig",))
-            return WornVibrationCase
+            return WORN_CASES[_choice(source, ("structure", "kind"), tuple(WORN_CASES))]
         _choice(source, ("structure", "kind"), ("rig", "reduced", "friction_rig"))
         return VibrationCase
     if analysis == "wear":

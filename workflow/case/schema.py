@@ -14,7 +14,7 @@ from workflow.case.resultants_case import ResultantsCase
 from workflow.case.specimens_case import SpecimensCase
 from workflow.case.time_case import JointCase, RigCase
 from workflow.case.vibration_case import VibrationCase
-from workflow.case.worn_vibration_case import WornVibrationCase
+from workflow.case.worn_vibration_case import WornFrictionRigCase, WornVibrationCase
 
 Case = (
     DovetailCase
@@ -29,6 +29,7 @@ Case = (
     | RigCase
     | VibrationCase
     | WornVibrationCase
+    | WornFrictionRigCase
 )
 
 

@@ -17,7 +17,7 @@ from workflow.case.specimens_case import SpecimensCase
 from workflow.case.time_case import JointCase, RigCase, SteadyAgeing
 from workflow.case.vibration_case import VibrationCase
 from workflow.case.wear_sections import Step
-from workflow.case.worn_vibration_case import WornVibrationCase
+from workflow.case.worn_vibration_case import WornFrictionRigCase, WornVibrationCase
 from workflow.case.writing import Row, render
 
 # What `fretscale new` can write.
@@ -34,6 +34,7 @@ KINDS: dict[str, type[Section]] = {
     "rig": RigCase,
     "vibration": VibrationCase,
     "worn_vibration": WornVibrationCase,
+    "worn_friction_rig": WornFrictionRigCase,
 }
 
 HEADER = """\

@@ -139,32 +139,20 @@ class LoopsAt(Section):
     )
 
 
-class VibrationCase(Scene):
-    """A structure with joints under forces a sin(2π frequency t), for all frequencies of a span."""
+class ForcedResponse(Scene):
+    """A structure under forces a sin(2π frequency t), for all frequencies of a span."""
 
     title: Title = entry("one line", "Forced response of a friction rig")
     analysis: Literal["vibration"] = entry("what is computed", "vibration")
-    structure: Annotated[Rig | ReducedBody | FrictionRig, Field(discriminator="kind")] = entry(
-        "what holds the joints"
-    )
-    joint: ContactLaw = entry("its law and its parameters; of all joints together")
+    structure: Rig | ReducedBody | FrictionRig = entry("what holds the joints")
     forces: Annotated[tuple[DrivingForce, ...], Field(min_length=1, max_length=100)] = entry(
         "amplitudes, ascending, each followed through the frequencies [N]", ["10 N", "40 N"]
     )
     frequencies: tuple[Frequency, Frequency] = entry(
         "lower and upper end [Hz]", ["20 Hz", "400 Hz"]
     )
-    mass: MassNumber | None = entry(
-        "of a row, that is driven, counted from the ground; without it the first", 1, default=None
-    )
     resolution: MotionResolution = entry("of a period", default=MotionResolution())
     continuation: Continuation = entry("of each curve", default=Continuation())
-    loops: LoopsAt | None = entry("of all joints together, at one frequency", default=None)
-    backbone: bool = entry(
-        "whether phase resonance, force and answer 90 degrees apart, is followed along the force",
-        False,
-        default=False,
-    )
     output: Output = entry("files beside summary and results", default=Output())
     assumed: tuple[DottedPath, ...] = entry(
         "inputs that are ours because the source does not print them",
@@ -173,10 +161,23 @@ class VibrationCase(Scene):
     )
     expect: tuple[Expectation, ...] = entry("values the run must reproduce", default=())
 
+    @model_validator(mode="after")
+    def _ascending(self) -> ForcedResponse:
+        if any(after <= before for before, after in pairwise(self.forces)):
+            raise disagreement("not ascending; allowed: each force above the last", "forces")
+        if self.frequencies[0] >= self.frequencies[1]:
+            raise disagreement("not ascending; allowed: lower, then upper end", "frequencies")
+        return self
+
+    @model_validator(mode="after")
+    def _assumed_exist(self) -> ForcedResponse:
+        self.require_entries(self.assumed)
+        return self
+
     @property
     def contacts(self) -> bool:
         """Whether joints are contacts, with a normal direction."""
-        return isinstance(self.joint, FrictionContactJoint)
+        return False
 
     @property
     def harmonics(self) -> tuple[int, ...]:
@@ -187,21 +188,37 @@ class VibrationCase(Scene):
         """Harmonics, with 0 where joints are contacts."""
         return tuple(sorted({0, *harmonics} if self.contacts else harmonics))
 
-    @model_validator(mode="after")
-    def _ascending(self) -> VibrationCase:
-        if any(after <= before for before, after in pairwise(self.forces)):
-            raise disagreement("not ascending; allowed: each force above the last", "forces")
-        if self.frequencies[0] >= self.frequencies[1]:
-            raise disagreement("not ascending; allowed: lower, then upper end", "frequencies")
-        if self.backbone and len(self.forces) < 2:
-            raise disagreement(
-                "a single force; allowed: two or more, between which phase resonance is followed",
-                *("forces", "backbone"),
-            )
-        return self
+    @property
+    def driving(self) -> str:
+        """Forces, where they act, and their frequencies, for an outline."""
+        forces = ", ".join(f"{force:g}" for force in self.forces)
+        low, high = self.frequencies
+        return f"{forces} N on {self._driven}, {low:g} to {high:g} Hz"
+
+    @property
+    def resolved(self) -> str:
+        """The resolution, for an outline."""
+        own, harmonics = self.resolution, self.harmonics
+        text = f"{len(harmonics)} harmonics to {harmonics[-1]}, {own.samples} samples"
+        if own.tolerance is not None:
+            text += f", growing to a tolerance of {own.tolerance:g}"
+        return text
+
+    @property
+    def _driven(self) -> str:
+        """Where the forces act, in a few words."""
+        return "mass 1"
+
+
+class DrivenMass(ForcedResponse):
+    """The same of a structure that may be a row of masses, of which any is driven."""
+
+    mass: MassNumber | None = entry(
+        "of a row, that is driven, counted from the ground; without it the first", 1, default=None
+    )
 
     @model_validator(mode="after")
-    def _drives_a_mass(self) -> VibrationCase:
+    def _drives_a_mass(self) -> DrivenMass:
         if not isinstance(self.structure, Rig):
             if self.mass is not None:
                 raise disagreement(
@@ -210,6 +227,40 @@ class VibrationCase(Scene):
         elif self.mass is not None and self.mass > len(self.structure.masses):
             count = len(self.structure.masses)
             raise disagreement(f"{self.mass}: no such mass; allowed: 1 to {count}", "mass")
+        return self
+
+    @property
+    def _driven(self) -> str:
+        if isinstance(self.structure, ReducedBody):
+            return f"{self.structure.driven.points} along {self.structure.driven.direction}"
+        return f"mass {self.mass or 1}"
+
+
+class VibrationCase(DrivenMass):
+    """A structure with joints that stay as they are."""
+
+    structure: Annotated[Rig | ReducedBody | FrictionRig, Field(discriminator="kind")] = entry(
+        "what holds the joints"
+    )
+    joint: ContactLaw = entry("its law and its parameters; of all joints together")
+    loops: LoopsAt | None = entry("of all joints together, at one frequency", default=None)
+    backbone: bool = entry(
+        "whether phase resonance, force and answer 90 degrees apart, is followed along the force",
+        False,
+        default=False,
+    )
+
+    @property
+    def contacts(self) -> bool:
+        return isinstance(self.joint, FrictionContactJoint)
+
+    @model_validator(mode="after")
+    def _joins_forces(self) -> VibrationCase:
+        if self.backbone and len(self.forces) < 2:
+            raise disagreement(
+                "a single force; allowed: two or more, between which phase resonance is followed",
+                *("forces", "backbone"),
+            )
         return self
 
     @model_validator(mode="after")
@@ -254,30 +305,12 @@ class VibrationCase(Scene):
             )
         return self
 
-    @model_validator(mode="after")
-    def _assumed_exist(self) -> VibrationCase:
-        self.require_entries(self.assumed)
-        return self
-
     def outline(self) -> list[tuple[str, str]]:
         """What would run, in a few rows of name and text."""
-        structure, joint, own = self.structure, self.joint, self.resolution
-        forces = ", ".join(f"{force:g}" for force in self.forces)
-        low, high = self.frequencies
-        harmonics = self.harmonics
-        resolution = f"{len(harmonics)} harmonics to {harmonics[-1]}, {own.samples} samples"
-        if own.tolerance is not None:
-            resolution += f", growing to a tolerance of {own.tolerance:g}"
+        structure, joint = self.structure, self.joint
         return [
             ("structure", f"{structure.text}, damping ratio {structure.damping_ratio:g}"),
             ("joint", f"{joint.law} under {joint.normal_load:g} N"),
-            ("forces", f"{forces} N on {self._driven}, {low:g} to {high:g} Hz"),
-            ("resolution", resolution),
+            ("forces", self.driving),
+            ("resolution", self.resolved),
         ]
-
-    @property
-    def _driven(self) -> str:
-        """Where the forces act, in a few words."""
-        if isinstance(self.structure, ReducedBody):
-            return f"{self.structure.driven.points} along {self.structure.driven.direction}"
-        return f"mass {self.mass or 1}"

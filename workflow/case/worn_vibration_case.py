@@ -1,4 +1,4 @@
-"""A vibration case whose contact wears: its forced response, computed anew as wear grows."""
+"""Vibration cases whose contact wears: their forced response, computed anew as wear grows."""
 
 from __future__ import annotations
 
@@ -8,22 +8,17 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from workflow.case.excitation import DrivingForce, Frequency, MassNumber
-from workflow.case.fields import File
-from workflow.case.joint_sections import JenkinsJoint
-from workflow.case.rig_structure import Rig
-from workflow.case.sections import (
-    DottedPath,
-    Expectation,
-    Output,
-    Scene,
-    Section,
-    Title,
-    disagreement,
-    entry,
-)
-from workflow.case.vibration_case import Continuation, MotionResolution, VibrationCase
+from workflow.case.excitation import DrivingForce, Frequency
+from workflow.case.fields import File, Quantity
+from workflow.case.joint_sections import FrictionContactJoint, JenkinsJoint, Joint, JointStiffness
+from workflow.case.rig_structure import FrictionRig, Rig
+from workflow.case.sections import Section, Title, disagreement, entry
+from workflow.case.specimens_case import Pressing
+from workflow.case.vibration_case import DrivenMass, ForcedResponse, VibrationCase
 from workflow.case.wear_sections import Cycles
+
+# Of the cases with wear, what a vibration case of one state has no use for.
+NOT_OF_A_STATE = ("assumed", "expect")
 
 
 class WornContact(Section):
@@ -53,74 +48,89 @@ class WearByVibration(Section):
         return self
 
 
-class WornVibrationCase(Scene):
+class WearOfNodes(WearByVibration):
+    """The same, with the error of steps between specimens."""
+
+    tolerance: Annotated[
+        float, Quantity("1", at_least=1e-4, at_most=0.5, range_text="0.01 % to 50 %")
+    ] = entry(
+        "of what a step wears, for the first-order step that is improved on [1]", 0.1, default=0.1
+    )
+
+
+class PadContacts(Joint):
+    """A friction contact at every node of two pads that a load presses together."""
+
+    law: Literal["friction_contact"] = entry("at every node of the pads", "friction_contact")
+    normal_load: Pressing = entry("that presses the pads together [N]", "60 N")
+    stiffness: JointStiffness = entry("along the pads, stuck [N/mm]", "45 N/um")
+    normal_stiffness: JointStiffness = entry("in contact [N/mm]", "58.5 N/um")
+
+
+class WornResponse(ForcedResponse):
     """A rig on a contact that it wears, and its response to forces a sin(2π frequency t)."""
 
     title: Title = entry("one line", "Forced response of a friction rig as it wears")
-    analysis: Literal["vibration"] = entry("what is computed", "vibration")
+    structure: Rig | FrictionRig = entry("what holds the contact")
+    wear: WearByVibration = entry("how the contact wears")
+
+    def outline(self) -> list[tuple[str, str]]:
+        """What would run, in a few rows of name and text."""
+        structure, wear = self.structure, self.wear
+        return [
+            ("structure", f"{structure.text}, damping ratio {structure.damping_ratio:g}"),
+            ("contact", self._contact),
+            ("wear", f"{wear.cycles[-1]:g} cycles of {wear.force:g} N at {wear.frequency:g} Hz"),
+            ("forces", self.driving),
+            ("resolution", self.resolved),
+        ]
+
+    @property
+    def _contact(self) -> str:
+        """The contact in a few words."""
+        raise NotImplementedError
+
+    def _of_a_state(self, joint: Joint, mass: int | None = None) -> VibrationCase:
+        """The vibration case with this joint, driven at the mass of this number."""
+        shared = [name for name in ForcedResponse.model_fields if name not in NOT_OF_A_STATE]
+        entries = {name: getattr(self, name) for name in shared}
+        return VibrationCase(joint=joint, mass=mass, **entries)
+
+
+class WornVibrationCase(WornResponse, DrivenMass):
+    """A row of masses on a half-space contact that it wears."""
+
     structure: Rig = entry("what holds the contact")
     contact: WornContact = entry("between the last mass and the ground")
-    wear: WearByVibration = entry("how the contact wears")
-    forces: Annotated[tuple[DrivingForce, ...], Field(min_length=1, max_length=100)] = entry(
-        "amplitudes, ascending, each followed through the frequencies [N]", ["10 N", "40 N"]
-    )
-    frequencies: tuple[Frequency, Frequency] = entry(
-        "lower and upper end [Hz]", ["20 Hz", "400 Hz"]
-    )
-    mass: MassNumber | None = entry(
-        "that is driven, counted from the ground; without it the first", 1, default=None
-    )
-    resolution: MotionResolution = entry("of a period", default=MotionResolution())
-    continuation: Continuation = entry("of each curve", default=Continuation())
-    output: Output = entry("files beside summary and results", default=Output())
-    assumed: tuple[DottedPath, ...] = entry(
-        "inputs that are ours because the source does not print them",
-        ["structure.damping_ratio", "resolution"],
-        default=(),
-    )
-    expect: tuple[Expectation, ...] = entry("values the run must reproduce", default=())
-
-    @model_validator(mode="after")
-    def _ascending(self) -> WornVibrationCase:
-        if any(after <= before for before, after in pairwise(self.forces)):
-            raise disagreement("not ascending; allowed: each force above the last", "forces")
-        if self.frequencies[0] >= self.frequencies[1]:
-            raise disagreement("not ascending; allowed: lower, then upper end", "frequencies")
-        return self
-
-    @model_validator(mode="after")
-    def _drives_a_mass(self) -> WornVibrationCase:
-        count = len(self.structure.masses)
-        if self.mass is not None and self.mass > count:
-            raise disagreement(f"{self.mass}: no such mass; allowed: 1 to {count}", "mass")
-        return self
-
-    @model_validator(mode="after")
-    def _assumed_exist(self) -> WornVibrationCase:
-        self.require_entries(self.assumed)
-        return self
 
     def with_joint(self, normal_load: float, friction: float, stiffness: float) -> VibrationCase:
         """The vibration case of one state of the contact, whose joint is described by these."""
         joint = JenkinsJoint(
             law="jenkins", normal_load=normal_load, friction=friction, stiffness=stiffness
         )
-        shared = (
-            *("title", "structure", "forces", "frequencies", "mass", "resolution"),
-            *("continuation", "output"),
-        )
-        entries = {name: getattr(self, name) for name in shared}
-        return VibrationCase(analysis="vibration", joint=joint, **entries)
+        return self._of_a_state(joint, self.mass)
 
-    def outline(self) -> list[tuple[str, str]]:
-        """What would run, in a few rows of name and text."""
-        forces = ", ".join(f"{force:g}" for force in self.forces)
-        low, high = self.frequencies
-        wear, own = self.wear, self.resolution
-        return [
-            ("structure", f"{self.structure.text}, damping ratio {self.structure.damping_ratio:g}"),
-            ("contact", f"that of {Path(self.contact.file).name}"),
-            ("wear", f"{wear.cycles[-1]:g} cycles of {wear.force:g} N at {wear.frequency:g} Hz"),
-            ("forces", f"{forces} N on mass {self.mass or 1}, {low:g} to {high:g} Hz"),
-            ("resolution", f"{len(own.harmonics)} harmonics to {own.harmonics[-1]}"),
-        ]
+    @property
+    def _contact(self) -> str:
+        return f"that of {Path(self.contact.file).name}"
+
+
+class WornFrictionRigCase(WornResponse):
+    """Two specimens in a rig that wear each other, node by node."""
+
+    structure: FrictionRig = entry("two specimens in a rig; their case says how they wear")
+    joint: PadContacts = entry("all contacts of the pads together; gaps are those of their form")
+    wear: WearOfNodes = entry("how the pads wear")
+
+    @property
+    def contacts(self) -> bool:
+        return True
+
+    @property
+    def unworn(self) -> VibrationCase:
+        """The vibration case before the first cycle."""
+        return self._of_a_state(FrictionContactJoint(**self.joint.model_dump()))
+
+    @property
+    def _contact(self) -> str:
+        return f"{self.joint.law} under {self.joint.normal_load:g} N"

@@ -8,15 +8,18 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from sa_solver.types import Array
+from sa_solver.types import Array, Indices
 from workflow.figures.fields import spread
 from workflow.figures.style import BLUE, GREEN, ORANGE, PURPLE, new_figure
+from workflow.pad_nodes import rows_and_columns
 from workflow.store import grid_of
 from workflow.worn_vibration_outcome import (
     CONTACT,
     EVOLUTION,
     HALF_SPACE,
     LOOP,
+    NODES,
+    PLACES,
     RESPONSES,
     WORN,
 )
@@ -32,15 +35,22 @@ STATE_COLOURS = "viridis"
 TO_MICRONS, PER_MICRON, TO_JOULES = 1e3, 1e-3, 1e-3
 # Where the unworn contact stands on an axis of logarithms: so far before the first worn one.
 BEFORE = 0.1
+# What is shown along the pad: of these datasets, the latter two per area of each node.
+PROFILE = {
+    "gap": "gap without load [µm]",
+    "normal_force": "pressure at rest [MPa]",
+    "energy": "energy per cycle\nand area [mJ/mm²]",
+}
 FORCE_COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
 
 
 def figures_of(file: h5py.File) -> dict[str, Callable[[h5py.File], Figure]]:
     """The figures, by name."""
+    at_nodes = PLACES in file
     return {
         "frequency_response": frequency_response,
         "evolution": evolution,
-        "scar": scar,
+        **({"profile": profile} if at_nodes else {"scar": scar}),
         "loops": loops,
     }
 
@@ -76,7 +86,7 @@ def evolution(file: h5py.File) -> Figure:
     figure = new_figure(_title(file), 9.0)
     (stiffness, frequency), (motion, depth) = figure.subplots(2, 2, sharex=True)
     stiffness.plot(place, PER_MICRON * own["stiffness"][()], "o-", color=BLUE)
-    stiffness.set_ylabel("stiffness kt of the stuck contact [N/µm]")
+    stiffness.set_ylabel("stiffness kt while the contact sticks [N/µm]")
     frequency.plot(place, own["stuck"][:, 0], "k--", label="stuck")
     for column, colour in zip(_some(len(forces), len(FORCE_COLOURS)), FORCE_COLOURS, strict=False):
         label = f"{forces[column]:g} N"
@@ -89,11 +99,14 @@ def evolution(file: h5py.File) -> Figure:
         (TO_MICRONS * own["stroke"][()], "stroke under the force that wears [µm]"),
         (own["energy_per_cycle"][()], "energy per cycle [mJ]"),
     )
+    touching = ("area", "area in contact [mm²]")
+    if "touching" in own:
+        touching = ("touching", "nodes in contact")
     _two(
         depth,
         place,
         (TO_MICRONS * own["depth"][()], "largest worn depth [µm]"),
-        (own["area"][()], "area in contact [mm²]"),
+        (own[touching[0]][()], touching[1]),
     )
     for axis in (motion, depth):
         axis.set_xscale("log")
@@ -122,19 +135,59 @@ def scar(file: h5py.File) -> Figure:
     return figure
 
 
+def profile(file: h5py.File) -> Figure:
+    """Gap, pressure at rest and energy of a cycle of nodes along the pad's middle and diagonal."""
+    places = {name: file[PLACES][name][()] for name in ("x", "y", "area")}
+    sections = _sections(places["x"], places["y"])
+    figure = new_figure(_title(file), 9.0)
+    panels = figure.subplots(3, len(sections), sharex="col", sharey="row", squeeze=False)
+    for (along, nodes, label), column in zip(sections, panels.T, strict=True):
+        for state, colour in _states(file):
+            area = places["area"][nodes]
+            gap, force, energy = (state[NODES][n][()][nodes] for n in PROFILE)
+            for axis, values in zip(
+                column, (TO_MICRONS * gap, force / area, energy / area), strict=True
+            ):
+                axis.plot(along, values, ".-", color=colour, label=_cycles(state))
+        column[-1].set_xlabel(label)
+    for axis, label in zip(panels[:, 0], PROFILE.values(), strict=True):
+        axis.set_ylabel(label)
+    panels[0, -1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="cycles")
+    return figure
+
+
+def _sections(x: Array, y: Array) -> list[tuple[Array, Indices, str]]:
+    """Lines of nodes: places along each, numbers of its nodes, and what it is.
+
+    Where nodes are not in rows and columns, all of them over their distance from the middle.
+    """
+    numbers = rows_and_columns(x, y)
+    if numbers is None:
+        distance = np.hypot(x, y)
+        order = np.argsort(distance, kind="stable")
+        return [(distance[order], order, "distance from the middle [mm]")]
+    middle, diagonal = numbers[:, numbers.shape[1] // 2], numbers.diagonal()
+    across = np.hypot(x[diagonal], y[diagonal]) * np.sign(x[diagonal])
+    return [(x[middle], middle, "x [mm]"), (across, diagonal, "along the diagonal [mm]")]
+
+
 def loops(file: h5py.File) -> Figure:
-    """Loops under the force that wears, and those of the half-space of the same stroke."""
+    """Loops under the force that wears; of a half-space also its own of the same stroke."""
     figure = new_figure(_title(file), 7.0)
     axis: Any = figure.subplots()
     for state, colour in _states(file):
         own = state[LOOP]
         label = f"{_cycles(state)}: {state.attrs['energy_per_cycle']:.4g} mJ"
         axis.plot(TO_MICRONS * own["displacement"][()], own["force"][()], color=colour, label=label)
+        if HALF_SPACE not in state:
+            continue
         other = state[HALF_SPACE]
         moved = TO_MICRONS * other["displacement"][()]
         axis.plot(moved, other["force"][()], "o", color=colour, markersize=3)
-    axis.set_xlabel("displacement of the joint [µm]")
-    axis.set_ylabel("force [N]; points: whole tangential problem")
+    between = "between the targets" if PLACES in file else "of the joint"
+    axis.set_xlabel(f"displacement {between} [µm]")
+    points = "" if PLACES in file else "; points: whole tangential problem"
+    axis.set_ylabel(f"force [N]{points}")
     axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="cycles, energy")
     return figure
 

@@ -1,0 +1,126 @@
+"""A friction rig whose specimens wear each other: motion, wear, motion, responses on the way."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fe_models.dynamics.harmonics import HarmonicBalanceError
+from fe_models.dynamics.receptance import ReceptanceError
+from sa_solver.types import Array
+from wear.joints.parameters import JointError
+from wear.stepping import ContactFailure
+from workflow.case import SpecimensCase, WornFrictionRigCase, load_case
+from workflow.errors import MethodFailed, UserError
+from workflow.folder import OutputFolder
+from workflow.reporter import Reporter
+from workflow.vibration_model import VibrationModel
+from workflow.vibration_outcome import Curves
+from workflow.vibration_response import loop_of, response_under
+from workflow.worn_vibration_outcome import LOOP, NODES, WornState, WornVibrationOutcome
+from workflow.worn_vibration_pads import RubbedPads, WearingPads
+from workflow.worn_vibration_steps import PadState, wear
+
+
+def run_worn_friction_rig(
+    case: WornFrictionRigCase, folder: OutputFolder, reporter: Reporter
+) -> None:
+    """Run such a case to its end.
+
+    Raises UserError where specimens or rig cannot be what the case says, MethodFailed where rest or
+    a motion is not found.
+    """
+    from workflow.worn_vibration_output import write_worn_vibration_output
+
+    reporter.say(f"run: {case.title}")
+    try:
+        outcome = worn_friction_rig(case, reporter)
+    except ContactFailure as error:
+        raise MethodFailed(str(error)) from error
+    except JointError as error:
+        raise UserError(f"{folder.case}: joint: {error}") from error
+    except (HarmonicBalanceError, ReceptanceError) as error:
+        raise UserError(f"{folder.case}: structure: {error}") from error
+    write_worn_vibration_output(outcome, folder, reporter)
+
+
+def worn_friction_rig(case: WornFrictionRigCase, reporter: Reporter) -> WornVibrationOutcome:
+    """All that is kept of a run; see :func:`run_worn_friction_rig`."""
+    own = case.wear
+    unworn = VibrationModel.of(case.unworn, reporter)
+    pads = WearingPads(unworn, _coefficients(case), own.force, own.frequency)
+    with reporter.stage("wear"):
+        state = PadState.new(pads)
+    states = [_kept(case, pads, state, state.steps, reporter)]
+    with reporter.jumps(own.cycles[-1], 0.0) as progress:
+        for cycles in own.cycles:
+            before = state.steps
+            with reporter.stage("wear"):
+                state = wear(pads, state, cycles, own.tolerance)
+            states.append(_kept(case, pads, state, state.steps - before, reporter))
+            progress.update(cycles, len(states) - 1)
+    rig = unworn.rig
+    assert rig.places is not None
+    assert rig.area is not None
+    places = {"x": rig.places[:, 0], "y": rig.places[:, 1], "area": rig.area}
+    return WornVibrationOutcome(case, tuple(states), places=places)
+
+
+def _coefficients(case: WornFrictionRigCase) -> tuple[float, float]:
+    """Of body 1 and 2 [1/MPa], from the case whose specimens the rig has been made of."""
+    specimens = load_case(Path(case.structure.specimens))
+    assert isinstance(specimens, SpecimensCase)
+    return specimens.wear.body_1.coefficient, specimens.wear.body_2.coefficient
+
+
+def _kept(
+    case: WornFrictionRigCase, pads: WearingPads, state: PadState, steps: int, reporter: Reporter
+) -> WornState:
+    """The pads in a state, reached in ``steps`` since the last, and the rig on them."""
+    rubbed, of_state = state.rubbed, case.unworn
+    loop = loop_of(of_state, rubbed.model, rubbed.motion)
+    with reporter.stage("response"):
+        found = [response_under(of_state, rubbed.model, own, reporter)[0] for own in case.forces]
+    numbers: dict[str, Any] = {"cycles": state.cycles, "steps": steps, "energy": state.energy}
+    numbers |= _numbers(rubbed, state.depth, loop) | rubbed.model.numbers()
+    tolerance = case.resolution.tolerance
+    if tolerance is not None and rubbed.motion.left_out > tolerance:
+        reporter.warn(
+            f"the motion that wears leaves out harmonics of {rubbed.motion.left_out:.1e}, above "
+            "resolution.tolerance: raise resolution.harmonics, those to begin with"
+        )
+    reporter.log(
+        f"{state.cycles:g} cycles: {steps} steps, {numbers['touching']} nodes touch, "
+        f"stiffness {numbers['stiffness']:.5g} N/mm, stroke {numbers['stroke']:.4g} mm"
+    )
+    return WornState(state.cycles, numbers, _fields(pads, state, loop), tuple(found))
+
+
+def _numbers(rubbed: RubbedPads, depth: Array, loop: Curves) -> dict[str, Any]:
+    return {
+        "volume": float(depth @ rubbed.area),
+        "depth": float(depth.max()),
+        "friction": float(np.max(rubbed.law.friction)),
+        "stiffness": loop.numbers["stiffness"],
+        "stroke": loop.numbers["stroke"],
+        "energy_per_cycle": float(rubbed.energy.sum()),
+        "left_out": rubbed.motion.left_out,
+    }
+
+
+def _fields(pads: WearingPads, state: PadState, loop: Curves) -> dict[str, dict[str, Array]]:
+    rubbed = state.rubbed
+    depth_1, depth_2 = pads.depths(state.depth)
+    return {
+        NODES: {
+            "gap": np.asarray(rubbed.law.gap),
+            "depth_1": depth_1,
+            "depth_2": depth_2,
+            "normal_force": rubbed.model.rest.cycle.samples[0, :, 2],
+            "path": rubbed.path,
+            "energy": rubbed.energy,
+        },
+        LOOP: {name: loop.values[name] for name in ("displacement", "force")},
+    }
