@@ -132,7 +132,6 @@ EVOLUTION = {
     for name in ("friction", "stiffness", "residual_stiffness", "normal_load")
 }
 GIVEN["joint"] = {"joint": JOINTS, **EVOLUTION, "reported": {ALWAYS: TOLD}}
-GIVEN["vibration"] = {"joint": JOINTS}
 GIVEN["worn_vibration"] = GIVEN["worn_friction_rig"] = {}
 CONTACT = {"law": "friction_contact", **JOINT, "normal_load": 0, "normal_stiffness": 1e4}
 REDUCED = {
@@ -144,6 +143,18 @@ REDUCED = {
     "damping_ratio": 0.1,
     "driven": {"points": "ring", "direction": "x"},
     "seen": {"points": "pad", "direction": "x"},
+}
+FRICTION_RIG = {
+    "kind": "friction_rig",
+    "specimens": "specimens_rig.yaml",
+    "masses": [1, 1],
+    "springs": [1, 1],
+    "damping_ratio": 0.1,
+}
+GIVEN["vibration"] = {
+    "structure": {"reduced": REDUCED, "friction_rig": FRICTION_RIG},
+    "joint": JOINTS | {"friction_contact": CONTACT},
+    "loops": {ALWAYS: {"frequency": "100 Hz"}},
 }
 GIVEN["rig"] = GIVEN["joint"] | {
     "structure": {"reduced": REDUCED},
@@ -202,6 +213,8 @@ class Leaf:
                 found += [f"{section}={value}" for value in chosen[:1]]
         if "friction_contact" in self.tags:
             found.append(f"structure={REDUCED}")
+        if "friction_rig" in self.tags:
+            found.append(f"joint={CONTACT | {'normal_load': 60}}")
         return found
 
     @property
@@ -258,7 +271,7 @@ def folders(tmp_path_factory, template_files) -> dict[str, Folder]:
         np.save(made[kind] / "gap.npy", np.zeros(CELLS.get(kind, (0, 0))))
         (made[kind] / "history.csv").write_text("P,Qx\n1,0\n1,0.1\n", encoding="utf-8")
         (made[kind] / "force.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
-        for file in ("body_2.h5", "specimens.yaml", "specimens_wear.yaml"):
+        for file in ("body_2.h5", "specimens.yaml", "specimens_wear.yaml", "specimens_rig.yaml"):
             (made[kind] / file).touch()
         (made[kind] / "loops.csv").write_text("energy,P,kt,mu\n0,1,1,1\n", encoding="utf-8")
     return made

@@ -225,7 +225,7 @@ def _lost_in_slip(path: Path, slip: Slip) -> float:
         return max(straight, 0.0)
     growth, decay = 2.0 * log(path.end / slip.limit), 2.0 * slip.length
     # What is left of the integral at η is at most R0² (1 - cos ψ0)/(1 + cos ψ0) exp((growth -
-    # decay) η). Up to where that is negligible beside the rest; for a force along the pull, nowhere.
+    # decay) η): it ends where that is negligible, for a force along the pull before it begins.
     most = slip.limit * slip.limit * slip.away / slip.toward
     exponent = NEGLIGIBLE + log(most / straight)
     if exponent <= 0.0:

@@ -8,7 +8,7 @@ from itertools import pairwise
 from math import radians
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field, StrictBool, model_validator
 
 from workflow.case.excitation import DrivingForce, Frequency, MassNumber
 from workflow.case.fields import Entry, Quantity, Whole
@@ -244,7 +244,7 @@ class VibrationCase(DrivenMass):
     )
     joint: ContactLaw = entry("its law and its parameters; of all joints together")
     loops: LoopsAt | None = entry("of all joints together, at one frequency", default=None)
-    backbone: bool = entry(
+    backbone: StrictBool = entry(
         "whether phase resonance, force and answer 90 degrees apart, is followed along the force",
         False,
         default=False,
