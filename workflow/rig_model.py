@@ -6,10 +6,12 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+import scipy.linalg as sl
 
 from fe_models.dynamics.excitation import Constant, Force, Together
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.motion import Motion
+from fe_models.dynamics.receptance import RIGID
 from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
@@ -113,6 +115,17 @@ class RigModel:
         if rest is not None:
             state = law.respond(state, rest).state
         return law.respond(state, still).tangent
+
+    def stuck_damping(self, law: Law, rest: Array | None = None) -> list[float]:
+        """Damping ratios of the lowest modes with all joints stuck: C is that of the open ones."""
+        held = sl.block_diag(*self.stuck(law, rest))
+        stiffness = self.model.stiffness + self.model.connection.T @ held @ self.model.connection
+        squares, shapes = sl.eigh(stiffness, self.model.mass)
+        # Modes of a structure that moves freely have no damping ratio.
+        lowest = np.flatnonzero(squares > RIGID * squares[-1])[:MOST_FREQUENCIES]
+        lost = np.einsum("nm,nm->m", shapes, self.model.damping @ shapes)[lowest]
+        ratios: list[float] = (0.5 * lost / np.sqrt(squares[lowest])).tolist()
+        return ratios
 
     def modes(self, law: Law, rest: Array | None = None) -> dict[str, list[float]]:
         """The lowest natural frequencies with all joints stuck, and with all sliding [Hz].

@@ -117,7 +117,8 @@ class VibratingContact:
     def at(self, state: WearState) -> Rubbing:
         """The contact in a state. Raises ContactFailure where contact or motion are not found."""
         for kept in self._kept:
-            if kept.state.surfaces is state.surfaces:
+            same = kept.state.surfaces is state.surfaces
+            if same and kept.state.energy == state.energy:
                 return kept
         found = self._found(state)
         self._kept = [*self._kept[1 - KEPT :], found]
@@ -126,6 +127,20 @@ class VibratingContact:
     def wearing(self, state: WearState) -> WearingContact:
         """The same for wear steps."""
         return self.at(state).wearing
+
+    def alike_cycles(self, state: WearState, most: float, change: float) -> float:
+        """Cycles, ``most`` or fewer, in which friction changes by no more than this share; or one.
+
+        A wear step takes the friction of its beginning.
+        """
+        rubbing, cycles = self.at(state), most
+        per_cycle = float(rubbing.by_slider.sum())
+        while cycles > 1.0:
+            friction = self._case.friction.at(state.energy + cycles * per_cycle)
+            if abs(friction - rubbing.friction) <= change * rubbing.friction:
+                return cycles
+            cycles *= 0.5
+        return min(1.0, most)
 
     def problem(self, sliders: Jenkins, resolution: Resolution) -> HarmonicBalance:
         """The balance of the rig held by ``sliders``."""

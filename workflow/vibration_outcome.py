@@ -100,7 +100,7 @@ DATASETS: dict[str, dict[str, tuple[str, str]]] = {
     },
     "backbone": {
         "force": ("N", "amplitude of the force"),
-        "frequency": ("Hz", "of phase resonance: force and answer are 90 degrees apart"),
+        "frequency": ("Hz", "of phase resonance: what is driven lags the force by 90 degrees"),
         "amplitude": ("mm", "half of the way to and fro of what is looked at"),
         "damping": ("1", "energy lost in a cycle over 4π times the largest kinetic energy"),
         "energy_per_cycle": ("N mm", "energy that the joints dissipate in a cycle"),

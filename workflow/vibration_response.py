@@ -21,8 +21,11 @@ from fe_models.dynamics.forced_response import (
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, HarmonicSolution
 from fe_models.dynamics.harmonics import Resolution
 from sa_solver.types import Array
+from wear.joints.friction_contact import FrictionContact
+from wear.joints.jenkins import Jenkins
 from wear.joints.measured_loops import MeasuredLoopError, MeasuredLoops, measure_loops
-from wear.joints.periodic import SEPARATED, SLIP
+from wear.joints.periodic import SEPARATED, SLIP, STICK
+from wear.moving import LARGE_STROKE
 from workflow.case import VibrationCase
 from workflow.errors import MethodFailed
 from workflow.reporter import Reporter
@@ -90,6 +93,7 @@ def response_under(
     peak = _resonance(model, branch, curves)
     # The peak may have been found before the resolution grew.
     problem, resonance = _accurate(branch.problem.refined(peak.resolution), peak, accuracy)
+    _warn_of_stroke(model, resonance, reporter)
     response = Response(
         force,
         curves,
@@ -186,6 +190,20 @@ def _cycle(solution: HarmonicSolution) -> dict[str, Array]:
         "force": solution.cycle.samples,
         "state": solution.cycle.states.astype(np.int8),
     }
+
+
+def _warn_of_stroke(model: VibrationModel, motion: HarmonicSolution, reporter: Reporter) -> None:
+    """Warn where contacts move further than contacts of fixed pairs of nodes may."""
+    places = model.rig.places
+    if places is None:
+        return
+    moved = motion.resolution.basis @ motion.coefficients
+    stroke, width = float(np.ptp(moved[:, :, 0], axis=1).max()), float(np.ptp(places[:, 0]))
+    if stroke > LARGE_STROKE * width:
+        reporter.warn(
+            f"{motion.force:g} N: at resonance the pads slide over each other by {stroke:.3g} mm, "
+            f"more than {LARGE_STROKE:.0%} of their width: that other nodes meet is neglected"
+        )
 
 
 # --- resonance ----------------------------------------------------------------------------------
@@ -292,7 +310,7 @@ def loop_of(case: VibrationCase, model: VibrationModel, motion: HarmonicSolution
         "slip": share_of(model, motion, SLIP),
         "left_out": motion.left_out,
         "deformation": _deformation(force, expansion),
-        **_slopes(displacement, force, case.joint.normal_load),
+        **_slopes(model, motion, displacement, force, case.joint.normal_load),
     }
     return Curves(values, numbers)
 
@@ -307,19 +325,35 @@ def _closed(values: Array) -> Array:
     return np.append(values, values[:1])
 
 
-def _slopes(displacement: Array, force: Array, load: float) -> dict[str, float | None]:
+def _slopes(
+    model: VibrationModel, motion: HarmonicSolution, displacement: Array, force: Array, load: float
+) -> dict[str, float | None]:
     """Stick slope and friction of a loop; no friction where it does not slide."""
     found = _as_measured([np.tile(own, REPEATED) for own in (displacement, force)])
-    if found is None or found.energy.mean() < STUCK_LOOP * np.ptp(displacement) * np.ptp(force):
-        moved = displacement - displacement.mean()
-        square = float(moved @ moved)
-        slope = float((force - force.mean()) @ moved) / square if square > 0.0 else None
-        return {"stiffness": slope, "friction": None}
-    sliding = found.sliding > 0.0 and load > 0.0
-    return {
-        "stiffness": float(found.stick_stiffness.mean()),
-        "friction": float(found.friction_force.mean()) / load if sliding else None,
-    }
+    lossy = STUCK_LOOP * np.ptp(displacement) * np.ptp(force)
+    loop = found if found is not None and found.energy.mean() > lossy else None
+    slope = _stick_slope(model, motion, displacement, force)
+    if slope is None and loop is not None:
+        slope = float(loop.stick_stiffness.mean())
+    sliding = loop is not None and loop.sliding > 0.0 and load > 0.0
+    friction = float(loop.friction_force.mean()) / load if loop is not None and sliding else None
+    return {"stiffness": slope, "friction": friction}
+
+
+def _stick_slope(
+    model: VibrationModel, motion: HarmonicSolution, displacement: Array, force: Array
+) -> float | None:
+    """Slope over the increments in which all joints that touch at rest stick; None without any.
+
+    A state is that at the end of an increment: a joint with one slider that sticks then has stuck
+    throughout. Joints of many sliders have no such increments but in a loop without slip.
+    """
+    sticks = (motion.cycle.states[:, model.touching] == STICK).all(axis=1)
+    if not isinstance(model.law, FrictionContact | Jenkins) and not sticks.all():
+        return None
+    moved, pulled = ((own - np.roll(own, 1))[sticks] for own in (displacement, force))
+    square = float(moved @ moved)
+    return float(moved @ pulled) / square if square > 0.0 else None
 
 
 def _as_measured(record: Sequence[Array]) -> MeasuredLoops | None:

@@ -20,6 +20,7 @@ from sa_solver.types import Array
 from wear.joints.jenkins import Jenkins
 from wear.moving import LARGE_STROKE
 from wear.steppers import (
+    ROUNDING,
     ErrorControl,
     Implicit,
     SecondOrder,
@@ -48,6 +49,8 @@ from workflow.worn_vibration_outcome import (
 
 # Of the motion at which all of the contact slides: where loops in partial slip are compared.
 PARTIAL = 0.5
+# Share by which friction may change in a wear step.
+FRICTION_CHANGE = 0.03
 
 
 def run_worn_vibration(case: WornVibrationCase, folder: OutputFolder, reporter: Reporter) -> None:
@@ -83,10 +86,14 @@ def _outcome(case: WornVibrationCase, reporter: Reporter) -> WornVibrationOutcom
     states = [keeper.keep(state, 0.0, 0)]
     with reporter.jumps(total, 0.0) as progress:
         for cycles in wear.cycles:
+            steps = 0
             with reporter.stage("wear"):
-                worn = advance(stepper, state, cycles - done, total - done, contact.wearing)
-            state, done = worn.state, cycles
-            states.append(keeper.keep(state, cycles, worn.steps))
+                while cycles - done > ROUNDING * cycles:
+                    most = contact.alike_cycles(state, cycles - done, FRICTION_CHANGE)
+                    worn = advance(stepper, state, most, total - done, contact.wearing)
+                    state, done, steps = worn.state, done + most, steps + worn.steps
+            done = cycles
+            states.append(keeper.keep(state, cycles, steps))
             progress.update(cycles, len(states) - 1)
     return WornVibrationOutcome(case, tuple(states), grid=contact.grid)
 

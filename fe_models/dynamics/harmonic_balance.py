@@ -335,19 +335,24 @@ class HarmonicBalance:
         )
 
     def left_out(self, coefficients: Array, cycle: CycleRecord, frequency: float) -> Array:
-        """Share of the joints' vibration that each harmonic 0, 1, 2, ... left out would have."""
+        """Share of the joints' vibration that each harmonic 0, 1, 2, ... left out would have.
+
+        The larger of what the joints' forces there cause with joints free, and as stiff as at rest:
+        a harmonic may meet a mode of either.
+        """
         beyond, vibration = self._beyond, self._vibration(coefficients)
         harmonics = np.array(beyond.harmonics)
         shares = np.zeros(harmonics[-1] + 1)
         if vibration == 0.0:
             return shares
         pull = beyond.weights @ cycle.samples.reshape(beyond.samples, -1)
-        steady = self.receptance.at(2.0 * np.pi * frequency * harmonics)
-        moved = steady.respond(beyond.combined(pull @ self.receptance.at_joints))
-        rows = beyond.separated(moved) @ self.receptance.at_joints.T
         cosine, sine = beyond.places
-        squares = np.square(rows).sum(axis=1)
-        shares[harmonics] = np.sqrt(squares[cosine] + np.where(sine < 0, 0.0, squares[sine]))
+        for structure in (self.receptance, self.rest.stiffened):
+            steady = structure.at(2.0 * np.pi * frequency * harmonics)
+            moved = steady.respond(beyond.combined(pull @ structure.at_joints))
+            squares = np.square(beyond.separated(moved) @ structure.at_joints.T).sum(axis=1)
+            found = np.sqrt(squares[cosine] + np.where(sine < 0, 0.0, squares[sine]))
+            shares[harmonics] = np.maximum(shares[harmonics], found)
         shares[list(self.resolution.harmonics)] = 0.0
         return shares / vibration
 

@@ -13,6 +13,7 @@ import numpy as np
 import scipy.linalg as sl
 
 from fe_models.dynamics.model import DynamicModel
+from fe_models.dynamics.receptance import RIGID
 from fe_models.reduction import ReducedModel
 from sa_solver.types import Array
 
@@ -147,7 +148,7 @@ def natural_frequencies(model: DynamicModel, joint_stiffness: float | Array = 0.
     """Natural frequencies ``(n,)`` [Hz], undamped, with springs in place of the joints.
 
     ``joint_stiffness`` [N/mm] is one for all, one for each row of the connection ``(j d,)``, or
-    the joints' tangents ``(j, d, d)``. Zero leaves the joints free.
+    the joints' tangents ``(j, d, d)``. Zero leaves the joints free. Rigid motions have 0.
     """
     stretch = model.connection
     held = np.asarray(joint_stiffness, dtype=float)
@@ -158,7 +159,9 @@ def natural_frequencies(model: DynamicModel, joint_stiffness: float | Array = 0.
     squares = sl.eigh(
         model.stiffness + stretch.T @ springs @ stretch, model.mass, eigvals_only=True
     )
-    return np.asarray(np.sqrt(np.maximum(squares, 0.0)) / (2.0 * np.pi))
+    return np.asarray(
+        np.sqrt(np.where(squares < RIGID * squares[-1], 0.0, squares)) / (2.0 * np.pi)
+    )
 
 
 def unit_force(model: DynamicModel, name: str) -> Array:

@@ -62,7 +62,8 @@ def files(tmp_path):
 
 def test_the_rig_sticks_under_a_small_force_and_slides_under_a_large_one(files):
     summary = run(files, RIG, "loops={frequency: 100 Hz, harmonics: [3, 8]}")
-    assert summary["warnings"] == []
+    (warning,) = summary["warnings"]
+    assert "90 N: at resonance the pads slide over each other by" in warning
     assert summary["joints"] == NODES
     assert 9 <= summary["touching"] <= NODES
     # The masses alone give 39.08 Hz; the specimen adds 1 % to the second.

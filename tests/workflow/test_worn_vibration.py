@@ -101,6 +101,24 @@ def summary(ended):
     return json.loads((ended / "summary.json").read_text(encoding="utf-8"))
 
 
+def test_friction_that_grows_within_a_few_cycles_is_followed(tmp_path):
+    """The paper's friction grows fivefold in ten cycles: against one cycle after the other."""
+    law = "evolution: {energy: [0 J, 1 mJ, 10 mJ, 0.1 J], factor: [1, 2, 2.5, 3]}"
+    wear = WEAR.replace("evolution: {energy: [0 J, 10 J], factor: [1, 2]}", law)
+    assert wear != WEAR
+    ended = run(tmp_path, "wear.cycles=[20]", "forces=[5 N]", wear=wear)
+    assert ended.exit_code == 0, ended.output
+    summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
+    rig = row_of_masses(Rig(kind="rig", masses=MASSES, springs=SPRINGS, damping_ratio=0.01))
+    shaking = Shaking(75.0, 100.0, Resolution((1, 3, 5), 64))
+    contact = VibratingContact(contact_case(str(tmp_path / "wear.yaml")), rig, shaking)
+    state = contact.unworn()
+    for _ in range(20):
+        # In so few cycles the form does not change.
+        state = replace(state, energy=state.energy + float(contact.at(state).by_slider.sum()))
+    assert summary["states"][-1]["energy"] == pytest.approx(state.energy, rel=0.05)
+
+
 # --- what the contact is to the rig -------------------------------------------------------------
 
 

@@ -245,7 +245,7 @@ class VibrationCase(DrivenMass):
     joint: ContactLaw = entry("its law and its parameters; of all joints together")
     loops: LoopsAt | None = entry("of all joints together, at one frequency", default=None)
     backbone: StrictBool = entry(
-        "whether phase resonance, force and answer 90 degrees apart, is followed along the force",
+        "whether phase resonance, what is driven 90 degrees behind the force, is followed too",
         False,
         default=False,
     )
