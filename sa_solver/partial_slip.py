@@ -214,7 +214,7 @@ def _stiffness(half_space: HalfSpace, normal: NormalState) -> tuple[float, float
     if status != 0:
         raise PartialSlipError(
             f"the pressed contact of {count} cells did not converge in {STUCK_ITERATIONS} "
-            "iterations: loosen the tolerance, or smooth or refine the heights"
+            "iterations: smooth or refine the heights, or smooth or refine the heights"
         )
     return tangential, float(pressure.sum()) * half_space.grid.cell_area / tangential
 

@@ -254,8 +254,8 @@ def describe(file: Path, size: str | None) -> None:
 def new(kind: str, file: Path | None) -> None:
     """Write a commented case of KIND to FILE, or print it.
 
-    KIND is dovetail, mesh, resultants, specimens, bodies, line, bodies_wear, line_wear, joint or
-    rig.
+    KIND is dovetail, mesh, resultants, specimens, bodies, line, bodies_wear, line_wear, joint, rig,
+    vibration, vibration_wear or friction_rig_wear.
     """
     from workflow.case import KINDS, template
 
@@ -284,16 +284,16 @@ def schema() -> None:
 def _outline(case: Case) -> list[tuple[str, str]]:
     """What would run, in a few rows."""
     from workflow.case import (
+        FrictionRigWearCase,
         JointCase,
         RigCase,
         SpecimensCase,
         VibrationCase,
+        VibrationWearCase,
         WearCase,
-        WornFrictionRigCase,
-        WornVibrationCase,
     )
 
-    vibrating = VibrationCase | WornVibrationCase | WornFrictionRigCase
+    vibrating = VibrationCase | VibrationWearCase | FrictionRigWearCase
     if isinstance(case, SpecimensCase | JointCase | RigCase | vibrating):
         return case.outline()
     return _wear_outline(case) if isinstance(case, WearCase) else _contact_outline(case)

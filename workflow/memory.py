@@ -8,14 +8,14 @@ from fe_models.memory import available_bytes as _available_bytes
 from workflow.case import (
     Case,
     DovetailCase,
+    FrictionRigWearCase,
     JointCase,
     LineContactCase,
     RigCase,
     SpecimensCase,
     VibrationCase,
+    VibrationWearCase,
     WearCase,
-    WornFrictionRigCase,
-    WornVibrationCase,
 )
 from workflow.case.rig_structure import ReducedBody
 from workflow.errors import OutOfMemory
@@ -53,9 +53,9 @@ def required_bytes(
         return BYTES * _kept_in_time(case, structure_nodes) + REST
     if isinstance(case, VibrationCase):
         return BYTES * _kept_of_motions(case, structure_nodes, max(interface_nodes, 1)) + REST
-    if isinstance(case, WornVibrationCase):
+    if isinstance(case, VibrationWearCase):
         return required_bytes(case.with_joint(1.0, 1.0, 1.0))
-    if isinstance(case, WornFrictionRigCase):
+    if isinstance(case, FrictionRigWearCase):
         return required_bytes(case.unworn)
     if isinstance(case, SpecimensCase):
         pad = 3 * (case.mesh.pad_elements + 1) ** 2
@@ -111,7 +111,7 @@ def _remedy(case: WearCase | Case) -> str:
     """What makes a case smaller."""
     if isinstance(case, JointCase | RigCase):
         return "raise integration.step, or shorten what is recorded"
-    if isinstance(case, VibrationCase | WornVibrationCase | WornFrictionRigCase):
+    if isinstance(case, VibrationCase | VibrationWearCase | FrictionRigWearCase):
         return "lower resolution.samples or resolution.harmonics"
     if isinstance(case, SpecimensCase):
         return "lower mesh.pad_elements, mesh.order or contact.grid, or raise mesh.size"

@@ -7,13 +7,13 @@ from pathlib import Path
 from workflow import fidelity
 from workflow.case import (
     Case,
+    FrictionRigWearCase,
     JointCase,
     RigCase,
     SpecimensCase,
     VibrationCase,
+    VibrationWearCase,
     WearCase,
-    WornFrictionRigCase,
-    WornVibrationCase,
 )
 from workflow.errors import UserError
 from workflow.folder import OutputFolder
@@ -70,14 +70,14 @@ def _run(case: Case, folder: OutputFolder, resume: bool) -> None:
             from workflow.vibration_run import run_vibration
 
             run_vibration(case, folder, reporter)
-        elif isinstance(case, WornVibrationCase):
-            from workflow.worn_vibration_run import run_worn_vibration
+        elif isinstance(case, VibrationWearCase):
+            from workflow.vibration_wear_run import run_vibration_wear
 
-            run_worn_vibration(case, folder, reporter)
-        elif isinstance(case, WornFrictionRigCase):
-            from workflow.worn_vibration_rig_run import run_worn_friction_rig
+            run_vibration_wear(case, folder, reporter)
+        elif isinstance(case, FrictionRigWearCase):
+            from workflow.friction_rig_wear_run import run_friction_rig_wear
 
-            run_worn_friction_rig(case, folder, reporter)
+            run_friction_rig_wear(case, folder, reporter)
         else:
             from workflow.contact_run import run_contact
 

@@ -174,7 +174,7 @@ class VibratingContact:
             slipping = partial_slip(
                 self._contact, state.surfaces.gap, self.load, tolerance=tolerance, start=start
             )
-        except PartialSlipError as error:
+        except (PartialSlipError, LoopFailure) as error:
             raise ContactFailure(str(error)) from error
         friction = self._case.friction.at(state.energy)
         sliders = Jenkins(slipping.slider_stiffness, friction, slipping.slider_load)

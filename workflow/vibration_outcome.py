@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from itertools import pairwise
 from typing import Any
+
+import numpy as np
 
 from sa_solver.types import Array
 from workflow.case import VibrationCase
@@ -58,6 +61,13 @@ class VibrationOutcome:
     numbers: Mapping[str, Any]
     contact: Mapping[str, Array] | None = None
     backbone: Curves | None = None
+
+
+def trend(values: Sequence[float]) -> float:
+    """1 where values rise and never fall, -1 where they fall and never rise, else 0."""
+    finite = [value for value in values if np.isfinite(value)]
+    signs = {float(np.sign(after - before)) for before, after in pairwise(finite)} - {0.0}
+    return signs.pop() if len(signs) == 1 else 0.0
 
 
 # Unit and description of every dataset, by group and name.

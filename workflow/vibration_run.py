@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -19,7 +18,7 @@ from workflow.errors import UserError
 from workflow.folder import OutputFolder
 from workflow.reporter import Reporter
 from workflow.vibration_model import VibrationModel
-from workflow.vibration_outcome import Curves, Response, VibrationOutcome
+from workflow.vibration_outcome import Curves, Response, VibrationOutcome, trend
 from workflow.vibration_response import (
     accuracy_of,
     amplitudes_of,
@@ -77,11 +76,10 @@ def _outcome(case: VibrationCase, reporter: Reporter) -> VibrationOutcome:
 def _across(responses: list[Response]) -> dict[str, Any]:
     """What the forces show together: where the peak is lowest, and whether resonances move on."""
     resonances = [response.numbers["resonance"] for response in responses]
-    signs = {float(np.sign(after - before)) for before, after in pairwise(resonances)}
     lowest = min(responses, key=lambda response: response.numbers["receptance"])
     return {
         "least_receptance_force": lowest.force,
-        "trend": {"resonance": signs.pop() if len(signs) == 1 else 0.0},
+        "trend": {"resonance": trend(resonances)},
     }
 
 
@@ -100,8 +98,8 @@ def _backbone(
     motions = found.solutions
     return Curves(
         {
-            "force": np.array([own.force for own in motions]),
-            "frequency": np.array([own.frequency for own in motions]),
+            "force": found.forces,
+            "frequency": found.frequencies,
             "amplitude": np.array([amplitudes_of(model, own)[-1] for own in motions]),
             "damping": np.array([damping_ratio(found.problem, own) for own in motions]),
             "energy_per_cycle": np.array([own.cycle.dissipated.sum() for own in motions]),

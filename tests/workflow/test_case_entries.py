@@ -132,7 +132,7 @@ EVOLUTION = {
     for name in ("friction", "stiffness", "residual_stiffness", "normal_load")
 }
 GIVEN["joint"] = {"joint": JOINTS, **EVOLUTION, "reported": {ALWAYS: TOLD}}
-GIVEN["worn_vibration"] = GIVEN["worn_friction_rig"] = {}
+GIVEN["vibration_wear"] = GIVEN["friction_rig_wear"] = {}
 CONTACT = {"law": "friction_contact", **JOINT, "normal_load": 0, "normal_stiffness": 1e4}
 REDUCED = {
     "kind": "reduced",

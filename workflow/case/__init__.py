@@ -11,8 +11,8 @@ from workflow.case.specimens_case import SpecimensCase
 from workflow.case.template import KINDS, template
 from workflow.case.time_case import JointCase, RigCase, TimeCase
 from workflow.case.vibration_case import VibrationCase
+from workflow.case.vibration_wear_case import FrictionRigWearCase, VibrationWearCase
 from workflow.case.wear_case import WearCase
-from workflow.case.worn_vibration_case import WornFrictionRigCase, WornVibrationCase
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError
 
@@ -23,6 +23,7 @@ __all__ = [
     "CaseError",
     "ContactCase",
     "DovetailCase",
+    "FrictionRigWearCase",
     "JointCase",
     "LineBodiesWearCase",
     "LineContactCase",
@@ -32,9 +33,8 @@ __all__ = [
     "SpecimensCase",
     "TimeCase",
     "VibrationCase",
+    "VibrationWearCase",
     "WearCase",
-    "WornFrictionRigCase",
-    "WornVibrationCase",
     "dump_case",
     "json_schema",
     "load_case",

@@ -42,8 +42,8 @@ class BoucWenJoint(RisingJoint):
     """Bouc and Wen's law, normalised: force µN ξ and the residual slope."""
 
     law: Literal["bouc_wen"] = entry(
-        "bouc_wen, jenkins, uniform_iwan or four_parameter_iwan; at the points of a reduced body "
-        "friction_contact too",
+        "bouc_wen, jenkins, uniform_iwan or four_parameter_iwan; in a reduced structure "
+        "friction_contact too, in a friction_rig only that",
         "bouc_wen",
     )
     stiffness: JointStiffness = entry(

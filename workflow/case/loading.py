@@ -25,7 +25,7 @@ from workflow.case.source import KeyPath, Source, dotted, read_text
 from workflow.case.specimens_case import SpecimensCase
 from workflow.case.time_case import JointCase, RigCase
 from workflow.case.vibration_case import VibrationCase
-from workflow.case.worn_vibration_case import WornFrictionRigCase, WornVibrationCase
+from workflow.case.vibration_wear_case import FrictionRigWearCase, VibrationWearCase
 from workflow.errors import CaseError
 
 
@@ -67,9 +67,9 @@ TIME_CASES: dict[str, type[Case]] = {
     "reduced": RigCase,
 }
 # Vibration cases with wear by what holds the contact.
-WORN_CASES: dict[str, type[Case]] = {
-    "rig": WornVibrationCase,
-    "friction_rig": WornFrictionRigCase,
+VIBRATION_WEAR_CASES: dict[str, type[Case]] = {
+    "rig": VibrationWearCase,
+    "friction_rig": FrictionRigWearCase,
 }
 
 
@@ -79,8 +79,10 @@ def _kind_of_case(source: Source) -> type[Case]:
     if analysis == "time":
         return TIME_CASES[_choice(source, ("structure", "kind"), tuple(TIME_CASES))]
     if analysis == "vibration":
-        if source.at(("wear",)) is not None:
-            return WORN_CASES[_choice(source, ("structure", "kind"), tuple(WORN_CASES))]
+        if any(source.at((section,)) is not None for section in ("wear", "contact")):
+            return VIBRATION_WEAR_CASES[
+                _choice(source, ("structure", "kind"), tuple(VIBRATION_WEAR_CASES))
+            ]
         _choice(source, ("structure", "kind"), ("rig", "reduced", "friction_rig"))
         return VibrationCase
     if analysis == "wear":

@@ -19,7 +19,7 @@ Direction = Literal["x", "y", "z", "-x", "-y", "-z"]
 class Rig(Section):
     """Masses in a row on springs from the ground on; the joint holds the last to the ground."""
 
-    kind: Literal["rig"] = entry("rig, reduced or, for vibration, friction_rig", "rig")
+    kind: Literal["rig"] = entry("masses in a row", "rig")
     masses: Annotated[tuple[Mass, ...], Field(min_length=1, max_length=20)] = entry(
         "from the ground on [t]", ["21.2 kg", "1.2 kg"]
     )

@@ -14,7 +14,7 @@ from workflow.case.resultants_case import ResultantsCase
 from workflow.case.specimens_case import SpecimensCase
 from workflow.case.time_case import JointCase, RigCase
 from workflow.case.vibration_case import VibrationCase
-from workflow.case.worn_vibration_case import WornFrictionRigCase, WornVibrationCase
+from workflow.case.vibration_wear_case import FrictionRigWearCase, VibrationWearCase
 
 Case = (
     DovetailCase
@@ -28,8 +28,8 @@ Case = (
     | JointCase
     | RigCase
     | VibrationCase
-    | WornVibrationCase
-    | WornFrictionRigCase
+    | VibrationWearCase
+    | FrictionRigWearCase
 )
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Annotated, Any, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, field_validator
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
@@ -83,6 +83,21 @@ class Expectation(Section):
         False,
         default=False,
     )
+
+
+class OutputWithoutFields(Output):
+    """What is written beside summary and results, of a case that has no fields."""
+
+    paraview: StrictBool = entry("files for ParaView: there are none", False, default=False)
+
+    @field_validator("paraview")
+    @classmethod
+    def _has_no_fields(cls, paraview: bool) -> bool:
+        if paraview:
+            raise PydanticCustomError(
+                "entry", "true: such a case has nothing to show in ParaView; allowed: false"
+            )
+        return paraview
 
 
 # The sections of a case, of whatever kind, in the order in which they are written.

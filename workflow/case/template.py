@@ -16,8 +16,8 @@ from workflow.case.sections import Section, entries_of, sections_of
 from workflow.case.specimens_case import SpecimensCase
 from workflow.case.time_case import JointCase, RigCase, SteadyAgeing
 from workflow.case.vibration_case import VibrationCase
+from workflow.case.vibration_wear_case import FrictionRigWearCase, VibrationWearCase
 from workflow.case.wear_sections import Step
-from workflow.case.worn_vibration_case import WornFrictionRigCase, WornVibrationCase
 from workflow.case.writing import Row, render
 
 # What `fretscale new` can write.
@@ -33,8 +33,8 @@ KINDS: dict[str, type[Section]] = {
     "joint": JointCase,
     "rig": RigCase,
     "vibration": VibrationCase,
-    "worn_vibration": WornVibrationCase,
-    "worn_friction_rig": WornFrictionRigCase,
+    "vibration_wear": VibrationWearCase,
+    "friction_rig_wear": FrictionRigWearCase,
 }
 
 HEADER = """\

@@ -6,8 +6,7 @@ from itertools import pairwise
 from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, StrictBool, field_validator, model_validator
-from pydantic_core import PydanticCustomError
+from pydantic import Field, model_validator
 
 from workflow.case.evolution import TotalEnergy
 from workflow.case.excitation import (
@@ -25,7 +24,7 @@ from workflow.case.rig_structure import ReducedBody, Rig
 from workflow.case.sections import (
     DottedPath,
     Expectation,
-    Output,
+    OutputWithoutFields,
     Scene,
     Section,
     Title,
@@ -91,21 +90,6 @@ class Reported(Section):
     source: Title = entry("where the value comes from", "measured")
 
 
-class TimeOutput(Output):
-    """What is written beside summary and results."""
-
-    paraview: StrictBool = entry("files for ParaView: there are none", False, default=False)
-
-    @field_validator("paraview")
-    @classmethod
-    def _has_no_fields(cls, paraview: bool) -> bool:
-        if paraview:
-            raise PydanticCustomError(
-                "entry", "true: a case in time has nothing to show in ParaView; allowed: false"
-            )
-        return paraview
-
-
 class TimeCase(Scene):
     """A joint that changes with the energy it dissipates."""
 
@@ -121,7 +105,9 @@ class TimeCase(Scene):
         ["0 J", "1 kJ"],
         default=(0.0,),
     )
-    output: TimeOutput = entry("files beside summary and results", default=TimeOutput())
+    output: OutputWithoutFields = entry(
+        "files beside summary and results", default=OutputWithoutFields()
+    )
     assumed: tuple[DottedPath, ...] = entry(
         "inputs that are ours because the source does not print them",
         ["joint", "evolution"],

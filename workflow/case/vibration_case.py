@@ -45,8 +45,10 @@ class HarmonicNumbers(Entry):
         if isinstance(value, list | tuple):
             if not all(type(own) is int and 0 <= own <= HIGHEST for own in value):
                 raise self.refusal(value, "not all of them harmonics")
-            if any(after <= before for before, after in pairwise(value)) or 1 not in value:
-                raise self.refusal(value, "not ascending from 0 or 1, each once")
+            if any(after <= before for before, after in pairwise(value)):
+                raise self.refusal(value, "not ascending, each once")
+            if 1 not in value:
+                raise self.refusal(value, "without harmonic 1")
             return tuple(value)
         if type(value) is not int:
             raise self.refusal(value, "not harmonics")
@@ -93,7 +95,7 @@ class MotionResolution(Section):
 class Continuation(Section):
     """How a curve of motions is followed: steps are shares of the motion and of the frequency."""
 
-    first_step: Step = entry("[1]", 0.02, default=0.02)
+    first_step: Step = entry("with which a curve begins [1]", 0.02, default=0.02)
     shortest_step: Step = entry("at which the curve is given up [1]", 1e-6, default=1e-6)
     longest_step: Step = entry("shorter ones draw a smoother curve [1]", 0.1, default=0.1)
     iterations: Annotated[int, Whole(1, 50)] = entry(
@@ -119,7 +121,8 @@ class Continuation(Section):
     def _steps_ascend(self) -> Continuation:
         if not self.shortest_step <= self.first_step <= self.longest_step:
             raise disagreement(
-                f"{self.first_step:g}: not between the shortest and the longest step",
+                f"{self.first_step:g}: not between the shortest and the longest step; allowed: "
+                f"{self.shortest_step:g} to {self.longest_step:g}",
                 *("first_step", "shortest_step", "longest_step"),
             )
         return self
@@ -138,8 +141,18 @@ class LoopsAt(Section):
         default=(),
     )
 
+    @model_validator(mode="after")
+    def _finer_and_finer(self) -> LoopsAt:
+        if any(after[-1] <= before[-1] for before, after in pairwise(self.harmonics)):
+            raise disagreement(
+                "not finer and finer; allowed: each with a higher last harmonic than the one "
+                "before",
+                "harmonics",
+            )
+        return self
 
-class ForcedResponse(Scene):
+
+class VibrationScene(Scene):
     """A structure under forces a sin(2π frequency t), for all frequencies of a span."""
 
     title: Title = entry("one line", "Forced response of a friction rig")
@@ -162,7 +175,7 @@ class ForcedResponse(Scene):
     expect: tuple[Expectation, ...] = entry("values the run must reproduce", default=())
 
     @model_validator(mode="after")
-    def _ascending(self) -> ForcedResponse:
+    def _ascending(self) -> VibrationScene:
         if any(after <= before for before, after in pairwise(self.forces)):
             raise disagreement("not ascending; allowed: each force above the last", "forces")
         if self.frequencies[0] >= self.frequencies[1]:
@@ -170,7 +183,7 @@ class ForcedResponse(Scene):
         return self
 
     @model_validator(mode="after")
-    def _assumed_exist(self) -> ForcedResponse:
+    def _assumed_exist(self) -> VibrationScene:
         self.require_entries(self.assumed)
         return self
 
@@ -210,7 +223,7 @@ class ForcedResponse(Scene):
         return "mass 1"
 
 
-class DrivenMass(ForcedResponse):
+class DrivenMass(VibrationScene):
     """The same of a structure that may be a row of masses, of which any is driven."""
 
     mass: MassNumber | None = entry(

@@ -11,7 +11,7 @@ from types import ModuleType
 
 import h5py
 
-from workflow.figures import contact, specimens, time, vibration, wear, worn_vibration
+from workflow.figures import contact, specimens, time, vibration, vibration_wear, wear
 from workflow.figures.style import STYLE, save
 
 
@@ -36,7 +36,7 @@ def write_figures(results: Path, folder: Path, first: int = 0, every: int = 1) -
 def _kind(file: h5py.File) -> ModuleType:
     """The module that draws this kind of results."""
     if "worn" in file:
-        return worn_vibration
+        return vibration_wear
     if "states" in file:
         return time
     if "responses" in file:

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -15,25 +13,26 @@ from workflow.folder import OutputFolder
 from workflow.reporter import Reporter
 from workflow.store import replacing
 from workflow.versions import versions
+from workflow.vibration_outcome import trend
 from workflow.vibration_store import put, write_table
-from workflow.worn_vibration_outcome import (
+from workflow.vibration_wear_outcome import (
     DATASETS,
     EVOLUTION,
     PLACES,
     RESPONSES,
     WORN,
+    VibrationWearOutcome,
     WornState,
-    WornVibrationOutcome,
 )
 
 # What rises, falls, or neither, beside the resonance under the least force.
 TRENDS = ("stiffness", "peak_pressure", "touching")
 # N mm to J, N/mm to N/µm, mm to µm.
-JOULES, PER_MICRON, MICRONS = 1e-3, 1e-3, 1e3
+TO_JOULES, PER_MICRON, TO_MICRONS = 1e-3, 1e-3, 1e3
 
 
-def write_worn_vibration_output(
-    outcome: WornVibrationOutcome, folder: OutputFolder, reporter: Reporter
+def write_vibration_wear_output(
+    outcome: VibrationWearOutcome, folder: OutputFolder, reporter: Reporter
 ) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
     with reporter.stage("results"):
@@ -42,7 +41,7 @@ def write_worn_vibration_output(
     if outcome.case.output.figures:
         from workflow.figures import write_figures
 
-        with reporter.stage("paraview and figures"):
+        with reporter.stage("figures"):
             write_figures(folder.results, folder.figures)
     summary = _summary(outcome, reporter)
     folder.write_summary(summary)
@@ -55,7 +54,7 @@ def write_worn_vibration_output(
 # --- results ------------------------------------------------------------------------------------
 
 
-def _write_results(outcome: WornVibrationOutcome, path: Path) -> None:
+def _write_results(outcome: VibrationWearOutcome, path: Path) -> None:
     case = outcome.case
     with replacing(path) as partial, h5py.File(partial, "w") as file:
         file.attrs.update({"title": case.title, "analysis": case.analysis})
@@ -81,7 +80,7 @@ def _write_results(outcome: WornVibrationOutcome, path: Path) -> None:
 # --- tables -------------------------------------------------------------------------------------
 
 
-def _write_tables(outcome: WornVibrationOutcome, root: Path) -> None:
+def _write_tables(outcome: VibrationWearOutcome, root: Path) -> None:
     """The evolution, and the responses of every state to every force, as CSV in base units."""
     write_table(root / f"{EVOLUTION}.csv", outcome.evolution, DATASETS[EVOLUTION])
     for number, state in enumerate(outcome.states):
@@ -93,7 +92,7 @@ def _write_tables(outcome: WornVibrationOutcome, root: Path) -> None:
 # --- summary ------------------------------------------------------------------------------------
 
 
-def _summary(outcome: WornVibrationOutcome, reporter: Reporter) -> dict[str, Any]:
+def _summary(outcome: VibrationWearOutcome, reporter: Reporter) -> dict[str, Any]:
     states, last = outcome.states, outcome.states[-1].numbers
     energy = last["energy"]
     return {
@@ -102,11 +101,11 @@ def _summary(outcome: WornVibrationOutcome, reporter: Reporter) -> dict[str, Any
         "volume_per_energy": last["volume"] / energy if energy > 0.0 else 0.0,
         "states": [_of_state(state) for state in states],
         "trend": {
-            name: _trend([state.numbers[name] for state in states])
+            name: trend([state.numbers[name] for state in states])
             for name in TRENDS
             if name in states[0].numbers
         }
-        | {"resonance": _trend([state.responses[0].numbers["resonance"] for state in states])},
+        | {"resonance": trend([state.responses[0].numbers["resonance"] for state in states])},
         "warnings": reporter.warnings,
         "seconds": {name: round(value, 2) for name, value in reporter.seconds.items()},
         "versions": versions(),
@@ -115,13 +114,9 @@ def _summary(outcome: WornVibrationOutcome, reporter: Reporter) -> dict[str, Any
 
 def _of_state(state: WornState) -> dict[str, Any]:
     responses = [{"force": own.force, **own.numbers} for own in state.responses]
-    return {**state.numbers, RESPONSES: responses}
-
-
-def _trend(values: Sequence[float]) -> float:
-    """1 where values rise and never fall, -1 where they fall and never rise, else 0."""
-    signs = {float(np.sign(after - before)) for before, after in pairwise(values)} - {0.0}
-    return signs.pop() if len(signs) == 1 else 0.0
+    # JSON has no NaN.
+    numbers = {name: value for name, value in state.numbers.items() if value == value}
+    return {**numbers, RESPONSES: responses}
 
 
 def _line(state: WornState) -> str:
@@ -131,8 +126,10 @@ def _line(state: WornState) -> str:
         f"{response.numbers['resonance']:.4g} Hz under {response.force:g} N"
         for response in state.responses
     )
+    stiffness = PER_MICRON * own["stiffness"]
+    sticks = f"kt {stiffness:.4g} N/um, " if np.isfinite(stiffness) else ""
     return (
-        f"{state.cycles:g} cycles, {JOULES * own['energy']:.4g} J: kt "
-        f"{PER_MICRON * own['stiffness']:.4g} N/um, depth {MICRONS * own['depth']:.3g} um, stroke "
-        f"{MICRONS * own['stroke']:.3g} um; resonance {resonances}"
+        f"{state.cycles:g} cycles, {TO_JOULES * own['energy']:.4g} J: {sticks}depth "
+        f"{TO_MICRONS * own['depth']:.3g} um, stroke {TO_MICRONS * own['stroke']:.3g} um; "
+        f"resonance {resonances}"
     )

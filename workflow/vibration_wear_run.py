@@ -29,7 +29,7 @@ from wear.steppers import (
     first_cycles,
 )
 from wear.stepping import ContactFailure, WearState
-from workflow.case import BodiesWearCase, CaseError, WornVibrationCase, load_case
+from workflow.case import BodiesWearCase, CaseError, VibrationWearCase, load_case
 from workflow.errors import MethodFailed, UserError
 from workflow.folder import OutputFolder
 from workflow.reporter import Reporter
@@ -38,13 +38,13 @@ from workflow.vibrating_contact import Rubbing, Shaking, VibratingContact
 from workflow.vibration_model import VibrationModel
 from workflow.vibration_outcome import Response
 from workflow.vibration_response import response_under
-from workflow.worn_vibration_outcome import (
+from workflow.vibration_wear_outcome import (
     CONTACT,
     HALF_SPACE,
     LOOP,
     SLIDERS,
+    VibrationWearOutcome,
     WornState,
-    WornVibrationOutcome,
 )
 
 # Of the motion at which all of the contact slides: where loops in partial slip are compared.
@@ -53,13 +53,13 @@ PARTIAL = 0.5
 FRICTION_CHANGE = 0.03
 
 
-def run_worn_vibration(case: WornVibrationCase, folder: OutputFolder, reporter: Reporter) -> None:
+def run_vibration_wear(case: VibrationWearCase, folder: OutputFolder, reporter: Reporter) -> None:
     """Run such a case to its end.
 
     Raises UserError where contact or rig cannot be what the case says, MethodFailed where a contact
     problem or a motion is not found.
     """
-    from workflow.worn_vibration_output import write_worn_vibration_output
+    from workflow.vibration_wear_output import write_vibration_wear_output
 
     reporter.say(f"run: {case.title}")
     try:
@@ -68,10 +68,10 @@ def run_worn_vibration(case: WornVibrationCase, folder: OutputFolder, reporter: 
         raise MethodFailed(str(error)) from error
     except (HarmonicBalanceError, ReceptanceError) as error:
         raise UserError(f"{folder.case}: structure: {error}") from error
-    write_worn_vibration_output(outcome, folder, reporter)
+    write_vibration_wear_output(outcome, folder, reporter)
 
 
-def _outcome(case: WornVibrationCase, reporter: Reporter) -> WornVibrationOutcome:
+def _outcome(case: VibrationWearCase, reporter: Reporter) -> VibrationWearOutcome:
     bodies = contact_case(case.contact.file)
     rig = row_of_masses(case.structure, case.mass or 1)
     own, wear = case.resolution, case.wear
@@ -95,7 +95,7 @@ def _outcome(case: WornVibrationCase, reporter: Reporter) -> WornVibrationOutcom
             done = cycles
             states.append(keeper.keep(state, cycles, steps))
             progress.update(cycles, len(states) - 1)
-    return WornVibrationOutcome(case, tuple(states), grid=contact.grid)
+    return VibrationWearOutcome(case, tuple(states), grid=contact.grid)
 
 
 def contact_case(file: str) -> BodiesWearCase:
@@ -136,7 +136,7 @@ class _Keeper:
     """Finds what is kept of a state."""
 
     def __init__(
-        self, case: WornVibrationCase, rig: RigModel, contact: VibratingContact, reporter: Reporter
+        self, case: VibrationWearCase, rig: RigModel, contact: VibratingContact, reporter: Reporter
     ) -> None:
         self._case, self._rig, self._contact, self._reporter = case, rig, contact, reporter
 

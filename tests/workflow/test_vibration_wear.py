@@ -13,11 +13,11 @@ from fe_models.dynamics.harmonics import Resolution
 from tests.workflow.conftest import invoke
 from wear.joints.periodic import PeriodicMarch
 from wear.steppers import ErrorControl, Implicit, advance, first_cycles
-from workflow.case import WornVibrationCase, dump_case, parse_case
+from workflow.case import VibrationWearCase, dump_case, parse_case
 from workflow.case.rig_structure import Rig
 from workflow.rig_model import row_of_masses
 from workflow.vibrating_contact import Shaking, VibratingContact
-from workflow.worn_vibration_run import contact_case
+from workflow.vibration_wear_run import contact_case
 
 WEAR = """\
 title: Ball that wears
@@ -261,7 +261,7 @@ def test_figures_are_drawn(ended, tmp_path):
 def test_a_case_is_written_as_it_was_read(tmp_path):
     (tmp_path / "wear.yaml").write_text(WEAR, encoding="utf-8")
     case = parse_case(RIG, str(tmp_path / "rig.yaml"))
-    assert isinstance(case, WornVibrationCase)
+    assert isinstance(case, VibrationWearCase)
     assert parse_case(dump_case(case), str(tmp_path / "again.yaml")) == case
     rows = dict(case.outline())
     assert rows["wear"] == "20000 cycles of 75 N at 100 Hz"

@@ -18,7 +18,7 @@ import numpy as np
 
 from sa_solver.types import Array
 from wear.steppers import GROWTH, ROUNDING, SAFETY, SHORTEST, SHRINKAGE, root_mean_square
-from workflow.worn_vibration_pads import RubbedPads, WearingPads
+from workflow.rubbed_pads import RubbedPads, WearingPads
 
 
 @dataclass(frozen=True)
@@ -26,7 +26,8 @@ class PadState:
     """Pads after so many ``cycles``.
 
     They have lost the ``depth`` ``(j,)`` [mm] and dissipated an ``energy`` [N mm] in so many
-    ``steps``; ``rubbed`` is how they move now, and ``next_cycles`` how far the next step may go.
+    ``steps``, of whose errors ``worst`` was the largest; ``rubbed`` is how they move now, and
+    ``next_cycles`` how far the next step may go.
     """
 
     cycles: float
@@ -35,6 +36,7 @@ class PadState:
     rubbed: RubbedPads
     steps: int = 0
     next_cycles: float = np.inf
+    worst: float = 0.0
 
     @classmethod
     def new(cls, pads: WearingPads) -> PadState:
@@ -80,13 +82,15 @@ def taken(pads: WearingPads, state: PadState, step: Step) -> PadState:
         energy=state.energy + step.energy,
         rubbed=pads.at(depth, step.following.motion),
         steps=state.steps + 1,
+        worst=max(state.worst, step.error),
     )
 
 
-def wear(pads: WearingPads, state: PadState, cycles: float, tolerance: float) -> PadState:
+def worn_until(pads: WearingPads, state: PadState, cycles: float, tolerance: float) -> PadState:
     """The pads after so many ``cycles`` in all, the ``error`` of each step within ``tolerance``.
 
-    Steps of a small share of the stable length are not tried again: something else is wrong then.
+    Steps of a small share of the stable length are not tried again: something else is wrong then,
+    which ``worst`` tells.
     """
     while cycles - state.cycles > ROUNDING * cycles:
         longest = state.rubbed.longest_step

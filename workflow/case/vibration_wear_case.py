@@ -12,11 +12,12 @@ from workflow.case.excitation import DrivingForce, Frequency
 from workflow.case.fields import File, Quantity
 from workflow.case.joint_sections import FrictionContactJoint, JenkinsJoint, Joint, JointStiffness
 from workflow.case.rig_structure import FrictionRig, Rig
-from workflow.case.sections import Section, Title, disagreement, entry
+from workflow.case.sections import OutputWithoutFields, Section, Title, disagreement, entry
 from workflow.case.specimens_case import Pressing
-from workflow.case.vibration_case import DrivenMass, ForcedResponse, VibrationCase
+from workflow.case.vibration_case import DrivenMass, VibrationCase, VibrationScene
 from workflow.case.wear_sections import Cycles
 
+WearingFriction = Annotated[float, Quantity("1", above=0.0, at_most=10.0)]
 # Of the cases with wear, what a vibration case of one state has no use for.
 NOT_OF_A_STATE = ("assumed", "expect")
 
@@ -38,7 +39,7 @@ class WearByVibration(Section):
     frequency: Frequency = entry("of the force [Hz]", "100 Hz")
     cycles: Annotated[tuple[Cycles, ...], Field(min_length=1, max_length=100)] = entry(
         "so many in all, ascending; before the first of them the contact is unworn [1]",
-        [1e3, 1e5],
+        [1000, 100_000],
     )
 
     @model_validator(mode="after")
@@ -54,7 +55,10 @@ class WearOfNodes(WearByVibration):
     tolerance: Annotated[
         float, Quantity("1", at_least=1e-4, at_most=0.5, range_text="0.01 % to 50 %")
     ] = entry(
-        "of what a step wears, for the first-order step that is improved on [1]", 0.1, default=0.1
+        "error of a first-order step over what it wears; the step taken, of second order, is far "
+        "better [1]",
+        0.1,
+        default=0.1,
     )
 
 
@@ -62,42 +66,40 @@ class PadContacts(Joint):
     """A friction contact at every node of two pads that a load presses together."""
 
     law: Literal["friction_contact"] = entry("at every node of the pads", "friction_contact")
+    friction: WearingFriction = entry("limit of the friction force over the normal load [1]", 0.88)
     normal_load: Pressing = entry("that presses the pads together [N]", "60 N")
     stiffness: JointStiffness = entry("along the pads, stuck [N/mm]", "45 N/um")
     normal_stiffness: JointStiffness = entry("in contact [N/mm]", "58.5 N/um")
 
 
-class WornResponse(ForcedResponse):
+class VibrationWearScene(VibrationScene):
     """A rig on a contact that it wears, and its response to forces a sin(2π frequency t)."""
 
     title: Title = entry("one line", "Forced response of a friction rig as it wears")
     structure: Rig | FrictionRig = entry("what holds the contact")
     wear: WearByVibration = entry("how the contact wears")
+    output: OutputWithoutFields = entry(
+        "files beside summary and results", default=OutputWithoutFields()
+    )
 
     def outline(self) -> list[tuple[str, str]]:
         """What would run, in a few rows of name and text."""
         structure, wear = self.structure, self.wear
         return [
             ("structure", f"{structure.text}, damping ratio {structure.damping_ratio:g}"),
-            ("contact", self._contact),
             ("wear", f"{wear.cycles[-1]:g} cycles of {wear.force:g} N at {wear.frequency:g} Hz"),
             ("forces", self.driving),
             ("resolution", self.resolved),
         ]
 
-    @property
-    def _contact(self) -> str:
-        """The contact in a few words."""
-        raise NotImplementedError
-
     def _of_a_state(self, joint: Joint, mass: int | None = None) -> VibrationCase:
         """The vibration case with this joint, driven at the mass of this number."""
-        shared = [name for name in ForcedResponse.model_fields if name not in NOT_OF_A_STATE]
+        shared = [name for name in VibrationScene.model_fields if name not in NOT_OF_A_STATE]
         entries = {name: getattr(self, name) for name in shared}
         return VibrationCase(joint=joint, mass=mass, **entries)
 
 
-class WornVibrationCase(WornResponse, DrivenMass):
+class VibrationWearCase(VibrationWearScene, DrivenMass):
     """A row of masses on a half-space contact that it wears."""
 
     structure: Rig = entry("what holds the contact")
@@ -110,12 +112,11 @@ class WornVibrationCase(WornResponse, DrivenMass):
         )
         return self._of_a_state(joint, self.mass)
 
-    @property
-    def _contact(self) -> str:
-        return f"that of {Path(self.contact.file).name}"
+    def outline(self) -> list[tuple[str, str]]:
+        return [*super().outline(), ("contact", f"that of {Path(self.contact.file).name}")]
 
 
-class WornFrictionRigCase(WornResponse):
+class FrictionRigWearCase(VibrationWearScene):
     """Two specimens in a rig that wear each other, node by node."""
 
     structure: FrictionRig = entry("two specimens in a rig; their case says how they wear")
@@ -131,6 +132,6 @@ class WornFrictionRigCase(WornResponse):
         """The vibration case before the first cycle."""
         return self._of_a_state(FrictionContactJoint(**self.joint.model_dump()))
 
-    @property
-    def _contact(self) -> str:
-        return f"{self.joint.law} under {self.joint.normal_load:g} N"
+    def outline(self) -> list[tuple[str, str]]:
+        joint = self.joint
+        return [*super().outline(), ("joint", f"{joint.law} under {joint.normal_load:g} N")]

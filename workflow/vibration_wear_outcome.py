@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array, Grid
-from workflow.case.worn_vibration_case import WornResponse
+from workflow.case.vibration_wear_case import VibrationWearScene
 from workflow.vibration_outcome import DATASETS as VIBRATION
 from workflow.vibration_outcome import Response
 
@@ -35,13 +35,13 @@ class WornState:
 
 
 @dataclass(frozen=True)
-class WornVibrationOutcome:
+class VibrationWearOutcome:
     """All states of a run, the unworn one first.
 
     The contact is on a ``grid``, or at nodes with ``places``: of :data:`DATASETS`.
     """
 
-    case: WornResponse
+    case: VibrationWearScene
     states: tuple[WornState, ...]
     grid: Grid | None = None
     places: Mapping[str, Array] | None = None

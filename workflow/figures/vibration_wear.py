@@ -13,7 +13,7 @@ from workflow.figures.fields import spread
 from workflow.figures.style import BLUE, GREEN, ORANGE, PURPLE, new_figure
 from workflow.pad_nodes import rows_and_columns
 from workflow.store import grid_of
-from workflow.worn_vibration_outcome import (
+from workflow.vibration_wear_outcome import (
     CONTACT,
     EVOLUTION,
     HALF_SPACE,

@@ -14,13 +14,13 @@ from tests.workflow.conftest import invoke
 from tests.workflow.test_friction_rig import NODES, RIG, SPECIMENS
 from tests.workflow.test_time_cases import refused
 from workflow.case import dump_case, parse_case
-from workflow.case.worn_vibration_case import WornFrictionRigCase
+from workflow.case.vibration_wear_case import FrictionRigWearCase
 from workflow.folder import OutputFolder
+from workflow.friction_rig_wear_run import run_friction_rig_wear
+from workflow.pad_wear_steps import PadState, heun, taken, worn_until
 from workflow.reporter import Reporter
+from workflow.rubbed_pads import WearingPads
 from workflow.vibration_model import VibrationModel
-from workflow.worn_vibration_pads import WearingPads
-from workflow.worn_vibration_rig_run import run_worn_friction_rig
-from workflow.worn_vibration_steps import PadState, heun, taken, wear
 
 # What changes of the rig that does not wear.
 WORN = {
@@ -43,7 +43,7 @@ def case_in(folder):
     (folder / "specimens.yaml").write_text(SPECIMENS, encoding="utf-8")
     given = yaml.safe_load(RIG) | WORN
     given["structure"]["specimens"] = str(folder / "specimens.yaml")
-    return WornFrictionRigCase(**given)
+    return FrictionRigWearCase(**given)
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +64,7 @@ def unworn(pads):
 @pytest.fixture(scope="module")
 def flat(pads, unworn):
     """Pads that have worn flat."""
-    return wear(pads, unworn, FLAT, 0.1)
+    return worn_until(pads, unworn, FLAT, 0.1)
 
 
 # --- balances -----------------------------------------------------------------------------------
@@ -81,7 +81,7 @@ def test_energy_is_that_of_the_motions_on_the_way(pads, unworn):
     cycles, state = np.linspace(0.0, 1e5, 5), unworn
     energies, spent = [float(unworn.rubbed.energy.sum())], 0.0
     for end in cycles[1:]:
-        state = wear(pads, state, end, 0.01)
+        state = worn_until(pads, state, end, 0.01)
         energies.append(float(state.rubbed.energy.sum()))
         spent = state.energy
     weights = np.array([1.0, 4.0, 2.0, 4.0, 1.0]) / 3.0 * cycles[1]
@@ -101,7 +101,7 @@ def test_what_a_node_dissipates_is_its_force_along_its_path(unworn):
 
 def test_nothing_wears_where_nothing_slips(pads):
     still = replace(pads, force=STUCK_FORCE)
-    state = wear(still, PadState.new(still), 1e6, 0.1)
+    state = worn_until(still, PadState.new(still), 1e6, 0.1)
     assert state.steps == 1
     assert state.energy == 0.0
     assert not state.depth.any()
@@ -147,9 +147,9 @@ def test_steps_converge_with_their_square(pads, unworn):
 
 
 def test_the_tolerance_bounds_the_error(pads, unworn):
-    best = wear(pads, unworn, 2e5, 0.005)
+    best = worn_until(pads, unworn, 2e5, 0.005)
     for tolerance in (0.2, 0.1, 0.05):
-        found = wear(pads, unworn, 2e5, tolerance)
+        found = worn_until(pads, unworn, 2e5, tolerance)
         error = np.linalg.norm(found.depth - best.depth) / np.linalg.norm(best.depth)
         assert error < 0.2 * tolerance
         assert found.steps < best.steps
@@ -181,7 +181,7 @@ def ended(tmp_path_factory):
     case, out = case_in(folder), OutputFolder(folder / "out")
     out.claim(case, force=False)
     reporter = Reporter(out.log)
-    run_worn_friction_rig(case, out, reporter)
+    run_friction_rig_wear(case, out, reporter)
     reporter.close()
     return out
 
@@ -250,7 +250,7 @@ def text(tmp_path):
 
 def test_a_case_is_written_as_it_was_read_and_outlined(text, tmp_path):
     case = parse_case(text, str(tmp_path / "case.yaml"))
-    assert isinstance(case, WornFrictionRigCase)
+    assert isinstance(case, FrictionRigWearCase)
     assert parse_case(dump_case(case), str(tmp_path / "again.yaml")) == case
     (tmp_path / "case.yaml").write_text(text, encoding="utf-8")
     checked = invoke("check", tmp_path / "case.yaml")

@@ -12,42 +12,42 @@ from fe_models.dynamics.receptance import ReceptanceError
 from sa_solver.types import Array
 from wear.joints.parameters import JointError
 from wear.stepping import ContactFailure
-from workflow.case import SpecimensCase, WornFrictionRigCase, load_case
+from workflow.case import FrictionRigWearCase, SpecimensCase, load_case
 from workflow.errors import MethodFailed, UserError
 from workflow.folder import OutputFolder
+from workflow.pad_wear_steps import PadState, worn_until
 from workflow.reporter import Reporter
+from workflow.rubbed_pads import RubbedPads, WearingPads
 from workflow.vibration_model import VibrationModel
 from workflow.vibration_outcome import Curves
 from workflow.vibration_response import loop_of, response_under
-from workflow.worn_vibration_outcome import LOOP, NODES, WornState, WornVibrationOutcome
-from workflow.worn_vibration_pads import RubbedPads, WearingPads
-from workflow.worn_vibration_steps import PadState, wear
+from workflow.vibration_wear_outcome import LOOP, NODES, VibrationWearOutcome, WornState
 
 
-def run_worn_friction_rig(
-    case: WornFrictionRigCase, folder: OutputFolder, reporter: Reporter
+def run_friction_rig_wear(
+    case: FrictionRigWearCase, folder: OutputFolder, reporter: Reporter
 ) -> None:
     """Run such a case to its end.
 
     Raises UserError where specimens or rig cannot be what the case says, MethodFailed where rest or
     a motion is not found.
     """
-    from workflow.worn_vibration_output import write_worn_vibration_output
+    from workflow.vibration_wear_output import write_vibration_wear_output
 
     reporter.say(f"run: {case.title}")
     try:
-        outcome = worn_friction_rig(case, reporter)
+        outcome = _outcome(case, reporter)
     except ContactFailure as error:
         raise MethodFailed(str(error)) from error
     except JointError as error:
         raise UserError(f"{folder.case}: joint: {error}") from error
     except (HarmonicBalanceError, ReceptanceError) as error:
         raise UserError(f"{folder.case}: structure: {error}") from error
-    write_worn_vibration_output(outcome, folder, reporter)
+    write_vibration_wear_output(outcome, folder, reporter)
 
 
-def worn_friction_rig(case: WornFrictionRigCase, reporter: Reporter) -> WornVibrationOutcome:
-    """All that is kept of a run; see :func:`run_worn_friction_rig`."""
+def _outcome(case: FrictionRigWearCase, reporter: Reporter) -> VibrationWearOutcome:
+    """All that is kept of a run."""
     own = case.wear
     unworn = VibrationModel.of(case.unworn, reporter)
     pads = WearingPads(unworn, _coefficients(case), own.force, own.frequency)
@@ -58,17 +58,17 @@ def worn_friction_rig(case: WornFrictionRigCase, reporter: Reporter) -> WornVibr
         for cycles in own.cycles:
             before = state.steps
             with reporter.stage("wear"):
-                state = wear(pads, state, cycles, own.tolerance)
+                state = worn_until(pads, state, cycles, own.tolerance)
             states.append(_kept(case, pads, state, state.steps - before, reporter))
             progress.update(cycles, len(states) - 1)
     rig = unworn.rig
     assert rig.places is not None
     assert rig.area is not None
     places = {"x": rig.places[:, 0], "y": rig.places[:, 1], "area": rig.area}
-    return WornVibrationOutcome(case, tuple(states), places=places)
+    return VibrationWearOutcome(case, tuple(states), places=places)
 
 
-def _coefficients(case: WornFrictionRigCase) -> tuple[float, float]:
+def _coefficients(case: FrictionRigWearCase) -> tuple[float, float]:
     """Of body 1 and 2 [1/MPa], from the case whose specimens the rig has been made of."""
     specimens = load_case(Path(case.structure.specimens))
     assert isinstance(specimens, SpecimensCase)
@@ -76,7 +76,7 @@ def _coefficients(case: WornFrictionRigCase) -> tuple[float, float]:
 
 
 def _kept(
-    case: WornFrictionRigCase, pads: WearingPads, state: PadState, steps: int, reporter: Reporter
+    case: FrictionRigWearCase, pads: WearingPads, state: PadState, steps: int, reporter: Reporter
 ) -> WornState:
     """The pads in a state, reached in ``steps`` since the last, and the rig on them."""
     rubbed, of_state = state.rubbed, case.unworn
@@ -85,6 +85,12 @@ def _kept(
         found = [response_under(of_state, rubbed.model, own, reporter)[0] for own in case.forces]
     numbers: dict[str, Any] = {"cycles": state.cycles, "steps": steps, "energy": state.energy}
     numbers |= _numbers(rubbed, state.depth, loop) | rubbed.model.numbers()
+    if state.worst > case.wear.tolerance:
+        reporter.warn(
+            f"{state.cycles:g} cycles: steps of the shortest length left an error of "
+            f"{state.worst:.2g}, above wear.tolerance {case.wear.tolerance:g}: raise "
+            "resolution.samples or resolution.harmonics"
+        )
     tolerance = case.resolution.tolerance
     if tolerance is not None and rubbed.motion.left_out > tolerance:
         reporter.warn(
@@ -93,7 +99,7 @@ def _kept(
         )
     reporter.log(
         f"{state.cycles:g} cycles: {steps} steps, {numbers['touching']} nodes touch, "
-        f"stiffness {numbers['stiffness']:.5g} N/mm, stroke {numbers['stroke']:.4g} mm"
+        f"stroke {numbers['stroke']:.4g} mm"
     )
     return WornState(state.cycles, numbers, _fields(pads, state, loop), tuple(found))
 
@@ -103,7 +109,8 @@ def _numbers(rubbed: RubbedPads, depth: Array, loop: Curves) -> dict[str, Any]:
         "volume": float(depth @ rubbed.area),
         "depth": float(depth.max()),
         "friction": float(np.max(rubbed.law.friction)),
-        "stiffness": loop.numbers["stiffness"],
+        # None where no increment of the loop sticks.
+        "stiffness": np.nan if loop.numbers["stiffness"] is None else loop.numbers["stiffness"],
         "stroke": loop.numbers["stroke"],
         "energy_per_cycle": float(rubbed.energy.sum()),
         "left_out": rubbed.motion.left_out,
