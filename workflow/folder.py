@@ -13,8 +13,8 @@ from workflow.errors import UserError
 from workflow.store import PARTIAL, replacing
 
 FILES = ("case.yaml", "summary.json", "results.h5", "worn.msh", "checkpoint.h5", "run.log")
-# Worn surfaces at the nodes of another code, and tangential loops, by interface; and the curves of
-# a case in time, by state.
+# Worn surfaces at the nodes of another code, and tangential loops, by interface; curves of cases in
+# time, by state, and of vibration cases, by force.
 TABLES = (
     *("worn_nodes_*.csv", "loops_*.csv", "evolution.csv", "loop_*.csv"),
     *("frequency_response_*.csv", "ring_down_*.csv", "frf_*.csv", "backbone.csv"),

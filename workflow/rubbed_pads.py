@@ -71,13 +71,13 @@ class RubbedPads:
         A depth δ that is wrong changes the normal forces by -K δ, K = (1/kn + C)⁻¹: the contact
         springs in series with the elastic bodies, whose compliance C is not negative, be it under
         constant load or not. Energies change by µ s K δ at the paths s, depths per cycle by -D K δ
-        with D = α µ s / A. The eigenvalues of D K lie between 0 and kn max D: in ΔN = 1/(kn max D)
+        with D = α µ s / A. The eigenvalues of D K lie between 0 and max kn D: in ΔN = 1/(max kn D)
         an Euler step multiplies errors by 1 - x, x between 0 and 1, and a step of second order by
-        1 - x + x²/2. Both are stable up to twice that length. Paths and areas are the longest and
-        the smallest of all nodes, as those that do not touch yet may touch before the step ends.
+        1 - x + x²/2. Both are stable up to twice that length. The path is the longest of all nodes,
+        as those that do not touch yet may touch before the step ends.
         """
         rubbed = self.coefficient * float(np.max(self.law.friction)) * float(self.path.max())
-        fastest = float(np.max(self.law.normal_stiffness)) * rubbed / float(self.area.min())
+        fastest = float(np.max(self.law.normal_stiffness / self.area)) * rubbed
         return 1.0 / fastest if fastest > 0.0 else np.inf
 
 

@@ -16,6 +16,7 @@ from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.periodic import PeriodicMarch
 from workflow.case import VibrationCase
+from workflow.case.rig_structure import FrictionRig
 from workflow.errors import MethodFailed
 from workflow.joint_model import LAWS, Law, shared_out
 from workflow.memory import check_memory
@@ -83,9 +84,11 @@ class VibrationModel:
 
     def numbers(self) -> dict[str, Any]:
         """Natural frequencies, and how joints touch, for the summary."""
+        rig = self.rig
         numbers: dict[str, Any] = {
-            "free": self.rig.free(),
-            **self.rig.modes(self.law, self.resting),
+            "free": rig.free(),
+            **rig.modes(self.law, self.resting),
+            "damping_stuck": rig.stuck_damping(self.law, self.resting),
         }
         if self.rig.pressing is not None:
             numbers["touching"] = int(self.touching.sum())
@@ -146,11 +149,20 @@ def _law(case: VibrationCase, rig: RigModel) -> Law:
     """The law of each joint: all of them share stiffness and load evenly.
 
     Between two bodies that a load presses together, joints have the gap of the bodies and no load
-    of their own.
+    of their own, and may share stiffness by their areas.
     """
     whole: Law = LAWS[case.joint.law](**case.joint.model_dump(exclude={"law"}))
-    law = shared_out(whole, rig.joints)
-    if rig.pressing is None or not isinstance(law, FrictionContact):
-        return law
+    if rig.pressing is None or not isinstance(whole, FrictionContact):
+        return shared_out(whole, rig.joints)
     assert rig.gap is not None
-    return replace(law, normal_load=0.0, gap=rig.gap)
+    assert rig.area is not None
+    assert isinstance(case.structure, FrictionRig)
+    even = case.structure.sharing == "even"
+    share = 1.0 / rig.joints if even else rig.area / rig.area.sum()
+    return replace(
+        whole,
+        stiffness=share * whole.stiffness,
+        normal_stiffness=share * whole.normal_stiffness,
+        normal_load=0.0,
+        gap=rig.gap,
+    )

@@ -90,6 +90,20 @@ def test_the_rig_sticks_under_a_small_force_and_slides_under_a_large_one(files):
     np.testing.assert_allclose(nodes["energy"].sum(axis=1), energy, rtol=1e-12)
 
 
+def test_pads_pressed_evenly_are_closed_evenly_if_contacts_share_by_area(files):
+    """Contacts so soft that bodies are rigid and flat beside them: each carries its share."""
+    law = "law: friction_contact, normal_load: 60, friction: 1"
+    soft = f"joint={{{law}, stiffness: 10, normal_stiffness: 10}}"
+    shares = {}
+    for sharing in ("even", "area"):
+        run(files, RIG, soft, f"structure.sharing={sharing}", "forces=[1e-3 N]")
+        with h5py.File(files / "out" / "results.h5") as file:
+            shares[sharing] = file["contact/normal_force"][()] / 60.0
+            area = file["contact/area"][()]
+    np.testing.assert_allclose(shares["even"], 1.0 / NODES, rtol=1e-2)
+    np.testing.assert_allclose(shares["area"], area, rtol=1e-2)
+
+
 @pytest.mark.parametrize(
     ("override", "words"),
     [

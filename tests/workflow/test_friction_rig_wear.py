@@ -42,7 +42,9 @@ def case_in(folder):
     """The case as it is read from a file; its specimens are in the folder."""
     (folder / "specimens.yaml").write_text(SPECIMENS, encoding="utf-8")
     given = yaml.safe_load(RIG) | WORN
-    given["structure"]["specimens"] = str(folder / "specimens.yaml")
+    # The numbers of cycles below lie between those after which a further node of such pads touches.
+    specimens = {"specimens": str(folder / "specimens.yaml"), "sharing": "even"}
+    given["structure"] = given["structure"] | specimens
     return FrictionRigWearCase(**given)
 
 
@@ -122,7 +124,8 @@ def test_flat_pads_wear_evenly_and_stick_as_pads_without_form(pads, unworn, flat
     assert np.ptp(unworn.rubbed.rate) > unworn.rubbed.rate.mean()
     assert unworn.rubbed.model.touching.sum() < rubbed.model.touching.sum() == NODES
     law = rubbed.law
-    stuck = np.tile(np.diag([law.stiffness, law.stiffness, law.normal_stiffness]), (NODES, 1, 1))
+    springs = [law.stiffness, law.stiffness, law.normal_stiffness]
+    stuck = np.broadcast_to(np.column_stack(springs), (NODES, 3))[:, :, None] * np.eye(3)
     expected = natural_frequencies(pads.unworn.rig.model, stuck)[0]
     before, after = (own.rubbed.model.numbers()["stuck"][0] for own in (unworn, flat))
     assert after == pytest.approx(expected, rel=1e-9)

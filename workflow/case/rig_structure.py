@@ -146,6 +146,11 @@ class FrictionRig(Section):
     target_distance: Length = entry(
         "from the contact plane to where a laser looks at each specimen [mm]", "1 mm", default=1.0
     )
+    sharing: Literal["even", "area"] = entry(
+        "of the joint's stiffness among the pairs of nodes: even, or by the area of each",
+        "area",
+        default="area",
+    )
 
     @property
     def text(self) -> str:
