@@ -18,6 +18,7 @@ FILES = ("case.yaml", "summary.json", "results.h5", "worn.msh", "checkpoint.h5",
 TABLES = (
     *("worn_nodes_*.csv", "loops_*.csv", "evolution.csv", "loop_*.csv"),
     *("frequency_response_*.csv", "ring_down_*.csv", "frf_*.csv", "backbone.csv"),
+    "force_sweep_*.csv",
 )
 FOLDERS = ("jumps", "reduced", "paraview", "figures", "wear")
 

@@ -14,6 +14,8 @@ from workflow.case import VibrationCase
 
 # Groups of a response, beside its own curves.
 NODES, RESONANCE, LOOPS = "nodes", "resonance", "loops"
+# Motions along the force at a frequency.
+FORCE_SWEEPS = "force_sweeps"
 
 
 @dataclass(frozen=True)
@@ -50,7 +52,8 @@ class VibrationOutcome:
 
     ``labels`` of what is seen, the last of which is looked at. ``linear`` are the limits of joints
     that are free and stuck, over frequency; ``contact`` is where joints are and how they rest, if
-    they have places; ``backbone`` the curve of phase resonance, if it was asked for. ``numbers`` go
+    they have places; ``backbone`` the curve of phase resonance and ``force_sweeps`` motions along
+    the force, if they were asked for. ``numbers`` go
     into the summary as they are.
     """
 
@@ -61,6 +64,7 @@ class VibrationOutcome:
     numbers: Mapping[str, Any]
     contact: Mapping[str, Array] | None = None
     backbone: Curves | None = None
+    force_sweeps: tuple[Curves, ...] = ()
 
 
 def trend(values: Sequence[float]) -> float:
@@ -118,6 +122,15 @@ DATASETS: dict[str, dict[str, tuple[str, str]]] = {
             "1",
             "share of the cycle in which a joint slips, mean of those that touch at rest",
         ),
+    },
+    FORCE_SWEEPS: {
+        "force": ("N", "amplitude of the force, in the order of the curve"),
+        "amplitude": ("mm", "half of the way to and fro of what is looked at"),
+        "phase": ("rad", "of harmonic 1 of what is looked at before the force"),
+        "damping": ("1", "energy lost in a cycle over 4π times the largest kinetic energy"),
+        "energy_per_cycle": ("N mm", "energy that the joints dissipate in a cycle"),
+        "slip": ("1", "share of the cycle in which a joint that touches at rest slips, their mean"),
+        "left_out": ("1", "estimated share of the joints' vibration in harmonics left out"),
     },
     "linear": {
         "frequency": ("Hz", "frequency of the force"),

@@ -14,6 +14,7 @@ from workflow.store import replacing
 from workflow.versions import versions
 from workflow.vibration_outcome import (
     DATASETS,
+    FORCE_SWEEPS,
     LOOPS,
     NODES,
     RESONANCE,
@@ -75,6 +76,8 @@ def _write_results(outcome: VibrationOutcome, path: Path) -> None:
             _put_response(file, f"{RESPONSES}/{number:05d}", response)
         if outcome.backbone is not None:
             _put_curves(file, BACKBONE, BACKBONE, outcome.backbone)
+        for number, sweep in enumerate(outcome.force_sweeps):
+            _put_curves(file, f"{FORCE_SWEEPS}/{number:05d}", FORCE_SWEEPS, sweep)
 
 
 def _put_response(file: h5py.File, place: str, response: Response) -> None:
@@ -97,13 +100,15 @@ def _put_curves(file: h5py.File, place: str, kind: str, curves: Curves) -> None:
 
 
 def _write_tables(outcome: VibrationOutcome, root: Path) -> None:
-    """Responses, loops (the finest of each force) and backbone as CSV in base units."""
+    """Responses, loops (the finest of each force), backbone and force sweeps as CSV."""
     for number, response in enumerate(outcome.responses):
         write_table(root / f"frf_{number:05d}.csv", response.curves, DATASETS[RESPONSES])
         if response.loops:
             write_table(root / f"loop_{number:05d}.csv", response.loops[-1].values, DATASETS[LOOPS])
     if outcome.backbone is not None:
         write_table(root / f"{BACKBONE}.csv", outcome.backbone.values, DATASETS[BACKBONE])
+    for number, sweep in enumerate(outcome.force_sweeps):
+        write_table(root / f"force_sweep_{number:05d}.csv", sweep.values, DATASETS[FORCE_SWEEPS])
 
 
 # --- summary ------------------------------------------------------------------------------------
@@ -121,6 +126,8 @@ def _summary(outcome: VibrationOutcome, reporter: Reporter) -> dict[str, Any]:
     if outcome.backbone is not None:
         points = len(outcome.backbone.values["force"])
         found[BACKBONE] = {"points": points, **outcome.backbone.numbers}
+    if outcome.force_sweeps:
+        found[FORCE_SWEEPS] = [dict(sweep.numbers) for sweep in outcome.force_sweeps]
     return found | {
         "warnings": reporter.warnings,
         "seconds": {name: round(value, 2) for name, value in reporter.seconds.items()},

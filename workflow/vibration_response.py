@@ -15,6 +15,7 @@ from fe_models.dynamics.forced_response import (
     SAMPLES_PER_PERIOD,
     Accuracy,
     Branch,
+    along_force,
     along_frequency,
     finer_resolution,
 )
@@ -109,6 +110,32 @@ def response_under(
             f"resolution.tolerance {accuracy.tolerance:g}"
         )
     return response, branch
+
+
+def force_sweep(
+    case: VibrationCase, model: VibrationModel, frequency: float, reporter: Reporter
+) -> Curves:
+    """The motions at a frequency from the least force of a case to the largest.
+
+    Raises MethodFailed where there is none under the least. A curve that ends before the largest is
+    told as a warning.
+    """
+    span = case.forces[0], case.forces[-1]
+    branch = along_force(
+        model.problem, frequency, span, control=step_control(case), accuracy=accuracy_of(case)
+    )
+    if not branch.solutions:
+        raise MethodFailed(f"no motion at {frequency:g} Hz: {branch.message}; change force_sweeps")
+    if branch.message:
+        reporter.warn(f"{frequency:g} Hz, along the force: {branch.message}")
+    curves = _curves(model, branch)
+    shared = ("phase", "damping", "energy_per_cycle", "slip", "left_out")
+    values = {"force": branch.forces, "amplitude": curves["amplitude"][:, -1]}
+    values |= {name: curves[name] for name in shared}
+    folds = [float(branch.curve.parameters[place]) for place in branch.curve.folds]
+    points = len(branch.solutions)
+    numbers = {"frequency": frequency, "points": points, "folds": folds, "message": branch.message}
+    return Curves(values, numbers)
 
 
 def _numbers(

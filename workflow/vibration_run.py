@@ -22,6 +22,7 @@ from workflow.vibration_outcome import Curves, Response, VibrationOutcome, trend
 from workflow.vibration_response import (
     accuracy_of,
     amplitudes_of,
+    force_sweep,
     response_under,
     share_of,
     step_control,
@@ -62,6 +63,10 @@ def _outcome(case: VibrationCase, reporter: Reporter) -> VibrationOutcome:
             # From the least force on which there is a phase resonance.
             with reporter.stage("backbone"):
                 backbone = _backbone(case, model, branch, reporter)
+    sweeps = []
+    for frequency in case.force_sweeps:
+        with reporter.stage("force sweep"):
+            sweeps.append(force_sweep(case, model, frequency, reporter))
     return VibrationOutcome(
         case,
         model.rig.labels,
@@ -70,6 +75,7 @@ def _outcome(case: VibrationCase, reporter: Reporter) -> VibrationOutcome:
         numbers | _across(responses),
         contact,
         backbone,
+        tuple(sweeps),
     )
 
 

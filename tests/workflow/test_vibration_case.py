@@ -214,6 +214,26 @@ def test_phase_resonance_follows_the_peaks(tmp_path):
         assert found["amplitude"][place] == pytest.approx(own["amplitude"], rel=0.02)
 
 
+def test_motions_along_the_force_leave_the_linear_limit_where_the_joint_slips(tmp_path):
+    """From the stuck rig to the response of the largest force at the same frequency."""
+    summary = run(tmp_path, RIG, "forces=[2 N, 60 N]", "force_sweeps=[90 Hz]")
+    (sweep,) = summary["force_sweeps"]
+    assert (sweep["frequency"], sweep["folds"], sweep["message"]) == (90.0, [], "")
+    with h5py.File(tmp_path / "out" / "results.h5") as file:
+        found = {name: file[f"force_sweeps/00000/{name}"][()] for name in ("force", "amplitude")}
+        slip = file["force_sweeps/00000/slip"][()]
+        curve = {name: file[f"responses/00001/{name}"][()] for name in ("frequency", "amplitude")}
+    assert found["force"][[0, -1]].tolist() == [2.0, 60.0]
+    stuck = slip == 0.0
+    wanted = np.abs(receptance(90.0, STIFFNESS)[-1]) * found["force"]
+    assert 1 < stuck.sum() < len(stuck)
+    np.testing.assert_allclose(found["amplitude"][stuck], wanted[stuck], rtol=SAMPLED + SOLVED)
+    assert np.all(np.abs(found["amplitude"] / wanted - 1.0)[~stuck][1:] > 1e-4)
+    along = np.interp(90.0, curve["frequency"], curve["amplitude"][:, -1])
+    assert found["amplitude"][-1] == pytest.approx(along, rel=2e-2)
+    assert (tmp_path / "out" / "force_sweep_00000.csv").exists()
+
+
 def test_loops_of_the_joint_at_one_frequency(tmp_path):
     """A slider's loop: its spring's slope, µN, and 4 µN (a - µN/kt) of energy."""
     run(tmp_path, RIG, "forces=[2 N, 60 N]", "loops={frequency: 60 Hz, harmonics: [1, 40]}")

@@ -104,7 +104,7 @@ class OutputWithoutFields(Output):
 SCENE_ORDER = (
     *("title", "analysis", "structure", "materials", "friction", "load_path", "mesh"),
     *("joint", "evolution", "drive", "excitation", "energies", "ageing", "integration"),
-    *("forces", "frequencies", "mass", "resolution", "continuation", "backbone"),
+    *("forces", "frequencies", "mass", "resolution", "continuation", "force_sweeps", "backbone"),
     *("nonlinearity", "reduction", "contact", "wear", "coupling", "accuracy", "fidelity"),
     *("loops", "stress", "output", "assumed", "reported", "expect"),
 )

@@ -257,6 +257,12 @@ class VibrationCase(DrivenMass):
     )
     joint: ContactLaw = entry("its law and its parameters; of all joints together")
     loops: LoopsAt | None = entry("of all joints together, at one frequency", default=None)
+    force_sweeps: Annotated[tuple[Frequency, ...], Field(max_length=100)] = entry(
+        "frequencies at which motions are followed along the force, from the least to the largest "
+        "[Hz]",
+        ["100 Hz"],
+        default=(),
+    )
     backbone: StrictBool = entry(
         "whether phase resonance, what is driven 90 degrees behind the force, is followed too",
         False,
@@ -269,10 +275,10 @@ class VibrationCase(DrivenMass):
 
     @model_validator(mode="after")
     def _joins_forces(self) -> VibrationCase:
-        if self.backbone and len(self.forces) < 2:
+        if (self.backbone or self.force_sweeps) and len(self.forces) < 2:
             raise disagreement(
-                "a single force; allowed: two or more, between which phase resonance is followed",
-                *("forces", "backbone"),
+                "a single force; allowed: two or more, between which motions are followed",
+                *("forces", "backbone", "force_sweeps"),
             )
         return self
 
