@@ -8,16 +8,14 @@ from fe_models.memory import available_bytes as _available_bytes
 from workflow.case import (
     Case,
     DovetailCase,
-    FrictionRigWearCase,
     JointCase,
     LineContactCase,
     RigCase,
     SpecimensCase,
-    VibrationCase,
-    VibrationWearCase,
     WearCase,
 )
 from workflow.case.rig_structure import ReducedBody
+from workflow.case.vibration_case import VibrationScene
 from workflow.errors import OutOfMemory
 
 # Dense interface matrices alive at once while the joint is condensed.
@@ -51,12 +49,8 @@ def required_bytes(
     """
     if isinstance(case, JointCase | RigCase):
         return BYTES * _kept_in_time(case, structure_nodes) + REST
-    if isinstance(case, VibrationCase):
+    if isinstance(case, VibrationScene):
         return BYTES * _kept_of_motions(case, structure_nodes, max(interface_nodes, 1)) + REST
-    if isinstance(case, VibrationWearCase):
-        return required_bytes(case.with_joint(1.0, 1.0, 1.0))
-    if isinstance(case, FrictionRigWearCase):
-        return required_bytes(case.unworn)
     if isinstance(case, SpecimensCase):
         pad = 3 * (case.mesh.pad_elements + 1) ** 2
         factors = FACTOR_BYTES * (structure_nodes / FACTOR_NODES) ** FACTOR_POWER
@@ -86,7 +80,7 @@ def _kept_in_time(case: JointCase | RigCase, displacements: int) -> float:
     return STEP_COLUMNS * len(case.structure.masses) * len(case.energies) * case.steps
 
 
-def _kept_of_motions(case: VibrationCase, displacements: int, joints: int) -> float:
+def _kept_of_motions(case: VibrationScene, displacements: int, joints: int) -> float:
     """Numbers kept of all motions under a force, and those held while one is found."""
     directions = 3 if case.contacts else 1
     functions = 2 * len(case.harmonics)
@@ -111,7 +105,7 @@ def _remedy(case: WearCase | Case) -> str:
     """What makes a case smaller."""
     if isinstance(case, JointCase | RigCase):
         return "raise integration.step, or shorten what is recorded"
-    if isinstance(case, VibrationCase | VibrationWearCase | FrictionRigWearCase):
+    if isinstance(case, VibrationScene):
         return "lower resolution.samples or resolution.harmonics"
     if isinstance(case, SpecimensCase):
         return "lower mesh.pad_elements, mesh.order or contact.grid, or raise mesh.size"

@@ -82,12 +82,16 @@ class VibrationModel:
             return np.ones(self.rig.joints, dtype=bool)
         return np.asarray(self.rest.cycle.samples[0, :, 2] > 0.0)
 
+    @cached_property
+    def _natural(self) -> dict[str, list[float]]:
+        """The lowest natural frequencies [Hz] with the joints free, stuck and sliding."""
+        return {"free": self.rig.free(), **self.rig.modes(self.law, self.resting)}
+
     def numbers(self) -> dict[str, Any]:
         """Natural frequencies, and how joints touch, for the summary."""
         rig = self.rig
         numbers: dict[str, Any] = {
-            "free": rig.free(),
-            **rig.modes(self.law, self.resting),
+            **self._natural,
             "damping_stuck": rig.stuck_damping(self.law, self.resting),
         }
         if self.rig.pressing is not None:
@@ -113,7 +117,7 @@ class VibrationModel:
 
     def linear(self, span: tuple[float, float]) -> dict[str, Array]:
         """Amplitude over force of what is looked at, with the joints free, and stuck."""
-        natural = np.array([*self.rig.free(), *self.rig.modes(self.law, self.resting)["stuck"]])
+        natural = np.array([*self._natural["free"], *self._natural["stuck"]])
         inside = natural[(natural > span[0]) & (natural < span[1])]
         directions = self.rig.joints * self.rig.directions
         points = LINEAR_POINTS if directions <= FEW_DIRECTIONS else FEWER_POINTS

@@ -148,12 +148,11 @@ def _lines(response: Response, label: str) -> list[str]:
     parts = [
         f"{response.force:g} N: resonance {own['resonance']:.5g} Hz",
         f"{label} moves {TO_MICRONS * own['amplitude']:.4g} um",
+        f"damping {own['damping']:.2%}",
         f"slips {own['slip']:.0%} of the cycle",
         f"{own['points']} points",
         f"harmonics left out {own['left_out']:.1e}",
     ]
-    if "damping" in own:
-        parts.insert(2, f"damping {own['damping']:.2%}")
     text = ", ".join(parts) + (f"; {len(own['folds'])} folds" if own["folds"] else "")
     return [text, *(_loop_line(loop) for loop in response.loops[-1:])]
 

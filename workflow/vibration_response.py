@@ -324,9 +324,9 @@ def loop_of(case: VibrationCase, model: VibrationModel, motion: HarmonicSolution
     total = motion.cycle.force[:, :, rig.along].sum(axis=0)
     expansion = motion.resolution.basis @ total
     values = {
-        "displacement": _closed(displacement),
-        "force": _closed(force),
-        "expansion": _closed(expansion),
+        "displacement": closed(displacement),
+        "force": closed(force),
+        "expansion": closed(expansion),
     }
     numbers = {
         "frequency": motion.frequency,
@@ -348,7 +348,8 @@ def _deformation(force: Array, expansion: Array) -> float:
     return float(np.abs(force - expansion).max()) / half if half > 0.0 else 0.0
 
 
-def _closed(values: Array) -> Array:
+def closed(values: Array) -> Array:
+    """Values ``(t,)`` of a cycle, the first repeated at the end."""
     return np.append(values, values[:1])
 
 

@@ -37,7 +37,7 @@ from workflow.rig_model import RigModel, row_of_masses
 from workflow.vibrating_contact import Rubbing, Shaking, VibratingContact
 from workflow.vibration_model import VibrationModel
 from workflow.vibration_outcome import Response
-from workflow.vibration_response import response_under
+from workflow.vibration_response import closed, response_under
 from workflow.vibration_wear_outcome import (
     CONTACT,
     HALF_SPACE,
@@ -233,12 +233,8 @@ def _fields(rubbing: Rubbing, loop: TangentialLoop) -> dict[str, dict[str, Array
             "energy": rubbing.by_slider,
         },
         LOOP: {
-            "displacement": _closed(rubbing.displacement),
-            "force": _closed(rubbing.motion.cycle.samples[:, 0, 0]),
+            "displacement": closed(rubbing.displacement),
+            "force": closed(rubbing.motion.cycle.samples[:, 0, 0]),
         },
         HALF_SPACE: {"displacement": displacement, "force": force},
     }
-
-
-def _closed(values: Array) -> Array:
-    return np.append(values, values[:1])

@@ -41,20 +41,10 @@ class Accuracy:
 
 
 @dataclass(frozen=True)
-class Branch:
-    """Motions in the order in which they were found, the first one included.
-
-    ``message`` is empty if the branch reached an end of its span. ``points`` are those of the
-    curve, and ``problem`` is what it ended with, to go on from its last point.
-    """
+class Motions:
+    """Motions ``(s,)`` in the order of a curve."""
 
     solutions: tuple[HarmonicSolution, ...]
-    curve: Curve
-    problem: HarmonicBalance
-
-    @property
-    def message(self) -> str:
-        return self.curve.message
 
     @property
     def frequencies(self) -> Array:
@@ -67,6 +57,22 @@ class Branch:
     def first_amplitudes(self, place: int) -> Array:
         """Size of harmonic 1 of a degree of freedom ``(s,)`` [mm]."""
         return np.array([abs(solution.amplitude(place)) for solution in self.solutions])
+
+
+@dataclass(frozen=True)
+class Branch(Motions):
+    """Motions in the order in which they were found, the first one included.
+
+    ``message`` is empty if the branch reached an end of its span. ``points`` are those of the
+    curve, and ``problem`` is what it ended with, to go on from its last point.
+    """
+
+    curve: Curve
+    problem: HarmonicBalance
+
+    @property
+    def message(self) -> str:
+        return self.curve.message
 
 
 def along_frequency(

@@ -35,7 +35,7 @@ from fe_models.dynamics.continuation import (
     follow,
     solve,
 )
-from fe_models.dynamics.forced_response import Accuracy, Branch, finer_resolution
+from fe_models.dynamics.forced_response import Accuracy, Branch, Motions, finer_resolution
 from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance, HarmonicSolution
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.receptance import ComplexArray, SteadyMotion
@@ -132,28 +132,15 @@ class PhaseBalance:
 
 
 @dataclass(frozen=True)
-class Backbone:
+class Backbone(Motions):
     """Motions at phase resonance, from the least force on; the curve may turn back in force.
 
     ``message`` is empty if the curve reaches both ends of the forces. ``problem`` is at the
     resolution of the last motion found upward.
     """
 
-    solutions: tuple[HarmonicSolution, ...]
     message: str
     problem: HarmonicBalance
-
-    @property
-    def frequencies(self) -> Array:
-        return np.array([solution.frequency for solution in self.solutions])
-
-    @property
-    def forces(self) -> Array:
-        return np.array([solution.force for solution in self.solutions])
-
-    def first_amplitudes(self, place: int) -> Array:
-        """Size of harmonic 1 of a degree of freedom ``(s,)`` [mm]."""
-        return np.array([abs(solution.amplitude(place)) for solution in self.solutions])
 
 
 def along_phase_resonance(
