@@ -40,7 +40,7 @@ lint: install
 
 # Ends in one line naming the Debian packages to install when a system library is missing.
 check: install
-	@$(BIN)/python -m workflow.system_check
+	@$(BIN)/python -m workflow.shell.system_check
 
 install: $(STAMP)
 

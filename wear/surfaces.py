@@ -34,6 +34,11 @@ class Surfaces:
         return self.depth_1 + self.depth_2
 
     @property
+    def depths(self) -> tuple[Array, Array]:
+        """Depths lost by body 1 and body 2 [mm]."""
+        return self.depth_1, self.depth_2
+
+    @property
     def gap(self) -> Array:
         """Distance of the unloaded surfaces [mm]."""
         return self.initial_gap + self.depth_1 + self.depth_2

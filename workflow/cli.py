@@ -7,16 +7,12 @@ a command early ends it in one line and an exit code (``workflow.errors``).
 from __future__ import annotations
 
 import sys
-from math import ceil
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn
+from typing import Any, NoReturn
 
 import click
 
 from workflow import errors
-
-if TYPE_CHECKING:
-    from workflow.case import Case, ContactCase, LineContactCase, WearCase
 
 
 class _OneLineGroup(click.Group):
@@ -55,7 +51,7 @@ def _ending(error: Exception) -> tuple[str, int]:
         return str(error), error.exit_code
     if isinstance(error, MemoryError):
         return f"out of memory: {error}".rstrip(": "), errors.OutOfMemory.exit_code
-    from workflow.system_check import remedy
+    from workflow.shell.system_check import remedy
 
     if missing := remedy(error):
         return missing, errors.MethodFailed.exit_code
@@ -88,10 +84,10 @@ def cli() -> None:
 @click.option("--force", is_flag=True, help="Overwrite a folder that holds another run.")
 def run(case: str, out: Path, overrides: tuple[str, ...], force: bool) -> None:
     """Run CASE and write its results."""
-    from workflow.case import load_case
+    from workflow.kinds import load_case
 
     loaded = load_case(case, overrides)
-    from workflow.run import run_case
+    from workflow.runs.run import run_case
 
     run_case(loaded, out, force)
 
@@ -100,7 +96,7 @@ def run(case: str, out: Path, overrides: tuple[str, ...], force: bool) -> None:
 @click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
 def resume(folder: Path) -> None:
     """Continue an interrupted run from its output FOLDER."""
-    from workflow.run import resume_run
+    from workflow.runs.run import resume_run
 
     if not resume_run(folder):
         click.echo(f"{folder}: this run is finished; nothing to do")
@@ -117,7 +113,7 @@ def resume(folder: Path) -> None:
 )
 def verify(cases: tuple[Path, ...], out: Path) -> int:
     """Run CASES and compare with what they expect."""
-    from workflow.verify import verify_cases
+    from workflow.runs.verify import verify_cases
 
     return errors.DONE if verify_cases(cases, out) else errors.ExpectationMissed.exit_code
 
@@ -189,11 +185,11 @@ def sweep(file: Path, out: Path, processes: int | None, dask: str | None, force:
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
 def check(case: str, overrides: tuple[str, ...]) -> None:
     """Read CASE and say what it would run."""
-    from workflow.case import load_case
+    from workflow.kinds import load_case
 
     loaded = load_case(case, overrides)
     click.echo(f"OK {case}: {loaded.title}")
-    for name, text in _outline(loaded):
+    for name, text in loaded.outline():
         click.echo(f"  {name:<10} {text}")
 
 
@@ -204,12 +200,15 @@ def check(case: str, overrides: tuple[str, ...]) -> None:
 @click.option("--force", is_flag=True, help="Overwrite what is there.")
 def resultants(case: str, out: Path, overrides: tuple[str, ...], force: bool) -> None:
     """Solve the structure of CASE alone and write the loads of its contacts."""
-    from workflow.case import load_case
+    from workflow.kinds import analysis_of, load_case
 
     loaded = load_case(case, overrides)
-    from workflow.resultants.export import export_resultants
-
-    for line in export_resultants(loaded, case, out, force):
+    write_loads = analysis_of(loaded).write_loads
+    if write_loads is None:
+        raise errors.UserError(
+            f"{case}: a case of this kind has no structure to take loads from; allowed: a wear case"
+        )
+    for line in write_loads(loaded, case, out, force):
         click.echo(line)
 
 
@@ -227,7 +226,7 @@ def loops(
     FILE is CSV with headings such as `displacement [um], force [N]`, and `time [s]` where samples
     are not evenly spaced, and `normal_load [N]` where it is known.
     """
-    from workflow.loops_command import loops_of_file, report, write_loops
+    from workflow.commands.loops import loops_of_file, report, write_loops
 
     found = loops_of_file(file, columns, normal_load)
     for line in report(found):
@@ -242,7 +241,7 @@ def loops(
 @click.option("--size", metavar="LENGTH", help="Of the elements, for a CAD file, such as '2 mm'.")
 def describe(file: Path, size: str | None) -> None:
     """List bodies, boundaries and node sets of a mesh or CAD FILE, as a case may name them."""
-    from workflow.case.mesh_case import described_file
+    from workflow.analyses.wear.structures.mesh.case import described_file
 
     for line in described_file(file, size):
         click.echo(line)
@@ -257,16 +256,18 @@ def new(kind: str, file: Path | None) -> None:
     KIND is dovetail, mesh, resultants, specimens, bodies, line, bodies_wear, line_wear, joint, rig,
     vibration, vibration_wear or friction_rig_wear.
     """
-    from workflow.case import KINDS, template
+    from workflow.kinds import template
 
-    if kind not in KINDS:
-        raise errors.UserError(f"{kind}: no such kind of case; allowed: {', '.join(KINDS)}")
+    try:
+        text = template(kind)
+    except ValueError as error:
+        raise errors.UserError(str(error)) from None
     if file is None:
-        click.echo(template(kind), nl=False)
+        click.echo(text, nl=False)
         return
     try:
         with file.open("x", encoding="utf-8") as stream:
-            stream.write(template(kind))
+            stream.write(text)
     except FileExistsError:
         raise errors.UserError(f"{file}: exists; give another name or remove it") from None
 
@@ -276,67 +277,9 @@ def schema() -> None:
     """Print the JSON schema of a case, for editors."""
     import json
 
-    from workflow.case import json_schema
+    from workflow.kinds import json_schema
 
     click.echo(json.dumps(json_schema(), indent=2, allow_nan=False, ensure_ascii=False))
-
-
-def _outline(case: Case) -> list[tuple[str, str]]:
-    """What would run, in a few rows."""
-    from workflow.case import (
-        FrictionRigWearCase,
-        JointCase,
-        RigCase,
-        SpecimensCase,
-        VibrationCase,
-        VibrationWearCase,
-        WearCase,
-    )
-
-    vibrating = VibrationCase | VibrationWearCase | FrictionRigWearCase
-    if isinstance(case, SpecimensCase | JointCase | RigCase | vibrating):
-        return case.outline()
-    return _wear_outline(case) if isinstance(case, WearCase) else _contact_outline(case)
-
-
-def _wear_outline(case: WearCase) -> list[tuple[str, str]]:
-    grid, wear = case.contact.grid, case.wear
-    plane = getattr(case.structure, "dimension", 3) == 2 or grid[1] == 1
-    cells = f"{grid[0]} strips" if plane else f"{grid[0]} x {grid[1]} cells"
-    return [
-        *case.outline(),
-        ("contact", f"{cells}, {case.contact.method}"),
-        ("wear", f"{wear.law}, {wear.cycles:g} cycles, {wear.step.kind} steps, {_step(case)}"),
-    ]
-
-
-def _step(case: WearCase) -> str:
-    """Size of a wear step, with the number of jumps where it is known beforehand."""
-    wear, step = case.wear, case.wear.step
-    if step.cycles is not None:
-        return f"{step.cycles:g} cycles each: {ceil(wear.cycles / step.cycles)} jumps"
-    if step.depth is not None:
-        return f"{step.depth:g} mm deep each"
-    if step.volume is not None:
-        return f"{step.volume:g} mm^3 each"
-    if step.fraction is not None:
-        return f"{step.fraction:g} of their stability limit each"
-    if wear.depth_tolerance is not None:
-        return f"for an error of {wear.depth_tolerance:g} mm"
-    return f"for an error of {wear.tolerance:.2g} of the depth"
-
-
-def _contact_outline(case: ContactCase | LineContactCase) -> list[tuple[str, str]]:
-    from workflow.bodies import grid_of
-
-    grid, table = grid_of(case), case.load_path.table()
-    cells = f"{grid.shape[0]} strips" if grid.line else f"{grid.shape[0]} x {grid.shape[1]} cells"
-    pitch = f"{grid.pitch[0]:.4g} mm" if grid.line else "{:.4g} x {:.4g} mm".format(*grid.pitch)
-    return [
-        ("structure", f"{case.structure.shape}, {'line contact' if grid.line else 'no structure'}"),
-        ("load path", f"{len(table)} increments of {', '.join(table.columns)}"),
-        ("contact", f"{cells} of {pitch}, history {case.contact.history}"),
-    ]
 
 
 def main() -> None:

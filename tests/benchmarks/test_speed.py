@@ -19,7 +19,7 @@ from fe_models.friction import FrictionalJoint
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import ElasticPair, Grid, Material
-from workflow.case import load_case
+from workflow.kinds import load_case
 
 CASE = load_case(Path(__file__).parents[2] / "cases" / "dovetail.yaml")
 TITANIUM = Material(115e3, 0.29, 4.43e-9)

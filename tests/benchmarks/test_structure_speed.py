@@ -16,9 +16,10 @@ from fe_models.linear_solver import LinearSolver, factorise, prepare
 from fe_models.mesh import Body
 from fe_models.multigrid import MultigridSolver, rigid_body_modes
 from sa_solver.types import Array, Material
-from workflow.case import DovetailCase, load_case
-from workflow.dovetail_model import DovetailModel
-from workflow.structure_stage import StructureStage
+from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.analyses.wear.structures.dovetail.case import DovetailCase
+from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+from workflow.kinds import load_case
 
 CASE = load_case(Path(__file__).parents[2] / "cases" / "dovetail.yaml")
 TITANIUM = Material(115e3, 0.29, 4.43e-9)

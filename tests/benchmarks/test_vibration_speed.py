@@ -27,9 +27,10 @@ from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic import PeriodicMarch
-from workflow.case import VibrationCase, load_case
-from workflow.reporter import Reporter
-from workflow.vibration_model import VibrationModel
+from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.model import VibrationModel
+from workflow.kinds import load_case
+from workflow.shell.reporter import Reporter
 
 HERE = Path(__file__).parent
 PYHARM = HERE.parents[1] / ".venv" / "pyharm"

@@ -43,7 +43,7 @@ def test_archard_is_the_energy_law_with_its_coefficient_over_hardness_and_fricti
 
 
 def test_case_units_reach_the_law(dovetail_path) -> None:
-    from workflow.case import load_case
+    from workflow.kinds import load_case
 
     for text, value in (("1 um^3/J", 1e-12), ("1e4 um^3/J", 1e-8), ("1e-8", 1e-8)):
         case = load_case(dovetail_path, [f"wear.blade.coefficient={text}"])

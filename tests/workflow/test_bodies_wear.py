@@ -9,18 +9,14 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
-from workflow.bodies_source import BodiesSource
-from workflow.case import (
-    BodiesWearCase,
-    CaseError,
-    LineBodiesWearCase,
-    dump_case,
-    load_case,
-    parse_case,
-    template,
-)
+from workflow.analyses.wear.contact_stage import ContactStage, StageSettings
+from workflow.analyses.wear.interface_state import InterfaceState
+from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
+from workflow.analyses.wear.structures.bodies.source import BodiesSource
+from workflow.case.writing import dump_case
 from workflow.cli import cli
-from workflow.contact_stage import ContactStage, InterfaceState, StageSettings
+from workflow.errors import CaseError
+from workflow.kinds import load_case, parse_case, template
 
 CASES = Path(__file__).parents[2] / "cases"
 AREA, LINE = template("bodies_wear"), template("line_wear")

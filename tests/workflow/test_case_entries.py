@@ -14,10 +14,12 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
-from workflow.case import KINDS, CaseError, load_case, parse_case, source, template
+from workflow.analyses.contact.load_table import FORCES, MOTIONS
+from workflow.case import source
 from workflow.case.fields import File, Path, Quantity, Text, Whole
-from workflow.case.load_table import FORCES, MOTIONS
 from workflow.case.sections import entry_of, sections_of
+from workflow.errors import CaseError
+from workflow.kinds import kinds, load_case, parse_case, template
 
 LENGTHS = {"cycles": 1e5, "step": {"kind": "implicit", "cycles": 5000}}
 ARCHARD_BODY = {"coefficient": 1e-4, "hardness": "3.5 GPa"}
@@ -207,9 +209,9 @@ class Leaf:
     def needed(self) -> list[str]:
         """Overrides that make the template have it."""
         found = []
-        for section, kinds in ({"expect": {ALWAYS: EXPECT}} | GIVEN[self.kind]).items():
+        for section, given in ({"expect": {ALWAYS: EXPECT}} | GIVEN[self.kind]).items():
             if self.key.startswith(f"{section}."):
-                chosen = [kinds[tag] for tag in (*self.tags, ALWAYS) if tag in kinds]
+                chosen = [given[tag] for tag in (*self.tags, ALWAYS) if tag in given]
                 found += [f"{section}={value}" for value in chosen[:1]]
         if "friction_contact" in self.tags:
             found.append(f"structure={REDUCED}")
@@ -241,7 +243,7 @@ def leaves(model, path=(), tags=()):
 
 
 def all_leaves():
-    for kind, model in KINDS.items():
+    for kind, model in kinds().items():
         for path, tags, field in leaves(model):
             yield Leaf(kind, ".".join(map(str, path)), tags, field)
 
@@ -265,7 +267,7 @@ def _parse_once(monkeypatch):
 def folders(tmp_path_factory, template_files) -> dict[str, Folder]:
     """A folder for the template of each kind, with the files that its examples name."""
     made = {}
-    for kind in KINDS:
+    for kind in kinds():
         made[kind] = tmp_path_factory.mktemp(kind)
         shutil.copytree(template_files, made[kind], dirs_exist_ok=True)
         np.save(made[kind] / "gap.npy", np.zeros(CELLS.get(kind, (0, 0))))
@@ -387,7 +389,7 @@ def stated(leaf):
 @each_leaf
 def test_example_is_accepted(leaf, folders):
     case = load(leaf, folders, *stated(leaf))
-    assert isinstance(case, KINDS[leaf.kind])
+    assert isinstance(case, kinds()[leaf.kind])
     node = case
     for key in leaf.key.split("."):
         node = node[int(key)] if key.isdecimal() else getattr(node, key)

@@ -8,15 +8,18 @@ import numpy as np
 import pytest
 
 from sa_solver.types import Grid
-from workflow.case import dump_case, load_case
+from workflow.analyses.wear.measures import profile_difference
+from workflow.case.writing import dump_case
 from workflow.chart import Chart, accuracy_of
 from workflow.chart.axes import AXES, Axis, Rung, axes_of
-from workflow.chart.convergence import richardson
+from workflow.chart.costs import Cost, costs, stage_seconds
 from workflow.chart.frontier import Option, cheapest, efficient
 from workflow.chart.ladder import Ladder, Point, judge
-from workflow.chart.measures import Cost, costs, number_at, profile_difference, stage_seconds
 from workflow.chart.report import combination, sentences, write_chart
 from workflow.errors import UserError
+from workflow.kinds import load_case
+from workflow.shell.convergence import richardson
+from workflow.shell.summary import number_at
 
 # --- frontier -----------------------------------------------------------------------------------
 

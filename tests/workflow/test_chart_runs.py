@@ -19,14 +19,14 @@ from click.testing import CliRunner, Result
 import workflow.chart.run
 from sa_solver.reference.hertz import Sphere
 from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
-from workflow.case import DovetailCase
+from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.chart import axes, chart_case
 from workflow.chart.ladder import Ladder
 from workflow.cli import cli
 from workflow.errors import UserError
-from workflow.folder import OutputFolder
-from workflow.run import run_case
-from workflow.runs import Finished, Job
+from workflow.runs.job import Finished, Job
+from workflow.runs.run import run_case
+from workflow.shell.folder import OutputFolder
 
 HERTZ = Sphere(load=400.0, radius=10.0, contact_modulus=0.5 * 115e3 / (1.0 - 0.29**2))
 HERTZ_EXPECTED = f"""\

@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
-from workflow import errors, system_check
-from workflow.case import KINDS, load_case
+from workflow import errors
 from workflow.cli import cli
+from workflow.kinds import load_case
+from workflow.shell import system_check
 
 CASES = Path(__file__).parents[2] / "cases"
 # Only these outside the standard library may be imported to print the help.
@@ -43,13 +44,13 @@ print("\\nIMPORTED", *({{name.partition(".")[0] for name in set(sys.modules) - b
 
 def test_case_without_units_needs_no_pint(dovetail_path, tmp_path):
     """Importing pint takes longer than everything else that reads a case."""
-    from workflow.case import dump_case
+    from workflow.case.writing import dump_case
 
     path = tmp_path / "bare.yaml"
     path.write_text(dump_case(load_case(dovetail_path)), encoding="utf-8")
     code = f"""
 import sys
-from workflow.case import load_case
+from workflow.kinds import load_case
 load_case({str(path)!r})
 assert "pint" not in sys.modules
 """
@@ -106,7 +107,7 @@ def test_new_writes_a_case_that_checks(tmp_path, template_files, kind, words):
 def test_schema_is_json_with_descriptions():
     schema = json.loads(invoke("schema").stdout)
     kinds = [kind["$ref"].rpartition("/")[2] for kind in schema["anyOf"]]
-    assert kinds == [model.__name__ for model in KINDS.values()]
+    assert kinds == [model.__name__ for model in kinds().values()]
     for name, section in schema["$defs"].items():
         assert section["additionalProperties"] is False, name
         for key, entry in section["properties"].items():
@@ -160,9 +161,9 @@ def test_endings_have_their_exit_code(monkeypatch, dovetail_path, tmp_path, endi
         if ending is not None:
             raise ending
 
-    stand_in = types.ModuleType("workflow.run")
+    stand_in = types.ModuleType("workflow.runs.run")
     stand_in.run_case = run_case
-    monkeypatch.setitem(sys.modules, "workflow.run", stand_in)
+    monkeypatch.setitem(sys.modules, "workflow.runs.run", stand_in)
     monkeypatch.setattr(system_check, "missing_packages", list)
     result = invoke(
         *("run", dovetail_path, "--out", tmp_path, "--force"), "--set", "friction.coefficient=0.3"
@@ -188,8 +189,8 @@ def test_verify_reports_by_exit_code(monkeypatch, dovetail_path, tmp_path):
             assert (paths, out) == ((dovetail_path,), tmp_path)
             return passed
 
-        stand_in = types.ModuleType("workflow.verify")
+        stand_in = types.ModuleType("workflow.runs.verify")
         stand_in.verify_cases = verify_cases
-        monkeypatch.setitem(sys.modules, "workflow.verify", stand_in)
+        monkeypatch.setitem(sys.modules, "workflow.runs.verify", stand_in)
         done = invoke("verify", dovetail_path, "--out", tmp_path)
         assert done.exit_code == (0 if passed else 1)

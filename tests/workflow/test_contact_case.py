@@ -8,10 +8,13 @@ import pytest
 
 from sa_solver.types import Material
 from tests.workflow.scenes import BALL
-from workflow.bodies import bulk_strain, grid_of, height_of
-from workflow.case import CaseError, ContactCase, LineContactCase, dump_case, parse_case
+from workflow.analyses.contact.bodies import bulk_strain, grid_of, height_of
+from workflow.analyses.contact.case import ContactCase, LineContactCase
+from workflow.analyses.contact.load_table import FORCES, LoadTable
 from workflow.case.input_files import InputFileError, read_heights
-from workflow.case.load_table import FORCES, LoadTable
+from workflow.case.writing import dump_case
+from workflow.errors import CaseError
+from workflow.kinds import parse_case
 
 ROLLER = (
     BALL.replace("shape: sphere", "shape: cylinder")

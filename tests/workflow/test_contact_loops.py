@@ -7,16 +7,15 @@ import h5py
 import numpy as np
 import pytest
 
-import workflow.wear_run
+import workflow.analyses.wear.run
 from sa_solver.contact import FrictionalContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.workflow.conftest import Run, invoke
 from wear.stepping import ContactFailure
-from workflow.case import load_case
-from workflow.case.loops import Loops
-from workflow.contact_loops import (
+from workflow.analyses.wear.case.loops import Loops
+from workflow.analyses.wear.contact_loops import (
     MEASURED,
     kept_loops,
     loop_path,
@@ -25,13 +24,14 @@ from workflow.contact_loops import (
     worn_loop,
     write_loops,
 )
-from workflow.contact_stage import ContactStage
+from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.figures import loops as loops_figure
+from workflow.analyses.wear.figures import wear as figures
+from workflow.analyses.wear.loop_table import read_loop_table
 from workflow.errors import CaseError, UserError
-from workflow.figures import loops as loops_figure
-from workflow.figures import wear as figures
-from workflow.folder import OutputFolder
-from workflow.loop_table import read_loop_table
-from workflow.store import ResultsWriter, write_arrays
+from workflow.kinds import load_case
+from workflow.shell.folder import OutputFolder
+from workflow.shell.store import ResultsWriter, write_arrays
 
 BODY = Material(115e3, 0.0)
 SPHERE = ShearedSphere(400.0, 10.0, BODY, BODY, 0.7)
@@ -277,7 +277,7 @@ class Here:
 def here(monkeypatch):
     """Runs without workers."""
     monkeypatch.setattr(
-        workflow.wear_run, "contact_workers", lambda settings: nullcontext(Here(settings))
+        workflow.analyses.wear.run, "contact_workers", lambda settings: nullcontext(Here(settings))
     )
 
 
@@ -320,7 +320,7 @@ def test_resumed_run_keeps_its_earlier_loops(
     start_balls, resume, rubbed, tmp_path, monkeypatch, every
 ):
     """The same loops as without the interruption; with ``end`` the first and the last of them."""
-    keep = workflow.wear_run.WearLoop.keep
+    keep = workflow.analyses.wear.run.WearLoop.keep
 
     def interrupting(loop, state):
         keep(loop, state)
@@ -328,7 +328,7 @@ def test_resumed_run_keeps_its_earlier_loops(
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(workflow.wear_run.WearLoop, "keep", interrupting)
+        patch.setattr(workflow.analyses.wear.run.WearLoop, "keep", interrupting)
         begun = start_balls(tmp_path / "out", *ASKED, f"loops.every={every}")
         assert begun.ending.exit_code == 130
     run = resume(tmp_path / "out")

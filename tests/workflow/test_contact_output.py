@@ -12,15 +12,17 @@ from sa_solver.history import History
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.reference.torsion import TwistedSphere
 from sa_solver.types import Grid, Material
-from workflow.case import dump_case, parse_case
-from workflow.case.load_table import LoadTable
-from workflow.contact_output import ContactOutcome, write_contact_results
-from workflow.contact_summary import loop_summary, state_summaries
-from workflow.figures import contact as figures
-from workflow.figures import write_figures
-from workflow.folder import OutputFolder
-from workflow.paraview import write_paraview
-from workflow.store import grid_of
+from workflow.analyses.contact import figures
+from workflow.analyses.contact.figures import figures_of
+from workflow.analyses.contact.load_table import LoadTable
+from workflow.analyses.contact.paraview import write_contact
+from workflow.analyses.contact.results import ContactOutcome, write_contact_results
+from workflow.analyses.contact.summary import loop_summary, state_summaries
+from workflow.case.writing import dump_case
+from workflow.kinds import parse_case
+from workflow.pictures.drawing import write_figures, write_paraview
+from workflow.shell.folder import OutputFolder
+from workflow.shell.store import grid_of
 
 MATERIAL = Material(115e3, 0.29)
 FRICTION, LOAD, TANGENTIAL, RADIUS = 0.7, 400.0, 210.0, 10.0
@@ -107,7 +109,7 @@ def outcome():
 @pytest.fixture(scope="module")
 def folder(outcome, tmp_path_factory):
     folder = OutputFolder(tmp_path_factory.mktemp("contact") / "out")
-    folder.claim(outcome.case, force=False)
+    folder.claim(outcome.case, force=False, resumable=False)
     write_contact_results(outcome, folder)
     return folder
 
@@ -251,7 +253,7 @@ def test_results_hold_states_path_and_case(outcome, folder):
 def test_figures_are_wide_and_not_blank(folder, tmp_path):
     from matplotlib.image import imread
 
-    written = write_figures(folder.results, tmp_path)
+    written = write_figures(figures_of, folder.results, tmp_path)
     assert {path.stem for path in written} == {"profiles", "maps", "forces"}
     for path in written:
         image = imread(path)
@@ -293,7 +295,7 @@ def test_forces_are_drawn_against_the_motion_they_work_on(folder):
 
 
 def test_paraview_steps_through_the_increments(outcome, folder, tmp_path):
-    written = write_paraview(folder.results, tmp_path)
+    written = write_paraview(write_contact, folder.results, tmp_path)
     assert sorted(written) == sorted(path for path in tmp_path.rglob("*") if path.is_file())
     reader = pv.PVDReader(tmp_path / "contact.pvd")
     assert reader.time_values == list(range(1, 2 + 3 * STEPS))
@@ -317,10 +319,10 @@ def test_line_has_no_maps_and_no_images(tmp_path):
     table = case.load_path.table()
     outcome = ContactOutcome(case, grid, grid.x**2, table, history(states))
     folder = OutputFolder(tmp_path / "out")
-    folder.claim(case, force=False)
+    folder.claim(case, force=False, resumable=False)
     write_contact_results(outcome, folder)
-    assert write_paraview(folder.results, folder.paraview) == []
-    written = write_figures(folder.results, folder.figures)
+    assert write_paraview(write_contact, folder.results, folder.paraview) == []
+    written = write_figures(figures_of, folder.results, folder.figures)
     assert {path.stem for path in written} == {"profiles", "forces"}
     with h5py.File(folder.results) as file:
         assert grid_of(file["grid/bodies"]).line

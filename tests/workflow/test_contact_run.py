@@ -12,9 +12,9 @@ import pytest
 from click.testing import CliRunner
 
 from sa_solver.history import History
-from workflow import contact_run
-from workflow.case import template
+from workflow.analyses.contact import run as contact_run
 from workflow.cli import cli
+from workflow.kinds import template
 
 CASES = Path(__file__).parents[2] / "cases"
 QUIET = ["--set", "output.paraview=false", "--set", "output.figures=false"]
@@ -125,7 +125,7 @@ def test_border_and_yield_are_warned_of(solver, small, tmp_path):
 
 
 def test_too_many_cells_are_refused_before_anything_is_done(monkeypatch, small, tmp_path):
-    from workflow import memory
+    from workflow.shell import memory
 
     monkeypatch.setattr(memory, "_available_bytes", lambda: 2e9)
     done = invoke("run", small, "--out", tmp_path / "out", "--set", "contact.grid=[4096, 4096]")
@@ -236,8 +236,8 @@ def test_contact_needs_no_finite_elements(whole, small, tmp_path):
     code = f"""
 import sys
 from pathlib import Path
-from workflow.case import load_case
-from workflow.run import run_case
+from workflow.kinds import load_case
+from workflow.runs.run import run_case
 run_case(load_case({str(small)!r}), Path({str(tmp_path / "out")!r}), False)
 assert not {{"gmsh", "skfem", "fe_models.mesh"}} & set(sys.modules)
 """

@@ -7,17 +7,25 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from workflow import dimension, fidelity
-from workflow.case import dump_case, load_case
-from workflow.case.wear_sections import Coupling, Step
-from workflow.dovetail_model import DovetailModel
+from workflow.analyses.wear import ANALYSIS
+from workflow.analyses.wear.case.sections import Coupling, Step
+from workflow.analyses.wear.fidelity import axes, dimension
+from workflow.analyses.wear.fidelity.decision import Decision, changed
+from workflow.analyses.wear.fidelity.estimate import estimate
+from workflow.analyses.wear.fidelity.probe import (
+    STEPS,
+    coupled_life,
+    end_life,
+    increments,
+    life,
+    plane_section,
+)
+from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+from workflow.case.writing import dump_case
 from workflow.errors import MethodFailed
-from workflow.fidelity import axes
-from workflow.fidelity.decision import Decision, changed
-from workflow.fidelity.estimate import estimate
-from workflow.fidelity.probe import STEPS, coupled_life, end_life, increments, life, plane_section
-from workflow.run import run_case
-from workflow.structure_stage import StructureStage
+from workflow.kinds import load_case
+from workflow.runs.run import run_case
 
 FRICTION = 0.4
 COARSE = "mesh.flank_nodes=[9, 9]", "mesh.size=8", "contact.grid=[64, 64]"
@@ -271,7 +279,7 @@ def test_shares_add_up_to_the_accuracy(plane_path):
     costs = []
     for accuracy in (0.2, 0.1):
         case = load_case(plane_path, ["fidelity=auto", f"accuracy={accuracy}", *COARSE])
-        chosen, record = fidelity.choose(case)
+        chosen, record = ANALYSIS.choose(case)
         two, *others = record["decisions"]
         used = two["error"] + sum(own["allowed"] for own in others)
         assert used == pytest.approx(accuracy, rel=1e-9)
@@ -286,7 +294,7 @@ def test_shares_add_up_to_the_accuracy(plane_path):
 def test_record_makes_the_case(plane_path, tmp_path):
     """As a resumed run reads it, from JSON, and as the folder's case has it."""
     case = load_case(plane_path, ["fidelity=auto", *COARSE])
-    chosen, record = fidelity.choose(case)
+    chosen, record = ANALYSIS.choose(case)
     read = json.loads(json.dumps(record))
     assert dump_case(changed(case, read["chosen"])) == dump_case(chosen)
     assert read_again(chosen, tmp_path) == chosen
@@ -303,7 +311,7 @@ def test_a_probe_that_fails_leaves_the_setting_and_says_so(plane_path, monkeypat
 
     monkeypatch.setattr(axes, "life", fail)
     case = load_case(plane_path, ["fidelity=auto", *COARSE])
-    chosen, record = fidelity.choose(case)
+    chosen, record = ANALYSIS.choose(case)
     assert chosen.load_path == case.load_path
     assert chosen.mesh == case.mesh
     assert chosen.contact.grid == case.contact.grid
@@ -322,7 +330,7 @@ def test_nothing_that_wears_decides_nothing(case):
 
 def test_fixed_settings_stand(plane_path):
     case = load_case(plane_path)
-    assert fidelity.choose(case) == (case, None)
+    assert ANALYSIS.choose(case) == (case, None)
 
 
 # --- the proof ------------------------------------------------------------------------------------

@@ -7,9 +7,11 @@ import h5py
 import numpy as np
 import pytest
 
-from workflow.figures import structure_stress, write_figures
-from workflow.figures import wear as figures
-from workflow.figures.style import STYLE
+from workflow.analyses.wear.figures import structure_stress
+from workflow.analyses.wear.figures import wear as figures
+from workflow.analyses.wear.figures.wear import figures_of
+from workflow.pictures.drawing import write_figures
+from workflow.pictures.style import STYLE
 
 NAMES = {
     "resultants",
@@ -24,7 +26,7 @@ NAMES = {
 
 @pytest.fixture(scope="module")
 def written(results: Path) -> list[Path]:
-    return write_figures(results, results.parent / "figures")
+    return write_figures(figures_of, results, results.parent / "figures")
 
 
 @pytest.fixture
@@ -181,7 +183,7 @@ def test_figures_without_data_are_left_out(changed: Path, tmp_path: Path) -> Non
         for group in ("structure", "structure_worn", "bodies"):
             del file[group]
         del file["contact/intrados/coarse"]
-    names = {path.stem for path in write_figures(changed, tmp_path / "figures")}
+    names = {path.stem for path in write_figures(figures_of, changed, tmp_path / "figures")}
     assert names == NAMES - {"resultants", "structure_stress", "half_space_and_structure"}
 
 
@@ -193,5 +195,5 @@ def test_run_without_wear_can_be_drawn(changed: Path, tmp_path: Path) -> None:
         for body in file["bodies"].values():
             del body["worn"]
         del file["kinetics"]
-    names = {path.stem for path in write_figures(changed, tmp_path / "figures")}
+    names = {path.stem for path in write_figures(figures_of, changed, tmp_path / "figures")}
     assert names == NAMES - {"kinetics"}

@@ -2,9 +2,10 @@
 
 import pytest
 
-from workflow.case import dump_case, load_case
+from workflow.case.writing import dump_case
 from workflow.errors import UserError
-from workflow.folder import OutputFolder
+from workflow.kinds import load_case
+from workflow.shell.folder import OutputFolder
 
 
 @pytest.fixture
@@ -22,18 +23,18 @@ def files(folder):
 
 
 def test_claim_makes_the_folder_and_records_the_case(case, folder):
-    folder.claim(case, force=False)
+    folder.claim(case, force=False, resumable=True)
     assert files(folder) == ["case.yaml", "jumps"]
-    assert folder.load_case() == case
+    assert load_case(folder.case) == case
 
 
 def test_claim_removes_only_what_a_run_writes(case, folder):
-    folder.claim(case, force=False)
+    folder.claim(case, force=False, resumable=True)
     for name in ("summary.json", "results.h5", "worn.msh", "jumps/00001.h5", "notes.txt"):
         (folder.root / name).write_text("old")
     (folder.root / ".results.h5.123.part").write_text("old")
     (folder.jumps / ".00002.h5.123.part").write_text("old")
-    folder.claim(case, force=False)
+    folder.claim(case, force=False, resumable=True)
     assert files(folder) == ["case.yaml", "jumps", "notes.txt"]
 
 
@@ -57,19 +58,19 @@ def test_what_is_refused_and_what_force_takes(case, folder, prepare, words):
     prepare(folder.root, dump_case(case))
     before = files(folder)
     with pytest.raises(UserError, match=words) as refusal:
-        folder.claim(case, force=False)
+        folder.claim(case, force=False, resumable=True)
     assert "\n" not in str(refusal.value)
     assert files(folder) == before
-    folder.claim(case, force=True)
+    folder.claim(case, force=True, resumable=True)
     assert {"case.yaml", "jumps"} <= set(files(folder))
     assert not folder.checkpoint.exists()
 
 
 def test_finished_run_of_the_same_case_may_be_repeated(case, folder):
-    folder.claim(case, force=False)
+    folder.claim(case, force=False, resumable=True)
     folder.checkpoint.touch()
     folder.summary.touch()
-    folder.claim(case, force=False)
+    folder.claim(case, force=False, resumable=True)
     assert not folder.summary.exists()
 
 

@@ -13,14 +13,15 @@ from fe_models.dynamics.rig import natural_frequencies
 from tests.workflow.conftest import invoke
 from tests.workflow.test_friction_rig import NODES, RIG, SPECIMENS
 from tests.workflow.test_time_cases import refused
-from workflow.case import dump_case, parse_case
-from workflow.case.vibration_wear_case import FrictionRigWearCase
-from workflow.folder import OutputFolder
-from workflow.friction_rig_wear_run import run_friction_rig_wear
-from workflow.pad_wear_steps import PadState, heun, taken, worn_until
-from workflow.reporter import Reporter
-from workflow.rubbed_pads import WearingPads
-from workflow.vibration_model import VibrationModel
+from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration_wear.case import FrictionRigWearCase
+from workflow.analyses.vibration_wear.friction_rig_run import run_friction_rig_wear
+from workflow.analyses.vibration_wear.pad_wear_steps import PadState, heun, taken, worn_until
+from workflow.analyses.vibration_wear.pads import WearingPads
+from workflow.case.writing import dump_case
+from workflow.kinds import parse_case
+from workflow.shell.folder import OutputFolder
+from workflow.shell.reporter import Reporter
 
 # What changes of the rig that does not wear.
 WORN = {
@@ -182,7 +183,7 @@ def test_the_longest_step_presses_roughness_away(pads, flat, seed):
 def ended(tmp_path_factory):
     folder = tmp_path_factory.mktemp("worn_rig")
     case, out = case_in(folder), OutputFolder(folder / "out")
-    out.claim(case, force=False)
+    out.claim(case, force=False, resumable=False)
     reporter = Reporter(out.log)
     run_friction_rig_wear(case, out, reporter)
     reporter.close()
@@ -235,9 +236,10 @@ def test_results_hold_nodes_loops_and_responses(ended, summary):
 
 
 def test_figures_are_drawn(ended, tmp_path):
-    from workflow.figures import write_figures
+    from workflow.analyses.vibration_wear.figures import figures_of
+    from workflow.pictures.drawing import write_figures
 
-    drawn = {path.stem for path in write_figures(ended.results, tmp_path)}
+    drawn = {path.stem for path in write_figures(figures_of, ended.results, tmp_path)}
     assert drawn == {"frequency_response", "evolution", "profile", "loops"}
 
 

@@ -15,8 +15,10 @@ import h5py
 import numpy as np
 import pytest
 
-import workflow.wear_run
-from workflow import checkpoint, workers
+import workflow.analyses.wear.run
+from workflow.analyses.wear import checkpoint
+from workflow.analyses.wear.contact_workers import contact_workers
+from workflow.shell import processes as workers
 
 # Many quick jumps, so that a random moment mostly falls among them.
 MANY = "wear.step.cycles=1500", "coupling.drift=2e-4"
@@ -54,7 +56,7 @@ def jumps_kept(folder: Path) -> int:
 @pytest.fixture(scope="module")
 def stopped(start, tmp_path_factory):
     """A run that got Ctrl-C once two jumps were kept; not to be changed."""
-    keep = workflow.wear_run.WearLoop.keep
+    keep = workflow.analyses.wear.run.WearLoop.keep
 
     def interrupting(loop, state):
         keep(loop, state)
@@ -62,7 +64,7 @@ def stopped(start, tmp_path_factory):
             raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(workflow.wear_run.WearLoop, "keep", interrupting)
+        patch.setattr(workflow.analyses.wear.run.WearLoop, "keep", interrupting)
         run = start(tmp_path_factory.mktemp("stopped") / "out")
     assert run.ending.exit_code == 130
     assert run.ending.stderr.splitlines()[-1].startswith("fretscale: interrupted")
@@ -129,7 +131,7 @@ def test_interruption_after_the_last_jump_writes_the_output(start, resume, monke
     quick = "wear.cycles=1e4", "contact.grid=[16, 24]"
     reference = start(tmp_path / "reference", *quick)
     with monkeypatch.context() as patch:
-        patch.setattr(workflow.wear_run, "write_output", refuse)
+        patch.setattr(workflow.analyses.wear.run, "write_output", refuse)
         run = start(tmp_path / "out", *quick)
     assert run.ending.exit_code == 130
     assert jumps_kept(run.folder) == 1
@@ -139,7 +141,7 @@ def test_interruption_after_the_last_jump_writes_the_output(start, resume, monke
 def test_method_that_fails_later_says_how_to_go_on(start, resume, whole, monkeypatch, tmp_path):
     from wear.stepping import ContactFailure
 
-    jump = workflow.wear_run.WearLoop._jump
+    jump = workflow.analyses.wear.run.WearLoop._jump
 
     def failing(loop, state):
         if state.jump == 1:
@@ -147,7 +149,7 @@ def test_method_that_fails_later_says_how_to_go_on(start, resume, whole, monkeyp
         return jump(loop, state)
 
     with monkeypatch.context() as patch:
-        patch.setattr(workflow.wear_run.WearLoop, "_jump", failing)
+        patch.setattr(workflow.analyses.wear.run.WearLoop, "_jump", failing)
         run = start(tmp_path / "out")
     assert run.ending.exit_code == 3
     last = run.ending.stderr.splitlines()[-1]
@@ -175,7 +177,7 @@ def test_worker_that_dies_is_one_line():
 def test_worker_that_cannot_be_set_up_says_why(small_path):
     """What goes wrong in a worker is raised here, not printed there."""
     with (
-        workers.contact_workers([None]) as team,
+        contact_workers([None]) as team,
         pytest.raises(AttributeError, match="'NoneType'"),
     ):
         team.call("begin", [None])
@@ -186,7 +188,7 @@ def test_workers_are_born_deaf_to_ctrl_c():
     """From their first instruction, the first of a process included."""
     code = """
 import signal
-from workflow.workers import _answers, _do, _processes
+from workflow.shell.processes import _answers, _do, _processes
 ask = signal.pthread_sigmask, (signal.SIG_BLOCK, ())
 with _processes(_do, [ask, ask]) as connections:
     assert all(signal.SIGINT in mask for mask in _answers(connections))
@@ -339,7 +341,9 @@ def test_kill_while_the_checkpoint_is_written(small_path, resume, reference, tmp
     """The half of it that is on disk is not the checkpoint."""
     code = """
 import os, signal, sys
-from workflow import checkpoint, store
+from workflow.analyses.wear import checkpoint
+from workflow.analyses.wear.contact_workers import contact_workers
+from workflow.shell import store
 whole, written = store.write_arrays, []
 def torn(path, arrays, attributes):
     written.append(path)

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from workflow.analyses.wear.loop_table import COLUMNS, read_loop_table, write_table
 from workflow.errors import UserError
-from workflow.loop_table import COLUMNS, read_loop_table, write_table
 
 
 def rows(count):

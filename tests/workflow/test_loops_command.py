@@ -8,8 +8,8 @@ from click.testing import CliRunner
 
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import march
+from workflow.analyses.wear.loop_table import read_loop_table
 from workflow.cli import cli
-from workflow.loop_table import read_loop_table
 
 STIFFNESS, FRICTION, LOAD, STROKE = 60e3, 0.9, 60.0, 14e-3
 CYCLES = 15

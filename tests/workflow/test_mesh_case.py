@@ -14,12 +14,12 @@ from fe_models.geometry.imported import patch, read_bodies
 from fe_models.gmsh_session import gmsh_model
 from fe_models.mesh import write_msh
 from fe_models.structure import CLOSED
-from workflow.case import load_case, template
+from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+from workflow.analyses.wear.structures.mesh.model import MeshModel
 from workflow.cli import cli
-from workflow.dovetail_model import DovetailModel
 from workflow.errors import MethodFailed
-from workflow.mesh_model import MeshModel
-from workflow.structure_stage import StructureStage
+from workflow.kinds import load_case, template
 
 STEEL = {"young": "200 GPa", "poisson": 0.3, "density": "7800 kg/m^3"}
 WEAR = {

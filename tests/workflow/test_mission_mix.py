@@ -7,13 +7,17 @@ import pytest
 
 from sa_solver.types import LoadHistory
 from tests.workflow.conftest import Run, invoke
-from workflow.case import CaseError, load_case, parse_case, template
+from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.structures.mesh.model import MeshModel
+from workflow.analyses.wear.structures.resultants.reading import read_resultants
+from workflow.analyses.wear.structures.resultants.writing import (
+    write_resultants_csv,
+    write_resultants_h5,
+)
 from workflow.case.input_files import InputFileError
-from workflow.mesh_model import MeshModel
-from workflow.resultants.reading import read_resultants
-from workflow.resultants.writing import write_resultants_csv, write_resultants_h5
-from workflow.sources import load_source
-from workflow.structure_stage import StructureStage
+from workflow.errors import CaseError
+from workflow.kinds import load_case, parse_case, template
 
 COARSE = "mesh.flank_nodes=[10, 10]", "mesh.size=8", "contact.grid=[48, 64]"
 QUIET = "output.paraview=false", "output.figures=false", "stress.section=none"
@@ -38,7 +42,8 @@ def staged(plane_path):
     """The structure of the plane dovetail with overrides."""
 
     def make(*overrides: str) -> StructureStage:
-        source = load_source(load_case(plane_path, [*COARSE, *SHORT, *overrides]))
+        case = load_case(plane_path, [*COARSE, *SHORT, *overrides])
+        source = structure_of(case).source(case)
         assert isinstance(source, StructureStage)
         return source
 

@@ -10,8 +10,9 @@ import pytest
 import pyvista as pv
 
 from sa_solver.types import Array, Frame, Grid
-from workflow.paraview import write_paraview
-from workflow.store import frame_of, grid_of
+from workflow.analyses.wear.paraview.wear import write_wear
+from workflow.pictures.drawing import write_paraview
+from workflow.shell.store import frame_of, grid_of
 
 SIZE = (10.0, 60.0)  # of the synthetic flanks [mm]
 INTERFACES = ("intrados", "extrados")
@@ -21,7 +22,7 @@ SINGLE = 2e-7  # rounding of single precision
 @pytest.fixture(scope="module")
 def folder(results: Path) -> Path:
     written = results.parent / "paraview"
-    paths = write_paraview(results, written)
+    paths = write_paraview(write_wear, results, written)
     assert sorted(paths) == sorted(path for path in written.rglob("*") if path.is_file())
     return written
 
@@ -179,7 +180,7 @@ def test_failed_write_leaves_nothing_behind(results: Path, tmp_path: Path) -> No
     blocked = tmp_path / "paraview"
     (blocked / "intrados.pvd").mkdir(parents=True)  # a folder where the series should go
     with pytest.raises(OSError, match=r"intrados\.pvd"):
-        write_paraview(results, blocked)
+        write_paraview(write_wear, results, blocked)
     assert not list(blocked.rglob("*.part"))
 
 
@@ -190,7 +191,7 @@ def test_run_without_structure_writes_the_flanks(results: Path, tmp_path: Path) 
         for group in ("structure", "structure_worn", "bodies"):
             del file[group]
         nodes = int(np.prod(file["grid/intrados"].attrs["shape"]))
-    written = {path.name for path in write_paraview(bare, tmp_path / "paraview")}
+    written = {path.name for path in write_paraview(write_wear, bare, tmp_path / "paraview")}
     assert "intrados.pvd" in written
     assert "structure.pvd" not in written
     assert pv.read(tmp_path / "paraview" / "flank_intrados_disk.stl").n_points == nodes

@@ -12,15 +12,17 @@ from fe_models.dynamics.newmark import StepControl
 from fe_models.reduction import ReducedModel, load_reduced, save_reduced
 from tests.workflow.test_time_cases import MASS, RIG, STIFF, refused, run
 from wear.joints.law import march
-from workflow.case import CaseError, dump_case, load_case, parse_case
-from workflow.errors import UserError
-from workflow.joint_model import JointModel
-from workflow.memory import required_bytes
-from workflow.reporter import Reporter
-from workflow.rig_model import RigModel, rig_model
-from workflow.specimens_model import SpecimensModel
-from workflow.time_rig import motion_of
-from workflow.verify import verify_cases
+from workflow.analyses.rig.building import rig_model
+from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.specimens.model import SpecimensModel
+from workflow.analyses.time.joint_model import JointModel
+from workflow.analyses.time.memory import memory
+from workflow.analyses.time.rig import motion_of
+from workflow.case.writing import dump_case
+from workflow.errors import CaseError, UserError
+from workflow.kinds import load_case, parse_case
+from workflow.runs.verify import verify_cases
+from workflow.shell.reporter import Reporter
 
 CASES = Path(__file__).parents[2] / "cases"
 # What sums over a few hundred steps leave of a balance.
@@ -288,7 +290,7 @@ def test_a_gap_closes(specimen):
 
 def test_memory_grows_with_the_body(specimen):
     case = parse_case(SPECIMEN, str(specimen / "case.yaml"), ["integration.step=1 us"])
-    assert required_bytes(case, 10_000) > 2.0 * required_bytes(case)
+    assert memory(case, 10_000).required > 2.0 * memory(case).required
 
 
 # --- refusals -----------------------------------------------------------------------------------

@@ -13,13 +13,17 @@ from click.testing import CliRunner, Result
 
 from fe_models.geometry.dovetail import Dovetail
 from sa_solver.types import Array, Grid
-from workflow.case import CaseError, ResultantsCase, dump_case, load_case, parse_case, template
-from workflow.case.gaps import ParaboloidGap, RoundedGap
+from workflow.analyses.wear.case.gaps import ParaboloidGap, RoundedGap
+from workflow.analyses.wear.figures.wear import figures_of
+from workflow.analyses.wear.gaps import GridHeights, gap_over
+from workflow.analyses.wear.paraview.wear import write_wear
+from workflow.analyses.wear.structures.resultants.case import ResultantsCase
+from workflow.analyses.wear.structures.resultants.source import ResultantsSource
+from workflow.case.writing import dump_case
 from workflow.cli import cli
-from workflow.figures import write_figures
-from workflow.paraview import write_paraview
-from workflow.resultants.gaps import GridHeights, gap_over
-from workflow.resultants.source import ResultantsSource
+from workflow.errors import CaseError
+from workflow.kinds import load_case, parse_case, template
+from workflow.pictures.drawing import write_figures, write_paraview
 
 # Typed by hand: what presses and slides, what opens and closes, a face that is never closed.
 TABLE = """\
@@ -325,9 +329,9 @@ def test_a_new_run_takes_away_the_nodes_of_the_old(typed, tmp_path):
 def test_pictures_of_resultants_alone(typed, tmp_path):
     """Figures leave out what another code did not tell; ParaView shows every face."""
     results = typed[0] / "results.h5"
-    figures = {path.stem for path in write_figures(results, tmp_path / "figures")}
+    figures = {path.stem for path in write_figures(figures_of, results, tmp_path / "figures")}
     assert {"resultants", "half_space_and_structure", "pressure_maps", "kinetics"} <= figures
-    written = {path.name for path in write_paraview(results, tmp_path / "paraview")}
+    written = {path.name for path in write_paraview(write_wear, results, tmp_path / "paraview")}
     assert {"early.pvd", "late.pvd", "never.pvd", "flank_early_body_1.stl"} <= written
 
 

@@ -8,25 +8,28 @@ import h5py
 import numpy as np
 import pytest
 
-import workflow.resultants
+import workflow.analyses.wear.structures.resultants
 from fe_models.mesh import Face, Interface
 from fe_models.structure import InterfaceHistory
 from fe_models.transfer import FaceTransfer
 from sa_solver.types import Frame, Grid, LoadHistory, resultants
-from workflow.case.input_files import InputFileError
-from workflow.resultants.faces import FaceError, facets_over
-from workflow.resultants.reading import read_resultants
-from workflow.resultants.worn_nodes import (
+from workflow.analyses.wear.structures.resultants.faces import FaceError, facets_over
+from workflow.analyses.wear.structures.resultants.reading import read_resultants
+from workflow.analyses.wear.structures.resultants.writing import (
+    write_resultants_csv,
+    write_resultants_h5,
+)
+from workflow.analyses.wear.worn_nodes import (
     nodal_depths,
     read_nodes,
     worn_displacement,
     write_worn_nodes,
 )
-from workflow.resultants.writing import write_resultants_csv, write_resultants_h5
-from workflow.store import ResultsWriter
+from workflow.case.input_files import InputFileError
+from workflow.shell.store import ResultsWriter
 
 FRICTION, SIZE = 0.4, (10.0, 60.0)
-RECIPE = Path(workflow.resultants.__file__).with_name("RECIPE.md")
+RECIPE = Path(workflow.analyses.wear.structures.resultants.__file__).with_name("RECIPE.md")
 COLUMNS = ("P", "Qx", "Qy", "Mx", "My", "Mz", "Edx", "Edy")
 GOOD = {"P": 100, "Qx": -40, "Qy": 0, "Mx": 30, "My": -20, "Mz": 5, "Edx": 2, "Edy": 0}
 

@@ -4,8 +4,8 @@ import h5py
 import numpy as np
 import pytest
 
-from workflow import memory
-from workflow.case import load_case
+from workflow.kinds import load_case
+from workflow.shell import memory
 
 UM3_PER_J = 1e-12
 # Few and quick increments for the odd cases, where a run is only to end well.

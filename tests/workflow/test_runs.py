@@ -14,11 +14,14 @@ import numpy as np
 import pytest
 
 from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
-from workflow import runs_job
-from workflow.case import load_case
+from workflow.analyses.contact.case import ContactCase
 from workflow.errors import UserError
-from workflow.folder import OutputFolder
-from workflow.runs import Job, kept_in, run_jobs
+from workflow.kinds import load_case
+from workflow.runs import job as runs_job
+from workflow.runs.job import Job
+from workflow.runs.jobs import run_jobs
+from workflow.runs.run import kept_in
+from workflow.shell.folder import OutputFolder
 
 QUIET = "output: {paraview: false, figures: false}\n"
 # Jumps of some hundredths of a second each, so that a moment among them is easily met.
@@ -126,7 +129,7 @@ def test_a_process_that_breaks_tells_its_last_words(contact, tmp_path, monkeypat
 
 
 def test_a_mistake_of_the_program_leaves_its_traceback_in_the_log(contact, tmp_path, monkeypatch):
-    code = "import workflow.contact_run as c; c.bodies_of = None;" + runs_job.COMMAND
+    code = "import workflow.analyses.contact.run as c; c.bodies_of = None;" + runs_job.COMMAND
     monkeypatch.setattr(runs_job, "COMMAND", code)
     (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
     assert done.error == "TypeError: 'NoneType' object is not callable"
@@ -144,14 +147,14 @@ def test_jobs_have_one_thread_each(contact, tmp_path, monkeypatch):
 
 
 def test_a_run_takes_a_core_for_each_of_its_contacts(dovetail_path, contact, wear):
-    assert runs_job.cores_of(load_case(dovetail_path)) == 2
-    assert runs_job.cores_of(load_case(contact)) == 1
-    assert runs_job.cores_of(load_case(wear)) == 1
+    assert load_case(dovetail_path).cores == 2
+    assert load_case(contact).cores == 1
+    assert load_case(wear).cores == 1
 
 
 def test_cores_are_shared_out(contact, tmp_path, monkeypatch):
     """Never more in use than there are, and all used where jobs allow it."""
-    import workflow.runs as runs
+    import workflow.runs.jobs as runs
 
     wants, used, most = {"a": 2, "b": 1, "c": 1, "d": 3, "e": 9}, [], []
 
@@ -164,7 +167,7 @@ def test_cores_are_shared_out(contact, tmp_path, monkeypatch):
 
     cases = {name: Job(name, contact, (f"title={name}",)) for name in wants}
     monkeypatch.setattr(runs, "run_job", pretend)
-    monkeypatch.setattr(runs, "cores_of", lambda case: wants[case.title])
+    monkeypatch.setattr(ContactCase, "cores", property(lambda case: wants[case.title]))
     done = run_jobs(list(cases.values()), tmp_path / "out", processes=3)
     assert [own.error for own in done] == ["pretended"] * 5
     assert max(most) == 3
@@ -175,7 +178,8 @@ def test_cores_are_shared_out(contact, tmp_path, monkeypatch):
 RUN = """
 import sys
 from pathlib import Path
-from workflow.runs import Job, run_jobs
+from workflow.runs.job import Job
+from workflow.runs.jobs import run_jobs
 case, out, *overrides = sys.argv[1:]
 run_jobs([Job("one", Path(case), tuple(overrides))], Path(out), processes=1)
 """
@@ -208,7 +212,7 @@ def alive(pid):
 
 WAIT = """
 import threading, time
-from workflow.runs_job import _end_with_parent
+from workflow.runs.job import _end_with_parent
 threading.Thread(target=_end_with_parent, daemon=True).start()
 time.sleep(600)
 """
@@ -218,7 +222,7 @@ time.sleep(600)
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
 def test_a_job_ends_with_whoever_waits_for_it(contact, tmp_path):
     """However that one ends."""
-    code = f"from workflow import runs_job\nruns_job.COMMAND = {WAIT!r}\n{RUN}"
+    code = f"from workflow.runs import job\njob.COMMAND = {WAIT!r}\n{RUN}"
     process = subprocess.Popen([sys.executable, "-c", code, contact, tmp_path / "out"])
     wait_until(lambda: below(process.pid))
     (job,) = below(process.pid)
@@ -283,7 +287,7 @@ def test_a_chosen_case_is_known_by_the_case_that_was_asked_for(wear, tmp_path):
 
 def test_no_scheduler_is_one_line(contact, tmp_path, monkeypatch):
     pytest.importorskip("distributed")
-    from workflow import runs_dask
+    from workflow.runs import cluster as runs_dask
 
     monkeypatch.setattr(runs_dask, "PATIENCE", "1 s")
     with pytest.raises(UserError, match=r"--dask tcp://127.0.0.1:9: no scheduler answers: \S+"):

@@ -12,9 +12,12 @@ from fe_models.mesh import Face
 from fe_models.reduction import free_frequencies, load_reduced
 from sa_solver.reference.hertz import Sphere
 from sa_solver.types import ElasticPair, Frame, Material
-from workflow.case import CaseError, SpecimensCase, dump_case, load_case, parse_case, template
+from workflow.analyses.specimens.case import SpecimensCase
+from workflow.analyses.specimens.half_space import NodeGrid, PadHalfSpace
+from workflow.case.writing import dump_case
 from workflow.cli import cli
-from workflow.specimens_half_space import NodeGrid, PadHalfSpace
+from workflow.errors import CaseError
+from workflow.kinds import load_case, parse_case, template
 
 CASES = Path(__file__).parents[2] / "cases"
 STEEL = Material(200e3, 0.3)
@@ -239,8 +242,8 @@ class TestResults:
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.image import imread
 
-        from workflow.figures import specimens
-        from workflow.figures.style import STYLE
+        from workflow.analyses.specimens import figures as specimens
+        from workflow.pictures.style import STYLE
 
         names = {"pad", "loops", "kinetics", "half_space"}
         assert {path.stem for path in (curved / "figures").iterdir()} == names

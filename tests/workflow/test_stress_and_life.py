@@ -9,10 +9,10 @@ import pytest
 
 from sa_solver.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Grid, Material
-from workflow.case.wear_sections import ContactStress, Life
-from workflow.contact_stage import CycleTractions
-from workflow.store import grid_of, jump_names
-from workflow.stress_stage import Planes, _tell_of_stick, life_maps
+from workflow.analyses.wear.case.sections import ContactStress, Life
+from workflow.analyses.wear.contact_stage import CycleTractions
+from workflow.analyses.wear.contact_stress import Planes, _tell_of_stick, life_maps
+from workflow.shell.store import grid_of, jump_names
 
 FLANKS = ("intrados", "extrados")
 BODIES = {1: "disk", 2: "blade"}
@@ -290,8 +290,8 @@ def test_figures_say_what_the_summary_says(request: pytest.FixtureRequest, metho
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-    from workflow.figures import wear as figures
-    from workflow.figures.style import STYLE
+    from workflow.analyses.wear.figures import wear as figures
+    from workflow.pictures.style import STYLE
 
     run = request.getfixturevalue(method)
     told = {
@@ -316,10 +316,11 @@ def test_figures_say_what_the_summary_says(request: pytest.FixtureRequest, metho
 
 @pytest.fixture(scope="module")
 def paraview(normal: Any) -> Path:
-    from workflow.paraview import write_paraview
+    from workflow.analyses.wear.paraview.wear import write_wear
+    from workflow.pictures.drawing import write_paraview
 
     folder = normal.folder / "shown"
-    write_paraview(normal.folder / "results.h5", folder)
+    write_paraview(write_wear, normal.folder / "results.h5", folder)
     return folder
 
 

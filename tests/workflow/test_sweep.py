@@ -15,9 +15,9 @@ import pytest
 from click.testing import CliRunner
 
 from tests.workflow.scenes import BALL
-from workflow.case import CaseError
 from workflow.cli import cli
-from workflow.runs import Finished
+from workflow.errors import CaseError
+from workflow.runs.job import Finished
 from workflow.sweep.design import Run, runs_of
 from workflow.sweep.schema import load_sweep
 from workflow.sweep.table import Row, columns_of, unit_of, varied_in
@@ -360,7 +360,7 @@ def test_varied_values_share_a_unit_where_they_can():
 
 def test_bands_over_the_cycles(tmp_path):
     """Runs that end earlier than others leave the bands to those, and a failure is no run."""
-    from workflow.figures.sweep import kinetics_bands, write_sweep_figures
+    from workflow.sweep.figures import kinetics_bands, write_sweep_figures
 
     rows = [worn(depth) for depth in (0.1, 0.2, 0.3, 0.4, 0.5)]
     rows[0].finished.summary["kinetics"]["cycles"] = [0.0, 10.0, 20.0]

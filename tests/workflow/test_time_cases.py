@@ -9,14 +9,14 @@ import numpy as np
 import pytest
 
 from tests.workflow.conftest import invoke
-from workflow.case import CaseError, parse_case, template
+from workflow.analyses.time.joint import steady_loop
+from workflow.analyses.time.joint_model import JointModel
+from workflow.analyses.time.memory import memory
 from workflow.case.loading import load_case
 from workflow.chart.axes import axes_of
-from workflow.errors import UserError
-from workflow.joint_model import JointModel
-from workflow.memory import required_bytes
-from workflow.time_joint import steady_loop
-from workflow.verify import verify_cases
+from workflow.errors import CaseError, UserError
+from workflow.kinds import parse_case, template
+from workflow.runs.verify import verify_cases
 
 CASES = Path(__file__).parents[2] / "cases"
 LAWS = ("bouc_wen", "jenkins", "uniform_iwan", "four_parameter_iwan")
@@ -485,8 +485,8 @@ def test_memory_grows_with_what_is_recorded(monkeypatch, tmp_path):
         parse_case(RIG, "case.yaml", [HAMMER, "integration.step=1 us", f"excitation.record={time}"])
         for time in (1, 100)
     )
-    assert required_bytes(long) > 10.0 * required_bytes(short) / 2.0
-    monkeypatch.setattr("workflow.memory._available_bytes", lambda: 1e9)
+    assert memory(long).required > 10.0 * memory(short).required / 2.0
+    monkeypatch.setattr("workflow.shell.memory._available_bytes", lambda: 1e9)
     overrides = HAMMER, "integration.step=1 us", "excitation.record=100"
     code, message = refused(tmp_path, RIG, *overrides)
     assert code == 4

@@ -14,18 +14,19 @@ from fe_models.structure import InterfaceHistory, load_history
 from fe_models.transfer import FaceTransfer
 from sa_solver.types import Frame, Grid
 from tests.workflow.conftest import Run, invoke
-from workflow import fidelity
-from workflow.case import dump_case, load_case
-from workflow.contact_stage import ContactStage, StageSettings
-from workflow.dimension import choose_dimension
+from workflow.analyses.wear import ANALYSIS
+from workflow.analyses.wear.contact_stage import ContactStage, StageSettings
+from workflow.analyses.wear.fidelity import axes
+from workflow.analyses.wear.fidelity.dimension import choose_dimension
+from workflow.analyses.wear.figures.wear import FIGURES, figures_of
+from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.uniformity import ALIKE, Uniformity, sections, uniformities
+from workflow.case.writing import dump_case
 from workflow.errors import MethodFailed
-from workflow.fidelity import axes
-from workflow.figures.style import STYLE
-from workflow.figures.wear import FIGURES, figures_of
-from workflow.folder import OutputFolder
-from workflow.sources import load_source
-from workflow.structure_stage import StructureStage
-from workflow.uniformity import ALIKE, Uniformity, sections, uniformities
+from workflow.kinds import load_case
+from workflow.pictures.style import STYLE
+from workflow.shell.folder import OutputFolder
 
 # Coarse enough to run in a second; probes have a mesh of their own.
 COARSE = "mesh.flank_nodes=[10, 10]", "mesh.size=8", "contact.grid=[64, 64]"
@@ -188,7 +189,7 @@ def slot(small_path):
     case = load_case(
         small_path, ["mesh.flank_nodes=[6, 8]", "mesh.size=12", "contact.grid=[24, 48]"]
     )
-    source = load_source(case)
+    source = structure_of(case).source(case)
     stages = [ContactStage(StageSettings(case, face)) for face in source.faces]
     return (
         source,
@@ -236,7 +237,7 @@ def test_what_has_worn_unevenly_is_not_uniform(slot):
 
 def test_a_section_or_a_file_has_no_uniformity(plane_path):
     case = load_case(plane_path, ["mesh.flank_nodes=[6, 8]"])
-    source = load_source(case)
+    source = structure_of(case).source(case)
     assert source.line
     assert uniformities(source, [], []) == {}
 
@@ -265,14 +266,14 @@ def auto(path: Path, *overrides: str):
 def test_settings_stand_as_written_unless_asked_otherwise(plane_path, dovetail_path):
     for path in (plane_path, dovetail_path):
         case = load_case(path)
-        assert fidelity.choose(case) == (case, None)
+        assert ANALYSIS.choose(case) == (case, None)
 
 
 @pytest.mark.parametrize(("accuracy", "dimension"), [("5 %", 2), ("3 %", 3)])
 @pytest.mark.usefixtures("dimension_only")
 def test_dimension_follows_the_accuracy(plane_path, accuracy, dimension):
     case = auto(plane_path, f"accuracy={accuracy}")
-    chosen, record = fidelity.choose(case)
+    chosen, record = ANALYSIS.choose(case)
     assert chosen.structure.dimension == dimension
     assert record["chosen"] == {"structure.dimension": dimension}
     (decision,) = record["decisions"]
@@ -281,7 +282,7 @@ def test_dimension_follows_the_accuracy(plane_path, accuracy, dimension):
     assert f"{largest:.1%}" in decision["why"]
     # Whatever the case says itself, the same is chosen, and a case so written stands.
     structure = case.structure.model_copy(update={"dimension": 2})
-    assert fidelity.choose(case.model_copy(update={"structure": structure}))[0] == chosen
+    assert ANALYSIS.choose(case.model_copy(update={"structure": structure}))[0] == chosen
 
 
 def test_probe_finds_the_closed_form_and_the_mean_load(plane_path):
@@ -322,13 +323,13 @@ def test_a_probe_that_fails_decides_nothing(plane_path, monkeypatch):
 @pytest.mark.usefixtures("dimension_only")
 def test_choice_is_kept_until_the_run_is_finished(plane_path, tmp_path):
     """So a run that is interrupted and resumed still knows why."""
-    case, record = fidelity.choose(auto(plane_path, "structure.skew=5 deg"))
+    case, record = ANALYSIS.choose(auto(plane_path, "structure.skew=5 deg"))
     folder = OutputFolder(tmp_path / "out")
-    folder.claim(case, force=False)
-    assert fidelity.kept(folder) is None
-    fidelity.keep(folder, record)
-    assert fidelity.kept(folder) == json.loads(json.dumps(record))
-    assert folder.load_case() == case
+    folder.claim(case, force=False, resumable=True)
+    assert folder.choice is None
+    folder.keep_choice(record)
+    assert folder.choice == json.loads(json.dumps(record))
+    assert load_case(folder.case) == case
 
 
 def test_check_says_that_a_probe_decides(plane_path):
@@ -371,7 +372,7 @@ def test_run_in_space_says_how_uniform_it_is(whole):
 def in_the_middle(run: Run, name: str) -> dict[str, float]:
     """P, Qx at peak load, mean slip and energy of a cycle, and worn depth, in mid-slot."""
     case = load_case(run.folder / "case.yaml")
-    source = load_source(case)
+    source = structure_of(case).source(case)
     faces = {face.face.name: number for number, face in enumerate(source.faces)}
     stage = ContactStage(StageSettings(case, source.faces[faces[name]]))
     found = sections(stage.transfer, source.unworn()[faces[name]], source.peak).middle

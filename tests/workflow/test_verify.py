@@ -7,7 +7,7 @@ from click.testing import CliRunner
 
 from workflow.cli import cli
 from workflow.errors import UserError
-from workflow.verify import _lookup
+from workflow.runs.verify import _lookup
 
 
 def verify(path, out):

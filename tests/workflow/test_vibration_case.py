@@ -9,8 +9,10 @@ import pytest
 from tests.workflow.conftest import invoke
 from tests.workflow.test_time_cases import MASS, linear_rig, receptance, refused, run
 from wear.joints.jenkins import Jenkins
-from workflow.case import VibrationCase, dump_case, parse_case
-from workflow.memory import required_bytes
+from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.memory import memory
+from workflow.case.writing import dump_case
+from workflow.kinds import parse_case
 
 RIG = """\
 title: Rig
@@ -198,7 +200,7 @@ def test_harmonics_are_a_number_of_odd_ones_or_a_list():
 
 def test_memory_grows_with_the_samples():
     few, many = (parse_case(RIG, "case", [f"resolution.samples={n}"]) for n in (256, 65536))
-    assert required_bytes(many) - required_bytes(few) == 8 * 2000 * 2 * (65536 - 256)
+    assert memory(many).required - memory(few).required == 8 * 2000 * 2 * (65536 - 256)
 
 
 def test_phase_resonance_follows_the_peaks(tmp_path):

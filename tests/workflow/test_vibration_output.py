@@ -15,11 +15,15 @@ from sa_solver.types import Array
 from tests.workflow.conftest import invoke
 from tests.workflow.vibration_pad import LOAD, ROWS, block, places, run_block
 from wear.joints.periodic import SEPARATED, SLIP
-from workflow.figures import vibration, vibration_loops, vibration_states, write_figures
-from workflow.figures.style import STYLE
-from workflow.pad_nodes import rows_and_columns
-from workflow.paraview.vibration import write_vibration
-from workflow.vibration_outcome import DATASETS
+from workflow.analyses.vibration.figures import loops as vibration_loops
+from workflow.analyses.vibration.figures import response as vibration
+from workflow.analyses.vibration.figures import states as vibration_states
+from workflow.analyses.vibration.figures.response import figures_of
+from workflow.analyses.vibration.outcome import DATASETS
+from workflow.analyses.vibration.pad_nodes import rows_and_columns
+from workflow.analyses.vibration.paraview import write_vibration
+from workflow.pictures.drawing import write_figures
+from workflow.pictures.style import STYLE
 
 FRICTION = 0.5
 SINGLE = 2e-7  # rounding of single precision
@@ -361,6 +365,6 @@ def test_case_without_figures_and_paraview_has_none(tmp_path: Path) -> None:
     assert (out / "frf_00000.csv").exists()
     for name in ("figures", "paraview", "loop_00000.csv", "backbone.csv"):
         assert not (out / name).exists()
-    assert {path.name for path in write_figures(out / "results.h5", tmp_path / "later")} == {
-        *("frequency_response.png", "node_states.png", "pad_states.png")
-    }
+    assert {
+        path.name for path in write_figures(figures_of, out / "results.h5", tmp_path / "later")
+    } == {*("frequency_response.png", "node_states.png", "pad_states.png")}

@@ -13,11 +13,13 @@ from fe_models.dynamics.harmonics import Resolution
 from tests.workflow.conftest import invoke
 from wear.joints.periodic import PeriodicMarch
 from wear.steppers import ErrorControl, Implicit, advance, first_cycles
-from workflow.case import VibrationWearCase, dump_case, parse_case
-from workflow.case.rig_structure import Rig
-from workflow.rig_model import row_of_masses
-from workflow.vibrating_contact import Shaking, VibratingContact
-from workflow.vibration_wear_run import contact_case
+from workflow.analyses.rig.building import row_of_masses
+from workflow.analyses.rig.structure import Rig
+from workflow.analyses.vibration_wear.case import VibrationWearCase
+from workflow.analyses.vibration_wear.half_space_run import contact_case
+from workflow.analyses.vibration_wear.vibrating_contact import Shaking, VibratingContact
+from workflow.case.writing import dump_case
+from workflow.kinds import parse_case
 
 WEAR = """\
 title: Ball that wears
@@ -252,9 +254,10 @@ def test_tables_hold_the_evolution_and_every_response(ended, summary):
 
 
 def test_figures_are_drawn(ended, tmp_path):
-    from workflow.figures import write_figures
+    from workflow.analyses.vibration_wear.figures import figures_of
+    from workflow.pictures.drawing import write_figures
 
-    drawn = {path.stem for path in write_figures(ended / "results.h5", tmp_path)}
+    drawn = {path.stem for path in write_figures(figures_of, ended / "results.h5", tmp_path)}
     assert drawn == {"frequency_response", "evolution", "scar", "loops"}
 
 

@@ -4,12 +4,14 @@ import json
 
 import numpy as np
 import pytest
+from workflow.case.schema import json_schema
 
 from sa_solver.types import Array
 from wear.evolution import EnergyTable
 from wear.laws import Archard, Energy, EnergyAmplitude, Evolving
-from workflow.case import CaseError, dump_case, load_case, parse_case, template
-from workflow.case.schema import json_schema
+from workflow.case.writing import dump_case
+from workflow.errors import CaseError
+from workflow.kinds import load_case, parse_case, template
 
 ARCHARD = "{law: archard, coefficient: 1e-4, hardness: 3.5 GPa}"
 ENERGY = "{law: energy, coefficient: 2e4 um^3/J}"
@@ -175,13 +177,13 @@ def test_template_shows_how_a_body_names_its_own_law():
 
 
 def amplitudes(path, *overrides) -> list[Array]:
-    from workflow.dovetail_model import DovetailModel
+    from workflow.analyses.wear.structures.dovetail.model import DovetailModel
 
     return [block.amplitudes for block in DovetailModel(load_case(path, overrides)).blocks]
 
 
 def test_missions_of_a_mix_differ_only_in_what_they_name(dovetail_path):
-    from workflow.dovetail_model import DovetailModel
+    from workflow.analyses.wear.structures.dovetail.model import DovetailModel
 
     mix = "[{share: 30 %, rotation_speed: 3000 rpm, aerodynamic_moment: 20 N*m}, {share: 0.7}]"
     model = DovetailModel(load_case(dovetail_path, [f"load_path.mix={mix}"]))

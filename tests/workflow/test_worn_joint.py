@@ -6,7 +6,7 @@ import pytest
 
 from tests.workflow.conftest import invoke
 from tests.workflow.scenes import BALL
-from workflow.loop_table import read_loop_table
+from workflow.analyses.wear.loop_table import read_loop_table
 
 WEAR = """\
 title: Ball that wears

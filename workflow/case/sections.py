@@ -6,15 +6,19 @@ write it. JSON schema, template and error messages are made from these; nothing 
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import Annotated, Any, get_args
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, field_validator
+from pydantic import BaseModel, ConfigDict, Field, StrictBool, field_validator, model_validator
 from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from sa_solver.types import Material as ElasticMaterial
 from workflow.case.fields import Entry, Path, Quantity, Text, Whole
+
+if TYPE_CHECKING:
+    from workflow.case.source import Source
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual machine.
 Length = Annotated[float, Quantity("mm", above=0.0, at_most=1e4)]
@@ -43,6 +47,9 @@ class Section(BaseModel):
     """A section of a case: frozen, every key known, every number finite."""
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+    # Whether a template fills in optional entries that most cases give.
+    filled_in: ClassVar[bool] = True
 
 
 class ElasticBody(Section):
@@ -100,28 +107,59 @@ class OutputWithoutFields(Output):
         return paraview
 
 
-# The sections of a case, of whatever kind, in the order in which they are written.
-SCENE_ORDER = (
+# The order in which sections are written that several kinds of case have. Those of one kind alone
+# stand before the last of these, in the order in which the kind declares them.
+FIRST = (
     *("title", "analysis", "structure", "materials", "friction", "load_path", "mesh"),
     *("joint", "evolution", "drive", "excitation", "energies", "ageing", "integration"),
     *("forces", "frequencies", "mass", "resolution", "continuation", "force_sweeps", "backbone"),
     *("nonlinearity", "reduction", "contact", "wear", "coupling", "accuracy", "fidelity"),
-    *("loops", "stress", "output", "assumed", "reported", "expect"),
+    *("loops", "stress"),
 )
+LAST = ("output", "assumed", "reported", "expect")
 
 
-class Scene(Section):
-    """Base of all kinds of case."""
+class Case(Section, ABC):
+    """Base of all kinds of case: what the shell needs of any of them."""
 
-    def require_entries(self, paths: tuple[str, ...]) -> None:
-        """Raise unless each of the dotted ``paths`` of ``assumed`` leads to an entry."""
-        for index, path in enumerate(paths):
+    title: Title = entry("one line", "Ball on a flat, pressed and sheared")
+    analysis: str = entry("what is computed", "contact")
+    structure: Section = entry("what is loaded")
+    output: Output = entry("files beside summary and results", default=Output())
+    assumed: tuple[DottedPath, ...] = entry(
+        "inputs that are ours because the source does not print them",
+        ["structure"],
+        default=(),
+    )
+    expect: tuple[Expectation, ...] = entry("values the run must reproduce", default=())
+
+    @classmethod
+    def suits(cls, source: Source) -> bool:
+        """Whether the source means this kind and none of the others of its analysis.
+
+        Asked where their kinds of structure do not tell them apart. May raise CaseError.
+        """
+        return True
+
+    @abstractmethod
+    def outline(self) -> list[tuple[str, str]]:
+        """What would run, in a few rows of name and text."""
+
+    @property
+    def cores(self) -> int:
+        """Processes of a run that compute at the same time."""
+        return 1
+
+    @model_validator(mode="after")
+    def _assumed_exist(self) -> Self:
+        for index, path in enumerate(self.assumed):
             if not _has(self, path):
                 raise disagreement(
                     f"'{path}': no such entry in a case of this kind; "
                     "allowed: dotted paths such as structure or friction.coefficient",
                     f"assumed.{index}",
                 )
+        return self
 
 
 def _has(node: object, path: str) -> bool:
@@ -147,9 +185,20 @@ def sections_of(annotation: object) -> Iterator[type[Section]]:
 def entries_of(model: type[BaseModel]) -> dict[str, FieldInfo]:
     """The fields of a model, in the order in which they are written."""
     fields = model.model_fields
-    if not issubclass(model, Scene):
+    if not issubclass(model, Case):
         return dict(fields)
-    return {name: fields[name] for name in SCENE_ORDER if name in fields}
+    others = [name for name in fields if name not in (*FIRST, *LAST)]
+    return {name: fields[name] for name in (*FIRST, *others, *LAST) if name in fields}
+
+
+def words_of(model: type[Section], *path: str) -> tuple[str, ...]:
+    """The words that an entry of a fixed choice admits, such as ``structure.kind``."""
+    *sections, name = path
+    models: list[type[Section]] = [model]
+    for section in sections:
+        models = [m for own in models for m in sections_of(own.model_fields[section].annotation)]
+    words = [w for own in models for w in get_args(own.model_fields[name].annotation)]
+    return tuple(dict.fromkeys(words))
 
 
 def entry_of(field: FieldInfo) -> Entry | None:

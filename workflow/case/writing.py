@@ -10,7 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from workflow.case.sections import Scene, entries_of
+from workflow.case.sections import Case, entries_of
 
 HEADER = """\
 # The case as run, every default written out. Base units: mm, N, s, MPa, tonne (t), rad.
@@ -34,7 +34,7 @@ class Row:
     off: bool = False
 
 
-def dump_case(case: Scene) -> str:
+def dump_case(case: Case) -> str:
     """``case`` in base units; ``parse_case`` of the result is equal to ``case``."""
     return HEADER + render(rows_of(case))
 

@@ -12,9 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from workflow.case import Case, CaseError, MeshCase, dump_case, load_case
-from workflow.case.contact_case import HEIGHTS
-from workflow.errors import UserError
+from workflow.analyses.contact.case import HEIGHTS
+from workflow.case.sections import Case
+from workflow.case.writing import dump_case
+from workflow.errors import CaseError, UserError
+from workflow.kinds import load_case
 
 # Refinements of a contact grid along each direction. A grid twice as fine takes four times as long
 # in 3-D, once for every increment of every jump where the contact wears.
@@ -135,7 +137,7 @@ def _settings(axis: Axis, own: Setting, case: Path, base: Sequence[str]) -> list
     return list(found.values())
 
 
-def _entry(case: Case, path: str) -> Any:
+def entry_at(case: Case, path: str) -> Any:
     """The entry at a dotted path, None where this kind of case has none."""
     node: Any = case
     for key in path.split("."):
@@ -145,16 +147,16 @@ def _entry(case: Case, path: str) -> Any:
 
 def _is_line(case: Case) -> bool:
     """Whether the contacts are line contacts."""
-    size = _entry(case, "contact.size")
-    return _entry(case, "structure.dimension") == 2 or isinstance(size, float)
+    size = entry_at(case, "contact.size")
+    return entry_at(case, "structure.dimension") == 2 or isinstance(size, float)
 
 
 # --- contact ------------------------------------------------------------------------------------
 
 
 def _grids(case: Case) -> Iterator[Rung]:
-    grid = _entry(case, "contact.grid")
-    if grid is None or _entry(case, "structure.shape") == HEIGHTS:
+    grid = entry_at(case, "contact.grid")
+    if grid is None or entry_at(case, "structure.shape") == HEIGHTS:
         return
     cells = (grid,) if isinstance(grid, int) else tuple(grid)
     line = _is_line(case)
@@ -170,7 +172,7 @@ def _grids(case: Case) -> Iterator[Rung]:
 
 
 def _tolerances(case: Case) -> Iterator[Rung]:
-    own = _entry(case, "contact.tolerance")
+    own = entry_at(case, "contact.tolerance")
     if own is None:
         return
     coarser = [tolerance for tolerance in TOLERANCES if tolerance > own]
@@ -179,18 +181,18 @@ def _tolerances(case: Case) -> Iterator[Rung]:
 
 
 def _methods(case: Case) -> Iterator[Rung]:
-    if _entry(case, "contact.method") is not None:
+    if entry_at(case, "contact.method") is not None:
         for method in ("normal", "full"):
             yield Rung(method, (f"contact.method={method}",))
 
 
 def _histories(case: Case) -> Iterator[Rung]:
-    if _entry(case, "contact.history") is not None:
+    if entry_at(case, "contact.history") is not None:
         yield Rung("reversals", ("contact.history=reversals",), branch="reversals")
         yield from _legs(case)
     else:
         finer = INCREMENTS_2D if _is_line(case) else INCREMENTS
-        yield from _cycle(_entry(case, "load_path"), finer)
+        yield from _cycle(entry_at(case, "load_path"), finer)
 
 
 def _cycle(path: Any, factors: Sequence[float]) -> Iterator[Rung]:
@@ -209,7 +211,7 @@ def _cycle(path: Any, factors: Sequence[float]) -> Iterator[Rung]:
 
 def _legs(case: Case) -> Iterator[Rung]:
     """The full history of a contact case in fewer and in more increments."""
-    legs = _entry(case, "load_path.legs")
+    legs = entry_at(case, "load_path.legs")
     full = "contact.history=full"
     if not legs or all(leg.increments == 1 for leg in legs):
         yield Rung("full", (full,), branch="full")
@@ -228,8 +230,8 @@ def _legs(case: Case) -> Iterator[Rung]:
 
 def _steppers(case: Case) -> Iterator[Rung]:
     """Fixed jumps and automatic ones of each kind, and explicit ones in shares of their limit."""
-    cycles = _entry(case, "wear.cycles")
-    if _entry(case, "wear.step.kind") is None:
+    cycles = entry_at(case, "wear.cycles")
+    if entry_at(case, "wear.step.kind") is None:
         return
     coarser = 0 if _is_line(case) else COARSER_3D
     for share in EXPLICIT if _is_line(case) else EXPLICIT[:1]:
@@ -250,7 +252,7 @@ def _steppers(case: Case) -> Iterator[Rung]:
 
 
 def _couplings(case: Case) -> Iterator[Rung]:
-    own = _entry(case, "coupling")
+    own = entry_at(case, "coupling")
     if own is None:
         return
     yield Rung("constant", (f"coupling={{resultants: constant, drift: {own.drift!r}}}",))
@@ -265,7 +267,7 @@ def _couplings(case: Case) -> Iterator[Rung]:
 
 def _time_steps(case: Case) -> Iterator[Rung]:
     """Longer and shorter steps; those in which the excitation is not seen are refused."""
-    own = _entry(case, "integration.step")
+    own = entry_at(case, "integration.step")
     if own is None:
         return
     for factor in TIME_STEPS:
@@ -278,7 +280,7 @@ def _time_steps(case: Case) -> Iterator[Rung]:
 
 def _harmonics(case: Case) -> Iterator[Rung]:
     """Fewer and more odd harmonics, in samples that show the highest."""
-    samples = _entry(case, "resolution.samples")
+    samples = entry_at(case, "resolution.samples")
     if samples is None:
         return
     for count in ODD_HARMONICS:
@@ -289,7 +291,7 @@ def _harmonics(case: Case) -> Iterator[Rung]:
 
 def _samples(case: Case) -> Iterator[Rung]:
     """Fewer and more samples of the case's harmonics; too few of them are refused."""
-    harmonics = _entry(case, "resolution.harmonics")
+    harmonics = entry_at(case, "resolution.harmonics")
     if harmonics is None:
         return
     for samples in SAMPLES:
@@ -301,31 +303,37 @@ def _samples(case: Case) -> Iterator[Rung]:
 
 
 def _dimensions(case: Case) -> Iterator[Rung]:
-    if _entry(case, "structure.kind") == "dovetail":
+    if entry_at(case, "structure.kind") == "dovetail":
         for dimension in (2, 3):
             yield Rung(f"{dimension}-D", (f"structure.dimension={dimension}",))
 
 
 def _meshes(case: Case) -> Iterator[Rung]:
     for factor in MESHES_2D if _is_line(case) else MESHES_3D:
-        if (nodes := _entry(case, "mesh.flank_nodes")) is not None:
+        if (nodes := entry_at(case, "mesh.flank_nodes")) is not None:
             counts = [max(3, 1 + round(factor * (count - 1))) for count in nodes]
-            size = _entry(case, "mesh.size") / factor
+            size = entry_at(case, "mesh.size") / factor
             overrides = f"mesh.flank_nodes={counts}", f"mesh.size={size!r}"
             yield Rung(f"{counts[0]} x {counts[1]} nodes", overrides, 1.0 / factor)
-        elif (own := _entry(case, "mesh.pad_elements")) is not None:
+        elif (own := entry_at(case, "mesh.pad_elements")) is not None:
             elements = 2 * max(1, round(0.5 * factor * own))
-            size = _entry(case, "mesh.size") / factor
+            size = entry_at(case, "mesh.size") / factor
             overrides = f"mesh.pad_elements={elements}", f"mesh.size={size!r}"
             yield Rung(f"{elements} elements on the pad", overrides, 1.0 / factor)
-        elif isinstance(case, MeshCase) and case.structure.size is not None:
-            size = case.structure.size / factor
+        elif (longest := _element_size(case)) is not None:
+            size = longest / factor
             yield Rung(f"elements of {size:.3g} mm", (f"structure.size={size!r}",), 1.0 / factor)
+
+
+def _element_size(case: Case) -> float | None:
+    """Of the elements that a CAD file is meshed with [mm]; None for other structures."""
+    size: float | None = entry_at(case, "structure.size")
+    return size if entry_at(case, "structure.kind") == "mesh" else None
 
 
 def _orders(case: Case) -> Iterator[Rung]:
     for entry in ("mesh.order", "structure.order"):
-        if _entry(case, entry) is not None:
+        if entry_at(case, entry) is not None:
             for order in (1, 2):
                 yield Rung(f"order {order}", (f"{entry}={order}",))
 

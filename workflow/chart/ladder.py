@@ -7,9 +7,9 @@ from dataclasses import dataclass, field, replace
 from math import inf, nan
 
 from workflow.chart.axes import Axis, Rung
-from workflow.chart.convergence import Convergence, richardson
+from workflow.chart.costs import Cost
 from workflow.chart.frontier import Option, efficient
-from workflow.chart.measures import Cost
+from workflow.shell.convergence import Convergence, richardson
 
 # Changes of a quantity below this share of it are rounding, and no sign of convergence or its lack.
 ROUNDING = 1e-12

@@ -16,8 +16,8 @@ from rich.table import Column, Table
 from workflow.chart.frontier import Combination, cheapest
 from workflow.chart.ladder import Judged, Ladder
 from workflow.chart.run import Chart
-from workflow.store import replacing
-from workflow.versions import versions
+from workflow.shell.store import replacing
+from workflow.shell.versions import versions
 
 # Columns of text where the tables go to a file.
 FILE_WIDTH = 120
@@ -28,7 +28,7 @@ FRONTIER = ("efficient_by_seconds", "efficient_by_convolutions")
 
 def write_chart(chart: Chart, out: Path) -> None:
     """Write ``chart.csv``, ``figures`` and, last, ``summary.json``."""
-    from workflow.figures.chart import write_chart_figures
+    from workflow.chart.figures import write_chart_figures
 
     _write_table(chart, out / "chart.csv")
     write_chart_figures(chart, out / "figures")

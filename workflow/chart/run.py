@@ -8,6 +8,7 @@ as it is and an interrupted one goes on.
 from __future__ import annotations
 
 import os
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -16,27 +17,17 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
-from workflow.case import Case, WearCase, load_case
 from workflow.case.fields import Quantity
-from workflow.chart.axes import Axis, Setting, axes_of
+from workflow.case.sections import Case
+from workflow.chart.axes import Axis, Setting, axes_of, entry_at
+from workflow.chart.costs import Cost, costs
 from workflow.chart.ladder import Ladder, Point, judge
-from workflow.chart.measures import (
-    CONTACT,
-    FROM_THE_FIRST,
-    MIDDLE,
-    Cost,
-    costs,
-    default_quantities,
-    extra_quantities,
-    interfaces,
-    middle_quantities,
-    middle_sections,
-    number_at,
-    profile_difference,
-    worn_depths,
-)
 from workflow.errors import MethodFailed, UserError
-from workflow.runs import Finished, Job, kept_in, run_jobs
+from workflow.kinds import analysis_of, load_case
+from workflow.runs.job import Finished, Job
+from workflow.runs.jobs import run_jobs
+from workflow.runs.run import kept_in
+from workflow.shell.summary import number_at
 
 CACHE = "FRETSCALE_CACHE"
 ACCURACY = Quantity("1", above=0.0, at_most=1.0)
@@ -44,10 +35,10 @@ ACCURACY = Quantity("1", above=0.0, at_most=1.0)
 RUNS, STRUCTURES, OWN = "runs", "structures", "own"
 # Entry of an interface in the summary: the longest stable explicit step of the unworn contact.
 LIMIT = "explicit_limit"
+# Quantities of a computed increment counted from the first, which is another one with other steps.
+FROM_THE_FIRST = re.compile(r"states\.\d")
 # Explicit steps beyond this number are left out: as many cycles are solved, most of a day in 3-D.
 MOST_STEPS = 5000
-# Key of the difference of worn depth anywhere among the extras.
-PROFILE = "depth anywhere"
 
 
 @dataclass(frozen=True)
@@ -117,8 +108,9 @@ def chart_case(
 def _plain(case: Case, quantities: Sequence[str]) -> Iterator[str]:
     """Overrides that leave out what no quantity needs, and any other choice of settings."""
     yield from ("output.paraview=false", "output.figures=false")
-    if isinstance(case, WearCase) and not any(".stress." in path for path in quantities):
-        yield from ("stress.section=none", "stress.life.parameter=none")
+    for entry, overrides in analysis_of(case).comparison.plain.items():
+        if not any(f".{entry}." in path for path in quantities):
+            yield from overrides
     if hasattr(case, "fidelity"):
         yield "fidelity=fixed"
 
@@ -163,7 +155,7 @@ def _run(
     own, *others = jobs.values()
     ended = run_jobs([own], out, alone=True, report=told)
     if (summary := ended[0].summary) is not None:
-        _check(quantities, _with_middle(own.load(), ended[0].folder, summary))
+        _check(quantities, _measured(own.load(), ended[0].folder, summary))
     left_out = {}
     for setting in (one for rungs in settings.values() for one in rungs):
         if why := _too_long(setting, ended[0].summary or {}):
@@ -175,11 +167,11 @@ def _run(
 def _too_long(setting: Setting, own: Mapping[str, Any]) -> str:
     """Why nobody would wait for explicit steps, as far as the run of the case itself knows it."""
     share, case = setting.rung.of_limit, setting.case
-    limits = [limit for name in interfaces(own) if (limit := number_at(own, f"{name}.{LIMIT}"))]
-    if share is None or not limits or not isinstance(case, WearCase):
+    limits = [limit for name in own if (limit := number_at(own, f"{name}.{LIMIT}"))]
+    if share is None or not limits:
         return ""
     length = share * min(limits)
-    steps = case.wear.cycles / length
+    steps = entry_at(case, "wear.cycles") / length
     return f"it would take {steps:.2g} steps of {length:.3g} cycles" if steps > MOST_STEPS else ""
 
 
@@ -217,15 +209,13 @@ def _runs(ended: Sequence[Finished]) -> dict[str, _Run]:
     cases = [own.job.load() for own, _ in found]
     paid = costs(cases, [own.folder for own, _ in found], [summary for _, summary in found])
     return {
-        own.job.name: _Run(case, own, _with_middle(case, own.folder, summary), cost)
+        own.job.name: _Run(case, own, _measured(case, own.folder, summary), cost)
         for (own, summary), case, cost in zip(found, cases, paid, strict=True)
     }
 
 
-def _with_middle(case: Case, folder: Path, summary: Mapping[str, Any]) -> Mapping[str, Any]:
-    if not isinstance(case, WearCase):
-        return summary
-    return {**summary, MIDDLE: middle_sections(folder, interfaces(summary))}
+def _measured(case: Case, folder: Path, summary: Mapping[str, Any]) -> Mapping[str, Any]:
+    return analysis_of(case).comparison.measured(folder, summary)
 
 
 def _check(quantities: Sequence[str], summary: Mapping[str, Any]) -> None:
@@ -261,7 +251,7 @@ def _ladder(
             folder=run.finished.job.name,
             values=_numbers(run.summary, wanted),
             cost=run.cost,
-            extras=_numbers(run.summary, extra_quantities(run.summary)) | _profile(run, last),
+            extras=_extras(run, last),
         )
         for rung, run in found
     ]
@@ -270,11 +260,16 @@ def _ladder(
 
 def _quantities(axis: Axis, own: _Run, picked: Sequence[str]) -> list[str]:
     """What the rungs of an axis are compared by."""
+    comparison = analysis_of(own.case).comparison
     if axis.sections:
-        return middle_quantities(own.summary)
-    paths = list(picked) or default_quantities(own.case, own.summary)
+        return comparison.sections(own.summary)
+    paths = list(picked)
+    if not paths:
+        # Nothing is relative to 0.
+        by_default = comparison.quantities(own.case, own.summary)
+        paths = [path for path in by_default if number_at(own.summary, path)]
     if axis.moves_states:
-        paths = [p for p in paths if not FROM_THE_FIRST.match(p)] or list(CONTACT)
+        paths = [p for p in paths if not FROM_THE_FIRST.match(p)] or list(comparison.at_the_end)
     return paths
 
 
@@ -283,12 +278,8 @@ def _numbers(summary: Mapping[str, Any], paths: Sequence[str]) -> dict[str, floa
     return {path: value for path, value in found.items() if value is not None}
 
 
-def _profile(run: _Run, last: _Run) -> dict[str, float]:
-    """Largest difference of worn depth anywhere to the last rung, over its largest depth."""
-    if not isinstance(run.case, WearCase):
-        return {}
-    own, reference = (
-        worn_depths(each.finished.folder, interfaces(each.summary)) for each in (run, last)
-    )
-    difference = profile_difference(own, reference)
-    return {} if difference is None else {PROFILE: difference}
+def _extras(run: _Run, last: _Run) -> dict[str, float]:
+    """What is told of a run beside the quantities, and how far its fields are from the last."""
+    comparison, folder = analysis_of(run.case).comparison, run.finished.folder
+    beside = _numbers(run.summary, comparison.extras(run.summary))
+    return beside | comparison.apart(folder, last.finished.folder, run.summary)

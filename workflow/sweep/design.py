@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.case import CaseError
 from workflow.case.writing import scalar
-from workflow.runs import Job
+from workflow.errors import CaseError
+from workflow.runs.job import Job
 from workflow.sweep.schema import MOST_RUNS, Amount, LogNormal, Normal, Sweep, Variation
 
 # Of a folder; what is longer is called by its hash.

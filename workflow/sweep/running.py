@@ -13,15 +13,16 @@ from collections.abc import Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
-from workflow.case import CaseError
-from workflow.errors import UserError
-from workflow.reporter import Reporter
-from workflow.runs import Finished, Job, kept_in, run_jobs
-from workflow.store import replacing
+from workflow.errors import CaseError, UserError
+from workflow.runs.job import Finished, Job
+from workflow.runs.jobs import run_jobs
+from workflow.runs.run import kept_in
+from workflow.shell.reporter import Reporter
+from workflow.shell.store import replacing
+from workflow.shell.versions import versions
 from workflow.sweep.design import Run, runs_of
 from workflow.sweep.schema import Sweep, load_sweep
 from workflow.sweep.table import Row, columns_of, spread, unit_of, varied_in, write_table
-from workflow.versions import versions
 
 # A copy of the file marks the folder as that of a sweep.
 FILE, RUNS, TABLE, SUMMARY, LOG = "sweep.yaml", "runs", "sweep.csv", "summary.json", "sweep.log"
@@ -169,6 +170,6 @@ def _title(sweep: Sweep, rows: Sequence[Row]) -> str:
 def _write_figures(sweep: Sweep, rows: list[Row], out: Path) -> None:
     if not any(row.done for row in rows):
         return
-    from workflow.figures.sweep import write_sweep_figures
+    from workflow.sweep.figures import write_sweep_figures
 
     write_sweep_figures(_title(sweep, rows), rows, out / FIGURES)

@@ -10,12 +10,13 @@ from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, create_model, model_validator
 
-from workflow.case import CaseError, units
+from workflow.case import units
 from workflow.case.explain import lines_about
 from workflow.case.fields import Entry, File, Whole, shown
 from workflow.case.sections import Section, Title, disagreement, entry
 from workflow.case.source import Source, read_text
 from workflow.case.writing import scalar
+from workflow.errors import CaseError
 
 # Beyond it a sweep is a slip of the pen: a run takes seconds at least.
 MOST_RUNS = 10_000

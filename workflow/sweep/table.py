@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.runs import Finished
-from workflow.store import PER_LENGTH, replacing
+from workflow.runs.job import Finished
+from workflow.shell.store import PER_LENGTH, replacing
 from workflow.sweep.design import Run
 from workflow.sweep.schema import Amount, amount_of
 

@@ -1,0 +1,34 @@
+"""Contact of two bodies along a path of loads: no structure, no wear."""
+
+from workflow.analyses.contact.case import ContactCase, LineContactCase
+from workflow.analyses.contact.memory import memory
+from workflow.shell.analysis import Analysis, Comparison, Run, Summary
+
+__all__ = ["ANALYSIS"]
+
+
+def _run(run: Run[ContactCase | LineContactCase]) -> None:
+    # Solvers take a second to load: where they are used.
+    from workflow.analyses.contact.run import run_contact
+
+    run_contact(run.case, run.folder, run.reporter)
+
+
+# What contact cases are compared by where they expect nothing.
+AT_THE_END = (
+    *("states.-1.approach", "states.-1.central_pressure", "states.-1.shift_x"),
+    *("states.-1.stick_radius", "states.-1.stick_half_width", "loop.energy"),
+)
+
+
+def _quantities(case: ContactCase | LineContactCase, summary: Summary) -> list[str]:
+    return [own.quantity for own in case.expect if own.value] or list(AT_THE_END)
+
+
+ANALYSIS: Analysis[ContactCase | LineContactCase] = Analysis(
+    name="contact",
+    cases={"bodies": ContactCase, "line": LineContactCase},
+    run=_run,
+    memory=memory,
+    comparison=Comparison(quantities=_quantities, at_the_end=AT_THE_END),
+)

@@ -1,0 +1,435 @@
+"""A contact case: two bodies without a structure, pressed and sheared along a path of loads.
+
+A line contact, in plane strain, differs in the dimensions of its loads and its grid: a case of its
+own, though both are written ``analysis: contact``.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal, TypeVar
+
+from pydantic import Discriminator, Field, StrictBool, Tag, model_validator
+
+from workflow.analyses.contact.load_table import LoadTable, conflict, ramps
+from workflow.case.fields import File, Quantity, Whole
+from workflow.case.input_files import InputFileError, height_shape, read_columns
+from workflow.case.loading import word_at
+from workflow.case.sections import (
+    Case,
+    ElasticBody,
+    Friction,
+    GridCells,
+    Length,
+    RoundingRadius,
+    Section,
+    Stress,
+    Title,
+    Tolerance,
+    disagreement,
+    entry,
+    quantities_of,
+)
+from workflow.case.source import Source
+
+# Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual contact.
+Poisson = Annotated[float, Quantity("1", at_least=0.0, at_most=0.5)]
+NormalForce = Annotated[float, Quantity("N", at_least=0.0, at_most=1e9, range_text="0 to 1e6 kN")]
+Force = Annotated[float, Quantity("N", at_least=-1e9, at_most=1e9, range_text="-1e6 kN to 1e6 kN")]
+Moment = Annotated[
+    float, Quantity("N*mm", at_least=-1e9, at_most=1e9, range_text="-1e6 N*m to 1e6 N*m")
+]
+NormalLineForce = Annotated[
+    float, Quantity("N/mm", at_least=0.0, at_most=1e9, range_text="0 to 1e6 kN/mm")
+]
+LineForce = Annotated[
+    float, Quantity("N/mm", at_least=-1e9, at_most=1e9, range_text="-1e6 kN/mm to 1e6 kN/mm")
+]
+LineMoment = Annotated[
+    float, Quantity("N", at_least=-1e9, at_most=1e9, range_text="-1e6 kN to 1e6 kN")
+]
+Travel = Annotated[float, Quantity("mm", at_least=-1e3, at_most=1e3)]
+Turn = Annotated[float, Quantity("rad", at_least=-1.0, at_most=1.0)]
+BulkStress = Annotated[
+    float, Quantity("MPa", at_least=-1e5, at_most=1e5, range_text="-100 GPa to 100 GPa")
+]
+Increments = Annotated[int, Whole(1, 100_000)]
+
+AREA_SHAPES = ("sphere", "ellipsoid")
+LINE_SHAPES = ("cylinder", "flat_rounded")
+HEIGHTS = "heights"
+
+# --- bodies -------------------------------------------------------------------------------------
+
+
+class Sphere(Section):
+    """Hertz's paraboloid (x² + y²) / 2 R."""
+
+    kind: Literal["bodies"] = entry("what the structure is", "bodies")
+    shape: Literal["sphere"] = entry("sphere, ellipsoid or heights", "sphere")
+    radius: RoundingRadius = entry("relative, 1/R = 1/R1 + 1/R2 [mm]", "10 mm")
+
+
+class Ellipsoid(Section):
+    """Paraboloid x² / 2 Rx + y² / 2 Ry."""
+
+    kind: Literal["bodies"] = entry("what the structure is", "bodies")
+    shape: Literal["ellipsoid"] = entry("sphere, ellipsoid or heights", "ellipsoid")
+    radius_x: RoundingRadius = entry("relative, of the section along x [mm]", "10 mm")
+    radius_y: RoundingRadius = entry("relative, of the section along y [mm]", "20 mm")
+
+
+class Cylinder(Section):
+    """Parabola x² / 2 R, the same all along y: a line contact."""
+
+    kind: Literal["bodies"] = entry("what the structure is", "bodies")
+    shape: Literal["cylinder"] = entry("cylinder, flat_rounded or heights", "cylinder")
+    radius: RoundingRadius = entry("relative, 1/R = 1/R1 + 1/R2 [mm]", "10 mm")
+
+
+class FlatRounded(Section):
+    """Flat, and a parabola beyond either end of it: a line contact."""
+
+    kind: Literal["bodies"] = entry("what the structure is", "bodies")
+    shape: Literal["flat_rounded"] = entry("cylinder, flat_rounded or heights", "flat_rounded")
+    half_width: Length = entry("of the flat [mm]", "4 mm")
+    edge_radius: RoundingRadius = entry("of the parabola beyond it [mm]", "10 mm")
+
+
+class Heights(Section):
+    """Gap before loading from a file, rows along x and columns along y, over ``contact.size``."""
+
+    kind: Literal["bodies"] = entry("what the structure is", "bodies")
+    shape: Literal["heights"] = entry("heights: the gap before loading from a file", "heights")
+    file: Annotated[str, File((".npy", ".csv", ".h5"))] = entry(
+        "gap in mm, a value per cell; for .h5 with :dataset at the end", "gap.npy"
+    )
+
+
+class BodyMaterial(ElasticBody):
+    """Isotropic linear elastic material."""
+
+    young: Stress = entry("Young's modulus [MPa]", "115 GPa")
+    poisson: Poisson = entry("Poisson's ratio [1]", 0.29)
+    yield_stress: Stress | None = entry(
+        "pressures above it are warned of; without it none [MPa]", "900 MPa", default=None
+    )
+
+
+def _body_tag(value: object) -> str:
+    return "(name)" if isinstance(value, str) else "(section)"
+
+
+Body = Annotated[
+    Annotated[BodyMaterial, Tag("(section)")] | Annotated[Literal["rigid"], Tag("(name)")],
+    Discriminator(_body_tag),
+]
+
+
+class BodyMaterials(Section):
+    """The two bodies in contact."""
+
+    body_1: Body = entry("the lower, fixed body; or the word rigid")
+    body_2: Body = entry("the upper, moving body; or the word rigid")
+
+    @model_validator(mode="after")
+    def _one_is_elastic(self) -> BodyMaterials:
+        if self.body_1 == self.body_2 == "rigid":
+            raise disagreement(
+                "both bodies are rigid; allowed: at most one of them", "body_2", "body_1"
+            )
+        return self
+
+
+# --- loads --------------------------------------------------------------------------------------
+
+
+class Leg(Section):
+    """A part of the path, passed at equal steps; what it does not name keeps its value.
+
+    Forces are those on body 2, motions those of body 1 relative to body 2 far from the contact.
+    """
+
+    P: NormalForce | None = entry("normal force [N]", "400 N", default=None)
+    approach: Travel | None = entry("instead of P [mm]", "13 um", default=None)
+    Qx: Force | None = entry("tangential force along x [N]", "210 N", default=None)
+    shift_x: Travel | None = entry("instead of Qx [mm]", "5 um", default=None)
+    Qy: Force | None = entry("tangential force along y [N]", "0 N", default=None)
+    shift_y: Travel | None = entry("instead of Qy [mm]", "0 um", default=None)
+    Mx: Moment | None = entry("moment of the pressure about x [N*mm]", "0 N*mm", default=None)
+    tilt_x: Turn | None = entry("instead of Mx [rad]", "0 deg", default=None)
+    My: Moment | None = entry("moment of the pressure about y [N*mm]", "0 N*mm", default=None)
+    tilt_y: Turn | None = entry("instead of My [rad]", "0 deg", default=None)
+    Mz: Moment | None = entry("moment of the shear [N*mm]", "10 N*mm", default=None)
+    twist: Turn | None = entry("instead of Mz [rad]", "0.01 deg", default=None)
+    bulk_stress_1: BulkStress | None = entry(
+        "along x in body 1, held from straining along y [MPa]", "100 MPa", default=None
+    )
+    bulk_stress_2: BulkStress | None = entry(
+        "along x in body 2, held from straining along y [MPa]", "0 MPa", default=None
+    )
+    increments: Increments = entry("equal steps to the end of this leg", 1, default=1)
+
+
+class LineLeg(Section):
+    """A part of the path of a line contact; forces and moments are per length."""
+
+    P: NormalLineForce | None = entry("normal force [N/mm]", "400 N/mm", default=None)
+    approach: Travel | None = entry("instead of P, see contact.datum [mm]", "13 um", default=None)
+    Qx: LineForce | None = entry("tangential force along x [N/mm]", "100 N/mm", default=None)
+    shift_x: Travel | None = entry("instead of Qx [mm]", "5 um", default=None)
+    Qy: LineForce | None = entry("tangential force along y [N/mm]", "0 N/mm", default=None)
+    shift_y: Travel | None = entry("instead of Qy [mm]", "0 um", default=None)
+    My: LineMoment | None = entry("moment of the pressure about y [N]", "0 N", default=None)
+    tilt_y: Turn | None = entry("instead of My [rad]", "0 deg", default=None)
+    bulk_stress_1: BulkStress | None = entry(
+        "along x in body 1, in plane strain [MPa]", "100 MPa", default=None
+    )
+    bulk_stress_2: BulkStress | None = entry(
+        "along x in body 2, in plane strain [MPa]", "0 MPa", default=None
+    )
+    increments: Increments = entry("equal steps to the end of this leg", 1, default=1)
+
+
+HistoryFile = Annotated[str, File((".csv",))]
+LegT = TypeVar("LegT", Leg, LineLeg)
+
+
+class ContactPath(Section):
+    """Legs one after the other from the unloaded state, or a file."""
+
+    legs: tuple[Leg, ...] = entry("one after the other, from no load", default=())
+    file: HistoryFile | None = entry(
+        "instead of legs: columns named like their entries, a row per increment, base units",
+        "history.csv",
+        default=None,
+    )
+
+    @model_validator(mode="after")
+    def _can_be_followed(self) -> ContactPath:
+        _check_path(self.legs, self.file, Leg)
+        return self
+
+    def table(self) -> LoadTable:
+        """Every increment of the path."""
+        return _table(self.legs, self.file, Leg)
+
+
+class LineContactPath(Section):
+    """Legs one after the other from the unloaded state, or a file; forces are per length."""
+
+    legs: tuple[LineLeg, ...] = entry("one after the other, from no load", default=())
+    file: HistoryFile | None = entry(
+        "instead of legs: columns named like their entries, a row per increment, base units",
+        "history.csv",
+        default=None,
+    )
+
+    @model_validator(mode="after")
+    def _can_be_followed(self) -> LineContactPath:
+        _check_path(self.legs, self.file, LineLeg)
+        return self
+
+    def table(self) -> LoadTable:
+        """Every increment of the path."""
+        return _table(self.legs, self.file, LineLeg)
+
+
+def _check_path(legs: tuple[LegT, ...], file: str | None, model: type[LegT]) -> None:
+    """Raise unless the path is given once, presses, and no two entries fight."""
+    if (file is None) == (not legs):
+        given = "both given" if legs else "neither given"
+        raise disagreement(f"{given}; allowed: either legs or file", "file" if legs else "legs")
+    if file is not None:
+        try:
+            named = list(_table(legs, file, model).columns)
+        except InputFileError as error:
+            raise disagreement(str(error), "file") from error
+        places = dict.fromkeys(named, "file")
+    else:
+        places = {
+            key: f"legs.{number}.{key}"
+            for number, leg in reversed(list(enumerate(legs)))
+            for key in quantities_of(model)
+            if getattr(leg, key) is not None
+        }
+    if wrong := conflict(places):
+        key, message = wrong
+        raise disagreement(message, places.get(key, "legs" if legs else "file"))
+
+
+def _table(legs: tuple[LegT, ...], file: str | None, model: type[LegT]) -> LoadTable:
+    if file is not None:
+        return LoadTable(read_columns(file, quantities_of(model)))
+    steps = [leg.increments for leg in legs]
+    targets = {key: [getattr(leg, key) for leg in legs] for key in quantities_of(model)}
+    return LoadTable(ramps(targets, steps))
+
+
+# --- grids --------------------------------------------------------------------------------------
+
+
+class ContactGrid(Section):
+    """Half-space solution on a grid centred on the bodies."""
+
+    grid: tuple[GridCells, GridCells] = entry(
+        "cells along x, along y; of heights as many as their file has",
+        [128, 128],
+        default=(128, 128),
+    )
+    size: tuple[Length, Length] = entry("of the grid along x, along y [mm]", ["1 mm", "1 mm"])
+    tolerance: Tolerance = entry("relative, of every residual [1]", 1e-8, default=1e-8)
+    history: Literal["auto", "full", "reversals"] = entry(
+        "auto: the cheapest that is exact; full: all increments; reversals: turning points",
+        "auto",
+        default="auto",
+    )
+    estimate_error: StrictBool = entry(
+        "follow a full history with half its increments too, and report the difference",
+        False,
+        default=False,
+    )
+
+
+class LineContactGrid(Section):
+    """Half-plane solution on strips centred on the bodies."""
+
+    grid: GridCells = entry(
+        "strips along x; of heights as many as their file has", 512, default=512
+    )
+    size: Length = entry("of the grid along x [mm]", "2 mm")
+    datum: Length | None = entry(
+        "depth at which displacements vanish; without it twice the size [mm]",
+        "50 mm",
+        default=None,
+    )
+    tolerance: Tolerance = entry("relative, of every residual [1]", 1e-8, default=1e-8)
+    history: Literal["auto", "full", "reversals"] = entry(
+        "auto: the cheapest that is exact; full: all increments; reversals: turning points",
+        "auto",
+        default="auto",
+    )
+    estimate_error: StrictBool = entry(
+        "follow a full history with half its increments too, and report the difference",
+        False,
+        default=False,
+    )
+
+    @model_validator(mode="after")
+    def _datum_beyond_grid(self) -> LineContactGrid:
+        if self.datum is not None and self.datum < self.size:
+            raise disagreement(
+                f"{self.datum:g} mm: too close; allowed: at least the size, {self.size:g} mm",
+                *("datum", "size"),
+            )
+        return self
+
+
+# --- cases --------------------------------------------------------------------------------------
+
+
+class ContactCase(Case):
+    """Two bodies in contact over an area of both directions."""
+
+    title: Title = entry("one line", "Ball on a flat, pressed and sheared")
+    analysis: Literal["contact"] = entry("what is computed", "contact")
+    structure: Annotated[Sphere | Ellipsoid | Heights, Field(discriminator="shape")] = entry(
+        "the bodies: no finite elements"
+    )
+    materials: BodyMaterials = entry("the two bodies in contact")
+    friction: Friction = entry("Coulomb's law")
+    load_path: ContactPath = entry("forces or motions, in turn")
+    contact: ContactGrid = entry("half-space grid")
+
+    @classmethod
+    def suits(cls, source: Source) -> bool:
+        return not touches_along_a_line(source, (HEIGHTS,))
+
+    @model_validator(mode="after")
+    def _can_run(self) -> ContactCase:
+        _require_elastic(self.materials, self.load_path.table())
+        if isinstance(self.structure, Heights):
+            require_shape(self.structure.file, self.contact.grid)
+        return self
+
+    def outline(self) -> list[tuple[str, str]]:
+        (nx, ny), (x, y) = self.contact.grid, self.contact.size
+        cells = f"{nx} x {ny} cells of {x / nx:.4g} x {y / ny:.4g} mm"
+        return _outline(self, "no structure", cells)
+
+
+class LineContactCase(Case):
+    """Two bodies in contact along a line, in plane strain: everything is per length of it."""
+
+    title: Title = entry("one line", "Cylinder on a flat, pressed and sheared")
+    analysis: Literal["contact"] = entry("what is computed", "contact")
+    structure: Annotated[Cylinder | FlatRounded | Heights, Field(discriminator="shape")] = entry(
+        "the bodies: no finite elements"
+    )
+    materials: BodyMaterials = entry("the two bodies in contact")
+    friction: Friction = entry("Coulomb's law")
+    load_path: LineContactPath = entry("forces or motions per length, in turn")
+    contact: LineContactGrid = entry("half-plane grid")
+
+    @classmethod
+    def suits(cls, source: Source) -> bool:
+        return touches_along_a_line(source, (HEIGHTS,))
+
+    @model_validator(mode="after")
+    def _can_run(self) -> LineContactCase:
+        _require_elastic(self.materials, self.load_path.table())
+        if isinstance(self.structure, Heights):
+            require_shape(self.structure.file, (self.contact.grid, 1))
+        return self
+
+    def outline(self) -> list[tuple[str, str]]:
+        strips, size = self.contact.grid, self.contact.size
+        return _outline(self, "line contact", f"{strips} strips of {size / strips:.4g} mm")
+
+
+def _outline(case: ContactCase | LineContactCase, kind: str, cells: str) -> list[tuple[str, str]]:
+    table = case.load_path.table()
+    return [
+        ("structure", f"{case.structure.shape}, {kind}"),
+        ("load path", f"{len(table)} increments of {', '.join(table.columns)}"),
+        ("contact", f"{cells}, history {case.contact.history}"),
+    ]
+
+
+def touches_along_a_line(source: Source, either: tuple[str, ...]) -> bool:
+    """Whether two bodies touch along a line: by their shape, or one that may be ``either``.
+
+    Heights and flats know no dimension: a grid of one size is that of a line contact. Raises
+    CaseError where the shape is none of them.
+    """
+    if source.at(("structure", "kind")) != "bodies":
+        return False
+    shape = word_at(source, ("structure", "shape"), (*AREA_SHAPES, *LINE_SHAPES, *either))
+    one_size = isinstance(source.at(("contact", "size")), str | int | float)
+    return one_size if shape in either else shape in LINE_SHAPES
+
+
+def _require_elastic(materials: BodyMaterials, loads: LoadTable) -> None:
+    """Raise if a rigid body is to carry bulk stress."""
+    for number in (1, 2):
+        body, key = f"body_{number}", f"bulk_stress_{number}"
+        if key in loads.columns and getattr(materials, body) == "rigid":
+            raise disagreement(
+                f"a rigid body carries no bulk stress, but load_path has {key}; "
+                "allowed: an elastic body",
+                f"materials.{body}",
+            )
+
+
+def require_shape(file: str, grid: tuple[int, int]) -> None:
+    """Raise unless a file of heights has a value for each cell of ``grid``."""
+    try:
+        shape = height_shape(file)
+    except InputFileError as error:
+        raise disagreement(str(error), "structure.file") from error
+    if shape != grid:
+        cells = f"[{shape[0]}, {shape[1]}]" if grid[1] > 1 or shape[1] > 1 else f"{shape[0]}"
+        raise disagreement(
+            f"{grid[0]} x {grid[1]} cells: the file of heights has {shape[0]} x {shape[1]}; "
+            f"allowed: {cells}",
+            "contact.grid",
+        )

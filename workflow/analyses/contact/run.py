@@ -1,0 +1,100 @@
+"""A contact case: two bodies followed along their path of loads."""
+
+from __future__ import annotations
+
+from sa_solver.contact import ContactState
+from sa_solver.coupled import CoupledContactError
+from sa_solver.history import History, HistoryError, march
+from sa_solver.normal import NormalContactError
+from sa_solver.tangential import TangentialContactError
+from workflow.analyses.contact.bodies import bodies_of, grid_of, half_space_of, height_of, path_of
+from workflow.analyses.contact.case import ContactCase, LineContactCase
+from workflow.analyses.contact.results import (
+    ContactOutcome,
+    write_contact_output,
+    write_contact_results,
+)
+from workflow.errors import MethodFailed, UserError
+from workflow.shell.folder import OutputFolder
+from workflow.shell.reporter import Reporter
+
+# Loads that the contact cannot carry.
+IMPOSSIBLE = (NormalContactError, TangentialContactError, CoupledContactError)
+
+
+def run_contact(
+    case: ContactCase | LineContactCase, folder: OutputFolder, reporter: Reporter
+) -> None:
+    """Run a contact case to its end.
+
+    Raises MethodFailed at an increment that does not converge or that no contact can carry; those
+    before it are written. Raises UserError where ``contact.history`` does not suit the path.
+    """
+    reporter.say(f"run: {case.title}")
+    outcome, message = _march(case, folder, reporter)
+    if outcome.history.states:
+        _warn(outcome, reporter)
+    if message:
+        kept = ""
+        if outcome.history.states:
+            write_contact_results(outcome, folder)
+            kept = f"; the increments so far are in {folder.results}"
+        raise MethodFailed(f"{message}{kept}")
+    write_contact_output(outcome, folder, reporter)
+
+
+def _march(
+    case: ContactCase | LineContactCase, folder: OutputFolder, reporter: Reporter
+) -> tuple[ContactOutcome, str]:
+    """What the path has led to, and why it ended early if it did."""
+    grid, table = grid_of(case), case.load_path.table()
+    height, half_space = height_of(case, grid), half_space_of(case, grid)
+    passed: dict[int, ContactState] = {}
+    with reporter.increments(len(table)) as show, reporter.stage("contact"):
+
+        def keep(row: int, state: ContactState) -> None:
+            passed[row] = state
+            show(row + 1)
+            reporter.log(
+                f"increment {row + 1}: residual {state.residual:.1e}, "
+                f"{state.convolutions} convolutions"
+            )
+
+        try:
+            history = march(
+                half_space,
+                height,
+                path_of(case, table),
+                case.friction.coefficient,
+                history=case.contact.history,
+                tolerance=case.contact.tolerance,
+                estimate_error=case.contact.estimate_error,
+                progress=keep,
+            )
+        except HistoryError as error:
+            raise UserError(f"{folder.case}: contact.history: {error}") from error
+        except IMPOSSIBLE as error:
+            reached = max(passed, default=-1) + 1
+            message = f"after increment {reached} of {len(table)}: {error}"
+            history = History(list(passed.values()), list(passed), "full", "ended early")
+        else:
+            last, row = history.states[-1], history.indices[-1] + 1
+            message = f"increment {row} of {len(table)} did not converge: {last.message}"
+            message = "" if last.converged else message
+    return ContactOutcome(case, grid, height, table, history), message
+
+
+def _warn(outcome: ContactOutcome, reporter: Reporter) -> None:
+    """Contacts cut off by the border of the grid, and pressures above yield."""
+    states = outcome.history.states
+    if any(state.border_load > 0.0 for state in states):
+        reporter.warn(
+            "the contact touches the border of its grid, where it is cut off: raise contact.size"
+        )
+    highest = max(float(state.traction[2].max()) for state in states)
+    yield_stress = min(body.yield_stress for body in bodies_of(outcome.case))
+    if highest > yield_stress:
+        reporter.warn(
+            f"the pressure reaches {highest:.0f} MPa, above the yield stress of "
+            f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there"
+        )

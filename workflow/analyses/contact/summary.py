@@ -1,0 +1,166 @@
+"""The numbers of a contact run: of every computed increment, and of its last closed cycle."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sa_solver.types import Array, Grid
+from workflow.analyses.contact.load_table import FORCES, MOTIONS, LoadTable
+
+if TYPE_CHECKING:
+    from sa_solver.contact import ContactState
+    from sa_solver.history import History
+
+# A cell sticks when its shear is below µp by more than this share: rounding of the slip circle.
+STICK_MARGIN = 1e-6
+# A cycle is closed where shear comes back to within this share of µ times the peak pressure.
+CLOSED = 0.05
+
+
+def state_summaries(grid: Grid, friction: float, history: History) -> list[dict[str, Any]]:
+    """Numbers of every computed increment, in base units; forces and energies of a line per mm.
+
+    ``full_slip_force`` and ``full_slip_moment`` (about the grid's centre) are what friction carries
+    at the present pressure; ``radial_shear_share`` is the largest shear along a radius from that
+    centre over the largest shear.
+    """
+    energies = np.cumsum([np.sum(state.energy) for state in history.states])
+    return [
+        {
+            "increment": index + 1,
+            **dict(zip(FORCES, map(float, state.resultants), strict=True)),
+            **dict(zip(MOTIONS, map(float, state.rigid), strict=True)),
+            **_pressure_summary(grid, state),
+            **_shear_summary(grid, friction, state),
+            "energy": float(np.sum(state.energy)),
+            "cumulative_energy": float(energy),
+            "sliding": slides(state, friction),
+            "residual": float(state.residual),
+            "convolutions": int(state.convolutions),
+            "border_load": float(state.border_load),
+        }
+        for index, state, energy in zip(history.indices, history.states, energies, strict=True)
+    ]
+
+
+def stick_zone(state: ContactState, friction: float) -> np.ndarray:
+    """Cells ``(nx, ny)`` that are pressed and whose shear is below µp."""
+    pressure = state.traction[2]
+    shear = np.hypot(*state.traction[:2])
+    zone: np.ndarray = (pressure > 0.0) & (shear < friction * pressure * (1.0 - STICK_MARGIN))
+    return zone
+
+
+def slides(state: ContactState, friction: float) -> bool:
+    """Whether the contact is pressed and slips everywhere."""
+    pressed = bool((state.traction[2] > 0.0).any())
+    return bool(state.sliding) or (pressed and not stick_zone(state, friction).any())
+
+
+def _pressure_summary(grid: Grid, state: ContactState) -> dict[str, float]:
+    pressure = state.traction[2]
+    near = (np.abs(grid.x) < 0.75 * grid.pitch[0]) & (np.abs(grid.y) < 0.75 * grid.pitch[1])
+    return {
+        "peak_pressure": float(pressure.max()),
+        "central_pressure": float(pressure[near].mean()),
+        **_extent(grid, pressure > 0.0, "contact"),
+    }
+
+
+def _shear_summary(grid: Grid, friction: float, state: ContactState) -> dict[str, Any]:
+    qx, qy, pressure = state.traction
+    shear, radius = np.hypot(qx, qy), np.hypot(grid.x, grid.y)
+    sticks = stick_zone(state, friction)
+    radial = np.abs(qx * grid.x + qy * grid.y) / np.where(radius > 0.0, radius, 1.0)
+    numbers = {
+        "peak_shear": float(shear.max()),
+        **_extent(grid, sticks, "stick"),
+        "stick_centre": _centre(grid, sticks),
+        "full_slip_force": float(friction * pressure.sum() * grid.cell_area),
+    }
+    if grid.line:
+        return numbers
+    moment = friction * np.sum(pressure * radius) * grid.cell_area
+    share = float(radial.max() / shear.max()) if shear.any() else 0.0
+    return numbers | {"radial_shear_share": share, "full_slip_moment": float(moment)}
+
+
+def _extent(grid: Grid, cells: np.ndarray, name: str) -> dict[str, float]:
+    """Area of ``cells``, and the radius of a disk or the half width of a strip as large."""
+    area = float(np.count_nonzero(cells)) * grid.cell_area
+    if grid.line:
+        return {f"{name}_area": area, f"{name}_half_width": 0.5 * area}
+    return {f"{name}_area": area, f"{name}_radius": float(np.sqrt(area / np.pi))}
+
+
+def _centre(grid: Grid, cells: np.ndarray) -> list[float] | None:
+    """Centroid of ``cells`` [mm]; None where there are none."""
+    if not cells.any():
+        return None
+    along, across = np.broadcast_arrays(grid.x, grid.y)
+    return [float(along[cells].mean()), float(across[cells].mean())]
+
+
+def loop_summary(
+    grid: Grid, friction: float, table: LoadTable, history: History, strain: Array
+) -> dict[str, Any] | None:
+    """The last closed cycle of the path; None if no cycle closes.
+
+    ``energy`` is dissipated by slip, ``area`` the work ∮ F dδ (- Σ qx x S dε under bulk strain
+    ``strain`` ``(n,)``) by trapezoids, which needs every increment. ``amplitude`` is half the range
+    of ``motion``, the rigid motion that the cycle works on most, ``force_amplitude`` that of its
+    ``force``.
+    """
+    span = _last_cycle(friction, table, history)
+    if span is None:
+        return None
+    first, last = span
+    states = history.states[first : last + 1]
+    forces = np.array([state.resultants for state in states])
+    motions = np.array([state.rigid for state in states])
+    driven = int(np.argmax(np.ptp(forces, axis=0) * np.ptp(motions, axis=0)))
+    loop: dict[str, Any] = {
+        "from_increment": history.indices[first] + 1,
+        "to_increment": history.indices[last] + 1,
+        "energy": float(sum(np.sum(state.energy) for state in states[1:])),
+        "force": FORCES[driven],
+        "motion": MOTIONS[driven],
+        "amplitude": 0.5 * float(np.ptp(motions[:, driven])),
+        "force_amplitude": 0.5 * float(np.ptp(forces[:, driven])),
+        "closure": _shear_change(friction, states[0], states[-1]),
+    }
+    if history.method == "full":
+        stretching = [np.sum(state.traction[0] * grid.x) * grid.cell_area for state in states]
+        strains = strain[history.indices[first : last + 1]]
+        work = sum(map(_area, forces.T, motions.T)) - _area(np.array(stretching), strains)
+        loop["area"] = float(work)
+    return loop
+
+
+def _area(force: Array, motion: Array) -> float:
+    """∫ F dδ by trapezoids."""
+    return float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(motion)))
+
+
+def _last_cycle(friction: float, table: LoadTable, history: History) -> tuple[int, int] | None:
+    """First and last of the computed states of the last closed cycle."""
+    loads = np.stack([column[history.indices] for column in table.columns.values()], axis=1)
+    for last in range(len(loads) - 1, 1, -1):
+        same = np.flatnonzero(np.all(loads[: last - 1] == loads[last], axis=1))
+        for first in same[::-1]:
+            # Between the two the load must have gone elsewhere, and the shear have come back.
+            moves = any(np.any(a != b) for a, b in pairwise(loads[first : last + 1]))
+            ends = history.states[first], history.states[last]
+            if moves and _shear_change(friction, *ends) <= CLOSED:
+                return int(first), last
+    return None
+
+
+def _shear_change(friction: float, one: ContactState, other: ContactState) -> float:
+    """Largest change of shear over µ times the peak pressure."""
+    limit = friction * float(one.traction[2].max())
+    change = np.hypot(*(other.traction[:2] - one.traction[:2])).max()
+    return float(change / limit) if limit > 0.0 else 0.0

@@ -1,0 +1,1 @@
+"""Rigs and their joints: what analyses share that make them move."""

@@ -1,0 +1,64 @@
+"""The friction rig of a case: the two specimens of another case, reduced, and two masses."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from fe_models.dynamics.friction_rig import friction_rig
+from fe_models.dynamics.rig import RigError, unit_force
+from fe_models.mesh import MeshError
+from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.rig.structure import FrictionRig
+from workflow.analyses.specimens.case import SpecimensCase
+from workflow.analyses.specimens.memory import memory
+from workflow.analyses.specimens.model import SpecimensModel
+from workflow.case.loading import load_case
+from workflow.errors import CaseError, UserError
+from workflow.shell.reporter import Reporter
+
+# What is looked at: displacements of the model, the last first of all.
+SEEN = {"m1": "m1 x", "m2": "m2 x"}
+
+
+def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
+    """The rig with its specimens, pressed together by the joint's normal load.
+
+    Raises UserError for a file that is no case of specimens, or one that cannot be meshed.
+    """
+    specimens = _specimens(rig.specimens)
+    bodies = SpecimensModel(specimens, rig.target_distance)
+    try:
+        with reporter.stage("reduction"):
+            memory(specimens, bodies.node_count()).check()
+            reduced = bodies.reduction.models
+    except MeshError as error:
+        raise UserError(f"structure.specimens: {rig.specimens}: {error}") from error
+    if bodies.from_cache:
+        reporter.log("reduction: from the cache")
+    try:
+        model = friction_rig(*reduced, rig.masses, rig.springs, rig.damping_ratio)
+    except RigError as error:
+        raise UserError(f"structure: {error}") from error
+    face = bodies.face
+    return RigModel(
+        model,
+        driven=unit_force(model, "m1 x"),
+        seen=np.array([unit_force(model, name) for name in SEEN.values()]),
+        labels=tuple(SEEN),
+        directions=3,
+        in_a_row=False,
+        pressing=-unit_force(model, "m2 z"),
+        stretch=unit_force(model, "upper target 1 x") - unit_force(model, "lower target 1 x"),
+        places=face.coordinates,
+        gap=face.gap,
+        area=face.nodal_areas,
+    )
+
+
+def _specimens(file: str) -> SpecimensCase:
+    try:
+        return load_case(Path(file), [SpecimensCase])
+    except CaseError as error:
+        raise UserError(f"structure.specimens: {error}") from error

@@ -1,0 +1,122 @@
+"""How the parameters of a joint change with the energy that it has dissipated."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from workflow.analyses.wear.case.evolution import Table, TotalEnergy
+from workflow.case.fields import File, Quantity
+from workflow.case.sections import Section, disagreement, entry
+from workflow.errors import UserError
+
+# Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual material.
+Change = Annotated[float, Quantity("1", at_least=-1.0, at_most=1e6)]
+PerEnergy = Annotated[
+    float, Quantity("1/(N*mm)", at_least=0.0, at_most=1e12, range_text="0 to 1e15 1/J")
+]
+Slope = Annotated[
+    float, Quantity("1/(N*mm)", at_least=-1e12, at_most=1e12, range_text="-1e15 to 1e15 1/J")
+]
+Final = Annotated[float, Quantity("1", at_least=0.0, at_most=1e6)]
+EnergyScale = Annotated[
+    float, Quantity("N*mm", above=0.0, at_most=1e15, range_text="above 0 and at most 1e12 J")
+]
+Part = Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)]
+
+
+class Logarithmic(Section):
+    """1 + change ln(1 + rate E)."""
+
+    kind: Literal["logarithmic"] = entry("1 + change ln(1 + rate E)", "logarithmic")
+    change: Change = entry("of the factor with the logarithm [1]", 0.26)
+    rate: PerEnergy = entry("beside the energy [1/(N*mm)]", "1.3e9 1/J")
+
+
+class Arrhenius(Section):
+    """1 + change exp(-scale / E)."""
+
+    kind: Literal["arrhenius"] = entry("1 + change exp(-scale / E)", "arrhenius")
+    change: Change = entry("of the factor in the end [1]", 1.32)
+    scale: EnergyScale = entry("energy that it takes [N*mm]", "150 J")
+
+
+class Linear(Section):
+    """1 + slope E, no less than 0."""
+
+    kind: Literal["linear"] = entry("1 + slope E", "linear")
+    slope: Slope = entry("against energy [1/(N*mm)]", "0.24 1/kJ")
+
+
+class Exponential(Section):
+    """final + (1 - final) [share exp(-rate E) + (1 - share) exp(-second_rate E)]."""
+
+    kind: Literal["exponential"] = entry(
+        "final + (1 - final) [share exp(-rate E) + (1 - share) exp(-second_rate E)]",
+        "exponential",
+    )
+    final: Final = entry("in the end [1]", 0.72)
+    rate: PerEnergy = entry("of the first exponential [1/(N*mm)]", "0.3 1/kJ")
+    share: Part = entry("of the first exponential [1]", 0.8, default=1.0)
+    second_rate: PerEnergy = entry("of the second exponential [1/(N*mm)]", "5 1/kJ", default=0.0)
+
+
+class Points(Table):
+    """A table of factors."""
+
+    kind: Literal["table"] = entry("factors against energies", "table")
+    energy: tuple[TotalEnergy, ...] = entry(
+        "dissipated so far in the joint, ascending [N*mm]", ["0 J", "1 kJ"], default=(0.0,)
+    )
+
+
+Factor = Annotated[
+    Logarithmic | Arrhenius | Linear | Exponential | Points, Field(discriminator="kind")
+]
+
+
+class JointEvolution(Section):
+    """Factors of the joint's parameters against the energy E that it has dissipated so far."""
+
+    friction: Factor | None = entry("of joint.friction", default=None)
+    stiffness: Factor | None = entry("of joint.stiffness", default=None)
+    residual_stiffness: Factor | None = entry("of joint.residual_stiffness", default=None)
+    normal_load: Factor | None = entry("of joint.normal_load", default=None)
+    file: Annotated[str, File((".csv", ".yaml"))] | None = entry(
+        "loops_<interface>.csv of a wear run, or measured: its kt (all of the stuck slope, "
+        "joint.residual_stiffness included) and mu against energy take the place of "
+        "joint.stiffness and joint.friction; or the wear case itself, which is run first",
+        "loops.csv",
+        default=None,
+    )
+
+    @model_validator(mode="after")
+    def _file_stands_alone(self) -> JointEvolution:
+        for key in ("friction", "stiffness"):
+            if self.file is not None and getattr(self, key) is not None:
+                raise disagreement(f"given beside {key}; allowed: one of them", "file", key)
+        return self
+
+    @model_validator(mode="after")
+    def _file_is_of_a_whole_joint(self) -> JointEvolution:
+        if self.file is None or not self.file.endswith(".csv"):
+            return self
+        # Imported here: it reads units, which are of this package.
+        from workflow.analyses.wear.loop_table import read_loop_table
+
+        try:
+            table = read_loop_table(Path(self.file))
+        except UserError as error:
+            raise disagreement(str(error), "file") from error
+        if table.per_length:
+            raise disagreement(
+                "loops of a line contact, per mm; allowed: those of a whole joint", "file"
+            )
+        return self
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing changes."""
+        return all(getattr(self, name) is None for name in type(self).model_fields)

@@ -1,0 +1,188 @@
+"""A rig made of a reduced body: joints, masses and springs at the points that it is reduced to."""
+
+from __future__ import annotations
+
+from collections import Counter, defaultdict
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+
+from fe_models.dynamics.rig import Link, RigError, reduced_rig, unit_force
+from fe_models.mesh import MeshError
+from fe_models.reduction import ReducedModel, load_reduced
+from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.rig.structure import Against, JointPlaces, Moved, ReducedBody
+from workflow.analyses.specimens.case import SpecimensCase
+from workflow.analyses.specimens.memory import memory
+from workflow.analyses.specimens.model import SpecimensModel
+from workflow.case.loading import load_case
+from workflow.errors import CaseError, UserError
+from workflow.shell.reporter import Reporter
+
+AXES = "xyz"
+
+
+def reduced_rig_model(body: ReducedBody, directions: int, reporter: Reporter) -> RigModel:
+    """The rig that a reduced body makes, with joints of so many ``directions``, 1 or 3.
+
+    Raises UserError for a file without such a body, and for points that it does not have.
+    """
+    with reporter.stage("reduction"):
+        reduced = _reduced_body(body, reporter)
+    points = _Points(reduced)
+    joints = [
+        joint
+        for number, own in enumerate(body.joints)
+        for joint in points.joints(own, directions, f"joints.{number}")
+    ]
+    try:
+        model = reduced_rig(
+            reduced,
+            points.names,
+            joints,
+            points.masses(body),
+            points.springs(body),
+            body.damping_ratio,
+        )
+        driven, seen = (
+            np.sum([share * unit_force(model, name) for name, share in points.shared(own, key)], 0)
+            for own, key in ((body.driven, "driven"), (body.seen, "seen"))
+        )
+    except RigError as error:
+        raise UserError(f"structure: {error}") from error
+    label = f"{body.seen.points} {body.seen.direction}"
+    along = _along(directions, body)
+    return RigModel(model, driven, seen[None], (label,), directions, along, in_a_row=False)
+
+
+def _along(directions: int, body: ReducedBody) -> int:
+    """The joints' direction that is looked at: their only one, or of two across the one seen."""
+    if directions == 1:
+        return 0
+    across = _across(body.joints[0].direction)
+    axis = body.seen.direction[-1]
+    return across.index(axis) if axis in across else 0
+
+
+def _across(direction: str) -> list[str]:
+    """The two axes across a direction."""
+    return [axis for axis in AXES if axis != direction[-1]]
+
+
+# --- the body -----------------------------------------------------------------------------------
+
+
+def _reduced_body(body: ReducedBody, reporter: Reporter) -> ReducedModel:
+    if body.body is None:
+        try:
+            return load_reduced(Path(body.file))
+        except (OSError, ValueError) as error:
+            raise UserError(f"structure.file: {error}") from error
+    try:
+        case = load_case(Path(body.file), [SpecimensCase])
+    except CaseError as error:
+        raise UserError(f"structure.file: {error}") from error
+    model = SpecimensModel(case)
+    try:
+        memory(case, model.node_count()).check()
+        found = model.reduction.models[body.body - 1]
+    except MeshError as error:
+        raise UserError(f"structure.file: {body.file}: {error}") from error
+    if model.from_cache:
+        reporter.log("reduction: from the cache")
+    return found
+
+
+# --- its points ---------------------------------------------------------------------------------
+
+
+class _Points:
+    """The kept points of a body by name, and what is put there."""
+
+    def __init__(self, reduced: ReducedModel) -> None:
+        if reduced.names is None:
+            raise UserError(
+                "structure.file: a model whose kept displacements have no names; allowed: one of a "
+                "specimens run, or written with names"
+            )
+        self.names = reduced.names
+        # Each once, in order.
+        self._points = list(dict.fromkeys(name.rpartition(" ")[0] for name in self.names))
+
+    def of(self, wanted: str, key: str) -> list[str]:
+        """The point of that name, or all of that kind."""
+        if wanted in self._points:
+            return [wanted]
+        found = [point for point in self._points if _kind(point) == wanted]
+        if not found:
+            kinds = Counter(map(_kind, self._points))
+            known = [f"{kind}, {kind} 1 to {kind} {count}" for kind, count in kinds.items() if kind]
+            known += [point for point in self._points if not _kind(point)]
+            raise UserError(
+                f"structure.{key}: '{wanted}': no such point; allowed: {', '.join(known)}"
+            )
+        return found
+
+    def pairs(self, own: Against, key: str) -> list[tuple[str, str | None]]:
+        """Each point and that against which it moves, None for the ground."""
+        points = self.of(own.points, f"{key}.points")
+        if own.against is None:
+            return [(point, None) for point in points]
+        others = self.of(own.against, f"{key}.against")
+        if len(others) == 1:
+            others *= len(points)
+        if len(others) != len(points):
+            raise UserError(
+                f"structure.{key}.against: {len(others)} points for {len(points)}; allowed: as "
+                "many, or one"
+            )
+        pairs = list(zip(points, others, strict=True))
+        for point, other in pairs:
+            if point == other:
+                raise UserError(f"structure.{key}.against: {point} against itself; allowed: others")
+        return [(point, other) for point, other in pairs]
+
+    def joints(self, own: JointPlaces, directions: int, key: str) -> Iterator[list[Link]]:
+        """The links of every joint: that along its direction; three with it as the last."""
+        across = _across(own.direction) if directions > 1 else []
+        for point, other in self.pairs(own, key):
+            yield [_link(point, other, axis) for axis in (*across, own.direction)]
+
+    def masses(self, body: ReducedBody) -> dict[str, float]:
+        """Masses added to displacements [t]."""
+        added: defaultdict[str, float] = defaultdict(float)
+        for number, own in enumerate(body.masses):
+            points = self.of(own.points, f"masses.{number}.points")
+            for name in self.names:
+                if name.rpartition(" ")[0] in points:
+                    added[name] += own.mass / len(points)
+        return added
+
+    def springs(self, body: ReducedBody) -> dict[Link, float]:
+        """Springs added between displacements [N/mm]."""
+        added: defaultdict[Link, float] = defaultdict(float)
+        for number, own in enumerate(body.springs):
+            pairs = self.pairs(own, f"springs.{number}")
+            for point, other in pairs:
+                added[_link(point, other, own.direction)] += own.stiffness / len(pairs)
+        return added
+
+    def shared(self, own: Moved, key: str) -> list[tuple[str, float]]:
+        """Displacements along a direction, and the even share of each with its sign."""
+        points = self.of(own.points, f"{key}.points")
+        sign = -1.0 if own.direction.startswith("-") else 1.0
+        return [(f"{point} {own.direction[-1]}", sign / len(points)) for point in points]
+
+
+def _kind(point: str) -> str:
+    """What a point's name begins with, before its number; nothing where it has none."""
+    kind, _, number = point.rpartition(" ")
+    return kind if number.isdecimal() else ""
+
+
+def _link(point: str, other: str | None, direction: str) -> Link:
+    """What stretches when a point moves in a direction, from another or the ground."""
+    axis = direction[-1]
+    ends = f"{point} {axis}", None if other is None else f"{other} {axis}"
+    return Link(*reversed(ends)) if direction.startswith("-") else Link(*ends)

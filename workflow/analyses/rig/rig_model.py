@@ -1,0 +1,146 @@
+"""A rig: what vibrates, where it is driven, and what is seen of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+import scipy.linalg as sl
+
+from fe_models.dynamics.excitation import Constant, Force, Together
+from fe_models.dynamics.model import DynamicModel
+from fe_models.dynamics.motion import Motion
+from fe_models.dynamics.receptance import RIGID
+from fe_models.dynamics.rig import natural_frequencies
+from sa_solver.types import Array
+from wear.joints.friction_contact import FrictionContact
+from workflow.analyses.rig.laws import Law
+
+# Natural frequencies that are told, from the lowest on: those of a row of masses, all.
+MOST_FREQUENCIES = 20
+
+
+@dataclass(frozen=True)
+class RigModel:
+    """A vibrating structure with joints of ``directions`` directions.
+
+    ``driven`` ``(n,)`` are the forces of an excitation of 1 N; ``seen`` ``(k, n)`` takes
+    displacements to those that are kept, with ``labels`` ``(k,)``, the last of which is looked at.
+    Loops are those along the joints' direction number ``along``. Of masses ``in_a_row`` the second
+    mode is looked for too.
+
+    Two bodies that touch have ``pressing`` ``(n,)``, the forces of a normal load of 1 N (elsewhere
+    the load is the joints' own preload); ``stretch`` ``(n,)``, which takes displacements to the one
+    that loops are drawn over, not the joints' mean; and of each joint its place ``places``
+    ``(j, 2)`` on the contact plane [mm], the initial ``gap`` ``(j,)`` [mm] and ``area`` ``(j,)``
+    [mm²].
+    """
+
+    model: DynamicModel
+    driven: Array
+    seen: Array
+    labels: tuple[str, ...]
+    directions: int = 1
+    along: int = 0
+    in_a_row: bool = True
+    pressing: Array | None = None
+    stretch: Array | None = None
+    places: Array | None = None
+    gap: Array | None = None
+    area: Array | None = None
+
+    @property
+    def joints(self) -> int:
+        """How many there are."""
+        return len(self.model.connection) // self.directions
+
+    @property
+    def still(self) -> Array:
+        """Joints ``(j, d)`` that have not moved [mm]."""
+        return np.zeros((self.joints, self.directions))
+
+    def preload(self, law: Law) -> Array:
+        """The static load ``(n,)`` that balances joints that have not moved [N].
+
+        Displacements count from there: what the load has done to the structure before does not
+        matter, as it is linear.
+        """
+        force = law.respond(law.rest(self.joints), self.still).force
+        return np.asarray(force.ravel() @ self.model.connection)
+
+    def shaken(self, law: Law, force: Force) -> Together:
+        """An excitation, with the static load that balances the joints at rest."""
+        preload = self.preload(law)
+        if not preload.any():
+            return Together((force,))
+        return Together((force, Constant(preload)))
+
+    def loop(self, motion: Motion) -> tuple[Array, Array]:
+        """Mean displacement [mm] and force [N] of all joints ``(t,)``, along one direction."""
+        stretch, force = (
+            values[:, :, self.along] for values in (motion.joint_displacement, motion.joint_force)
+        )
+        return stretch.mean(axis=1), force.sum(axis=1)
+
+    def looked_at(self, values: Array) -> Array:
+        """Displacement or acceleration ``(t,)`` that is looked at, of all of them ``(t, n)``."""
+        return values @ self.seen[-1]
+
+    def contact(self, motion: Motion) -> dict[str, Any]:
+        """How friction contacts press in a motion; nothing of joints along one direction."""
+        if self.directions == 1:
+            return {}
+        normal = motion.joint_force[:, :, 2]
+        total = normal.sum(axis=1)
+        return {
+            "smallest_normal_force": float(total.min()),
+            "largest_normal_force": float(total.max()),
+            "most_open": int((normal <= 0.0).sum(axis=1).max()),
+        }
+
+    def free(self) -> list[float]:
+        """The lowest natural frequencies without the joints [Hz]."""
+        return _lowest(natural_frequencies(self.model))
+
+    def stuck(self, law: Law, rest: Array | None = None) -> Array:
+        """Tangents ``(j, d, d)`` [N/mm] of joints that stick.
+
+        Where the load presses them, they are displaced by ``rest`` ``(j, d)`` [mm].
+        """
+        state, still = law.rest(self.joints), self.still
+        if rest is not None:
+            state = law.respond(state, rest).state
+        return law.respond(state, still).tangent
+
+    def stuck_damping(self, law: Law, rest: Array | None = None) -> list[float]:
+        """Damping ratios of the lowest modes with all joints stuck: C is that of the open ones."""
+        held = sl.block_diag(*self.stuck(law, rest))
+        stiffness = self.model.stiffness + self.model.connection.T @ held @ self.model.connection
+        squares, shapes = sl.eigh(stiffness, self.model.mass)
+        # Modes of a structure that moves freely have no damping ratio.
+        lowest = np.flatnonzero(squares > RIGID * squares[-1])[:MOST_FREQUENCIES]
+        lost = np.einsum("nm,nm->m", shapes, self.model.damping @ shapes)[lowest]
+        ratios: list[float] = (0.5 * lost / np.sqrt(squares[lowest])).tolist()
+        return ratios
+
+    def modes(self, law: Law, rest: Array | None = None) -> dict[str, list[float]]:
+        """The lowest natural frequencies with all joints stuck, and with all sliding [Hz].
+
+        Those that are open at rest stay open; see :meth:`stuck`.
+        """
+        stuck = self.stuck(law, rest)
+        sliding = np.zeros_like(stuck)
+        if isinstance(law, FrictionContact):
+            sliding[:, 2, 2] = stuck[:, 2, 2]
+        else:
+            sliding[:, 0, 0] = law.residual_stiffness
+        return {
+            "stuck": _lowest(natural_frequencies(self.model, stuck)),
+            "sliding": _lowest(natural_frequencies(self.model, sliding)),
+        }
+
+
+def _lowest(frequencies: Array) -> list[float]:
+    found: list[float] = frequencies[:MOST_FREQUENCIES].tolist()
+    return found

@@ -1,0 +1,22 @@
+"""Two specimens of a friction rig, reduced, worn under each normal force."""
+
+from workflow.analyses.specimens.case import SpecimensCase
+from workflow.analyses.specimens.memory import memory
+from workflow.shell.analysis import Analysis, Run
+
+__all__ = ["ANALYSIS"]
+
+
+def _run(run: Run[SpecimensCase]) -> None:
+    # Finite elements take a second to load: where they are used.
+    from workflow.analyses.specimens.run import run_specimens
+
+    run_specimens(run.case, run.folder, run.reporter)
+
+
+ANALYSIS = Analysis(
+    name="specimens",
+    cases={"specimens": SpecimensCase},
+    run=_run,
+    memory=memory,
+)

@@ -1,0 +1,219 @@
+"""A case of two rig specimens: pressed together, rubbed, and worn in stints of cycles."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from sa_solver.types import Material as ElasticMaterial
+from workflow.analyses.wear.case.sections import Cycles, Ratio, TwoBodies, TwoMaterials
+from workflow.analyses.wear.case.worn_bodies import EnergyBody
+from workflow.case.fields import Quantity, Whole
+from workflow.case.sections import (
+    Case,
+    Friction,
+    GridCells,
+    Length,
+    RoundingRadius,
+    Section,
+    Title,
+    Tolerance,
+    disagreement,
+    entry,
+)
+
+if TYPE_CHECKING:
+    from fe_models.geometry.specimens import Specimen
+
+Depth = Annotated[float, Quantity("mm", at_least=0.0, at_most=1e4)]
+Pressing = Annotated[
+    float, Quantity("N", above=0.0, at_most=1e9, range_text="above 0 and at most 1e6 kN")
+]
+Energy = Annotated[
+    float, Quantity("N*mm", above=0.0, at_most=1e15, range_text="above 0 and at most 1e12 J")
+]
+
+
+class Form(Section):
+    """Radii of each strip, which is otherwise flat."""
+
+    along: RoundingRadius = entry("of its section along the strip [mm]", "1000 mm")
+    across: RoundingRadius = entry("of its section across the strip [mm]", "50 mm")
+
+
+class Specimens(Section):
+    """Two cylinders end to end, each narrowed to a strip; the strips cross over a square pad."""
+
+    kind: Literal["specimens"] = entry("what the structure is", "specimens")
+    diameter: Length = entry("of the cylinders [mm]", "8 mm")
+    length: Length = entry("of each cylinder [mm]", "33 mm")
+    strip_width: Length = entry("of each strip, the side of the pad [mm]", "1 mm")
+    chamfer_depth: Depth = entry("from the strip down to the cylinder's side [mm]", "1 mm")
+    ring_distance: Length = entry(
+        "from the pad to the ring where the holder ends, which is held or moved [mm]", "2 mm"
+    )
+    ring_nodes: Annotated[int, Whole(4, 400)] = entry(
+        "points of the ring that are kept, a multiple of 4", 16, default=16
+    )
+    form: Form | None = entry("of the strips; without it they are flat", default=None)
+
+    @model_validator(mode="after")
+    def _can_be_drawn(self) -> Specimens:
+        from fe_models.mesh import MeshError
+
+        try:
+            self.geometry().check()
+        except MeshError as error:
+            key, _, _ = str(error).partition(" ")
+            raise disagreement(str(error), *({key} & set(type(self).model_fields))) from error
+        return self
+
+    def geometry(self, **settings: int) -> Specimen:
+        """The specimen as the mesher takes it, with ``pad_elements`` if they are known."""
+        from fe_models.geometry.specimens import Specimen
+
+        radii = None if self.form is None else (self.form.along, self.form.across)
+        return Specimen(**self.model_dump(exclude={"kind", "form"}), radii=radii, **settings)
+
+
+class PressAndRub(Section):
+    """One normal force after the other, each on unworn specimens."""
+
+    normal_forces: Annotated[tuple[Pressing, ...], Field(min_length=1)] = entry(
+        "constant while the pair is rubbed [N]", ["17 N", "87 N", "150 N", "250 N"]
+    )
+    stroke: Length = entry("of body 2's ring along x, peak to peak [mm]", "14 um")
+
+    @model_validator(mode="after")
+    def _forces_differ(self) -> PressAndRub:
+        for index, force in enumerate(self.normal_forces):
+            if force in self.normal_forces[:index]:
+                raise disagreement(
+                    f"{force:g} N: given twice; allowed: every force once", f"normal_forces.{index}"
+                )
+        return self
+
+
+class SpecimenMesh(Section):
+    """Tetrahedra of each specimen, growing away from its pad."""
+
+    pad_elements: Annotated[int, Whole(2, 60)] = entry(
+        "squares along each side of the pad, an even number", 10, default=10
+    )
+    size: Length = entry("of the largest elements [mm]", "1 mm", default=1.0)
+    order: Literal[1, 2] = entry("of the tetrahedra, 1 or 2", 2, default=2)
+
+    @model_validator(mode="after")
+    def _pad_has_a_middle(self) -> SpecimenMesh:
+        if self.pad_elements % 2:
+            raise disagreement(f"{self.pad_elements}: odd; allowed: even numbers", "pad_elements")
+        return self
+
+
+class Reduction(Section):
+    """Craig-Bampton model of each specimen on the nodes of its pad and ring."""
+
+    modes: Annotated[int, Whole(1, 500)] = entry(
+        "fixed-interface modes that are kept", 20, default=20
+    )
+
+
+class PadGrid(Section):
+    """The same contact on a half-space, over exactly the pad."""
+
+    grid: tuple[GridCells, GridCells] = entry("cells along x, y", [40, 40], default=(40, 40))
+    tolerance: Tolerance = entry(
+        "relative, on equilibrium and complementarity [1]", 1e-8, default=1e-8
+    )
+
+
+class Stint(Section):
+    """Cycles of constant geometry."""
+
+    share: Ratio = entry("of the longest that is stable [1]", 0.5, default=0.5)
+    length: Cycles | None = entry(
+        "of every stint instead, refused where it would be unstable [1]", 1000, default=None
+    )
+
+
+class Reported(Section):
+    """A number of cycles that a source reports, to find the wear coefficient that gives it."""
+
+    normal_force: Pressing = entry("one of load_path.normal_forces [N]", "17 N")
+    steady: Literal["stiffness", "pressure"] = entry("what no longer changes then", "stiffness")
+    cycles: Cycles = entry("when it has become steady [1]", 2.5e6)
+
+
+class StintWear(TwoBodies[EnergyBody]):
+    """Depth = coefficient x dissipated energy per area; ends by exactly one of cycles, energy."""
+
+    law: Literal["energy"] = entry("energy", "energy")
+    cycles: Cycles | None = entry("under each normal force [1]", 3e5, default=None)
+    energy: Energy | None = entry("dissipated under each normal force [N*mm]", "1 kJ", default=None)
+    stint: Stint = entry("cycles of constant geometry", default=Stint())
+    reported: tuple[Reported, ...] = entry("cycles that a source reports", default=())
+
+    @model_validator(mode="after")
+    def _ends_once(self) -> StintWear:
+        if (self.cycles is None) == (self.energy is None):
+            given = "neither" if self.cycles is None else "both"
+            raise disagreement(f"{given} given; allowed: either cycles or energy", "energy")
+        return self
+
+    @model_validator(mode="after")
+    def _something_wears(self) -> StintWear:
+        if self.body_1.coefficient == self.body_2.coefficient == 0.0:
+            raise disagreement("0 for both bodies; allowed: one of them at most", "body_1")
+        return self
+
+
+class SpecimensCase(Case):
+    """Two specimens of a friction rig, on their reduced models and on a half-space."""
+
+    title: Title = entry("one line", "Friction-rig specimens worn at 14 um stroke")
+    analysis: Literal["wear"] = entry("what is computed", "wear")
+    structure: Specimens = entry("two specimens alike, turned 90° to each other")
+    materials: TwoMaterials = entry("the two specimens")
+    friction: Friction = entry("Coulomb's law on the pad")
+    load_path: PressAndRub = entry("what every cycle does")
+    mesh: SpecimenMesh = entry("finite elements of each specimen", default=SpecimenMesh())
+    reduction: Reduction = entry("of each specimen", default=Reduction())
+    contact: PadGrid = entry("half-space beside the specimens", default=PadGrid())
+    wear: StintWear = entry("law, length of the run and stints")
+
+    def material(self, number: int) -> ElasticMaterial:
+        """Material of body ``number``, 1 or 2."""
+        return (self.materials.body_1, self.materials.body_2)[number - 1].elastic()
+
+    def geometry(self) -> Specimen:
+        """The specimen as the mesher takes it."""
+        return self.structure.geometry(pad_elements=self.mesh.pad_elements)
+
+    def outline(self) -> list[tuple[str, str]]:
+        form, wear = self.structure.form, self.wear
+        pad = self.structure.strip_width
+        shape = "flat" if form is None else f"radii {form.along:g} and {form.across:g} mm"
+        forces = ", ".join(f"{force:g}" for force in self.load_path.normal_forces)
+        nodes = (self.mesh.pad_elements + 1) ** 2
+        end = f"{wear.energy:g} N mm" if wear.cycles is None else f"{wear.cycles:g} cycles"
+        share, length = wear.stint.share, wear.stint.length
+        stint = f"{share:.0%} of their limit" if length is None else f"{length:g} cycles"
+        cells = " x ".join(map(str, self.contact.grid))
+        return [
+            ("structure", f"specimens, pad {pad:g} x {pad:g} mm of {nodes} nodes, {shape}"),
+            ("load path", f"{forces} N, stroke {self.load_path.stroke:g} mm"),
+            ("contact", f"reduced specimens; beside them {cells} cells on a half-space"),
+            ("wear", f"{wear.law}, {end} each, in stints of {stint}"),
+        ]
+
+    @model_validator(mode="after")
+    def _reported_forces_run(self) -> SpecimensCase:
+        for index, reported in enumerate(self.wear.reported):
+            if reported.normal_force not in self.load_path.normal_forces:
+                forces = ", ".join(f"{force:g}" for force in self.load_path.normal_forces)
+                raise disagreement(
+                    f"{reported.normal_force:g} N: not run; allowed: {forces} N",
+                    f"wear.reported.{index}.normal_force",
+                )
+        return self

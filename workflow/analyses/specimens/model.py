@@ -1,0 +1,130 @@
+"""The two specimens of a case: mesh, reduced models and their natural frequencies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fe_models.geometry.specimens import Specimen
+from fe_models.mesh import Interface, StructureMesh
+from fe_models.reduced_contact import ReducedPair
+from fe_models.reduction import ReducedModel, free_frequencies
+from fe_models.specimens import pad_stiffness, reduced_specimens, specimen_matrices
+from sa_solver.types import Array
+from workflow.analyses.specimens.case import SpecimensCase
+from workflow.shell.cache import content_key, load_arrays, save_arrays
+
+# Rigid motions of a free body, and the natural frequencies above them that are compared.
+RIGID_MOTIONS, FREQUENCIES = 6, 6
+
+
+@dataclass(frozen=True)
+class SpecimenReduction:
+    """Reduced models of body 1 and 2, and natural frequencies of each, free, ``(6,)`` [Hz].
+
+    ``full`` are those of the finite elements, ``reduced`` those of the reduced model.
+    """
+
+    models: tuple[ReducedModel, ReducedModel]
+    full: tuple[Array, Array]
+    reduced: tuple[Array, Array]
+
+
+class SpecimensModel:
+    """The specimens as the case gives them.
+
+    Their reduced models keep a target too if its distance from the contact is given [mm].
+    """
+
+    def __init__(self, case: SpecimensCase, target_distance: float | None = None) -> None:
+        self._case, self._target = case, target_distance
+        self.specimen: Specimen = case.geometry()
+        self._materials = case.material(1), case.material(2)
+        self.from_cache = False
+
+    @cached_property
+    def mesh(self) -> StructureMesh:
+        """Both specimens; raises :class:`~fe_models.mesh.MeshError`."""
+        return self.specimen.mesh(self._case.mesh.size)
+
+    @property
+    def face(self) -> Interface:
+        """The pad."""
+        (face,) = self.mesh.interfaces
+        return face
+
+    @cached_property
+    def reduction(self) -> SpecimenReduction:
+        """Reduced models and frequencies, from the cache when they are there.
+
+        The form is a gap: flat and curved specimens share them.
+        """
+        case = self._case
+        flat = replace(self.specimen, radii=None)
+        modes = case.reduction.modes
+        further = () if self._target is None else (self._target,)
+        key = content_key("specimens", flat, self._materials, case.mesh, modes, *further)
+        found = load_arrays(f"specimens-{key}")
+        self.from_cache = found is not None
+        if found is None:
+            found = self._reduce(modes)
+            save_arrays(f"specimens-{key}", found)
+        return SpecimenReduction(
+            (_model(found, 1), _model(found, 2)),
+            (found["full/1"], found["full/2"]),
+            (found["reduced/1"], found["reduced/2"]),
+        )
+
+    def node_count(self) -> int:
+        """Nodes of both bodies, midsides included."""
+        return self.mesh.node_count(self._case.mesh.order)
+
+    def pair(self) -> ReducedPair:
+        """Both reduced models on the nodes of the pad, rings held."""
+        one, two = (pad_stiffness(model, self.specimen) for model in self.reduction.models)
+        return ReducedPair.from_stiffness(self.face, one, two)
+
+    def _reduce(self, modes: int) -> dict[str, Any]:
+        """Everything that is worth keeping, by name."""
+        order = self._case.mesh.order
+        models = reduced_specimens(
+            self.specimen,
+            self.mesh,
+            self._materials,
+            order,
+            modes=modes,
+            target_distance=self._target,
+        )
+        arrays: dict[str, Any] = {}
+        for number, model in enumerate(models, 1):
+            arrays |= {f"{number}/{name}": values for name, values in vars(model).items()}
+            assert model.mass is not None
+            arrays[f"reduced/{number}"] = _lowest(model.stiffness, model.mass)
+            arrays[f"full/{number}"] = self._full_frequencies(number, arrays)
+        return arrays
+
+    def _full_frequencies(self, number: int, known: dict[str, Any]) -> Array:
+        """Those of the finite elements; a specimen of the other's material has the other's."""
+        if number == 2 and self._materials[0] == self._materials[1]:
+            alike: Array = known["full/1"]
+            return alike
+        body = (self.mesh.body_1, self.mesh.body_2)[number - 1]
+        pad = self.face.nodes(number)
+        material, order = self._materials[number - 1], self._case.mesh.order
+        matrices = specimen_matrices(self.specimen, body, pad, material, order)
+        return _lowest(matrices.stiffness, matrices.mass)
+
+
+def _lowest(stiffness: Any, mass: Any) -> Array:
+    """The lowest frequencies of a free body above its rigid motions [Hz]."""
+    return free_frequencies(stiffness, mass, RIGID_MOTIONS + FREQUENCIES)[RIGID_MOTIONS:]
+
+
+def _model(arrays: dict[str, Any], number: int) -> ReducedModel:
+    prefix = f"{number}/"
+    own = {name.removeprefix(prefix): v for name, v in arrays.items() if name.startswith(prefix)}
+    names = tuple(name if isinstance(name, str) else name.decode() for name in own["names"])
+    return ReducedModel(**own | {"kept": np.asarray(own["kept"]), "names": names})

@@ -1,0 +1,64 @@
+"""What a run of specimens has found."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from fe_models.reduced_contact import ReducedPair, VirginCurve
+from fe_models.stints import StintState
+from sa_solver.types import Array
+from workflow.analyses.specimens.case import SpecimensCase
+from workflow.analyses.specimens.half_space import BulkCompliance, HalfSpaceState, PadHalfSpace
+from workflow.analyses.specimens.model import SpecimensModel
+
+
+@dataclass(frozen=True)
+class KeptState:
+    """A worn state with its ``curve`` of first loading."""
+
+    stint: StintState
+    curve: VirginCurve
+
+
+@dataclass(frozen=True)
+class MarchedCycle:
+    """The coupled cycle on the unworn shape beside the uncoupled one.
+
+    ``displacement`` of body 2's ring [mm] and ``force`` that moves it [N] ``(k,)`` over the closed
+    cycle; ``energy`` [N mm] and ``secant_stiffness`` [N/mm] at a small first motion, marched and
+    uncoupled; ``pressure_change`` is the largest change of a node's pressure in the cycle over the
+    largest pressure.
+    """
+
+    displacement: Array
+    force: Array
+    energy: tuple[float, float]
+    secant_stiffness: tuple[float, float]
+    pressure_change: float
+
+
+@dataclass(frozen=True)
+class LoadOutcome:
+    """Everything found under one normal ``force`` [N].
+
+    ``stints`` are all states, ``kept`` those with fields; ``half_space`` belongs to the first and
+    last of them.
+    """
+
+    force: float
+    stints: tuple[StintState, ...]
+    kept: tuple[KeptState, ...]
+    half_space: tuple[HalfSpaceState, HalfSpaceState]
+    marched: MarchedCycle
+
+
+@dataclass(frozen=True)
+class SpecimensOutcome:
+    """Everything a run of specimens found."""
+
+    case: SpecimensCase
+    model: SpecimensModel
+    pair: ReducedPair
+    half_space: PadHalfSpace
+    bulk: BulkCompliance
+    loads: tuple[LoadOutcome, ...]

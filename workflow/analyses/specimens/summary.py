@@ -1,0 +1,229 @@
+"""The numbers of a run of specimens, in base units."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sa_solver.types import Array
+from workflow.analyses.specimens.half_space import BulkCompliance
+
+if TYPE_CHECKING:
+    from fe_models.reduced_contact import ReducedPair
+    from fe_models.stints import StintState
+    from workflow.analyses.specimens.case import Reported
+    from workflow.analyses.specimens.half_space import HalfSpaceState
+    from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
+
+# Steady is what stays within this of its last value: of the stiffness, and of the mean pressure.
+STEADY = 0.02
+# Up to this share of the force that slides the slope of the loop is read: most still sticks.
+SLOPE_SHARE = 0.5
+# What becomes steady after this share of the run would perhaps change in a longer one.
+LATE = 0.8
+
+
+def frequencies(outcome: SpecimensOutcome) -> dict[str, Any]:
+    """Natural frequencies of each free specimen [Hz]."""
+    reduction = outcome.model.reduction
+    return {
+        f"body_{number + 1}": {
+            "full": reduction.full[number].tolist(),
+            "reduced": reduction.reduced[number].tolist(),
+        }
+        for number in (0, 1)
+    }
+
+
+def explanation(outcome: SpecimensOutcome) -> list[str]:
+    """Where specimens and half-space differ and why, in sentences."""
+    bulk, first = outcome.bulk, outcome.loads[0]
+    (stiff_z, stiff_x), (half_z, half_x) = bulk.specimens, bulk.half_space
+    ring = outcome.case.structure.ring_distance
+    unworn, beside = first.kept[0].stint.contact.normal, first.half_space[0]
+    shares = [edge_share(outcome.pair, p) for p in (unworn.pressure, beside.nodal_pressure)]
+    softer = ": they lack what a half-space has beside the strips" if bulk.tangential > 0.0 else ""
+    held = f": held {ring:g} mm from the pad, where a half-space gives way"
+    stiffer = held if bulk.normal < 0.0 else ""
+    sentences = [
+        f"tied along x the pad of the specimens has {1e-3 * stiff_x:.4g} N/um and a half-space "
+        f"{1e-3 * half_x:.4g}, so that the specimens' compliance differs by "
+        f"{1e6 * bulk.tangential:.3g} nm/N{softer}",
+        f"tied along z they have {1e-3 * stiff_z:.4g} and {1e-3 * half_z:.4g} N/um, a difference "
+        f"of {1e6 * bulk.normal:.3g} nm/N{stiffer}",
+        f"at {first.force:g} N unworn {unworn.area:.3g} mm^2 touch on the specimens, in whole "
+        f"nodes, and {beside.area:.3g} mm^2 on the half-space, in whole cells",
+    ]
+    if max(shares) > 0.0:
+        sentences.append(
+            f"there the border of the pad bears {shares[0]:.3g} times the mean pressure on the "
+            f"specimens and {shares[1]:.3g} times on the half-space"
+        )
+    return sentences
+
+
+def tied_pad(bulk: BulkCompliance) -> dict[str, Any]:
+    """Stiffness of the tied pad, of specimens and half-space, and the compliance between them."""
+    rows = zip(bulk.specimens, bulk.half_space, (bulk.normal, bulk.tangential), strict=True)
+    keys = "specimens", "half_space", "bulk_compliance"
+    return {
+        name: dict(zip(keys, row, strict=True))
+        for name, row in zip(("normal", "tangential"), rows, strict=True)
+    }
+
+
+def load_summary(outcome: SpecimensOutcome, load: LoadOutcome) -> dict[str, Any]:
+    """Everything about one normal force."""
+    end, areas = load.stints[-1], outcome.pair.areas
+    steady = steady_states(outcome.pair, load.stints)
+    return {
+        "normal_force": load.force,
+        "cycles": end.cycles,
+        "stints": len(load.stints) - 1,
+        "energy": end.energy,
+        "volumes": (end.depths @ areas).tolist(),
+        "depths": end.depths.max(axis=1).tolist(),
+        "unworn": _state_summary(outcome, load, 0),
+        "worn": _state_summary(outcome, load, -1),
+        "steady": {
+            name: {"cycles": state.cycles, "energy": state.energy} for name, state in steady.items()
+        },
+        "coupled_cycle": {
+            "energy": load.marched.energy[0],
+            "energy_uncoupled": load.marched.energy[1],
+            "energy_difference": _relative(*load.marched.energy),
+            "secant_stiffness": load.marched.secant_stiffness[0],
+            "secant_stiffness_uncoupled": load.marched.secant_stiffness[1],
+            "secant_stiffness_difference": _relative(*load.marched.secant_stiffness),
+            "pressure_change": load.marched.pressure_change,
+        },
+    }
+
+
+def _relative(value: float, other: float) -> float:
+    return float(other / value - 1.0) if value else 0.0
+
+
+def _state_summary(outcome: SpecimensOutcome, load: LoadOutcome, place: int) -> dict[str, Any]:
+    """The specimens on one shape, and the half-space beside them; ``place`` 0 or -1."""
+    state, beside = load.kept[place], load.half_space[place]
+    contact, areas = state.stint.contact, outcome.pair.areas
+    normal = contact.normal
+    return {
+        **_stiffness(state),
+        "area": normal.area,
+        "approach": normal.approach,
+        "peak_pressure": float(normal.pressure.max()),
+        "edge_pressure_share": edge_share(outcome.pair, normal.pressure),
+        "pressure_deviation": pressure_deviation(areas, normal.pressure),
+        "friction": contact.friction,
+        "energy_per_cycle": contact.energy,
+        "half_space": _beside(outcome, state, beside, load.force),
+    }
+
+
+def _stiffness(state: KeptState) -> dict[str, float]:
+    """With all that touches stuck, and as the slope of the loop."""
+    return {
+        "stick_stiffness": state.stint.contact.stick_stiffness,
+        "secant_stiffness": state.curve.secant_stiffness(SLOPE_SHARE),
+    }
+
+
+def _beside(
+    outcome: SpecimensOutcome, state: KeptState, beside: HalfSpaceState, force: float
+) -> dict[str, float]:
+    """The half-space, its stiffness corrected by what it lacks, and how its fields differ."""
+    areas, contact = outcome.pair.areas, state.stint.contact
+    shear = contact.tangential.shear / areas
+    return {
+        "stick_stiffness": beside.stick_stiffness,
+        "corrected_stiffness": 1.0 / (1.0 / beside.stick_stiffness + outcome.bulk.tangential),
+        "area": beside.area,
+        "approach": beside.approach,
+        "corrected_approach": beside.approach + force * outcome.bulk.normal,
+        "peak_pressure": float(beside.pressure.max()),
+        "edge_pressure_share": edge_share(outcome.pair, beside.nodal_pressure),
+        "energy_per_cycle": beside.energy,
+        "pressure_difference": _difference(areas, contact.normal.pressure, beside.nodal_pressure),
+        "shear_difference": _difference(areas, shear, beside.nodal_shear),
+    }
+
+
+def pressure_deviation(areas: Array, pressure: Array) -> float:
+    """Root mean square of p/mean - 1 over the pad: 0 where the pressure is uniform."""
+    mean = np.sum(areas * pressure) / areas.sum()
+    return float(np.sqrt(np.sum(areas * (pressure / mean - 1.0) ** 2) / areas.sum()))
+
+
+def edge_share(pair: ReducedPair, pressure: Array) -> float:
+    """Mean pressure of the nodes on the border of the pad over that of the pad."""
+    place = np.abs(pair.face.coordinates)
+    border = np.any(place > place.max(axis=0) * (1.0 - 1e-9), axis=1)
+    areas = pair.areas
+    mean = np.sum(areas * pressure) / areas.sum()
+    on_border = np.sum((areas * pressure)[border]) / areas[border].sum()
+    return float(on_border / mean)
+
+
+def _difference(areas: Array, field: Array, other: Array) -> float:
+    """Root mean square of the difference of two nodal fields over that of the first."""
+    size = float(np.sum(areas * field**2))
+    return float(np.sqrt(np.sum(areas * (field - other) ** 2) / size)) if size else 0.0
+
+
+def steady_states(pair: ReducedPair, stints: tuple[StintState, ...]) -> dict[str, StintState]:
+    """First states from which stiffness and evenness of pressure stay within ``STEADY``."""
+    stiffness = np.array([state.contact.stick_stiffness for state in stints])
+    pressures = (state.contact.normal.pressure for state in stints)
+    deviation = np.array([pressure_deviation(pair.areas, own) for own in pressures])
+    return {
+        "stiffness": stints[_settled(stiffness / stiffness[-1])],
+        "pressure": stints[_settled(deviation)],
+    }
+
+
+def _settled(values: Array) -> int:
+    """First place from which all values are near the last one."""
+    away = np.flatnonzero(np.abs(values - values[-1]) > STEADY)
+    return int(away[-1]) + 1 if len(away) else 0
+
+
+def collapse(loads: list[dict[str, Any]]) -> dict[str, float] | None:
+    """Largest over smallest number of cycles, and energy, at which stiffness becomes steady.
+
+    None if it is so from the start under some force.
+    """
+    steady = [load["steady"]["stiffness"] for load in loads]
+    if min(own["energy"] for own in steady) == 0.0:
+        return None
+    return {
+        key: max(own[key] for own in steady) / min(own[key] for own in steady)
+        for key in ("cycles", "energy")
+    }
+
+
+def reported_summary(
+    reported: Reported, loads: list[dict[str, Any]], coefficients: tuple[float, float]
+) -> dict[str, Any]:
+    """The wear coefficients that become steady after the reported cycles.
+
+    Shape and energy depend on cycles times coefficients alone. None if it is steady unworn.
+    """
+    (own,) = [load for load in loads if load["normal_force"] == reported.normal_force]
+    cycles = own["steady"][reported.steady]["cycles"]
+    ratio = cycles / reported.cycles
+    return {
+        "normal_force": reported.normal_force,
+        "steady": reported.steady,
+        "cycles_reported": reported.cycles,
+        "cycles_computed": cycles,
+        "coefficients": [ratio * coefficient for coefficient in coefficients] if ratio else None,
+    }
+
+
+def late(load: dict[str, Any]) -> bool:
+    """Whether something becomes steady so late that a longer run might show it steady later."""
+    end = load["cycles"]
+    return any(own["cycles"] > LATE * end > 0.0 for own in load["steady"].values())

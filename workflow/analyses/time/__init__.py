@@ -1,0 +1,22 @@
+"""Joints in time: at a prescribed stroke, or in a rig that is shaken, hit or driven."""
+
+from workflow.analyses.time.case import JointCase, RigCase
+from workflow.analyses.time.memory import memory
+from workflow.shell.analysis import Analysis, Run
+
+__all__ = ["ANALYSIS"]
+
+
+def _run(run: Run[JointCase | RigCase]) -> None:
+    # Joint laws are compiled when they are first needed.
+    from workflow.analyses.time.run import run_time
+
+    run_time(run)
+
+
+ANALYSIS = Analysis(
+    name="time",
+    cases={"joint": JointCase, "rig": RigCase},
+    run=_run,
+    memory=memory,
+)

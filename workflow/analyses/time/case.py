@@ -1,0 +1,300 @@
+"""Cases in time: a joint that wears while it is driven, alone or in a vibrating rig."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from typing import Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import Field, model_validator
+
+from workflow.analyses.rig.excitation import Drive, Excitation, Hammer, Harmonic, Recorded, Time
+from workflow.analyses.rig.joint_evolution import JointEvolution
+from workflow.analyses.rig.joint_sections import ContactLaw, FrictionContactJoint, Joint, JointLaw
+from workflow.analyses.rig.structure import ReducedBody, Rig
+from workflow.analyses.wear.case.evolution import TotalEnergy
+from workflow.analyses.wear.case.sections import Cycles
+from workflow.case.fields import Quantity
+from workflow.case.sections import (
+    Case,
+    DottedPath,
+    OutputWithoutFields,
+    Section,
+    Title,
+    disagreement,
+    entry,
+)
+
+EndEnergy = Annotated[
+    float,
+    Quantity("N*mm", above=0.0, at_most=1e15, range_text="above 0 and at most 1e12 J"),
+]
+StepError = Annotated[float, Quantity("1", above=0.0, at_most=0.1)]
+JumpError = Annotated[float, Quantity("1", at_least=1e-10, at_most=0.1)]
+
+
+class SingleJoint(Section):
+    """Nothing but the joint."""
+
+    kind: Literal["joint"] = entry("what the structure is", "joint")
+
+
+class Ageing(Section):
+    """How long the joint is driven: by energy or by cycles."""
+
+    energy: EndEnergy | None = entry("dissipated until the end [N*mm]", "2800 J", default=None)
+    cycles: Cycles | None = entry("until the end [1]", 1.08e6, default=None)
+    tolerance: JumpError = entry("of the cycles, for the jumps in energy [1]", 1e-4, default=1e-4)
+
+    @model_validator(mode="after")
+    def _one_end(self) -> Ageing:
+        if self.energy is not None and self.cycles is not None:
+            raise disagreement("both given; allowed: energy or cycles", "cycles", "energy")
+        return self
+
+    @property
+    def wanted(self) -> bool:
+        """Whether there is any."""
+        return self.energy is not None or self.cycles is not None
+
+
+class SteadyAgeing(Ageing):
+    """How long the joint is driven in steady states: by energy, by cycles, or not at all."""
+
+    filled_in: ClassVar[bool] = False
+
+
+class Integration(Section):
+    """Newmark's method, implicit in the force of the joint."""
+
+    step: Time = entry("of time [s]", "10 us", default=1e-5)
+    tolerance: StepError | None = entry(
+        "error of the displacement that a step may add before it is taken in parts, relative to "
+        "the largest displacement; without it none is [1]",
+        1e-5,
+        default=None,
+    )
+
+
+class Reported(Section):
+    """A value that the source reports, told beside what the run finds: nothing is asked of it."""
+
+    quantity: DottedPath = entry("path into summary.json", "states.-1.friction")
+    value: Annotated[float, Quantity(None)] = entry("in base units or with any unit", 0.9)
+    source: Title = entry("where the value comes from", "measured")
+
+
+class TimeCase(Case):
+    """A joint that changes with the energy it dissipates."""
+
+    title: Title = entry("one line", "Bouc-Wen joint at a prescribed stroke")
+    analysis: Literal["time"] = entry("what is computed", "time")
+    structure: Section = entry("what holds the joint")
+    joint: Joint = entry("its law, and the parameters that it begins with")
+    evolution: JointEvolution = entry(
+        "of the parameters with dissipated energy; without it none", default=JointEvolution()
+    )
+    energies: tuple[TotalEnergy, ...] = entry(
+        "dissipated so far, ascending, at which the joint is looked at [N*mm]",
+        ["0 J", "1 kJ"],
+        default=(0.0,),
+    )
+    output: OutputWithoutFields = entry(
+        "files beside summary and results", default=OutputWithoutFields()
+    )
+    reported: tuple[Reported, ...] = entry("values to be told beside those computed", default=())
+
+    @model_validator(mode="after")
+    def _evolves_what_there_is(self) -> TimeCase:
+        for name in ("friction", "stiffness", "residual_stiffness", "normal_load"):
+            if getattr(self.evolution, name) is not None and not hasattr(self.joint, name):
+                raise disagreement(
+                    f"{self.joint.law} has no {name}; allowed: those of the joint",
+                    f"evolution.{name}",
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _energies_ascend(self) -> TimeCase:
+        if not self.energies:
+            raise disagreement("none; allowed: one or more", "energies")
+        if any(after <= before for before, after in pairwise(self.energies)):
+            raise disagreement("not ascending; allowed: each energy above the last", "energies")
+        return self
+
+
+class JointCase(TimeCase):
+    """A joint alone, moved to and fro until it is worn."""
+
+    structure: SingleJoint = entry("what holds the joint: nothing but its drive")
+    joint: JointLaw = entry("its law, and the parameters that it begins with")
+    drive: Drive = entry("motion that is imposed on the joint")
+    ageing: Ageing = entry("how long it is driven")
+
+    @model_validator(mode="after")
+    def _ends_after_them(self) -> JointCase:
+        if not self.ageing.wanted:
+            raise disagreement("no end given; allowed: energy or cycles", "ageing.cycles", "ageing")
+        check_within(self.energies, self.ageing)
+        return self
+
+    def outline(self) -> list[tuple[str, str]]:
+        drive = self.drive
+        return [
+            ("structure", "none: the joint alone"),
+            ("joint", joint_outline(self)),
+            ("drive", f"stroke {drive.stroke:g} mm at {drive.frequency:g} Hz"),
+            ("ageing", ageing_outline(self.ageing)),
+        ]
+
+
+class RigCase(TimeCase):
+    """A rig with a joint that is shaken, hit, or driven by a recorded force."""
+
+    title: Title = entry("one line", "Friction rig driven by a force")
+    structure: Annotated[Rig | ReducedBody, Field(discriminator="kind")] = entry(
+        "what holds the joint"
+    )
+    joint: ContactLaw = entry(
+        "its law, and the parameters that it begins with; several joints share them evenly"
+    )
+    excitation: Excitation = entry("what drives the rig")
+    ageing: SteadyAgeing = entry(
+        "for a harmonic force: how long the joint is worn in steady states; without an end not "
+        "at all",
+        default=SteadyAgeing(),
+    )
+    integration: Integration = entry("of the motion in time", default=Integration())
+
+    @model_validator(mode="after")
+    def _drives_a_mass(self) -> RigCase:
+        mass = self.excitation.mass
+        if isinstance(self.structure, ReducedBody):
+            if mass is not None:
+                raise disagreement(
+                    f"{mass}: given beside a reduced body; allowed: structure.driven",
+                    "excitation.mass",
+                )
+        elif mass is not None and mass > len(self.structure.masses):
+            count = len(self.structure.masses)
+            raise disagreement(f"{mass}: no such mass; allowed: 1 to {count}", "excitation.mass")
+        return self
+
+    @model_validator(mode="after")
+    def _has_the_directions(self) -> RigCase:
+        if isinstance(self.joint, FrictionContactJoint) and isinstance(self.structure, Rig):
+            raise disagreement(
+                "friction_contact: has three directions; allowed: in a reduced structure, or "
+                "jenkins, which it is along one",
+                "joint.law",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _ages_in_steady_states(self) -> RigCase:
+        if not self.ageing.wanted:
+            return self
+        if not isinstance(self.excitation, Harmonic):
+            raise disagreement(
+                f"given beside {self.excitation.kind}; allowed: with a harmonic force", "ageing"
+            )
+        check_within(self.energies, self.ageing)
+        return self
+
+    @model_validator(mode="after")
+    def _step_resolves(self) -> RigCase:
+        longest = _longest_step(self.excitation)
+        if self.integration.step > (1.0 + ROUNDING) * longest:
+            raise disagreement(
+                f"{self.integration.step:g} s: too long for the excitation; "
+                f"allowed: up to {longest:g} s",
+                "integration.step",
+                "integration",
+            )
+        return self
+
+    @property
+    def steps(self) -> float:
+        """Steps of time that are kept of each motion."""
+        return _kept_time(self.excitation) / self.integration.step
+
+    def outline(self) -> list[tuple[str, str]]:
+        structure = self.structure
+        rows = [
+            ("structure", f"{structure.text}, damping ratio {structure.damping_ratio:g}"),
+            ("joint", joint_outline(self)),
+            ("excitation", excitation_outline(self)),
+            ("steps", f"of {self.integration.step:g} s"),
+        ]
+        if self.ageing.wanted:
+            rows.append(("ageing", ageing_outline(self.ageing)))
+        return rows
+
+
+# Of the difference of two recorded times.
+ROUNDING = 1e-9
+# Steps in a period or a blow: with fewer the excitation itself is not seen.
+FEWEST_STEPS = 20
+
+
+def _longest_step(excitation: Harmonic | Hammer | Recorded) -> float:
+    """The longest step of time in which the excitation is still seen [s]."""
+    if isinstance(excitation, Harmonic):
+        return 1.0 / (FEWEST_STEPS * excitation.frequency)
+    if isinstance(excitation, Hammer):
+        return min(excitation.duration / FEWEST_STEPS, 0.5 / excitation.highest)
+    return float(np.diff(excitation.read()[0]).min())
+
+
+def _kept_time(excitation: Harmonic | Hammer | Recorded) -> float:
+    """Length of the motion that is kept [s]."""
+    if isinstance(excitation, Harmonic):
+        return 1.0 / excitation.frequency
+    if isinstance(excitation, Hammer):
+        return excitation.record
+    return float(np.ptp(excitation.read()[0]))
+
+
+def joules(energy: float) -> str:
+    """An energy [N mm] as it is told."""
+    return f"{1e-3 * energy:.5g} J"
+
+
+def check_within(energies: tuple[float, ...], ageing: Ageing) -> None:
+    """Refuse energies beyond the end of the ageing."""
+    if ageing.energy is not None and energies[-1] > ageing.energy:
+        raise disagreement(
+            f"{joules(energies[-1])}: beyond the end; allowed: up to {joules(ageing.energy)}",
+            f"energies.{len(energies) - 1}",
+        )
+
+
+def joint_outline(case: TimeCase) -> str:
+    """Law and normal load of the joint, and whether it evolves."""
+    evolves = "fixed" if case.evolution.is_empty else "evolving with energy"
+    count = len(case.energies)
+    looked_at = f"looked at {count} energies" if count > 1 else "looked at one energy"
+    return f"{case.joint.law} under {case.joint.normal_load:g} N, {evolves}, {looked_at}"
+
+
+def excitation_outline(case: RigCase) -> str:
+    """What drives a rig, in a line."""
+    excitation, structure = case.excitation, case.structure
+    place = f"mass {excitation.mass or 1}"
+    if isinstance(structure, ReducedBody):
+        place = f"{structure.driven.points} along {structure.driven.direction}"
+    if isinstance(excitation, Harmonic):
+        return f"{excitation.force:g} N at {excitation.frequency:g} Hz on {place}"
+    if isinstance(excitation, Hammer):
+        return (
+            f"blow of {excitation.force:g} N and {excitation.duration:g} s on {place}, "
+            f"{excitation.record:g} s recorded"
+        )
+    return f"{excitation.file} on {place}"
+
+
+def ageing_outline(ageing: Ageing) -> str:
+    """The end of the ageing."""
+    if ageing.cycles is not None:
+        return f"to {ageing.cycles:g} cycles"
+    return f"to {joules(ageing.energy or 0.0)}"

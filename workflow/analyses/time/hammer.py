@@ -1,0 +1,190 @@
+"""A rig that is hit: frequency response and ring-down of its first mode, at every energy."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from fe_models.dynamics.excitation import HammerBlow
+from fe_models.dynamics.frequency_response import (
+    FrequencyResponse,
+    SignalError,
+    frequency_response,
+)
+from fe_models.dynamics.motion import Motion
+from fe_models.dynamics.ring_down import ring_down
+from sa_solver.types import Array
+from workflow.analyses.rig import excitation as given
+from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.time.case import RigCase, joules
+from workflow.analyses.time.joint import evolution_curve
+from workflow.analyses.time.joint_model import JointModel
+from workflow.analyses.time.motion import motion_curves, motion_numbers, motion_of, step_control
+from workflow.analyses.time.outcome import MOTION, RESPONSE, RING_DOWN, State, TimeOutcome
+from workflow.errors import MethodFailed
+from workflow.shell.reporter import Reporter
+
+# The second mode is looked for between these shares of its frequencies without the joint and with
+# all of it stuck.
+BELOW_FREE, ABOVE_STUCK = 0.95, 1.05
+# A response that is still so large at the end of its record leaks into the frequency response.
+AT_REST = 0.05
+# A ring-down that is smaller than this share of the largest displacement, once the filter has
+# settled, is not that of the first mode but of what is left in the filter.
+NOTHING_LEFT = 1e-3
+# Share of all that a joint dissipates in the record, after which a motion has decayed: a measure of
+# damping that needs no mode.
+DECAYED = 0.9
+# Points of a ring-down that are kept: it is smooth.
+RING_DOWN_POINTS = 400
+
+
+def run_hammer(case: RigCase, rig: RigModel, joint: JointModel, reporter: Reporter) -> TimeOutcome:
+    """Hit the rig at every energy, which stays what it is during the record.
+
+    Raises MethodFailed where a motion is not found, or shows no resonance.
+    """
+    assert isinstance(case.excitation, given.Hammer)
+    hammer, control = case.excitation, step_control(case)
+    blow = HammerBlow(rig.driven, hammer.force, hammer.duration)
+    states = []
+    for energy in case.energies:
+        with reporter.stage("motion"):
+            motion = motion_of(rig, joint, energy, blow, hammer.record, control)
+        with reporter.stage("signals"):
+            states.append(_state(hammer, blow, rig, joint, energy, motion, reporter))
+    curve = evolution_curve(joint, case.energies[-1])
+    return TimeOutcome(case, tuple(states), curve, _trend(states))
+
+
+def _state(
+    hammer: given.Hammer,
+    blow: HammerBlow,
+    rig: RigModel,
+    joint: JointModel,
+    energy: float,
+    motion: Motion,
+    reporter: Reporter,
+) -> State:
+    bounds, step = rig.modes(joint.at(energy)), float(motion.times[1] - motion.times[0])
+    acceleration = rig.looked_at(motion.acceleration)
+    response = frequency_response(blow.value(motion.times), acceleration, step)
+    if response.remaining > AT_REST:
+        reporter.warn(
+            f"at {joules(energy)} {response.remaining:.0%} of the response is left when the record "
+            "ends, which blurs its peaks: raise excitation.record"
+        )
+    peaks = _peak("first", response, *hammer.band, energy)
+    if rig.in_a_row and len(bounds["stuck"]) > 1:
+        ends = BELOW_FREE * rig.free()[1], ABOVE_STUCK * bounds["stuck"][1]
+        if ends[1] < hammer.highest:
+            peaks |= _peak("second", response, *ends, energy)
+    decay = _ring_down(rig, motion, hammer, energy, reporter)
+    numbers: dict[str, Any] = {
+        **bounds,
+        **peaks,
+        "ring_down": _ends(decay),
+        "decay_time": _decay_time(motion),
+        "remaining": response.remaining,
+        "resolution": float(response.frequency[0]),
+        **motion_numbers(rig, motion),
+    }
+    seen = response.frequency <= hammer.highest
+    curves = {
+        MOTION: motion_curves(rig, motion, blow),
+        RESPONSE: {
+            "frequency": response.frequency[seen],
+            "magnitude": np.abs(response.value[seen]),
+            "phase": np.angle(response.value[seen]),
+        },
+    }
+    if decay is not None:
+        curves[RING_DOWN] = decay
+    return State(energy, None, joint.parameters(energy), numbers, curves)
+
+
+def _peak(
+    name: str, response: FrequencyResponse, lowest: float, highest: float, energy: float
+) -> dict[str, float]:
+    """Frequency and height of the highest line between two frequencies [Hz].
+
+    No mode is fitted to it: joints that slide make peaks of another shape.
+    """
+    inside = (response.frequency >= lowest) & (response.frequency <= highest)
+    lines, heights = response.frequency[inside], np.abs(response.value[inside])
+    top = int(np.argmax(heights)) if len(heights) else 0
+    if not 0 < top < len(lines) - 1:
+        raise MethodFailed(
+            f"at {joules(energy)} the response has no peak from {lowest:.4g} to {highest:.4g} Hz: "
+            "change excitation.band, or raise excitation.record"
+        )
+    return {f"{name}_frequency": float(lines[top]), f"{name}_peak": float(heights[top])}
+
+
+def _decay_time(motion: Motion) -> float:
+    """Time in which the joints dissipate most of what they will [s]."""
+    dissipated = motion.energies.joints.sum(axis=1)
+    place = int(np.searchsorted(dissipated, DECAYED * dissipated[-1]))
+    return float(motion.times[place] - motion.times[0])
+
+
+def _ring_down(
+    rig: RigModel, motion: Motion, hammer: given.Hammer, energy: float, reporter: Reporter
+) -> dict[str, Array] | None:
+    """Frequency and damping of the first mode against its amplitude; None of a dead beat.
+
+    By the acceleration, as it is measured: what the joint creeps does not disturb it.
+    """
+    free = motion.times > hammer.duration
+    step = float(motion.times[1] - motion.times[0])
+    try:
+        found = ring_down(rig.looked_at(motion.acceleration)[free], step, hammer.band)
+    except SignalError as error:
+        reporter.warn(f"no ring-down at {joules(energy)}: {error}")
+        return None
+    amplitude = found.amplitude / (2.0 * np.pi * found.frequency) ** 2
+    if amplitude[0] < NOTHING_LEFT * np.abs(rig.looked_at(motion.displacement)).max():
+        reporter.warn(f"no ring-down at {joules(energy)}: over before the filter has settled")
+        return None
+    kept = np.unique(np.linspace(0, len(amplitude) - 1, RING_DOWN_POINTS).astype(int))
+    return {
+        "amplitude": amplitude[kept],
+        "frequency": found.frequency[kept],
+        "damping_ratio": found.damping_ratio[kept],
+    }
+
+
+def _ends(decay: dict[str, Array] | None) -> dict[str, dict[str, float]] | None:
+    """A ring-down where it is largest and where it is smallest."""
+    if decay is None:
+        return None
+    return {
+        when: {name: float(values[place]) for name, values in decay.items()}
+        for when, place in (("largest", 0), ("smallest", -1))
+    }
+
+
+def _trend(states: Sequence[State]) -> dict[str, Any]:
+    """What wear makes of the first mode: ratios of the last state to the first; 1 up, -1 down.
+
+    Its damping is that of the largest amplitude that the ring-downs show. A joint that dissipates
+    nothing has no trend.
+    """
+    if len(states) < 2:
+        return {}
+    first, last = (_first_mode(state) for state in (states[0], states[-1]))
+    both = [name for name in first if name in last and first[name] > 0.0]
+    return {
+        "ratio": {name: last[name] / first[name] for name in both},
+        "trend": {name: float(np.sign(last[name] - first[name])) for name in both},
+    }
+
+
+def _first_mode(state: State) -> dict[str, float]:
+    numbers = state.numbers
+    found = {name: numbers[name] for name in ("first_frequency", "first_peak", "decay_time")}
+    if numbers["ring_down"] is not None:
+        found["damping_ratio"] = numbers["ring_down"]["largest"]["damping_ratio"]
+    return found

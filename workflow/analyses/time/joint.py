@@ -1,0 +1,188 @@
+"""A joint alone, at a prescribed stroke: aged by jumps in energy, with its loops on the way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+import numpy as np
+
+from sa_solver.types import Array
+from wear.joints.ageing import (
+    AgeingError,
+    LongTest,
+    MarchedStroke,
+    NeverReachedError,
+    integrated_stretch,
+    long_test,
+    steady_stroke,
+)
+from wear.joints.law import march
+from wear.joints.measured_loops import MeasuredLoopError, measure_loops
+from workflow.analyses.rig.laws import Law
+from workflow.analyses.time.case import Ageing, JointCase, joules
+from workflow.analyses.time.joint_model import JointModel
+from workflow.analyses.time.outcome import LOOP, PARAMETERS, State, TimeOutcome
+from workflow.errors import MethodFailed, UserError
+from workflow.shell.reporter import Reporter
+
+# Points of a loop: those of a cosine over a cycle, dense where the motion turns.
+LOOP_POINTS = 720
+# Cycles that a loop settles in from rest: the second one repeats itself for every law but
+# Bouc-Wen's, which takes a few more where it hardly slides.
+SETTLING = 20
+# Cycles integrated one by one beside the jumps, half way through the test.
+STRETCH = 1000
+# Points of the evolution over the energy: evenly, and as many evenly over its logarithm from this
+# share on, as friction changes within a few cycles.
+CURVE_POINTS, CURVE_BEGIN = 101, 1e-6
+
+
+def run_joint(case: JointCase, reporter: Reporter) -> TimeOutcome:
+    """Age a joint at its stroke, and look at it at the energies asked for.
+
+    Raises UserError where it never dissipates the energy, MethodFailed where it cannot be aged.
+    """
+    model, amplitude = JointModel.of(case), 0.5 * case.drive.stroke
+    with reporter.stage("ageing"):
+        rate = steady_stroke(model.line_law, model.evolution, amplitude)
+        test = aged(rate, case.ageing, model.evolution.breaks)
+    last = test_end(test, case.ageing)
+    with reporter.stage("loops"):
+        states = tuple(
+            _state(model, energy, float(test.cycles_at(energy)), amplitude)
+            for energy in energies_within(case.energies, last, reporter)
+        )
+    with reporter.stage("check of the jumps"):
+        numbers = _ageing_numbers(model, test, amplitude)
+    cycles = test.total_cycles
+    ended = {"cycles": cycles, "energy": last, "duration": cycles / case.drive.frequency}
+    curve = evolution_curve(model, last, test, rate)
+    return TimeOutcome(case, states, curve, ended | {"ageing": numbers})
+
+
+def _state(model: JointModel, energy: float, cycles: float, amplitude: float) -> State:
+    displacement, force, dissipated = steady_loop(model.at(energy), amplitude)
+    parameters = model.parameters(energy)
+    numbers = {
+        "energy_per_cycle": dissipated,
+        "stroke": float(np.ptp(displacement)),
+        "force": 0.5 * float(np.ptp(force)),
+        "extracted": extracted(displacement, force, parameters["normal_load"]),
+    }
+    curves = {LOOP: {"displacement": displacement, "force": force}}
+    return State(energy, cycles, parameters, numbers, curves)
+
+
+def steady_loop(law: Law, amplitude: float) -> tuple[Array, Array, float]:
+    """A settled cycle between ± ``amplitude`` [mm]: displacement, force, and energy dissipated.
+
+    From a reversal on, its end included.
+    """
+    phase = np.linspace(0.0, 2.0 * np.pi, LOOP_POINTS + 1)
+    moved = amplitude * np.cos(phase)[:, None, None]
+    settling = np.array([amplitude, *[-amplitude, amplitude] * SETTLING])[:, None, None]
+    begin = np.zeros((1, 1))
+    settled = march(law, law.rest(1), begin, settling)
+    cycle = march(law, settled.state, settling[-1], moved)
+    return moved[:, 0, 0], cycle.force[:, 0, 0], float(cycle.dissipated.sum())
+
+
+def extracted(displacement: Array, force: Array, normal_load: float) -> dict[str, float | None]:
+    """What the loop would tell one who measures it; None where it does not."""
+    try:
+        # Two periods: a cycle then begins and ends at a reversal for sure.
+        found = measure_loops(
+            np.concatenate([displacement, displacement[1:], displacement[1:2]]),
+            np.concatenate([force, force[1:], force[1:2]]),
+            normal_load,
+        )
+    except MeasuredLoopError:
+        return dict.fromkeys(("friction", "stiffness", "residual_stiffness", "energy"))
+    return {
+        "friction": float(np.mean(found.friction)) if found.slides and normal_load else None,
+        "stiffness": float(np.mean(found.stick_stiffness)),
+        "residual_stiffness": float(np.mean(found.residual_stiffness)) if found.slides else None,
+        "energy": float(np.mean(found.energy)),
+    }
+
+
+# --- ageing -------------------------------------------------------------------------------------
+
+
+def aged(rate: Callable[[float], float], ageing: Ageing, breaks: tuple[float, ...]) -> LongTest:
+    """A long test to the end that the case asks for.
+
+    Raises UserError where so much energy is never dissipated, MethodFailed where jumps fail.
+    """
+    try:
+        return long_test(
+            rate,
+            np.inf if ageing.cycles is None else ageing.cycles,
+            until=np.inf if ageing.energy is None else ageing.energy,
+            tolerance=ageing.tolerance,
+            breaks=breaks,
+        )
+    except NeverReachedError as error:
+        raise UserError(f"ageing.energy: {error}; allowed: less, or a joint that slides") from error
+    except AgeingError as error:
+        raise MethodFailed(f"ageing: {error}") from error
+
+
+def test_end(test: LongTest, ageing: Ageing) -> float:
+    """Energy at the end of a test [N mm]."""
+    return test.final_energy if ageing.energy is None else ageing.energy
+
+
+def energies_within(
+    energies: tuple[float, ...], last: float, reporter: Reporter
+) -> Iterator[float]:
+    """The energies asked for that a test has reached, and its last."""
+    for energy in energies:
+        if energy < last:
+            yield energy
+        elif energy > last:
+            reporter.warn(
+                f"energies: {joules(energy)} are not reached: the test ends at {joules(last)}"
+            )
+    yield last
+
+
+def evolution_curve(
+    model: JointModel,
+    last: float,
+    test: LongTest | None = None,
+    rate: Callable[[float], float] | None = None,
+) -> dict[str, Array]:
+    """Parameters over the energy up to the ``last``; cycles and energy per cycle where aged."""
+    energy = np.array([0.0])
+    if last > 0.0:
+        even = np.linspace(0.0, last, CURVE_POINTS)
+        energy = np.union1d(even, np.geomspace(CURVE_BEGIN * last, last, CURVE_POINTS)[:-1])
+    parameters = [model.parameters(float(own)) for own in energy]
+    curve = {"energy": energy}
+    if test is not None and rate is not None:
+        curve["cycles"] = test.cycles_at(energy)
+        curve["energy_per_cycle"] = np.array([rate(float(own)) for own in energy])
+    names = [name for name in PARAMETERS if name in parameters[0]]
+    return curve | {name: np.array([own[name] for own in parameters]) for name in names}
+
+
+def _ageing_numbers(model: JointModel, test: LongTest, amplitude: float) -> dict[str, Any]:
+    """How good the jumps are: as stated, and beside cycles marched with their memory."""
+    numbers: dict[str, Any] = {"error": test.error, "evaluations": test.evaluations}
+    first = np.floor(0.5 * test.total_cycles)
+    cycles = int(min(STRETCH, test.total_cycles - first))
+    if cycles < 1:
+        return numbers
+    begin = float(test.energy_at(first))
+    marched = MarchedStroke(model.line_law, model.evolution, amplitude, start=begin)
+    stretch = integrated_stretch(test, marched, first, cycles)
+    return numbers | {
+        "stretch": {
+            "first": stretch.first,
+            "cycles": cycles,
+            "difference": stretch.difference,
+            "stated": stretch.stated,
+        }
+    }

@@ -1,0 +1,28 @@
+"""Memory a case in time needs."""
+
+from __future__ import annotations
+
+from workflow.analyses.rig.structure import ReducedBody
+from workflow.analyses.time.case import JointCase, RigCase
+from workflow.shell.memory import Memory
+
+# A rig in time: displacement, velocity, acceleration, forces, energies and what is made of them,
+# per mass and step, with the objects that hold a step while it is found.
+STEP_COLUMNS = 60
+# The same per displacement of a reduced body, whose numbers are in large arrays.
+REDUCED_COLUMNS = 20
+
+
+def memory(case: JointCase | RigCase, displacements: int = 0) -> Memory:
+    """Of the motions: every step, with all its columns, at every energy.
+
+    A reduced body has so many ``displacements``, once they are known.
+    """
+    remedy = "raise integration.step, or shorten what is recorded"
+    if isinstance(case, JointCase):
+        return Memory(0.0, remedy)
+    if isinstance(case.structure, ReducedBody):
+        # Of these motions little is kept once they are found.
+        return Memory(REDUCED_COLUMNS * displacements * case.steps, remedy)
+    columns = STEP_COLUMNS * len(case.structure.masses) * len(case.energies)
+    return Memory(columns * case.steps, remedy)

@@ -1,0 +1,65 @@
+"""Motions of a rig whose joints have aged: found, measured, and what is kept of them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fe_models.dynamics.excitation import Force
+from fe_models.dynamics.motion import Motion, Start
+from fe_models.dynamics.newmark import StepControl, integrate
+from sa_solver.types import Array
+from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.time.case import RigCase, joules
+from workflow.analyses.time.joint_model import JointModel
+from workflow.errors import MethodFailed
+
+
+def step_control(case: RigCase) -> StepControl:
+    """Steps as the case asks for."""
+    return StepControl(case.integration.step, case.integration.tolerance)
+
+
+def motion_of(
+    rig: RigModel,
+    joint: JointModel,
+    energy: float,
+    force: Force,
+    duration: float,
+    control: StepControl,
+    start: Start | None = None,
+) -> Motion:
+    """Motion of a rig whose joints have dissipated so much ``energy`` [N mm] before.
+
+    Raises MethodFailed for one that was not found to its end.
+    """
+    law = joint.at(energy)
+    motion = integrate(rig.model, law, rig.shaken(law, force), duration, control, start)
+    if not motion.converged:
+        raise MethodFailed(f"motion at {joules(energy)}: {motion.message}")
+    return motion
+
+
+def motion_numbers(rig: RigModel, motion: Motion) -> dict[str, Any]:
+    """What a motion comes to."""
+    return {
+        "dissipated": float(motion.energies.joints[-1].sum()),
+        "largest_displacement": float(np.abs(rig.looked_at(motion.displacement)).max()),
+        **rig.contact(motion),
+        "step_error": motion.error,
+        "joint_residual": motion.residual,
+        "balance_error": motion.energies.balance_error,
+    }
+
+
+def motion_curves(rig: RigModel, motion: Motion, force: Force) -> dict[str, Array]:
+    """What is kept of a motion."""
+    return {
+        "time": motion.times,
+        "excitation": force.value(motion.times),
+        "displacement": motion.displacement @ rig.seen.T,
+        "acceleration": motion.acceleration @ rig.seen.T,
+        "joint_force": rig.loop(motion)[1],
+        "dissipated": motion.energies.joints.sum(axis=1),
+    }

@@ -1,0 +1,272 @@
+"""A rig with a joint: shaken until it is steady, driven by a recorded force, or hit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from scipy.interpolate import PchipInterpolator
+
+from fe_models.dynamics.excitation import Harmonic, Recorded
+from fe_models.dynamics.motion import Start
+from fe_models.dynamics.newmark import StepControl
+from sa_solver.types import Array
+from wear.joints.ageing import LongTest
+from workflow.analyses.rig import excitation as given
+from workflow.analyses.rig.building import rig_model
+from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.time.case import Ageing, RigCase, joules
+from workflow.analyses.time.hammer import run_hammer
+from workflow.analyses.time.joint import aged, energies_within, evolution_curve, extracted, test_end
+from workflow.analyses.time.joint_model import JointModel
+from workflow.analyses.time.memory import memory
+from workflow.analyses.time.motion import motion_curves, motion_numbers, motion_of, step_control
+from workflow.analyses.time.outcome import LOOP, MOTION, State, TimeOutcome
+from workflow.errors import MethodFailed
+from workflow.shell.reporter import Reporter
+
+# Cycles in a row that must change little before a state is steady: one alone may change little
+# while a slow mode turns.
+IN_A_ROW = 3
+# Steady states that an ageing is first built on, beside that of no energy, and at most. Doubled
+# until the cycles agree.
+FEWEST_STATES, MOST_STATES = 6, 48
+# The first of them, as a share of the last energy: friction that rises as ln E changes early.
+FIRST_STATE = 1e-6
+
+
+@dataclass(frozen=True)
+class SteadyCycle:
+    """The last of ``periods`` cycles, and where to go on from.
+
+    ``amplitudes`` ``(k,)`` of what is seen [mm]; of the joints ``stretch`` [mm] and ``force`` [N]
+    ``(t,)``, ``energy`` [N mm] that they dissipate, and how they press, ``contact``. ``change`` is
+    that of energy and stroke from the cycle before, ``error`` what one step may add to the
+    displacement, both relative.
+    """
+
+    amplitudes: Array
+    stretch: Array
+    force: Array
+    energy: float
+    contact: dict[str, Any]
+    periods: int
+    change: float
+    error: float
+    end: Start
+
+
+def run_rig(case: RigCase, reporter: Reporter) -> TimeOutcome:
+    """Run a rig at all energies that are asked for.
+
+    Raises MethodFailed where a motion is not found or not steady, UserError where the joint can
+    never dissipate what it is to be aged by.
+    """
+    rig = rig_model(case.structure, case.joint, case.excitation.mass, reporter)
+    memory(case, len(rig.model.mass)).check()
+    joint = JointModel.of(case, rig.joints)
+    if isinstance(case.excitation, given.Hammer):
+        outcome = run_hammer(case, rig, joint, reporter)
+    elif isinstance(case.excitation, given.Recorded):
+        outcome = _run_recorded(case, case.excitation, rig, joint, reporter)
+    else:
+        outcome = _run_harmonic(case, case.excitation, rig, joint, reporter)
+    numbers = {"free": rig.free(), **outcome.numbers}
+    return replace(outcome, numbers=numbers, seen=rig.labels)
+
+
+# --- recorded -----------------------------------------------------------------------------------
+
+
+def _run_recorded(
+    case: RigCase,
+    excitation: given.Recorded,
+    rig: RigModel,
+    joint: JointModel,
+    reporter: Reporter,
+) -> TimeOutcome:
+    times, samples = excitation.read()
+    force = Recorded(rig.driven, times, samples)
+    control, begin = step_control(case), Start(time=float(times[0]))
+    states = []
+    for energy in case.energies:
+        with reporter.stage("motion"):
+            motion = motion_of(rig, joint, energy, force, float(np.ptp(times)), control, begin)
+        largest = {"largest_force": float(np.abs(rig.loop(motion)[1]).max())}
+        numbers = rig.modes(joint.at(energy)) | motion_numbers(rig, motion) | largest
+        curves = {MOTION: motion_curves(rig, motion, force)}
+        states.append(State(energy, None, joint.parameters(energy), numbers, curves))
+    return TimeOutcome(case, tuple(states), evolution_curve(joint, case.energies[-1]))
+
+
+# --- harmonic -----------------------------------------------------------------------------------
+
+
+def _run_harmonic(
+    case: RigCase,
+    excitation: given.Harmonic,
+    rig: RigModel,
+    joint: JointModel,
+    reporter: Reporter,
+) -> TimeOutcome:
+    steady = _SteadyStates(case, excitation, rig, joint)
+    energies, rate, test = list(case.energies), None, None
+    cycles: list[float | None] = [None] * len(energies)
+    numbers: dict[str, Any] = {}
+    if case.ageing.wanted:
+        with reporter.stage("ageing"):
+            rate, test, numbers = _aged(case.ageing, steady, joint, reporter)
+        energies = list(energies_within(case.energies, numbers["energy"], reporter))
+        cycles = test.cycles_at(np.array(energies)).tolist()
+    with reporter.stage("steady states"):
+        states = tuple(
+            _steady_state(rig, joint, energy, steady.at(energy), reached)
+            for energy, reached in zip(energies, cycles, strict=True)
+        )
+    return TimeOutcome(case, states, evolution_curve(joint, energies[-1], test, rate), numbers)
+
+
+def _steady_state(
+    rig: RigModel,
+    joint: JointModel,
+    energy: float,
+    cycle: SteadyCycle,
+    cycles: float | None,
+) -> State:
+    parameters = joint.parameters(energy)
+    numbers: dict[str, Any] = rig.modes(joint.at(energy)) | {
+        "stroke": float(np.ptp(cycle.stretch)),
+        "energy_per_cycle": cycle.energy,
+        "force": 0.5 * float(np.ptp(cycle.force)),
+        "amplitudes": cycle.amplitudes.tolist(),
+        **cycle.contact,
+        "extracted": extracted(cycle.stretch, cycle.force, parameters["normal_load"]),
+        "periods": cycle.periods,
+        "change": cycle.change,
+        "step_error": cycle.error,
+    }
+    curves = {LOOP: {"displacement": cycle.stretch, "force": cycle.force}}
+    return State(energy, cycles, parameters, numbers, curves)
+
+
+class _SteadyStates:
+    """Steady states of a rig at any energy, each found once, from the one that is nearest."""
+
+    def __init__(
+        self,
+        case: RigCase,
+        excitation: given.Harmonic,
+        rig: RigModel,
+        joint: JointModel,
+    ) -> None:
+        self._excitation, self._rig, self._joint = excitation, rig, joint
+        self._steps = int(np.ceil(1.0 / (excitation.frequency * case.integration.step) - 1e-9))
+        self._tolerance = case.integration.tolerance
+        self._found: dict[float, SteadyCycle] = {}
+
+    def at(self, energy: float) -> SteadyCycle:
+        """The steady cycle after so much dissipated ``energy`` [N mm]."""
+        if energy not in self._found:
+            near = min(self._found, key=lambda own: abs(own - energy), default=None)
+            start = None if near is None else self._found[near].end
+            self._found[energy] = self._settle(energy, start)
+        return self._found[energy]
+
+    def _settle(self, energy: float, start: Start | None) -> SteadyCycle:
+        excitation, rig = self._excitation, self._rig
+        period = 1.0 / excitation.frequency
+        force = Harmonic(rig.driven, excitation.force, excitation.frequency)
+        control = StepControl(period / self._steps, self._tolerance)
+        if start is not None:
+            # Where a period begins, whatever came before: times must not lose their digits.
+            start = replace(start, time=0.0)
+        before, in_a_row = np.full(2, np.inf), 0
+        for periods in range(1, excitation.periods + 1):
+            motion = motion_of(rig, self._joint, energy, force, period, control, start)
+            start = replace(motion.end, time=0.0)
+            dissipated = float(motion.energies.joints[-1].sum())
+            stretch, joint_force = rig.loop(motion)
+            now = np.array([dissipated, np.ptp(stretch)])
+            change = _change(now, before)
+            in_a_row = in_a_row + 1 if change <= excitation.steady else 0
+            if in_a_row == IN_A_ROW:
+                return SteadyCycle(
+                    0.5 * np.ptp(motion.displacement @ rig.seen.T, axis=0),
+                    stretch,
+                    joint_force,
+                    dissipated,
+                    rig.contact(motion),
+                    periods,
+                    change,
+                    motion.error,
+                    start,
+                )
+            before = now
+        raise MethodFailed(
+            f"no steady state at {joules(energy)} after {excitation.periods} cycles: they still "
+            f"change by {change:.1e}; raise excitation.periods or excitation.steady"
+        )
+
+
+def _change(now: Array, before: Array) -> float:
+    """The larger relative change of energy and stroke; of what stays at nothing there is none."""
+    if not np.isfinite(before).all():
+        return np.inf
+    scale = np.where(now > 0.0, now, 1.0)
+    return float(np.max(np.abs(now - before) / scale))
+
+
+# --- ageing -------------------------------------------------------------------------------------
+
+
+def _aged(
+    ageing: Ageing, steady: _SteadyStates, joint: JointModel, reporter: Reporter
+) -> tuple[Callable[[float], float], LongTest, dict[str, Any]]:
+    """Energy per cycle between steady states, the test that it makes, and its numbers.
+
+    Steady states are added between those there are until they no longer change the cycles.
+    """
+    breaks = joint.evolution.breaks
+    end = ageing.energy or _energy_of(ageing, steady)
+    nodes = [0.0, *np.geomspace(FIRST_STATE * end, end, FEWEST_STATES).tolist()]
+    before = np.inf
+    while True:
+        rate = _between(nodes, [steady.at(energy).energy for energy in nodes])
+        test = aged(rate, ageing, (*breaks, *nodes[1:-1]))
+        last = test_end(test, ageing)
+        cycles = test.total_cycles
+        # By energy the cycles change, by cycles the energy.
+        now = cycles if ageing.energy is not None else last
+        change = abs(now - before) / now
+        if change <= ageing.tolerance or len(nodes) > MOST_STATES:
+            break
+        before = now
+        inner = np.sqrt(np.multiply(nodes[1:-1], nodes[2:])).tolist()
+        nodes = sorted({*nodes, *inner, max(last, nodes[-1])})
+    if change > ageing.tolerance:
+        reporter.warn(
+            f"ageing: {len(nodes)} steady states leave an error of about {change:.1e}, above "
+            f"ageing.tolerance {ageing.tolerance:g}"
+        )
+    numbers = {"relative_error": change, "steady_states": len(nodes)}
+    return rate, test, {"cycles": cycles, "energy": last, "ageing": numbers}
+
+
+def _energy_of(ageing: Ageing, steady: _SteadyStates) -> float:
+    """About the energy of so many cycles [N mm]."""
+    assert ageing.cycles is not None
+    energy = ageing.cycles * steady.at(0.0).energy
+    return ageing.cycles * max(steady.at(energy).energy, steady.at(0.0).energy)
+
+
+def _between(energies: list[float], rates: list[float]) -> Callable[[float], float]:
+    """Energy of a cycle between those computed, over ln(E + E1); constant beyond the last."""
+    places, floor = np.asarray(energies), energies[1]
+    curve = PchipInterpolator(np.log(places + floor), rates)
+
+    def rate(energy: float) -> float:
+        return max(float(curve(np.log(min(energy, places[-1]) + floor))), 0.0)
+
+    return rate

@@ -1,0 +1,32 @@
+"""A case in time: a joint at a prescribed stroke, or in a rig that is shaken, hit or driven."""
+
+from __future__ import annotations
+
+from wear.joints.parameters import JointError
+from workflow.analyses.time.case import JointCase, RigCase
+from workflow.analyses.time.joint import run_joint
+from workflow.analyses.time.results import write_time_output
+from workflow.analyses.time.rig import run_rig
+from workflow.analyses.time.worn_joint import warn_of_table, with_computed_wear
+from workflow.errors import UserError
+from workflow.shell.analysis import Run
+
+
+def run_time(run: Run[JointCase | RigCase]) -> None:
+    """Run a case in time to its end.
+
+    Raises UserError where joint or rig cannot be what the case says, MethodFailed where a motion
+    cannot be followed or is not steady.
+    """
+    folder, reporter = run.folder, run.reporter
+    reporter.say(f"run: {run.case.title}")
+    case = with_computed_wear(run)
+    try:
+        if isinstance(case, JointCase):
+            outcome = run_joint(case, reporter)
+        else:
+            outcome = run_rig(case, reporter)
+    except JointError as error:
+        raise UserError(f"{folder.case}: joint: {error}") from error
+    warn_of_table(case, float(outcome.evolution["energy"][-1]), reporter)
+    write_time_output(outcome, folder, reporter)

@@ -1,0 +1,81 @@
+"""A joint whose friction and stiffness follow the wear of its contact, computed first."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from workflow.analyses import wear
+from workflow.analyses.time.case import JointCase, RigCase
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.loop_table import read_loop_table
+from workflow.case.loading import load_case
+from workflow.errors import CaseError, UserError
+from workflow.shell.analysis import Run
+from workflow.shell.reporter import Reporter
+
+# A joint is under the load of its table when they differ by less than this share.
+SAME_LOAD = 0.01
+# Folder of the wear run inside that of the joint.
+WEAR = "wear"
+
+
+def with_computed_wear(run: Run[JointCase | RigCase]) -> JointCase | RigCase:
+    """The case with the table of loops that its wear case leaves; as it is if it names none.
+
+    The wear case runs into ``wear`` in the folder, from where an earlier run of it there has got
+    to. Raises UserError if it cannot be read, is not one of a single contact, or asks for no loops.
+    """
+    case, file = run.case, run.case.evolution.file
+    if file is None or not file.endswith(".yaml"):
+        return case
+    _check(file)
+    folder = run.folder.root / WEAR
+    with run.reporter.stage("wear of the contact"):
+        computed = run.compute(Path(file), folder)
+    if not computed:
+        run.reporter.say(f"wear of the contact: as an earlier run has left it in {folder}")
+    tables = sorted(folder.glob("loops_*.csv"))
+    if len(tables) != 1:
+        names = ", ".join(path.stem.removeprefix("loops_") for path in tables)
+        raise UserError(
+            f"evolution.file: {file} wears the contacts {names}; allowed: a case of one contact, "
+            f"or one of the tables in {folder}"
+        )
+    evolution = case.evolution.model_copy(update={"file": str(tables[0])})
+    return case.model_copy(update={"evolution": evolution})
+
+
+def warn_of_table(case: JointCase | RigCase, last: float, reporter: Reporter) -> None:
+    """Say where a table of loops is used beyond its energies, or under another load.
+
+    ``last`` is the largest energy that the joint came to [N mm].
+    """
+    if case.evolution.file is None:
+        return
+    table = read_loop_table(Path(case.evolution.file))
+    if last > table.energy[-1]:
+        reporter.warn(
+            f"evolution.file: its loops end at {1e-3 * table.energy[-1]:g} J; beyond, up to "
+            f"{1e-3 * last:g} J, the last one holds"
+        )
+    load = case.joint.normal_load
+    if load > 0.0 and np.any(np.abs(table.P - load) > SAME_LOAD * load):
+        reporter.warn(
+            f"evolution.file: its loops are under {table.P.min():g} to {table.P.max():g} N, the "
+            f"joint is under {load:g} N: stiffness depends on the load"
+        )
+
+
+def _check(file: str) -> None:
+    """Refuse a file that is no wear case, or one without loops."""
+    try:
+        case: WearCase = load_case(Path(file), list(wear.ANALYSIS.cases.values()))
+    except CaseError as error:
+        raise UserError(f"evolution.file: {error}") from error
+    if not case.loops.wanted:
+        raise UserError(
+            f"evolution.file: {file} leaves no table of loops; allowed: a wear case with "
+            "loops.amplitude or loops.force"
+        )

@@ -1,0 +1,34 @@
+"""Steady vibration of structures with joints, by harmonic balance."""
+
+from itertools import product
+
+from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.memory import memory
+from workflow.shell.analysis import Analysis, Comparison, Run, Summary
+
+__all__ = ["ANALYSIS"]
+
+# What the motions under every force are compared by: a resonance's frequency says little, where the
+# amplitude hardly changes with it.
+MOTIONS = "amplitude", "energy_per_cycle", "loops.-1.energy"
+
+
+def _run(run: Run[VibrationCase]) -> None:
+    # Joint laws are compiled when they are first needed.
+    from workflow.analyses.vibration.run import run_vibration
+
+    run_vibration(run.case, run.folder, run.reporter)
+
+
+def _quantities(case: VibrationCase, summary: Summary) -> list[str]:
+    count = len(case.forces)
+    return [f"responses.{n}.{moved}" for n, moved in product(range(count), MOTIONS)]
+
+
+ANALYSIS = Analysis(
+    name="vibration",
+    cases={"vibration": VibrationCase},
+    run=_run,
+    memory=memory,
+    comparison=Comparison(quantities=_quantities),
+)

@@ -1,0 +1,144 @@
+"""Figure of a vibration case: the loops under all forces at one frequency, and their slopes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+
+from sa_solver.types import Array
+from workflow.pictures.fields import spread
+from workflow.pictures.style import new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# More loops than this overlap.
+MOST_LOOPS = 8
+FORCE_COLOURS = "viridis"
+TO_MICRONS, PER_MICRON = 1e3, 1e-3  # mm to µm, N/mm to N/µm
+COARSE: dict[str, Any] = {"linestyle": (0, (2, 1)), "linewidth": 1.0}
+# Of the way on which the tallest loop would gain its height if it stuck: what the branches show.
+REACH = 1.6
+HEADROOM = 1.08
+
+
+def has_loops(file: h5py.File) -> bool:
+    """Whether there is a loop under some force."""
+    return any("loops" in own for own in file["responses"].values())
+
+
+def loops(file: h5py.File) -> Figure:
+    """Force against displacement in a cycle, and the rising branches from one reversal on.
+
+    Of coarser resolutions than the last the force is shown, thin and dashed, as their harmonics
+    alone give it: too few of them deform the loop.
+    """
+    responses = file["responses"]
+    names = spread([name for name in sorted(responses) if "loops" in responses[name]], MOST_LOOPS)
+    shown = [responses[name] for name in names]
+    figure = new_figure(_title(shown), 7.5)
+    left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
+    for own, colour in zip(shown, _colours(len(shown)), strict=True):
+        for coarse in _resolutions(own)[:-1]:
+            left.plot(*_curve(coarse, "expansion"), color=colour, **COARSE)
+        left.plot(*_curve(_finest(own)), color=colour)
+        _draw_branch(right, _finest(own), colour, f"{own.attrs['force']:g} N")
+    _bound(right, [_finest(own) for own in shown])
+    _label(left, right, shown[0])
+    return figure
+
+
+def _label(left: Axes, right: Axes, own: h5py.Group) -> None:
+    finest, coarse = _finest(own), _resolutions(own)[:-1]
+    text = f"{finest.attrs['frequency']:.4g} Hz, {_harmonics(finest)} harmonics"
+    if coarse:
+        text += f"; dashed: the force in {', '.join(map(_harmonics, coarse))} alone"
+    left.set_title(text)
+    right.set_title("rising branches from one origin")
+    left.set_xlabel("displacement [µm]")
+    left.set_ylabel("tangential force [N]")
+    right.set_xlabel("displacement since the reversal [µm]")
+    right.set_ylabel("force since the reversal [N]")
+    right.legend(loc="lower right", title="excitation: stick slope (dashed)")
+
+
+def _resolutions(own: h5py.Group) -> list[h5py.Group]:
+    """Loops of a force, the finest last."""
+    return [own["loops"][name] for name in sorted(own["loops"])]
+
+
+def _finest(own: h5py.Group) -> h5py.Group:
+    return _resolutions(own)[-1]
+
+
+def _harmonics(loop: h5py.Group) -> str:
+    """How many harmonics the motion has, the mean apart."""
+    return str(int(np.count_nonzero(loop.attrs["harmonics"])))
+
+
+def _colours(count: int) -> list[Any]:
+    from matplotlib import colormaps
+
+    return [colormaps[FORCE_COLOURS](shade) for shade in np.linspace(0.0, 0.9, count)]
+
+
+def _curve(loop: h5py.Group, force: str = "force") -> tuple[Array, Array]:
+    return TO_MICRONS * loop["displacement"][()], loop[force][()]
+
+
+def rising_branch(displacement: Array, force: Array) -> tuple[Array, Array]:
+    """The branch of a closed cycle ``(t,)`` from its smallest to its largest displacement.
+
+    Both are counted from the reversal at which it begins.
+    """
+    displacement, force = displacement[:-1], force[:-1]
+    first = int(displacement.argmin())
+    count = (int(displacement.argmax()) - first) % len(displacement) + 1
+    branch = (first + np.arange(count)) % len(displacement)
+    return displacement[branch] - displacement[first], force[branch] - force[first]
+
+
+def _draw_branch(axis: Axes, loop: h5py.Group, colour: Any, label: str) -> None:
+    moved, gained = rising_branch(*_curve(loop))
+    slope = _slope(loop)
+    text = f"{label}: {slope:.4g} N/µm" if np.isfinite(slope) else f"{label}: none"
+    axis.plot(moved, gained, color=colour, label=text)
+    if np.isfinite(slope):
+        top = gained.max()
+        axis.plot([0.0, top / slope], [0.0, top], "--", color=colour, linewidth=1.0, zorder=3)
+
+
+def _slope(loop: h5py.Group) -> float:
+    """Slope of stick [N/µm], NaN where there is none."""
+    slope = PER_MICRON * float(loop.attrs.get("stiffness", np.nan))
+    return slope if slope > 0.0 else np.nan
+
+
+def _bound(axis: Axes, shown: list[h5py.Group]) -> None:
+    """Show the part in which branches bend, not the way on which they slide."""
+    heights = [float(np.ptp(loop["force"][()])) for loop in shown]
+    ways = [height / _slope(loop) for height, loop in zip(heights, shown, strict=True)]
+    longest = max((way for way in ways if np.isfinite(way)), default=np.nan)
+    if np.isfinite(longest):
+        axis.set_xlim(0.0, REACH * longest)
+    if max(heights) > 0.0:
+        axis.set_ylim(0.0, HEADROOM * max(heights))
+
+
+def _title(shown: list[h5py.Group]) -> str:
+    slopes = np.array([_slope(_finest(own)) for own in shown])
+    text = f"A cycle loses {', '.join(map(_lost, (shown[0], shown[-1])[: len(shown)]))}"
+    if np.isfinite(slopes).any():
+        low, high = (f"{own:.4g}" for own in (np.nanmin(slopes), np.nanmax(slopes)))
+        text += f"; it sticks with {low if low == high else f'{low} to {high}'} N/µm"
+    return text
+
+
+def _lost(own: h5py.Group) -> str:
+    """Energy of a loop, in words."""
+    loop = _finest(own).attrs
+    energy = f"{loop['energy']:.3g} mJ" if loop["slip"] > 0.0 else "nothing"
+    return f"{energy} under {own.attrs['force']:g} N"

@@ -1,0 +1,189 @@
+"""Figures of a vibration case: which nodes of a contact stick, slip and lift off."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+
+from sa_solver.types import Array, Indices
+from workflow.analyses.vibration.figures.axes import plain_ticks
+from workflow.analyses.vibration.pad_nodes import rows_and_columns
+from workflow.pictures.fields import spread
+from workflow.pictures.style import BLACK, BLUE, ORANGE, new_figure
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# As many forces as have a readable map each, over frequency and of the pad.
+MOST_MAPS, MOST_PADS = 3, 6
+# What a node does in a cycle, from 0 on, and its colour (Okabe and Ito's, and greys).
+KINDS = {
+    "sticks": BLUE,
+    "slips, up to half of the cycle": "#F0E442",
+    "slips longer": ORANGE,
+    "lifts off for a part": "#8A8A8A",
+    "open all the time": "#E3E3E3",
+}
+STICKS, SLIPS_BRIEFLY, SLIPS_LONG, LIFTS_OFF, OPEN = range(len(KINDS))
+HALF = 0.5
+# Shares of a cycle, of few samples: rounding.
+ROUNDING = 1e-9
+# Columns of a map over frequency: more than its pixels at three maps in a row.
+COLUMNS = 480
+# Where the pad is looked at, over the frequency of the peak: an octave below and above, or at the
+# end of the curve.
+OCTAVES = {"below": 0.5, "at the peak": 1.0, "above": 2.0}
+MOST_TICKS = 6
+# Heights of what is around the maps of the pad, and of these [inch]; more columns than ``WIDE`` ask
+# for less.
+AROUND_PADS, PAD_ROWS, WIDE = 2.4, 6.6, 4
+TO_MICRONS = 1e3
+
+
+def has_states(file: h5py.File) -> bool:
+    """Whether there are nodes with places and states."""
+    return "contact/x" in file and any("nodes" in own for own in file["responses"].values())
+
+
+def node_states(file: h5py.File) -> Figure:
+    """The state of every node over frequency, below the response, under some forces."""
+    shown = _with_states(file, MOST_MAPS)
+    figure = new_figure(_title(shown), 8.5)
+    panels = figure.subplots(
+        2, len(shown), sharex=True, sharey="row", squeeze=False, height_ratios=(1.0, 1.6)
+    )
+    distance = np.hypot(file["contact/x"][()], file["contact/y"][()])
+    order = np.argsort(distance, kind="stable")
+    for (top, bottom), own in zip(panels.T, shown, strict=True):
+        top.plot(own["frequency"][()], TO_MICRONS * own["amplitude"][:, -1] / own.attrs["force"])
+        _draw_over_frequency(bottom, own, order)
+        for axis in (top, bottom):
+            axis.axvline(own.attrs["resonance"], color=BLACK, linestyle=":", linewidth=1.2)
+        top.set_title(f"{own.attrs['force']:g} N: {own.attrs['resonance']:.4g} Hz")
+        bottom.set_xlabel("frequency [Hz]")
+    panels[0, 0].set_xscale("log")
+    panels[0, 0].set_yscale("log")
+    plain_ticks(bottom)
+    panels[0, 0].set_ylabel("amplitude / force [µm/N]")
+    panels[1, 0].set_ylabel("nodes by distance from the middle [mm]")
+    ticks = np.unique(np.linspace(0, len(order) - 1, MOST_TICKS).round().astype(int))
+    panels[1, 0].set_yticks(ticks + 0.5, [f"{distance[order[tick]]:.2g}" for tick in ticks])
+    _legend(figure)
+    return figure
+
+
+def pad_states(file: h5py.File) -> Figure:
+    """The state of the nodes on the pad: below, at and above the peak of each force."""
+    shown = _with_states(file, MOST_PADS)
+    height = PAD_ROWS * min(1.0, WIDE / len(shown))
+    figure = new_figure(_title(shown), AROUND_PADS + height)
+    panels = figure.subplots(len(OCTAVES), len(shown), sharex=True, sharey=True, squeeze=False)
+    for row, (name, factor) in zip(panels, OCTAVES.items(), strict=True):
+        for axis, own in zip(row, shown, strict=True):
+            place = _point_near(own, factor * float(own.attrs["resonance"]))
+            frequency, force = own["frequency"][place], own.attrs["force"]
+            _draw_pad(axis, file["contact"], _kinds(own)[place])
+            axis.set_title(f"{force:g} N, {frequency:.4g} Hz", fontsize="small")
+        row[0].set_ylabel(f"{name}\ny [mm]")
+    for axis in panels[-1]:
+        axis.set_xlabel("x [mm]")
+    _legend(figure)
+    return figure
+
+
+def _with_states(file: h5py.File, most: int) -> list[h5py.Group]:
+    """The forces that have states; of many, some."""
+    responses = file["responses"]
+    names = [name for name in sorted(responses) if "nodes" in responses[name]]
+    return [responses[name] for name in spread(names, most)]
+
+
+def _kinds(own: h5py.Group) -> Indices:
+    """What every node does at every point of a curve ``(p, j)``, as places in ``KINDS``."""
+    slip, apart = own["nodes/slip"][()], own["nodes/separated"][()]
+    kinds = np.where(slip <= ROUNDING, STICKS, SLIPS_LONG)
+    kinds[(slip > ROUNDING) & (slip <= HALF)] = SLIPS_BRIEFLY
+    kinds[apart > ROUNDING] = LIFTS_OFF
+    kinds[apart >= 1.0 - ROUNDING] = OPEN
+    return kinds
+
+
+def _title(shown: list[h5py.Group]) -> str:
+    texts = []
+    for own in (shown[0], shown[-1])[: len(shown)]:
+        kinds = _kinds(own)[_point_near(own, float(own.attrs["resonance"]))]
+        touching = int((kinds != OPEN).sum())
+        sticking = int((kinds == STICKS).sum())
+        texts.append(f"{sticking} of {touching} under {own.attrs['force']:g} N")
+    return f"Nodes that touch and only stick at the peak: {', '.join(texts)}"
+
+
+# --- over frequency -----------------------------------------------------------------------------
+
+
+def _draw_over_frequency(axis: Axes, own: h5py.Group, order: Indices) -> None:
+    frequency = own["frequency"][()]
+    edges = np.geomspace(frequency.min(), frequency.max(), COLUMNS + 1)
+    points = largest_at(frequency, own["amplitude"][:, -1], np.sqrt(edges[1:] * edges[:-1]))
+    nodes = np.arange(len(order) + 1)
+    axis.grid(visible=False)
+    axis.pcolormesh(edges, nodes, _kinds(own)[points][:, order].T, **_look())
+
+
+def largest_at(frequency: Array, amplitude: Array, wanted: Array) -> Indices:
+    """Points ``(w,)`` of a curve ``(p,)`` nearest to the frequencies that are ``wanted``.
+
+    Where the curve folds it has several motions at a frequency: the largest is taken.
+    """
+    before, after = frequency[:-1], frequency[1:]
+    low, high = np.minimum(before, after), np.maximum(before, after)
+    inside = (low <= wanted[:, None]) & (wanted[:, None] <= high)
+    sizes = np.where(inside, np.maximum(amplitude[:-1], amplitude[1:]), -1.0)
+    segment = sizes.argmax(axis=1)
+    second = np.abs(after[segment] - wanted) < np.abs(before[segment] - wanted)
+    return np.asarray(segment + second)
+
+
+def _point_near(own: h5py.Group, frequency: float) -> int:
+    """Point of a curve nearest to a frequency, which is taken into its span."""
+    curve, amplitude = own["frequency"][()], own["amplitude"][:, -1]
+    inside = np.clip([frequency], curve.min(), curve.max())
+    return int(largest_at(curve, amplitude, inside)[0])
+
+
+# --- on the pad ---------------------------------------------------------------------------------
+
+
+def _draw_pad(axis: Axes, contact: h5py.Group, kinds: Indices) -> None:
+    """One coloured cell per node; one dot where the nodes are not in rows and columns."""
+    x, y = contact["x"][()], contact["y"][()]
+    axis.set_aspect("equal")
+    axis.grid(visible=False)
+    numbers = rows_and_columns(x, y)
+    if numbers is None:
+        axis.scatter(x, y, c=kinds, **_look())
+        return
+    edges = (_edges(x[numbers].mean(axis=1)), _edges(y[numbers].mean(axis=0)))
+    axis.pcolormesh(*edges, kinds[numbers].T, edgecolors="white", linewidth=0.5, **_look())
+
+
+def _edges(lines: Array) -> Array:
+    """Ends of the cells around ascending ``lines``, the first and last of which are whole."""
+    between = 0.5 * (lines[1:] + lines[:-1])
+    return np.concatenate([[2.0 * lines[0] - between[0]], between, [2.0 * lines[-1] - between[-1]]])
+
+
+def _look() -> dict[str, Any]:
+    from matplotlib.colors import ListedColormap
+
+    return {"cmap": ListedColormap(list(KINDS.values())), "vmin": -0.5, "vmax": len(KINDS) - 0.5}
+
+
+def _legend(figure: Figure) -> None:
+    from matplotlib.patches import Patch
+
+    patches = [Patch(facecolor=colour, label=name) for name, colour in KINDS.items()]
+    figure.legend(handles=patches, loc="outside lower center", ncols=len(KINDS), columnspacing=1.2)

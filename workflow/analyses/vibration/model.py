@@ -1,0 +1,173 @@
+"""The structure of a vibration case with its joints: how it rests, and what it does if linear."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, HarmonicSolution, PeriodicLoad
+from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.receptance import Receptance
+from sa_solver.types import Array
+from wear.joints.friction_contact import FrictionContact
+from wear.joints.periodic import PeriodicMarch
+from workflow.analyses.rig.building import rig_model
+from workflow.analyses.rig.laws import LAWS, Law, shared_out
+from workflow.analyses.rig.rig_model import RigModel
+from workflow.analyses.rig.structure import FrictionRig
+from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.memory import memory
+from workflow.errors import MethodFailed
+from workflow.shell.reporter import Reporter
+
+# Frequencies of the linear limits, beside their own natural frequencies. Each takes the inverse of
+# a matrix of all joints' directions, which for many joints is slow.
+LINEAR_POINTS, FEWER_POINTS, FEW_DIRECTIONS = 2000, 200, 12
+# Frequencies at once: a matrix of all joints' directions is held for each.
+AT_ONCE = 20
+# Joints that are worth a thread of their own, and threads at most.
+JOINTS_PER_THREAD, MOST_THREADS = 16, 8
+
+
+@dataclass(frozen=True)
+class VibrationModel:
+    """A structure, the ``law`` of each of its joints, and the forces on it."""
+
+    rig: RigModel
+    law: Law
+    problem: HarmonicBalance
+
+    @classmethod
+    def of(cls, case: VibrationCase, reporter: Reporter) -> VibrationModel:
+        """The model of a case. Raises UserError for a structure or joints that cannot be."""
+        rig = rig_model(case.structure, case.joint, case.mass, reporter)
+        memory(case, len(rig.model.mass), rig.joints).check()
+        law = _law(case, rig)
+        threads = max(1, min(rig.joints // JOINTS_PER_THREAD, os.cpu_count() or 1, MOST_THREADS))
+        static = rig.preload(law)
+        if rig.pressing is not None:
+            static = case.joint.normal_load * rig.pressing
+        problem = HarmonicBalance(
+            rig.model,
+            PeriodicMarch(law, threads),
+            # The force is a sine: Re (-i) exp(iωt).
+            PeriodicLoad({1: -1j * rig.driven}, static if static.any() else None),
+            Resolution(case.harmonics, case.resolution.samples),
+        )
+        return cls(rig, law, problem)
+
+    @cached_property
+    def rest(self) -> HarmonicSolution:
+        """The structure under its static load alone. Raises MethodFailed if it does not rest."""
+        found = self.problem.solve(1.0, 0.0)
+        if not found.converged:
+            raise MethodFailed(
+                "the joints do not balance the static load; change joint.normal_load or "
+                f"joint.normal_stiffness ({found.message})"
+            )
+        return found
+
+    @property
+    def resting(self) -> Array | None:
+        """Displacements ``(j, d)`` of joints by the static load, if a load presses them [mm]."""
+        return None if self.rig.pressing is None else self.rest.coefficients[:, 0]
+
+    @cached_property
+    def touching(self) -> np.ndarray:
+        """Which joints ``(j,)`` touch at rest."""
+        if not isinstance(self.law, FrictionContact):
+            return np.ones(self.rig.joints, dtype=bool)
+        return np.asarray(self.rest.cycle.samples[0, :, 2] > 0.0)
+
+    @cached_property
+    def _natural(self) -> dict[str, list[float]]:
+        """The lowest natural frequencies [Hz] with the joints free, stuck and sliding."""
+        return {"free": self.rig.free(), **self.rig.modes(self.law, self.resting)}
+
+    def numbers(self) -> dict[str, Any]:
+        """Natural frequencies, and how joints touch, for the summary."""
+        rig = self.rig
+        numbers: dict[str, Any] = {
+            **self._natural,
+            "damping_stuck": rig.stuck_damping(self.law, self.resting),
+        }
+        if self.rig.pressing is not None:
+            numbers["touching"] = int(self.touching.sum())
+            numbers["joints"] = self.rig.joints
+        return numbers
+
+    def contact(self) -> dict[str, Array] | None:
+        """Where joints are and how they rest, if they have places."""
+        rig = self.rig
+        if rig.places is None:
+            return None
+        assert rig.gap is not None
+        assert rig.area is not None
+        return {
+            "x": rig.places[:, 0],
+            "y": rig.places[:, 1],
+            "gap": rig.gap,
+            "area": rig.area,
+            "normal_force": self.rest.cycle.samples[0, :, 2],
+            "normal_displacement": self.rest.coefficients[:, 0, 2],
+        }
+
+    def linear(self, span: tuple[float, float]) -> dict[str, Array]:
+        """Amplitude over force of what is looked at, with the joints free, and stuck."""
+        natural = np.array([*self._natural["free"], *self._natural["stuck"]])
+        inside = natural[(natural > span[0]) & (natural < span[1])]
+        directions = self.rig.joints * self.rig.directions
+        points = LINEAR_POINTS if directions <= FEW_DIRECTIONS else FEWER_POINTS
+        frequency = np.union1d(np.geomspace(*span, points), inside)
+        parts = np.array_split(frequency, -(-len(frequency) // AT_ONCE))
+        free, stuck = np.concatenate([self._limits(part) for part in parts], axis=1)
+        return {"frequency": frequency, "free": free, "stuck": stuck}
+
+    def _limits(self, frequency: Array) -> Array:
+        """Amplitudes over force ``(2, f)`` [mm/N], joints free and stuck.
+
+        Stuck joints pull with k u, u = (1 + R k)⁻¹ u_free.
+        """
+        receptance: Receptance = self.problem.receptance
+        seen = self.rig.seen[-1] @ receptance.at_points
+        steady = receptance.at(2.0 * np.pi * frequency)
+        force = self.rig.driven @ receptance.at_points
+        moved = steady.respond(np.broadcast_to(force, (len(frequency), len(force))) + 0j)
+        tangents = self.rig.stuck(self.law, self.resting)
+        between = steady.between_joints()
+        by_joint = between.reshape(*between.shape[:2], len(tangents), -1)
+        product = np.einsum("fpjd,jde->fpje", by_joint, tangents).reshape(between.shape)
+        free = moved @ receptance.at_joints.T
+        stuck = np.linalg.solve(np.eye(free.shape[1]) + product, free[..., None])[..., 0]
+        pulls = np.einsum(
+            "jde,fje->fjd", tangents, stuck.reshape(*free.shape[:1], *tangents.shape[:2])
+        )
+        held = moved - steady.respond(pulls.reshape(free.shape) @ receptance.at_joints)
+        return np.abs(np.array([moved @ seen, held @ seen]))
+
+
+def _law(case: VibrationCase, rig: RigModel) -> Law:
+    """The law of each joint: all of them share stiffness and load evenly.
+
+    Between two bodies that a load presses together, joints have the gap of the bodies and no load
+    of their own, and may share stiffness by their areas.
+    """
+    whole: Law = LAWS[case.joint.law](**case.joint.model_dump(exclude={"law"}))
+    if rig.pressing is None or not isinstance(whole, FrictionContact):
+        return shared_out(whole, rig.joints)
+    assert rig.gap is not None
+    assert rig.area is not None
+    assert isinstance(case.structure, FrictionRig)
+    even = case.structure.sharing == "even"
+    share = 1.0 / rig.joints if even else rig.area / rig.area.sum()
+    return replace(
+        whole,
+        stiffness=share * whole.stiffness,
+        normal_stiffness=share * whole.normal_stiffness,
+        normal_load=0.0,
+        gap=rig.gap,
+    )

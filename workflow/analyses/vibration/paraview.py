@@ -1,0 +1,93 @@
+"""A vibration case for ParaView: the pad through a cycle at resonance, a series for each force.
+
+``cycle_<n>.pvd`` over the time of a cycle [s], every step a mesh of the pad
+(``cycle_<n>/<step>.vtu``) with its fields at the nodes. Vectors are those of the interface frame:
+body 2 relative to body 1, and the force of body 1 on body 2. Warp By Vector on ``vibration``,
+``displacement`` less its mean over the cycle, lets the pad shake. ``state`` is 0 where a node
+sticks, 1 where it slips and 2 where it is apart: between the nodes it means nothing, so that it is
+best seen on points or glyphs.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import h5py
+import numpy as np
+
+from sa_solver.types import Array
+from workflow.analyses.vibration.pad_nodes import rows_and_columns
+from workflow.pictures.vtk import Fields, Step, attach, write_series, write_xml
+
+if TYPE_CHECKING:
+    import pyvista
+
+# Steps of a cycle that are played smoothly, and do not fill the disk.
+MOST_STEPS = 48
+# A joint counts its closing positive, which is body 2 along -z, and resists: its force on body 2 is
+# against the displacement.
+TO_FRAME = np.array([1.0, 1.0, -1.0])
+
+
+def write_vibration(file: h5py.File, folder: Path) -> list[Path]:
+    """Write the cycle of every force that has one; returns the paths.
+
+    Nothing where joints have no places.
+    """
+    written: list[Path] = []
+    if "contact" not in file:
+        return written
+    for number in sorted(file["responses"]):
+        own = file["responses"][number]
+        if "resonance" in own:
+            written += _write_cycle(file["contact"], own, number, folder)
+    return written
+
+
+def _write_cycle(contact: h5py.Group, own: h5py.Group, number: str, folder: Path) -> list[Path]:
+    cycle, frequency = own["resonance"], float(own.attrs["resonance"])
+    count = len(cycle["state"])
+    mean = TO_FRAME * cycle["displacement"][()].mean(axis=0)
+    steps: list[Step] = []
+    for step in _steps(count):
+        path = folder / f"cycle_{number}" / f"{len(steps):03d}.vtu"
+        mesh = _pad(contact)
+        attach(mesh.point_data, _fields(contact, cycle, step, mean))
+        write_xml(mesh, path)
+        steps.append((step / count / frequency, "pad", path))
+    return write_series(folder / f"cycle_{number}.pvd", steps)
+
+
+def _steps(count: int) -> list[int]:
+    """Every so many samples of a cycle, as evenly as they can be."""
+    shown = min(count, MOST_STEPS)
+    return [round(step * count / shown) for step in range(shown)]
+
+
+def _fields(contact: h5py.Group, cycle: h5py.Group, step: int, mean: Array) -> Fields:
+    displacement = TO_FRAME * cycle["displacement"][step]
+    force = -TO_FRAME * cycle["force"][step]
+    return {
+        "displacement": (displacement, "mm"),
+        "vibration": (displacement - mean, "mm"),
+        "force": (force, "N"),
+        "pressure": (force[:, 2] / contact["area"][()], "MPa"),
+        "gap": (contact["gap"][()] + displacement[:, 2], "mm"),
+        "state": (cycle["state"][step], "1"),
+    }
+
+
+def _pad(contact: h5py.Group) -> pyvista.UnstructuredGrid:
+    """Quadrilaterals between the nodes, or the nodes alone if they are not in rows and columns."""
+    import pyvista
+
+    x, y = contact["x"][()], contact["y"][()]
+    points = np.stack([x, y, np.zeros_like(x)], axis=1)
+    numbers = rows_and_columns(x, y)
+    if numbers is None:
+        vertices = np.arange(len(x))[:, None]
+        return pyvista.UnstructuredGrid({pyvista.CellType.VERTEX: vertices}, points)
+    corners = numbers[:-1, :-1], numbers[1:, :-1], numbers[1:, 1:], numbers[:-1, 1:]
+    quads = np.stack([corner.ravel() for corner in corners], axis=1)
+    return pyvista.UnstructuredGrid({pyvista.CellType.QUAD: quads}, points)

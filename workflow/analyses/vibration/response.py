@@ -1,0 +1,391 @@
+"""The motions of a structure with joints under one force: its curve, its resonance, its loops."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from scipy.optimize import minimize_scalar
+
+from fe_models.dynamics.continuation import StepControl
+from fe_models.dynamics.cycle_energy import damping_ratio
+from fe_models.dynamics.forced_response import (
+    SAMPLES_PER_PERIOD,
+    Accuracy,
+    Branch,
+    along_force,
+    along_frequency,
+    finer_resolution,
+)
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, HarmonicSolution
+from fe_models.dynamics.harmonics import Resolution
+from sa_solver.types import Array
+from wear.joints.friction_contact import FrictionContact
+from wear.joints.jenkins import Jenkins
+from wear.joints.measured_loops import MeasuredLoopError, MeasuredLoops, measure_loops
+from wear.joints.periodic import SEPARATED, SLIP, STICK
+from wear.moving import LARGE_STROKE
+from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.outcome import Curves, Response
+from workflow.errors import MethodFailed
+from workflow.shell.reporter import Reporter
+
+# Times of a period from which amplitudes are taken: between them harmonic 1 is 5e-6 larger.
+TIMES = 1024
+# Of the frequency at which the amplitude is largest.
+RESONANCE_TOLERANCE = 1e-6
+# A loop is that of stuck joints where it loses less than this share of stroke times force range.
+STUCK_LOOP = 1e-4
+# Times that a loop is repeated: the record then holds whole cycles wherever it begins.
+REPEATED = 3
+
+
+def step_control(case: VibrationCase) -> StepControl:
+    """How the case wants its curves followed."""
+    own = case.continuation
+    return StepControl(
+        first=own.first_step,
+        least=own.shortest_step,
+        most=own.longest_step,
+        iterations=own.iterations,
+        max_iterations=own.most_iterations,
+        max_angle=float(np.degrees(own.largest_angle)),
+        max_points=own.most_points,
+        tolerance=own.tolerance,
+    )
+
+
+def accuracy_of(case: VibrationCase) -> Accuracy | None:
+    """How accurate the case wants its motions, None where their resolution is given."""
+    tolerance = case.resolution.tolerance
+    if tolerance is None:
+        return None
+    allowed = Accuracy(tolerance)
+    return replace(allowed, highest=max(allowed.highest, case.harmonics[-1]))
+
+
+def response_under(
+    case: VibrationCase, model: VibrationModel, force: float, reporter: Reporter
+) -> tuple[Response, Branch]:
+    """What the structure does under a force, and the branch of motions that it was taken from.
+
+    Raises MethodFailed where there is no motion at all. A curve that ends before its span does is
+    told as a warning.
+    """
+    accuracy = accuracy_of(case)
+    branch = along_frequency(
+        model.problem,
+        force,
+        case.frequencies,
+        upward=case.continuation.start == "lower",
+        control=step_control(case),
+        accuracy=accuracy,
+    )
+    if not branch.solutions:
+        raise MethodFailed(f"no motion under {force:g} N: {branch.message}; change frequencies")
+    if branch.message:
+        reporter.warn(f"{force:g} N: {branch.message}")
+    curves = _curves(model, branch)
+    if int(np.argmax(curves["amplitude"][:, -1])) in (0, len(branch.solutions) - 1):
+        reporter.warn(f"{force:g} N: no resonance, the largest motion is at an end of the curve")
+    peak = _resonance(model, branch, curves)
+    # The peak may have been found before the resolution grew.
+    problem, resonance = _accurate(branch.problem.refined(peak.resolution), peak, accuracy)
+    _warn_of_stroke(model, resonance, reporter)
+    response = Response(
+        force,
+        curves,
+        _numbers(model, branch, curves, problem, resonance),
+        nodes=_nodes(branch) if model.rig.places is not None else None,
+        resonance=_cycle(resonance) if model.rig.places is not None else None,
+        loops=_loops(case, model, branch, reporter),
+    )
+    error = max(response.numbers["left_out"], response.numbers["sampling"])
+    if accuracy is not None and error > accuracy.tolerance:
+        reporter.warn(
+            f"{force:g} N: the finest resolution leaves an error of {error:.1e}, above "
+            f"resolution.tolerance {accuracy.tolerance:g}"
+        )
+    return response, branch
+
+
+def force_sweep(
+    case: VibrationCase, model: VibrationModel, frequency: float, reporter: Reporter
+) -> Curves:
+    """The motions at a frequency from the least force of a case to the largest.
+
+    Raises MethodFailed where there is none under the least. A curve that ends before the largest is
+    told as a warning.
+    """
+    span = case.forces[0], case.forces[-1]
+    branch = along_force(
+        model.problem, frequency, span, control=step_control(case), accuracy=accuracy_of(case)
+    )
+    if not branch.solutions:
+        raise MethodFailed(f"no motion at {frequency:g} Hz: {branch.message}; change force_sweeps")
+    if branch.message:
+        reporter.warn(f"{frequency:g} Hz, along the force: {branch.message}")
+    curves = _curves(model, branch)
+    shared = ("phase", "damping", "energy_per_cycle", "slip", "left_out")
+    values = {"force": branch.forces, "amplitude": curves["amplitude"][:, -1]}
+    values |= {name: curves[name] for name in shared}
+    folds = [float(branch.curve.parameters[place]) for place in branch.curve.folds]
+    points = len(branch.solutions)
+    numbers = {"frequency": frequency, "points": points, "folds": folds, "message": branch.message}
+    return Curves(values, numbers)
+
+
+def _numbers(
+    model: VibrationModel,
+    branch: Branch,
+    curves: Mapping[str, Array],
+    problem: HarmonicBalance,
+    resonance: HarmonicSolution,
+) -> dict[str, Any]:
+    """What a force does, for the summary."""
+    every = (*branch.solutions, resonance)
+    amplitudes, own = amplitudes_of(model, resonance), resonance.resolution
+    return {
+        "resonance": resonance.frequency,
+        "amplitude": float(amplitudes[-1]),
+        "receptance": float(amplitudes[-1]) / resonance.force,
+        "first_amplitude": float(max(amplitudes[0], curves["amplitude"][:, 0].max())),
+        "energy_per_cycle": float(resonance.cycle.dissipated.sum()),
+        "damping": damping_ratio(problem, resonance),
+        "slip": share_of(model, resonance, SLIP),
+        "separated": share_of(model, resonance, SEPARATED),
+        "points": len(branch.solutions),
+        "folds": [float(branch.curve.parameters[place]) for place in branch.curve.folds],
+        "left_out": max(motion.left_out for motion in every),
+        "sampling": max(motion.sampling for motion in every if motion.sampling is not None),
+        "harmonics": list(own.harmonics),
+        "samples": own.samples,
+        "message": branch.message,
+    }
+
+
+def _curves(model: VibrationModel, branch: Branch) -> dict[str, Array]:
+    solutions = branch.solutions
+    seen = model.rig.seen[-1]
+    return {
+        "frequency": branch.frequencies,
+        "amplitude": np.array([amplitudes_of(model, own) for own in solutions]),
+        "phase": np.array([_phase(own, seen) for own in solutions]),
+        "energy_per_cycle": np.array([own.cycle.dissipated.sum() for own in solutions]),
+        "damping": np.array([damping_ratio(branch.problem, own) for own in solutions]),
+        "slip": np.array([share_of(model, own, SLIP) for own in solutions]),
+        "separated": np.array([share_of(model, own, SEPARATED) for own in solutions]),
+        "left_out": np.array([own.left_out for own in solutions]),
+    }
+
+
+def _phase(solution: HarmonicSolution, seen: Array) -> float:
+    """Angle of harmonic 1 over that of the force, -i."""
+    first = solution.motion[solution.resolution.harmonics.index(1)] @ seen
+    return float(np.angle(1j * first))
+
+
+def amplitudes_of(model: VibrationModel, solution: HarmonicSolution) -> Array:
+    """Half of the way to and fro ``(k,)`` of what is seen [mm]."""
+    seen = replace(solution, motion=solution.motion @ model.rig.seen.T)
+    return np.asarray(0.5 * np.ptp(seen.displacement(TIMES), axis=0))
+
+
+def share_of(model: VibrationModel, solution: HarmonicSolution, state: int) -> float:
+    """Share of the cycle in which joints that touch at rest have a state."""
+    return float((solution.cycle.states[:, model.touching] == state).mean())
+
+
+def _nodes(branch: Branch) -> dict[str, Array]:
+    """What each joint does along the curve."""
+    cycles = [own.cycle for own in branch.solutions]
+    return {
+        "slip": np.array([(cycle.states == SLIP).mean(axis=0) for cycle in cycles]),
+        "separated": np.array([(cycle.states == SEPARATED).mean(axis=0) for cycle in cycles]),
+        "energy": np.array([cycle.dissipated for cycle in cycles]),
+    }
+
+
+def _cycle(solution: HarmonicSolution) -> dict[str, Array]:
+    """Displacements, forces and states of all joints in a cycle."""
+    displacement = solution.resolution.basis @ solution.coefficients
+    return {
+        "displacement": displacement.transpose(1, 0, 2),
+        "force": solution.cycle.samples,
+        "state": solution.cycle.states.astype(np.int8),
+    }
+
+
+def _warn_of_stroke(model: VibrationModel, motion: HarmonicSolution, reporter: Reporter) -> None:
+    """Warn where contacts move further than contacts of fixed pairs of nodes may."""
+    places = model.rig.places
+    if places is None:
+        return
+    moved = motion.resolution.basis @ motion.coefficients
+    stroke, width = float(np.ptp(moved[:, :, 0], axis=1).max()), float(np.ptp(places[:, 0]))
+    if stroke > LARGE_STROKE * width:
+        reporter.warn(
+            f"{motion.force:g} N: at resonance the pads slide over each other by {stroke:.3g} mm, "
+            f"more than {LARGE_STROKE:.0%} of their width: that other nodes meet is neglected"
+        )
+
+
+# --- resonance ----------------------------------------------------------------------------------
+
+
+def _resonance(
+    model: VibrationModel, branch: Branch, curves: Mapping[str, Array]
+) -> HarmonicSolution:
+    """The motion in which what is looked at moves most: between the points beside the largest.
+
+    Where the curve folds there, or ends, the largest point itself.
+    """
+    sizes = curves["amplitude"][:, -1]
+    place = int(np.argmax(sizes))
+    best = branch.solutions[place]
+    if place in (0, len(sizes) - 1):
+        return best
+    before, after = sorted(branch.frequencies[[place - 1, place + 1]])
+    if not before < best.frequency < after:
+        return best
+
+    def found(frequency: float) -> HarmonicSolution:
+        return branch.problem.solve(frequency, best.force, best)
+
+    def lowness(frequency: float) -> float:
+        solution = found(frequency)
+        return -float(amplitudes_of(model, solution)[-1]) if solution.converged else 0.0
+
+    search = minimize_scalar(
+        lowness,
+        bounds=(before, after),
+        method="bounded",
+        options={"xatol": RESONANCE_TOLERANCE * best.frequency},
+    )
+    top = found(float(search.x))
+    return top if top.converged and -search.fun > sizes[place] else best
+
+
+def _accurate(
+    problem: HarmonicBalance, motion: HarmonicSolution, accuracy: Accuracy | None
+) -> tuple[HarmonicBalance, HarmonicSolution]:
+    """The motion with its error by sampling; as accurate as asked for, if that is asked for."""
+    while True:
+        sampling = problem.sampling(motion.coefficients.ravel(), motion.frequency, motion.force)
+        motion = replace(motion, sampling=sampling)
+        finer = finer_resolution(problem, motion, accuracy) if accuracy is not None else None
+        if finer is None:
+            return problem, motion
+        refined = problem.refined(finer)
+        found = refined.solve(motion.frequency, motion.force, motion)
+        if not found.converged:
+            return problem, motion
+        problem, motion = refined, found
+
+
+# --- loops --------------------------------------------------------------------------------------
+
+
+def _loops(
+    case: VibrationCase, model: VibrationModel, branch: Branch, reporter: Reporter
+) -> tuple[Curves, ...]:
+    """Loops at the frequency that the case asks for, a resolution after the other."""
+    if case.loops is None:
+        return ()
+    frequency = case.loops.frequency
+    nearest = int(np.abs(branch.frequencies - frequency).argmin())
+    start, loops = branch.solutions[nearest], []
+    for harmonics in case.loops.harmonics or (start.resolution.harmonics,):
+        every = case.with_mean(harmonics)
+        samples = max(case.resolution.samples, SAMPLES_PER_PERIOD * every[-1])
+        problem = branch.problem.refined(Resolution(every, samples))
+        motion = problem.solve(frequency, start.force, start)
+        if not motion.converged:
+            reporter.warn(f"{start.force:g} N: no loop at {frequency:g} Hz: {motion.message}")
+            continue
+        loops.append(loop_of(case, model, motion))
+        start = motion
+    return tuple(loops)
+
+
+def loop_of(case: VibrationCase, model: VibrationModel, motion: HarmonicSolution) -> Curves:
+    """The loop of all joints together in a motion."""
+    rig = model.rig
+    if rig.stretch is None:
+        mean = motion.coefficients[:, :, rig.along].mean(axis=0)
+        displacement = motion.resolution.basis @ mean
+    else:
+        between = replace(motion, motion=(motion.motion @ rig.stretch)[:, None])
+        displacement = between.displacement(motion.resolution.samples)[:, 0]
+    force = motion.cycle.samples[:, :, rig.along].sum(axis=1)
+    total = motion.cycle.force[:, :, rig.along].sum(axis=0)
+    expansion = motion.resolution.basis @ total
+    values = {
+        "displacement": closed(displacement),
+        "force": closed(force),
+        "expansion": closed(expansion),
+    }
+    numbers = {
+        "frequency": motion.frequency,
+        "harmonics": list(motion.resolution.harmonics),
+        "stroke": float(np.ptp(displacement)),
+        "force_range": float(np.ptp(force)),
+        "energy": float(motion.cycle.dissipated.sum()),
+        "slip": share_of(model, motion, SLIP),
+        "left_out": motion.left_out,
+        "deformation": _deformation(force, expansion),
+        **_slopes(model, motion, displacement, force, case.joint.normal_load),
+    }
+    return Curves(values, numbers)
+
+
+def _deformation(force: Array, expansion: Array) -> float:
+    """Largest force that the harmonics leave out, over half of the range of the force."""
+    half = 0.5 * float(np.ptp(force))
+    return float(np.abs(force - expansion).max()) / half if half > 0.0 else 0.0
+
+
+def closed(values: Array) -> Array:
+    """Values ``(t,)`` of a cycle, the first repeated at the end."""
+    return np.append(values, values[:1])
+
+
+def _slopes(
+    model: VibrationModel, motion: HarmonicSolution, displacement: Array, force: Array, load: float
+) -> dict[str, float | None]:
+    """Stick slope and friction of a loop; no friction where it does not slide."""
+    found = _as_measured([np.tile(own, REPEATED) for own in (displacement, force)])
+    lossy = STUCK_LOOP * np.ptp(displacement) * np.ptp(force)
+    loop = found if found is not None and found.energy.mean() > lossy else None
+    slope = _stick_slope(model, motion, displacement, force)
+    if slope is None and loop is not None:
+        slope = float(loop.stick_stiffness.mean())
+    sliding = loop is not None and loop.sliding > 0.0 and load > 0.0
+    friction = float(loop.friction_force.mean()) / load if loop is not None and sliding else None
+    return {"stiffness": slope, "friction": friction}
+
+
+def _stick_slope(
+    model: VibrationModel, motion: HarmonicSolution, displacement: Array, force: Array
+) -> float | None:
+    """Slope over the increments in which all joints that touch at rest stick; None without any.
+
+    A state is that at the end of an increment: a joint with one slider that sticks then has stuck
+    throughout. Joints of many sliders have no such increments but in a loop without slip.
+    """
+    sticks = (motion.cycle.states[:, model.touching] == STICK).all(axis=1)
+    if not isinstance(model.law, FrictionContact | Jenkins) and not sticks.all():
+        return None
+    moved, pulled = ((own - np.roll(own, 1))[sticks] for own in (displacement, force))
+    square = float(moved @ moved)
+    return float(moved @ pulled) / square if square > 0.0 else None
+
+
+def _as_measured(record: Sequence[Array]) -> MeasuredLoops | None:
+    try:
+        return measure_loops(*record)
+    except MeasuredLoopError:
+        return None

@@ -1,0 +1,114 @@
+"""A vibration case: the steady motions of a structure along frequency, force by force."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from fe_models.dynamics.cycle_energy import damping_ratio
+from fe_models.dynamics.forced_response import Branch
+from fe_models.dynamics.harmonics import HarmonicBalanceError
+from fe_models.dynamics.phase_resonance import along_phase_resonance
+from fe_models.dynamics.receptance import ReceptanceError
+from wear.joints.parameters import JointError
+from wear.joints.periodic import SLIP
+from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.outcome import Curves, Response, VibrationOutcome, trend
+from workflow.analyses.vibration.response import (
+    accuracy_of,
+    amplitudes_of,
+    force_sweep,
+    response_under,
+    share_of,
+    step_control,
+)
+from workflow.analyses.vibration.results import write_vibration_output
+from workflow.errors import UserError
+from workflow.shell.folder import OutputFolder
+from workflow.shell.reporter import Reporter
+
+
+def run_vibration(case: VibrationCase, folder: OutputFolder, reporter: Reporter) -> None:
+    """Run a vibration case to its end.
+
+    Raises UserError where joint or structure cannot be what the case says, MethodFailed where it
+    does not rest, or a force has no motion at all. A curve that ends before its span does is told
+    as a warning.
+    """
+    reporter.say(f"run: {case.title}")
+    try:
+        outcome = _outcome(case, reporter)
+    except JointError as error:
+        raise UserError(f"{folder.case}: joint: {error}") from error
+    except (HarmonicBalanceError, ReceptanceError) as error:
+        raise UserError(f"{folder.case}: structure: {error}") from error
+    write_vibration_output(outcome, folder, reporter)
+
+
+def _outcome(case: VibrationCase, reporter: Reporter) -> VibrationOutcome:
+    model = VibrationModel.of(case, reporter)
+    with reporter.stage("rest and linear limits"):
+        numbers, contact = model.numbers(), model.contact()
+        linear = model.linear(case.frequencies)
+    responses: list[Response] = []
+    backbone = None
+    for force in case.forces:
+        with reporter.stage("response"):
+            response, branch = response_under(case, model, force, reporter)
+        responses.append(response)
+        if case.backbone and backbone is None:
+            # From the least force on which there is a phase resonance.
+            with reporter.stage("backbone"):
+                backbone = _backbone(case, model, branch, reporter)
+    sweeps = []
+    for frequency in case.force_sweeps:
+        with reporter.stage("force sweep"):
+            sweeps.append(force_sweep(case, model, frequency, reporter))
+    return VibrationOutcome(
+        case,
+        model.rig.labels,
+        tuple(responses),
+        linear,
+        numbers | _across(responses),
+        contact,
+        backbone,
+        tuple(sweeps),
+    )
+
+
+def _across(responses: list[Response]) -> dict[str, Any]:
+    """What the forces show together: where the peak is lowest, and whether resonances move on."""
+    resonances = [response.numbers["resonance"] for response in responses]
+    lowest = min(responses, key=lambda response: response.numbers["receptance"])
+    return {
+        "least_receptance_force": lowest.force,
+        "trend": {"resonance": trend(resonances)},
+    }
+
+
+def _backbone(
+    case: VibrationCase, model: VibrationModel, branch: Branch, reporter: Reporter
+) -> Curves | None:
+    """The curve of phase resonance through all forces, from the motions under one of them."""
+    span = case.forces[0], case.forces[-1]
+    found = along_phase_resonance(
+        model.problem, branch, span, control=step_control(case), accuracy=accuracy_of(case)
+    )
+    if found.message:
+        reporter.warn(f"backbone: {found.message}")
+    if not found.solutions:
+        return None
+    motions = found.solutions
+    return Curves(
+        {
+            "force": found.forces,
+            "frequency": found.frequencies,
+            "amplitude": np.array([amplitudes_of(model, own)[-1] for own in motions]),
+            "damping": np.array([damping_ratio(found.problem, own) for own in motions]),
+            "energy_per_cycle": np.array([own.cycle.dissipated.sum() for own in motions]),
+            "slip": np.array([share_of(model, own, SLIP) for own in motions]),
+        },
+        {"message": found.message},
+    )

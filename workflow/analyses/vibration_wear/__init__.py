@@ -1,0 +1,22 @@
+"""Vibration of a rig on a contact that it wears: motion, wear, motion."""
+
+from workflow.analyses.vibration.memory import memory
+from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
+from workflow.shell.analysis import Analysis, Run
+
+__all__ = ["ANALYSIS"]
+
+
+def _run(run: Run[VibrationWearCase | FrictionRigWearCase]) -> None:
+    # Joint laws are compiled when they are first needed.
+    from workflow.analyses.vibration_wear.run import run_vibration_wear
+
+    run_vibration_wear(run.case, run.folder, run.reporter)
+
+
+ANALYSIS = Analysis(
+    name="vibration_wear",
+    cases={"vibration_wear": VibrationWearCase, "friction_rig_wear": FrictionRigWearCase},
+    run=_run,
+    memory=memory,
+)

@@ -1,0 +1,146 @@
+"""Vibration cases whose contact wears: their forced response, computed anew as wear grows."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from workflow.analyses.rig.excitation import DrivingForce, Frequency
+from workflow.analyses.rig.joint_sections import (
+    FrictionContactJoint,
+    JenkinsJoint,
+    Joint,
+    JointStiffness,
+)
+from workflow.analyses.rig.structure import FrictionRig, Rig
+from workflow.analyses.specimens.case import Pressing
+from workflow.analyses.vibration.case import DrivenMass, VibrationCase, VibrationScene, wears
+from workflow.analyses.wear.case.sections import Cycles
+from workflow.case.fields import File, Quantity
+from workflow.case.sections import OutputWithoutFields, Section, Title, disagreement, entry
+from workflow.case.source import Source
+
+WearingFriction = Annotated[float, Quantity("1", above=0.0, at_most=10.0)]
+# Of the cases with wear, what a vibration case of one state has no use for.
+NOT_OF_A_STATE = ("assumed", "expect")
+
+
+class WornContact(Section):
+    """The contact that is the rig's joint."""
+
+    file: Annotated[str, File((".yaml",))] = entry(
+        "a wear case of two bodies: form, materials, friction, normal force, grid and wear are "
+        "taken from it; its stroke, cycles and stop are not",
+        "specimens_wear.yaml",
+    )
+
+
+class WearByVibration(Section):
+    """The force under which the contact wears, and the cycles after which responses are found."""
+
+    force: DrivingForce = entry("amplitude [N]", "75 N")
+    frequency: Frequency = entry("of the force [Hz]", "100 Hz")
+    cycles: Annotated[tuple[Cycles, ...], Field(min_length=1, max_length=100)] = entry(
+        "so many in all, ascending; before the first of them the contact is unworn [1]",
+        [1000, 100_000],
+    )
+
+    @model_validator(mode="after")
+    def _ascending(self) -> WearByVibration:
+        if any(after <= before for before, after in pairwise(self.cycles)):
+            raise disagreement("not ascending; allowed: each number above the last", "cycles")
+        return self
+
+
+class WearOfNodes(WearByVibration):
+    """The same, with the error of steps between specimens."""
+
+    tolerance: Annotated[
+        float, Quantity("1", at_least=1e-4, at_most=0.5, range_text="0.01 % to 50 %")
+    ] = entry(
+        "error of a first-order step over what it wears; the step taken, of second order, is far "
+        "better [1]",
+        0.1,
+        default=0.1,
+    )
+
+
+class PadContacts(Joint):
+    """A friction contact at every node of two pads that a load presses together."""
+
+    law: Literal["friction_contact"] = entry("at every node of the pads", "friction_contact")
+    friction: WearingFriction = entry("limit of the friction force over the normal load [1]", 0.88)
+    normal_load: Pressing = entry("that presses the pads together [N]", "60 N")
+    stiffness: JointStiffness = entry("along the pads, stuck [N/mm]", "45 N/um")
+    normal_stiffness: JointStiffness = entry("in contact [N/mm]", "58.5 N/um")
+
+
+class VibrationWearScene(VibrationScene):
+    """A rig on a contact that it wears, and its response to forces a sin(2π frequency t)."""
+
+    title: Title = entry("one line", "Forced response of a friction rig as it wears")
+    structure: Rig | FrictionRig = entry("what holds the contact")
+    wear: WearByVibration = entry("how the contact wears")
+    output: OutputWithoutFields = entry(
+        "files beside summary and results", default=OutputWithoutFields()
+    )
+
+    @classmethod
+    def suits(cls, source: Source) -> bool:
+        return wears(source)
+
+    def outline(self) -> list[tuple[str, str]]:
+        structure, wear = self.structure, self.wear
+        return [
+            ("structure", f"{structure.text}, damping ratio {structure.damping_ratio:g}"),
+            ("wear", f"{wear.cycles[-1]:g} cycles of {wear.force:g} N at {wear.frequency:g} Hz"),
+            ("forces", self.driving),
+            ("resolution", self.resolved),
+        ]
+
+    def _of_a_state(self, joint: Joint, mass: int | None = None) -> VibrationCase:
+        """The vibration case with this joint, driven at the mass of this number."""
+        shared = [name for name in VibrationScene.model_fields if name not in NOT_OF_A_STATE]
+        entries = {name: getattr(self, name) for name in shared}
+        return VibrationCase(joint=joint, mass=mass, **entries)
+
+
+class VibrationWearCase(VibrationWearScene, DrivenMass):
+    """A row of masses on a half-space contact that it wears."""
+
+    structure: Rig = entry("what holds the contact")
+    contact: WornContact = entry("between the last mass and the ground")
+
+    def with_joint(self, normal_load: float, friction: float, stiffness: float) -> VibrationCase:
+        """The vibration case of one state of the contact, whose joint is described by these."""
+        joint = JenkinsJoint(
+            law="jenkins", normal_load=normal_load, friction=friction, stiffness=stiffness
+        )
+        return self._of_a_state(joint, self.mass)
+
+    def outline(self) -> list[tuple[str, str]]:
+        return [*super().outline(), ("contact", f"that of {Path(self.contact.file).name}")]
+
+
+class FrictionRigWearCase(VibrationWearScene):
+    """Two specimens in a rig that wear each other, node by node."""
+
+    structure: FrictionRig = entry("two specimens in a rig; their case says how they wear")
+    joint: PadContacts = entry("all contacts of the pads together; gaps are those of their form")
+    wear: WearOfNodes = entry("how the pads wear")
+
+    @property
+    def contacts(self) -> bool:
+        return True
+
+    @property
+    def unworn(self) -> VibrationCase:
+        """The vibration case before the first cycle."""
+        return self._of_a_state(FrictionContactJoint(**self.joint.model_dump()))
+
+    def outline(self) -> list[tuple[str, str]]:
+        joint = self.joint
+        return [*super().outline(), ("joint", f"{joint.law} under {joint.normal_load:g} N")]

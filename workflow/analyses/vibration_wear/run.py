@@ -1,0 +1,39 @@
+"""A vibration case whose contact wears: motion, wear, motion, and the responses on the way."""
+
+from __future__ import annotations
+
+from fe_models.dynamics.harmonics import HarmonicBalanceError
+from fe_models.dynamics.receptance import ReceptanceError
+from sa_solver.normal import NormalContactError
+from wear.joints.parameters import JointError
+from wear.stepping import ContactFailure
+from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
+from workflow.analyses.vibration_wear.friction_rig_run import wear_specimens
+from workflow.analyses.vibration_wear.half_space_run import wear_half_space
+from workflow.analyses.vibration_wear.results import write_vibration_wear_output
+from workflow.errors import MethodFailed, UserError
+from workflow.shell.folder import OutputFolder
+from workflow.shell.reporter import Reporter
+
+
+def run_vibration_wear(
+    case: VibrationWearCase | FrictionRigWearCase, folder: OutputFolder, reporter: Reporter
+) -> None:
+    """Run such a case to its end.
+
+    Raises UserError where contact, specimens or rig cannot be what the case says, MethodFailed
+    where rest, a contact problem or a motion is not found.
+    """
+    reporter.say(f"run: {case.title}")
+    try:
+        if isinstance(case, VibrationWearCase):
+            outcome = wear_half_space(case, reporter)
+        else:
+            outcome = wear_specimens(case, reporter)
+    except (ContactFailure, NormalContactError) as error:
+        raise MethodFailed(str(error)) from error
+    except JointError as error:
+        raise UserError(f"{folder.case}: joint: {error}") from error
+    except (HarmonicBalanceError, ReceptanceError) as error:
+        raise UserError(f"{folder.case}: structure: {error}") from error
+    write_vibration_wear_output(outcome, folder, reporter)

@@ -1,0 +1,55 @@
+"""Wear of contacts: structure, contact, wear, and back to the structure."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.measures import COMPARISON
+from workflow.analyses.wear.structures import STRUCTURES, structure_of
+from workflow.shell.analysis import Analysis, Run
+from workflow.shell.folder import OutputFolder
+from workflow.shell.memory import Memory
+
+__all__ = ["ANALYSIS"]
+
+
+def _run(run: Run[WearCase]) -> None:
+    # Solvers take a second to load: where they are used.
+    from workflow.analyses.wear.run import run_wear
+
+    run_wear(run)
+
+
+def _memory(case: WearCase) -> Memory:
+    return structure_of(case).memory(case)
+
+
+def _choose(case: WearCase) -> tuple[WearCase, dict[str, Any] | None]:
+    return structure_of(case).choose(case)
+
+
+def _resumable(folder: OutputFolder) -> bool:
+    from workflow.analyses.wear.checkpoint import readable
+
+    return readable(folder.checkpoint)
+
+
+def _write_loads(case: WearCase, name: str, out: Path, force: bool) -> Sequence[str]:
+    from workflow.analyses.wear.export import export_resultants
+
+    return export_resultants(case, name, out, force)
+
+
+ANALYSIS = Analysis(
+    name="wear",
+    cases={own.name: own.case for own in STRUCTURES},
+    run=_run,
+    memory=_memory,
+    resumable=_resumable,
+    choose=_choose,
+    comparison=COMPARISON,
+    write_loads=_write_loads,
+)

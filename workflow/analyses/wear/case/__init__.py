@@ -1,0 +1,1 @@
+"""What cases of wear are made of, whatever loads their contacts."""

@@ -1,0 +1,81 @@
+"""What all wear cases share: contacts with friction that wear under one cycle of loads."""
+
+from __future__ import annotations
+
+from abc import abstractmethod
+from typing import ClassVar, Literal
+
+from sa_solver.types import Material as ElasticMaterial
+from workflow.analyses.wear.case.evolution import EvolvingFriction
+from workflow.analyses.wear.case.loops import Loops
+from workflow.analyses.wear.case.sections import BodiesThatWear, Contact, ContactStress, Coupling
+from workflow.analyses.wear.case.worn_bodies import Worn
+from workflow.case.sections import Case, Section, Title, disagreement, entry
+
+# What the summary and the results call their own entries.
+RESERVED = (
+    *("title", "assumed", "per_length", "cycles", "jumps", "work", "structure", "kinetics"),
+    *("warnings", "seconds", "versions", "fidelity"),
+)
+
+
+def check_interface_name(name: str, key: str) -> None:
+    """Refuse, at ``key``, an interface whose name could not stand in the results."""
+    if name in RESERVED or "/" in name:
+        raise disagreement(
+            f"an interface called {name!r}; allowed: names without / and none of "
+            f"{', '.join(RESERVED)}",
+            key,
+        )
+
+
+class WearCase(Case):
+    """One scene: where its loads come from, its contacts and how they wear.
+
+    Each kind of structure narrows ``structure``, ``materials`` and ``wear`` to its own.
+    """
+
+    # Names of body 1 and body 2 (sa_solver.types) in the sections that tell them apart.
+    bodies: ClassVar[tuple[str, str]] = ("body_1", "body_2")
+
+    title: Title = entry("one line", "Ti-6Al-4V dovetail, one mission per cycle")
+    analysis: Literal["wear"] = entry("what is computed", "wear")
+    structure: Section = entry("what is loaded")
+    materials: Section = entry("the two bodies in contact")
+    friction: EvolvingFriction = entry("Coulomb's law on every contact face")
+    contact: Contact = entry("half-space grid over each contact face", default=Contact())
+    wear: BodiesThatWear = entry("law, length of the run and step")
+    loops: Loops = entry(
+        "tangential loops on the worn contacts, where amplitude or force is given", default=Loops()
+    )
+    stress: ContactStress = entry("under the contacts, unworn and worn", default=ContactStress())
+
+    def material(self, number: int) -> ElasticMaterial:
+        """Material of body ``number``, 1 or 2."""
+        material: ElasticMaterial = getattr(self.materials, self.bodies[number - 1]).elastic()
+        return material
+
+    def wear_of(self, number: int) -> Worn:
+        """Wear law of body ``number``, 1 or 2."""
+        worn: Worn = getattr(self.wear, self.bodies[number - 1])
+        return worn
+
+    @abstractmethod
+    def loads_outline(self) -> list[tuple[str, str]]:
+        """What structure and loads would run, in a few rows of name and text."""
+
+    def outline(self) -> list[tuple[str, str]]:
+        grid, wear = self.contact.grid, self.wear
+        plane = getattr(self.structure, "dimension", 3) == 2 or grid[1] == 1
+        cells = f"{grid[0]} strips" if plane else f"{grid[0]} x {grid[1]} cells"
+        steps = f"{wear.step.kind} steps, {wear.step_size}"
+        return [
+            *self.loads_outline(),
+            ("contact", f"{cells}, {self.contact.method}"),
+            ("wear", f"{wear.law}, {wear.cycles:g} cycles, {steps}"),
+        ]
+
+    @property
+    def recoupling(self) -> Coupling:
+        """How often the worn surfaces go back to the structure: never, where there is none."""
+        return Coupling(resultants="constant")

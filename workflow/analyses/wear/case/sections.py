@@ -1,0 +1,338 @@
+"""What every wear case has: materials, contact, laws and steps of wear, coupling."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil
+from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar, get_args
+
+from pydantic import StrictBool, model_validator
+from pydantic_core import PydanticCustomError
+
+from workflow.analyses.wear.case.worn_bodies import (
+    BodyWear,
+    LawName,
+    WornByEnergyAmplitude,
+    with_laws,
+)
+from workflow.case.fields import Quantity, Whole
+from workflow.case.sections import (
+    ElasticBody,
+    GridCells,
+    Length,
+    Section,
+    Stress,
+    Tolerance,
+    disagreement,
+    entry,
+)
+
+# The sizes that a wear step may be given.
+SIZES = ("cycles", "depth", "volume", "fraction")
+
+# Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual machine.
+Density = Annotated[
+    float,
+    Quantity("t/mm^3", above=0.0, at_most=2.5e-8, range_text="above 0 and at most 25000 kg/m^3"),
+]
+Poisson = Annotated[float, Quantity("1", above=0.0, below=0.5)]
+Volume = Annotated[float, Quantity("mm^3", above=0.0, at_most=1e9)]
+Cycles = Annotated[float, Quantity("1", at_least=1.0, at_most=1e12)]
+Ratio = Annotated[float, Quantity("1", above=0.0, at_most=1.0)]
+Share = Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)]
+Place = Annotated[float, Quantity("mm", at_least=-1e4, at_most=1e4)]
+
+# Shares add up to 1 but for the rounding of what was written.
+SHARES_APART = 1e-6
+
+
+def check_shares(shares: Sequence[float]) -> None:
+    """Refuse a mix of missions that are not all cycles together, or more."""
+    if abs(sum(shares) - 1.0) > SHARES_APART:
+        raise disagreement(f"shares that add up to {sum(shares):g}; allowed: to 1", "mix")
+
+
+Part = TypeVar("Part", bound=Section)
+
+
+class BladeAndDisk(Section, Generic[Part]):
+    """The two bodies of a dovetail."""
+
+    blade: Part = entry("the upper, moving body")
+    disk: Part = entry("the lower, fixed body")
+
+
+class TwoBodies(Section, Generic[Part]):
+    """The two bodies of any other structure."""
+
+    body_1: Part = entry("the lower, fixed body")
+    body_2: Part = entry("the upper, moving body")
+
+
+class Material(ElasticBody):
+    """Isotropic linear elastic material."""
+
+    young: Stress = entry("Young's modulus [MPa]", "115 GPa")
+    poisson: Poisson = entry("Poisson's ratio [1]", 0.29)
+    density: Density = entry("mass per volume [t/mm^3]", "4430 kg/m^3")
+    yield_stress: Stress | None = entry(
+        "pressures above it are warned of; without it none [MPa]", "900 MPa", default=None
+    )
+
+
+class BladeAndDiskMaterials(BladeAndDisk[Material]):
+    """The two bodies in contact."""
+
+
+class TwoMaterials(TwoBodies[Material]):
+    """The two bodies in contact."""
+
+
+class Contact(Section):
+    """Half-space solution on a grid over each contact face."""
+
+    grid: tuple[GridCells, GridCells] = entry(
+        "cells along x, along y of every face", [128, 256], default=(128, 256)
+    )
+    method: Literal["normal", "full"] = entry(
+        "normal: pressure of the half-space, slips of the structure; full: both of the half-space",
+        "normal",
+        default="normal",
+    )
+    gross_slip: Literal["force", "energies"] = entry(
+        "direction in which a face slides as a whole (method full): force: with the structure's "
+        "shear force; energies: sharing the structure's energy between x and y",
+        "force",
+        default="force",
+    )
+    tolerance: Tolerance = entry(
+        "relative, on equilibrium and complementarity [1]", 1e-8, default=1e-8
+    )
+
+
+class Step(Section):
+    """How a wear step is made, and its size; without one it is chosen by an error estimate."""
+
+    filled_in: ClassVar[bool] = False
+
+    kind: Literal["explicit", "implicit", "second_order"] = entry(
+        "implicit and second_order are stable at any size, explicit below a limit",
+        "implicit",
+        default="implicit",
+    )
+    cycles: Cycles | None = entry("jumped in a step [1]", 30000, default=None)
+    depth: Length | None = entry("largest depth worn in a step [mm]", "1 um", default=None)
+    volume: Volume | None = entry(
+        "worn in a step; in the plane per length [mm^3]", "0.01 mm^3", default=None
+    )
+    fraction: Annotated[float, Quantity("1", above=0.0, at_most=10.0)] | None = entry(
+        "of the stability limit, for explicit steps [1]", 0.9, default=None
+    )
+
+    @model_validator(mode="after")
+    def _one_size(self) -> Step:
+        sizes = [key for key in SIZES if getattr(self, key) is not None]
+        if len(sizes) > 1:
+            allowed = f"one of {', '.join(SIZES)}, or none"
+            raise disagreement(f"{' and '.join(sizes)} given; allowed: {allowed}", *sizes[1:])
+        if self.fraction is not None and self.kind != "explicit":
+            raise disagreement(
+                f"{self.kind} steps have no stability limit; allowed: fraction with explicit",
+                *("fraction", "kind"),
+            )
+        if not sizes and self.kind == "explicit":
+            raise disagreement(
+                f"explicit steps without a size; allowed: one of {', '.join(SIZES)}", "kind"
+            )
+        return self
+
+    @property
+    def automatic(self) -> bool:
+        """Whether an error estimate chooses the size."""
+        return all(getattr(self, key) is None for key in SIZES)
+
+
+class Stop(Section):
+    """Ends the run before its cycles are over, at the first of these that is reached to 0.1 %."""
+
+    depth: Length | None = entry("largest depth of either body [mm]", "0.5 mm", default=None)
+    volume: Volume | None = entry(
+        "worn from both bodies; in the plane per length [mm^3]", "10 mm^3", default=None
+    )
+
+
+class Duration(Section):
+    """What every wear law needs."""
+
+    law: str  # named first in every wear section; each law narrows it to its own name
+    cycles: Cycles = entry("of the whole run [1]", 3e5)
+    step: Step = entry("how far one wear step jumps", default=Step())
+    tolerance: Annotated[float, Quantity("1", above=0.0, at_most=1.0)] = entry(
+        "error of the depth that steps of no given size may make, root mean square over the worn "
+        "area, relative to the depth at the end [1]",
+        "1 %",
+        default=0.01,
+    )
+    depth_tolerance: Length | None = entry("instead of tolerance [mm]", "0.05 um", default=None)
+    motion: Literal["auto", "follow", "neglect"] = entry(
+        "of the surfaces over each other within a cycle: auto follows it where it is more than a "
+        "tenth of the contact's width and the grid can resolve it",
+        "auto",
+        default="auto",
+    )
+    stop: Stop = entry("ends the run early", default=Stop())
+
+    @property
+    def step_size(self) -> str:
+        """Size of a wear step, with the number of jumps where it is known beforehand."""
+        step = self.step
+        if step.cycles is not None:
+            jumps = ceil(self.cycles / step.cycles)
+            return f"{step.cycles:g} cycles each: {jumps} jumps"
+        if step.depth is not None:
+            return f"{step.depth:g} mm deep each"
+        if step.volume is not None:
+            return f"{step.volume:g} mm^3 each"
+        if step.fraction is not None:
+            return f"{step.fraction:g} of their stability limit each"
+        if self.depth_tolerance is not None:
+            return f"for an error of {self.depth_tolerance:g} mm"
+        return f"for an error of {self.tolerance:.2g} of the depth"
+
+
+class BodiesThatWear(Duration):
+    """A law for both bodies, unless one has its own."""
+
+    law: LawName = entry("energy, energy_amplitude or archard; a body may name its own", "energy")
+    reference_amplitude: Length | None = entry(
+        "at which coefficients of energy_amplitude hold [mm]", "75 um", default=None
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _fill_in_laws(cls, data: Any) -> Any:
+        """Give the bodies that name no law of their own that of this section."""
+        if not isinstance(data, dict):
+            return data
+        law: Any = data.get("law")
+        if law not in get_args(LawName):
+            # As pydantic says it of a section that is one of several kinds.
+            context = {"discriminator": "law"}
+            raise PydanticCustomError("union_tag_invalid", "{discriminator}", context)
+        bodies = {name: data[name] for name in cls._names() if name in data}
+        return data | with_laws(bodies, law, data.get("reference_amplitude"))
+
+    @model_validator(mode="after")
+    def _amplitude_is_needed(self) -> BodiesThatWear:
+        amplitudes = [
+            body.reference_amplitude
+            for body in (getattr(self, name) for name in self._names())
+            if isinstance(body, WornByEnergyAmplitude)
+        ]
+        if None in amplitudes:
+            field = type(self).model_fields["reference_amplitude"]
+            raise disagreement(
+                f"missing; allowed: {field.description}, such as 75 um", "reference_amplitude"
+            )
+        if self.reference_amplitude is not None and not amplitudes:
+            raise disagreement(
+                f"{self.reference_amplitude:g} mm: no body wears by energy_amplitude; "
+                "allowed: leave it out",
+                *("reference_amplitude", "law"),
+            )
+        return self
+
+    @classmethod
+    def _names(cls) -> list[str]:
+        """The keys of the two bodies."""
+        return [name for name in cls.model_fields if name not in BodiesThatWear.model_fields]
+
+
+class DovetailWear(BladeAndDisk[BodyWear], BodiesThatWear):
+    """Wear of blade and disk, and how far it goes."""
+
+
+class Wear(TwoBodies[BodyWear], BodiesThatWear):
+    """Wear of two bodies, and how far it goes."""
+
+
+class Nonlinearity(Section):
+    """What large displacements change: small for stiff joints, and measured by the check."""
+
+    stiffness: Literal["linear", "stress_stiffened", "relinearised"] = entry(
+        "linear; stress_stiffened: with the stress and spin of peak load; relinearised: tangent to "
+        "the nonlinear structure there",
+        "linear",
+        default="linear",
+    )
+    check: StrictBool = entry(
+        "compare with a total Lagrangian model at peak load (two more condensations)",
+        False,
+        default=False,
+    )
+
+
+class Coupling(Section):
+    """How often the worn surfaces go back to the structure."""
+
+    resultants: Literal["constant", "drift", "every"] = entry(
+        "constant: of the unworn structure; drift: computed again when wear changes them; every: "
+        "after every jump",
+        "drift",
+        default="drift",
+    )
+    drift: Ratio = entry(
+        "change that asks for new resultants, when they may drift [1]", "2 %", default=0.02
+    )
+
+
+class Life(Section):
+    """Map of a fretting parameter over each contact face."""
+
+    parameter: Literal["ruiz", "smith_watson_topper", "findley", "none"] = entry(
+        "ruiz: friction work times tension; smith_watson_topper, findley: worst plane, tens of "
+        "times slower; or none",
+        "ruiz",
+        default="ruiz",
+    )
+    depth: Length = entry(
+        "critical distance below the surface, where the map lies and the section begins [mm]",
+        "20 um",
+        default=0.02,
+    )
+    sensitivity: Annotated[float, Quantity("1", at_least=0.0, at_most=10.0)] = entry(
+        "k of findley, to normal stress [1]", 0.3, default=0.3
+    )
+
+
+class ContactStress(Section):
+    """Stress of both bodies under each contact face, unworn and worn."""
+
+    section: Literal["x", "y", "none"] = entry(
+        "plane at peak load: x, across the face; y, along it (not for line contacts); or none",
+        "x",
+        default="x",
+    )
+    at: Place = entry(
+        "where the plane cuts the other axis, 0 being the middle [mm]", "0 mm", default=0.0
+    )
+    depth: Length = entry("of the plane [mm]", "2 mm", default=2.0)
+    points: Annotated[int, Whole(2, 1000)] = entry(
+        "over the depth, denser towards the surface", 24, default=24
+    )
+    life: Life = entry("where fretting cracks would start", default=Life())
+
+    @model_validator(mode="after")
+    def _section_has_depth(self) -> ContactStress:
+        if self.depth <= self.life.depth:
+            raise disagreement(
+                f"{self.depth:g} mm: not below the critical distance; "
+                f"allowed: above life.depth, {self.life.depth:g} mm",
+                *("depth", "life.depth"),
+            )
+        return self
+
+    @property
+    def wanted(self) -> bool:
+        """Whether there is anything to compute."""
+        return self.section != "none" or self.life.parameter != "none"

@@ -1,0 +1,61 @@
+"""The half-space's own cycle beside the structure's, where the contact method is full."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from sa_solver.contact import ContactState
+from sa_solver.types import LoadHistory
+from workflow.shell.store import ResultsWriter
+
+# Increments shown, as shares of the way from the peak to the end of the cycle: 8, 12 and 15 of 22.
+SHOWN = 0.0, 2.0 / 7.0, 0.5
+
+
+def half_space_loads(cycle: tuple[ContactState, ...], structure: LoadHistory) -> LoadHistory:
+    """Resultants and energies of a cycle of the half-space, mixed as those of the structure."""
+    P, Qx, Qy, Mx, My, Mz = np.stack([state.resultants for state in cycle], axis=1)
+    Edx, Edy = np.stack([state.energy for state in cycle], axis=1)
+    sliding = np.array([state.sliding for state in cycle])
+    mix = structure.share, structure.block
+    return LoadHistory(P, Qx, Qy, Mx, My, Mz, Edx, Edy, sliding, *mix)
+
+
+def write_comparison(
+    writer: ResultsWriter,
+    name: str,
+    cycle: tuple[ContactState, ...],
+    structure: LoadHistory,
+    peak: int,
+) -> None:
+    """Loads of the cycle, and its fields at the increments shown; of a mix, of the peak's cycle."""
+    group = f"comparison/{name}"
+    writer.put(f"{group}/load_history", **half_space_loads(cycle, structure).columns())
+    left = next(own.stop for own in structure.blocks if peak < own.stop) - 1 - peak
+    # A set: in a short cycle two of them may be the same.
+    for increment in sorted({peak + round(share * left) for share in SHOWN}):
+        state = cycle[increment]
+        writer.put(
+            f"{group}/{increment:05d}",
+            pressure=state.pressure,
+            shear=state.shear,
+            slip=state.slip,
+        )
+
+
+def comparison_summary(cycle: tuple[ContactState, ...], structure: LoadHistory) -> dict[str, Any]:
+    """By increment, what follows in the half-space and what the structure says."""
+    half_space = half_space_loads(cycle, structure)
+    columns = ("Qx", "Qy", "Mz", "Edx", "Edy")
+    return {
+        "sliding": half_space.sliding.tolist(),
+        **{
+            name: {
+                "half_space": getattr(half_space, name).tolist(),
+                "structure": getattr(structure, name).tolist(),
+            }
+            for name in columns
+        },
+    }

@@ -1,0 +1,187 @@
+"""Tangential loops on the worn contacts of a wear run.
+
+A loop is run where it is due (unworn, after every wear step or only at the end), is kept with the
+fields of its jump, so that a resumed run still has it, and ends up in ``results.h5`` and, one row
+per loop, in ``loops_<interface>.csv`` (:mod:`workflow.analyses.wear.loop_table`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+
+from sa_solver.contact import FrictionalContact
+from sa_solver.tangential_loop import (
+    CLOSED,
+    MOST_CYCLES,
+    LoopFailure,
+    LoopPath,
+    tangential_loop,
+)
+from sa_solver.types import Array
+from wear.full_cycle import IMPOSSIBLE
+from wear.stepping import ContactFailure
+from workflow.analyses.wear.case.loops import Loops
+from workflow.analyses.wear.loop_table import COLUMNS, write_table
+from workflow.errors import UserError
+
+if TYPE_CHECKING:
+    from workflow.analyses.wear.interface_state import InterfaceState
+    from workflow.shell.folder import OutputFolder
+    from workflow.shell.reporter import Reporter
+    from workflow.shell.store import ResultsWriter
+
+
+# Measured by every loop; cycles come from the jump.
+MEASURED = tuple(column.name for column in COLUMNS if column.name != "cycles")
+CURVES = {
+    "displacement": ("mm", "of body 1 relative to body 2 along the axis, from the pressed state"),
+    "force": ("N", "tangential force on body 2"),
+}
+# Interfaces and jumps are groups of a file.
+LOOPS = "loops"
+
+
+@dataclass(frozen=True)
+class WornLoop:
+    """A loop on worn surfaces: ``values`` by the names ``MEASURED``, in base units.
+
+    ``displacement`` [mm] and ``force`` [N] ``(k,)`` are its curve, first loading included.
+    """
+
+    values: dict[str, float]
+    displacement: Array
+    force: Array
+
+
+# --- running ------------------------------------------------------------------------------------
+
+
+def loops_due(loops: Loops, jump: int, ended: bool) -> bool:
+    """Whether a loop is to be run after ``jump``."""
+    return loops.wanted and (loops.every == "jump" or jump == 0 or ended)
+
+
+def worn_loop(
+    contact: FrictionalContact, loops: Loops, name: str, state: InterfaceState, peak: int
+) -> WornLoop:
+    """The loop of the contact ``name`` in its present state, under its loads at ``peak``.
+
+    A normal force of one's own acts along the same line. Raises ContactFailure if it does not
+    converge or friction cannot carry it, UserError for a contact without load.
+    """
+    path = loop_path(loops, name, state, peak)
+    try:
+        loop = tangential_loop(contact, state.surfaces.gap, path)
+    except (LoopFailure, *IMPOSSIBLE) as error:
+        raise ContactFailure(
+            f"tangential loop: {error}; allowed: lower loops.force or loops.amplitude"
+        ) from error
+    if loop.closure > CLOSED:
+        raise ContactFailure(
+            f"tangential loop: still open by {loop.closure:.1e} of its range after {MOST_CYCLES} "
+            "cycles; allowed: lower loops.amplitude or loops.force"
+        )
+    values = {
+        "energy": state.energy,
+        "P": loop.P,
+        "kt": loop.stiffness,
+        "mu": loop.friction,
+        "energy_per_loop": loop.energy,
+        "area": loop.area,
+        "amplitude": loop.amplitude,
+        "force": loop.force_amplitude,
+        "sliding": loop.sliding,
+        "residual_stiffness": loop.residual_stiffness,
+        "border_load": loop.border_load,
+    }
+    return WornLoop(values, loop.displacement, loop.force)
+
+
+def loop_path(loops: Loops, name: str, state: InterfaceState, peak: int) -> LoopPath:
+    """What the loop imposes on the contact ``name``."""
+    loads = state.loads
+    P, Mx, My = (float(column[peak]) for column in (loads.P, loads.Mx, loads.My))
+    if loops.normal_force is None and not P > 0.0:
+        raise UserError(
+            f"loops: {name} carries nothing at peak load; allowed: loops.normal_force above 0"
+        )
+    force = P if loops.normal_force is None else loops.normal_force
+    arms = (Mx / P, My / P) if P > 0.0 else (0.0, 0.0)
+    amplitude = loops.amplitude if loops.force is None else loops.force
+    assert amplitude is not None, "loops that are not wanted"
+    return LoopPath(
+        force,
+        amplitude,
+        "motion" if loops.force is None else "force",
+        loops.increments,
+        loops.axis,
+        (arms[0] * force, arms[1] * force),
+    )
+
+
+def kept_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Array]:
+    """Loops of the contacts ``names`` as arrays for the file of their jump."""
+    arrays: dict[str, Array] = {}
+    for name, loop in zip(names, loops, strict=True):
+        place = f"{LOOPS}/{name}"
+        arrays[f"{place}/values"] = np.array([loop.values[own] for own in MEASURED])
+        arrays |= {f"{place}/{curve}": getattr(loop, curve) for curve in CURVES}
+    return arrays
+
+
+# --- writing ------------------------------------------------------------------------------------
+
+
+def write_loops(writer: ResultsWriter, folder: OutputFolder, jumps: int) -> None:
+    """Copy the loops of all jumps, 0 to ``jumps``, into the results: /loops/<interface>/<jump>."""
+    for jump in range(jumps + 1):
+        with h5py.File(folder.jump(jump), "r") as file:
+            cycles = float(file.attrs["cycles"])
+            for name, kept in file.get(LOOPS, {}).items():
+                _write_loop(writer, f"{LOOPS}/{name}/{jump:05d}", kept, cycles)
+
+
+def _write_loop(writer: ResultsWriter, place: str, kept: h5py.Group, cycles: float) -> None:
+    for curve, (unit, description) in CURVES.items():
+        dataset = writer.file.create_dataset(f"{place}/{curve}", data=kept[curve][()])
+        dataset.attrs.update({"unit": unit, "description": description})
+    values = dict(zip(MEASURED, kept["values"][()].tolist(), strict=True))
+    writer.file[place].attrs.update(values | {"cycles": cycles})
+
+
+def write_loop_tables(folder: OutputFolder, per_length: bool) -> dict[str, dict[str, Any]]:
+    """Write the table of every interface; what the summary says of its loops, by interface."""
+    summary: dict[str, dict[str, Any]] = {}
+    with h5py.File(folder.results, "r") as file:
+        for name, group in file.get(LOOPS, {}).items():
+            rows = [{c.name: float(own.attrs[c.name]) for c in COLUMNS} for own in group.values()]
+            table = f"loops_{name}.csv"
+            write_table(folder.root / table, rows, per_length)
+            summary[name] = {"file": table, "unworn": rows[0], "worn": rows[-1]}
+    return summary
+
+
+def warn_of_border(loops: dict[str, dict[str, Any]], asked: Loops, reporter: Reporter) -> None:
+    """Warn of loops under a normal force of their own that is too much for the grid."""
+    for name, own in loops.items():
+        share = max(own[when]["border_load"] for when in ("unworn", "worn"))
+        if share > 0.0 and asked.normal_force is not None:
+            reporter.warn(
+                f"{name}: in the tangential loops the contact reaches the border of its grid "
+                f"({share:.1%} of the force): lower loops.normal_force"
+            )
+
+
+def loops_sentence(name: str, loops: dict[str, Any], per_length: bool) -> str:
+    """The loops of an interface, as the summary has them, in a line."""
+    first, last = loops["unworn"], loops["worn"]
+    per = "/mm" if per_length else ""
+    return (
+        f"{name}: kt {first['kt'] * 1e-3:.4g} -> {last['kt'] * 1e-3:.4g} N/um{per}, energy per "
+        f"loop {first['energy_per_loop']:.4g} -> {last['energy_per_loop']:.4g} mJ{per}"
+    )

@@ -1,0 +1,282 @@
+"""Stress under the contacts, and where fretting cracks would start, on unworn and worn surfaces.
+
+Both follow from the tractions of the half-space, with each body a half-space of its own: the stress
+that the structure carries past the contact is not in them. The surface itself is left out, since
+stress there hangs on the grid where shear starts at a slipping edge: sections begin, and maps lie,
+at the case's critical distance.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fe_models.elasticity import von_mises
+from sa_solver.subsurface import COMPONENTS, SubsurfaceStress
+from sa_solver.types import Array, Grid, Material
+from wear.life import findley, ruiz, smith_watson_topper
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.case.sections import ContactStress, Life
+from workflow.analyses.wear.contact_stage import ContactStage, CycleTractions, FirstContact
+from workflow.analyses.wear.load_source import FaceLoads
+from workflow.shell.reporter import Reporter
+from workflow.shell.store import ResultsWriter
+
+MOMENTS = ("unworn", "worn")
+
+# Share of the load whose shear may be unknown. A hole in the shear makes stress of the order of µp
+# at its rim, whatever its size; the cells at the edge of a sliding contact that find no slipping
+# node of the structure stay below this.
+STUCK_SHARE = 0.01
+
+# What the summary tells of each parameter's maps, the parameter itself first.
+TOLD = {
+    "ruiz": ("cracking_parameter", "friction_parameter", "tension"),
+    "smith_watson_topper": ("smith_watson_topper",),
+    "findley": ("findley",),
+    "none": (),
+}
+
+
+@dataclass(frozen=True)
+class BodyStress:
+    """Stress of one body under one contact.
+
+    ``section`` ``(6, n, k)`` [MPa] at peak load, None if not asked for; ``maps`` of the fretting
+    parameter over the face by their names in ``results.h5``, each ``(..., nx, ny)``.
+    """
+
+    section: Array | None
+    maps: dict[str, Array]
+
+
+@dataclass(frozen=True)
+class ContactMoment:
+    """Both bodies under one contact, unworn or worn.
+
+    ``left_out`` are the increments, counted from 0, whose shear is not known (see
+    :class:`workflow.analyses.wear.contact_stage.CycleTractions`) and that the maps do without.
+    """
+
+    bodies: tuple[BodyStress, BodyStress]
+    left_out: np.ndarray
+
+
+class Planes:
+    """Where the stress of a contact is looked at: the section's points and the depth of maps."""
+
+    def __init__(self, settings: ContactStress, grid: Grid) -> None:
+        self.settings = settings
+        self.grid = grid
+        centres = grid.x.ravel(), grid.y.ravel()
+        along = 1 if settings.section == "y" else 0
+        across = centres[1 - along]
+        self.along = centres[along]
+        self.at = float(across[np.argmin(np.abs(across - settings.at))])
+        first, share = settings.life.depth, np.linspace(0.0, 1.0, settings.points)
+        self.depths: Array = first + (settings.depth - first) * share**2
+
+    def section(self, stress: SubsurfaceStress, traction: Array) -> Array | None:
+        """Stress ``(6, n, k)`` in the section under ``traction`` ``(3, nx, ny)``."""
+        axis = self.settings.section
+        if axis == "none":
+            return None
+        return stress.section(traction, axis, self.at, self.depths)
+
+
+@dataclass(frozen=True)
+class InterfaceStress:
+    """Stress under one contact; ``moments`` by the names in ``MOMENTS``."""
+
+    name: str
+    body_names: tuple[str, str]
+    yield_stresses: tuple[float, float]
+    planes: Planes
+    moments: dict[str, ContactMoment]
+    convolutions: int
+
+    @property
+    def mapped(self) -> bool:
+        """Whether there are maps of the fretting parameter."""
+        return all(body.maps for own in self.moments.values() for body in own.bodies)
+
+    def write(self, writer: ResultsWriter) -> None:
+        """Sections into ``stress/section``, maps into ``stress/life``, by interface."""
+        if self.planes.settings.section != "none":
+            self._write_section(writer, f"stress/section/{self.name}")
+        if self.mapped:
+            self._write_life(writer, f"stress/life/{self.name}")
+
+    def _write_section(self, writer: ResultsWriter, group: str) -> None:
+        planes = self.planes
+        writer.put(group, along=planes.along, depths=planes.depths)
+        attributes = {"axis": planes.settings.section, "at": planes.at, "components": COMPONENTS}
+        limits = dict(enumerate(self.yield_stresses, start=1))
+        attributes |= {f"yield_stress_{n}": y for n, y in limits.items() if np.isfinite(y)}
+        writer.file[group].attrs.update(attributes)
+        for moment, own in self.moments.items():
+            for number, body in enumerate(own.bodies, start=1):
+                stress, place = body.section, f"{group}/{moment}/body_{number}"
+                assert stress is not None
+                writer.put(place, stress=stress, von_mises=von_mises(stress))
+
+    def _write_life(self, writer: ResultsWriter, group: str) -> None:
+        for moment, own in self.moments.items():
+            writer.put(f"{group}/{moment}", left_out=own.left_out)
+            for number, body in enumerate(own.bodies, start=1):
+                writer.put(f"{group}/{moment}/body_{number}", **body.maps)
+        life = self.planes.settings.life
+        writer.file[group].attrs.update({"parameter": life.parameter, "depth": life.depth})
+
+    def summary(self) -> dict[str, Any]:
+        """Largest values, where they are, and worn over unworn, by body."""
+        told: dict[str, Any] = {"convolutions": self.convolutions}
+        if self.planes.settings.section != "none":
+            told["von_mises"] = self._of_bodies(self._largest_von_mises)
+        if not self.mapped:
+            return told
+        told["left_out"] = {m: len(own.left_out) for m, own in self.moments.items()}
+        for name in TOLD[self.planes.settings.life.parameter]:
+            told[name] = self._of_bodies(lambda body, name=name: self._largest(body.maps[name]))
+        return told
+
+    def _of_bodies(self, largest: Any) -> dict[str, Any]:
+        told = {}
+        for number, name in enumerate(self.body_names):
+            own = {m: largest(moment.bodies[number]) for m, moment in self.moments.items()}
+            before, after = (own[moment]["value"] for moment in MOMENTS)
+            told[name] = own | {"ratio": after / before if before else None}
+        return told
+
+    def _largest_von_mises(self, body: BodyStress) -> dict[str, float]:
+        assert body.section is not None
+        values, planes = von_mises(body.section), self.planes
+        i, k = np.unravel_index(np.argmax(values), values.shape)
+        axis, other = ("y", "x") if planes.settings.section == "y" else ("x", "y")
+        place = {axis: float(planes.along[i]), other: planes.at, "depth": float(planes.depths[k])}
+        return {"value": float(values[i, k]), **place}
+
+    def _largest(self, values: Array) -> dict[str, float]:
+        grid = self.planes.grid
+        i, j = np.unravel_index(np.argmax(values), values.shape)
+        place = {"x": float(grid.x[i, 0]), "y": float(grid.y[0, j])}
+        return {"value": float(values[i, j]), **place, "depth": self.planes.settings.life.depth}
+
+
+def contact_stresses(
+    case: WearCase,
+    peak: int,
+    stages: Sequence[ContactStage],
+    unworn: Sequence[tuple[FaceLoads, FirstContact]],
+    worn: Sequence[CycleTractions],
+    reporter: Reporter,
+) -> list[InterfaceStress]:
+    """Stress under every contact as the case asks for it; empty if it does not.
+
+    ``unworn`` are the loads and the contact of the first cycle, ``worn`` the tractions of the last;
+    ``peak`` is the increment of peak load.
+    """
+    if not case.stress.wanted:
+        return []
+    found, unknown = [], []
+    for stage, (loads, first), last in zip(stages, unworn, worn, strict=True):
+        cycles = stage.unworn_tractions(loads, first), last
+        unknown += [cycle.unknown for cycle in cycles]
+        found.append(_interface_stress(case, stage, peak, cycles, loads.loads.share))
+    _tell_of_stick(np.array(unknown), peak, reporter)
+    return found
+
+
+def _interface_stress(
+    case: WearCase,
+    stage: ContactStage,
+    peak: int,
+    cycles: tuple[CycleTractions, CycleTractions],
+    share: Array,
+) -> InterfaceStress:
+    planes = Planes(case.stress, stage.grid)
+    materials = case.material(1), case.material(2)
+    # Each keeps the symbols of a depth: one per body serves both moments.
+    solvers = (
+        SubsurfaceStress(stage.grid, materials[0], 1),
+        SubsurfaceStress(stage.grid, materials[1], 2),
+    )
+    moments = {}
+    for moment, cycle in zip(MOMENTS, cycles, strict=True):
+        known = cycle.unknown <= STUCK_SHARE
+        body_1, body_2 = (
+            BodyStress(
+                planes.section(solver, _traction(cycle, peak)),
+                life_maps(case.stress.life, solver, material, cycle, known, share),
+            )
+            for solver, material in zip(solvers, materials, strict=True)
+        )
+        moments[moment] = ContactMoment((body_1, body_2), np.flatnonzero(~known))
+    return InterfaceStress(
+        stage.name,
+        case.bodies,
+        (materials[0].yield_stress, materials[1].yield_stress),
+        planes,
+        moments,
+        sum(solver.count for solver in solvers),
+    )
+
+
+def _traction(cycle: CycleTractions, t: int) -> Array:
+    """Tractions qx, qy, p of an increment ``(3, nx, ny)``."""
+    return np.concatenate([cycle.shear[t], cycle.pressure[t, None]])
+
+
+def life_maps(
+    life: Life,
+    solver: SubsurfaceStress,
+    material: Material,
+    cycle: CycleTractions,
+    known: np.ndarray,
+    share: Array | None = None,
+) -> dict[str, Array]:
+    """Maps of the parameter and of what it is made of, at the critical distance, by name.
+
+    Stress is that of the ``known`` ``(t,)`` increments, of all cycles of a mix together; friction
+    work that of all, by the ``share`` ``(t,)`` of each in a mean cycle. Where no increment is known
+    there is no map.
+    """
+    if life.parameter == "none" or not known.any():
+        return {}
+    history = np.zeros((len(known), 6, *solver.grid.shape))
+    for t in np.flatnonzero(known & cycle.pressure.any(axis=(1, 2))):
+        history[t] = solver.at_depth(_traction(cycle, int(t)), life.depth)
+    if life.parameter == "ruiz":
+        # Without stress, an increment adds its work and leaves the largest tension as it is.
+        parameters = ruiz(history, cycle.shear, cycle.slip, share)
+        names = "friction_parameter", "tension", "cracking_parameter"
+        return {name: getattr(parameters, name) for name in names}
+    if life.parameter == "findley":
+        plane, amplitude = findley(history[known], life.sensitivity), "shear_amplitude"
+    else:
+        plane, amplitude = smith_watson_topper(history[known], material), "strain_amplitude"
+    return {
+        life.parameter: plane.value,
+        amplitude: plane.amplitude,
+        "normal_stress": plane.normal_stress,
+        "normal": plane.normal,
+    }
+
+
+def _tell_of_stick(unknown: Array, peak: int, reporter: Reporter) -> None:
+    """Say where the shear is not known, ``unknown`` ``(cycles, t)``; warn if so at peak load."""
+    why = "contact.method: normal does not know the shear where a contact sticks; full does"
+    worst = unknown.max(axis=0)
+    if worst[peak] > STUCK_SHARE:
+        reporter.warn(
+            f"up to {worst[peak]:.0%} of the peak load sticks: stress.section lacks its shear, and "
+            f"stress.life that increment's stress: {why}"
+        )
+    if count := int((worst > STUCK_SHARE).sum()):
+        reporter.log(
+            f"stress.life leaves out the stress of {count} of {len(worst)} increments, in which up "
+            f"to {worst.max():.0%} of the load sticks: {why}"
+        )

@@ -1,0 +1,137 @@
+"""``fretscale resultants``: what our own structure does to its contacts, as files."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from fe_models.mesh import Interface, MeshError
+from fe_models.structure import InterfaceHistory
+from sa_solver.types import Array
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.load_source import ContactFace
+from workflow.analyses.wear.structure import condensation_memory
+from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.analyses.wear.structures import resultants, structure_of
+from workflow.analyses.wear.structures.resultants.case import ResultantsCase
+from workflow.analyses.wear.structures.resultants.writing import (
+    write_resultants_csv,
+    write_resultants_h5,
+)
+from workflow.analyses.wear.warnings import warn_of_structure
+from workflow.case.writing import dump_case
+from workflow.errors import UserError
+from workflow.shell.reporter import Reporter
+from workflow.shell.store import replacing
+
+# How other codes write such files.
+RECIPE = Path(resultants.__file__).with_name("RECIPE.md")
+TABLE, FIELDS, CASE, LOG = "resultants.csv", "resultants.h5", "resultants.yaml", "resultants.log"
+
+
+def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list[str]:
+    """Solve the structure of a case and write its loads; lines that say what to do with them.
+
+    ``name`` is that of the case in messages. Raises UserError, MethodFailed, OutOfMemory.
+    """
+    structure = structure_of(case)
+    source = structure.source(case)
+    if not isinstance(source, StructureStage):
+        raise UserError(
+            f"{name}: structure.kind: {structure.name} has no finite elements "
+            "to take loads from; allowed: a case with a structure of ours, such as dovetail"
+        )
+    structure.memory(case).check()
+    _claim(out, force)
+    reporter = Reporter(out / LOG)
+    try:
+        _write(case, source, out, reporter)
+    except MeshError as error:
+        raise UserError(f"{name}: structure: {error}") from error
+    finally:
+        reporter.close()
+    return [
+        f"{out / TABLE}: forces, moments and energies of every interface and increment",
+        f"{out / FIELDS}: the same with slip, nodes, frames and unworn gaps",
+        f"{out / CASE}: a case that wears under them, constant: fretscale run {out / CASE} --out "
+        "DIR",
+        f"Columns, signs, and how other codes write them: {RECIPE}",
+    ]
+
+
+def _claim(out: Path, force: bool) -> None:
+    """Make the folder; refuse to overwrite without ``force``."""
+    if out.exists() and not out.is_dir():
+        raise UserError(f"{out}: is a file; give a folder to --out")
+    there = [name for name in (TABLE, FIELDS, CASE) if (out / name).exists()]
+    if there and not force:
+        raise UserError(f"{out / there[0]}: exists; give another folder, or --force")
+    out.mkdir(parents=True, exist_ok=True)
+
+
+def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter) -> None:
+    with reporter.stage("mesh"):
+        faces = source.faces
+    condensation_memory(source.node_count(), source.interface_count()).check()
+    with reporter.stage("condensation"):
+        source.prepare()
+    with reporter.stage("structural friction"):
+        histories = {own.interface.name: _numbered(source, own) for own in source.unworn()}
+    warn_of_structure(source, reporter)
+    heights = {face.face.name: _height(face, case) for face in faces}
+    loads = {name: history.loads for name, history in histories.items()}
+    write_resultants_csv(out / TABLE, loads, source.line)
+    write_resultants_h5(out / FIELDS, histories, heights)
+    text = dump_case(_imported(case, faces, out))
+    with replacing(out / CASE) as partial:
+        partial.write_text(text, encoding="utf-8")
+
+
+def _numbered(source: StructureStage, history: InterfaceHistory) -> InterfaceHistory:
+    """The history with the user's own node numbers, where the mesh has them."""
+    face = history.interface
+    numbers = source.model.node_numbers(1), source.model.node_numbers(2)
+    if not isinstance(face, Interface) or numbers[0] is None or numbers[1] is None:
+        return history
+    own = replace(face, nodes_1=numbers[0][face.nodes_1], nodes_2=numbers[1][face.nodes_2])
+    return replace(history, interface=own)
+
+
+def _height(face: ContactFace, case: WearCase) -> Array:
+    """Unworn gap on the contact grid of the case, ``(nx, ny)`` [mm]."""
+    grid = face.grid(case.contact.grid)
+    return np.array(np.broadcast_to(face.gap(grid.x, grid.y), grid.shape))
+
+
+def _imported(case: WearCase, faces: tuple[ContactFace, ...], out: Path) -> ResultantsCase:
+    """The case with the loads of the files in the place of its structure."""
+    shared = ResultantsCase.model_fields.keys() & type(case).model_fields.keys()
+    data = case.model_dump(include=shared - {"structure", "assumed", "expect"}, exclude_none=True)
+    for section in ("materials", "wear"):
+        for number, body in enumerate(case.bodies, start=1):
+            data[section][f"body_{number}"] = data[section].pop(body)
+    data["structure"] = _structure(faces)
+    imported = ResultantsCase.model_validate(data, context={"folder": str(out)})
+    # The files stay together wherever they go.
+    beside = imported.structure.model_copy(update={"file": FIELDS})
+    return imported.model_copy(update={"structure": beside})
+
+
+def _structure(faces: tuple[ContactFace, ...]) -> dict[str, Any]:
+    """The structure of that case: faces in their order, sizes to the last digit."""
+    line = faces[0].face.line
+    sizes = [list(face.size[:1] if line else face.size) for face in faces]
+    interfaces: list[dict[str, Any]] = [{"name": face.face.name} for face in faces]
+    for interface, size in zip(interfaces, sizes, strict=True):
+        if size != sizes[0]:
+            interface["size"] = size
+    return {
+        "kind": "resultants",
+        "dimension": 2 if line else 3,
+        "file": FIELDS,
+        "size": sizes[0],
+        "interfaces": interfaces,
+    }

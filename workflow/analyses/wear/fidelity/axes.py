@@ -1,0 +1,273 @@
+"""The axes of fidelity after the dimension: how fine each setting must be for its share of error.
+
+Shares are large where accuracy is dear: increments cost in proportion to 1/error, meshes more. They
+add up to 1; errors of all axes are taken to have one sign. Estimates are of the largest depth and
+the volume of either flank.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from math import ceil
+from typing import Any
+
+from workflow.analyses.wear.case.sections import SIZES
+from workflow.analyses.wear.fidelity.decision import Axis, Decision
+from workflow.analyses.wear.fidelity.estimate import Numbers, estimate
+from workflow.analyses.wear.fidelity.probe import (
+    INCREMENTS,
+    STEPS,
+    coupled_life,
+    end_life,
+    increments,
+    life,
+    plane_section,
+)
+from workflow.analyses.wear.structures.dovetail.case import DovetailCase
+from workflow.case.changing import changed
+
+# Structural friction is first order in the increment; meshes and grids are at most second order.
+FRICTION_ORDER, GRID_ORDER = 1.0, 2.0
+# Doublings of the fewest increments that are probed, and the most that are ever chosen.
+DOUBLINGS, MOST_INCREMENTS = 2, 1500
+# Elements across a flank: fewer say nothing, and so many take seconds to condense in the plane.
+# In space the time grows with the fourth power: a mesh is never made finer than the case has it.
+FEWEST_ELEMENTS, MOST_ELEMENTS = 7, 160
+# Cells of a contact grid along one direction: fewer hardly show a contact. In the plane so many may
+# be chosen; in space, where each doubling takes four times as long, twice those of the case. None
+# is coarser than the case's own by more than the last.
+FEWEST_CELLS, MOST_STRIPS, FINER_SPACE, COARSER = 16, 512, 2, 4
+# Rungs of a ladder that are probed before any is chosen: an order takes three.
+LEAST_RUNGS = 3
+# The contact solver's tolerance left at most 0.35 of itself as error of depth and volume, for
+# tolerances from 1e-3 to 1e-6 on two dovetails' flanks. So its share is its tolerance; no looser
+# ones than the loosest were measured.
+LOOSEST_TOLERANCE, LEFT_BY_TOLERANCE = 1e-3, 0.5
+# Steps of an automatic tolerance 0.1, 0.01, 0.003, 0.001 left 1.2, 0.4, 0.23, 0.08 % of the largest
+# depth on the section of the default joint and less of the volume; 1.4, 0.27, 0.13, 0.07 % where
+# flanks carry differently over 1e6 cycles: never more than themselves. Looser are hardly quicker.
+LOOSEST_STEPS = 0.1
+# Drift below this is rounding of the structure's solver.
+LEAST_DRIFT = 1e-4
+# An error that is its share but for rounding is within it.
+ROUNDING = 1e-9
+
+
+# --- increments -----------------------------------------------------------------------------------
+
+
+def choose_increments(case: DovetailCase, allowed: float) -> Decision:
+    """As many increments as Richardson asks for, from three lives with doubled increments."""
+    section = plane_section(case)
+    first = increments(case, INCREMENTS)["load_path.increments"]
+    counts = [first * 2**k for k in range(DOUBLINGS + 1)]
+    values = [life(changed(section, increments(case, count))) for count in counts]
+    found = estimate(values, [1.0 / count for count in counts], FRICTION_ORDER)
+    needed = max(first, ceil(counts[-1] * found.refinement(allowed) * (1.0 - ROUNDING)))
+    settings = increments(case, min(needed, MOST_INCREMENTS))
+    count = settings["load_path.increments"]
+    error, own = (found.beyond(n / counts[-1]) for n in (count, case.load_path.increments))
+    more = "more than" if count > case.load_path.increments else "against"
+    why = (
+        f"{error:.2%} of {allowed:.2%} allowed; {more} the case's own "
+        f"{case.load_path.increments}, which leave {own:.2%}"
+    )
+    probe = {"increments": counts, "values": values, "errors": found.errors, "own": own}
+    return _decision(settings, why, probe, allowed, error)
+
+
+# --- ladders of meshes and grids ------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Rung:
+    """A setting ``size`` times as fine as another; ``offered`` unless it is only to compare with.
+
+    ``settings`` are its entries.
+    """
+
+    size: int
+    settings: dict[str, Any]
+    offered: bool = True
+
+
+@dataclass(frozen=True)
+class _Climb:
+    """The rung that was ``taken``, and what the ``probed`` ones gave."""
+
+    taken: _Rung
+    error: float
+    worst: str
+    probed: dict[str, Any]
+
+
+def choose_mesh(case: DovetailCase, allowed: float) -> Decision:
+    """The coarsest mesh, along and away in proportion, whose section wears as it should."""
+    section = plane_section(case)
+
+    def worn(rung: _Rung) -> Numbers:
+        return life(changed(section, rung.settings))
+
+    climb = _climb(list(_meshes(case)), worn, allowed)
+    why = _sentence(climb, allowed, "elements across the flank")
+    return _decision(climb.taken.settings, why, climb.probed, allowed, climb.error)
+
+
+def _meshes(case: DovetailCase) -> Iterator[_Rung]:
+    across, along = case.mesh.flank_nodes
+    in_space = case.structure.dimension == 3
+    own = across - 1
+    # Rungs beyond those that are offered say how good the finest of these is.
+    most = 4 * own if in_space else max(own, MOST_ELEMENTS)
+    for elements in _doublings(own, FEWEST_ELEMENTS, most):
+        factor = elements / own
+        settings = {
+            "mesh.flank_nodes": (1 + elements, max(3, 1 + round(factor * (along - 1)))),
+            "mesh.size": case.mesh.size / factor,
+        }
+        yield _Rung(elements, settings, offered=elements <= own or not in_space)
+
+
+def choose_grid(case: DovetailCase, allowed: float) -> Decision:
+    """The coarsest grid across the flank, and along the slot, whose line contact wears alike."""
+    section = plane_section(case)
+    across, along = case.contact.grid
+    if case.structure.dimension == 2:
+        most = max(across, MOST_STRIPS)
+        climb = _climb_grid(across, most, allowed, partial(_strips, section))
+        grid, climbs = (climb.taken.size, along), [climb]
+    else:
+        half = 0.5 * allowed
+        first = _climb_grid(across, FINER_SPACE * across, half, partial(_strips, section))
+        second = _climb_grid(along, FINER_SPACE * along, half, partial(_ends, section))
+        grid, climbs = (first.taken.size, second.taken.size), [first, second]
+    names = "strips across the flank", "strips along the slot"
+    part = allowed / len(climbs)
+    why = "; ".join(_sentence(own, part, name) for own, name in zip(climbs, names, strict=False))
+    probe = {name: own.probed for own, name in zip(climbs, names, strict=False)}
+    error = sum(own.error for own in climbs)
+    return _decision({"contact.grid": grid}, why, probe, allowed, error)
+
+
+def _strips(section: DovetailCase, rung: _Rung) -> Numbers:
+    return life(changed(section, {"contact.grid": (rung.size, rung.size)}))
+
+
+def _ends(section: DovetailCase, rung: _Rung) -> Numbers:
+    return end_life(section, rung.size)
+
+
+def _climb_grid(own: int, most: int, allowed: float, worn: Callable[[_Rung], Numbers]) -> _Climb:
+    """Up the halves and doubles of so many cells."""
+    sizes = _doublings(own, max(FEWEST_CELLS, own // COARSER), most)
+    return _climb([_Rung(size, {}) for size in sizes], worn, allowed)
+
+
+def _doublings(own: int, fewest: int, most: int) -> list[int]:
+    """Halves and doubles of a count, coarse to fine, itself among them."""
+    sizes = [own]
+    while (half := round(0.5 * sizes[0])) >= fewest:
+        sizes.insert(0, half)
+    while 2 * sizes[-1] <= most:
+        sizes.append(2 * sizes[-1])
+    return sizes
+
+
+def _climb(rungs: Sequence[_Rung], worn: Callable[[_Rung], Numbers], allowed: float) -> _Climb:
+    """Probe ever finer rungs until one of them is good enough; the finest offered if none is."""
+    values: list[Numbers] = []
+    for rung in rungs:
+        values.append(worn(rung))
+        if len(values) < min(LEAST_RUNGS, len(rungs)):
+            continue
+        steps = [1.0 / own.size for own in rungs[: len(values)]]
+        found = estimate(values, steps, GRID_ORDER)
+        errors = found.errors
+        enough = [k for k, error in enumerate(errors) if rungs[k].offered and error <= allowed]
+        if enough:
+            break
+    offered = [k for k in range(len(values)) if rungs[k].offered]
+    taken = enough[0] if enough else offered[-1]
+    sizes = [own.size for own in rungs[: len(values)]]
+    probed = {"sizes": sizes, "values": values, "errors": errors}
+    return _Climb(rungs[taken], errors[taken], found.worst(taken), probed)
+
+
+def _sentence(climb: _Climb, allowed: float, unit: str) -> str:
+    text = f"{climb.taken.size} {unit} leave {climb.error:.2%} of {allowed:.2%} allowed"
+    beyond = "" if climb.error <= allowed else ", the finest that is offered"
+    return f"{text} ({climb.worst}){beyond}"
+
+
+# --- without a ladder -----------------------------------------------------------------------------
+
+
+def choose_tolerance(case: DovetailCase, allowed: float) -> Decision:
+    """The contact solver's tolerance is its share: it leaves less."""
+    tolerance = max(min(allowed, LOOSEST_TOLERANCE), 1e-12)
+    why = "its share: depth and volume were found within half of it"
+    error = LEFT_BY_TOLERANCE * tolerance
+    return _decision({"contact.tolerance": tolerance}, why, {}, allowed, error)
+
+
+def choose_steps(case: DovetailCase, allowed: float) -> Decision:
+    """Automatic implicit steps, whose tolerance is their share."""
+    tolerance = min(allowed, LOOSEST_STEPS)
+    settings = {
+        "wear.tolerance": tolerance,
+        "wear.depth_tolerance": None,
+        "wear.step.kind": "implicit",
+        **{f"wear.step.{size}": None for size in SIZES},
+    }
+    why = "its share, for automatic implicit steps"
+    return _decision(settings, why, {}, allowed, tolerance)
+
+
+def choose_drift(case: DovetailCase, allowed: float) -> Decision:
+    """The drift at which two lives, coupled and not, would differ by the share."""
+    own = case.coupling
+    if own.resultants == "constant":
+        why = "resultants stay those of the unworn structure, as the case has it"
+        return Decision("coupling.drift", own.drift, why)
+    section = plane_section(case)
+    apart = life(section)
+    coupled, drift = coupled_life(section)
+    # Loads that follow at the end of a step miss half of it: of a steady drift, one step of all.
+    effect = _effect(apart, coupled) * STEPS / (STEPS - 1)
+    bounded = max(LEAST_DRIFT, min(1.0, drift * allowed / effect)) if effect > 0.0 else 1.0
+    settings = {"coupling.drift": bounded, "coupling.resultants": "drift"}
+    error = effect if drift <= 0.0 else min(effect, effect * bounded / drift)
+    why = (
+        f"drift of {drift:.2%} over the run changes depth or volume by {effect:.2%}; "
+        f"allowed: {allowed:.2%}"
+    )
+    probe = {"apart": apart, "coupled": coupled, "drift": drift, "effect": effect}
+    return _decision(settings, why, probe, allowed, error)
+
+
+def _effect(apart: Numbers, coupled: Numbers) -> float:
+    """Largest relative difference of two lives."""
+    pair = estimate([apart, coupled], [2.0, 1.0], GRID_ORDER)
+    # Of two rungs the last one's error is their difference, and the first one's twice that.
+    return pair.errors[-1]
+
+
+def _decision(
+    settings: dict[str, Any], why: str, probe: dict[str, Any], allowed: float, error: float
+) -> Decision:
+    entry, *others = settings
+    also = {name: settings[name] for name in others}
+    met = error <= allowed * (1.0 + ROUNDING)
+    return Decision(entry, settings[entry], why, probe, also, allowed, error, met)
+
+
+AXES = (
+    Axis("load_path.increments", 0.31, choose_increments),
+    Axis("mesh.flank_nodes", 0.30, choose_mesh),
+    Axis("contact.grid", 0.10, choose_grid),
+    Axis("contact.tolerance", 0.02, choose_tolerance),
+    Axis("wear.tolerance", 0.15, choose_steps),
+    Axis("coupling.drift", 0.12, choose_drift),
+)

@@ -1,0 +1,88 @@
+"""How far each rung of a probe's ladder is from the limit that the ladder goes to."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from workflow.shell.convergence import richardson
+
+Numbers = dict[str, dict[str, float]]  # by interface and quantity
+
+# A flank that wears less than this share of the other's is measured by that share.
+LESSER_FLANK = 0.1
+# An order that is taken for granted beyond the probed rungs where these show none.
+LEAST_ORDER = 0.5
+
+
+@dataclass(frozen=True)
+class Deviation:
+    """Relative ``errors`` of one quantity on every rung, and the ``order`` they fall with."""
+
+    name: str
+    errors: tuple[float, ...]
+    order: float
+
+    def beyond(self, refinement: float) -> float:
+        """Error at a step shorter than the last one by a factor (longer: below 1)."""
+        return self.errors[-1] / refinement**self.order
+
+    def refinement(self, allowed: float) -> float:
+        """How much shorter than the last one a step must be for this error."""
+        if self.errors[-1] <= 0.0:
+            return 0.0
+        return float((self.errors[-1] / allowed) ** (1.0 / self.order))
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """Deviations of all quantities of all interfaces."""
+
+    deviations: tuple[Deviation, ...]
+
+    @property
+    def errors(self) -> list[float]:
+        """The largest error of every rung."""
+        return [max(own) for own in zip(*(d.errors for d in self.deviations), strict=True)]
+
+    def worst(self, rung: int) -> str:
+        """The quantity that is worst on a rung."""
+        return max(self.deviations, key=lambda own: own.errors[rung]).name
+
+    def beyond(self, refinement: float) -> float:
+        """The largest error at a step shorter than the last one by a factor."""
+        return max(own.beyond(refinement) for own in self.deviations)
+
+    def refinement(self, allowed: float) -> float:
+        """How much shorter than the last one a step must be for this error."""
+        return max(own.refinement(allowed) for own in self.deviations)
+
+
+def estimate(values: Sequence[Numbers], steps: Sequence[float], order: float) -> Estimate:
+    """Errors of the rungs, coarse to fine, of methods of at most this ``order`` in their ``steps``.
+
+    Relative to the last rung. The last one's error is Richardson's, those of the others are their
+    distances from it on top, so that an early one that is near by chance counts for no more than
+    the last.
+    """
+    last = values[-1]
+    names = next(iter(last.values()))
+    largest = {name: max(abs(own[name]) for own in last.values()) for name in names}
+    deviations = []
+    for flank, own in last.items():
+        for name, value in own.items():
+            scale = max(abs(value), LESSER_FLANK * largest[name])
+            found = [each[flank][name] for each in values]
+            deviations.append(_deviation(f"{name} on the {flank}", found, scale, steps, order))
+    return Estimate(tuple(deviations))
+
+
+def _deviation(
+    name: str, found: Sequence[float], scale: float, steps: Sequence[float], order: float
+) -> Deviation:
+    if scale <= 0.0:
+        return Deviation(name, (0.0,) * len(found), order)
+    convergence = richardson(found, steps, order)
+    errors = [(abs(value - found[-1]) + convergence.error) / scale for value in found]
+    observed = LEAST_ORDER if convergence.order is None else convergence.order
+    return Deviation(name, tuple(errors), min(max(observed, LEAST_ORDER), order))

@@ -1,0 +1,177 @@
+"""Figure of the structure's stress in a section through the contacts, and of what wear changed."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import h5py
+import numpy as np
+
+from sa_solver.types import Array
+from workflow.analyses.wear.body_mesh import body_mesh
+from workflow.pictures.fields import line_contacts
+from workflow.pictures.style import BLACK, new_figure
+from workflow.shell.store import grid_of
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+STRESS_COLOURS, CHANGE_COLOURS = "magma_r", "RdBu_r"
+CHANGE = "worn less unworn"
+
+# How far from the middle the section is, as a share of the body's diagonal.
+BESIDE = 1e-7
+# Planes y = 0 of two faces are one if they differ by less: mesh files keep six digits.
+SAME_PLANE = 1e-5
+# Around the faces, how far the section shows the bodies: as a share of what the faces span.
+SECTION_MARGIN = 0.4
+
+
+class _Section(NamedTuple):
+    """One body's stress in the section.
+
+    ``points (n, 2)`` to the right and up [mm], ``triangles (m, 3)``, ``stress (n,)`` [MPa], and
+    ``outline (k, 2, 2)``, the segments of the body's border.
+    """
+
+    points: Array
+    triangles: np.ndarray
+    stress: Array
+    outline: Array
+
+
+def structure_stress(file: h5py.File) -> Figure:
+    """Von Mises stress of both bodies around the faces: unworn, worn and what wear changed."""
+    panels = {state: _sections(file, state) for state in _states(file)}
+    ranges = {state: _range_in_view(file, sections) for state, sections in panels.items()}
+    top = max(ranges[state][1] for state in panels if state != CHANGE)
+    texts = (f"{ranges[state][1]:.0f} MPa {state}" for state in panels if state != CHANGE)
+    title = f"Von Mises stress {_place(file)} at peak load: at most {', '.join(texts)}"
+    figure = new_figure(title, 1.0 + 4.2 * len(panels))
+    axes = figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
+    for axis, (state, sections) in zip(axes, panels.items(), strict=True):
+        low, high = ranges[state]
+        scale = max(-low, high) if state == CHANGE else top
+        colours = _draw_sections(axis, sections, scale, signed=state == CHANGE)
+        _zoom(axis, file)
+        axis.set_title(f"{state}: {low:+.0f} to {high:+.0f} MPa" if state == CHANGE else state)
+        axis.set_ylabel(f"{'XYZ'[_plane(file)[2]]} [mm]")
+        figure.colorbar(colours, ax=axis, label="[MPa]", pad=0.01)
+    axes[-1].set_xlabel(f"{'XYZ'[_plane(file)[1]]} [mm]")
+    return figure
+
+
+def _place(file: h5py.File) -> str:
+    """Which section of the bodies is shown, for the title."""
+    if line_contacts(file):
+        return "in plane strain"
+    (name, first), *others = ((name, group.attrs) for name, group in file["grid"].items())
+    y, far = first["axes"][1], SAME_PLANE * grid_of(file["grid"][name]).size[1]
+    shared = all(
+        abs(other["axes"][1] @ y) > 1.0 - SAME_PLANE
+        and abs((other["origin"] - first["origin"]) @ y) < far
+        for _, other in others
+    )
+    return "at y = 0" if shared else f"at y = 0 of {name}"
+
+
+def _states(file: h5py.File) -> list[str]:
+    """What there is to show; a change needs both states on one mesh."""
+    bodies = list(file["bodies"].values())
+    states = [state for state in ("unworn", "worn") if all(state in body for body in bodies)]
+    if len(states) == 2 and all(
+        np.array_equal(body["unworn/elements"], body["worn/elements"]) for body in bodies
+    ):
+        states.append(CHANGE)
+    return states
+
+
+def _plane(file: h5py.File) -> tuple[int, int, int]:
+    """Global axes nearest to the first face's y (the plane's normal), to right and to top."""
+    y = np.abs(next(iter(file["grid"].values())).attrs["axes"][1])
+    normal = int(np.argmax(y))
+    right, top = (axis for axis in range(3) if axis != normal)
+    return normal, right, top
+
+
+def _sections(file: h5py.File, state: str) -> list[_Section]:
+    """Both bodies in the plane y = 0 of the first face."""
+    cuts = []
+    for body in file["bodies"].values():
+        if state == CHANGE:
+            change = body["worn/von_mises"][()] - body["unworn/von_mises"][()]
+            cuts.append(_cut(file, body["unworn"], change))
+        else:
+            cuts.append(_cut(file, body[state], body[state]["von_mises"][()]))
+    return cuts
+
+
+def _cut(file: h5py.File, body: h5py.Group, stress: Array) -> _Section:
+    """One body and a nodal stress cut by the plane y = 0 of the first face; a plane body whole."""
+    shown = list(_plane(file)[1:])
+    face = next(iter(file["grid"].values())).attrs
+    mesh = body_mesh(body)
+    mesh.point_data["stress"] = stress
+    if body["elements"].shape[1] == 4:
+        # Beside the middle: a plane through nodes of the mesh leaves holes between its elements.
+        beside = face["origin"] + BESIDE * mesh.length * face["axes"][1]
+        cut = mesh.slice(normal=face["axes"][1], origin=beside).triangulate()
+    else:
+        cut = mesh.extract_surface(algorithm="dataset_surface")
+    border = cut.extract_feature_edges(
+        feature_edges=False, non_manifold_edges=False, manifold_edges=False
+    )
+    return _Section(
+        points=cut.points[:, shown],
+        triangles=cut.regular_faces,
+        stress=cut["stress"],
+        outline=border.points[border.lines.reshape(-1, 3)[:, 1:]][..., shown],
+    )
+
+
+def _draw_sections(axis: Axes, sections: list[_Section], top: float, signed: bool) -> Any:
+    """Colours and outlines of the bodies; returns the colours."""
+    from matplotlib.collections import LineCollection
+    from matplotlib.tri import Triangulation
+
+    axis.set_aspect("equal")
+    axis.grid(visible=False)
+    for section in sections:
+        axis.add_collection(LineCollection(list(section.outline), colors=BLACK, linewidths=0.8))
+        colours = axis.tripcolor(
+            Triangulation(section.points[:, 0], section.points[:, 1], section.triangles),
+            section.stress,
+            shading="gouraud",
+            cmap=CHANGE_COLOURS if signed else STRESS_COLOURS,
+            vmin=-top if signed else 0.0,
+            vmax=top,
+        )
+    return colours
+
+
+def _window(file: h5py.File) -> tuple[Array, Array]:
+    """Lower left and upper right corner of the view, ``(2,)`` each [mm]."""
+    shown = list(_plane(file)[1:])
+    ends = []
+    for group in file["grid"].values():
+        half = 0.5 * grid_of(group).size[0] * group.attrs["axes"][0]
+        ends += [(group.attrs["origin"] + sign * half)[shown] for sign in (-1.0, 1.0)]
+    low, high = np.min(ends, axis=0), np.max(ends, axis=0)
+    margin = SECTION_MARGIN * np.max(high - low)
+    return low - margin, high + margin
+
+
+def _range_in_view(file: h5py.File, sections: list[_Section]) -> tuple[float, float]:
+    """Smallest and largest stress in view [MPa]."""
+    low, high = _window(file)
+    seen = [s.stress[np.all((s.points >= low) & (s.points <= high), axis=1)] for s in sections]
+    every = np.concatenate(seen)
+    return float(every.min()), float(every.max())
+
+
+def _zoom(axis: Axes, file: h5py.File) -> None:
+    """Show the surroundings of the faces, where wear makes the difference."""
+    low, high = _window(file)
+    axis.set_xlim(low[0], high[0])
+    axis.set_ylim(low[1], high[1])

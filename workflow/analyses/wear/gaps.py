@@ -1,0 +1,76 @@
+"""Gap of the unloaded bodies over a face, as a function of the place on it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+
+from sa_solver.shapes import rounded_edge
+from sa_solver.types import Array, Grid
+from workflow.analyses.wear.case.gaps import GapShape, HeightsGap, ParaboloidGap, RoundedGap
+from workflow.case.input_files import read_heights
+
+GapFunction = Callable[[Array, Array], Array]
+
+
+@dataclass(frozen=True)
+class GridHeights:
+    """Heights ``(nx, ny)`` [mm] at the centres of a grid; bilinear between and beyond them."""
+
+    grid: Grid
+    heights: Array
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """Heights at ``x`` ``(n, 1)`` and ``y`` ``(1, m)``; on the grid itself as they are."""
+        grid = self.grid
+        if np.array_equal(x, grid.x) and np.array_equal(y, grid.y):
+            return self.heights
+        along_x = _linear(grid.x.ravel(), x.ravel())
+        along_y = _linear(grid.y.ravel(), y.ravel())
+        heights: Array = along_x @ self.heights @ along_y.T
+        return heights
+
+
+def gap_over(shape: GapShape | None, heights: Array | None, grid: Grid) -> GapFunction:
+    """Gap [mm] at x and y of a face that ``grid`` covers.
+
+    ``heights`` on the grid count where the case gives no shape.
+    """
+    match shape:
+        case RoundedGap():
+            return partial(_rounded, shape, grid.size, grid.line)
+        case ParaboloidGap():
+            return partial(_paraboloid, shape)
+        case HeightsGap():
+            return GridHeights(grid, read_heights(shape.file))
+    assert heights is not None  # a case without either is refused
+    return GridHeights(grid, heights)
+
+
+def _rounded(shape: RoundedGap, size: tuple[float, float], line: bool, x: Array, y: Array) -> Array:
+    edges = rounded_edge(np.abs(x), 0.5 * size[0], shape.edge_width, shape.edge_radius)
+    if line or shape.end_width is None or shape.end_radius is None:
+        return edges
+    return edges + rounded_edge(np.abs(y), 0.5 * size[1], shape.end_width, shape.end_radius)
+
+
+def _paraboloid(shape: ParaboloidGap, x: Array, y: Array) -> Array:
+    curvature_x, curvature_y = (
+        0.0 if radius is None else 1.0 / radius for radius in (shape.radius_x, shape.radius_y)
+    )
+    return 0.5 * (curvature_x * x**2 + curvature_y * y**2)
+
+
+def _linear(known: Array, wanted: Array) -> Array:
+    """Weights ``(m, n)`` of values at ``known`` ``(n,)``, ascending, for those at ``wanted``."""
+    if len(known) == 1:
+        return np.ones((len(wanted), 1))
+    left = np.clip(np.searchsorted(known, wanted) - 1, 0, len(known) - 2)
+    share = (wanted - known[left]) / (known[left + 1] - known[left])
+    weights = np.zeros((len(wanted), len(known)))
+    rows = np.arange(len(wanted))
+    weights[rows, left], weights[rows, left + 1] = 1.0 - share, share
+    return weights

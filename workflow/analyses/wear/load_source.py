@@ -1,0 +1,100 @@
+"""Where a wear run gets the loads of its contacts from: a structure of ours, or a file."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+from fe_models.mesh import Face
+from sa_solver.types import Array, Frame, Grid, Indices, LoadHistory
+
+BODIES: tuple[Literal[1, 2], ...] = (1, 2)
+
+
+@dataclass(frozen=True)
+class ContactFace:
+    """A nominal contact face and the gap of the unloaded, unworn bodies over it.
+
+    ``size`` (x, y) [mm] is what the contact grid covers, ``gap`` gives the distance [mm] at x and y
+    of the face, and ``coarse`` as many cells as the face has nodes. ``remedy`` is what to do where
+    the contact reaches the end of the face. A ``driven`` contact has the motion of its bodies
+    imposed and not the tangential force: the slip of its loads is then that motion.
+    """
+
+    face: Face
+    size: tuple[float, float]
+    gap: Callable[[Array, Array], Array]
+    coarse: tuple[int, int]
+    remedy: str = "make the face larger or round its edges"
+    driven: bool = False
+
+    def grid(self, cells: tuple[int, int]) -> Grid:
+        """The grid of so many cells along x and y over the face."""
+        return Grid.over(self.size, cells, self.face.line)
+
+
+@dataclass(frozen=True)
+class UserFace:
+    """Nodes that the user has numbered, of the face of body 1 or 2 of an interface.
+
+    They are those of the contact's own face, or lie at ``points`` ``(n, 3)`` [mm] in the user's
+    axes, in which the face has its ``frame``.
+    """
+
+    body: Literal[1, 2]
+    numbers: Indices
+    frame: Frame
+    points: Array | None = None
+
+
+class FaceLoads(Protocol):
+    """What one face carries over a cycle: ``slip`` ``(t, 2, n)`` [mm] is that of its nodes."""
+
+    @property
+    def loads(self) -> LoadHistory: ...
+    @property
+    def slip(self) -> Array: ...
+
+
+class LoadSource(Protocol):
+    """Loads and slips of every contact face over one closed cycle.
+
+    Worn depths are nodal, ``(n,)`` per face, of both bodies together [mm]. Coefficients of friction
+    are one per face; those before any wear where they are not given.
+    """
+
+    @property
+    def faces(self) -> tuple[ContactFace, ...]: ...
+
+    @property
+    def peak(self) -> int:
+        """Index of the increment of peak load."""
+        ...
+
+    @property
+    def line(self) -> bool:
+        """Whether the contacts are line contacts, all forces per length."""
+        ...
+
+    def prepare(self) -> None:
+        """Do the costly part now."""
+        ...
+
+    def unworn(self) -> Sequence[FaceLoads]:
+        """The closed cycle with unworn faces."""
+        ...
+
+    def worn(
+        self, depths: list[Array], friction: Sequence[float] | None = None
+    ) -> Sequence[FaceLoads]:
+        """The closed cycle with worn faces."""
+        ...
+
+    def user_faces(self, number: int) -> Sequence[UserFace]:
+        """Where the worn surfaces of interface ``number`` go back to nodes of the user's own."""
+        ...
+
+    def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
+        """Resultants ``(faces, 6)`` that wear moves as it moves those of the cycle, but cheap."""
+        ...

@@ -1,0 +1,134 @@
+"""What wear runs are compared by in a chart: depths and volumes, sections and profiles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from sa_solver.types import Array, Grid
+from workflow.analyses.wear.case.base import WearCase
+from workflow.shell.analysis import Comparison, Summary
+from workflow.shell.folder import OutputFolder
+from workflow.shell.store import grid_of
+
+WORN = ("depth_1", "depth_2", "volume_1", "volume_2")
+MIDDLE = "middle"
+# Rows on either side of the middle of a face whose mean is its middle section.
+MIDDLE_ROWS = 1
+# Name of the difference of worn depth anywhere.
+PROFILE = "depth anywhere"
+# Overrides that leave out what only quantities below ``stress`` need.
+WITHOUT_STRESS = {"stress": ("stress.section=none", "stress.life.parameter=none")}
+
+
+def quantities(case: WearCase, summary: Summary) -> list[str]:
+    """Depth and volume of every body of every interface."""
+    return [f"{name}.{worn}" for name, worn in product(interfaces(summary), WORN)]
+
+
+def interfaces(summary: Mapping[str, Any]) -> list[str]:
+    """Names of the contacts of a wear run."""
+    return [name for name, own in summary.items() if isinstance(own, Mapping) and "depth_1" in own]
+
+
+def extra_quantities(summary: Mapping[str, Any]) -> list[str]:
+    """Numbers of a wear run that are told beside the quantities."""
+    return [f"{name}.peak_pressure.worn" for name in interfaces(summary)]
+
+
+# --- fields -------------------------------------------------------------------------------------
+
+
+def worn_depths(folder: Path, names: Iterable[str]) -> dict[str, tuple[Grid, Array, Array]]:
+    """Grid of each interface and worn depths ``(nx, ny)`` of body 1 and body 2 [mm]."""
+    found = {}
+    with h5py.File(OutputFolder(folder).results) as file:
+        for name in names:
+            jumps = file["surfaces"][name]
+            first, last = (jumps[jump] for jump in (min(jumps), max(jumps)))
+            depths = [abs(last[body][()] - first[body][()]) for body in ("body_1", "body_2")]
+            found[name] = grid_of(file["grid"][name]), depths[0], depths[1]
+    return found
+
+
+def middle_sections(folder: Path, names: Iterable[str]) -> dict[str, dict[str, float]]:
+    """Largest depth [mm] and worn area [mm²] of each body in the middle of each face.
+
+    A line contact is its own middle section: two and three dimensions can be compared by it.
+    """
+    sections = {}
+    for name, (grid, *depths) in worn_depths(folder, names).items():
+        half = grid.shape[1] // 2
+        rows = slice(max(0, half - MIDDLE_ROWS), half + MIDDLE_ROWS)
+        profiles = [np.mean(depth[:, rows] if half else depth, axis=1) for depth in depths]
+        sections[name] = {
+            **{f"depth_{k}": float(own.max()) for k, own in enumerate(profiles, 1)},
+            **{f"area_{k}": float(own.sum()) * grid.pitch[0] for k, own in enumerate(profiles, 1)},
+        }
+    return sections
+
+
+def middle_quantities(summary: Mapping[str, Any]) -> list[str]:
+    """Paths of the numbers of :func:`middle_sections` in a summary that has them."""
+    sections: Mapping[str, Mapping[str, float]] = summary.get(MIDDLE, {})
+    return [f"{MIDDLE}.{name}.{key}" for name, own in sections.items() for key in own if own[key]]
+
+
+def profile_difference(
+    own: Mapping[str, tuple[Grid, Array, Array]], other: Mapping[str, tuple[Grid, Array, Array]]
+) -> float | None:
+    """Largest difference of depth anywhere, over the largest depth of ``other``; both bodies.
+
+    None where the grids are not of one dimension.
+    """
+    largest = 0.0
+    for name, (grid, *depths) in own.items():
+        reference, *finer = other[name]
+        if grid.line != reference.line:
+            return None
+        there = _resampled(sum(finer), reference, grid)
+        scale = float(np.max(sum(finer)))
+        if scale > 0.0:
+            largest = max(largest, float(np.max(np.abs(sum(depths) - there))) / scale)
+    return largest
+
+
+def _resampled(field: Any, grid: Grid, onto: Grid) -> Array:
+    """A field of one grid at the cells of another over the same face."""
+    from scipy.interpolate import RegularGridInterpolator
+
+    if grid.line:
+        values: Array = np.interp(onto.x.ravel(), grid.x.ravel(), field.ravel())[:, None]
+        return values
+    axes = grid.x.ravel(), grid.y.ravel()
+    inside = [np.clip(c.ravel(), a[0], a[-1]) for c, a in zip((onto.x, onto.y), axes, strict=True)]
+    points = np.meshgrid(*inside, indexing="ij")
+    resampled: Array = RegularGridInterpolator(axes, field)(tuple(points))
+    return resampled
+
+
+def _measured(folder: Path, summary: Summary) -> Summary:
+    return {**summary, MIDDLE: middle_sections(folder, interfaces(summary))}
+
+
+def _apart(folder: Path, reference: Path, summary: Summary) -> dict[str, float]:
+    """Largest difference of worn depth anywhere to another run, over its largest depth."""
+    names = interfaces(summary)
+    own, other = worn_depths(folder, names), worn_depths(reference, names)
+    difference = profile_difference(own, other)
+    return {} if difference is None else {PROFILE: difference}
+
+
+COMPARISON: Comparison[WearCase] = Comparison(
+    quantities=quantities,
+    extras=extra_quantities,
+    sections=middle_quantities,
+    plain=WITHOUT_STRESS,
+    measured=_measured,
+    apart=_apart,
+)

@@ -1,0 +1,1 @@
+"""Wear runs for ParaView."""

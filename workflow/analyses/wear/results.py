@@ -1,0 +1,385 @@
+"""What a finished wear run leaves: results, summary, ParaView files, figures."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import h5py
+import numpy as np
+
+from sa_solver.normal import NormalContactError
+from sa_solver.types import Array, LoadHistory
+from wear.kinetics import LinearRegime, linear_regime
+from wear.steppers import root_mean_square
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.checkpoint import KINETICS, RunState
+from workflow.analyses.wear.comparison import comparison_summary, write_comparison
+from workflow.analyses.wear.contact_loops import (
+    loops_sentence,
+    warn_of_border,
+    write_loop_tables,
+    write_loops,
+)
+from workflow.analyses.wear.contact_stage import ContactStage, CycleTractions, FirstContact
+from workflow.analyses.wear.contact_stress import InterfaceStress, contact_stresses
+from workflow.analyses.wear.figures.wear import EXTRAPOLATION, figures_of
+from workflow.analyses.wear.load_source import FaceLoads, LoadSource
+from workflow.analyses.wear.paraview.wear import write_wear
+from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.analyses.wear.uniformity import uniformities
+from workflow.analyses.wear.worn_faces import worn_faces, write_worn_faces
+from workflow.analyses.wear.worn_structure import WornStructure, resultants_at, worn_structure
+from workflow.case.writing import dump_case
+from workflow.pictures.drawing import write_pictures
+from workflow.shell.folder import OutputFolder
+from workflow.shell.reporter import Reporter
+from workflow.shell.store import ResultsWriter, read_arrays, replacing
+from workflow.shell.versions import versions
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Everything a wear run found.
+
+    ``unworn`` are the loads of the faces before wear and ``first`` the contact of that cycle, by
+    interface; ``worn`` the tractions of a cycle at the end, none where no stress is asked for.
+    """
+
+    case: WearCase
+    source: LoadSource
+    stages: list[ContactStage]
+    state: RunState
+    unworn: Sequence[FaceLoads]
+    first: list[FirstContact]
+    worn: list[CycleTractions]
+
+    @cached_property
+    def regimes(self) -> dict[str, dict[str, LinearRegime | None]]:
+        """Linear regimes of depth and volume, both bodies together, by interface."""
+        columns = {"depth": slice(0, 2), "volume": slice(2, 4)}
+        cycles, kinetics = self.state.cycles, self.state.kinetics
+        return {
+            stage.name: {
+                name: linear_regime(cycles, kinetics[:, number, pick].sum(axis=1))
+                for name, pick in columns.items()
+            }
+            for number, stage in enumerate(self.stages)
+        }
+
+
+def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> None:
+    """Write all files of a finished run; the summary comes last and marks it as finished."""
+    structure = None
+    if isinstance(outcome.source, StructureStage):
+        structure = worn_structure(
+            outcome.source,
+            outcome.stages,
+            outcome.state,
+            outcome.case.friction,
+            folder,
+            reporter,
+        )
+    with reporter.stage("stress under the contacts"):
+        stresses = contact_stresses(
+            outcome.case,
+            outcome.source.peak,
+            outcome.stages,
+            list(zip(outcome.unworn, outcome.first, strict=True)),
+            outcome.worn,
+            reporter,
+        )
+    with reporter.stage("results"):
+        _write_results(outcome, structure, stresses, folder)
+    with reporter.stage("paraview and figures"):
+        # They take ten seconds and more on one core.
+        write_pictures(outcome.case.output, folder, figures_of, write_wear, processes=2)
+    worn_nodes = _write_worn_nodes(outcome, folder, reporter)
+    pressures = _peak_pressures(outcome, folder)
+    loops = write_loop_tables(folder, outcome.source.line)
+    warn_of_border(loops, outcome.case.loops, reporter)
+    _warn_of_steps(outcome, reporter)
+    summary = _summary(outcome, structure, stresses, pressures, reporter)
+    _add_areas(summary, outcome, folder)
+    for name, written in worn_nodes.items():
+        summary[name]["worn_nodes"] = written
+    for name, found in loops.items():
+        summary[name]["loops"] = found
+    if chosen := folder.choice:
+        summary["fidelity"] = chosen
+    uniform = uniformities(outcome.source, outcome.stages, outcome.state.interfaces)
+    for name, own in uniform.items():
+        summary[name]["uniformity"] = vars(own)
+    folder.write_summary(summary)
+    shutil.rmtree(folder.jumps)
+    _say(outcome, summary, reporter)
+    for name, own in uniform.items():
+        reporter.say(f"  {own.sentence(name)}")
+    for name, found in loops.items():
+        reporter.say(f"  {loops_sentence(name, found, outcome.source.line)}")
+
+
+def _write_worn_nodes(
+    outcome: Outcome, folder: OutputFolder, reporter: Reporter
+) -> dict[str, dict[str, Any]]:
+    """Worn surfaces at the user's own nodes, where the loads or the mesh are the user's."""
+    pairs = zip(outcome.stages, outcome.state.interfaces, strict=True)
+    faces = [
+        face
+        for number, (stage, state) in enumerate(pairs)
+        for face in worn_faces(outcome.source.user_faces(number), stage, state)
+    ]
+    return write_worn_faces(faces, folder.root, reporter)
+
+
+def _write_results(
+    outcome: Outcome,
+    structure: WornStructure | None,
+    stresses: list[InterfaceStress],
+    folder: OutputFolder,
+) -> None:
+    source = outcome.source
+    with replacing(folder.results) as partial, h5py.File(partial, "w") as file:
+        writer = ResultsWriter(file, per_length=source.line)
+        file.attrs.update(
+            {
+                "title": outcome.case.title,
+                "friction": outcome.case.friction.at(0.0),
+                "peak_increment": source.peak,
+                "bodies": list(outcome.case.bodies),
+            }
+        )
+        file.create_group("case").attrs.update({"text": dump_case(outcome.case)} | versions())
+        for stage, result, loads in zip(outcome.stages, outcome.first, outcome.unworn, strict=True):
+            writer.put_grid(stage.name, stage.grid, stage.face.frame)
+            writer.put_face(f"structure/{stage.name}", stage.face, loads)
+            _write_coarse(writer, stage, loads.loads, source.peak)
+            writer.put(f"contact/{stage.name}", energy_half_space=result.energy)
+            if result.cycle:
+                write_comparison(writer, stage.name, result.cycle, loads.loads, source.peak)
+        _write_jumps(writer, outcome, folder)
+        _write_kinetics(writer, outcome)
+        write_loops(writer, folder, outcome.state.jump)
+        if structure is not None:
+            structure.write(writer)
+        for stress in stresses:
+            stress.write(writer)
+
+
+def _write_coarse(
+    writer: ResultsWriter, stage: ContactStage, loads: LoadHistory, peak: int
+) -> None:
+    """The peak load on a grid as coarse as the mesh, to compare with.
+
+    None where the moments put that load outside the middles of the coarse cells: no reason to lose
+    the run.
+    """
+    try:
+        pressure = stage.coarse_pressure(loads, peak)
+    except NormalContactError:
+        return
+    place, grid = f"contact/{stage.name}/coarse", stage.coarse_grid
+    writer.put(place, pressure=pressure)
+    shape = {"shape": grid.shape, "pitch": grid.pitch, "line": grid.line}
+    writer.file[place].attrs.update(shape)
+
+
+def _write_jumps(writer: ResultsWriter, outcome: Outcome, folder: OutputFolder) -> None:
+    for jump in range(outcome.state.jump + 1):
+        arrays, attributes = read_arrays(folder.jump(jump))
+        for stage in outcome.stages:
+            for kind in ("surfaces", "contact"):
+                prefix = f"{kind}/{stage.name}/"
+                fields = {
+                    n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)
+                }
+                writer.put(f"{prefix}{jump:05d}", **fields)
+                writer.file[f"{prefix}{jump:05d}"].attrs["cycles"] = attributes["cycles"]
+
+
+def _write_kinetics(writer: ResultsWriter, outcome: Outcome) -> None:
+    state = outcome.state
+    writer.put("kinetics", cycles=state.cycles)
+    for number, stage in enumerate(outcome.stages):
+        group = f"kinetics/{stage.name}"
+        columns = dict(zip(KINETICS, state.kinetics[:, number].T, strict=True))
+        writer.put(group, **columns, area=_contact_area(writer.file, stage, state.jump))
+        for name, regime in outcome.regimes[stage.name].items():
+            writer.file[group].attrs.update(
+                {
+                    f"{name}_linear_from": regime.start if regime else np.nan,
+                    f"{name}_rate": regime.rate if regime else np.nan,
+                    f"{name}_trend": regime.trend if regime else np.nan,
+                    f"{name}_scatter": regime.scatter if regime else np.nan,
+                }
+            )
+
+
+def _contact_area(file: h5py.File, stage: ContactStage, jumps: int) -> Array:
+    """Area in contact at peak load after every jump, unworn first, ``(jumps + 1,)`` [mm²]."""
+    pressures = (file[f"contact/{stage.name}/{jump:05d}/pressure"] for jump in range(jumps + 1))
+    cells = [np.count_nonzero(pressure[()] > 0.0) for pressure in pressures]
+    return np.array(cells, dtype=np.float64) * stage.grid.cell_area
+
+
+def _add_areas(summary: dict[str, Any], outcome: Outcome, folder: OutputFolder) -> None:
+    """Area in contact at peak load over the cycles, and that which has worn by the end."""
+    with h5py.File(folder.results, "r") as file:
+        for stage, state in zip(outcome.stages, outcome.state.interfaces, strict=True):
+            area = file[f"kinetics/{stage.name}/area"][()].tolist()
+            summary["kinetics"][stage.name]["area"] = area
+            worn = np.count_nonzero(state.surfaces.depth > 0.0)
+            areas = {"area": area[-1], "worn_area": worn * stage.grid.cell_area}
+            summary[stage.name].update(areas)
+
+
+def _peak_pressures(outcome: Outcome, folder: OutputFolder) -> dict[str, dict[str, float]]:
+    """Largest pressure at peak load before the first and after the last jump, by interface."""
+    jumps = {"unworn": 0, "worn": outcome.state.jump}
+    with h5py.File(folder.results, "r") as file:
+        return {
+            stage.name: {
+                moment: float(file[f"contact/{stage.name}/{jump:05d}/pressure"][()].max())
+                for moment, jump in jumps.items()
+            }
+            for stage in outcome.stages
+        }
+
+
+def _summary(
+    outcome: Outcome,
+    structure: WornStructure | None,
+    stresses: list[InterfaceStress],
+    pressures: dict[str, dict[str, float]],
+    reporter: Reporter,
+) -> dict[str, Any]:
+    state = outcome.state
+    stress = {own.name: {"stress": own.summary()} for own in stresses}
+    return {
+        "title": outcome.case.title,
+        "assumed": list(outcome.case.assumed),
+        "per_length": outcome.source.line,
+        "cycles": float(state.cycles[-1]),
+        "jumps": state.jump,
+        "work": vars(state.spent),
+        **({"structure": structure.summary(state)} if structure else {}),
+        **{
+            stage.name: _interface_summary(outcome, number)
+            | (structure.interface_summary(number) if structure else {})
+            | {"peak_pressure": pressures[stage.name]}
+            | stress.get(stage.name, {})
+            for number, stage in enumerate(outcome.stages)
+        },
+        "kinetics": {
+            "cycles": state.cycles.tolist(),
+            **{
+                stage.name: dict(zip(KINETICS, state.kinetics[:, number].T.tolist(), strict=True))
+                for number, stage in enumerate(outcome.stages)
+            },
+        },
+        "warnings": reporter.warnings,
+        "seconds": {name: round(value, 2) for name, value in reporter.seconds.items()},
+        "versions": versions(),
+    }
+
+
+def _interface_summary(outcome: Outcome, number: int) -> dict[str, Any]:
+    stage, first = outcome.stages[number], outcome.first[number]
+    unworn = outcome.unworn[number]
+    loads = unworn.loads
+    last = dict(zip(KINETICS, outcome.state.kinetics[-1, number].tolist(), strict=True))
+    return {
+        **last,
+        "peak_load": {"unworn": resultants_at(loads, outcome.source.peak)},
+        "slip_per_cycle": _slip_per_cycle(unworn, first),
+        "energy_per_cycle": {
+            "half_space": float(first.energy.sum()),
+            "structure": loads.mean_energy,
+        },
+        **({"by_increment": comparison_summary(first.cycle, loads)} if first.cycle else {}),
+        "step_error": _step_error(outcome, number),
+        "explicit_limit": first.stable_cycles if np.isfinite(first.stable_cycles) else None,
+        "contact_residual": first.largest_residual,
+        "convolutions": first.spent.convolutions,
+        "linear_regime": {
+            name: None if regime is None else _regime_summary(regime)
+            for name, regime in outcome.regimes[stage.name].items()
+        },
+    }
+
+
+def _regime_summary(regime: LinearRegime) -> dict[str, Any]:
+    """A linear regime, and where it leads with its uncertainty."""
+    cycles = np.array(EXTRAPOLATION * regime.last_cycles)
+    return vars(regime) | {
+        "extrapolated": {
+            "cycles": float(cycles),
+            "value": float(regime.extrapolate(cycles)),
+            "uncertainty": float(regime.uncertainty(cycles)),
+        }
+    }
+
+
+def _step_error(outcome: Outcome, number: int) -> dict[str, float] | None:
+    """Estimated errors by wear steps of depth (root mean square) and volume, relative.
+
+    None where they are unknown or nothing is worn.
+    """
+    own = outcome.state.interfaces[number]
+    depth = own.surfaces.depth
+    if outcome.case.wear.step.kind == "explicit" or not depth.any():
+        return None
+    volume = float(depth.sum()) * outcome.stages[number].grid.cell_area
+    return {
+        "depth": root_mean_square(own.error, depth) / root_mean_square(depth, depth),
+        "volume": abs(own.volume_error) / volume,
+    }
+
+
+def _warn_of_steps(outcome: Outcome, reporter: Reporter) -> None:
+    """Automatic steps that did not meet their tolerance."""
+    wear = outcome.case.wear
+    if not wear.step.automatic:
+        return
+    for number, stage in enumerate(outcome.stages):
+        found = _step_error(outcome, number)
+        if found is None:
+            continue
+        asked = wear.tolerance
+        if wear.depth_tolerance is not None:
+            depth = outcome.state.interfaces[number].surfaces.depth
+            asked = wear.depth_tolerance / root_mean_square(depth, depth)
+        if max(found.values()) > asked:
+            reporter.warn(
+                f"{stage.name}: wear steps leave an estimated error of {max(found.values()):.2%} "
+                f"where {asked:.2%} was asked for (wear.tolerance): try wear.step.kind: "
+                "second_order, or a smaller tolerance"
+            )
+
+
+def _slip_per_cycle(unworn: FaceLoads, first: FirstContact) -> float:
+    """Largest path of slip [mm] per unworn, mean cycle: of the half-space where loads have none."""
+    slip = unworn.slip
+    if first.cycle and not slip.any():
+        slip = np.stack([state.slip for state in first.cycle])
+    return float(np.tensordot(unworn.loads.share, np.hypot(slip[:, 0], slip[:, 1]), 1).max())
+
+
+def _say(outcome: Outcome, summary: dict[str, Any], reporter: Reporter) -> None:
+    """The end of the run in a few lines."""
+    reporter.say(f"{summary['cycles']:.6g} cycles in {summary['jumps']} jumps")
+    name_1, name_2 = outcome.case.bodies
+    unit = "mm^3/mm" if outcome.source.line else "mm^3"
+    for stage in outcome.stages:
+        own = summary[stage.name]
+        peaks = own["peak_pressure"]
+        reporter.say(
+            f"  {stage.name}: worn {own['depth_1'] * 1e3:.3g} um ({name_1}), "
+            f"{own['depth_2'] * 1e3:.3g} um ({name_2}); {own['volume_1']:.3g}, "
+            f"{own['volume_2']:.3g} {unit}; peak pressure {peaks['unworn']:.0f} -> "
+            f"{peaks['worn']:.0f} MPa"
+        )
+    reporter.say(f"  seconds: {', '.join(f'{k} {v:.1f}' for k, v in summary['seconds'].items())}")

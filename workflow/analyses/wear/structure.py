@@ -1,0 +1,59 @@
+"""A kind of structure that loads contacts, as the wear analysis knows it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from math import prod
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
+
+from workflow.analyses.wear.case.base import WearCase
+from workflow.shell.memory import Memory, factor_bytes
+
+if TYPE_CHECKING:
+    from workflow.analyses.wear.contact_stage import ContactStage
+    from workflow.analyses.wear.load_source import LoadSource
+
+AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
+
+# Spectra and iterates alive during a contact solve, per cell.
+SPECTRA = 300
+# Dense interface matrices alive at once while a joint is condensed.
+DENSE_MATRICES = 6
+
+
+def contact_memory(case: WearCase) -> Memory:
+    """Of one contact at a time, under loads that are given."""
+    return Memory(prod(case.contact.grid) * SPECTRA, "lower contact.grid")
+
+
+def condensation_memory(nodes: int, interface_nodes: int) -> Memory:
+    """Of a structure of so many nodes that is condensed onto those of its interfaces."""
+    remedy = "lower contact.grid, or make the mesh coarser (mesh or structure.size)"
+    dense = DENSE_MATRICES * (3 * interface_nodes) ** 2
+    return Memory(dense, remedy, factor_bytes(nodes))
+
+
+def _as_written(case: Any) -> tuple[Any, None]:
+    return case, None
+
+
+def _nothing_to_warn_of(case: Any, stage: ContactStage, load: float) -> Iterator[str]:
+    return iter(())
+
+
+@dataclass(frozen=True)
+class WearStructure(Generic[AnyWearCase]):
+    """What a wear run needs to know of a kind of structure.
+
+    ``case`` is the kind of case that has it, ``source`` gives the loads of its contacts and
+    ``memory`` what they need. ``choose`` gives the case with the settings that it leaves open, and
+    a record of why; ``warnings`` are about the unworn contact of a stage under a peak load [N].
+    """
+
+    name: str
+    case: type[AnyWearCase]
+    source: Callable[[AnyWearCase], LoadSource]
+    memory: Callable[[AnyWearCase], Memory] = contact_memory
+    choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = _as_written
+    warnings: Callable[[AnyWearCase, ContactStage, float], Iterator[str]] = _nothing_to_warn_of

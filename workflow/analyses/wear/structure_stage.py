@@ -1,0 +1,328 @@
+"""The structural stage of a run: mesh, condensed joint, cycles, stress, worn mesh."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from fe_models.friction import FrictionalJoint, FrictionState
+from fe_models.joint import JointResolvent
+from fe_models.mesh import Interface, StructureMesh
+from fe_models.nonlinear import NonlinearCheck, check_nonlinearity
+from fe_models.relinearised import (
+    PrestressedStructure,
+    Softening,
+    relinearised,
+    stress_stiffened,
+)
+from fe_models.stress import StressField, deformation, stress_state
+from fe_models.structure import CycleSolution, InterfaceHistory, Structure, mixed
+from sa_solver.types import Array, Indices
+from workflow.analyses.wear.case.sections import Nonlinearity
+from workflow.analyses.wear.load_source import BODIES, ContactFace, UserFace
+from workflow.errors import MethodFailed
+from workflow.shell.cache import content_key, load_cycle, load_joint, save_cycle, save_joint
+from workflow.shell.reporter import Reporter
+
+Solved = TypeVar("Solved", CycleSolution, FrictionState)
+
+
+@dataclass(frozen=True)
+class LoadBlock:
+    """A closed cycle of loads that is so large a ``share`` of all cycles.
+
+    ``amplitudes`` ``(t, cases)`` are those of the load cases over the cycle and ``preload``
+    ``(s, cases)`` those before the first one.
+    """
+
+    amplitudes: Array
+    preload: Array
+    share: float = 1.0
+
+
+class StructureModel(Protocol):
+    """A structure as a case describes it.
+
+    ``key`` is everything that its condensed joint depends on, ``blocks`` are the closed cycles of
+    its loads, one unless missions are mixed; ``peak`` is the increment of peak load, counted from 0
+    over all blocks, ``friction`` µ before any wear, ``order`` that of the elements.
+    """
+
+    @property
+    def key(self) -> tuple[object, ...]: ...
+    @property
+    def blocks(self) -> tuple[LoadBlock, ...]: ...
+    @property
+    def peak(self) -> int: ...
+    @property
+    def order(self) -> int: ...
+    @property
+    def friction(self) -> float: ...
+    @property
+    def nonlinearity(self) -> Nonlinearity: ...
+
+    def softening(self, structure: Structure) -> Softening:
+        """Spin softening of both bodies at peak load."""
+        ...
+
+    def mesh(self) -> StructureMesh:
+        """The unworn mesh."""
+        ...
+
+    def structure(self, mesh: StructureMesh) -> Structure:
+        """Both bodies with supports and loads, on the mesh as it is or worn."""
+        ...
+
+    def contact_face(self, interface: Interface) -> ContactFace:
+        """What the contact stage needs of an interface."""
+        ...
+
+    def node_numbers(self, body: int) -> Indices | None:
+        """The user's numbers of the vertices of body 1 or 2; None where the mesh is ours."""
+        ...
+
+    def warn(self, structure: Structure, reporter: Reporter) -> None:
+        """Say what only this kind of structure can know."""
+        ...
+
+
+class StructureStage:
+    """Everything the run asks of the structure: a load source, and stress and worn mesh after it.
+
+    Worn depths are nodal, ``(n,)`` per interface, of both bodies together [mm]. Coefficients of
+    friction are one per interface; those before any wear where they are not given.
+    """
+
+    def __init__(self, model: StructureModel) -> None:
+        self.model = model
+        self.peak = model.peak
+        self.from_cache = False
+
+    @cached_property
+    def mesh(self) -> StructureMesh:
+        """The unworn mesh."""
+        return self.model.mesh()
+
+    @property
+    def faces(self) -> tuple[ContactFace, ...]:
+        return tuple(self.model.contact_face(interface) for interface in self.mesh.interfaces)
+
+    @property
+    def line(self) -> bool:
+        return self.mesh.interfaces[0].line
+
+    @cached_property
+    def joint(self) -> FrictionalJoint:
+        """The condensed joint before any wear, from the cache when it is there."""
+        return FrictionalJoint(self._resolvent, self.model.friction)
+
+    @cached_property
+    def _resolvent(self) -> JointResolvent:
+        """The condensed joint, as stiff as the case asks for."""
+        resolvent = self._linear_resolvent
+        # The linear structure itself takes seconds to build, and is not asked for.
+        if self.model.nonlinearity.stiffness != "linear":
+            assert isinstance(self.structure, PrestressedStructure)
+            resolvent = self.structure.condense_path(resolvent)
+        return resolvent
+
+    @property
+    def rigid_modes(self) -> int:
+        """Rigid motions that contact alone holds."""
+        return self._linear_resolvent.rigid_modes
+
+    @cached_property
+    def _linear_resolvent(self) -> JointResolvent:
+        key = content_key(*self.model.key)
+        joint = load_joint(key)
+        self.from_cache = joint is not None
+        if joint is None:
+            joint = self._linear.condense().resolvent()
+            save_joint(key, joint)
+        return joint
+
+    @cached_property
+    def _linear(self) -> Structure:
+        return self.model.structure(self.mesh)
+
+    @cached_property
+    def structure(self) -> Structure:
+        """Both bodies with supports and loads, unworn, as stiff as the case asks for."""
+        return self._prestressed(self._linear)
+
+    def _prestressed(self, structure: Structure) -> Structure:
+        """The structure with the stiffness that the case asks for."""
+        kind = self.model.nonlinearity.stiffness
+        if kind == "linear":
+            return structure
+        amplitudes = self._peak_amplitudes
+        softening = self.model.softening(structure)
+        how = {"stress_stiffened": stress_stiffened, "relinearised": relinearised}
+        return how[kind](structure, self._linear_peak, amplitudes, softening)
+
+    @cached_property
+    def _linear_peak(self) -> tuple[Array, Array]:
+        """Displacements of both bodies of the linear structure at peak load."""
+        amplitudes = self._peak_amplitudes
+        linear = FrictionalJoint(self._linear_resolvent, self.model.friction)
+        (state,) = map(_converged, linear.march(amplitudes[None], self._linear.gap()))
+        return deformation(self._linear, state.force, state.displacement, amplitudes)
+
+    @cached_property
+    def nonlinear_check(self) -> NonlinearCheck:
+        """The linear structure at peak load beside the total Lagrangian one."""
+        linear = self._linear
+        check = check_nonlinearity(
+            linear,
+            self._linear_resolvent,
+            self.model.friction,
+            self._peak_amplitudes,
+            linear.gap(),
+            self.model.softening(linear),
+        )
+        if not check.converged:
+            raise MethodFailed(
+                f"the total Lagrangian check left a residual of {check.residual:.1e} after "
+                f"{check.iterations} iterations: run without nonlinearity.check, or lower the load"
+            )
+        return check
+
+    def node_count(self) -> int:
+        """Nodes of both bodies, midsides included."""
+        return self.mesh.node_count(self.model.order)
+
+    def interface_count(self) -> int:
+        """Nodes of all interfaces."""
+        return sum(len(interface) for interface in self.mesh.interfaces)
+
+    def prepare(self) -> None:
+        """Do the costly part now: condense the structure, or find it in the cache."""
+        _ = self.joint
+
+    @cached_property
+    def unworn_cycle(self) -> CycleSolution:
+        """The closed cycle from rest with unworn faces, of all blocks one after the other."""
+        return self._mixed(self._unworn_blocks)
+
+    @cached_property
+    def _unworn_blocks(self) -> tuple[CycleSolution, ...]:
+        return tuple(map(self._unworn_block, self.model.blocks))
+
+    def _unworn_block(self, block: LoadBlock) -> CycleSolution:
+        """The closed cycle of one block from rest, from the cache if it is there."""
+        friction = self.model.friction
+        loads = [path.tolist() for path in (block.preload, block.amplitudes)]
+        stiffness = self.model.nonlinearity.stiffness
+        at = None if stiffness == "linear" else self._peak_amplitudes.tolist()
+        key = content_key(*self.model.key, *loads, stiffness, at, friction)
+        cycle = load_cycle(key, self.structure, friction)
+        if cycle is None:
+            unworn = [np.zeros(len(i)) for i in self.mesh.interfaces]
+            cycle = self._cycle(block, unworn, None, None)
+            save_cycle(key, cycle)
+        return cycle
+
+    def unworn(self) -> tuple[InterfaceHistory, ...]:
+        return self.unworn_cycle.histories
+
+    def worn_cycle(
+        self, depths: list[Array], friction: Sequence[float] | None = None
+    ) -> CycleSolution:
+        """The cycle that follows the unworn one when the gaps are wider by the worn depths."""
+        pairs = zip(self.model.blocks, self._unworn_blocks, strict=True)
+        return self._mixed([self._cycle(block, depths, own, friction) for block, own in pairs])
+
+    def worn(
+        self, depths: list[Array], friction: Sequence[float] | None = None
+    ) -> tuple[InterfaceHistory, ...]:
+        return self.worn_cycle(depths, friction).histories
+
+    def _mixed(self, cycles: Sequence[CycleSolution]) -> CycleSolution:
+        return mixed(cycles, [block.share for block in self.model.blocks])
+
+    def _cycle(
+        self,
+        block: LoadBlock,
+        depths: list[Array],
+        after: CycleSolution | None,
+        friction: Sequence[float] | None,
+    ) -> CycleSolution:
+        nodal = self._nodal_friction(friction)
+        solution = self.structure.solve_cycle(
+            self._joint_of(nodal), block.amplitudes, self._gap(depths), nodal, after, block.preload
+        )
+        return _converged(solution)
+
+    def user_faces(self, number: int) -> tuple[UserFace, ...]:
+        """The nodes of the faces of a mesh of the user's own."""
+        interface, faces = self.mesh.interfaces[number], []
+        for body in BODIES:
+            numbers = self.model.node_numbers(body)
+            if numbers is not None:
+                own = numbers[interface.nodes(body)]
+                faces.append(UserFace(body, own, interface.frame))
+        return tuple(faces)
+
+    def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
+        """Resultants ``(interfaces, 6)`` at peak load reached in a single increment.
+
+        Cheap, and moved by wear and friction as those of the full cycle are.
+        """
+        state = self._march_to_peak(depths, [self._unworn_peak.state], friction)
+        return self.structure.interface_resultants(state)
+
+    @cached_property
+    def _unworn_peak(self) -> FrictionState:
+        return self._march_to_peak([np.zeros(len(i)) for i in self.mesh.interfaces], [], None)
+
+    def _march_to_peak(
+        self, depths: list[Array], guess: list[Array], friction: Sequence[float] | None
+    ) -> FrictionState:
+        joint = self._joint_of(self._nodal_friction(friction))
+        path = self._peak_amplitudes[None]
+        (state,) = map(_converged, joint.march(path, self._gap(depths), guess=guess))
+        return state
+
+    def _nodal_friction(self, friction: Sequence[float] | None) -> float | Array:
+        """Coefficients of the interfaces at all nodes ``(n,)``; one for all before any wear."""
+        if friction is None:
+            return self.model.friction
+        return np.repeat(friction, [len(interface) for interface in self.mesh.interfaces])
+
+    def _joint_of(self, friction: float | Array) -> FrictionalJoint:
+        if isinstance(friction, float):
+            return self.joint
+        return FrictionalJoint(self._resolvent, friction)
+
+    @property
+    def _peak_amplitudes(self) -> Array:
+        """Amplitudes of the load cases at peak load ``(cases,)``."""
+        amplitudes = np.concatenate([block.amplitudes for block in self.model.blocks])
+        peak: Array = amplitudes[self.peak]
+        return peak
+
+    def stress(self, mesh: StructureMesh, solution: CycleSolution) -> tuple[StressField, ...]:
+        """Stress of both bodies at peak load, on the unworn or the worn mesh."""
+        worn = mesh is not self.mesh
+        structure = self._prestressed(self.model.structure(mesh)) if worn else self.structure
+        fields = {name: values[self.peak] for name, values in solution.fields().items()}
+        amplitudes = self._peak_amplitudes
+        return stress_state(structure, fields["force"], fields["displacement"], amplitudes)
+
+    def _gap(self, depths: list[Array]) -> Array:
+        return self.structure.gap() + np.concatenate(depths)
+
+
+def _converged(solved: Solved) -> Solved:
+    """What was solved. Raises MethodFailed unless it has converged."""
+    if not solved.converged:
+        raise MethodFailed(
+            f"structural friction did not converge: residual {solved.residual:.1e} after "
+            f"{solved.iterations} iterations; see that contacts and supports can carry the loads "
+            "and leave no face open, refine load_path.increments or lower friction.coefficient"
+        )
+    return solved

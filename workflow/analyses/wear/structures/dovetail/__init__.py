@@ -1,0 +1,63 @@
+"""A blade root in a disk sector, in contact along two flanks."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from math import prod
+from typing import TYPE_CHECKING, Any
+
+from workflow.analyses.wear.structure import DENSE_MATRICES, WearStructure
+from workflow.analyses.wear.structures.dovetail.case import DovetailCase
+from workflow.shell.memory import Memory
+
+if TYPE_CHECKING:
+    from workflow.analyses.wear.contact_stage import ContactStage
+    from workflow.analyses.wear.load_source import LoadSource
+
+# Fields per cell and increment: slips, depths per pressure, pressures, starts.
+FIELDS = 12
+# Spectra and iterates alive during a contact solve, per cell.
+SPECTRA = 300
+
+
+def _source(case: DovetailCase) -> LoadSource:
+    # Finite elements take a second to load: where they are used.
+    from workflow.analyses.wear.structure_stage import StructureStage
+    from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+
+    return StructureStage(DovetailModel(case))
+
+
+def _memory(case: DovetailCase) -> Memory:
+    """Of two flanks whose nodes and increments are known beforehand, unlike those of a section."""
+    remedy = "lower mesh.flank_nodes, mesh.order or contact.grid, or raise mesh.size"
+    if case.structure.dimension == 2:
+        return Memory(prod(case.contact.grid) * SPECTRA, remedy)
+    interface_nodes = 2 * prod(case.mesh.flank_nodes)
+    increments = len(case.load_path.shares) * case.load_path.increments
+    fields = 2 * prod(case.contact.grid) * increments * FIELDS
+    return Memory(DENSE_MATRICES * (3 * interface_nodes) ** 2 + fields, remedy)
+
+
+def _choose(case: DovetailCase) -> tuple[DovetailCase, dict[str, Any] | None]:
+    if case.fidelity == "fixed":
+        return case, None
+    from workflow.analyses.wear.fidelity.choosing import choose
+
+    return choose(case)
+
+
+def _warnings(case: DovetailCase, stage: ContactStage, load: float) -> Iterator[str]:
+    from workflow.analyses.wear.structures.dovetail.edge_peaks import warnings
+
+    return warnings(case, stage, load)
+
+
+STRUCTURE = WearStructure(
+    name="dovetail",
+    case=DovetailCase,
+    source=_source,
+    memory=_memory,
+    choose=_choose,
+    warnings=_warnings,
+)

@@ -1,0 +1,289 @@
+"""A dovetail case: a blade root in its disk, its mission, its flanks and how they wear."""
+
+from __future__ import annotations
+
+from math import cos, pi, radians, sin, tan
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from pydantic import model_validator
+
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.case.sections import (
+    BladeAndDiskMaterials,
+    Coupling,
+    DovetailWear,
+    Nonlinearity,
+    Ratio,
+    Share,
+    check_shares,
+)
+from workflow.case.fields import Quantity, Whole
+from workflow.case.sections import Length, RoundingRadius, Section, disagreement, entry
+
+if TYPE_CHECKING:
+    from fe_models.geometry.dovetail import Dovetail as Geometry
+
+Mass = Annotated[float, Quantity("t", at_least=0.0, at_most=1.0, range_text="0 to 1000 kg")]
+FlankAngle = Annotated[
+    float,
+    Quantity("rad", at_least=radians(10), at_most=radians(80), range_text="10 deg to 80 deg"),
+]
+Skew = Annotated[
+    float,
+    Quantity("rad", at_least=radians(-30), at_most=radians(30), range_text="-30 deg to 30 deg"),
+]
+RotationSpeed = Annotated[
+    float,
+    Quantity(
+        "rad/s", above=0.0, at_most=1e5 * pi / 30, range_text="above 0 and at most 100000 rpm"
+    ),
+]
+Moment = Annotated[
+    float, Quantity("N*mm", at_least=-1e9, at_most=1e9, range_text="-1e6 N*m to 1e6 N*m")
+]
+FlankNodes = Annotated[int, Whole(3, 2000)]
+
+
+class Dovetail(Section):
+    """Blade root in a disk sector, in contact along two flanks (dovetail attachment)."""
+
+    kind: Literal["dovetail"] = entry("what the structure is", "dovetail")
+    dimension: Literal[2, 3] = entry(
+        "3, or 2: the section in the middle of the slot in plane strain, loads per length",
+        3,
+        default=3,
+    )
+    flank_angle: FlankAngle = entry("between the flank and the radial axis [rad]", "45 deg")
+    flank_length: Length = entry("flat part of the flank, across the slot [mm]", "8 mm")
+    edge_radius: RoundingRadius = entry(
+        "rounding of the two flank edges along the slot [mm]", "30 mm"
+    )
+    edge_width: Length = entry("width of each rounded edge, beyond the flat [mm]", "1.5 mm")
+    end_radius: RoundingRadius = entry("rounding of the flank at the slot ends [mm]", "150 mm")
+    end_width: Length = entry("width of each rounded end, inside the slot length [mm]", "3 mm")
+    neck_width: Length = entry("blade, between the tops of the flanks [mm]", "20 mm")
+    neck_fillet: Length = entry("blade, radius between neck and flank [mm]", "3 mm")
+    slot_length: Length = entry("of the slot, along its direction [mm]", "60 mm")
+    slot_fillet: Length = entry("disk, radius at the bottom of the slot [mm]", "3 mm")
+    root_depth: Length = entry("blade, below the flanks [mm]", "6 mm")
+    shank_height: Length = entry("blade, from the top of the flanks outwards [mm]", "30 mm")
+    slot_clearance: Length = entry("play under the blade root [mm]", "1 mm")
+    lug_height: Length = entry("disk, above the top of the flanks [mm]", "6 mm")
+    blades: Annotated[int, Whole(3, 1000)] = entry("the sector spans 360°/blades", 24)
+    rim_radius: Length = entry("rotor axis to the top of the flanks [mm]", "250 mm")
+    disk_height: Length = entry("radial height of the sector below the rim [mm]", "60 mm")
+    skew: Skew = entry("slot direction against the rotor axis [rad]", "0 deg", default=0.0)
+
+    @property
+    def face_width(self) -> float:
+        """Flat and both rounded edges of a flank, across the slot [mm]."""
+        return self.flank_length + 2.0 * self.edge_width
+
+    @property
+    def face_depth(self) -> float:
+        """Radial extent of the flank below the rim [mm]."""
+        return self.face_width * cos(self.flank_angle)
+
+    @property
+    def root_width(self) -> float:
+        """Width of the blade root at the bottom of the flanks [mm]."""
+        return self.neck_width + 2.0 * self.face_width * sin(self.flank_angle)
+
+    @model_validator(mode="after")
+    def _plane_is_straight(self) -> Dovetail:
+        if self.dimension == 2 and self.skew != 0.0:
+            raise disagreement(
+                "2: a skewed slot is not the same all along; allowed: dimension 3, or skew 0",
+                *("dimension", "skew"),
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _roundings_fit(self) -> Dovetail:
+        for name in ("edge", "end"):
+            width, radius = getattr(self, f"{name}_width"), getattr(self, f"{name}_radius")
+            if width >= radius:
+                raise disagreement(
+                    f"{width:g} mm: the rounding ends beyond its own arc; "
+                    f"allowed: below {name}_radius, {radius:g} mm",
+                    f"{name}_width",
+                    f"{name}_radius",
+                )
+        _require_below(self, "edge_width", self.flank_length / 2, "half the flank_length")
+        _require_below(self, "end_width", self.slot_length / 2, "half the slot_length")
+        return self
+
+    @model_validator(mode="after")
+    def _root_fits_sector(self) -> Dovetail:
+        _require_below(self, "disk_height", self.rim_radius, "the rim_radius")
+        depth = self.face_depth + self.slot_fillet
+        if depth >= self.disk_height:
+            raise disagreement(
+                f"{self.disk_height:g} mm: too shallow for flanks and slot_fillet, which reach "
+                f"{depth:.4g} mm below the rim; allowed: above {depth:.4g} mm",
+                *("disk_height", "flank_length", "edge_width", "flank_angle", "slot_fillet"),
+            )
+        sector = 2.0 * (self.rim_radius - self.face_depth) * tan(pi / self.blades)
+        if self.root_width >= sector:
+            raise disagreement(
+                f"{self.blades} blades: the sector is {sector:.4g} mm wide at the bottom of the "
+                f"flanks, the blade root {self.root_width:.4g} mm; allowed: fewer blades or a "
+                "narrower root",
+                *("blades", "neck_width", "flank_length", "edge_width", "flank_angle"),
+                "rim_radius",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _can_be_drawn(self) -> Dovetail:
+        from fe_models.mesh import MeshError
+
+        try:
+            self.geometry().check()
+        except MeshError as error:
+            raise disagreement(str(error)) from error
+        return self
+
+    def geometry(self) -> Geometry:
+        """The joint as the mesher takes it."""
+        from fe_models.geometry.dovetail import Dovetail as Geometry
+
+        return Geometry(**self.model_dump(exclude={"kind", "dimension"}))
+
+
+def _require_below(section: Section, key: str, limit: float, name: str) -> None:
+    """Raise unless the length ``key`` is below ``limit`` [mm], called ``name`` in the message."""
+    length = getattr(section, key)
+    if length >= limit:
+        other = name.rsplit(" ", 1)[-1]
+        raise disagreement(
+            f"{length:g} mm: too large; allowed: below {name}, {limit:g} mm", key, other
+        )
+
+
+class MissionOfMix(Section):
+    """One of several missions; what it does not name is that of load_path."""
+
+    share: Share = entry("of all cycles; the shares add up to 1 [1]", "100 %")
+    rotation_speed: RotationSpeed | None = entry("at the peak [rad/s]", "5000 rpm", default=None)
+    aerodynamic_moment: Moment | None = entry(
+        "at peak speed, about the slot; presses on the intrados [N*mm]", "20 N*m", default=None
+    )
+
+
+class LoadPath(Section):
+    """One mission: the speed rises linearly to its peak and falls back to zero.
+
+    Centrifugal force and aerodynamic moment follow the square of the speed.
+    """
+
+    increments: Annotated[int, Whole(2, 10_000)] = entry("of one cycle", 22)
+    peak_at: Annotated[int, Whole(1, 10_000)] = entry("increment at which the speed peaks", 8)
+    rotation_speed: RotationSpeed = entry("at the peak [rad/s]", "6000 rpm")
+    airfoil_mass: Mass = entry("of the blade outside the model [t]", "0.8 kg")
+    airfoil_radius: Length = entry(
+        "of the airfoil's centre of mass, from the rotor axis [mm]", "400 mm"
+    )
+    aerodynamic_moment: Moment = entry(
+        "at peak speed, about the slot; presses on the intrados [N*mm]", "30 N*m", default=0.0
+    )
+    mix: tuple[MissionOfMix, ...] = entry(
+        "missions that take turns; without it there is one", default=()
+    )
+
+    @model_validator(mode="after")
+    def _shares_are_whole(self) -> LoadPath:
+        check_shares(self.shares)
+        return self
+
+    @property
+    def shares(self) -> tuple[float, ...]:
+        """Share of each mission in all cycles."""
+        return tuple(own.share for own in self.mix) or (1.0,)
+
+    def missions(self) -> list[dict[str, Any]]:
+        """The entries of every mission of the mix."""
+        entries = self.model_dump(exclude={"mix"})
+        own = [mission.model_dump(exclude={"share"}, exclude_none=True) for mission in self.mix]
+        return [entries | given for given in own or [{}]]
+
+    @property
+    def heaviest(self) -> int:
+        """The mission of the highest speed, of several the one of the largest moment."""
+        peaks = [(m["rotation_speed"], abs(m["aerodynamic_moment"])) for m in self.missions()]
+        return peaks.index(max(peaks))
+
+    @model_validator(mode="after")
+    def _peak_inside_cycle(self) -> LoadPath:
+        if self.peak_at >= self.increments:
+            raise disagreement(
+                f"{self.peak_at}: the peak comes after the cycle; "
+                f"allowed: below increments, {self.increments}",
+                *("peak_at", "increments"),
+            )
+        return self
+
+
+class Mesh(Section):
+    """Tetrahedra of the structure."""
+
+    flank_nodes: tuple[FlankNodes, FlankNodes] = entry(
+        "nodes across the flank, along the slot", [20, 34], default=(20, 34)
+    )
+    size: Length = entry("of the elements away from the flanks [mm]", "5 mm", default=5.0)
+    order: Literal[1, 2] = entry("of the tetrahedra, 1 or 2", 1, default=1)
+
+
+class DovetailCase(WearCase):
+    """A dovetail under its mission."""
+
+    bodies: ClassVar[tuple[str, str]] = ("disk", "blade")
+
+    structure: Dovetail = entry("lengths in the section across the slot unless named otherwise")
+    materials: BladeAndDiskMaterials = entry("the two bodies in contact")
+    load_path: LoadPath = entry("one cycle")
+    mesh: Mesh = entry("finite elements of the structure", default=Mesh())
+    nonlinearity: Nonlinearity = entry("geometric, of the structure", default=Nonlinearity())
+    wear: DovetailWear = entry("law, length of the run and step")
+    coupling: Coupling = entry("worn surfaces back to the structure", default=Coupling())
+    accuracy: Ratio = entry(
+        "of depth and volume in mid-slot, when fidelity is auto [1]", "5 %", default=0.05
+    )
+    fidelity: Literal["fixed", "auto"] = entry(
+        "fixed: as written; auto: dimension, increments, mesh, grid, tolerances, wear steps and "
+        "drift as coarse as probes show that the accuracy allows",
+        "fixed",
+        default="fixed",
+    )
+
+    def loads_outline(self) -> list[tuple[str, str]]:
+        path, (across, along) = self.load_path, self.mesh.flank_nodes
+        nodes = f"{across} x {along}" if self.structure.dimension == 3 else f"{across}"
+        missions = f", {len(path.mix)} missions" if path.mix else ""
+        rows = [
+            ("structure", f"dovetail in {self.structure.dimension}-D, {nodes} nodes on a flank"),
+            ("load path", f"{path.increments} increments, peak at {path.peak_at}{missions}"),
+        ]
+        if self.fidelity == "auto":
+            by_probes = f"2-D or 3-D and how fine, by probes: {100 * self.accuracy:g} %"
+            rows.append(("fidelity", by_probes))
+        return rows
+
+    @property
+    def cores(self) -> int:
+        return 2
+
+    @property
+    def recoupling(self) -> Coupling:
+        return self.coupling
+
+    @model_validator(mode="after")
+    def _airfoil_outside_disk(self) -> DovetailCase:
+        radius, rim = self.load_path.airfoil_radius, self.structure.rim_radius
+        if radius <= rim:
+            raise disagreement(
+                f"{radius:g} mm: the airfoil is inside the disk; "
+                f"allowed: above structure.rim_radius, {rim:g} mm",
+                *("load_path.airfoil_radius", "structure.rim_radius"),
+            )
+        return self

@@ -1,0 +1,44 @@
+"""Pressure peaks at the rounded edges of a flank that the contact grid cuts off."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from sa_solver.reference.flat_rounded import FlatRounded
+from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.structures.dovetail.case import DovetailCase
+
+# Share of the closed form's edge peak that the grid may miss.
+PEAK_ERROR = 0.05
+
+
+def warnings(case: DovetailCase, stage: ContactStage, load: float) -> Iterator[str]:
+    """What to say of each edge whose peak the grid misses."""
+    for edge, error in edge_peak_errors(case, stage, load).items():
+        if abs(error) > PEAK_ERROR:
+            yield (
+                f"{stage.name}: the grid misses {abs(error):.0%} of the pressure peak at the "
+                f"{edge}: refine contact.grid or increase structure.{edge}_radius"
+            )
+
+
+def edge_peak_errors(case: DovetailCase, stage: ContactStage, load: float) -> dict[str, float]:
+    """What the grid makes of the closed form's edge peaks, relative, under a centred ``load``.
+
+    The plane strain profile across the flank stands for both: the peak at the slot ends is set by
+    the same short side.
+    """
+    if load <= 0.0:
+        return {}
+    dovetail = case.structure
+    half_width = 0.5 * dovetail.flank_length
+    per_length, radii = load, {"edge": dovetail.edge_radius}
+    if not stage.grid.line:
+        per_length = load / (dovetail.slot_length - 2.0 * dovetail.end_width)
+        radii["end"] = dovetail.end_radius
+    return {
+        edge: FlatRounded(half_width, radius, per_length, stage.pair.contact_modulus).peak_error(
+            pitch
+        )
+        for (edge, radius), pitch in zip(radii.items(), stage.grid.pitch, strict=False)
+    }

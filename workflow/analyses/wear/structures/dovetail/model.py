@@ -1,0 +1,77 @@
+"""A dovetail case as a structure."""
+
+from __future__ import annotations
+
+from functools import partial
+
+import numpy as np
+
+from fe_models.dovetail import Mission, dovetail_softening, dovetail_structure
+from fe_models.mesh import Interface, StructureMesh
+from fe_models.relinearised import Softening
+from fe_models.structure import Structure
+from workflow.analyses.wear.load_source import ContactFace
+from workflow.analyses.wear.structure_stage import LoadBlock
+from workflow.analyses.wear.structures.dovetail.case import DovetailCase
+from workflow.shell.reporter import Reporter
+
+# The flank at X > 0 and the one at X < 0.
+SIDES = {"intrados": 1, "extrados": -1}
+
+
+class DovetailModel:
+    """The joint, its mission and its mesh as the case gives them."""
+
+    def __init__(self, case: DovetailCase) -> None:
+        self._case = case
+        self.dovetail = case.structure.geometry()
+        self._missions = [Mission(**entries) for entries in case.load_path.missions()]
+        heaviest = case.load_path.heaviest
+        self._mission = self._missions[heaviest]
+        self.friction = case.friction.at(0.0)
+        self.peak = heaviest * case.load_path.increments + case.load_path.peak_at - 1
+        self.nonlinearity = case.nonlinearity
+        self.order = case.mesh.order
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        case, mission = self._case, self._mission
+        pull = mission.airfoil_mass, mission.airfoil_radius
+        return self.dovetail, case.structure.dimension, case.mesh, case.materials, pull
+
+    @property
+    def blocks(self) -> tuple[LoadBlock, ...]:
+        paths = [mission.amplitudes() for mission in self._missions]
+        shares = self._case.load_path.shares
+        return tuple(LoadBlock(p, p[:0], share) for p, share in zip(paths, shares, strict=True))
+
+    def mesh(self) -> StructureMesh:
+        mesh = self._case.mesh
+        return self.dovetail.mesh(mesh.flank_nodes, mesh.size, self._case.structure.dimension)
+
+    def structure(self, mesh: StructureMesh) -> Structure:
+        disk, blade = self._case.material(1), self._case.material(2)
+        return dovetail_structure(self.dovetail, mesh, disk, blade, self._mission, self.order)
+
+    def softening(self, structure: Structure) -> Softening:
+        return dovetail_softening(structure, self.dovetail, self._mission)
+
+    def contact_face(self, interface: Interface) -> ContactFace:
+        side = SIDES[interface.name]
+        gap = partial(self.dovetail.flank_gap, side=side)
+        nodes = self._case.mesh.flank_nodes
+        widen = "widen structure.edge_width or structure.end_width"
+        return ContactFace(interface, self.dovetail.flank_size(side), gap, nodes, widen)
+
+    def node_numbers(self, body: int) -> None:
+        """Nobody but us knows the nodes."""
+
+    def warn(self, structure: Structure, reporter: Reporter) -> None:
+        """Self-locking joints."""
+        slope = np.tan(self.dovetail.flank_angle)
+        if self.friction > slope:
+            reporter.warn(
+                f"friction.coefficient {self.friction:g} exceeds the tangent of the flank angle, "
+                f"{slope:.3g}: the joint locks itself and the blade does not come back when the "
+                "load falls"
+            )

@@ -1,0 +1,391 @@
+"""A wear case whose structure is a mesh or CAD file of the user's."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+
+import numpy as np
+from pydantic import TypeAdapter, ValidationError, model_validator
+
+from workflow.analyses.wear.case.base import WearCase, check_interface_name
+from workflow.analyses.wear.case.gaps import Gap, check_gap
+from workflow.analyses.wear.case.sections import (
+    Coupling,
+    Nonlinearity,
+    Share,
+    TwoMaterials,
+    Wear,
+    check_shares,
+)
+from workflow.analyses.wear.structures.mesh.loads import (
+    Component,
+    DisplacementLoad,
+    Factor,
+    Load,
+    Name,
+)
+from workflow.case.fields import File, Whole
+from workflow.case.sections import Length, Section, Title, disagreement, entry
+from workflow.errors import UserError
+
+if TYPE_CHECKING:
+    from fe_models import imported_structure as fe
+    from fe_models.geometry.imported import ImportedMesh
+    from fe_models.mesh import Interface, StructureMesh
+
+# Files that hold shapes and no mesh.
+CAD = (".step", ".stp", ".brep")
+# What the readers take; other endings are refused with advice.
+ENDINGS = (
+    ".msh", ".inp", ".step", ".stp", ".brep", ".vtu", ".vtk", ".xdmf", ".med", ".bdf", ".mesh",
+    ".nas", ".cdb", ".odb", ".cae", ".db", ".igs", ".iges",
+)  # fmt: skip
+
+Stamp = tuple[int, int]
+
+
+class ContactPair(Section):
+    """Two faces that meet; their meshes need not match."""
+
+    name: Name = entry("of the interface in all results", "pad")
+    face_1: Name = entry("boundary of body 1", "disk_top")
+    face_2: Name = entry("boundary of body 2", "blade_foot")
+    x: tuple[Component, Component, Component] = entry(
+        "direction in which body 2 would slide under the load; x of the interface frame [1]",
+        [1.0, 0.0, 0.0],
+    )
+    gap: Gap | None = entry("of the unloaded bodies, beside that of their meshes", default=None)
+
+    @model_validator(mode="after")
+    def _has_direction(self) -> ContactPair:
+        if not any(self.x):
+            raise disagreement("no direction; allowed: one that is not zero", "x")
+        return self
+
+    def described(self) -> fe.ContactPair:
+        """As the structure takes it."""
+        from fe_models.imported_structure import ContactPair as Pair
+
+        return Pair(self.name, self.face_1, self.face_2, np.array(self.x))
+
+
+class Support(Section):
+    """Displacements held at a boundary or a node set, of whichever body has it."""
+
+    group: Name = entry("boundary or node set", "disk_base")
+    hold: Literal[
+        "all", "normal", "x", "y", "z", "xy", "xz", "yz", "mean_x", "mean_y", "mean_z"
+    ] = entry(
+        "all, normal, global axes such as xz, or mean_x: only the mean of a boundary along x", "all"
+    )
+
+    def described(self) -> fe.Support:
+        """As the structure takes it."""
+        from fe_models.imported_structure import Support as Held
+
+        return Held(self.group, "xyz" if self.hold == "all" else self.hold)
+
+
+class ImportedStructure(Section):
+    """Two bodies from a file; lengths in mm.
+
+    Tetrahedra and hexahedra, or triangles and quadrilaterals in plane strain: coordinates of a
+    plane mesh are called X and Z.
+    """
+
+    kind: Literal["mesh"] = entry("what the structure is", "mesh")
+    file: Annotated[str, File(ENDINGS)] = entry(
+        "mesh (.msh, .inp, .vtu, ...) or CAD (.step, .brep)", "joint.msh"
+    )
+    size: Length | None = entry("of the elements, for CAD files only [mm]", "2 mm", default=None)
+    order: Literal[1, 2] = entry("of the elements, 1 or 2", 1, default=1)
+    body_1: Name = entry("name in the file of the lower, fixed body", "disk")
+    body_2: Name = entry("name in the file of the upper, moving body", "blade")
+    contacts: tuple[ContactPair, ...] = entry("faces that meet")
+    supports: tuple[Support, ...] = entry("what is held")
+    loads: tuple[Load, ...] = entry("what is applied")
+
+    @model_validator(mode="after")
+    def _has_some(self) -> ImportedStructure:
+        for name in ("contacts", "supports", "loads"):
+            if not getattr(self, name):
+                raise disagreement("none; allowed: one or more", name)
+        return self
+
+    @model_validator(mode="after")
+    def _size_is_for_cad(self) -> ImportedStructure:
+        shapes = Path(self.file).suffix.lower() in CAD
+        if shapes and self.size is None:
+            raise disagreement("missing; allowed: a size, to mesh a CAD file with", "size")
+        if not shapes and self.size is not None:
+            raise disagreement(
+                f"{self.size:g} mm: the file is a mesh already; allowed: none, or a file of "
+                f"{', '.join(CAD)}",
+                "size",
+            )
+        return self
+
+    @model_validator(mode="after")
+    def _names_differ(self) -> ImportedStructure:
+        names = [pair.name for pair in self.contacts]
+        if len(set(names)) < len(names):
+            raise disagreement("two contacts of one name; allowed: names that differ", "contacts")
+        for index, name in enumerate(names):
+            check_interface_name(name, f"contacts.{index}.name")
+        if self.body_1 == self.body_2:
+            raise disagreement("the same body twice; allowed: two bodies", "body_2", "body_1")
+        return self
+
+    def read(self) -> ImportedMesh:
+        """Everything in the file, read once. Raises MeshError."""
+        return _read(self.file, self.size, _stamp(self.file))
+
+    def mesh(self) -> StructureMesh:
+        """The two bodies and their interfaces, made once. Raises MeshError."""
+        return _joined(self, _stamp(self.file))
+
+
+# Reading or meshing takes seconds for every 100 000 elements: a check and the run that follows it
+# share what they find.
+@lru_cache(maxsize=1)
+def _read(file: str, size: float | None, stamp: Stamp) -> ImportedMesh:
+    from fe_models.geometry.imported import read_bodies
+
+    return read_bodies(Path(file), size)
+
+
+@lru_cache(maxsize=1)
+def _joined(structure: ImportedStructure, stamp: Stamp) -> StructureMesh:
+    from fe_models.imported_structure import imported_mesh
+
+    pairs = [pair.described() for pair in structure.contacts]
+    return imported_mesh(structure.read(), (structure.body_1, structure.body_2), pairs)
+
+
+def _stamp(file: str) -> Stamp:
+    """Time and size by which a file that has changed is known."""
+    state = Path(file).stat()
+    return state.st_mtime_ns, state.st_size
+
+
+def described_file(file: Path, size: str | None) -> list[str]:
+    """Lines that list what a mesh or CAD file has; ``size`` with its unit. Raises UserError."""
+    from fe_models.geometry.imported import describe, read_bodies
+    from fe_models.mesh import MeshError
+
+    try:
+        return describe(read_bodies(file, None if size is None else _length(size)))
+    except MeshError as error:
+        raise UserError(str(error)) from error
+
+
+def _length(text: str) -> float:
+    """A length in mm. Raises UserError."""
+    value = float(text) if text.replace(".", "", 1).isdecimal() else text
+    try:
+        length: float = TypeAdapter(Length).validate_python(value)
+    except ValidationError as error:
+        raise UserError(f"--size: {error.errors()[0]['msg']}") from error
+    return length
+
+
+class CycleOfMix(Section):
+    """One of several cycles, in which every load has its own factor."""
+
+    share: Share = entry("of all cycles; the shares add up to 1 [1]", "100 %")
+    factors: tuple[Factor, ...] = entry(
+        "of every load, in the order of structure.loads; of the speed for a rotation [1]", [1.0]
+    )
+
+
+class Legs(Section):
+    """Every load goes linearly from leg to leg; the last legs are one cycle."""
+
+    increments: tuple[Annotated[int, Whole(1, 10_000)], ...] = entry("of each leg", [8, 14])
+    cycle_from: Annotated[int, Whole(1, 1000)] = entry(
+        "first leg of the cycle; those before it are passed once", 1, default=1
+    )
+    peak_leg: Annotated[int, Whole(1, 1000)] = entry(
+        "leg of the cycle at whose end the load peaks: stress is shown there", 1, default=1
+    )
+    mix: tuple[CycleOfMix, ...] = entry(
+        "cycles that take turns, all on these legs, the one to show first; without it there is one",
+        default=(),
+    )
+
+    @model_validator(mode="after")
+    def _peak_is_a_leg(self) -> Legs:
+        if not self.increments:
+            raise disagreement("none; allowed: one or more", "increments")
+        if self.mix:
+            check_shares([own.share for own in self.mix])
+        if not self.cycle_from <= self.peak_leg <= len(self.increments):
+            raise disagreement(
+                f"{self.peak_leg}: no leg of the cycle; "
+                f"allowed: {self.cycle_from} to {len(self.increments)}",
+                *("peak_leg", "cycle_from"),
+            )
+        return self
+
+    def mixed(self, loads: int) -> list[tuple[tuple[float, ...], float]]:
+        """Factors of all ``loads``, so many, and share of every cycle."""
+        return [(own.factors, own.share) for own in self.mix] or [((1.0,) * loads, 1.0)]
+
+
+class MeshCase(WearCase):
+    """Bodies from a file under loads of the user's."""
+
+    bodies: ClassVar[tuple[str, str]] = ("body_1", "body_2")
+
+    title: Title = entry("one line", "Two bodies of a mesh file")
+    structure: ImportedStructure = entry("bodies, contacts, supports and loads, named by groups")
+    materials: TwoMaterials = entry("the two bodies in contact")
+    load_path: Legs = entry("one cycle")
+    nonlinearity: Nonlinearity = entry("geometric, of the structure", default=Nonlinearity())
+    wear: Wear = entry("law, length of the run and step")
+    coupling: Coupling = entry("worn surfaces back to the structure", default=Coupling())
+
+    @property
+    def recoupling(self) -> Coupling:
+        return self.coupling
+
+    @property
+    def cores(self) -> int:
+        return len(self.structure.contacts)
+
+    def loads_outline(self) -> list[tuple[str, str]]:
+        structure, legs = self.structure, self.load_path.increments
+        cycles = f", {len(self.load_path.mix)} cycles mixed" if self.load_path.mix else ""
+        mesh = structure.mesh()
+        bodies = [f"{b.name} of {b.mesh.nvertices} nodes" for b in (mesh.body_1, mesh.body_2)]
+        return [
+            ("structure", f"{Path(structure.file).name}: {' and '.join(bodies)}"),
+            *(("face", _outline_of(interface)) for interface in mesh.interfaces),
+            ("load path", f"{sum(legs)} increments in {len(legs)} legs{cycles}"),
+        ]
+
+    @model_validator(mode="after")
+    def _paths_fit_legs(self) -> MeshCase:
+        legs = len(self.load_path.increments)
+        for index, load in enumerate(self.structure.loads):
+            if len(load.path) != legs:
+                raise disagreement(
+                    f"{len(load.path)} factors for {legs} legs of load_path; "
+                    "allowed: one for each leg",
+                    f"structure.loads.{index}.path",
+                )
+        loads = len(self.structure.loads)
+        for index, own in enumerate(self.load_path.mix):
+            if len(own.factors) != loads:
+                raise disagreement(
+                    f"{len(own.factors)} factors for {loads} loads; allowed: one for each load",
+                    f"load_path.mix.{index}.factors",
+                )
+        return self
+
+    @model_validator(mode="after")
+    def _fits_the_file(self) -> MeshCase:
+        """Every name is in the file, the faces meet and body 1 is held."""
+        structure = self.structure
+        with _pointing_at("structure.file"):
+            imported = structure.read()
+        self._check_names(imported)
+        self._check_contacts()
+        self._check_supports(imported)
+        return self
+
+    def _check_names(self, imported: ImportedMesh) -> None:
+        from fe_models.imported_structure import (
+            check_load,
+            check_support,
+            contact_facets,
+            named_body,
+        )
+
+        structure = self.structure
+        with _pointing_at("structure.body_1"):
+            body_1 = named_body(imported, structure.body_1)
+        with _pointing_at("structure.body_2"):
+            body_2 = named_body(imported, structure.body_2)
+        for index, pair in enumerate(structure.contacts):
+            with _pointing_at(f"structure.contacts.{index}.face_1"):
+                contact_facets(imported, body_1, pair.face_1)
+            with _pointing_at(f"structure.contacts.{index}.face_2"):
+                contact_facets(imported, body_2, pair.face_2)
+        for index, support in enumerate(structure.supports):
+            with _pointing_at(f"structure.supports.{index}.group"):
+                check_support(imported, (body_1, body_2), support.described())
+        for index, load in enumerate(structure.loads):
+            own = ".group" if hasattr(load, "group") else ""
+            with _pointing_at(f"structure.loads.{index}{own}"):
+                check_load(imported, (body_1, body_2), load.described())
+
+    def _check_contacts(self) -> None:
+        """Make the interfaces; where they cannot be, find the pair that is at fault."""
+        from fe_models.mesh import MeshError
+
+        structure = self.structure
+        try:
+            interfaces = structure.mesh().interfaces
+        except MeshError:
+            for index, pair in enumerate(structure.contacts):
+                with _pointing_at(f"structure.contacts.{index}"):
+                    structure.model_copy(update={"contacts": (pair,)}).mesh()
+            raise
+        for index, (pair, face) in enumerate(zip(structure.contacts, interfaces, strict=True)):
+            if pair.gap is not None:
+                cells = self.contact.grid[0], 1 if face.line else self.contact.grid[1]
+                key = f"structure.contacts.{index}.gap"
+                check_gap(pair.gap, face_size(face), cells, face.line, key)
+
+    def _check_supports(self, imported: ImportedMesh) -> None:
+        """Build what holds the bodies, on elements of order 1 and without forces."""
+        from fe_models.imported_structure import imported_structure
+
+        structure = self.structure
+        supports = [support.described() for support in structure.supports]
+        imposed = [o.described() for o in structure.loads if isinstance(o, DisplacementLoad)]
+        materials = self.material(1), self.material(2)
+        with _pointing_at("structure.supports"):
+            made = imported_structure(structure.mesh(), imported, materials, supports, imposed, 1)
+        slices = [name for name, share in made.held_faces.items() if share == 1.0]
+        if slices and made.body_1.elastic.dimension == 3:
+            raise disagreement(
+                f"all nodes of {slices[0]} are held along it, as in a slice in plane strain, and "
+                "its half-space would be a strip as wide as the slice; allowed: the section as a "
+                "plane mesh",
+                "structure.supports",
+            )
+
+
+def face_size(face: Interface) -> tuple[float, float]:
+    """Extent of a face along x and y about its origin [mm]; of a line contact a slice of 1 mm."""
+    reach = 2.0 * np.abs(face.coordinates).max(axis=0)
+    return float(reach[0]), 1.0 if face.line else float(reach[1])
+
+
+def _outline_of(interface: Interface) -> str:
+    """What a user should see of an interface before running it."""
+    meet = "meet node to node" if interface.projection is None else "do not match"
+    area = f"{interface.nodal_areas.sum():.4g} {'mm' if interface.line else 'mm²'}"
+    # Rounded, as planes of a mesh file are off by its last digits.
+    low, high = (round(float(gap), 9) + 0.0 for gap in (interface.gap.min(), interface.gap.max()))
+    return (
+        f"{interface.name}, {len(interface)} nodes that {meet}, {area}, gap of the meshes "
+        f"{low:.3g} to {high:.3g} mm"
+    )
+
+
+@contextmanager
+def _pointing_at(key: str) -> Iterator[None]:
+    """Say of a mesh that cannot be used which entry asks for it."""
+    from fe_models.mesh import MeshError
+
+    try:
+        yield
+    except MeshError as error:
+        raise disagreement(str(error), key) from error

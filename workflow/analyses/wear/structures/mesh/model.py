@@ -1,0 +1,193 @@
+"""A mesh case as a structure."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from pathlib import Path
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from fe_models.imported_structure import imported_softening, imported_structure
+from fe_models.mesh import Interface, StructureMesh
+from fe_models.relinearised import Softening
+from fe_models.structure import Structure
+from sa_solver.shapes import PARTING_SLOPE
+from sa_solver.types import Array, Grid, Indices
+from workflow.analyses.wear.gaps import GapFunction, gap_over
+from workflow.analyses.wear.load_source import ContactFace
+from workflow.analyses.wear.structure_stage import LoadBlock
+from workflow.analyses.wear.structures.mesh.case import MeshCase, face_size
+from workflow.analyses.wear.structures.mesh.loads import RotationLoad
+from workflow.shell.reporter import Reporter
+
+# A point is still on a facet when it is off by this share of it: edges belong to both sides.
+INSIDE = 1e-9
+
+
+class MeshModel:
+    """The bodies of the file with supports, loads and cycle as the case gives them."""
+
+    def __init__(self, case: MeshCase) -> None:
+        self._case = case
+        self.friction = case.friction.at(0.0)
+        self.nonlinearity = case.nonlinearity
+        self.order = case.structure.order
+        path = case.load_path
+        self._begun = sum(path.increments[: path.cycle_from - 1])
+        self.peak = sum(path.increments[: path.peak_leg]) - 1 - self._begun
+
+    @property
+    def key(self) -> tuple[object, ...]:
+        structure = self._case.structure
+        contents = Path(structure.file).read_bytes()
+        loads = [load.model_dump(exclude={"path"}) for load in structure.loads]
+        described = structure.model_dump(exclude={"file", "loads"})
+        gaps = [interface.gap.tobytes() for interface in self._mesh.interfaces]
+        return contents, described, loads, gaps, self._case.materials
+
+    @property
+    def blocks(self) -> tuple[LoadBlock, ...]:
+        begun, made = self._begun, []
+        for factors, share in self._case.load_path.mixed(len(self._case.structure.loads)):
+            path = self._path(factors)
+            made.append(LoadBlock(path[begun:], path[:begun], share))
+        return tuple(made)
+
+    def _path(self, factors: tuple[float, ...]) -> Array:
+        """Amplitudes of the loads, ``(t, loads)``; squared where a load is a rotation."""
+        legs, loads = self._case.load_path.increments, self._case.structure.loads
+        ends = np.insert(np.cumsum(legs), 0, 0)
+        steps = np.arange(1, ends[-1] + 1)
+        columns = [
+            factor * np.interp(steps, ends, (0.0, *load.path))
+            for factor, load in zip(factors, loads, strict=True)
+        ]
+        squared = [isinstance(load, RotationLoad) for load in loads]
+        return np.stack([c**2 if s else c for c, s in zip(columns, squared, strict=True)], axis=1)
+
+    def mesh(self) -> StructureMesh:
+        return self._mesh
+
+    @cached_property
+    def _mesh(self) -> StructureMesh:
+        interfaces = tuple(map(self._with_gap, self._meshed.interfaces))
+        return replace(self._meshed, interfaces=interfaces)
+
+    @cached_property
+    def _meshed(self) -> StructureMesh:
+        """The mesh of the file, without the gaps that the case gives."""
+        return self._case.structure.mesh()
+
+    def _with_gap(self, interface: Interface) -> Interface:
+        """The interface with the case's own gap on top of the meshes'."""
+        given = self._given(interface)
+        if given is None:
+            return interface
+        points = interface.coordinates[:, :, None, None]
+        at_nodes = np.array([float(given(x, y)[0, 0]) for x, y in points])
+        return replace(interface, gap=interface.gap + at_nodes)
+
+    def _given(self, interface: Interface) -> GapFunction | None:
+        """The gap that the case gives an interface, if it does."""
+        (pair,) = (p for p in self._case.structure.contacts if p.name == interface.name)
+        if pair.gap is None:
+            return None
+        grid = Grid.over(face_size(interface), self._case.contact.grid, interface.line)
+        return gap_over(pair.gap, None, grid)
+
+    def structure(self, mesh: StructureMesh) -> Structure:
+        case, described = self._case, self._case.structure
+        return imported_structure(
+            mesh,
+            described.read(),
+            (case.material(1), case.material(2)),
+            [support.described() for support in described.supports],
+            [load.described() for load in described.loads],
+            self.order,
+        )
+
+    def softening(self, structure: Structure) -> Softening:
+        loads = [load.described() for load in self._case.structure.loads]
+        return imported_softening(structure, loads, self.blocks[0].amplitudes[self.peak])
+
+    def contact_face(self, interface: Interface) -> ContactFace:
+        size, given = face_size(interface), self._given(interface)
+        (own,) = (i for i in self._meshed.interfaces if i.name == interface.name)
+        gap = _MeshGap(own) if given is None else _Sum(_MeshGap(own), given)
+        return ContactFace(interface, size, gap, _coarse(interface, size))
+
+    def node_numbers(self, body: int) -> Indices:
+        structure = self._case.structure
+        name = {1: structure.body_1, 2: structure.body_2}[body]
+        return structure.read().node_numbers[name]
+
+    def warn(self, structure: Structure, reporter: Reporter) -> None:
+        """Planes of symmetry that cut a contact, of which its half-space knows nothing."""
+        for name in structure.held_faces:
+            reporter.warn(
+                f"{name}: supports hold some of its nodes, as on a plane of symmetry: the "
+                "structure knows of it, the half-space of the contact does not, whose pressure is "
+                "that of a face that ends there; mesh the whole face"
+            )
+
+
+@dataclass(frozen=True)
+class _Sum:
+    """Two gaps, one on the other."""
+
+    one: GapFunction
+    other: GapFunction
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """Gap ``(nx, ny)`` [mm] at ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``."""
+        return self.one(x, y) + self.other(x, y)
+
+
+class _MeshGap:
+    """Gap of the meshed faces, linear between nodes; the bodies part beyond them."""
+
+    def __init__(self, interface: Interface) -> None:
+        self._face, self._gap = interface, interface.gap
+
+    def __call__(self, x: Array, y: Array) -> Array:
+        """Gap ``(nx, ny)`` [mm] at ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``."""
+        gap = self._on_segments(x, y) if self._face.line else self._on_triangles(x, y)
+        outside = np.isnan(gap)
+        points = np.stack(np.broadcast_arrays(x, y), axis=-1)[outside]
+        distance, nearest = cKDTree(self._face.coordinates).query(points)
+        gap[outside] = self._gap[nearest] + PARTING_SLOPE * distance
+        return gap
+
+    def _on_segments(self, x: Array, y: Array) -> Array:
+        gap = np.full((x.size, y.size), np.nan)
+        for segment in self._face.facets:
+            start, end = self._face.coordinates[segment, 0]
+            share = (x.ravel() - start) / (end - start)
+            met = (share >= -INSIDE) & (share <= 1.0 + INSIDE)
+            ends = self._gap[segment]
+            gap[met, 0] = ends[0] + share[met] * (ends[1] - ends[0])
+        return gap
+
+    def _on_triangles(self, x: Array, y: Array) -> Array:
+        gap = np.full((x.size, y.size), np.nan)
+        for triangle in self._face.facets:
+            corners = self._face.coordinates[triangle]
+            low, high = corners.min(axis=0), corners.max(axis=0)
+            i = slice(*np.searchsorted(x.ravel(), (low[0], high[0])))
+            j = slice(*np.searchsorted(y.ravel(), (low[1], high[1])))
+            arms = np.stack(np.broadcast_arrays(x[i] - corners[0, 0], y[:, j] - corners[0, 1]))
+            shares = np.einsum("ab,bij->aij", np.linalg.inv((corners[1:] - corners[0]).T), arms)
+            shares = np.concatenate([1.0 - shares.sum(axis=0, keepdims=True), shares])
+            met = np.all(shares >= -INSIDE, axis=0)
+            gap[i, j][met] = np.einsum("a,an->n", self._gap[triangle], shares[:, met])
+        return gap
+
+
+def _coarse(interface: Interface, size: tuple[float, float]) -> tuple[int, int]:
+    """About as many cells as nodes, as square as may be."""
+    if interface.line:
+        return len(interface), 1
+    across = max(int(np.sqrt(len(interface) * size[0] / size[1])), 1)
+    return across, max(len(interface) // across, 1)

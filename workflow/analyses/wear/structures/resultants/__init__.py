@@ -1,0 +1,23 @@
+"""Loads of a contact as files: from another FE code in, and worn surfaces back to its nodes.
+
+Columns, units, signs and how to get them out of Abaqus and Ansys: ``RECIPE.md`` beside this file.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from workflow.analyses.wear.structure import WearStructure
+from workflow.analyses.wear.structures.resultants.case import ResultantsCase
+
+if TYPE_CHECKING:
+    from workflow.analyses.wear.load_source import LoadSource
+
+
+def _source(case: ResultantsCase) -> LoadSource:
+    from workflow.analyses.wear.structures.resultants.source import ResultantsSource
+
+    return ResultantsSource(case)
+
+
+STRUCTURE = WearStructure(name="resultants", case=ResultantsCase, source=_source)

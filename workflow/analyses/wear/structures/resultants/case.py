@@ -1,0 +1,302 @@
+"""A case whose loads come from a file: another code's finite elements, our contact and wear."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Literal
+
+import numpy as np
+from pydantic import model_validator
+
+from workflow.analyses.wear.case.base import WearCase, check_interface_name
+from workflow.analyses.wear.case.gaps import Gap, GapShape, check_cells, check_gap
+from workflow.analyses.wear.case.sections import Contact, TwoMaterials, Wear
+from workflow.case.fields import File, Quantity, shown, split_dataset
+from workflow.case.input_files import InputFileError
+from workflow.case.sections import Length, Section, Title, disagreement, entry
+
+if TYPE_CHECKING:
+    from sa_solver.types import Frame
+    from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
+
+# How far x and normal may be from perpendicular: six printed digits.
+PERPENDICULAR = 1e-6
+
+Place = Annotated[float, Quantity("mm", at_least=-1e6, at_most=1e6)]
+Direction = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
+NodeFile = Annotated[str, File((".csv",))]
+
+# --- faces --------------------------------------------------------------------------------------
+
+
+class FaceFrame(Section):
+    """Where a face lies in the user's axes; y is normal × x."""
+
+    origin: tuple[Place, Place, Place] = entry(
+        "centre of the face [mm]", ["15 mm", "0 mm", "245 mm"]
+    )
+    x: tuple[Direction, Direction, Direction] = entry(
+        "along the face, as body 2 slides out, of any length [1]", [-1.0, 0.0, 1.0]
+    )
+    normal: tuple[Direction, Direction, Direction] = entry(
+        "out of body 1 into body 2, of any length [1]", [-1.0, 0.0, -1.0]
+    )
+
+    @model_validator(mode="after")
+    def _is_right_angled(self) -> FaceFrame:
+        x, normal = np.array(self.x), np.array(self.normal)
+        lengths = float(np.linalg.norm(x) * np.linalg.norm(normal))
+        if lengths == 0.0 or abs(x @ normal) > PERPENDICULAR * lengths:
+            raise disagreement(
+                "x and normal are not at right angles; allowed: perpendicular directions, none of "
+                "length 0",
+                "x",
+                "normal",
+            )
+        return self
+
+    def frame(self) -> Frame:
+        """The frame, its axes of length 1."""
+        from sa_solver.types import Frame
+
+        normal = np.array(self.normal) / np.linalg.norm(self.normal)
+        x = np.array(self.x) - (np.array(self.x) @ normal) * normal
+        x /= np.linalg.norm(x)
+        return Frame(np.array(self.origin), np.array([x, np.cross(normal, x), normal]))
+
+
+class NodeTables(Section):
+    """Node numbers and global coordinates of the face of each body, to take the worn surface."""
+
+    body_1: NodeFile | None = entry("columns node, X, Y, Z", "nodes_1.csv", default=None)
+    body_2: NodeFile | None = entry("columns node, X, Y, Z", "nodes_2.csv", default=None)
+
+
+class ImportedInterface(Section):
+    """An interface of the file, and what is different or known about it."""
+
+    name: Title = entry("as in the file; 'interface' where it has no names", "interface")
+    size: tuple[Length, ...] | None = entry(
+        "instead of structure.size [mm]", ["11 mm", "60 mm"], default=None
+    )
+    gap: Gap | None = entry("instead of structure.gap", default=None)
+    frame: FaceFrame | None = entry("where the face lies; instead of the file's", default=None)
+    nodes: NodeTables | None = entry("where the worn surfaces go to; needs a frame", default=None)
+
+
+class Resultants(Section):
+    """Loads from a file, over nominal faces with the gap of the unloaded bodies."""
+
+    kind: Literal["resultants"] = entry("what the structure is", "resultants")
+    dimension: Literal[2, 3] = entry(
+        "3, or 2: line contacts in plane strain, loads per length", 3, default=3
+    )
+    file: Annotated[str, File((".csv", ".h5", ".hdf5"))] = entry(
+        "loads of one closed cycle (columns: workflow/resultants/RECIPE.md); .h5 may go on :group",
+        "loads.csv",
+    )
+    size: tuple[Length, ...] = entry(
+        "of every face, and of the contact grid, along x and y; along x in 2 dimensions [mm]",
+        ["11 mm", "60 mm"],
+    )
+    gap: Gap | None = entry(
+        "distance of the unloaded bodies over every face; without it 'height' of an HDF5 file",
+        default=None,
+    )
+    interfaces: tuple[ImportedInterface, ...] = entry(
+        "those to take and what is different on them; without it all of the file", default=()
+    )
+
+    @model_validator(mode="after")
+    def _sizes_are_whole(self) -> Resultants:
+        sizes = {"size": self.size} | {
+            f"interfaces.{number}.size": own.size
+            for number, own in enumerate(self.interfaces)
+            if own.size is not None
+        }
+        for key, size in sizes.items():
+            if len(size) != 2 and not (len(size) == 1 and self.dimension == 2):
+                allowed = "[x, y]" if self.dimension == 3 else "[x], or [x, y]"
+                raise disagreement(f"{shown(size)}: not a size; allowed: {allowed}", key)
+        return self
+
+    @property
+    def line(self) -> bool:
+        """Whether the contacts are line contacts."""
+        return self.dimension == 2
+
+    def size_of(self, name: str) -> tuple[float, float]:
+        """Extent of a face along x and y [mm]; of a line contact a slice of 1 mm."""
+        size = getattr(self._own(name), "size", None) or self.size
+        return size[0], 1.0 if self.line else size[1]
+
+    def gap_of(self, name: str) -> GapShape | None:
+        """Gap over a face, None where the file has it."""
+        return getattr(self._own(name), "gap", None) or self.gap
+
+    def frame_of(self, name: str) -> Frame | None:
+        """Frame of a face where the case gives one."""
+        own: FaceFrame | None = getattr(self._own(name), "frame", None)
+        return None if own is None else own.frame()
+
+    def nodes_of(self, name: str) -> dict[Literal[1, 2], str]:
+        """Node tables of a face by body."""
+        own: NodeTables | None = getattr(self._own(name), "nodes", None)
+        files: dict[Literal[1, 2], str | None] = {}
+        if own is not None:
+            files = {1: own.body_1, 2: own.body_2}
+        return {body: file for body, file in files.items() if file is not None}
+
+    def _own(self, name: str) -> ImportedInterface | None:
+        return next((own for own in self.interfaces if own.name == name), None)
+
+    def key_of(self, name: str, key: str) -> str:
+        """The dotted path of an entry about a face: its own where it has one."""
+        for number, own in enumerate(self.interfaces):
+            if own.name == name and getattr(own, key.partition(".")[0]) is not None:
+                return f"structure.interfaces.{number}.{key}"
+        return f"structure.{key}"
+
+    def read(self, friction: float) -> dict[str, ImportedLoads]:
+        """Loads of all interfaces of the file, by name. Raises InputFileError."""
+        from workflow.analyses.wear.structures.resultants.reading import read_resultants
+
+        # The faces' sizes bound the moments, and the first reading says which faces there are.
+        names = read_resultants(self.file, self.line)
+        sizes = {name: self.size_of(name) for name in names}
+        return read_resultants(self.file, self.line, friction, sizes)
+
+    def taken(self, found: dict[str, ImportedLoads]) -> dict[str, ImportedLoads]:
+        """Of what the file has, the interfaces that the case takes."""
+        names = [own.name for own in self.interfaces] or list(found)
+        return {name: found[name] for name in names}
+
+
+class ImportedContact(Contact):
+    """Half-space solution on a grid over each contact face."""
+
+    method: Literal["normal", "full"] = entry(
+        "full: pressure and slips of the half-space; normal: slips of the file, an HDF5 one",
+        "full",
+        default="full",
+    )
+
+
+# --- the case -----------------------------------------------------------------------------------
+
+
+class ResultantsCase(WearCase):
+    """Contacts under loads from a file."""
+
+    title: Title = entry("one line", "Contacts under loads of another code")
+    structure: Resultants = entry("the loads, and the faces they press")
+    materials: TwoMaterials = entry("the two bodies in contact")
+    contact: ImportedContact = entry(
+        "half-space grid over each contact face", default=ImportedContact()
+    )
+    wear: Wear = entry("law, length of the run and step")
+
+    def loads(self) -> dict[str, ImportedLoads]:
+        """Loads of the interfaces that are taken, by name. Raises InputFileError."""
+        return self.structure.taken(self.structure.read(self.friction.at(0.0)))
+
+    @property
+    def cells(self) -> tuple[int, int]:
+        """Cells of the contact grid along x and y."""
+        nx, ny = self.contact.grid
+        return nx, 1 if self.structure.line else ny
+
+    @property
+    def cores(self) -> int:
+        return len(self.loads())
+
+    def loads_outline(self) -> list[tuple[str, str]]:
+        loads = self.loads()
+        first = next(iter(loads.values()))
+        unit = "N/mm" if self.structure.line else "N"
+        file = Path(split_dataset(self.structure.file)[0]).name
+        slip = "with" if first.slip is not None else "without"
+        return [
+            ("structure", f"loads in {self.structure.dimension}-D from {file}, {slip} slip"),
+            ("load path", f"{len(first.loads)} increments"),
+            *(("face", f"{name}, P up to {own.loads.P.max():g} {unit}, {self._shape(name)}")
+              for name, own in loads.items()),
+        ]  # fmt: skip
+
+    def _shape(self, name: str) -> str:
+        size, gap = self.structure.size_of(name), self.structure.gap_of(name)
+        sides = f"{size[0]:g} mm" if self.structure.line else f"{size[0]:g} x {size[1]:g} mm"
+        return f"{sides}, {'heights of the file' if gap is None else gap.shape}"
+
+    @model_validator(mode="after")
+    def _loads_can_be_used(self) -> ResultantsCase:
+        try:
+            found = self.structure.read(self.friction.at(0.0))
+        except InputFileError as error:
+            raise disagreement(str(error), "structure.file") from error
+        self._check_names(list(found))
+        loads = self.structure.taken(found)
+        if not any(own.loads.P.any() for own in loads.values()):
+            raise disagreement(
+                "P is 0 in every increment; allowed: loads that press", "structure.file"
+            )
+        for name, own in loads.items():
+            self._check_slip(own)
+            self._check_gap(name, own)
+            self._check_nodes(name, own)
+        return self
+
+    def _check_names(self, found: list[str]) -> None:
+        """Every interface of the case is in the file, once, and none is called as a result is."""
+        named = [own.name for own in self.structure.interfaces]
+        for number, name in enumerate(named):
+            key = f"structure.interfaces.{number}.name"
+            if name not in found:
+                allowed = ", ".join(found)
+                raise disagreement(f"{shown(name)}: not in the file; allowed: {allowed}", key)
+            if name in named[:number]:
+                raise disagreement(f"{shown(name)}: given twice; allowed: once", key)
+        for name in named or found:
+            check_interface_name(name, "structure.file")
+
+    def _check_slip(self, loads: ImportedLoads) -> None:
+        if self.contact.method == "normal" and loads.slip is None:
+            raise disagreement(
+                f"normal: no slip in {self.structure.file}; allowed: full, or an HDF5 file with "
+                "slip",
+                *("contact.method", "structure.file"),
+            )
+
+    def _check_gap(self, name: str, loads: ImportedLoads) -> None:
+        structure, gap = self.structure, self.structure.gap_of(name)
+        key = structure.key_of(name, "gap")
+        if gap is not None:
+            beside = structure.key_of(name, "size")
+            check_gap(gap, structure.size_of(name), self.cells, structure.line, key, beside)
+        elif loads.height is None:
+            raise disagreement(
+                f"missing, and {structure.file} has no height of {name}; allowed: shape rounded, "
+                "paraboloid or heights, with the entries of each",
+                key,
+            )
+        else:
+            check_cells(loads.height.shape, structure.file, self.cells)
+
+    def _check_nodes(self, name: str, loads: ImportedLoads) -> None:
+        from workflow.analyses.wear.structures.resultants.faces import FaceError
+        from workflow.analyses.wear.worn_nodes import check_nodes
+
+        structure = self.structure
+        frame = structure.frame_of(name) or loads.frame
+        for body, file in structure.nodes_of(name).items():
+            key = structure.key_of(name, f"nodes.body_{body}")
+            if frame is None:
+                raise disagreement(
+                    f"nodes of {name} without its frame; allowed: frame beside nodes", key
+                )
+            try:
+                check_nodes(file, frame, structure.size_of(name), structure.line)
+            except InputFileError as error:
+                raise disagreement(str(error), key) from error
+            except FaceError as error:
+                raise disagreement(f"{file}: {error}", key) from error

@@ -1,0 +1,170 @@
+"""What the loads of an interface must satisfy whatever code they come from."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sa_solver.contact import GROSS_SHARE
+from sa_solver.types import Array, LoadHistory
+from workflow.analyses.wear.case.sections import SHARES_APART
+from workflow.analyses.wear.structures.resultants.imported import COLUMNS
+from workflow.case.input_files import InputFileError
+
+# Below this share of a column's largest value numbers are what an iterative solver leaves.
+REMAINDER = 1e-6
+# Forces may pass what the face can carry by this share: friction regularised by a penalty, and
+# results printed with four digits.
+EXCESS = 1e-3
+
+Refusal = Callable[[int, str, str, str], InputFileError]
+"""The error about a column of an increment: what is wrong, what is allowed."""
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """What is known of an interface: Coulomb's coefficient, and the ``size`` of its face [mm]."""
+
+    friction: float | None = None
+    size: tuple[float, float] | None = None
+    line: bool = False
+
+
+def check_loads(columns: dict[str, Array], bounds: Bounds, refusal: Refusal) -> None:
+    """Raise what ``refusal`` makes of the first column ``(n,)`` that contradicts another."""
+    remainder = {name: REMAINDER * float(np.abs(columns[name]).max()) for name in COLUMNS}
+    for name in ("P", "Edx", "Edy"):
+        meaning = "body 1 presses on body 2" if name == "P" else "energy is lost, not gained"
+        low = 0.0 if name == "P" else -remainder[name]
+        _refuse_where(columns[name] < low, name, "negative", f"0 or more, {meaning}", refusal)
+    _check_apart(columns, remainder, refusal)
+    if bounds.line:
+        _check_line(columns, refusal)
+    if bounds.friction is not None:
+        _check_friction(columns, bounds.friction, refusal)
+    if bounds.size is not None:
+        _check_moments(columns, bounds, refusal)
+
+
+def slides_by_limit(columns: dict[str, Array], friction: float | None) -> NDArray[np.bool_]:
+    """Increments ``(n,)`` that slide as a whole: near Coulomb's limit, with energy lost.
+
+    None of them where friction is not known. The contact solver decides by the same share.
+    """
+    P = columns["P"]
+    if friction is None:
+        return np.zeros(len(P), dtype=bool)
+    shear = np.hypot(columns["Qx"], columns["Qy"])
+    energy = columns["Edx"] + columns["Edy"]
+    return (P > 0.0) & (energy > 0.0) & (shear >= GROSS_SHARE * friction * P)
+
+
+MIX = ("block", "share")
+"""Columns of files that hold several closed cycles, which take turns."""
+
+
+def mix_columns(columns: Mapping[str, Array], refusal: Refusal) -> dict[str, Any]:
+    """``block`` counted from 0 and ``share`` ``(n,)`` of a mix, from what a file calls them.
+
+    Empty where the file has neither. Raises what ``refusal`` makes of columns that are no mix: the
+    rows of a block follow each other and have one share, and the shares add up to 1.
+    """
+    given = [name for name in MIX if name in columns]
+    if not given:
+        return {}
+    if len(given) == 1:
+        raise refusal(0, given[0], "given alone", f"{' and '.join(MIX)}, or neither")
+    names, share = (columns[name] for name in MIX)
+    begins = np.flatnonzero(np.diff(names, prepend=np.nan) != 0.0)
+    for number, row in enumerate(begins.tolist()):
+        if names[row] in names[begins[:number]]:
+            raise refusal(row, "block", "a block that had ended", "the rows of a block together")
+    block = np.searchsorted(begins, np.arange(len(names)), side="right") - 1
+    _refuse_where((share < 0.0) | (share > 1.0), "share", "out of range", "0 to 1", refusal)
+    _refuse_where(share != share[begins][block], "share", "not as above", "one in a block", refusal)
+    total = float(share[begins].sum())
+    if abs(total - 1.0) > SHARES_APART:
+        wrong = f"the shares of all blocks add up to {total:g}"
+        raise refusal(len(share) - 1, "share", wrong, "to 1")
+    return {"block": block, "share": share}
+
+
+def differently_mixed(loads: Mapping[str, LoadHistory]) -> str | None:
+    """An interface whose cycles are mixed otherwise than those of the first one."""
+    first = next(iter(loads.values()))
+    for name, own in loads.items():
+        pairs = ((own.block, first.block), (own.share, first.share))
+        if not all(np.array_equal(*pair) for pair in pairs):
+            return name
+    return None
+
+
+def _refuse_where(
+    wrong: NDArray[np.bool_], column: str, what: str, allowed: str, refusal: Refusal
+) -> None:
+    for increment in np.flatnonzero(wrong).tolist():
+        raise refusal(increment, column, what, allowed)
+
+
+def _check_apart(columns: dict[str, Array], remainder: dict[str, float], refusal: Refusal) -> None:
+    """Bodies that are apart carry and dissipate nothing."""
+    apart = columns["P"] == 0.0
+    for name in COLUMNS[1:]:
+        allowed = "0 where the bodies are apart"
+        if name in ("Edx", "Edy"):
+            allowed += "; let an increment end just before they part"
+        wrong = apart & (np.abs(columns[name]) > remainder[name])
+        _refuse_where(wrong, name, "not zero though P is", allowed, refusal)
+
+
+def _check_line(columns: dict[str, Array], refusal: Refusal) -> None:
+    """Moments of a line contact about other axes than its length have no arm of their own."""
+    for name in ("Mx", "Mz"):
+        wrong = np.abs(columns[name]) > REMAINDER * columns["P"].max()
+        _refuse_where(wrong, name, "moment of a line contact", "0 but for My", refusal)
+
+
+def _check_friction(columns: dict[str, Array], friction: float, refusal: Refusal) -> None:
+    P = columns["P"]
+    shear = np.hypot(columns["Qx"], columns["Qy"])
+    limit = friction * P
+    wrong = shear > limit * (1.0 + EXCESS) + REMAINDER * friction * P.max()
+    for increment in np.flatnonzero(wrong).tolist():
+        name = max(("Qx", "Qy"), key=lambda own: abs(float(columns[own][increment])))
+        raise refusal(
+            increment,
+            name,
+            f"shear force {shear[increment]:.6g} above µP = {limit[increment]:.6g}",
+            f"up to µP with µ = {friction:g}",
+        )
+
+
+def _check_moments(columns: dict[str, Array], bounds: Bounds, refusal: Refusal) -> None:
+    """The centre of pressure lies on the face, and so does all shear."""
+    assert bounds.size is not None
+    half_x, half_y = 0.5 * bounds.size[0], 0.5 * bounds.size[1]
+    arms = {"My": half_x} if bounds.line else {"Mx": half_y, "My": half_x}
+    for name, arm in arms.items():
+        _check_arm(columns, name, columns["P"], arm, "the resultant pressure", refusal)
+    if bounds.friction is not None and not bounds.line:
+        limit, corner = bounds.friction * columns["P"], float(np.hypot(half_x, half_y))
+        _check_arm(columns, "Mz", limit, corner, "the shear", refusal)
+
+
+def _check_arm(
+    columns: dict[str, Array], name: str, force: Array, arm: float, whose: str, refusal: Refusal
+) -> None:
+    limit = force * arm * (1.0 + EXCESS) + REMAINDER * arm * force.max()
+    wrong = np.abs(columns[name]) > limit
+    for increment in np.flatnonzero(wrong).tolist():
+        raise refusal(
+            increment,
+            name,
+            f"puts {whose} outside the face",
+            f"up to {force[increment] * arm:.6g}, a force of {force[increment]:.6g} at "
+            f"{arm:.6g} mm from the centre of the face",
+        )

@@ -1,0 +1,240 @@
+"""Loads and slip fields of an HDF5 file, laid out as the structure's own in ``results.h5``."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import h5py
+import numpy as np
+
+from sa_solver.types import Array, Frame, Indices, LoadHistory
+from workflow.analyses.wear.structures.resultants.consistency import (
+    MIX,
+    Bounds,
+    check_loads,
+    mix_columns,
+    slides_by_limit,
+)
+from workflow.analyses.wear.structures.resultants.faces import FaceError, check_facets, facets_over
+from workflow.analyses.wear.structures.resultants.imported import (
+    ImportedLoads,
+    base_units,
+    required_columns,
+)
+from workflow.analyses.wear.structures.resultants.table import check_unit
+from workflow.case import units
+from workflow.case.input_files import InputFileError
+from workflow.shell.store import frame_of
+
+LOADS = "load_history"
+# In a group beside the loads: what is read, and what our results hold besides.
+NODAL = ("coordinates", "facets", "slip", "nodes_1", "nodes_2", "nodal_height", "height")
+IGNORED = ("pressure", "shear")
+# How far the axes of a frame may be from perpendicular and from length 1: six printed digits.
+ORTHONORMAL = 1e-6
+
+
+@dataclass(frozen=True)
+class Group:
+    """A group of an open file, which says where it is when something in it is wrong."""
+
+    file: str
+    group: h5py.Group
+
+    def error(self, name: str, wrong: str, allowed: str) -> InputFileError:
+        place = f"{self.group.name.rstrip('/')}/{name}".rstrip("/")
+        return InputFileError(f"{self.file}: {place}: {wrong}; allowed: {allowed}")
+
+    def numbers(self, name: str, unit: str = "1") -> Array | None:
+        """A dataset in the base unit ``unit``, None if there is none. Raises InputFileError."""
+        if name not in self.group:
+            return None
+        dataset = self.group[name]
+        values = np.asarray(dataset[()]) if isinstance(dataset, h5py.Dataset) else np.empty(0)
+        if values.dtype.kind not in "biuf" or values.size == 0:
+            raise self.error(name, "no numbers", "a dataset of numbers")
+        numbers = values.astype(np.float64)
+        if not np.all(np.isfinite(numbers)):
+            place = ", ".join(str(k + 1) for k in np.argwhere(~np.isfinite(numbers))[0])
+            raise self.error(name, f"entry {place} is not finite", "finite numbers")
+        written = dataset.attrs.get("unit", unit)
+        # Some programs store texts as bytes.
+        written = written.decode() if isinstance(written, bytes) else str(written)
+        check_unit(f"{self.file}: {dataset.name}: unit", written, unit)
+        factor = units.to_base(f"1 {written}", unit)
+        return numbers if factor == 1.0 else numbers * factor
+
+    def whole(self, name: str) -> Indices | None:
+        """A dataset of whole numbers, None if there is none. Raises InputFileError."""
+        numbers = self.numbers(name)
+        if numbers is None:
+            return None
+        if np.any(numbers != np.rint(numbers)):
+            raise self.error(name, "not whole numbers", "whole numbers")
+        return numbers.astype(np.int64)
+
+    def shaped(self, name: str, unit: str, shape: tuple[int, ...]) -> Array | None:
+        """As ``numbers``, of a given shape."""
+        numbers = self.numbers(name, unit)
+        if numbers is not None and numbers.shape != shape:
+            raise self.error(name, f"shape {numbers.shape}", f"{shape}")
+        return numbers
+
+
+def read_h5(
+    file: str, group: str, bounds: Callable[[str], Bounds], line: bool
+) -> dict[str, ImportedLoads]:
+    """Loads by interface of the group ``group``, which holds a group for each.
+
+    Raises InputFileError.
+    """
+    try:
+        with h5py.File(file, "r") as opened:
+            top = opened.get(group or "/")
+            found = {} if not isinstance(top, h5py.Group) else _interfaces(file, top)
+            if not found:
+                raise InputFileError(
+                    f"{file}: /{group}: no interfaces; allowed: a group for each, with a group "
+                    f"{LOADS} in it; at the top: {', '.join(opened) or 'nothing'}"
+                )
+            read = {name: _read(own, bounds(name), line) for name, own in found.items()}
+    except OSError as error:
+        reason = " ".join(str(error).split())
+        raise InputFileError(f"{file}: cannot be read ({reason})") from error
+    _check_counts(file, read)
+    return read
+
+
+def _interfaces(file: str, top: h5py.Group) -> dict[str, Group]:
+    groups = {name: item for name, item in top.items() if isinstance(item, h5py.Group)}
+    return {
+        name: Group(file, item)
+        for name, item in groups.items()
+        if isinstance(item.get(LOADS), h5py.Group)
+    }
+
+
+def _check_counts(file: str, read: dict[str, ImportedLoads]) -> None:
+    counts = {name: len(own.loads) for name, own in read.items()}
+    if len(set(counts.values())) > 1:
+        told = ", ".join(f"{name} {count}" for name, count in counts.items())
+        raise InputFileError(
+            f"{file}: increments differ: {told}; allowed: as many for every interface"
+        )
+
+
+def _read(group: Group, bounds: Bounds, line: bool) -> ImportedLoads:
+    for name in group.group:
+        if name not in (LOADS, *NODAL, *IGNORED):
+            raise group.error(name, "unknown", ", ".join((LOADS, *NODAL)))
+    loads = _loads(Group(group.file, group.group[LOADS]), bounds)
+    height = group.numbers("height", "mm")
+    if height is not None:
+        height = height.reshape(len(height), -1)  # a list is one column, as in a line contact
+    frame = _frame(group)
+    coordinates = _coordinates(group, line)
+    if coordinates is None:
+        for name in ("facets", "slip", "nodes_1", "nodes_2", "nodal_height"):
+            if name in group.group:
+                raise group.error(name, "given without coordinates", "both or neither")
+        return ImportedLoads(loads, frame=frame, height=height)
+    count = len(coordinates)
+    return ImportedLoads(
+        loads,
+        slip=group.shaped("slip", "mm", (len(loads), 2, count)),
+        coordinates=coordinates,
+        facets=_facets(group, coordinates, line),
+        frame=frame,
+        nodes_1=_nodes(group, "nodes_1", count),
+        nodes_2=_nodes(group, "nodes_2", count),
+        nodal_height=group.shaped("nodal_height", "mm", (count,)),
+        height=height,
+    )
+
+
+def _loads(group: Group, bounds: Bounds) -> LoadHistory:
+    units_of = base_units(bounds.line)
+    required = required_columns(bounds.line)
+    missing = [name for name in required if name not in group.group]
+    if missing:
+        present = ", ".join(group.group) or "nothing"
+        raise group.error("", f"{', '.join(missing)} missing", f"all of them; there is {present}")
+    for name in group.group:
+        known = (*units_of, "sliding", *MIX)
+        if name not in known:
+            raise group.error(name, "unknown column", ", ".join(known))
+    first = group.numbers("P", units_of["P"])
+    assert first is not None
+    shape = (first.size,)
+    columns: dict[str, Any] = {}
+    for name, unit in units_of.items():
+        column = group.shaped(name, unit, shape)
+        columns[name] = np.zeros(shape) if column is None else column
+
+    found = {name: group.shaped(name, "1", shape) for name in MIX}
+    given = {name: column for name, column in found.items() if column is not None}
+
+    def refusal(increment: int, column: str, wrong: str, allowed: str) -> InputFileError:
+        value = (columns | given)[column][increment]
+        return group.error(column, f"increment {increment + 1}: {value:g}: {wrong}", allowed)
+
+    check_loads(columns, bounds, refusal)
+    mix = mix_columns(given, refusal)
+    marks = group.shaped("sliding", "1", shape)
+    if marks is None:
+        return LoadHistory(**columns, sliding=slides_by_limit(columns, bounds.friction), **mix)
+    if np.any((marks != 0.0) & (marks != 1.0)):
+        raise group.error("sliding", "neither yes nor no", "0 or 1")
+    return LoadHistory(**columns, sliding=marks == 1.0, **mix)
+
+
+def _frame(group: Group) -> Frame | None:
+    given = [name for name in ("origin", "axes") if name in group.group.attrs]
+    if not given:
+        return None
+    if len(given) == 1:
+        raise group.error("", f"attribute {given[0]} alone", "origin (3,) and axes (3, 3)")
+    frame = frame_of(group.group)
+    if frame.origin.shape != (3,) or frame.axes.shape != (3, 3):
+        raise group.error("", "frame of another shape", "origin (3,) and axes (3, 3)")
+    axes = frame.axes.astype(np.float64)
+    right_handed = np.linalg.det(axes) > 0.0
+    if not right_handed or np.abs(axes @ axes.T - np.eye(3)).max() > ORTHONORMAL:
+        raise group.error("", "axes of no frame", "rows x, y, z of length 1, z = x × y")
+    return Frame(frame.origin.astype(np.float64), axes)
+
+
+def _coordinates(group: Group, line: bool) -> Array | None:
+    coordinates = group.numbers("coordinates", "mm")
+    if coordinates is None:
+        return None
+    if line and coordinates.ndim == 1:
+        coordinates = np.stack([coordinates, np.zeros(len(coordinates))], axis=1)
+    if coordinates.ndim != 2 or coordinates.shape[1] != 2:
+        raise group.error("coordinates", f"shape {coordinates.shape}", "x and y of every node")
+    return coordinates
+
+
+def _facets(group: Group, coordinates: Array, line: bool) -> Indices:
+    facets = group.whole("facets")
+    corners = 2 if line else 3
+    if facets is not None and (facets.ndim != 2 or facets.shape[1] != corners):
+        raise group.error("facets", f"shape {facets.shape}", f"{corners} nodes for each")
+    try:
+        if facets is None:
+            return facets_over(coordinates, line)
+        check_facets(facets, len(coordinates))
+    except FaceError as error:
+        raise InputFileError(f"{group.file}: {group.group.name}: {error}") from error
+    return facets
+
+
+def _nodes(group: Group, name: str, count: int) -> Indices | None:
+    nodes = group.whole(name)
+    if nodes is None:
+        return None
+    if nodes.shape != (count,) or len(np.unique(nodes)) != count:
+        raise group.error(name, "not one number per node", f"{count} different numbers")
+    return nodes

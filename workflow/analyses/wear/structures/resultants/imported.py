@@ -1,0 +1,66 @@
+"""Loads of one interface that came from a file, and the columns such files have."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sa_solver.types import Array, Frame, Indices, LoadHistory
+from workflow.shell.store import DATASETS, PER_LENGTH
+
+if TYPE_CHECKING:
+    from fe_models.mesh import Face
+
+COLUMNS = ("P", "Qx", "Qy", "Mx", "My", "Mz", "Edx", "Edy")
+# A line contact has none of these unless it is sheared along its length.
+OPTIONAL_IN_LINE = ("Qy", "Mx", "Mz", "Edy")
+# Name of the interface of a file that names none.
+UNNAMED = "interface"
+
+
+@dataclass(frozen=True)
+class ImportedLoads:
+    """What a file says of one interface.
+
+    ``loads`` are those of one closed cycle. With the nodes of the face: ``slip`` ``(t, 2, n)`` of
+    each increment [mm], ``coordinates`` ``(n, 2)`` in the interface frame [mm], ``facets``
+    ``(m, 3)`` or, in a line contact, ``(m, 2)``, the ``frame`` in the user's axes, the user's node
+    numbers on body 1 and body 2 ``(n,)``, and the gap of the unloaded, unworn faces [mm]:
+    ``nodal_height`` ``(n,)`` at these nodes, ``height`` ``(nx, ny)`` on the grid of the case. None
+    where not given.
+    """
+
+    loads: LoadHistory
+    slip: Array | None = None
+    coordinates: Array | None = None
+    facets: Indices | None = None
+    frame: Frame | None = None
+    nodes_1: Indices | None = None
+    nodes_2: Indices | None = None
+    nodal_height: Array | None = None
+    height: Array | None = None
+
+    def face(self, name: str) -> Face | None:
+        """The face that slip is given on, None where there is none.
+
+        In a frame of its own where the file does not say where it lies.
+        """
+        from fe_models.mesh import Face
+
+        if self.coordinates is None or self.facets is None:
+            return None
+        frame = self.frame or Frame(np.zeros(3), np.eye(3))
+        return Face(name, frame, self.coordinates, self.facets)
+
+
+def base_units(line: bool) -> dict[str, str]:
+    """Base unit of every column; per length in a line contact."""
+    own = {name: DATASETS[name][0] for name in COLUMNS}
+    return {name: PER_LENGTH[unit] if line else unit for name, unit in own.items()}
+
+
+def required_columns(line: bool) -> list[str]:
+    """Columns that every file must have."""
+    return [name for name in COLUMNS if not (line and name in OPTIONAL_IN_LINE)]

@@ -1,0 +1,143 @@
+"""Loads of the interfaces of a structure, from a CSV or an HDF5 file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from sa_solver.types import LoadHistory
+from workflow.analyses.wear.structures.resultants.consistency import (
+    MIX,
+    Bounds,
+    check_loads,
+    differently_mixed,
+    mix_columns,
+    slides_by_limit,
+)
+from workflow.analyses.wear.structures.resultants.hdf5 import read_h5
+from workflow.analyses.wear.structures.resultants.imported import (
+    UNNAMED,
+    ImportedLoads,
+    base_units,
+    required_columns,
+)
+from workflow.analyses.wear.structures.resultants.table import Table, read_table
+from workflow.case.fields import shown, split_dataset
+from workflow.case.input_files import InputFileError
+
+INTERFACE, INCREMENT, SLIDING = "interface", "increment", "sliding"
+# Names become groups of results and columns of tables.
+NAME = re.compile(r"\w[\w .-]*")
+HDF5 = (".h5", ".hdf5")
+
+
+def read_resultants(
+    path: str | Path,
+    line: bool = False,
+    friction: float | None = None,
+    face_sizes: Mapping[str, tuple[float, float]] | None = None,
+) -> dict[str, ImportedLoads]:
+    """Loads by interface, in base units; per mm in a ``line`` contact.
+
+    A ``.h5`` file may name the group to look into: ``results.h5:structure``. ``friction`` µ and the
+    ``face_sizes`` (x, y) [mm] by interface, where given, bound forces and moments. Increments that
+    slide are those that the file marks or, where it marks none, those within 1 % of Coulomb's
+    limit that dissipate.
+
+    Raises InputFileError, ``file:line: column: what is wrong; allowed: ...``.
+    """
+    sizes = face_sizes or {}
+    file, group = split_dataset(str(path))
+
+    def bounds(name: str) -> Bounds:
+        return Bounds(friction, sizes.get(name), line)
+
+    if file.endswith(HDF5):
+        return _alike(file, read_h5(file, group, bounds, line))
+    table = read_table(file, _columns(line), required_columns(line))
+    rows = _rows_of(table)
+    _check_counts(table, rows)
+    read = {name: ImportedLoads(_loads(table, own, bounds(name))) for name, own in rows.items()}
+    return _alike(file, read)
+
+
+def _alike(file: str, read: dict[str, ImportedLoads]) -> dict[str, ImportedLoads]:
+    """What was read, if all interfaces go through the same mix of cycles."""
+    other = differently_mixed({name: own.loads for name, own in read.items()})
+    if other is not None:
+        first = next(iter(read))
+        raise InputFileError(
+            f"{file}: blocks or shares of {other} and {first} differ; allowed: the same for every "
+            "interface"
+        )
+    return read
+
+
+def _columns(line: bool) -> dict[str, str | None]:
+    """Base units of all columns of a CSV file; None is text."""
+    bare = dict.fromkeys((SLIDING, *MIX), "1")
+    return {INTERFACE: None, INCREMENT: "1", **base_units(line), **bare}
+
+
+def _rows_of(table: Table) -> dict[str, list[int]]:
+    """Rows of every interface, in the order of its increments."""
+    names = table.cells.get(INTERFACE, [UNNAMED] * len(table))
+    rows: dict[str, list[int]] = {}
+    for row, name in enumerate(names):
+        if not NAME.fullmatch(name):
+            allowed = "letters, digits, '_', '-', '.' and spaces between them"
+            raise table.refusal(row, INTERFACE, "no name", allowed)
+        rows.setdefault(name, []).append(row)
+    if INCREMENT in table.cells:
+        for own in rows.values():
+            _check_increments(table, own)
+    return rows
+
+
+def _check_increments(table: Table, rows: list[int]) -> None:
+    increments = table.whole(INCREMENT)
+    for count, row in enumerate(rows, start=1):
+        if increments[row] != count:
+            before = increments[row] in [increments[r] for r in rows[: count - 1]]
+            wrong = "increment given twice" if before else "increments are left out"
+            raise table.refusal(row, INCREMENT, wrong, f"{count}: they count from 1")
+
+
+def _check_counts(table: Table, rows: dict[str, list[int]]) -> None:
+    longest = max(rows, key=lambda name: len(rows[name]))
+    for name, own in rows.items():
+        if len(own) != len(rows[longest]):
+            raise InputFileError(
+                f"{table.file}:{table.lines[own[-1]]}: {shown(name)} ends after {len(own)} "
+                f"increments; allowed: as many for every interface, {longest} has "
+                f"{len(rows[longest])}"
+            )
+
+
+def _loads(table: Table, rows: list[int], bounds: Bounds) -> LoadHistory:
+    zeros = np.zeros(len(rows))
+    columns: dict[str, Any] = {
+        name: table.numbers[name][rows] if name in table.numbers else zeros
+        for name in base_units(bounds.line)
+    }
+    refusal = partial(_refusal, table, rows)
+    check_loads(columns, bounds, refusal)
+    given = {name: table.numbers[name][rows] for name in MIX if name in table.numbers}
+    mix = mix_columns(given, refusal)
+    if SLIDING not in table.numbers:
+        return LoadHistory(**columns, sliding=slides_by_limit(columns, bounds.friction), **mix)
+    marks = table.numbers[SLIDING][rows]
+    for increment in np.flatnonzero((marks != 0.0) & (marks != 1.0)).tolist():
+        raise refusal(increment, SLIDING, "neither yes nor no", "0 or 1")
+    return LoadHistory(**columns, sliding=marks == 1.0, **mix)
+
+
+def _refusal(
+    table: Table, rows: list[int], increment: int, column: str, wrong: str, allowed: str
+) -> InputFileError:
+    return table.refusal(rows[increment], column, wrong, allowed)

@@ -1,0 +1,136 @@
+"""Loads from a file as a load source: nothing to solve, and wear does not change them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from fe_models.mesh import Face
+from sa_solver.types import Array, Frame, Grid, LoadHistory
+from workflow.analyses.wear.gaps import gap_over
+from workflow.analyses.wear.load_source import BODIES, ContactFace, UserFace
+from workflow.analyses.wear.structures.resultants.case import ResultantsCase
+from workflow.analyses.wear.structures.resultants.consistency import REMAINDER
+from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
+from workflow.analyses.wear.worn_nodes import read_nodes
+
+# Without a mesh, the grid that shows what a coarse one misses has cells so many times larger.
+COARSER = 4
+# Cells below which a contact is hardly one.
+FEWEST = 8
+REMEDY = "enlarge structure.size, and contact.grid with it"
+
+
+@dataclass(frozen=True)
+class FaceHistory:
+    """What the file says of one face over the cycle: ``slip`` ``(t, 2, n)`` [mm]."""
+
+    loads: LoadHistory
+    slip: Array
+
+
+class ResultantsSource:
+    """The interfaces of a file as load source of a wear run."""
+
+    def __init__(self, case: ResultantsCase) -> None:
+        self._case = case
+        self.line = case.structure.line
+
+    @cached_property
+    def imported(self) -> dict[str, ImportedLoads]:
+        """What the file says, by interface."""
+        return self._case.loads()
+
+    @cached_property
+    def faces(self) -> tuple[ContactFace, ...]:
+        return tuple(self._contact_face(name, own) for name, own in self.imported.items())
+
+    @property
+    def peak(self) -> int:
+        """First increment in which a face carries the largest P of all."""
+        heaviest = np.max([own.loads.P for own in self.imported.values()], axis=0)
+        return int(np.argmax(heaviest >= (1.0 - REMAINDER) * heaviest.max()))
+
+    def frame(self, name: str) -> Frame | None:
+        """Where a face lies in the user's axes, None where nobody says."""
+        return self._case.structure.frame_of(name) or self.imported[name].frame
+
+    def prepare(self) -> None:
+        """Nothing is costly."""
+
+    def unworn(self) -> tuple[FaceHistory, ...]:
+        return tuple(
+            FaceHistory(own.loads, _slip(own, len(contact.face)))
+            for own, contact in zip(self.imported.values(), self.faces, strict=True)
+        )
+
+    def worn(
+        self, depths: Sequence[Array], friction: Sequence[float] | None = None
+    ) -> tuple[FaceHistory, ...]:
+        """As unworn: no structure answers to wear."""
+        return self.unworn()
+
+    def user_faces(self, number: int) -> tuple[UserFace, ...]:
+        """Over the nodes of the case's tables, else over those of the file of loads."""
+        name, own = list(self.imported.items())[number]
+        frame, tables = self.frame(name), self._case.structure.nodes_of(name)
+        if frame is None:
+            return ()
+        faces = []
+        for body, numbers in zip(BODIES, (own.nodes_1, own.nodes_2), strict=True):
+            if body in tables:
+                table = read_nodes(tables[body])
+                faces.append(UserFace(body, table.numbers, frame, table.points))
+            elif numbers is not None:
+                faces.append(UserFace(body, numbers, frame))
+        return tuple(faces)
+
+    def probe(self, depths: Sequence[Array], friction: Sequence[float] | None = None) -> Array:
+        """Resultants ``(faces, 6)`` at peak load, whatever the wear."""
+        columns = ("P", "Qx", "Qy", "Mx", "My", "Mz")
+        return np.array(
+            [
+                [getattr(own.loads, name)[self.peak] for name in columns]
+                for own in self.imported.values()
+            ]
+        )
+
+    def _contact_face(self, name: str, own: ImportedLoads) -> ContactFace:
+        structure = self._case.structure
+        grid = Grid.over(structure.size_of(name), self._case.contact.grid, self.line)
+        face = self._face(name, own, grid.size)
+        gap = gap_over(structure.gap_of(name), own.height, grid)
+        return ContactFace(face, grid.size, gap, self._coarse(own, grid), REMEDY)
+
+    def _face(self, name: str, own: ImportedLoads, size: tuple[float, float]) -> Face:
+        """The face of the file, or the corners of the nominal one."""
+        frame = self.frame(name) or Frame(np.zeros(3), np.eye(3))
+        found = own.face(name)
+        if found is not None:
+            return replace(found, frame=frame)
+        half_x, half_y = 0.5 * size[0], 0.5 * size[1]
+        if self.line:
+            return Face(name, frame, np.array([[-half_x, 0.0], [half_x, 0.0]]), np.array([[0, 1]]))
+        corners = [[-half_x, -half_y], [half_x, -half_y], [half_x, half_y], [-half_x, half_y]]
+        return Face(name, frame, np.array(corners), np.array([[0, 1, 2], [0, 2, 3]]))
+
+    def _coarse(self, own: ImportedLoads, grid: Grid) -> tuple[int, int]:
+        """About as many square-ish cells as the face has nodes; without nodes larger cells."""
+        nx, ny = grid.shape
+        if own.coordinates is None:
+            coarse = nx / COARSER, ny / COARSER
+        elif self.line:
+            coarse = float(len(own.coordinates)), 1.0
+        else:
+            pitch = np.sqrt(grid.size[0] * grid.size[1] / len(own.coordinates))
+            coarse = grid.size[0] / pitch, grid.size[1] / pitch
+        cells = max(FEWEST, round(coarse[0])), max(FEWEST, round(coarse[1]))
+        return cells[0], 1 if self.line else cells[1]
+
+
+def _slip(own: ImportedLoads, nodes: int) -> Array:
+    """Slip of the file, or none."""
+    return np.zeros((len(own.loads), 2, nodes)) if own.slip is None else own.slip

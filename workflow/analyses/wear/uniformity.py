@@ -1,0 +1,157 @@
+"""How much alike the sections of a contact are: what decides whether one stands for all.
+
+A case in two dimensions (``structure.dimension: 2``) computes the middle section in plane strain,
+under the mean load per length. A run in three dimensions shows how good that would be: by how much
+P, slip and worn area change along y, and how far the mean load per length is from the one in the
+middle. Pressure and slip are the structure's, wear is the half-space's.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.structure import InterfaceHistory
+from fe_models.transfer import FaceTransfer
+from sa_solver.types import Array
+from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.interface_state import InterfaceState
+from workflow.analyses.wear.load_source import LoadSource
+from workflow.analyses.wear.structure_stage import StructureStage
+
+# A middle below this share of the largest is rounding.
+ROUNDING = 1e-9
+# Sections whose values are this close to the middle's count as alike: a few per cent.
+ALIKE = 0.05
+# Deviations are taken over this share of the length, around its middle: the ends are never alike.
+MIDDLE = 0.5
+
+
+@dataclass(frozen=True)
+class Sections:
+    """What the sections of a contact carry, per length, ``(ny,)`` along y.
+
+    ``P`` and ``Qx`` [N/mm] are those of the increment of peak load, ``energy`` [N mm/mm]
+    is dissipated in a mean cycle and ``slip`` [mm] the mean path of the nodes in it, weighted by
+    their pressure at peak load.
+    """
+
+    P: Array
+    Qx: Array
+    energy: Array
+    slip: Array
+
+    @property
+    def middle(self) -> dict[str, float]:
+        """Every quantity in the middle."""
+        return {name: _middle(values) for name, values in vars(self).items()}
+
+
+def sections(transfer: FaceTransfer, history: InterfaceHistory, peak: int) -> Sections:
+    """Sections of a structure's contact, one per row of the transfer's grid."""
+    grid = transfer.grid
+    covered = np.asarray(transfer.shared.sum(axis=1)).reshape(grid.shape) / grid.pitch[1]
+
+    def per_length(nodal: Array) -> Array:
+        total: Array = np.sum(transfer.to_cells(nodal) * covered, axis=0)
+        return total
+
+    traction = history.force / history.interface.nodal_areas
+    pressure = traction[peak, 2]
+    share = history.loads.share
+    path = share @ np.hypot(history.slip[:, 0], history.slip[:, 1])
+    normal = per_length(pressure)
+    energy = -np.einsum("t,tan,tan->n", share, traction[:, :2], history.slip)
+    weighted = per_length(pressure * path)
+    slip = np.divide(weighted, normal, out=np.zeros_like(normal), where=normal > 0.0)
+    return Sections(normal, per_length(traction[peak, 0]), per_length(energy), slip)
+
+
+@dataclass(frozen=True)
+class Uniformity:
+    """How uniform a contact is along y.
+
+    ``pressure`` (P per length), ``slip`` and ``wear`` (worn area) are the largest deviations from
+    the middle over the ``MIDDLE`` share of the length, relative to the middle.
+    ``share_of_length_within`` is the share of the length, around the middle, over which all three
+    deviate by at most ``ALIKE``; ``mean_load`` the mean P per length over that in the middle.
+    ``uniform`` says whether one section stands for the middle: its likes reach at least as far to
+    either side as the face is wide, and the mean load is that of the middle within ``ALIKE``.
+    """
+
+    pressure: float
+    slip: float
+    wear: float
+    share_of_length_within: float
+    mean_load: float
+    uniform: bool
+
+    def sentence(self, name: str) -> str:
+        """For the log."""
+        text = (
+            f"{name}: sections alike within {ALIKE:.0%} over the middle "
+            f"{self.share_of_length_within:.0%} of the length"
+        )
+        if not self.uniform:
+            return f"{text}: too uneven for two dimensions"
+        extra = self.mean_load - 1.0
+        more = "more" if extra >= 0.0 else "less"
+        return f"{text}: two dimensions give the middle, with {abs(extra):.1%} {more} load"
+
+
+def uniformities(
+    source: LoadSource, stages: Sequence[ContactStage], states: Sequence[InterfaceState]
+) -> dict[str, Uniformity]:
+    """Uniformity of every loaded contact of a structure in three dimensions, by interface."""
+    if not isinstance(source, StructureStage) or source.line:
+        return {}
+    found = {}
+    for stage, history, state in zip(stages, source.unworn(), states, strict=True):
+        own = uniformity(stage, history, state, source.peak)
+        if own is not None:
+            found[stage.name] = own
+    return found
+
+
+def uniformity(
+    stage: ContactStage, history: InterfaceHistory, state: InterfaceState, peak: int
+) -> Uniformity | None:
+    """Uniformity of the unworn contact and of the wear so far; None without load in the middle."""
+    found = sections(stage.transfer, history, peak)
+    if _middle(found.P) <= 0.0:
+        return None
+    surfaces = state.surfaces
+    worn = np.sum(surfaces.depth, axis=0)
+    deviations = [_deviation(values) for values in (found.P, found.slip, worn)]
+    y = np.abs(stage.grid.y.ravel())
+    half = 0.5 * stage.grid.size[1]
+    inner = y <= MIDDLE * half
+    apart = y[np.max(deviations, axis=0) > ALIKE]
+    reach = float(apart.min()) - 0.5 * stage.grid.pitch[1] if apart.size else half
+    mean_load = float(found.P.mean()) / _middle(found.P)
+    pressure, slip, wear = (float(deviation[inner].max()) for deviation in deviations)
+    return Uniformity(
+        pressure=pressure,
+        slip=slip,
+        wear=wear,
+        share_of_length_within=reach / half,
+        mean_load=mean_load,
+        uniform=reach >= stage.grid.size[0] and abs(mean_load - 1.0) <= ALIKE,
+    )
+
+
+def _deviation(values: Array) -> Array:
+    """Difference from the middle relative to it ``(ny,)``, or to the largest of nothing there."""
+    middle = _middle(values)
+    largest = float(np.abs(values).max())
+    scale = abs(middle) if abs(middle) > ROUNDING * largest else largest
+    deviation: Array = np.abs(values - middle) / scale if scale > 0.0 else np.zeros_like(values)
+    return deviation
+
+
+def _middle(values: Array) -> float:
+    """Mean of the one or two rows next to y = 0."""
+    count = len(values)
+    return float(values[(count - 1) // 2 : count // 2 + 1].mean())

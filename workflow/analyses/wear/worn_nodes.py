@@ -1,0 +1,140 @@
+"""Worn depth of a face as displacements of the user's own nodes.
+
+A node gets the mean of the depth around it, weighted by its shape function over the facets of its
+face, so that Σ depth x nodal area is exactly the volume worn on the grid where the nodes cover it.
+How much of it they carry is measured: ``NodalDepths.volume_share``.
+"""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from fe_models.mesh import Face
+from fe_models.transfer import FaceTransfer
+from sa_solver.types import Array, Frame, Grid, Indices
+from workflow.analyses.wear.structures.resultants.faces import FaceError, facets_over
+from workflow.analyses.wear.structures.resultants.table import read_table
+from workflow.shell.store import replacing
+
+NODE = "node"
+AXES = ("X", "Y", "Z")
+# A face may rise above its plane by this share of its extent: more is a wrong frame or a node set
+# that is not the contact face. Crowned and rounded faces stay below a hundredth.
+OFF_PLANE = 0.1
+
+
+@dataclass(frozen=True)
+class NodeTable:
+    """The user's node ``numbers`` ``(n,)`` of one face and their ``points`` ``(n, 3)`` [mm]."""
+
+    numbers: Indices
+    points: Array
+
+    def __len__(self) -> int:
+        return len(self.numbers)
+
+
+@dataclass(frozen=True)
+class NodalDepths:
+    """Worn ``depth`` at nodes ``(n,)`` [mm].
+
+    ``volume_share`` is Σ depth x nodal area over the volume worn on the grid: 1 where the nodes
+    cover all that is worn, NaN where nothing is.
+    """
+
+    depth: Array
+    volume_share: float
+
+
+def read_nodes(file: str | Path) -> NodeTable:
+    """Node table ``node, X, Y, Z`` in global axes; Z may be left out of a plane model.
+
+    Raises InputFileError.
+    """
+    table = read_table(str(file), {NODE: "1", **dict.fromkeys(AXES, "mm")}, [NODE, "X", "Y"])
+    numbers = table.whole(NODE)
+    seen: set[int] = set()
+    for row, number in enumerate(numbers):
+        if number in seen:
+            raise table.refusal(row, NODE, "node given twice", "once")
+        seen.add(number)
+    zeros = np.zeros(len(table))
+    points = np.stack([table.numbers.get(axis, zeros) for axis in AXES], axis=1)
+    return NodeTable(np.array(numbers, dtype=np.int64), points)
+
+
+def nodal_depths(points: Array, frame: Frame, grid: Grid, depth: Array) -> NodalDepths:
+    """Worn depth at nodes of a face, from ``depth`` ``(nx, ny)`` [mm] on the grid in its frame.
+
+    ``points`` ``(n, 3)`` [mm] are in global axes; beyond the grid nothing is worn. Raises FaceError
+    unless they are the nodes of a face in that frame.
+    """
+    coordinates = _in_plane(points, frame, grid.line)
+    facets = facets_over(coordinates, grid.line)
+    facets = facets[_meets(coordinates, facets, grid)]
+    if len(facets) == 0:
+        raise FaceError("no node is near the contact; allowed: those of its face, in its frame")
+    nodes, numbered = np.unique(facets, return_inverse=True)
+    face = Face("worn", frame, coordinates[nodes], numbered.reshape(facets.shape))
+    shared = FaceTransfer.between(face, grid).shared
+    nodal = np.zeros(len(points))
+    nodal[nodes] = shared.T @ depth.ravel() / face.nodal_areas
+    worn = float(depth.sum()) * grid.cell_area
+    carried = float(nodal[nodes] @ face.nodal_areas)
+    return NodalDepths(nodal, carried / worn if worn else np.nan)
+
+
+def worn_displacement(depth: Array, frame: Frame, body: Literal[1, 2]) -> Array:
+    """Displacement ``(n, 3)`` [mm] in global axes of nodes that lose ``depth`` ``(n,)``.
+
+    Into their own body: body 1 lies below the face and moves along -z of the frame, body 2 along z.
+    """
+    inwards = {1: -1.0, 2: 1.0}[body] * frame.axes[2]
+    return np.outer(depth, inwards)
+
+
+def write_worn_nodes(path: Path, nodes: Indices, displacement: Array) -> None:
+    """Write displacements ``(n, 3)`` [mm] by node number, such that they read back the same."""
+    with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
+        writer = csv.writer(stream, lineterminator="\n")
+        writer.writerow([NODE, "ux [mm]", "uy [mm]", "uz [mm]"])
+        for node, row in zip(nodes.tolist(), displacement.tolist(), strict=True):
+            writer.writerow([node, *map(repr, row)])
+
+
+def _in_plane(points: Array, frame: Frame, line: bool) -> Array:
+    """Places ``(n, 2)`` of the nodes in the plane of the interface [mm]."""
+    local = frame.coordinates(points)
+    extent, off = float(np.ptp(local[:, :2], axis=0).max()), float(np.abs(local[:, 2]).max())
+    if off > OFF_PLANE * extent:
+        raise FaceError(
+            f"nodes lie up to {off:.3g} mm off the plane of the interface; "
+            "allowed: those of its contact face, in the axes of its frame"
+        )
+    if line:
+        local[:, 1] = 0.0
+    return local[:, :2]
+
+
+def _meets(coordinates: Array, facets: Indices, grid: Grid) -> NDArray[np.bool_]:
+    """Facets ``(m,)`` whose box overlaps the grid's: on the others nothing is worn."""
+    corners = coordinates[facets]
+    half = 0.5 * np.array(grid.size)
+    inside = (corners.min(axis=1) < half) & (corners.max(axis=1) > -half)
+    overlaps: NDArray[np.bool_] = inside.all(axis=1)
+    return overlaps
+
+
+def check_nodes(file: str, frame: Frame, size: tuple[float, float], line: bool) -> None:
+    """Raise unless the file has the nodes of a face of ``size`` [mm] in that frame.
+
+    InputFileError where the file is wrong, FaceError where its nodes are.
+    """
+    grid = Grid.over(size, (1, 1), line)
+    nodal_depths(read_nodes(file).points, frame, grid, np.zeros(grid.shape))

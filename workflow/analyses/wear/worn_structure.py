@@ -1,0 +1,154 @@
+"""What a run says of its structure at the end: worn mesh, stress, loads with the worn faces."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from fe_models.mesh import StructureMesh, write_msh
+from fe_models.nonlinear import NonlinearCheck
+from fe_models.remesh import worn_mesh, worn_volume
+from fe_models.stress import StressField
+from fe_models.structure import CycleSolution
+from sa_solver.types import LoadHistory
+from workflow.analyses.wear.case.evolution import EvolvingFriction
+from workflow.analyses.wear.checkpoint import RunState
+from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.shell.folder import OutputFolder
+from workflow.shell.reporter import Reporter
+from workflow.shell.store import ResultsWriter, replacing
+
+RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
+# What the summary tells of a total Lagrangian check, beside the resultants.
+MEASURES = ("slip_change", "slide", "largest_strain", "largest_rotation", "face_rotation")
+
+
+@dataclass(frozen=True)
+class WornStructure:
+    """The structure before and after: ``cycle`` and ``mesh`` are the worn ones.
+
+    ``stresses`` are those of both bodies at peak load, unworn and worn.
+    """
+
+    stage: StructureStage
+    mesh: StructureMesh
+    cycle: CycleSolution
+    stresses: dict[str, tuple[StressField, ...]]
+
+    def write(self, writer: ResultsWriter) -> None:
+        """Load histories of the worn faces, and both bodies unworn and worn."""
+        for history in self.cycle.histories:
+            group = f"structure_worn/{history.interface.name}"
+            writer.put_face(group, history.interface, history)
+        for moment, mesh in (("unworn", self.stage.mesh), ("worn", self.mesh)):
+            bodies = zip((mesh.body_1, mesh.body_2), self.stresses[moment], strict=True)
+            for body, field in bodies:
+                writer.put_body(f"bodies/{body.name}/{moment}", body.points, body.mesh.t.T, field)
+
+    def summary(self, state: RunState) -> dict[str, Any]:
+        """What the solver says of itself, and the largest stresses."""
+        stage, unworn = self.stage, self.stage.unworn_cycle
+        bodies = self.mesh.body_1, self.mesh.body_2
+        return {
+            "from_cache": stage.from_cache,
+            "nodes": {body.name: int(body.mesh.nvertices) for body in bodies},
+            "rigid_modes": stage.rigid_modes,
+            "solutions": state.solutions,
+            "iterations": unworn.iterations,
+            "residual": unworn.residual,
+            "equilibrium_error": float(unworn.equilibrium.max()),
+            "cycles": unworn.cycles,
+            "closure": unworn.closure,
+            "nonlinearity": nonlinearity_summary(stage),
+            "drift": [float(value) for value in state.drift],
+            "peak_stress": {
+                moment: {
+                    body.name: {
+                        "von_mises": float(field.von_mises.max()),
+                        "maximum_principal": float(field.maximum_principal.max()),
+                    }
+                    for body, field in zip(bodies, fields, strict=True)
+                }
+                for moment, fields in self.stresses.items()
+            },
+        }
+
+    def interface_summary(self, number: int) -> dict[str, Any]:
+        """Volumes in the mesh and resultants at peak load, unworn and worn."""
+        stage, interface = self.stage, self.stage.mesh.interfaces[number]
+        unworn, worn = (cycle.histories[number].loads for cycle in (stage.unworn_cycle, self.cycle))
+        before, after = stage.mesh, self.mesh
+        return {
+            "mesh_volume_1": worn_volume(before.body_1, after.body_1, interface, 1),
+            "mesh_volume_2": worn_volume(before.body_2, after.body_2, interface, 2),
+            "peak_load": {
+                "unworn": resultants_at(unworn, stage.peak),
+                "worn": resultants_at(worn, stage.peak),
+            },
+        }
+
+
+def worn_structure(
+    stage: StructureStage,
+    contacts: list[ContactStage],
+    state: RunState,
+    friction: EvolvingFriction,
+    folder: OutputFolder,
+    reporter: Reporter,
+) -> WornStructure:
+    """Solve the worn structure, put the worn shape into its mesh and write that."""
+    pairs = list(zip(contacts, state.interfaces, strict=True))
+    with reporter.stage("structural friction"):
+        cycle = stage.worn_cycle(
+            [contact.nodal_depth(own) for contact, own in pairs],
+            None if friction.evolution is None else [friction.at(own.energy) for _, own in pairs],
+        )
+    with reporter.stage("re-meshing"):
+        mesh = worn_mesh(stage.mesh, [contact.depths_of_bodies(own) for contact, own in pairs])
+        with replacing(folder.root / "worn.msh") as partial:
+            # gmsh goes by the ending; the name stays one that a resumed run clears away.
+            path = partial.with_name(f"{partial.name}.msh")
+            write_msh(path, mesh)
+            path.replace(partial)
+    with reporter.stage("stress"):
+        stresses = {
+            "unworn": stage.stress(stage.mesh, stage.unworn_cycle),
+            "worn": stage.stress(mesh, cycle),
+        }
+    return WornStructure(stage, mesh, cycle, stresses)
+
+
+def resultants_at(loads: LoadHistory, increment: int) -> dict[str, float]:
+    """Forces and moments of one increment."""
+    return {name: float(getattr(loads, name)[increment]) for name in RESULTANTS}
+
+
+def nonlinearity_sentence(check: NonlinearCheck) -> str:
+    """How far geometric nonlinearity moves the contact at peak load."""
+    force, moment = (float(np.abs(part).max()) for part in np.split(check.change, [3], axis=1))
+    return (
+        f"geometric nonlinearity at peak load moves P and Q by {force:.2%} of P, moments by "
+        f"{moment:.2%} of P x half a face, slips by {check.slip_change:.1%} of the largest"
+    )
+
+
+def nonlinearity_summary(stage: StructureStage) -> dict[str, Any]:
+    """The stiffness used and, where it was asked for, what the total Lagrangian check found."""
+    chosen = stage.model.nonlinearity
+    if not chosen.check:
+        return {"stiffness": chosen.stiffness}
+    check = stage.nonlinear_check
+    names = [interface.name for interface in stage.mesh.interfaces]
+    return {
+        "stiffness": chosen.stiffness,
+        "change": {
+            name: dict(zip(RESULTANTS, row.tolist(), strict=True))
+            for name, row in zip(names, check.change, strict=True)
+        },
+        **{name: float(getattr(check, name)) for name in MEASURES},
+        "iterations": check.iterations,
+        "residual": check.residual,
+    }

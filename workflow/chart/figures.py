@@ -1,0 +1,246 @@
+"""Figures of a chart: error against cost of each axis, and of all together."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf, isfinite, log10
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, STYLE, new_figure, save
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from workflow.chart.ladder import Judged, Ladder
+    from workflow.chart.run import Chart
+
+COSTS = {"seconds": "seconds, alone on this machine", "convolutions": "convolutions"}
+COLOURS = (BLUE, ORANGE, GREEN, PURPLE, "#E69F00", "#56B4E9", "#F0E442", BLACK, "#999999")
+MARKERS = ("o", "s", "^", "D", "v", "P", "X", "<", ">")
+HEIGHT = 6.6
+LEGEND_COLUMNS = 4
+LEGEND_SIZE = 10
+# Errors and costs that nothing else bounds are drawn this far from the next point.
+MARGIN = 3.0
+# Names that still find room beside their marks.
+MOST_NAMES = 12
+# Rungs whose costs and errors agree to so many decimals of their logarithm are at one place.
+PLACE = 2
+# Quantities that are drawn one by one: more would hide the rungs.
+MOST_QUANTITIES = 4
+# Errors of all axes are drawn down to this share of the accuracy: less decides nothing.
+DEEPEST = 1e-3
+# Smallest error drawn where nothing but references ran.
+SMALLEST = 1e-12
+
+
+def write_chart_figures(chart: Chart, folder: Path) -> list[Path]:
+    """Draw a figure for each axis and one for all, as PNG files; returns their paths."""
+    import matplotlib
+
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    with matplotlib.rc_context(STYLE):
+        ladders = [ladder for ladder in chart.ladders if ladder.rungs]
+        drawn = {own.axis.name: axis_figure(own, chart.accuracy) for own in ladders}
+        if len(drawn) > 1:
+            drawn["all"] = all_figure(chart)
+        for name, figure in drawn.items():
+            path = folder / f"chart_{name}.png"
+            save(figure, path)
+            written.append(path)
+    return written
+
+
+def axis_figure(ladder: Ladder, accuracy: float) -> Figure:
+    """Error against seconds and against convolutions, a line for each branch."""
+    chosen = ladder.cheapest(accuracy)
+    ending = "none is known to be enough" if chosen is None else f"{chosen.name} is enough"
+    title = f"{ladder.axis.name}: {ladder.axis.what}; for {100 * accuracy:g} % {ending}"
+    figure = new_figure(title, HEIGHT)
+    bottom = _bottom([ladder])
+    for axis, cost in _panels(figure, [ladder]):
+        branches = list(dict.fromkeys(rung.point.rung.branch for rung in ladder.rungs))
+        for number, branch in enumerate(branches):
+            own = [rung for rung in ladder.rungs if rung.point.rung.branch == branch]
+            label = branch if len(branches) > 1 else ""
+            _draw_line(axis, own, cost, bottom, number, label or None)
+        _name_rungs(axis, _named(ladder.rungs, cost), cost, bottom)
+        _draw_own(axis, [rung for rung in ladder.rungs if rung.point.own], cost, bottom)
+        _draw_frontier(axis, ladder.rungs, cost, bottom)
+        _draw_floor(axis, ladder)
+        if len(branches) == 1 and 1 < len(ladder.references) <= MOST_QUANTITIES:
+            _draw_quantities(axis, ladder, cost)
+        _finish(axis, cost, accuracy, (bottom, _top([ladder], accuracy)))
+    figure.axes[0].set_ylabel("largest relative error of the quantities")
+    _legend(figure)
+    return figure
+
+
+def all_figure(chart: Chart) -> Figure:
+    """The efficient rungs of all axes, each varied alone about the case's own settings."""
+    ladders = [ladder for ladder in chart.ladders if ladder.rungs]
+    lowest = max(_bottom(ladders), DEEPEST * chart.accuracy)
+    title = f"All axes, each varied alone; errors below {100 * lowest:.1g} % on the dotted line"
+    figure = new_figure(title, HEIGHT)
+    for axis, cost in _panels(figure, ladders):
+        for number, ladder in enumerate(ladders):
+            own = [rung for rung in ladder.rungs if rung.point.own]
+            _draw_line(axis, own, cost, lowest, number, None)
+            _draw_line(axis, _frontier(ladder.rungs, cost), cost, lowest, number, ladder.axis.name)
+            _draw_own(axis, own, cost, lowest)
+        axis.axhline(lowest, color=BLACK, lw=0.6, ls=":")
+        _finish(axis, cost, chart.accuracy, (lowest, _top(ladders, chart.accuracy)))
+    figure.axes[0].set_ylabel("largest relative error of the quantities")
+    _legend(figure)
+    return figure
+
+
+# --- parts --------------------------------------------------------------------------------------
+
+
+def _panels(figure: Figure, ladders: Sequence[Ladder]) -> list[tuple[Axes, str]]:
+    """Axes for each cost that the runs say."""
+    rungs = [rung for ladder in ladders for rung in ladder.rungs]
+    known = [cost for cost in COSTS if any(getattr(rung.point.cost, cost) for rung in rungs)]
+    axes = figure.subplots(1, len(known), sharey=True, squeeze=False)
+    return list(zip(axes[0], known, strict=True))
+
+
+def _bottom(ladders: Sequence[Ladder]) -> float:
+    """Where what has no error is drawn: below every error and floor."""
+    errors = [rung.error for ladder in ladders for rung in ladder.rungs]
+    seen = [*errors, *(ladder.floor for ladder in ladders)]
+    return min((own for own in seen if 0.0 < own < inf), default=SMALLEST * MARGIN) / MARGIN
+
+
+def _top(ladders: Sequence[Ladder], accuracy: float) -> float:
+    """Above every error."""
+    errors = [rung.error for ladder in ladders for rung in ladder.rungs if isfinite(rung.error)]
+    return MARGIN * max([accuracy, *errors])
+
+
+def _place(rung: Judged, cost: str, bottom: float) -> tuple[float, float]:
+    """Cost and error of a rung in the figure."""
+    spent = float(getattr(rung.point.cost, cost))
+    return max(spent, 1e-2), max(rung.error, bottom)
+
+
+def _draw_line(
+    axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float, number: int, label: str | None
+) -> None:
+    """A branch: full marks are resolved rungs, hollow ones are not."""
+    if not rungs:
+        return
+    colour, marker = COLOURS[number % len(COLOURS)], MARKERS[number % len(MARKERS)]
+    places = [_place(rung, cost, bottom) for rung in rungs]
+    joined = [place for rung, place in zip(rungs, places, strict=True) if rung.error > 0.0]
+    if joined and any(rung.point.rung.step is not None for rung in rungs):
+        axis.plot(*zip(*joined, strict=True), "-", color=colour, alpha=0.6, lw=1.2)
+    for rung, place in zip(rungs, places, strict=True):
+        hollow = rung.unresolved or rung.error == 0.0
+        axis.plot(*place, marker, color=colour, mfc="white" if hollow else colour, ms=8, zorder=3)
+    if any(rung.error == 0.0 for rung in rungs):
+        axis.axhline(bottom, color=BLACK, lw=0.6, ls=":")
+    if label:
+        axis.plot([], [], f"-{marker}", color=colour, ms=8, label=label)
+
+
+def _named(rungs: Sequence[Judged], cost: str) -> list[Judged]:
+    """Rungs whose names are written: all, or of many the efficient ones and those that begin."""
+    if len(rungs) <= MOST_NAMES:
+        return list(rungs)
+    first = {rung.point.rung.branch: rung.name for rung in reversed(rungs)}
+    kept = {*first.values(), *(rung.name for rung in _frontier(rungs, cost))}
+    return [rung for rung in rungs if rung.name in kept or rung.point.own]
+
+
+def _name_rungs(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> None:
+    """Names beside the marks; those of one place are named together."""
+    together: dict[tuple[float, ...], list[Judged]] = {}
+    for rung in rungs:
+        place = _place(rung, cost, bottom)
+        together.setdefault(tuple(round(log10(own), PLACE) for own in place), []).append(rung)
+    for number, own in enumerate(together.values()):
+        names = [rung.name.removeprefix(f"{rung.point.rung.branch}, ") for rung in own]
+        text = names[0] if len(names) == 1 else f"{names[0]} to {names[-1]}"
+        # Neighbours may be alike in cost and error: names go above and below in turn.
+        shift = (8, 6) if number % 2 == 0 else (8, -14)
+        place = _place(own[0], cost, bottom)
+        axis.annotate(text, place, shift, textcoords="offset points", fontsize=9)
+
+
+def _draw_own(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> None:
+    for rung in rungs:
+        place = _place(rung, cost, bottom)
+        axis.plot(*place, "o", mfc="none", mec=BLACK, mew=1.6, ms=17, zorder=4)
+    axis.plot([], [], "o", mfc="none", mec=BLACK, mew=1.6, ms=13, label="the case as written")
+
+
+def _frontier(rungs: Sequence[Judged], cost: str) -> list[Judged]:
+    """The efficient rungs, the cheapest first."""
+    found = [rung for rung in rungs if getattr(rung, f"by_{cost}")]
+    return sorted(found, key=lambda rung: getattr(rung.point.cost, cost))
+
+
+def _draw_frontier(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> None:
+    """Steps down: what can be had for no more than a cost."""
+    places = [_place(rung, cost, bottom) for rung in _frontier(rungs, cost)]
+    if places:
+        spent, errors = zip(*places, strict=True)
+        grey = "#88888859"
+        axis.step(spent, errors, where="post", label="efficient", color=grey, lw=5.0, zorder=1)
+
+
+def _draw_floor(axis: Axes, ladder: Ladder) -> None:
+    if ladder.floor > 0.0 and isfinite(ladder.floor):
+        axis.axhspan(0.0, ladder.floor, color=ORANGE, alpha=0.12, lw=0, zorder=0)
+        axis.axhline(ladder.floor, color=ORANGE, lw=0.8, alpha=0.6)
+        axis.plot([], [], "-", color=ORANGE, alpha=0.3, lw=8, label="references not known better")
+
+
+def _draw_quantities(axis: Axes, ladder: Ladder, cost: str) -> None:
+    """Error of each quantity where it is resolved: how fast it falls is the method's order."""
+    for number, (quantity, reference) in enumerate(ladder.references.items(), 1):
+        places = [
+            (_place(rung, cost, 0.0)[0], abs(rung.point.values[quantity] / reference.value - 1.0))
+            for rung in ladder.rungs
+        ]
+        seen = [place for place in places if place[1] > reference.floor]
+        if seen:
+            colour = COLOURS[number % len(COLOURS)]
+            axis.plot(*zip(*seen, strict=True), ":", color=colour, lw=1.6, zorder=2, label=quantity)
+
+
+def _finish(axis: Axes, cost: str, accuracy: float, ends: tuple[float, float]) -> None:
+    """Scales and labels; ``ends`` are the lowest and the highest error shown."""
+    from matplotlib.ticker import LogLocator
+
+    axis.axhline(accuracy, color=BLACK, lw=1.0, ls="--", label=f"asked for: {100 * accuracy:g} %")
+    axis.set_xscale("log")
+    axis.set_yscale("log")
+    axis.set_xlabel(COSTS[cost])
+    axis.set_ylim(ends[0] / 1.6, ends[1])
+    # Room for the name of the dearest rung.
+    low, high = axis.get_xlim()
+    high *= (high / low) ** 0.18
+    axis.set_xlim(low, high)
+    axis.xaxis.set_major_locator(LogLocator(subs=(1, 2, 3, 5, 7) if high < 20 * low else (1, 3)))
+    axis.xaxis.set_major_formatter("{x:g}")
+    axis.xaxis.set_minor_formatter("")
+    axis.yaxis.set_major_formatter(lambda share, _: f"{100 * share:g} %")
+    axis.yaxis.set_minor_formatter("")
+
+
+def _legend(figure: Figure) -> None:
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    unique = dict(zip(labels, handles, strict=True))
+    figure.legend(
+        unique.values(),
+        unique.keys(),
+        loc="outside lower center",
+        ncols=LEGEND_COLUMNS,
+        fontsize=LEGEND_SIZE,
+    )

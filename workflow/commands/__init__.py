@@ -1,0 +1,1 @@
+"""Commands that work on other files than cases: measured loops, meshes."""

@@ -1,0 +1,186 @@
+"""``fretscale loops``: friction, stiffness and energy of the loops in a measured record."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from sa_solver.types import Array
+from wear.joints.loop_record import MeasuredLoopError
+from wear.joints.measured_loops import Estimate, MeasuredLoops, estimate, measure_loops
+from workflow.analyses.wear.loop_table import write_table
+from workflow.case.units import UnitError, to_base
+from workflow.commands.loop_file import BASE_UNITS, LoopFile, read_loop_file
+from workflow.errors import UserError
+
+TABLE, FIGURE = "loops.csv", "loops.png"
+# More cycles than this are not all printed.
+MOST_ROWS = 12
+WIDTH = 14
+
+
+def loops_of_file(path: Path, columns: Sequence[str], normal_load: str | None) -> MeasuredLoops:
+    """Measure the loops in a file.
+
+    ``columns`` are texts ``KEY=NAME`` for columns that are called otherwise; ``normal_load`` such
+    as ``60 N`` is for a file without one. Raises UserError.
+    """
+    record = read_loop_file(path, _names(columns))
+    try:
+        return measure_loops(
+            record.displacement, record.force, _normal_load(path, record, normal_load), record.time
+        )
+    except MeasuredLoopError as error:
+        raise UserError(f"{path}: {error}") from error
+
+
+def _names(columns: Sequence[str]) -> dict[str, str]:
+    """Names of columns by what they are."""
+    names: dict[str, str] = {}
+    for text in columns:
+        key, equals, name = (part.strip() for part in text.partition("="))
+        if key not in BASE_UNITS or not equals or not name:
+            allowed = ", ".join(f"{key}=NAME" for key in BASE_UNITS)
+            raise UserError(f"--column {text}: no such column; allowed: {allowed}")
+        if key in names or name in names.values():
+            raise UserError(f"--column {text}: given twice; allowed: once")
+        names[key] = name
+    return names
+
+
+def _normal_load(path: Path, record: LoopFile, text: str | None) -> Array | float | None:
+    """The normal load of the file or of the command."""
+    if text is None:
+        return record.normal_load
+    if record.normal_load is not None:
+        raise UserError(f"{path}: has a column of the normal load; allowed: it or --normal-load")
+    try:
+        load = _number(text) or to_base(text, "N")
+    except UnitError as error:
+        raise UserError(f"--normal-load {text}: {error}; allowed: a force such as 60 N") from error
+    if not load > 0.0:
+        raise UserError(f"--normal-load {text}: not above 0; allowed: a force such as 60 N")
+    return load
+
+
+def _number(text: str) -> float | None:
+    """A bare number; None of anything else."""
+    try:
+        return float(text)
+    except ValueError:
+        return None
+
+
+# --- what is printed ----------------------------------------------------------------------------
+
+
+def report(found: MeasuredLoops) -> list[str]:
+    """The table of cycles, their means with standard errors, and what to know of them."""
+    columns = _shown(found)
+    rows = [["cycle", *columns]]
+    count = len(found.energy)
+    for cycle in _few(count):
+        values = [values[cycle] for values, _ in columns.values()]
+        rows.append([str(cycle + 1), *(f"{value:.4g}" for value in values)])
+    rows.append(["mean", *(f"{own.value:.4g}" for _, own in columns.values())])
+    if count > 1:
+        rows.append(["+-", *(f"{own.error:.1g}" for _, own in columns.values())])
+    lines = ["".join(f"{cell:>{WIDTH}}" for cell in row) for row in rows]
+    return [*lines, *_notes(found)]
+
+
+def _shown(found: MeasuredLoops) -> dict[str, tuple[Array, Estimate]]:
+    """Values ``(c,)`` and their mean, by heading."""
+    per_micron = 1e-3
+    stick = found.stick_estimate
+    columns = {
+        "stroke [um]": _with_mean(found.stroke / per_micron),
+        "energy [mJ]": _with_mean(found.energy),
+        "kt [N/um]": (
+            found.stick_stiffness * per_micron,
+            Estimate(stick.value * per_micron, stick.error * per_micron),
+        ),
+    }
+    if found.slides:
+        columns["kr [N/um]"] = _with_mean(found.residual_stiffness * per_micron)
+    if not np.isnan(found.normal_load).any():
+        mu = found.friction if found.slides else found.mobilised
+        columns["mu" if found.slides else "mu at least"] = _with_mean(mu)
+    else:
+        force = found.friction_force if found.slides else found.force
+        columns["mu N [N]" if found.slides else "force [N]"] = _with_mean(force)
+    return columns
+
+
+def _with_mean(values: Array) -> tuple[Array, Estimate]:
+    return values, estimate(values)
+
+
+def _few(count: int) -> list[int]:
+    """All cycles, or some of them from the first to the last."""
+    if count <= MOST_ROWS:
+        return list(range(count))
+    return np.unique(np.linspace(0, count - 1, MOST_ROWS).round().astype(int)).tolist()
+
+
+def _notes(found: MeasuredLoops) -> list[str]:
+    """What the numbers mean."""
+    notes = ["kt is the slope right after a reversal, residual stiffness included"]
+    if found.slides:
+        notes.append(
+            f"the last {found.sliding:.0%} of the branches slide: kr is their slope, mu half "
+            "their distance over the normal load"
+        )
+    else:
+        notes.append(
+            "no sliding branch: half the force range over the normal load is a lower bound of mu, "
+            "and kr is not known; a larger stroke would show both"
+        )
+    if np.isnan(found.normal_load).any():
+        notes.append("no normal load, so no mu: give --normal-load or a column normal_load")
+    return notes
+
+
+# --- what is written ----------------------------------------------------------------------------
+
+
+def write_loops(found: MeasuredLoops, out: Path, title: str, force: bool) -> list[Path]:
+    """Write a row per cycle, as a table of loops for joint laws, and the figure.
+
+    Raises UserError for a folder that has them already, unless ``force``.
+    """
+    if out.exists() and not out.is_dir():
+        raise UserError(f"{out}: is a file; give a folder to --out")
+    paths = [out / TABLE, out / FIGURE]
+    there = [path for path in paths if path.exists()]
+    if there and not force:
+        raise UserError(f"{there[0]}: exists; give another folder, or --force")
+    out.mkdir(parents=True, exist_ok=True)
+    write_table(paths[0], _rows(found))
+    from workflow.commands.loops_figure import write_figure
+
+    write_figure(found, title, paths[1])
+    return paths
+
+
+def _rows(found: MeasuredLoops) -> Iterator[dict[str, float]]:
+    """A row per cycle, in base units; columns that the record does not tell are left out."""
+    values: dict[str, Array] = {
+        "cycles": np.arange(1.0, len(found.energy) + 1.0),
+        # Since the first cycle of the record began.
+        "energy": np.cumsum(found.energy),
+        "kt": found.stick_stiffness,
+        "energy_per_loop": found.energy,
+        "amplitude": 0.5 * found.stroke,
+        "force": found.force,
+    }
+    if found.slides:
+        values["residual_stiffness"] = found.residual_stiffness
+    if not np.isnan(found.normal_load).any():
+        values["P"] = found.normal_load
+        if found.slides:
+            values["mu"] = found.friction
+    for cycle in zip(*values.values(), strict=True):
+        yield dict(zip(values, map(float, cycle), strict=True))

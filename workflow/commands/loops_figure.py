@@ -1,0 +1,119 @@
+"""Figure of measured loops: how they were read, and what they give cycle by cycle."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from sa_solver.types import Array
+from wear.joints.measured_loops import MeasuredLoops
+from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, STYLE, new_figure, save
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+TO_MICRONS, PER_MICRON = 1e3, 1e-3  # mm to µm, N/mm to N/µm
+# More loops than this are drawn as every so many.
+MOST_LOOPS = 40
+HEADROOM = 1.15
+
+
+def write_figure(found: MeasuredLoops, name: str, path: Path) -> None:
+    """Draw the loops of the record ``name``."""
+    import matplotlib
+
+    with matplotlib.rc_context(STYLE):
+        save(figure(found, name), path)
+
+
+def figure(found: MeasuredLoops, name: str) -> Figure:
+    """Loops with the lines that were laid through the middle one; stiffness, friction, energy."""
+    drawn = new_figure(_title(found, name), 7.0)
+    left, right = drawn.subfigures(1, 2, squeeze=False, width_ratios=(1.4, 1.0))[0]
+    _draw_loops(left.subplots(), found)
+    panels = right.subplots(3, 1, sharex=True)
+    _draw_values(panels[0], PER_MICRON * found.stick_stiffness, "kt [N/µm]", BLUE)
+    _draw_values(panels[1], *_friction(found), ORANGE)
+    _draw_values(panels[2], found.energy, "energy [mJ]", GREEN)
+    panels[2].set_xlabel("cycle of the record")
+    return drawn
+
+
+def _draw_loops(axis: Axes, found: MeasuredLoops) -> None:
+    record, count = found.record, len(found.energy)
+    for begin, _, end in found.reversals[:: -(-count // MOST_LOOPS)]:
+        here = slice(begin, end + 1)
+        axis.plot(TO_MICRONS * record.displacement[here], record.force[here], color="0.7", lw=0.8)
+    middle = count // 2
+    begin, turn, end = found.reversals[middle]
+    here = slice(begin, end + 1)
+    axis.plot(
+        TO_MICRONS * record.displacement[here],
+        record.force[here],
+        color=BLACK,
+        lw=1.2,
+        label=f"cycle {middle + 1}",
+    )
+    for number, place in enumerate((begin, turn)):
+        _draw_stick(axis, found, middle, place, None if number else "stick slope kt")
+    if found.slides:
+        _draw_sliding(axis, found, middle)
+    axis.set_xlabel("displacement [µm]")
+    axis.set_ylabel("force [N]")
+    # The loop fills its panel: room for the legend above it.
+    low, high = axis.get_ylim()
+    axis.set_ylim(low, high + 0.2 * (high - low))
+    axis.legend(loc="upper left", ncols=3)
+
+
+def _draw_stick(
+    axis: Axes, found: MeasuredLoops, cycle: int, place: int, label: str | None
+) -> None:
+    """The slope at the reversal ``place``, over half of the height of the loop."""
+    record = found.record
+    forces = record.force[found.reversals[cycle, :2]]
+    start, other = record.force[place], forces.sum() - record.force[place]
+    height = np.sign(other - start) * np.array([0.0, found.force[cycle]])
+    motion = record.displacement[place] + height / found.stick_stiffness[cycle]
+    axis.plot(TO_MICRONS * motion, start + height, color=BLUE, lw=2.5, label=label)
+
+
+def _draw_sliding(axis: Axes, found: MeasuredLoops, cycle: int) -> None:
+    """The sliding lines over the part of the branches that they are laid through."""
+    record, (begin, turn, end) = found.record, found.reversals[cycle]
+    stroke, slope = found.stroke[cycle], found.residual_stiffness[cycle]
+    for number, (start, stop) in enumerate(((begin, turn), (turn, end))):
+        sense = np.sign(record.displacement[stop] - record.displacement[start])
+        reach = record.displacement[stop] - sense * found.sliding * stroke
+        branch = slice(start, stop + 1)
+        motion, force = record.displacement[branch], record.force[branch]
+        there = sense * (motion - reach) >= 0.0
+        ends = np.array([reach, record.displacement[stop]])
+        line = force[there].mean() + slope * (ends - motion[there].mean())
+        label = None if number else "sliding, slope kr"
+        axis.plot(TO_MICRONS * ends, line, color=ORANGE, lw=2.5, label=label)
+
+
+def _friction(found: MeasuredLoops) -> tuple[Array, str]:
+    """What the record says of friction, and what to call it."""
+    if np.isnan(found.normal_load).any():
+        return (found.friction_force, "µN [N]") if found.slides else (found.force, "force [N]")
+    return (found.friction, "µ") if found.slides else (found.mobilised, "µ at least")
+
+
+def _draw_values(axis: Axes, values: Array, label: str, colour: str) -> None:
+    axis.plot(np.arange(1, len(values) + 1), values, color=colour, marker="o", ms=4.0, lw=1.2)
+    axis.set_ylim(0.0, HEADROOM * values.max())
+    axis.set_ylabel(label)
+
+
+def _title(found: MeasuredLoops, name: str) -> str:
+    values, label = _friction(found)
+    stick = PER_MICRON * found.stick_estimate.value
+    called, _, unit = label.partition(" [")
+    unit = f" {unit.rstrip(']')}" if unit else ""
+    equals = " " if called.endswith("least") else " = "
+    return f"{name}: kt = {stick:.4g} N/µm, {called}{equals}{values.mean():.4g}{unit}"

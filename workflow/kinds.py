@@ -1,0 +1,57 @@
+"""The analyses there are. A new one is a folder in ``workflow/analyses`` and a name here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any, Union
+
+from pydantic import TypeAdapter
+
+from workflow.analyses import contact, specimens, time, vibration, vibration_wear, wear
+from workflow.case import loading
+from workflow.case.sections import Case
+from workflow.case.template import template as write_template
+from workflow.shell.analysis import Analysis
+
+ANALYSES: tuple[Analysis[Any], ...] = (
+    wear.ANALYSIS,
+    specimens.ANALYSIS,
+    contact.ANALYSIS,
+    time.ANALYSIS,
+    vibration.ANALYSIS,
+    vibration_wear.ANALYSIS,
+)
+
+
+def kinds() -> dict[str, type[Case]]:
+    """Every kind of case, by the name that ``fretscale new`` has for it."""
+    return {name: case for analysis in ANALYSES for name, case in analysis.cases.items()}
+
+
+def analysis_of(case: Case) -> Analysis[Any]:
+    """The analysis that a case is a case of."""
+    return next(own for own in ANALYSES if type(case) in own.cases.values())
+
+
+def load_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
+    """The case of whatever kind in a file: see :func:`workflow.case.loading.load_case`."""
+    return loading.load_case(path, list(kinds().values()), overrides)
+
+
+def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
+    """The same, from text."""
+    return loading.parse_case(text, name, list(kinds().values()), overrides)
+
+
+def template(kind: str) -> str:
+    """A commented case of a kind, ready to run. Raises ValueError for a kind that there is not."""
+    if kind not in kinds():
+        raise ValueError(f"{kind}: no such kind of case; allowed: {', '.join(kinds())}")
+    return write_template(kinds()[kind])
+
+
+def json_schema() -> dict[str, Any]:
+    """JSON schema of a case of any kind."""
+    union: Any = Union[tuple(kinds().values())]  # noqa: UP007 - of as many as there are
+    return TypeAdapter[Any](union).json_schema()

@@ -1,0 +1,1 @@
+"""What figures and files for ParaView are made with, whatever they show."""

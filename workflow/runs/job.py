@@ -1,0 +1,151 @@
+"""One run of many: its folder, and the process of its own that computes it.
+
+The process ends when whoever started it ends, however that ends, and its contact workers with it.
+Interrupted or killed it leaves a folder that :func:`workflow.runs.run.bring_to_end` takes up.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import threading
+import traceback
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from workflow.case.sections import Case
+from workflow.errors import FretscaleError, MethodFailed, one_line
+from workflow.kinds import load_case
+from workflow.runs.run import bring_to_end
+from workflow.shell.folder import OutputFolder
+from workflow.shell.processes import THREAD_SETTINGS
+
+# Seconds between two looks at whether a run is still wanted.
+LOOK = 0.2
+# What the process runs; its only argument is the job.
+COMMAND = "from workflow.runs.job import main; main()"
+
+
+@dataclass(frozen=True)
+class Job:
+    """A case with overrides (``"wear.cycles=1e4"``) to run in the folder ``name``."""
+
+    name: str
+    case: Path
+    overrides: tuple[str, ...] = ()
+
+    def load(self) -> Case:
+        """The case to run. Raises CaseError."""
+        return load_case(self.case, self.overrides)
+
+
+@dataclass(frozen=True)
+class Finished:
+    """How a job ended: ``summary`` is that of its run, None where ``error`` says why not."""
+
+    job: Job
+    folder: Path
+    summary: dict[str, Any] | None
+    error: str = ""
+
+
+# --- in the process that computes ---------------------------------------------------------------
+
+
+def main() -> None:
+    """Compute the job given as the only argument and say on stdout how it ended."""
+    # Whatever a library prints goes to stderr; stdout is for the answer.
+    answer = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    given = json.loads(sys.argv[1])
+    job = Job(given["name"], Path(given["case"]), tuple(given["overrides"]))
+    error = ""
+    try:
+        bring_to_end(job.load(), Path(given["out"]) / job.name)
+    except FretscaleError as ending:
+        error = str(ending)
+    except Exception as ending:
+        error = f"{type(ending).__name__}: {ending}"
+        _log(OutputFolder(Path(given["out"]) / job.name).log, traceback.format_exc())
+    answer.write(json.dumps({"error": error}))
+    answer.close()
+
+
+def _log(path: Path, text: str) -> None:
+    """Keep what one line cannot say where the run has told of itself."""
+    with suppress(OSError), path.open("a", encoding="utf-8") as log:
+        log.write(text)
+
+
+def _end_with_parent() -> None:
+    """End when the other end of stdin closes: nobody writes to it."""
+    os.read(0, 1)
+    os._exit(1)
+
+
+# --- in the process that waits ------------------------------------------------------------------
+
+
+def run_job(job: Job, out: Path, unwanted: Callable[[], bool], one_thread: bool = True) -> str:
+    """Compute a job in a fresh process; the error in one line, "" if none.
+
+    It is ended when it is ``unwanted``. It has a process group of its own, so that Ctrl-C comes to
+    whoever waits, and only there.
+    """
+    given = asdict(job) | {"case": str(job.case.absolute()), "out": str(out.absolute())}
+    # Held open as long as this process lives: its end is the end of the other.
+    theirs, lifeline = os.pipe()
+    try:
+        process = subprocess.Popen(
+            [sys.executable, "-c", COMMAND, json.dumps(given)],
+            stdin=theirs,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+            env=os.environ | (dict.fromkeys(THREAD_SETTINGS, "1") if one_thread else {}),
+            start_new_session=True,
+        )
+        try:
+            return _ending(process, *_wait(process, unwanted))
+        finally:
+            process.kill()
+            process.wait()
+    finally:
+        os.close(theirs)
+        os.close(lifeline)
+
+
+def _wait(process: subprocess.Popen[str], unwanted: Callable[[], bool]) -> tuple[str, str]:
+    """What the process wrote to stdout and stderr until its end."""
+    while True:
+        try:
+            return process.communicate(timeout=LOOK)
+        except subprocess.TimeoutExpired:
+            if unwanted():
+                process.kill()
+
+
+def _ending(process: subprocess.Popen[str], answer: str, said: str) -> str:
+    """Why the job failed, in one line; "" if it did not."""
+    if process.returncode == 0:
+        return one_line(json.loads(answer)["error"])
+    if process.returncode < 0:
+        number = -process.returncode
+        return str(MethodFailed(f"the process of this run got signal {number}: for its memory?"))
+    last = (said.strip().splitlines() or ["it said nothing"])[-1]
+    return f"the process of this run ended with exit code {process.returncode}: {last}"
+
+
+def finished(job: Job, out: Path, error: str) -> Finished:
+    """A job that has ended, with the summary that its run left."""
+    root = out / job.name
+    if not error and not OutputFolder(root).summary.exists():
+        error = f"{root}: finished, but its summary is not to be seen here: is the folder shared?"
+    return Finished(job, root, None if error else OutputFolder(root).read_summary(), error)

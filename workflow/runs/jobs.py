@@ -1,0 +1,109 @@
+"""Many runs in folders: each in a fresh process, as many at once as there are cores, or one by one.
+
+What is finished stays, what was interrupted is taken up, and a run that fails is a value.
+"""
+
+from __future__ import annotations
+
+import os
+import threading
+from collections.abc import Callable, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from pathlib import Path
+
+from workflow.case.sections import Case
+from workflow.errors import FretscaleError, one_line
+from workflow.runs.cluster import run_on_cluster
+from workflow.runs.job import Finished, Job, finished, run_job
+from workflow.runs.run import kept_in
+
+Report = Callable[[Finished], None]
+
+
+def run_jobs(
+    jobs: Sequence[Job],
+    out: Path,
+    *,
+    processes: int | None = None,
+    alone: bool = False,
+    dask: str | None = None,
+    report: Report | None = None,
+) -> list[Finished]:
+    """Run every job in the folder of its name below ``out``; in the order of ``jobs``.
+
+    A finished run of the same case is taken as it is, an unfinished wear run goes on from its last
+    jump, anything else in such a folder is run anew. A job that fails is a :class:`Finished` with
+    its ``error``. Local runs share ``processes`` cores (default: all there are), of which each
+    takes as many as it has contacts; run ``alone``, one after the other, they have all cores and
+    threads as by themselves. ``dask`` is the address of a scheduler to send them to instead.
+    ``report`` is told each job as it ends. Ctrl-C ends all of them; another call goes on.
+
+    Raises ValueError where two jobs would share a folder.
+    """
+    _check_names(jobs)
+    ended: dict[str, Finished] = {}
+
+    def end(job: Job, error: str) -> None:
+        ended[job.name] = finished(job, out, error)
+        if report is not None:
+            report(ended[job.name])
+
+    left: list[_Waiting] = []
+    for job in jobs:
+        try:
+            case = job.load()
+        except FretscaleError as error:
+            end(job, one_line(error))
+            continue
+        if kept_in(out / job.name, case) == "finished":
+            end(job, "")
+        else:
+            left.append(_Waiting(job, case))
+    if dask is not None:
+        run_on_cluster([(own.job, own.case) for own in left], out, dask, end)
+    else:
+        cores = 1 if alone else processes or os.cpu_count() or 1
+        _run_here(left, out, cores, end, one_thread=not alone)
+    return [ended[job.name] for job in jobs]
+
+
+@dataclass(frozen=True)
+class _Waiting:
+    job: Job
+    case: Case
+
+
+def _check_names(jobs: Sequence[Job]) -> None:
+    names = [job.name for job in jobs]
+    for name in names:
+        if names.count(name) > 1:
+            raise ValueError(f"{name}: the name of two jobs; allowed: a folder for each")
+        if Path(name).name != name or name in ("", ".."):
+            raise ValueError(f"{name}: no name of a folder")
+
+
+def _run_here(
+    jobs: Sequence[_Waiting],
+    out: Path,
+    cores: int,
+    end: Callable[[Job, str], None],
+    one_thread: bool,
+) -> None:
+    """Run jobs side by side, first come, first served; one that wants more cores runs alone."""
+    stop = threading.Event()
+    queue = [(own.job, min(own.case.cores, cores)) for own in jobs]
+    running: dict[Future[str], tuple[Job, int]] = {}
+    with ThreadPoolExecutor(max_workers=cores) as pool:
+        try:
+            while queue or running:
+                free = cores - sum(wanted for _, wanted in running.values())
+                while queue and queue[0][1] <= free:
+                    job, wanted = queue.pop(0)
+                    running[pool.submit(run_job, job, out, stop.is_set, one_thread)] = job, wanted
+                    free -= wanted
+                for future in wait(running, return_when=FIRST_COMPLETED).done:
+                    job, _ = running.pop(future)
+                    end(job, future.result())
+        finally:
+            stop.set()

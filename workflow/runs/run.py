@@ -1,0 +1,139 @@
+"""A run of any kind of case: its folder, its log, and where an earlier one has got to."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any, Literal
+
+from workflow.case.changing import changed
+from workflow.case.sections import Case
+from workflow.case.writing import dump_case
+from workflow.errors import CaseError, UserError
+from workflow.kinds import analysis_of, load_case
+from workflow.shell.analysis import Run
+from workflow.shell.folder import OutputFolder
+from workflow.shell.reporter import Reporter
+
+if sys.platform != "win32":
+    import fcntl
+
+# Held while a process works in the folder: one that was cut off may still be about to end.
+LOCK = ".lock"
+
+Kept = Literal["finished", "unfinished", "other", "nothing"]
+
+
+def run_case(case: Case, out: Path, force: bool) -> None:
+    """Run a case from the start into a folder, by the cheapest model if it leaves that open."""
+    analysis = analysis_of(case)
+    case, choice = analysis.choose(case)
+    analysis.memory(case).check()
+    folder = OutputFolder(out)
+    folder.claim(case, force, resumable=analysis.resumable is not None)
+    folder.keep_choice(choice)
+    _run(case, folder, resume=False)
+
+
+def resume_run(out: Path) -> bool:
+    """Continue the run in a folder from its last whole jump; False if it is finished already."""
+    folder = OutputFolder(out)
+    if not folder.case.exists():
+        raise UserError(f"{out}: no run of fretscale here (case.yaml is missing)")
+    case = load_case(folder.case)
+    if folder.summary.exists():
+        return False
+    analysis = analysis_of(case)
+    if analysis.resumable is None:
+        raise UserError(
+            f"{out}: a case of this kind takes up no run half done; start it again with "
+            f"`fretscale run {folder.case} --out {out}`"
+        )
+    analysis.memory(case).check()
+    folder.clear_partial()
+    folder.jumps.mkdir(exist_ok=True)
+    _run(case, folder, resume=True)
+    return True
+
+
+def bring_to_end(case: Case, root: Path) -> bool:
+    """Bring a case to its end in a folder, from where that has got to; False if it was there.
+
+    A finished run of the same case stays, an unfinished one goes on from its last jump if it can,
+    and what else the folder has of earlier runs gives way. Raises FretscaleError.
+    """
+    _refuse_foreign(root)
+    with _locked(root):
+        kept = kept_in(root, case)
+        if kept == "finished":
+            return False
+        resumable = analysis_of(case).resumable
+        if kept == "unfinished" and resumable is not None and resumable(OutputFolder(root)):
+            resume_run(root)
+        else:
+            run_case(case, root, force=True)
+        return True
+
+
+def kept_in(root: Path, case: Case) -> Kept:
+    """What a folder has of this case; "other" is a run of another case."""
+    folder = OutputFolder(root)
+    if not folder.case.exists():
+        return "nothing"
+    finished = folder.summary.exists()
+    record = folder.read_summary().get("fidelity") if finished else folder.choice
+    if not _is_case(folder.case, _as_chosen(case, record)):
+        return "other"
+    if finished:
+        return "finished"
+    resumable = analysis_of(case).resumable is not None and folder.checkpoint.exists()
+    return "unfinished" if resumable else "nothing"
+
+
+def _run(case: Case, folder: OutputFolder, resume: bool) -> None:
+    def compute(file: Path, root: Path) -> bool:
+        return bring_to_end(load_case(file), root)
+
+    reporter = Reporter(folder.log, append=resume)
+    try:
+        run = Run(case, folder, reporter, resume, folder.choice, compute)
+        analysis_of(case).run(run)
+    finally:
+        reporter.close()
+
+
+def _is_case(path: Path, case: Case) -> bool:
+    """Whether the file says this case, perhaps in the words of another version."""
+    if path.read_text(encoding="utf-8") == dump_case(case):
+        return True
+    try:
+        return load_case(path) == case
+    except CaseError:
+        return False
+
+
+def _as_chosen(case: Case, record: dict[str, Any] | None) -> Case:
+    """The case as a run of it was claimed, after its open settings had been chosen."""
+    return changed(case, (record or {}).get("chosen", {}))
+
+
+def _refuse_foreign(root: Path) -> None:
+    """Leave alone what no run of ours has made."""
+    if not root.exists():
+        return
+    ours = any((root / name).exists() for name in (LOCK, OutputFolder(root).case.name))
+    if not root.is_dir() or (any(root.iterdir()) and not ours):
+        raise UserError(f"{root}: not empty and no run of fretscale; give another folder")
+
+
+@contextmanager
+def _locked(root: Path) -> Iterator[None]:
+    """Wait for the folder, as long as another process works in it."""
+    root.mkdir(parents=True, exist_ok=True)
+    with (root / LOCK).open("w") as file:
+        if sys.platform != "win32":
+            with suppress(OSError):  # a file system without locks
+                fcntl.flock(file, fcntl.LOCK_EX)
+        yield

@@ -1,0 +1,71 @@
+"""Run cases and compare what they computed with what they expect."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Column, Table
+
+from workflow.errors import UserError
+from workflow.kinds import load_case
+from workflow.runs.run import run_case
+
+COLUMNS = "expected", "computed", "error", "verdict", "source"
+# Columns of text where the table goes to a file.
+FILE_WIDTH = 120
+
+
+def verify_cases(cases: tuple[Path, ...], out: Path) -> bool:
+    """Run each case into its own folder under ``out``; True if every expectation is met."""
+    loaded = [(path, load_case(path)) for path in cases]
+    for path, case in loaded:
+        if not case.expect:
+            raise UserError(f"{path}: nothing to verify: the case has no `expect` list")
+    console = Console(highlight=False, markup=False)
+    if not console.is_terminal:
+        console.width = FILE_WIDTH
+    met_all = True
+    for path, case in loaded:
+        folder = out / Path(path).stem
+        run_case(case, folder, force=True)
+        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        table = Table(Column("quantity", no_wrap=True), *COLUMNS, title=str(path), box=SIMPLE)
+        for entry in case.expect:
+            computed = _lookup(summary, entry.quantity, path)
+            error = abs(computed - entry.value) / (abs(entry.value) or 1.0)
+            met = error <= entry.tolerance
+            met_all &= met
+            row = (
+                f"{entry.value:.6g}",
+                f"{computed:.6g}",
+                f"{error:.2%}" if entry.value else f"{error:.1e}",
+                "met" if met else "MISSED",
+            )
+            table.add_row(entry.quantity, *row, entry.source)
+        console.print(table)
+    return met_all
+
+
+def _lookup(summary: dict[str, Any], quantity: str, path: Path) -> float:
+    """The number a dotted path leads to."""
+    node: Any = summary
+    for key in quantity.split("."):
+        if (
+            isinstance(node, list)
+            and key.lstrip("-").isdecimal()
+            and -len(node) <= int(key) < len(node)
+        ):
+            node = node[int(key)]
+        elif isinstance(node, dict) and key in node:
+            node = node[key]
+        else:
+            raise UserError(
+                f"{path}: expect: no quantity {quantity} in summary.json ({key} is missing)"
+            )
+    if isinstance(node, bool) or not isinstance(node, int | float):
+        raise UserError(f"{path}: expect: {quantity} is not a number")
+    return float(node)

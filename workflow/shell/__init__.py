@@ -1,0 +1,1 @@
+"""What runs of all kinds share: folder, reporter, results, memory, cache, processes."""

@@ -1,0 +1,100 @@
+"""An analysis as the shell and the commands know it: one frozen description, and nothing else."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, Generic, TypeVar
+
+from workflow.case.sections import Case
+from workflow.shell.folder import OutputFolder
+from workflow.shell.memory import Memory
+from workflow.shell.reporter import Reporter
+
+AnyCase = TypeVar("AnyCase", bound=Case)
+Summary = Mapping[str, Any]
+
+
+@dataclass(frozen=True)
+class Run(Generic[AnyCase]):
+    """A run that an analysis is to bring to its end.
+
+    It goes on from where ``folder`` has got to if it is to ``resume``. ``choice`` is the record of
+    the settings that were chosen for the case, None where they stand as written. ``compute`` runs
+    another case file into a folder, from where an earlier run there has got to; False if that was
+    finished already.
+    """
+
+    case: AnyCase
+    folder: OutputFolder
+    reporter: Reporter
+    resume: bool
+    choice: dict[str, Any] | None
+    compute: Callable[[Path, Path], bool]
+
+
+def _as_written(case: Any) -> tuple[Any, None]:
+    """The case, and no record: nothing is to choose."""
+    return case, None
+
+
+def _expected(case: Case, summary: Summary) -> list[str]:
+    """What a case expects to find; of 0 there is no relative error."""
+    return [own.quantity for own in case.expect if own.value]
+
+
+def _none(summary: Summary) -> list[str]:
+    return []
+
+
+def _as_it_is(folder: Path, summary: Summary) -> Summary:
+    return summary
+
+
+def _no_fields(folder: Path, reference: Path, summary: Summary) -> dict[str, float]:
+    return {}
+
+
+@dataclass(frozen=True)
+class Comparison(Generic[AnyCase]):
+    """How a chart compares two runs of an analysis.
+
+    ``quantities`` are dotted paths into the summary, ``extras`` those told beside them,
+    ``sections`` those of the middle of the faces, and ``at_the_end`` those that do not depend on
+    which increments are computed. ``plain`` are overrides that leave out what a chart has no use
+    for, unless it asks for a quantity below the entry. ``measured`` is the summary with what only
+    the results in the folder tell, ``apart`` how far they are from those in another, by name.
+    """
+
+    quantities: Callable[[AnyCase, Summary], list[str]] = _expected
+    extras: Callable[[Summary], list[str]] = _none
+    sections: Callable[[Summary], list[str]] = _none
+    at_the_end: tuple[str, ...] = ()
+    plain: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    measured: Callable[[Path, Summary], Summary] = _as_it_is
+    apart: Callable[[Path, Path, Summary], dict[str, float]] = _no_fields
+
+
+@dataclass(frozen=True)
+class Analysis(Generic[AnyCase]):
+    """All that the shell and the commands know of an analysis.
+
+    ``cases`` are its kinds of case by the names that ``fretscale new`` has for them; these say
+    themselves how they are told apart, what they would run and on how many cores. ``memory`` is
+    what a run needs before anything is meshed; ``resumable``
+    tells of an unfinished run with a checkpoint whether it can go on from there; None where runs
+    leave none.
+    ``choose`` gives the case with the settings that it leaves open, and a record of why.
+    ``write_loads`` solves the structure of a case alone and writes the loads of its contacts into a
+    folder, None where there is no structure.
+    """
+
+    name: str
+    cases: Mapping[str, type[AnyCase]]
+    run: Callable[[Run[AnyCase]], None]
+    memory: Callable[[AnyCase], Memory]
+    resumable: Callable[[OutputFolder], bool] | None = None
+    choose: Callable[[AnyCase], tuple[AnyCase, dict[str, Any] | None]] = _as_written
+    comparison: Comparison[AnyCase] = Comparison()
+    write_loads: Callable[[AnyCase, str, Path, bool], Sequence[str]] | None = None

@@ -1,0 +1,145 @@
+"""Condensed structures and solved cycles on disk, found again by what they were made from."""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import fe_models
+import sa_solver
+from fe_models.joint import JointResolvent
+from fe_models.structure import FIELDS, CycleSolution, Structure
+from fe_models.symmetry import Mirror, SplitMatrix
+from sa_solver.types import Array
+from workflow.shell.store import read_arrays, write_arrays
+
+# Files are pruned, least recently used first, above this size; one default dovetail takes 67 MB.
+LARGEST_CACHE = 4 * 1024**3
+# Datasets of a joint with a mirror symmetry.
+HALVES = "kept", "turned"
+SOLVERS = ("numpy", "scipy", "scikit-fem", "gmsh")
+
+
+def cache_folder() -> Path:
+    """``FRETSCALE_CACHE``, or ``fretscale`` in the user's cache folder."""
+    default = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "fretscale"
+    return Path(os.environ.get("FRETSCALE_CACHE", default))
+
+
+def content_key(*parts: object) -> str:
+    """Hash of the parts, of the structural code and of the packages it relies on."""
+    digest = hashlib.sha256(repr(parts).encode())
+    for package in (fe_models, sa_solver):
+        assert package.__file__ is not None
+        for source in sorted(Path(package.__file__).parent.rglob("*.py")):
+            digest.update(source.read_bytes())
+    digest.update(repr([(name, version(name)) for name in SOLVERS]).encode())
+    return digest.hexdigest()[:32]
+
+
+def load_joint(key: str) -> JointResolvent | None:
+    """The condensed joint of that key, or None."""
+    found = _load(f"joint-{key}")
+    if found is None:
+        return None
+    arrays, attributes = found
+    return JointResolvent(
+        inverse=_inverse(arrays),
+        rho=float(attributes["rho"]),
+        loads=arrays["loads"],
+        rigid_modes=int(attributes["rigid_modes"]),
+    )
+
+
+def save_joint(key: str, joint: JointResolvent) -> None:
+    """Keep a condensed joint."""
+    inverse = joint.inverse
+    arrays: dict[str, Any] = {"loads": joint.loads}
+    if isinstance(inverse, SplitMatrix):
+        mirror = {"partner": inverse.mirror.partner, "sign": inverse.mirror.sign}
+        arrays |= mirror | dict(zip(HALVES, inverse.blocks, strict=True))
+    else:
+        arrays["inverse"] = inverse
+    _save(f"joint-{key}", arrays, {"rho": joint.rho, "rigid_modes": joint.rigid_modes})
+
+
+def _inverse(arrays: dict[str, Any]) -> Array | SplitMatrix:
+    """(H + ρ)⁻¹ as it was kept."""
+    if "inverse" in arrays:
+        return np.asarray(arrays["inverse"])
+    kept, turned = (arrays[name] for name in HALVES)
+    return SplitMatrix(Mirror(arrays["partner"], arrays["sign"]), (kept, turned))
+
+
+def load_cycle(key: str, structure: Structure, friction: float) -> CycleSolution | None:
+    """The solved cycle of that key on its structure, or None."""
+    found = _load(f"cycle-{key}")
+    if found is None:
+        return None
+    arrays, attributes = found
+    fields = {name: arrays[name] for name in FIELDS}
+    return CycleSolution(
+        histories=structure.histories(**fields, friction=friction),
+        states=tuple(arrays["states"]),
+        last_displacement=fields["displacement"][-1],
+        iterations=int(attributes["iterations"]),
+        residual=float(attributes["residual"]),
+        converged=True,
+        closure=float(attributes["closure"]),
+        cycles=int(attributes["cycles"]),
+        equilibrium=arrays["equilibrium"],
+    )
+
+
+def save_cycle(key: str, cycle: CycleSolution) -> None:
+    """Keep a solved, converged cycle."""
+    arrays = {"states": np.stack(cycle.states), "equilibrium": cycle.equilibrium}
+    names = ("iterations", "residual", "closure", "cycles")
+    attributes = {name: getattr(cycle, name) for name in names}
+    _save(f"cycle-{key}", cycle.fields() | arrays, attributes)
+
+
+def load_arrays(name: str) -> dict[str, Any] | None:
+    """Named arrays kept under that name, or None."""
+    found = _load(name)
+    return None if found is None else found[0]
+
+
+def save_arrays(name: str, arrays: dict[str, Array]) -> None:
+    """Keep named arrays."""
+    _save(name, arrays, {})
+
+
+def _load(name: str) -> tuple[dict[str, Any], dict[str, Any]] | None:
+    path = cache_folder() / f"{name}.h5"
+    try:
+        found = read_arrays(path)
+        os.utime(path)
+    except OSError:
+        return None
+    return found
+
+
+def _save(name: str, arrays: dict[str, Array], attributes: dict[str, Any]) -> None:
+    """Write a file; a cache that cannot be written is no error."""
+    folder = cache_folder()
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        write_arrays(folder / f"{name}.h5", arrays, attributes)
+        _prune(folder)
+    except OSError:
+        return
+
+
+def _prune(folder: Path) -> None:
+    files = sorted(folder.glob("*.h5"), key=lambda path: path.stat().st_mtime, reverse=True)
+    total = 0
+    for path in files:
+        total += path.stat().st_size
+        if total > LARGEST_CACHE:
+            path.unlink()

@@ -1,0 +1,219 @@
+"""Figures of a sweep: what its runs found, as bands over the cycles and against what varies."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from sa_solver.types import Array
+from workflow.pictures.style import BLACK, BLUE, ORANGE, STYLE, new_figure, save
+from workflow.sweep.table import Row, Varied, columns_of, interfaces_of, unit_of, varied_in
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+# So many runs can be told apart as lines of their own.
+LINES = 30
+# From a ratio of largest to smallest on, an axis is logarithmic.
+LOGARITHMIC = 30.0
+# With fewer runs a rank correlation says nothing.
+FEWEST_TO_CORRELATE = 6
+# What to show, with scale and unit: of a wear run, and of others what they have of these.
+WEAR = ("depth", 1e3, "µm"), ("volume", 1.0, "")
+OTHERS = (
+    ("states.-1.peak_pressure", "peak pressure at the end", "MPa"),
+    ("loop.energy", "energy of the last closed cycle", "N mm"),
+    ("states.-1.cumulative_energy", "energy dissipated on the path", "N mm"),
+)
+MOST_ROWS = 2
+# What only contacts of lines have, whose energies are per length.
+LINE_CONTACT = "states.-1.contact_half_width"
+
+
+def write_sweep_figures(title: str, rows: Sequence[Row], folder: Path) -> list[Path]:
+    """Draw the figures of a sweep as PNG files; returns their paths."""
+    import matplotlib
+
+    folder.mkdir(parents=True, exist_ok=True)
+    with matplotlib.rc_context(STYLE):
+        figures = {} if (bands := kinetics_bands(title, rows)) is None else {"kinetics": bands}
+        panels = _panels(rows)
+        for varied in varied_in(rows):
+            name = "against_" + re.sub(r"[^\w-]", "_", varied.path)
+            if panels:
+                figures[name] = against(title, varied, panels)
+        for name, figure in figures.items():
+            save(figure, folder / f"{name}.png")
+    return [folder / f"{name}.png" for name in figures]
+
+
+# --- over the cycles ----------------------------------------------------------------------------
+
+
+def kinetics_bands(title: str, rows: Sequence[Row]) -> Figure | None:
+    """Depth and volume of all runs against cycles, by interface; None where nothing wears."""
+    done = [row.finished.summary for row in rows if row.finished.summary]
+    names = list(dict.fromkeys(name for summary in done for name in interfaces_of(summary)))
+    if not names:
+        return None
+    told = "median (least to largest) at their end"
+    figure = new_figure(f"{title}: {len(done)} runs, {told}", 9.0)
+    axes = figure.subplots(2, len(names), sharex=True, sharey="row", squeeze=False)
+    for column, name in zip(axes.T, names, strict=True):
+        own = [summary for summary in done if name in interfaces_of(summary)]
+        for axis, (quantity, scale, unit) in zip(column, WEAR, strict=True):
+            unit = unit or _unit(f"{name}.{quantity}", rows)
+            last = _draw_bands(axis, own, name, quantity, scale)
+            low, middle, high = (float(np.quantile(last, q)) for q in (0.0, 0.5, 1.0))
+            found = f"{quantity} {middle:.3g} ({low:.3g} to {high:.3g})"
+            axis.set_title(f"{name}: {found} {unit}")
+            axis.set_ylabel(f"{_worded(quantity)} [{unit}]")
+            axis.label_outer()
+        column[-1].set_xlabel("cycles")
+        column[-1].xaxis.set_major_formatter("{x:,.0f}")
+        column[-1].locator_params(axis="x", nbins=5)
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    return figure
+
+
+def _draw_bands(
+    axis: Axes, summaries: Sequence[dict[str, Any]], name: str, quantity: str, scale: float
+) -> Array:
+    """Bands of the runs; returns their last values ``(runs,)``."""
+    curves = [_curve(summary, name, quantity, scale) for summary in summaries]
+    cycles = np.unique(np.concatenate([own for own, _ in curves]))
+    # A run says nothing beyond its own end.
+    values = np.array([np.interp(cycles, *own, right=np.nan) for own in curves])
+    low, quarter, middle, three, high = np.nanquantile(values, [0, 0.25, 0.5, 0.75, 1], axis=0)
+    axis.fill_between(cycles, low, high, color=BLUE, alpha=0.15, lw=0, label="all runs")
+    axis.fill_between(cycles, quarter, three, color=BLUE, alpha=0.35, lw=0, label="middle half")
+    if len(curves) <= LINES:
+        for index, curve in enumerate(curves):
+            label = None if index else "each run"
+            axis.plot(*curve, color=BLACK, lw=0.6, alpha=0.5, label=label)
+    axis.plot(cycles, middle, color=ORANGE, lw=2.2, label="median")
+    return np.array([curve[1][-1] for curve in curves])
+
+
+def _curve(summary: dict[str, Any], name: str, quantity: str, scale: float) -> tuple[Array, Array]:
+    """Cycles ``(j,)`` and what both bodies have worn together ``(j,)``."""
+    own = summary["kinetics"][name]
+    worn = np.array(own[f"{quantity}_1"]) + np.array(own[f"{quantity}_2"])
+    return np.array(summary["kinetics"]["cycles"]), scale * worn
+
+
+# --- against what varies ------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class Panel:
+    """What the runs found ``(runs,)``, NaN for one that failed, with its label and title."""
+
+    label: str
+    title: str
+    values: Array
+
+
+def _panels(rows: Sequence[Row]) -> list[list[Panel]]:
+    """Panels by row and column of a figure."""
+    found = columns_of(rows)
+    summaries = [row.finished.summary for row in rows if row.finished.summary]
+    names = list(dict.fromkeys(name for summary in summaries for name in interfaces_of(summary)))
+    if names:
+        return [
+            [
+                Panel(
+                    f"{_worded(quantity)} [{unit or _unit(f'{name}.{quantity}', rows)}]",
+                    f"{name}: {quantity} at the end",
+                    scale * found[f"{name}.{quantity}"],
+                )
+                for name in names
+            ]
+            for quantity, scale, unit in WEAR
+        ]
+    shown = [own for own in OTHERS if own[0] in found][:MOST_ROWS]
+    per = "/mm" if LINE_CONTACT in found else ""
+    return [
+        [Panel(f"{text} [{unit}{per if unit == 'N mm' else ''}]", text, found[name])]
+        for name, text, unit in shown
+    ]
+
+
+def _unit(name: str, rows: Sequence[Row]) -> str:
+    """Unit of a column, for an axis."""
+    return unit_of(name, rows).replace("^3", "³")
+
+
+def _worded(quantity: str) -> str:
+    """A quantity of both bodies together."""
+    return {"depth": "largest depths, both bodies", "volume": "volume, both bodies"}[quantity]
+
+
+def against(title: str, varied: Varied, panels: list[list[Panel]]) -> Figure:
+    """What the runs found against one entry that varies."""
+    figure = new_figure(f"{title}: against {varied.path}", 4.5 * len(panels))
+    axes = figure.subplots(len(panels), len(panels[0]), sharex=True, sharey="row", squeeze=False)
+    places, ticks = _places(varied)
+    for axis, panel in zip(axes.flat, (panel for row in panels for panel in row), strict=True):
+        _draw_against(axis, places, panel)
+        correlation = "" if ticks else _correlation(places, panel.values)
+        axis.set_title(f"{panel.title}{correlation}")
+        axis.set_ylabel(panel.label)
+        axis.set_xlabel(varied.heading)
+        axis.label_outer()
+        if ticks:
+            axis.set_xticks(range(len(ticks)), ticks)
+        elif places.min() > 0.0 and places.max() > LOGARITHMIC * places.min():
+            axis.set_xscale("log")
+    handles, labels = axes[0, 0].get_legend_handles_labels()
+    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    return figure
+
+
+def _places(varied: Varied) -> tuple[Array, list[str]]:
+    """Where each run is along the axis; with the words of the ticks where values are no numbers."""
+    if varied.numbers is not None:
+        return varied.numbers, []
+    words = list(dict.fromkeys(varied.texts))
+    return np.array([words.index(text) for text in varied.texts], dtype=np.float64), words
+
+
+def _draw_against(axis: Axes, places: Array, panel: Panel) -> None:
+    """A dot for each run; where runs share a value, their spread and median from value to value."""
+    done = np.isfinite(panel.values)
+    distinct = np.unique(places[done])
+    groups = [panel.values[done & (places == place)] for place in distinct]
+    if len(distinct) > 1 and any(len(group) > 1 for group in groups):
+        quantiles = np.array([np.quantile(group, [0, 0.25, 0.5, 0.75, 1]) for group in groups]).T
+        low, quarter, middle, three, high = quantiles
+        axis.fill_between(distinct, low, high, color=BLUE, alpha=0.15, lw=0, label="all runs")
+        axis.fill_between(
+            distinct, quarter, three, color=BLUE, alpha=0.35, lw=0, label="middle half"
+        )
+        axis.plot(distinct, middle, color=ORANGE, lw=2.2, label="median")
+    axis.plot(places[done], panel.values[done], "o", color=BLACK, ms=5, alpha=0.6, label="a run")
+    if not done.all():
+        bottom = axis.get_xaxis_transform()
+        style: dict[str, Any] = {"color": ORANGE, "ms": 9, "mew": 2, "clip_on": False}
+        failed = places[~done]
+        axis.plot(failed, 0.0 * failed, "x", transform=bottom, label="a run that failed", **style)
+
+
+def _correlation(places: Array, values: Array) -> str:
+    """Spearman's rank correlation, for a title."""
+    done = np.isfinite(values)
+    if np.count_nonzero(done) < FEWEST_TO_CORRELATE or np.ptp(places[done]) == 0.0:
+        return ""
+    if np.ptp(values[done]) == 0.0:
+        return ", the same in all runs"
+    from scipy.stats import spearmanr
+
+    rank = float(spearmanr(places[done], values[done]).statistic)
+    return f", rank correlation {rank:+.2f}"
