@@ -36,7 +36,7 @@ X, Y, Z = range(3)
 
 
 @dataclass(frozen=True)
-class NormalContact:
+class NormalSolution:
     """Frictionless contact under an imposed force.
 
     ``force`` ``(n,)`` on each node of body 2 [N], ``pressure`` [MPa], ``gap`` under load [mm],
@@ -60,7 +60,7 @@ class NormalContact:
 
 
 @dataclass(frozen=True)
-class TangentialContact:
+class TangentialSolution:
     """First loading: body 2's ring moved by ``displacement`` along an axis [mm].
 
     ``shear`` ``(n,)`` is the force on each node of body 2 along it [N], against the motion;
@@ -85,7 +85,7 @@ class VirginCurve:
 
     displacement: Array
     force: Array
-    states: tuple[TangentialContact, ...]
+    states: tuple[TangentialSolution, ...]
     stick_stiffness: float
     friction: float
 
@@ -136,8 +136,8 @@ class RubbedContact:
     [mm]; ``stint_limit`` the cycles of constant shape beyond which errors of shape grow.
     """
 
-    normal: NormalContact
-    tangential: TangentialContact
+    normal: NormalSolution
+    tangential: TangentialSolution
     stick_stiffness: float
     friction: float
     cycle_slip: Array
@@ -194,7 +194,7 @@ class ReducedPair:
         """A_xx, A_yy or A_zz, ``(n, n)`` [mm/N]."""
         return self.compliance[:, axis, :, axis]
 
-    def normal(self, gap: Array, force: float, guess: Flags | None = None) -> NormalContact:
+    def normal(self, gap: Array, force: float, guess: Flags | None = None) -> NormalSolution:
         """Press the pads of ``gap`` ``(n,)`` [mm] together with ``force`` > 0 [N].
 
         ``guess`` ``(n,)`` says which nodes are likely to touch.
@@ -202,7 +202,7 @@ class ReducedPair:
         if not force > 0.0:
             raise ValueError(f"a normal force of {force:g} N: give one above 0")
         found = complementary(self.block(Z), gap, force, guess)
-        return NormalContact(
+        return NormalSolution(
             force=found.force,
             pressure=found.force / self.areas,
             gap=found.gap,
@@ -213,8 +213,8 @@ class ReducedPair:
         )
 
     def tangential(
-        self, normal: NormalContact, displacement: float, friction: float, axis: int = X
-    ) -> TangentialContact:
+        self, normal: NormalSolution, displacement: float, friction: float, axis: int = X
+    ) -> TangentialSolution:
         """Move body 2's ring from rest by ``displacement`` >= 0 [mm] along x (0) or y (1)."""
         if displacement < 0.0:
             raise ValueError(
@@ -232,7 +232,7 @@ class ReducedPair:
         admissible = bool(np.all(found.force <= (2.0 + ROUNDING) * limit))
         slip = displacement + A @ shear
         slip[touching] = found.gap
-        return TangentialContact(
+        return TangentialSolution(
             displacement=displacement,
             force=-float(shear.sum()),
             shear=shear,
@@ -240,7 +240,7 @@ class ReducedPair:
             converged=found.converged and admissible,
         )
 
-    def stick_stiffness(self, normal: NormalContact, axis: int = X) -> float:
+    def stick_stiffness(self, normal: NormalSolution, axis: int = X) -> float:
         """Tangential stiffness at the ring while all that touches sticks [N/mm]."""
         touching = np.flatnonzero(normal.touching)
         ones = np.ones(len(touching))
@@ -248,7 +248,7 @@ class ReducedPair:
         return float(ones @ sl.solve(A, ones, assume_a="pos"))
 
     def virgin_curve(
-        self, normal: NormalContact, displacements: Array, friction: float, axis: int = X
+        self, normal: NormalSolution, displacements: Array, friction: float, axis: int = X
     ) -> VirginCurve:
         """First loading at rising ``displacements`` ``(k,)`` [mm]; give 0 for the origin."""
         states = tuple(self.tangential(normal, d, friction, axis) for d in displacements)
@@ -284,7 +284,7 @@ class ReducedPair:
             stint_limit=self._stint_limit(normal, per_force),
         )
 
-    def _stint_limit(self, normal: NormalContact, depth_per_force: Array) -> float:
+    def _stint_limit(self, normal: NormalSolution, depth_per_force: Array) -> float:
         """Cycles of constant shape beyond which errors of the worn shape grow.
 
         ``depth_per_force`` ``(n,)``, c, is what both bodies lose per cycle and nodal force [mm/N].

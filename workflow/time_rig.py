@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from fe_models.dynamics.excitation import Force, Harmonic, Recorded
+from fe_models.dynamics.excitation import ExcitationForce, HarmonicForce, RecordedForce
 from fe_models.dynamics.motion import Motion, Start
-from fe_models.dynamics.newmark import StepControl, integrate
+from fe_models.dynamics.newmark import TimeStepControl, integrate
 from sa_solver.types import Array
 from wear.joints.ageing import LongTest
 from workflow.case import RigCase
@@ -81,18 +81,18 @@ def run_rig(case: RigCase, reporter: Reporter) -> TimeOutcome:
     return replace(outcome, numbers=numbers, seen=rig.labels)
 
 
-def step_control(case: RigCase) -> StepControl:
+def step_control(case: RigCase) -> TimeStepControl:
     """Steps as the case asks for."""
-    return StepControl(case.integration.step, case.integration.tolerance)
+    return TimeStepControl(case.integration.step, case.integration.tolerance)
 
 
 def motion_of(
     rig: RigModel,
     joint: JointModel,
     energy: float,
-    force: Force,
+    force: ExcitationForce,
     duration: float,
-    control: StepControl,
+    control: TimeStepControl,
     start: Start | None = None,
 ) -> Motion:
     """Motion of a rig whose joints have dissipated so much ``energy`` [N mm] before.
@@ -129,7 +129,7 @@ def _run_recorded(
     reporter: Reporter,
 ) -> TimeOutcome:
     times, samples = excitation.read()
-    force = Recorded(rig.driven, times, samples)
+    force = RecordedForce(rig.driven, times, samples)
     control, begin = step_control(case), Start(time=float(times[0]))
     states = []
     for energy in case.energies:
@@ -142,7 +142,7 @@ def _run_recorded(
     return TimeOutcome(case, tuple(states), evolution_curve(joint, case.energies[-1]))
 
 
-def motion_curves(rig: RigModel, motion: Motion, force: Force) -> dict[str, Array]:
+def motion_curves(rig: RigModel, motion: Motion, force: ExcitationForce) -> dict[str, Array]:
     """What is kept of a motion."""
     return {
         "time": motion.times,
@@ -230,8 +230,8 @@ class _SteadyStates:
     def _settle(self, energy: float, start: Start | None) -> SteadyCycle:
         excitation, rig = self._excitation, self._rig
         period = 1.0 / excitation.frequency
-        force = Harmonic(rig.driven, excitation.force, excitation.frequency)
-        control = StepControl(period / self._steps, self._tolerance)
+        force = HarmonicForce(rig.driven, excitation.force, excitation.frequency)
+        control = TimeStepControl(period / self._steps, self._tolerance)
         if start is not None:
             # Where a period begins, whatever came before: times must not lose their digits.
             start = replace(start, time=0.0)

@@ -113,7 +113,7 @@ class NewtonControl:
 
 
 @dataclass(frozen=True)
-class StepControl:
+class ContinuationControl:
     """Steps along a curve, as shares of the unknowns and of λ.
 
     ``first``, ``least`` and ``most`` sizes; ``iterations`` of Newton's method that are wanted, and
@@ -132,7 +132,7 @@ class StepControl:
 
 
 @dataclass(frozen=True)
-class Point:
+class CurvePoint:
     """A point of a curve, enough to go on from it.
 
     ``unknowns`` ``(n,)`` and ``parameter``; ``tangent`` ``(n + 1,)``, the direction of both in
@@ -152,7 +152,7 @@ class Point:
 
 
 @dataclass(frozen=True)
-class Solution(Generic[L]):
+class NewtonSolution(Generic[L]):
     """Unknowns found for a parameter; ``message`` is empty, or says why they are not."""
 
     unknowns: Array
@@ -166,10 +166,10 @@ class Solution(Generic[L]):
 
 
 @dataclass(frozen=True)
-class Curve:
+class SolutionCurve:
     """Points in their order; ``message`` is empty if the curve reached an end of its span."""
 
-    points: tuple[Point, ...]
+    points: tuple[CurvePoint, ...]
     message: str
 
     @property
@@ -188,7 +188,7 @@ def solve(
     unknowns: Array,
     parameter: float,
     control: NewtonControl | None = None,
-) -> Solution[L]:
+) -> NewtonSolution[L]:
     """Newton's method at a given λ."""
     control = control or NewtonControl()
     found = _newton(
@@ -203,7 +203,7 @@ def solve(
         else f"Newton's method leaves a residual of {found.at.relative:.2g} at {parameter:g} after "
         f"{found.iterations} iterations: start from a solution nearby"
     )
-    return Solution(found.unknowns, found.at, found.iterations, message)
+    return NewtonSolution(found.unknowns, found.at, found.iterations, message)
 
 
 def _left(at: Linearisation) -> float:
@@ -216,7 +216,7 @@ def _newton(
     correction_of: Callable[[L], Array],
     place: Array,
     control: NewtonControl,
-) -> Solution[L]:
+) -> NewtonSolution[L]:
     """Newton's method from a place; what it has when it ends, converged or not.
 
     A correction that does not lower the residual is shortened. Where shortening does not help, a
@@ -226,13 +226,13 @@ def _newton(
     least, waited = at.relative, 0
     for iteration in range(control.max_iterations):
         if at.relative <= control.tolerance or not np.isfinite(at.relative):
-            return Solution(place, at, iteration, "")
+            return NewtonSolution(place, at, iteration, "")
         if waited == control.patience:
-            return Solution(place, at, iteration, "")
+            return NewtonSolution(place, at, iteration, "")
         try:
             correction = correction_of(at)
         except np.linalg.LinAlgError:
-            return Solution(place, at, iteration, "")
+            return NewtonSolution(place, at, iteration, "")
         norm, whole = np.linalg.norm(at.residual), place + correction
         trial = whole_at = equations_at(whole)
         shortened = 0
@@ -245,7 +245,7 @@ def _newton(
             place, at = whole, whole_at
         waited = 0 if at.relative < least else waited + 1
         least = min(least, at.relative)
-    return Solution(place, at, control.max_iterations, "")
+    return NewtonSolution(place, at, control.max_iterations, "")
 
 
 class Measure:
@@ -259,7 +259,7 @@ class Measure:
         self._farthest, self._largest, self.unknowns, self.parameter = farthest, 0.0, 1.0, 1.0
         self.origin = origin
 
-    def take(self, point: Point) -> None:
+    def take(self, point: CurvePoint) -> None:
         """Measure from this point on by the size it has."""
         moved = point.unknowns if self.origin is None else point.unknowns - self.origin
         norm = float(np.linalg.norm(moved))
@@ -281,12 +281,14 @@ class Measure:
         return np.asarray(way)
 
 
-def first_point(solution: Solution[L], parameter: float, upward: bool, step: float) -> Point:
+def first_point(
+    solution: NewtonSolution[L], parameter: float, upward: bool, step: float
+) -> CurvePoint:
     """The point from which a curve is followed, with λ growing or falling."""
     at, last = solution.at, np.zeros(len(solution.unknowns) + 1)
     last[-1] = 1.0 if upward else -1.0
     tangent, orientation = solve_bordered(at.jacobian, at.slope, last, abs(last)[:, None])
-    return Point(
+    return CurvePoint(
         unknowns=solution.unknowns,
         parameter=parameter,
         tangent=tangent[:, 0],
@@ -298,8 +300,8 @@ def first_point(solution: Solution[L], parameter: float, upward: bool, step: flo
 
 
 def next_point(
-    equations: Equations[L], point: Point, measure: Measure, control: StepControl
-) -> tuple[Point, L] | str:
+    equations: Equations[L], point: CurvePoint, measure: Measure, control: ContinuationControl
+) -> tuple[CurvePoint, L] | str:
     """The next point of a curve and the equations there, or a message why there is none."""
     shares = measure.shares(point.tangent)
     direction = shares / np.linalg.norm(shares)
@@ -322,11 +324,11 @@ def next_point(
 
 def _try_steps(
     equations: Equations[L],
-    point: Point,
+    point: CurvePoint,
     direction: Array,
     measure: Measure,
-    control: StepControl,
-) -> tuple[Point, L] | None:
+    control: ContinuationControl,
+) -> tuple[CurvePoint, L] | None:
     """Go on in a direction (in shares), by the longest of ever shorter steps that leads on."""
     step = min(point.step, control.most)
     while step >= control.least:
@@ -342,7 +344,9 @@ def _try_steps(
     return None
 
 
-def _turned(equations: Equations[L], point: Point, step: Array, measure: Measure) -> Array | None:
+def _turned(
+    equations: Equations[L], point: CurvePoint, step: Array, measure: Measure
+) -> Array | None:
     """Direction in shares in which a curve that turns back at a corner goes on, or None.
 
     It is the tangent beyond the corner, in the sense that keeps the orientation.
@@ -364,8 +368,12 @@ def _turned(equations: Equations[L], point: Point, step: Array, measure: Measure
 
 
 def _correct(
-    equations: Equations[L], point: Point, step: Array, measure: Measure, control: StepControl
-) -> tuple[Point, L, Array] | None:
+    equations: Equations[L],
+    point: CurvePoint,
+    step: Array,
+    measure: Measure,
+    control: ContinuationControl,
+) -> tuple[CurvePoint, L, Array] | None:
     """Newton's method across the tangent: the point, the equations there, its tangent in shares."""
     first = step / np.linalg.norm(step)
     system: Bordered | None = None
@@ -393,7 +401,7 @@ def _correct(
     except np.linalg.LinAlgError:
         return None
     place = found.unknowns
-    new = Point(
+    new = CurvePoint(
         unknowns=place[:-1],
         parameter=float(place[-1]),
         tangent=measure.way(along),
@@ -413,7 +421,7 @@ def _tangent(system: Bordered, size: int) -> tuple[Array, int]:
     return tangent / np.linalg.norm(tangent), system.sign
 
 
-def _adapted(step: float, iterations: int, angle: float, control: StepControl) -> float:
+def _adapted(step: float, iterations: int, angle: float, control: ContinuationControl) -> float:
     """The step after one that took so many iterations and turned the tangent so much."""
     by_iterations = (control.iterations + 1) / (iterations + 1)
     by_angle = 0.5 * control.max_angle / max(angle, 1e-9)
@@ -428,7 +436,7 @@ class Refinement(Generic[L]):
     equations: Equations[L]
     lift: Callable[[Array], Array]
 
-    def lifted(self, point: Point) -> Point:
+    def lifted(self, point: CurvePoint) -> CurvePoint:
         """A point of the present curve, near the one of the finer equations."""
         return replace(
             point,
@@ -440,13 +448,13 @@ class Refinement(Generic[L]):
 
 def follow(
     equations: Equations[L],
-    start: Point,
+    start: CurvePoint,
     span: tuple[float, float],
-    control: StepControl | None = None,
-    on_point: Callable[[Point, L], Refinement[L] | None] | None = None,
+    control: ContinuationControl | None = None,
+    on_point: Callable[[CurvePoint, L], Refinement[L] | None] | None = None,
     origin: Array | None = None,
     rounding: float = 0.0,
-) -> Curve:
+) -> SolutionCurve:
     """Follow a curve from a point until λ leaves the ``span``; its last point lies on the end.
 
     ``on_point`` is told every new point; where it answers with finer equations, the point is
@@ -454,14 +462,14 @@ def follow(
     ``origin``, zero unless given; below a norm of ``rounding`` they do not differ. The start is not
     repeated among the points. A curve that does not reach an end says why.
     """
-    control = control or StepControl()
+    control = control or ContinuationControl()
     measure, point = Measure(max(map(abs, span)), origin, rounding), start
-    points: list[Point] = []
+    points: list[CurvePoint] = []
     while len(points) < control.max_points:
         measure.take(point)
         found = _next_within(equations, point, span, measure, control)
         if isinstance(found, str):
-            return Curve(tuple(points), found)
+            return SolutionCurve(tuple(points), found)
         new, at = found
         finer = on_point(new, at) if on_point is not None else None
         if finer is not None:
@@ -471,16 +479,18 @@ def follow(
             continue
         points.append(new)
         if new.parameter in span:
-            return Curve(tuple(points), "")
+            return SolutionCurve(tuple(points), "")
         point = new
     message = (
         f"the curve has {control.max_points} points and is at {point.parameter:.6g}: go on from "
         "its last point, or allow longer steps"
     )
-    return Curve(tuple(points), message)
+    return SolutionCurve(tuple(points), message)
 
 
-def _moved(equations: Equations[L], point: Point, measure: Measure, control: StepControl) -> Point:
+def _moved(
+    equations: Equations[L], point: CurvePoint, measure: Measure, control: ContinuationControl
+) -> CurvePoint:
     """A point near a curve moved onto it, across its tangent or at its λ; itself if that fails."""
     measure.take(point)
     shares = measure.shares(point.tangent)
@@ -494,11 +504,11 @@ def _moved(equations: Equations[L], point: Point, measure: Measure, control: Ste
 
 def _next_within(
     equations: Equations[L],
-    point: Point,
+    point: CurvePoint,
     span: tuple[float, float],
     measure: Measure,
-    control: StepControl,
-) -> tuple[Point, L] | str:
+    control: ContinuationControl,
+) -> tuple[CurvePoint, L] | str:
     """The next point, on the end of the span if it would be beyond."""
     found = next_point(equations, point, measure, control)
     if isinstance(found, str) or span[0] < found[0].parameter < span[1]:
@@ -508,11 +518,11 @@ def _next_within(
 
 def _end(
     equations: Equations[L],
-    before: Point,
-    beyond: Point,
+    before: CurvePoint,
+    beyond: CurvePoint,
     span: tuple[float, float],
-    control: StepControl,
-) -> tuple[Point, L] | str:
+    control: ContinuationControl,
+) -> tuple[CurvePoint, L] | str:
     """The point at the end of the span that lies between two points."""
     end = span[0] if beyond.parameter <= span[0] else span[1]
     share = (end - before.parameter) / (beyond.parameter - before.parameter)

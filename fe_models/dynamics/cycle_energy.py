@@ -20,7 +20,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, HarmonicSolution
-from fe_models.dynamics.receptance import ComplexArray
+from fe_models.dynamics.harmonics import ComplexArray
 from sa_solver.types import Array
 
 # Times per period of the highest harmonic at which the kinetic energy is looked at: it has twice

@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from fe_models.dynamics.excitation import Force, Together
+from fe_models.dynamics.excitation import CombinedForces, ExcitationForce
 from fe_models.dynamics.linear_flow import Layout, LinearFlow, unknowns
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.motion import Energies, Motion, Start, accelerations, quadratic
@@ -59,7 +59,7 @@ class SliderJoints:
 def integrate_exactly(
     model: DynamicModel,
     joints: SliderJoints,
-    excitation: Force | Together | None,
+    excitation: ExcitationForce | CombinedForces | None,
     duration: float,
     step: float,
     start: Start | None = None,
@@ -103,7 +103,7 @@ class _Run:
         self,
         model: DynamicModel,
         joints: SliderJoints,
-        forces: Sequence[Force],
+        forces: Sequence[ExcitationForce],
         start: Start,
         step: float,
     ) -> None:
@@ -296,7 +296,7 @@ class _Watched:
 def _motion(
     model: DynamicModel,
     run: _Run,
-    excitation: Force | Together | None,
+    excitation: ExcitationForce | CombinedForces | None,
     times: Array,
     rows: list[_Row],
 ) -> Motion:

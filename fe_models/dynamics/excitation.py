@@ -8,14 +8,11 @@ integrator follows exactly.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
 from sa_solver.types import Array
-
-Excitation = Callable[[Array], Array]
 
 
 class ExcitationError(ValueError):
@@ -42,7 +39,7 @@ class Signal:
 
 
 @dataclass(frozen=True)
-class Force(ABC):
+class ExcitationForce(ABC):
     """One signal in time along ``shape`` ``(n,)``, the forces per unit of it."""
 
     shape: Array
@@ -51,7 +48,7 @@ class Force(ABC):
         return np.multiply.outer(self.value(np.asarray(times, dtype=float)), self.shape)
 
     @property
-    def forces(self) -> tuple[Force, ...]:
+    def forces(self) -> tuple[ExcitationForce, ...]:
         return (self,)
 
     @property
@@ -69,7 +66,7 @@ class Force(ABC):
 
 
 @dataclass(frozen=True)
-class Constant(Force):
+class ConstantForce(ExcitationForce):
     """A signal that is always 1: ``shape`` is the force [N]."""
 
     @property
@@ -84,7 +81,7 @@ class Constant(Force):
 
 
 @dataclass(frozen=True)
-class Harmonic(Force):
+class HarmonicForce(ExcitationForce):
     """``amplitude`` sin(2π ``frequency`` t + ``phase``) [N, Hz].
 
     With a ``ramp`` [s] it grows from zero at t = 0 as (1 - cos(π t / ramp)) / 2. Raises
@@ -126,7 +123,7 @@ class Harmonic(Force):
 
 
 @dataclass(frozen=True)
-class HammerBlow(Force):
+class HammerBlow(ExcitationForce):
     """Half a sine of height ``peak`` [N] from ``start`` on for ``duration`` [s].
 
     Raises :class:`ExcitationError` for a duration that is not above zero.
@@ -157,7 +154,7 @@ class HammerBlow(Force):
 
 
 @dataclass(frozen=True)
-class Recorded(Force):
+class RecordedForce(ExcitationForce):
     """Samples ``force`` ``(s,)`` [N] at ``times`` ``(s,)`` [s]: linear between, constant beyond.
 
     Raises :class:`ExcitationError` for no or unequal samples, for values that are not finite, or
@@ -194,10 +191,10 @@ class Recorded(Force):
 
 
 @dataclass(frozen=True)
-class Together:
+class CombinedForces:
     """The sum of one or more forces."""
 
-    forces: tuple[Force, ...]
+    forces: tuple[ExcitationForce, ...]
 
     def __call__(self, times: Array) -> Array:
         return np.asarray(sum(force(times) for force in self.forces))

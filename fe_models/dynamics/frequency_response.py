@@ -24,8 +24,8 @@ from scipy.signal import find_peaks
 
 from sa_solver.types import Array
 
-Quantity = Literal["receptance", "mobility", "accelerance"]
-DERIVATIVES: dict[Quantity, int] = {"receptance": 0, "mobility": 1, "accelerance": 2}
+ResponseQuantity = Literal["receptance", "mobility", "accelerance"]
+DERIVATIVES: dict[ResponseQuantity, int] = {"receptance": 0, "mobility": 1, "accelerance": 2}
 """Of the displacement in time, over force: mm/N, mm/(s N), mm/(s² N)."""
 
 REST = 0.05
@@ -55,12 +55,12 @@ class FrequencyResponse:
 
     frequency: Array
     value: np.ndarray
-    quantity: Quantity
+    quantity: ResponseQuantity
     coherence: Array | None
     decay: float
     remaining: float
 
-    def converted(self, quantity: Quantity) -> FrequencyResponse:
+    def converted(self, quantity: ResponseQuantity) -> FrequencyResponse:
         """The same as another quantity: a factor iω (σ + iω with an exponential window) each."""
         order = DERIVATIVES[quantity] - DERIVATIVES[self.quantity]
         rate = self.decay + 2j * np.pi * self.frequency
@@ -85,7 +85,7 @@ def frequency_response(
     force: Array,
     response: Array,
     step: float,
-    quantity: Quantity = "accelerance",
+    quantity: ResponseQuantity = "accelerance",
     *,
     blow_end: float | None = None,
     decay: float = 0.0,

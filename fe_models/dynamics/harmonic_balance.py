@@ -25,18 +25,24 @@ from numba import njit
 
 from fe_models.dynamics.bordered import LinearMap, solve_alone
 from fe_models.dynamics.continuation import (
+    ContinuationControl,
     NewtonControl,
-    Solution,
-    StepControl,
+    NewtonSolution,
     first_point,
     follow,
     relative_norm,
     solve,
 )
-from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution, by_function, by_joint
+from fe_models.dynamics.harmonics import (
+    ComplexArray,
+    HarmonicBalanceError,
+    Resolution,
+    by_function,
+    by_joint,
+)
 from fe_models.dynamics.joint_rest import Rest
 from fe_models.dynamics.model import DynamicModel
-from fe_models.dynamics.receptance import ComplexArray, Receptance, SteadyMotion
+from fe_models.dynamics.receptance import Receptance, SteadyMotion
 from sa_solver.types import Array
 
 # Unknowns up to which a matrix is assembled and factorised; beyond, products with it are cheaper.
@@ -266,8 +272,8 @@ class HarmonicBalance:
         frequency: float,
         force: float,
         unknowns: Array,
-        control: StepControl | None = None,
-    ) -> Solution[Balance]:
+        control: ContinuationControl | None = None,
+    ) -> NewtonSolution[Balance]:
         """Newton's method from given unknowns; if it fails, from rest, by raising the force.
 
         A branch is followed for the latter, with the steps of ``control``. The equations of the
@@ -279,7 +285,7 @@ class HarmonicBalance:
                 f"frequency {frequency:g} Hz, force {force:g}: give a frequency above 0, and both "
                 "finite"
             )
-        control = control or StepControl()
+        control = control or ContinuationControl()
         newton = NewtonControl(control.tolerance)
         found = solve(self.by_frequency(force), unknowns, frequency, newton)
         if found.converged or force == 0.0:

@@ -26,19 +26,19 @@ import numpy as np
 
 from fe_models.dynamics.bordered import LinearMap, NearlySolved
 from fe_models.dynamics.continuation import (
+    ContinuationControl,
+    CurvePoint,
     NewtonControl,
-    Point,
+    NewtonSolution,
     Refinement,
-    Solution,
-    StepControl,
     first_point,
     follow,
     solve,
 )
-from fe_models.dynamics.forced_response import Accuracy, Branch, Motions, finer_resolution
+from fe_models.dynamics.forced_response import Accuracy, Motions, ResponseBranch, finer_resolution
 from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance, HarmonicSolution
-from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
-from fe_models.dynamics.receptance import ComplexArray, SteadyMotion
+from fe_models.dynamics.harmonics import ComplexArray, HarmonicBalanceError, Resolution
+from fe_models.dynamics.receptance import SteadyMotion
 from sa_solver.types import Array
 
 # Frequencies are looked for up to this factor from the start's: Newton's method that goes farther
@@ -145,11 +145,11 @@ class Backbone(Motions):
 
 def along_phase_resonance(
     problem: HarmonicBalance,
-    start: HarmonicSolution | Branch,
+    start: HarmonicSolution | ResponseBranch,
     forces: tuple[float, float],
     seen: Array | None = None,
     *,
-    control: StepControl | None = None,
+    control: ContinuationControl | None = None,
     accuracy: Accuracy | None = None,
 ) -> Backbone:
     """Phase resonances for ``forces`` from a least to a largest, folds included.
@@ -165,7 +165,7 @@ def along_phase_resonance(
     the start's.
     """
     weights = _weights(problem, seen)
-    nearest = nearest_to_phase(start, weights) if isinstance(start, Branch) else start
+    nearest = nearest_to_phase(start, weights) if isinstance(start, ResponseBranch) else start
     if nearest is None:
         return Backbone(
             (), "the response does not pass through the phase: give one with its peak", problem
@@ -178,7 +178,7 @@ def along_phase_resonance(
         )
     if nearest.message:
         return Backbone((), f"the start is no solution: {nearest.message}", problem)
-    control = control or StepControl()
+    control = control or ContinuationControl()
     equations = PhaseResonance.near(problem, nearest, seen)
     first = _first(_Recorder(equations, accuracy), nearest, control)
     if isinstance(first, str):
@@ -192,7 +192,7 @@ def along_phase_resonance(
     )
 
 
-def nearest_to_phase(branch: Branch, weights: ComplexArray) -> HarmonicSolution | None:
+def nearest_to_phase(branch: ResponseBranch, weights: ComplexArray) -> HarmonicSolution | None:
     """The motion of a branch before or after which it passes through the phase, None if it never.
 
     The larger displacement wᴴ x with the ``weights`` w ``(n,)`` decides if it passes more often:
@@ -316,7 +316,7 @@ class _Recorder:
         self.equations, self._accuracy = equations, accuracy
         self.solutions: list[HarmonicSolution] = []
 
-    def __call__(self, point: Point, at: PhaseBalance) -> Refinement[PhaseBalance] | None:
+    def __call__(self, point: CurvePoint, at: PhaseBalance) -> Refinement[PhaseBalance] | None:
         problem, check = self.equations.problem, self._accuracy is not None
         solution = problem.describe(
             point.unknowns[:-1], at.balance, at.frequency, point.parameter, check=check
@@ -345,11 +345,13 @@ class _First:
     """The phase resonance from which the curve is followed both ways."""
 
     equations: PhaseResonance
-    found: Solution[PhaseBalance]
+    found: NewtonSolution[PhaseBalance]
     solution: HarmonicSolution
 
 
-def _first(record: _Recorder, start: HarmonicSolution, control: StepControl) -> _First | str:
+def _first(
+    record: _Recorder, start: HarmonicSolution, control: ContinuationControl
+) -> _First | str:
     """The phase resonance under the start's force; or why there is none."""
     unknowns = np.append(record.equations.problem.guess(start), 0.0)
     while True:
@@ -381,7 +383,7 @@ def _half(
     upward: bool,
     forces: tuple[float, float],
     accuracy: Accuracy | None,
-    control: StepControl,
+    control: ContinuationControl,
 ) -> _Half:
     force, problem = first.solution.force, first.equations.problem
     if force == forces[upward]:

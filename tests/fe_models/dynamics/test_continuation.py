@@ -9,10 +9,10 @@ import pytest
 
 from fe_models.dynamics.bordered import Bordered, NearlySolved, solve_alone, solve_bordered
 from fe_models.dynamics.continuation import (
+    ContinuationControl,
     Linearised,
     NewtonControl,
     Refinement,
-    StepControl,
     first_point,
     follow,
     solve,
@@ -121,7 +121,7 @@ def test_a_closed_curve_ends_by_the_number_of_points():
         lambda u, p: 2.0 * u,
         lambda u, p: 2.0 * (p - 2.0),
     )
-    curve = follow(circle, start(circle, 1.0, 2.0), (0.0, 4.0), StepControl(max_points=200))
+    curve = follow(circle, start(circle, 1.0, 2.0), (0.0, 4.0), ContinuationControl(max_points=200))
     assert "200 points" in curve.message
     assert len(curve.folds) >= 4
     places = np.array([point.unknowns[0] for point in curve.points])
@@ -208,7 +208,7 @@ def test_finer_equations_take_over_on_the_way():
 
 def test_a_step_is_never_shorter_than_asked():
     first = replace(start(S_CURVE, -3.0, 1.0), step=10.0)
-    curve = follow(S_CURVE, first, (0.5, 9.5), StepControl(most=0.05))
+    curve = follow(S_CURVE, first, (0.5, 9.5), ContinuationControl(most=0.05))
     assert curve.message == ""
     assert all(1e-6 <= point.step <= 0.05 for point in curve.points)
 

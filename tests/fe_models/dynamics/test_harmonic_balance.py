@@ -9,7 +9,7 @@ import pytest
 
 from fe_models.dynamics import harmonic_balance
 from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
-from fe_models.dynamics.excitation import Harmonic
+from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
@@ -353,7 +353,7 @@ def test_rig_against_its_exact_steady_state(frequency, force):
     motion = integrate_exactly(
         model,
         SliderJoints(np.array([KT]), np.array([MU * LOAD]), np.zeros(1)),
-        Harmonic(unit_force(model, "m1"), force, frequency),
+        HarmonicForce(unit_force(model, "m1"), force, frequency),
         50.0 / frequency,
         1.0 / (samples * frequency),
     )

@@ -9,7 +9,7 @@ import pytest
 from scipy.optimize import brentq
 
 from fe_models.dynamics import harmonic_balance
-from fe_models.dynamics.continuation import StepControl
+from fe_models.dynamics.continuation import ContinuationControl
 from fe_models.dynamics.cycle_energy import (
     damping_ratio,
     energy_lost,
@@ -17,7 +17,7 @@ from fe_models.dynamics.cycle_energy import (
     work_of_forces,
 )
 from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
-from fe_models.dynamics.excitation import Harmonic
+from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.forced_response import Accuracy, along_frequency
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
@@ -34,7 +34,7 @@ ODD = tuple(range(1, 16, 2))
 # After which the rig damped by 2 % has settled to 1e-3.
 PERIODS = 20
 # Steps that show where a peak is.
-CLOSE = StepControl(most=0.05)
+CLOSE = ContinuationControl(most=0.05)
 
 
 def rig(ratio=0.001):
@@ -236,7 +236,9 @@ def test_jenkins_oscillator_of_one_harmonic():
     model, law = oscillator(0.02), Jenkins(1500.0, 0.5, 10.0, 30.0)
     problem = balance(model, law, (1,), 65536)
     start = peak(replaced(problem, 256), 6.0, (80.0, 200.0))
-    backbone = along_phase_resonance(problem, start, (0.1, 12.0), control=StepControl(most=0.1))
+    backbone = along_phase_resonance(
+        problem, start, (0.1, 12.0), control=ContinuationControl(most=0.1)
+    )
     assert backbone.message == ""
     omega, sizes = 2.0 * np.pi * backbone.frequencies, backbone.first_amplitudes(0)
     cosine, sine = law.first_harmonic(sizes)
@@ -266,7 +268,7 @@ def test_only_friction_damps():
     wanted = (5.0 / 1500.0) / (1.0 - backbone.forces / bound)
     # Of a corner of the force, twice per period: second order in the 4096 samples.
     np.testing.assert_allclose(backbone.first_amplitudes(0), wanted, rtol=1e-5)
-    control = StepControl(max_points=60)
+    control = ContinuationControl(max_points=60)
     beyond = along_phase_resonance(problem, start, (0.5 * bound, 2.0 * bound), control=control)
     assert "upward in force" in beyond.message
     assert np.all(beyond.forces < 1.00001 * bound)
@@ -363,7 +365,7 @@ def test_motion_in_time_has_the_phase(place):
     motion = integrate_exactly(
         model,
         SliderJoints(np.array([KT]), np.array([LIMIT]), np.zeros(1)),
-        Harmonic(unit_force(model, "m1"), solution.force, solution.frequency),
+        HarmonicForce(unit_force(model, "m1"), solution.force, solution.frequency),
         PERIODS / solution.frequency,
         1.0 / (samples * solution.frequency),
     )
