@@ -11,7 +11,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Generic, Protocol, TypeVar
 
 import numpy as np
@@ -64,20 +63,6 @@ class Linearisation(Protocol):
     def size(self) -> float: ...
     @property
     def relative(self) -> float: ...
-
-
-@dataclass(frozen=True)
-class Linearised:
-    """A :class:`Linearisation` whose derivatives are there from the beginning."""
-
-    residual: Array
-    jacobian: Array | LinearMap
-    slope: Array
-    size: float
-
-    @cached_property
-    def relative(self) -> float:
-        return relative_norm(self.residual, self.size)
 
 
 def relative_norm(residual: Array, size: float) -> float:

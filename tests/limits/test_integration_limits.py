@@ -5,7 +5,6 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
 from fe_models.dynamics.excitation import HammerBlow, HarmonicForce, RecordedForce
 from fe_models.dynamics.motion import Start
 from fe_models.dynamics.newmark import TimeStepControl, integrate
@@ -13,9 +12,10 @@ from fe_models.dynamics.rig import (
     Link,
     lumped_rig,
     natural_frequencies,
-    two_mass_rig,
     unit_force,
 )
+from tests.oracles.event_driven import SliderJoints, integrate_exactly
+from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import JointResponse

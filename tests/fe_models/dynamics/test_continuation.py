@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -10,15 +10,29 @@ import pytest
 from fe_models.dynamics.bordered import Bordered, NearlySolved, solve_alone, solve_bordered
 from fe_models.dynamics.continuation import (
     ContinuationControl,
-    Linearised,
     NewtonControl,
     Refinement,
     first_point,
     follow,
+    relative_norm,
     solve,
 )
 
 EXACT = 1e-9
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Equations at one place, with all derivatives from the beginning."""
+
+    residual: np.ndarray
+    jacobian: object
+    slope: np.ndarray
+    size: float
+
+    @property
+    def relative(self):
+        return relative_norm(self.residual, self.size)
 
 
 def scalar(value, by_unknown, by_parameter):

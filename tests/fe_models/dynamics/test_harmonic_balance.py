@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from fe_models.dynamics import harmonic_balance
-from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
 from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.receptance import Receptance, ReceptanceError
-from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, two_mass_rig, unit_force
+from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
+from tests.oracles.event_driven import SliderJoints, integrate_exactly
+from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic import SEPARATED, SLIP, STICK, PeriodicMarch

@@ -5,11 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
 from fe_models.dynamics.excitation import HammerBlow, HarmonicForce
 from fe_models.dynamics.motion import Start
 from fe_models.dynamics.newmark import TimeStepControl, integrate
-from fe_models.dynamics.rig import Link, lumped_rig, two_mass_rig, unit_force
+from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from tests.oracles.event_driven import SliderJoints, integrate_exactly
+from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import JointResponse
 

@@ -14,15 +14,15 @@ from fe_models.dynamics.cycle_energy import (
     damping_ratio,
     energy_lost,
     largest_kinetic_energy,
-    work_of_forces,
 )
-from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
 from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.forced_response import Accuracy, along_frequency
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.phase_resonance import PhaseResonance, along_phase_resonance
-from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, two_mass_rig, unit_force
+from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
+from tests.oracles.event_driven import SliderJoints, integrate_exactly
+from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic import SLIP, STICK, PeriodicMarch
@@ -323,6 +323,15 @@ def test_any_response_leads_to_the_backbone(force, given):
     for solution in backbone.solutions:
         assert abs(cotangent(problem, solution)) <= 1e-8
         assert solution.residual <= 1e-10
+
+
+def work_of_forces(problem, solution):
+    """-π a Σ k Im(w_kᴴ x_k), the work of the periodic forces in a period."""
+    work = 0.0
+    for harmonic, wave in problem.load.waves.items():
+        moved = solution.motion[solution.resolution.harmonics.index(harmonic)]
+        work -= np.pi * harmonic * float(np.vdot(wave, moved).imag)
+    return solution.force * work
 
 
 def test_power_balances_with_the_samples():

@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
 from fe_models.dynamics.excitation import CombinedForces, HammerBlow, HarmonicForce, RecordedForce
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, two_mass_rig, unit_force
+from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
+from tests.oracles.event_driven import SliderJoints, integrate_exactly
+from tests.oracles.two_mass_rig import two_mass_rig
 
 EXACT = 1e-10
 
