@@ -10,15 +10,14 @@ import numpy as np
 from fe_models.dynamics.continuation import (
     ContinuationControl,
     CurvePoint,
-    Equations,
     Refinement,
     SolutionCurve,
     first_point,
     follow,
-    solve,
 )
 from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance, HarmonicSolution
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.newton import Equations, solve
 from sa_solver.types import Array
 
 # A harmonic left out is added where it has this share of the tolerance: many may sum up.

@@ -24,15 +24,7 @@ import numpy as np
 from numba import njit
 
 from fe_models.dynamics.bordered import LinearMap, solve_alone
-from fe_models.dynamics.continuation import (
-    ContinuationControl,
-    NewtonControl,
-    NewtonSolution,
-    first_point,
-    follow,
-    relative_norm,
-    solve,
-)
+from fe_models.dynamics.continuation import ContinuationControl, first_point, follow
 from fe_models.dynamics.harmonics import (
     ComplexArray,
     HarmonicBalanceError,
@@ -42,6 +34,7 @@ from fe_models.dynamics.harmonics import (
 )
 from fe_models.dynamics.joint_rest import Rest
 from fe_models.dynamics.model import DynamicModel
+from fe_models.dynamics.newton import NewtonControl, NewtonSolution, relative_norm, solve
 from fe_models.dynamics.receptance import Receptance, SteadyMotion
 from sa_solver.types import Array
 
@@ -469,7 +462,7 @@ class _Jacobian:
         force = (self.slopes.reshape(joints, size, size) @ columns).reshape(self.slopes.shape[:3])
         return vector + self._answer(self.steady, force, vector)
 
-    def nearly_solved(self, vector: Array) -> Array:
+    def precondition(self, vector: Array) -> Array:
         """The inverse with the joints' stiffness D at rest, for J, times a vector.
 
         (1 + R (D - κ))⁻¹ = 1 - R' (D - κ), with receptances R' of the structure stiffened by D.

@@ -24,20 +24,18 @@ from itertools import pairwise
 
 import numpy as np
 
-from fe_models.dynamics.bordered import LinearMap, NearlySolved
+from fe_models.dynamics.bordered import Bordered, LinearMap
 from fe_models.dynamics.continuation import (
     ContinuationControl,
     CurvePoint,
-    NewtonControl,
-    NewtonSolution,
     Refinement,
     first_point,
     follow,
-    solve,
 )
 from fe_models.dynamics.forced_response import Accuracy, Motions, ResponseBranch, finer_resolution
 from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance, HarmonicSolution
 from fe_models.dynamics.harmonics import ComplexArray, HarmonicBalanceError, Resolution
+from fe_models.dynamics.newton import NewtonControl, NewtonSolution, solve
 from fe_models.dynamics.receptance import SteadyMotion
 from sa_solver.types import Array
 
@@ -89,8 +87,9 @@ class PhaseBalance:
         stretch = self.frequency / scale
         by_frequency = complex(self._steady.turned(self._moved)[0] @ self._per_force)
         corner = -2.0 * np.pi * stretch * self._of_phase(by_frequency)
-        border = _Border(self.balance.slope * stretch, self._of_phase(self._by_motion), corner)
-        return border.around(inner) if isinstance(inner, np.ndarray) else _Bordered(inner, border)
+        row = np.append(self._of_phase(self._by_motion), corner)
+        bordered = Bordered(inner, self.balance.slope * stretch, row)
+        return bordered.assembled() if isinstance(inner, np.ndarray) else bordered
 
     @cached_property
     def slope(self) -> Array:
@@ -257,56 +256,6 @@ class PhaseResonance:
         balance = self.problem.evaluate(unknowns[:-1], frequency, parameter, "frequency")
         seen = complex(self.of_modes @ balance.motion[self.first])
         return PhaseBalance(self, balance, frequency, seen)
-
-
-@dataclass(frozen=True)
-class _Border:
-    """What makes [J c; r d] of J."""
-
-    column: Array
-    row: Array
-    corner: Array
-
-    def around(self, inner: Array) -> Array:
-        size = len(self.row)
-        whole = np.empty((size + 1, size + 1))
-        whole[:-1, :-1] = inner
-        whole[:-1, -1], whole[-1, :-1], whole[-1, -1] = self.column, self.row, self.corner
-        return whole
-
-
-@dataclass(frozen=True)
-class _Bordered:
-    """[J c; r d]: what it does to a vector, and its assembly."""
-
-    inner: LinearMap
-    border: _Border
-
-    def __matmul__(self, vector: Array) -> Array:
-        column, row, corner = self.border.column, self.border.row, self.border.corner
-        upper = self.inner @ vector[:-1] + column * vector[-1]
-        return np.append(upper, row @ vector[:-1] + corner * vector[-1])
-
-    def assembled(self) -> Array:
-        return self.border.around(self.inner.assembled())
-
-    def nearly_solved(self, vector: Array) -> Array:
-        """The inverse with that of a matrix like J, if one is known, or 1 for J, times a vector."""
-        upper = self._inner_nearly(vector[:-1])
-        last = (vector[-1] - self.border.row @ upper) / self._pivot
-        return np.append(upper - last * self._near_column, last)
-
-    def _inner_nearly(self, vector: Array) -> Array:
-        inner = self.inner
-        return inner.nearly_solved(vector) if isinstance(inner, NearlySolved) else vector
-
-    @cached_property
-    def _near_column(self) -> Array:
-        return self._inner_nearly(self.border.column)
-
-    @cached_property
-    def _pivot(self) -> float:
-        return float(self.border.corner - self.border.row @ self._near_column) or 1.0
 
 
 class _Recorder:

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models.dynamics import continuation
+from fe_models.dynamics import continuation, newton
 from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
@@ -346,10 +346,10 @@ def highest_point(folded):
     """The motion on the fold at 108 Hz, to 1e-9 of its frequency."""
     problem, last = stopped(), folded.solutions[folded.curve.folds[0] - 1]
     unknowns, below, above = last.coefficients.ravel(), last.frequency, last.frequency + 0.1
-    control = continuation.NewtonControl(max_iterations=8, max_shortened=1)
+    control = newton.NewtonControl(max_iterations=8, max_shortened=1)
     while above - below > 1e-9 * below:
         middle = 0.5 * (below + above)
-        found = continuation.solve(problem.by_frequency(1.0), unknowns, middle, control)
+        found = newton.solve(problem.by_frequency(1.0), unknowns, middle, control)
         # Beyond the fold Newton's method ends nowhere, or far away in the small motion.
         far = np.linalg.norm(found.unknowns - unknowns) > 0.2 * np.linalg.norm(unknowns)
         if found.converged and not far:

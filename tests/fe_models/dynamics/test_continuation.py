@@ -7,16 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from fe_models.dynamics.bordered import Bordered, NearlySolved, solve_alone, solve_bordered
-from fe_models.dynamics.continuation import (
-    ContinuationControl,
-    NewtonControl,
-    Refinement,
-    first_point,
-    follow,
-    relative_norm,
-    solve,
-)
+from fe_models.dynamics.bordered import Bordered, Preconditioned, solve_alone, solve_bordered
+from fe_models.dynamics.continuation import ContinuationControl, Refinement, first_point, follow
+from fe_models.dynamics.newton import NewtonControl, relative_norm, solve
 
 EXACT = 1e-9
 
@@ -72,7 +65,7 @@ class LikeAnother(Products):
         super().__init__(matrix)
         self._inverse = np.linalg.inv(other)
 
-    def nearly_solved(self, vector):
+    def precondition(self, vector):
         return self._inverse @ vector
 
 
@@ -255,7 +248,7 @@ def test_the_inverse_of_a_matrix_that_is_alike_saves_products():
     column, row, wanted = noise[0], rng.standard_normal(201), rng.standard_normal(201)
     exact, sign = solve_bordered(matrix, column, row, wanted[:, None])
     alike, alone = LikeAnother(matrix, other), Products(matrix)
-    assert isinstance(alike, NearlySolved)
+    assert isinstance(alike, Preconditioned)
     for products in (alike, alone):
         found = Bordered(products, column, row).solve(wanted, 1e-9)
         np.testing.assert_allclose(found, exact[:, 0], atol=1e-7 * np.abs(exact).max())

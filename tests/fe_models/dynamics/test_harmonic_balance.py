@@ -197,7 +197,7 @@ def test_products_with_the_jacobian_are_those_of_the_matrix(case, monkeypatch):
 
 
 @pytest.mark.parametrize("free", [False, True])
-def test_stuck_joints_are_undone_by_their_stiffness(free):
+def test_stuck_joints_are_preconditioned_by_their_stiffness(free):
     """Where joints do as at rest, the inverse that is known is that of the Jacobian."""
     model = contact_rig()
     if not free:
@@ -210,7 +210,7 @@ def test_stuck_joints_are_undone_by_their_stiffness(free):
     at = problem.evaluate(motion.coefficients.ravel(), 30.0, 0.1, "frequency")
     products = harmonic_balance._Jacobian(problem, at.steady, at.cycle.jacobian)
     vector = np.random.default_rng(8).standard_normal(problem.size)
-    np.testing.assert_allclose(products.nearly_solved(products @ vector), vector, atol=1e-9)
+    np.testing.assert_allclose(products.precondition(products @ vector), vector, atol=1e-9)
 
 
 def test_a_solution_keeps_no_derivatives():

@@ -177,7 +177,7 @@ def test_products_with_the_jacobian_are_those_of_the_matrix(monkeypatch):
     product = matrix @ vector
     np.testing.assert_allclose(products @ vector, product, atol=1e-12 * np.abs(product).max())
     # The border is undone exactly, whatever is known of the inverse of what it is around.
-    undone, inner = products.nearly_solved(vector), products.inner.nearly_solved
+    undone, inner = products.precondition(vector), products.inner.precondition
     assert matrix[-1] @ undone == pytest.approx(vector[-1], rel=1e-9)
     wanted_inner = inner(vector[:-1]) - undone[-1] * inner(matrix[:-1, -1])
     np.testing.assert_allclose(undone[:-1], wanted_inner, atol=1e-12 * np.abs(undone).max())
