@@ -1,1 +1,73 @@
-"""Structures: geometry and meshes, elasticity, reduction to the interfaces, structural friction."""
+"""Structures: geometry and meshes, elasticity, reduction to the interfaces, structural friction.
+
+A structure is meshed (:mod:`fe_models.geometry`), becomes elastic, is condensed onto the nodes of
+its interfaces and marched through a load path with Coulomb friction there; how it vibrates with its
+joints is in :mod:`fe_models.dynamics`. What most uses begin with:
+
+- ``Body``, ``Interface``, ``StructureMesh``: meshed bodies and the faces where they meet
+- ``ElasticBody``: stiffness, mass, loads and stresses of one body
+- ``Constraints``: what supports hold of its displacements
+- ``SupportedBody``: a supported, loaded body, condensed onto its interface nodes
+- ``Structure``: two of them, with the closed cycle of a load path
+- ``JointStiffness``, ``FrictionalJoint``: the joint of two condensed bodies, and friction in it
+- ``reduce_body``, ``ReducedModel``: Guyan and Craig-Bampton reduction
+- ``ReducedPair``, ``FrettingConditions``: two reduced specimens that fret
+- ``wear_in_cycle_blocks``: how these wear
+- ``MeshError``, ``SolverError``: a mesh that cannot be used, a system that cannot be solved
+
+One node pressed with 10 N on springs of 100 N/mm, µ = 0.4, under 3 N and then 6 N along the face:
+it sticks, then slips where friction carries no more than 4 N.
+
+>>> import numpy as np
+>>> from fe_models import FrictionalJoint, JointStiffness
+>>> normal_and_shear = np.array([[0.0, 1.0], [0.0, 0.0], [1.0, 0.0]])
+>>> springs = JointStiffness(100.0 * np.eye(3), normal_and_shear, 0, 100.0, 100.0)
+>>> joint = FrictionalJoint(springs.resolvent(), friction=0.4)
+>>> for state in joint.march(np.array([[10.0, 3.0], [10.0, 6.0]]), gap=np.zeros(1)):
+...     print(f"{state.force[0, 0]:.3f} N, slipped {abs(state.slip[0, 0]):.3f} mm")
+3.000 N, slipped 0.000 mm
+4.000 N, slipped 0.020 mm
+"""
+
+from typing import TYPE_CHECKING
+
+from fe_models.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from fe_models.constraints import Constraints as Constraints
+    from fe_models.cycle_blocks import wear_in_cycle_blocks as wear_in_cycle_blocks
+    from fe_models.elasticity import ElasticBody as ElasticBody
+    from fe_models.friction import FrictionalJoint as FrictionalJoint
+    from fe_models.joint import JointStiffness as JointStiffness
+    from fe_models.linear_solver import SolverError as SolverError
+    from fe_models.mesh import Body as Body
+    from fe_models.mesh import Interface as Interface
+    from fe_models.mesh import MeshError as MeshError
+    from fe_models.mesh import StructureMesh as StructureMesh
+    from fe_models.reduced_contact import FrettingConditions as FrettingConditions
+    from fe_models.reduced_contact import ReducedPair as ReducedPair
+    from fe_models.reduction import ReducedModel as ReducedModel
+    from fe_models.reduction import reduce_body as reduce_body
+    from fe_models.structure import Structure as Structure
+    from fe_models.supported_body import SupportedBody as SupportedBody
+
+_MODULES = {
+    "Body": "mesh",
+    "Constraints": "constraints",
+    "ElasticBody": "elasticity",
+    "FrettingConditions": "reduced_contact",
+    "FrictionalJoint": "friction",
+    "Interface": "mesh",
+    "JointStiffness": "joint",
+    "MeshError": "mesh",
+    "ReducedModel": "reduction",
+    "ReducedPair": "reduced_contact",
+    "SolverError": "linear_solver",
+    "Structure": "structure",
+    "StructureMesh": "mesh",
+    "SupportedBody": "supported_body",
+    "reduce_body": "reduction",
+    "wear_in_cycle_blocks": "cycle_blocks",
+}
+__all__ = [*_MODULES]
+__getattr__ = lazy_names(__name__, _MODULES)

@@ -55,7 +55,7 @@ class Pressure:
 
 
 @dataclass(frozen=True)
-class Force:
+class BoundaryForce:
     """Force ``(3,)`` [N] on a boundary, spread evenly; per length in the plane [N/mm]."""
 
     boundary: str
@@ -89,7 +89,7 @@ class Acceleration:
     acceleration: Array
 
 
-Load = Pressure | Force | Displacement | Rotation | Acceleration
+AppliedLoad = Pressure | BoundaryForce | Displacement | Rotation | Acceleration
 
 
 def imported_mesh(
@@ -121,7 +121,7 @@ def imported_structure(
     imported: ImportedMesh,
     materials: tuple[Material, Material],
     supports: Sequence[Support],
-    loads: Sequence[Load],
+    loads: Sequence[AppliedLoad],
     order: int,
 ) -> Structure:
     """Both bodies with their supports and a load case for each of the ``loads``.
@@ -182,7 +182,7 @@ def check_support(imported: ImportedMesh, bodies: tuple[Body, Body], support: Su
         )
 
 
-def check_load(imported: ImportedMesh, bodies: tuple[Body, Body], load: Load) -> None:
+def check_load(imported: ImportedMesh, bodies: tuple[Body, Body], load: AppliedLoad) -> None:
     """Raise :class:`MeshError` if neither body has the boundary, or the plane not the direction."""
     boundaries, node_sets = _groups(imported, bodies)
     group = _boundary(load)
@@ -193,7 +193,7 @@ def check_load(imported: ImportedMesh, bodies: tuple[Body, Body], load: Load) ->
             else f"no boundary {group} on {bodies[0].name} or {bodies[1].name}"
         )
         raise MeshError(f"{wrong}; allowed: {', '.join(sorted(boundaries)) or 'none'}")
-    if isinstance(load, Force) and all(group in _groups(imported, [b])[0] for b in bodies):
+    if isinstance(load, BoundaryForce) and all(group in _groups(imported, [b])[0] for b in bodies):
         raise MeshError(
             f"{group} is a boundary of both bodies, and each would take all of the force; allowed: "
             "boundaries of one body"
@@ -268,14 +268,14 @@ def _groups(imported: ImportedMesh, bodies: Sequence[Body]) -> tuple[set[str], s
     return boundaries, {name for body in bodies for name in imported.points[body.name]}
 
 
-def _boundary(load: Load) -> str | None:
+def _boundary(load: AppliedLoad) -> str | None:
     return getattr(load, "boundary", None)
 
 
-def _vector(load: Load) -> Array | None:
+def _vector(load: AppliedLoad) -> Array | None:
     """The direction of a load that has one."""
     match load:
-        case Force():
+        case BoundaryForce():
             return load.force
         case Displacement():
             return load.displacement
@@ -290,7 +290,7 @@ def _supported(
     imported: ImportedMesh,
     material: Material,
     supports: Sequence[Support],
-    loads: Sequence[Load],
+    loads: Sequence[AppliedLoad],
     order: int,
 ) -> SupportedBody:
     body = (mesh.body_1, mesh.body_2)[number - 1]
@@ -381,7 +381,7 @@ def _impose(constraints: Constraints, elastic: ElasticBody, load: Displacement) 
     return imposed.ravel()
 
 
-def _check_against_supports(loads: Sequence[Load], imposed: Array, allowed: Array) -> None:
+def _check_against_supports(loads: Sequence[AppliedLoad], imposed: Array, allowed: Array) -> None:
     """Raise unless supports leave the ``imposed`` displacements ``(size, loads)`` as they are."""
     for load, own, left in zip(loads, imposed.T, allowed.T, strict=True):
         if np.abs(left - own).max() > HELD_SHARE * np.abs(own).max():
@@ -411,13 +411,13 @@ def _check_against_each_other(elastic: ElasticBody, imposed: Sequence[Displaceme
                 )
 
 
-def _forces(elastic: ElasticBody, load: Load) -> Array:
+def _forces(elastic: ElasticBody, load: AppliedLoad) -> Array:
     """Nodal forces ``(size,)`` of a load."""
     density = elastic.material.density
     match load:
         case Pressure():
             return load.pressure * elastic.pressure_load(load.boundary)
-        case Force():
+        case BoundaryForce():
             area = elastic.boundary_integral(load.boundary, lambda x: np.ones_like(x[0]))
             return elastic.traction_load(
                 load.boundary, lambda x: np.full_like(x[0], 1.0 / area), load.force
@@ -442,7 +442,7 @@ def _centrifugal(load: Rotation, density: float) -> Callable[[Array], Array]:
 
 
 def imported_softening(
-    structure: Structure, loads: Sequence[Load], amplitudes: Array
+    structure: Structure, loads: Sequence[AppliedLoad], amplitudes: Array
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """Spin softening of both bodies ``(size, size)`` [N/mm] at ``amplitudes`` of the loads."""
     softening = []

@@ -101,7 +101,7 @@ def prepare(
     """Solver of a sparse symmetric positive definite matrix for a few right-hand sides.
 
     ``near_nullspace`` ``(n, k)`` are motions of little energy, for the iterative solver: those of
-    :func:`fe_models.multigrid.rigid_body_modes` if the matrix is an elastic body's. Raises
+    :func:`fe_models.rigid_motions.rigid_body_modes` if the matrix is an elastic body's. Raises
     :class:`SolverError`, here if the matrix is singular, or when called if the iterations do not
     converge; and :class:`FactorMemoryError` if ``choice`` is direct and does not fit.
     """

@@ -1,4 +1,4 @@
-"""Quasi-static friction and wear of two reduced specimens that are pressed together and rubbed.
+"""Quasi-static friction and wear of two reduced specimens that are pressed together and fret.
 
 The ring of body 1 is held. That of body 2 moves as a rigid translation: along x as prescribed, not
 along y, and along z so that the normal force is F. With A the sum of both compliances of the pad's
@@ -36,7 +36,7 @@ X, Y, Z = range(3)
 
 
 @dataclass(frozen=True)
-class NormalContact:
+class NormalSolution:
     """Frictionless contact under an imposed force.
 
     ``force`` ``(n,)`` on each node of body 2 [N], ``pressure`` [MPa], ``gap`` under load [mm],
@@ -60,7 +60,7 @@ class NormalContact:
 
 
 @dataclass(frozen=True)
-class TangentialContact:
+class TangentialSolution:
     """First loading: body 2's ring moved by ``displacement`` along an axis [mm].
 
     ``shear`` ``(n,)`` is the force on each node of body 2 along it [N], against the motion;
@@ -85,7 +85,7 @@ class VirginCurve:
 
     displacement: Array
     force: Array
-    states: tuple[TangentialContact, ...]
+    states: tuple[TangentialSolution, ...]
     stick_stiffness: float
     friction: float
 
@@ -113,7 +113,7 @@ class Loop:
 
 
 @dataclass(frozen=True)
-class Rubbing:
+class FrettingConditions:
     """What is done to the pair in every cycle, and what it loses.
 
     ``force`` normal [N], ``stroke`` of body 2's ring along x, peak to peak [mm], ``friction`` µ and
@@ -127,23 +127,23 @@ class Rubbing:
 
 
 @dataclass(frozen=True)
-class RubbedContact:
+class FrettingCycle:
     """One cycle on a given shape.
 
     ``tangential`` is first loading to half the stroke; ``stick_stiffness`` [N/mm]; ``friction`` the
     largest tangential over the normal force; ``cycle_slip`` ``(n,)`` the length each node slides in
     a cycle [mm]; ``energy`` of a cycle [N mm]; ``wear`` ``(2, n)`` what a cycle takes off each body
-    [mm]; ``stint_limit`` the cycles of constant shape beyond which errors of shape grow.
+    [mm]; ``stable_cycles`` the cycles of constant shape beyond which errors of shape grow.
     """
 
-    normal: NormalContact
-    tangential: TangentialContact
+    normal: NormalSolution
+    tangential: TangentialSolution
     stick_stiffness: float
     friction: float
     cycle_slip: Array
     energy: float
     wear: Array
-    stint_limit: float
+    stable_cycles: float
 
     @property
     def converged(self) -> bool:
@@ -194,7 +194,7 @@ class ReducedPair:
         """A_xx, A_yy or A_zz, ``(n, n)`` [mm/N]."""
         return self.compliance[:, axis, :, axis]
 
-    def normal(self, gap: Array, force: float, guess: Flags | None = None) -> NormalContact:
+    def normal(self, gap: Array, force: float, guess: Flags | None = None) -> NormalSolution:
         """Press the pads of ``gap`` ``(n,)`` [mm] together with ``force`` > 0 [N].
 
         ``guess`` ``(n,)`` says which nodes are likely to touch.
@@ -202,7 +202,7 @@ class ReducedPair:
         if not force > 0.0:
             raise ValueError(f"a normal force of {force:g} N: give one above 0")
         found = complementary(self.block(Z), gap, force, guess)
-        return NormalContact(
+        return NormalSolution(
             force=found.force,
             pressure=found.force / self.areas,
             gap=found.gap,
@@ -213,8 +213,8 @@ class ReducedPair:
         )
 
     def tangential(
-        self, normal: NormalContact, displacement: float, friction: float, axis: int = X
-    ) -> TangentialContact:
+        self, normal: NormalSolution, displacement: float, friction: float, axis: int = X
+    ) -> TangentialSolution:
         """Move body 2's ring from rest by ``displacement`` >= 0 [mm] along x (0) or y (1)."""
         if displacement < 0.0:
             raise ValueError(
@@ -232,7 +232,7 @@ class ReducedPair:
         admissible = bool(np.all(found.force <= (2.0 + ROUNDING) * limit))
         slip = displacement + A @ shear
         slip[touching] = found.gap
-        return TangentialContact(
+        return TangentialSolution(
             displacement=displacement,
             force=-float(shear.sum()),
             shear=shear,
@@ -240,7 +240,7 @@ class ReducedPair:
             converged=found.converged and admissible,
         )
 
-    def stick_stiffness(self, normal: NormalContact, axis: int = X) -> float:
+    def stick_stiffness(self, normal: NormalSolution, axis: int = X) -> float:
         """Tangential stiffness at the ring while all that touches sticks [N/mm]."""
         touching = np.flatnonzero(normal.touching)
         ones = np.ones(len(touching))
@@ -248,7 +248,7 @@ class ReducedPair:
         return float(ones @ sl.solve(A, ones, assume_a="pos"))
 
     def virgin_curve(
-        self, normal: NormalContact, displacements: Array, friction: float, axis: int = X
+        self, normal: NormalSolution, displacements: Array, friction: float, axis: int = X
     ) -> VirginCurve:
         """First loading at rising ``displacements`` ``(k,)`` [mm]; give 0 for the origin."""
         states = tuple(self.tangential(normal, d, friction, axis) for d in displacements)
@@ -261,36 +261,40 @@ class ReducedPair:
             friction=float(force[-1] / normal.force.sum()),
         )
 
-    def rub(self, gap: Array, rubbing: Rubbing, guess: Flags | None = None) -> RubbedContact:
+    def fretting_cycle(
+        self, gap: Array, conditions: FrettingConditions, guess: Flags | None = None
+    ) -> FrettingCycle:
         """One cycle on the shape ``gap`` ``(n,)``.
 
         By Masing's rule a cycle slides four times the slip of first loading to half the stroke, at
         the full Coulomb shear.
         """
-        normal = self.normal(gap, rubbing.force, guess)
-        tangential = self.tangential(normal, 0.5 * rubbing.stroke, rubbing.friction)
+        normal = self.normal(gap, conditions.force, guess)
+        tangential = self.tangential(normal, 0.5 * conditions.stroke, conditions.friction)
         cycle_slip = 4.0 * tangential.slip
         energy = np.abs(tangential.shear) * cycle_slip
-        wear = np.outer(rubbing.wear_coefficients, energy / self.areas)
-        per_force = sum(rubbing.wear_coefficients) * rubbing.friction * cycle_slip / self.areas
-        return RubbedContact(
+        wear = np.outer(conditions.wear_coefficients, energy / self.areas)
+        per_force = (
+            sum(conditions.wear_coefficients) * conditions.friction * cycle_slip / self.areas
+        )
+        return FrettingCycle(
             normal=normal,
             tangential=tangential,
             stick_stiffness=self.stick_stiffness(normal),
-            friction=tangential.force / rubbing.force,
+            friction=tangential.force / conditions.force,
             cycle_slip=cycle_slip,
             energy=float(energy.sum()),
             wear=wear,
-            stint_limit=self._stint_limit(normal, per_force),
+            stable_cycles=self._stable_cycles(normal, per_force),
         )
 
-    def _stint_limit(self, normal: NormalContact, depth_per_force: Array) -> float:
+    def _stable_cycles(self, normal: NormalSolution, depth_per_force: Array) -> float:
         """Cycles of constant shape beyond which errors of the worn shape grow.
 
         ``depth_per_force`` ``(n,)``, c, is what both bodies lose per cycle and nodal force [mm/N].
         A change of gap changes the forces by δf = -K' δg: with K the inverse of A_zz on the nodes
-        in contact, K' = K - K 1 1ᵀK/(1ᵀK 1), which leaves the imposed force as it is. A stint of ΔN
-        cycles turns δg into (I - ΔN C K') δg, C = diag(c): stable while ΔN < 2/λ, with λ the
+        in contact, K' = K - K 1 1ᵀK/(1ᵀK 1), which leaves the imposed force as it is. A cycle block
+        of ΔN cycles turns δg into (I - ΔN C K') δg, C = diag(c): stable while ΔN < 2/λ, with λ the
         largest eigenvalue of C^½ K' C^½. The change of slip with the forces is neglected.
         """
         touching = np.flatnonzero(normal.touching)
@@ -302,22 +306,22 @@ class ReducedPair:
         return 2.0 / largest if largest > 0.0 else np.inf
 
     def coupled_cycle(
-        self, gap: Array, rubbing: Rubbing, steps: int, first: float | None = None
+        self, gap: Array, conditions: FrettingConditions, steps: int, first: float | None = None
     ) -> CoupledCycle:
         """The cycle after first loading, ``steps`` increments to each quarter of the stroke.
 
         ``first`` [mm] is a motion within the first of them at which loading halts as well.
         """
-        amplitude = 0.5 * rubbing.stroke
+        amplitude = 0.5 * conditions.stroke
         rise = amplitude * np.arange(steps + 1) / steps
         if first is not None:
             rise = np.insert(rise, 1, first)
         fall = np.linspace(amplitude, -amplitude, 2 * steps + 1)[1:]
         path = np.concatenate([rise, fall, -fall])
-        amplitudes = np.stack([np.full(len(path), rubbing.force), path, 0.0 * path], axis=1)
+        amplitudes = np.stack([np.full(len(path), conditions.force), path, 0.0 * path], axis=1)
         # The ring is free along z, so the gap's datum is too: from here it is closed already.
-        closed = gap - self.normal(gap, rubbing.force).approach
-        joint = FrictionalJoint(self.joint().resolvent(), rubbing.friction)
+        closed = gap - self.normal(gap, conditions.force).approach
+        joint = FrictionalJoint(self.joint().resolvent(), conditions.friction)
         marched = tuple(joint.march(amplitudes, closed))
         begin = len(rise) - 1
         loading, states = marched[:begin], marched[begin:]

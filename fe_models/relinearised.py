@@ -18,6 +18,7 @@ import scipy.sparse as sp
 from fe_models.friction import FrictionState
 from fe_models.joint import JointResolvent
 from fe_models.mesh import Body, Interface, in_space
+from fe_models.rigid_motions import rigid_motions
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_frames
 from fe_models.total_lagrangian import TotalLagrangian
@@ -82,19 +83,17 @@ class PrestressedStructure(Structure):
 
     def _rigid_motions(self) -> Array:
         """Orthonormal motions ``(d n, k)`` of the interfaces that body 2's supports leave free."""
-        faces = self.mesh.interfaces
-        points = [self.mesh.body_2.points[face.nodes_2] for face in faces]
-        middle = np.concatenate(points).mean(axis=0)
-        size = float(np.linalg.norm(np.ptp(np.concatenate(points), axis=0)))
-        axes = self.mesh.body_2.axes
+        faces, axes = self.mesh.interfaces, self.mesh.body_2.axes
+        points = np.concatenate([self.mesh.body_2.points[face.nodes_2] for face in faces])
+        middle = points.mean(axis=0)
+        size = float(np.linalg.norm(np.ptp(points, axis=0)))
         free = self.body_2.free_motions(middle, size)
-        motions = np.empty((len(free), len(axes) * sum(len(own) for own in points)))
-        for row, motion in zip(motions, free, strict=True):
-            moved = [motion[:3] + np.cross(motion[3:], (own - middle) / size) for own in points]
-            pairs = zip(faces, moved, strict=True)
-            local = np.concatenate([face.frame.components(own) for face, own in pairs])
-            row[:] = local[:, axes].ravel()
-        return np.asarray(np.linalg.qr(motions.T)[0])
+        moved = (free @ rigid_motions((points - middle) / size).T).reshape(len(free), *points.shape)
+        ends = np.cumsum([len(face) for face in faces])[:-1]
+        by_face = zip(faces, np.split(moved, ends, axis=1), strict=True)
+        local = np.concatenate([face.frame.components(part) for face, part in by_face], axis=1)
+        motions = local[:, :, axes].transpose(1, 2, 0).reshape(len(axes) * len(points), len(free))
+        return np.asarray(np.linalg.qr(motions)[0])
 
 
 def stress_stiffened(

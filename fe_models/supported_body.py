@@ -13,8 +13,8 @@ from fe_models.constraints import Constraints
 from fe_models.elasticity import ElasticBody
 from fe_models.linear_solver import prepare
 from fe_models.mesh import Body, Interface
-from fe_models.multigrid import rigid_body_modes, rigid_motions
 from fe_models.reduction import reduce_body
+from fe_models.rigid_motions import rigid_body_modes, rigid_motions
 from fe_models.symmetry import Mirror, halves, mirror_of_nodes
 from sa_solver.types import Array, Indices
 

@@ -2,8 +2,8 @@
 
 A matrix is factorised. A Jacobian that is only known by what it does to a vector is solved with
 GMRES, which needs few iterations where it is 1 and something compact, as in harmonic balance, and
-fewer still where the inverse of one like it is known; where it does not converge, the Jacobian is
-assembled after all.
+fewer still where the inverse of one like it preconditions it; where it does not converge, the
+Jacobian is assembled after all.
 """
 
 from __future__ import annotations
@@ -18,10 +18,10 @@ from scipy.sparse.linalg import LinearOperator, gmres
 
 from sa_solver.types import Array
 
-# Residual that GMRES leaves of its right-hand side, unless told otherwise.
-LEFT = 1e-6
-# Vectors that GMRES keeps. If it needs more, the matrix is solved directly.
-MAX_KEPT = 150
+# Residual that GMRES leaves of its right-hand side, unless it is given another.
+GMRES_TOLERANCE = 1e-6
+# Krylov vectors of GMRES. If it needs more, the matrix is solved directly.
+MAX_VECTORS = 150
 
 
 class LinearMap(Protocol):
@@ -34,57 +34,84 @@ class LinearMap(Protocol):
 
 
 @runtime_checkable
-class NearlySolved(Protocol):
+class Preconditioned(Protocol):
     """A matrix that is like another one, whose inverse is known by its products."""
 
-    def nearly_solved(self, vector: Array) -> Array:
+    def precondition(self, vector: Array) -> Array:
         """The inverse of the other one times a vector ``(n,)``."""
         ...
 
 
-def solve_alone(jacobian: Array | LinearMap, wanted: Array, left: float = LEFT) -> Array:
-    """x of J x = w, ``(n,)``; by products it leaves the share ``left`` of w.
+def solve_alone(
+    jacobian: Array | LinearMap, rhs: Array, tolerance: float = GMRES_TOLERANCE
+) -> Array:
+    """x of J x = b, ``(n,)``; by products it leaves the share ``tolerance`` of b.
 
     A singular J has its smallest least squares. Raises ``numpy.linalg.LinAlgError`` where numbers
     are not finite.
     """
     if isinstance(jacobian, np.ndarray):
-        return _Factors(jacobian).solve(wanted)
-    undone = jacobian.nearly_solved if isinstance(jacobian, NearlySolved) else None
-    found = _iteratively(lambda vector: jacobian @ vector, undone, wanted, left)
-    return _Factors(jacobian.assembled()).solve(wanted) if found is None else found
+        return _Factors(jacobian).solve(rhs)
+    preconditioner = jacobian.precondition if isinstance(jacobian, Preconditioned) else None
+    solution = _iteratively(lambda vector: jacobian @ vector, preconditioner, rhs, tolerance)
+    return _Factors(jacobian.assembled()).solve(rhs) if solution is None else solution
 
 
 def solve_bordered(
-    jacobian: Array | LinearMap, column: Array, row: Array, wanted: Array
+    jacobian: Array | LinearMap, column: Array, row: Array, rhs: Array
 ) -> tuple[Array, int]:
-    """x ``(n + 1, r)`` of [J column; row] x = w; the sign of the determinant, 0 if 0 or not known.
+    """x ``(n + 1, r)`` of [J column; row] x = b; the sign of the determinant, 0 if 0 or not known.
 
     As :func:`solve_alone`.
     """
     system = Bordered(jacobian, column, row)
-    return np.array([system.solve(own) for own in wanted.T]).T, system.sign
+    return np.array([system.solve(side) for side in rhs.T]).T, system.sign
 
 
 class Bordered:
-    """[J column; row], to be solved more than once."""
+    """[J column; row] of ``inner`` J ``(n, n)``, known by products, and solved more than once.
 
-    def __init__(self, jacobian: Array | LinearMap, column: Array, row: Array) -> None:
-        self._jacobian, self._column, self._row = jacobian, column, row
-        self._direct = isinstance(jacobian, np.ndarray)
+    ``column`` ``(n,)``, ``row`` ``(n + 1,)``.
+    """
 
-    def solve(self, wanted: Array, left: float = LEFT) -> Array:
-        """x ``(n + 1,)`` of [J column; row] x = w; by products it leaves the share ``left`` of w.
+    def __init__(self, inner: Array | LinearMap, column: Array, row: Array) -> None:
+        self.inner, self._column, self._row = inner, column, row
+        self._direct = isinstance(inner, np.ndarray)
+
+    def __matmul__(self, vector: Array) -> Array:
+        upper = self.inner @ vector[:-1] + self._column * vector[-1]
+        return np.append(upper, self._row @ vector)
+
+    def assembled(self) -> Array:
+        """The matrix ``(n + 1, n + 1)``."""
+        size = len(self._row)
+        matrix = np.empty((size, size), order="F")
+        inner = self.inner
+        matrix[:-1, :-1] = inner if isinstance(inner, np.ndarray) else inner.assembled()
+        matrix[:-1, -1], matrix[-1] = self._column, self._row
+        return matrix
+
+    def precondition(self, vector: Array) -> Array:
+        """The inverse with that of a matrix like J, if one is known, or 1 for J, times a vector.
+
+        The border is eliminated with it, and a pivot that is not 0.
+        """
+        upper = self._inner_preconditioned(vector[:-1])
+        last = (vector[-1] - self._row[:-1] @ upper) / self._pivot
+        return np.append(upper - last * self._preconditioned_column, last)
+
+    def solve(self, rhs: Array, tolerance: float = GMRES_TOLERANCE) -> Array:
+        """x ``(n + 1,)`` of [J column; row] x = b; by products it leaves so large a share of b.
 
         As :func:`solve_alone`.
         """
         if not self._direct:
-            undone = self._nearly_solved if isinstance(self._jacobian, NearlySolved) else None
-            found = _iteratively(self._times, undone, wanted, left)
-            if found is not None:
-                return found
+            preconditioner = self.precondition if isinstance(self.inner, Preconditioned) else None
+            solution = _iteratively(self.__matmul__, preconditioner, rhs, tolerance)
+            if solution is not None:
+                return solution
             self._direct = True
-        return self._factors.solve(wanted)
+        return self._factors.solve(rhs)
 
     @property
     def sign(self) -> int:
@@ -93,31 +120,19 @@ class Bordered:
 
     @cached_property
     def _factors(self) -> _Factors:
-        jacobian, size = self._jacobian, len(self._column)
-        matrix = np.empty((size + 1, size + 1), order="F")
-        matrix[:-1, :-1] = jacobian if isinstance(jacobian, np.ndarray) else jacobian.assembled()
-        matrix[:-1, -1], matrix[-1] = self._column, self._row
-        return _Factors(matrix)
+        return _Factors(self.assembled())
 
-    def _times(self, vector: Array) -> Array:
-        upper = self._jacobian @ vector[:-1] + self._column * vector[-1]
-        return np.append(upper, self._row @ vector)
-
-    def _nearly_solved(self, vector: Array) -> Array:
-        """The row is eliminated with the inverse that is known, and a pivot that is not 0."""
-        assert isinstance(self._jacobian, NearlySolved)
-        upper = self._jacobian.nearly_solved(vector[:-1])
-        last = (vector[-1] - self._row[:-1] @ upper) / self._pivot
-        return np.append(upper - last * self._near_column, last)
+    def _inner_preconditioned(self, vector: Array) -> Array:
+        inner = self.inner
+        return inner.precondition(vector) if isinstance(inner, Preconditioned) else vector
 
     @cached_property
-    def _near_column(self) -> Array:
-        assert isinstance(self._jacobian, NearlySolved)
-        return self._jacobian.nearly_solved(self._column)
+    def _preconditioned_column(self) -> Array:
+        return self._inner_preconditioned(self._column)
 
     @cached_property
     def _pivot(self) -> float:
-        return float(self._row[-1] - self._row[:-1] @ self._near_column) or 1.0
+        return float(self._row[-1] - self._row[:-1] @ self._preconditioned_column) or 1.0
 
 
 class _Factors:
@@ -130,10 +145,10 @@ class _Factors:
         self._matrix = matrix
         self._factors, self._pivots, self._singular = dgetrf(matrix)
 
-    def solve(self, wanted: Array) -> Array:
+    def solve(self, rhs: Array) -> Array:
         if self._singular:
-            return np.asarray(np.linalg.lstsq(self._matrix, wanted)[0])
-        return np.asarray(dgetrs(self._factors, self._pivots, wanted)[0])
+            return np.asarray(np.linalg.lstsq(self._matrix, rhs)[0])
+        return np.asarray(dgetrs(self._factors, self._pivots, rhs)[0])
 
     @property
     def sign(self) -> int:
@@ -147,26 +162,26 @@ class _Factors:
 
 def _iteratively(
     times: Callable[[Array], Array],
-    undone: Callable[[Array], Array] | None,
-    wanted: Array,
-    left: float,
+    preconditioner: Callable[[Array], Array] | None,
+    rhs: Array,
+    tolerance: float,
 ) -> Array | None:
-    """Solution by GMRES, None if it does not converge; ``undone`` nearly undoes ``times``.
+    """Solution by GMRES, preconditioned from the right if it can be; None if it does not converge.
 
-    Where that loses too many digits, as of joints that stick for ones that slide near a resonance
-    of either, products alone are tried.
+    Where preconditioning loses too many digits, as of joints that stick for ones that slide near a
+    resonance of either, products alone are tried.
     """
-    if undone is not None:
-        found = _by_products(lambda vector: times(undone(vector)), wanted, left)
-        if found is not None:
-            return undone(found)
-    return _by_products(times, wanted, left)
+    if preconditioner is not None:
+        preconditioned = _gmres(lambda vector: times(preconditioner(vector)), rhs, tolerance)
+        if preconditioned is not None:
+            return preconditioner(preconditioned)
+    return _gmres(times, rhs, tolerance)
 
 
-def _by_products(times: Callable[[Array], Array], wanted: Array, left: float) -> Array | None:
+def _gmres(times: Callable[[Array], Array], rhs: Array, tolerance: float) -> Array | None:
     """Solution by GMRES, None if it does not converge."""
-    size = len(wanted)
+    size = len(rhs)
     operator = LinearOperator((size, size), matvec=times, dtype=float)
-    kept = min(MAX_KEPT, size)
-    solution, failed = gmres(operator, wanted, rtol=left, restart=kept, maxiter=1)
+    vectors = min(MAX_VECTORS, size)
+    solution, failed = gmres(operator, rhs, rtol=tolerance, restart=vectors, maxiter=1)
     return None if failed else np.asarray(solution)

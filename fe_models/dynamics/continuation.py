@@ -1,6 +1,6 @@
-"""Solutions of r(u, λ) = 0 and curves of them, also where the curve turns back in λ.
+"""Curves of solutions of r(u, λ) = 0, also where the curve turns back in λ.
 
-The curve is followed by its length: from a point the tangent is gone along by a step, and Newton's
+The curve is followed by its length: from a point a step is made along the tangent, and Newton's
 method leads back to the curve in the plane across the tangent there (Keller 1977; Seydel 2010,
 *Practical Bifurcation and Stability Analysis*, 3rd ed., section 4.5). Length is measured in shares
 of the unknowns' own norm and of λ, so that a step is a relative change, near a resonance and far
@@ -11,17 +11,19 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
-from typing import Generic, Protocol, TypeVar
+from typing import Generic
 
 import numpy as np
 
-from fe_models.dynamics.bordered import (
-    LEFT,
-    Bordered,
-    LinearMap,
-    solve_alone,
-    solve_bordered,
+from fe_models.dynamics.bordered import Bordered, solve_bordered
+from fe_models.dynamics.newton import (
+    Equations,
+    L,
+    NewtonControl,
+    NewtonSolution,
+    iterate,
+    linear_tolerance,
+    solve,
 )
 from sa_solver.types import Array
 
@@ -40,80 +42,13 @@ CROSSING = 1e-5
 MAX_SHORTENED, PATIENCE = 1, 2
 # Factor by which a step grows or shrinks at most after a point.
 MOST_CHANGE = 2.0
-# Share of the residual that an iterative solver may leave. Newton's method squares a small relative
-# residual: more digits than that has are lost again.
-MOST_LEFT = 1e-2
-# The same of a tangent, which only begins the next step.
-TANGENT_LEFT = 1e-4
-
-
-class Linearisation(Protocol):
-    """r ``(n,)``, ∂r/∂u, ∂r/∂λ ``(n,)``, and the norm of the terms r is the sum of.
-
-    ∂r/∂u is a matrix ``(n, n)``, or what multiplies like one. ``relative`` is the residual's norm
-    over ``size``: 0 if it vanishes, infinite if it is not a number.
-    """
-
-    @property
-    def residual(self) -> Array: ...
-    @property
-    def jacobian(self) -> Array | LinearMap: ...
-    @property
-    def slope(self) -> Array: ...
-    @property
-    def size(self) -> float: ...
-    @property
-    def relative(self) -> float: ...
+# Share of its right-hand side that an iterative solver may leave of a tangent, which only begins
+# the next step.
+TANGENT_TOLERANCE = 1e-4
 
 
 @dataclass(frozen=True)
-class Linearised:
-    """A :class:`Linearisation` whose derivatives are there from the beginning."""
-
-    residual: Array
-    jacobian: Array | LinearMap
-    slope: Array
-    size: float
-
-    @cached_property
-    def relative(self) -> float:
-        return relative_norm(self.residual, self.size)
-
-
-def relative_norm(residual: Array, size: float) -> float:
-    """A residual's norm over ``size``: 0 if it vanishes, infinite if it is not a number."""
-    norm = float(np.linalg.norm(residual))
-    if not np.isfinite(norm):
-        return np.inf
-    return norm / size if norm > 0.0 else 0.0
-
-
-L = TypeVar("L", bound=Linearisation)
-L_co = TypeVar("L_co", bound=Linearisation, covariant=True)
-
-
-class Equations(Protocol[L_co]):
-    """r(u, λ) and its derivatives, for u ``(n,)``."""
-
-    def __call__(self, unknowns: Array, parameter: float) -> L_co: ...
-
-
-@dataclass(frozen=True)
-class NewtonControl:
-    """When Newton's method has converged, and when it is given up.
-
-    ``max_shortened``: how often a correction that does not lower the residual is halved.
-    ``patience``: so many iterations in a row without a new least residual end it; None: any number.
-    """
-
-    tolerance: float = 1e-10
-    max_iterations: int = 25
-    max_shortened: int = 5
-    patience: int | None = None
-
-
-@dataclass(frozen=True)
-class StepControl:
+class ContinuationControl:
     """Steps along a curve, as shares of the unknowns and of λ.
 
     ``first``, ``least`` and ``most`` sizes; ``iterations`` of Newton's method that are wanted, and
@@ -132,14 +67,14 @@ class StepControl:
 
 
 @dataclass(frozen=True)
-class Point:
+class CurvePoint:
     """A point of a curve, enough to go on from it.
 
     ``unknowns`` ``(n,)`` and ``parameter``; ``tangent`` ``(n + 1,)``, the direction of both in
     which the curve is followed, and the ``step`` that comes next; ``orientation``, the sign of the
     determinant of the derivatives and the tangent, is the same along a smooth curve, also where it
     folds: another one says that a step has met the curve somewhere else (0: not known).
-    ``iterations`` it took to find the point, and what is left of the residual, ``relative``.
+    ``iterations`` it took to get to the point, and what is left of the residual, ``relative``.
     """
 
     unknowns: Array
@@ -150,26 +85,17 @@ class Point:
     iterations: int
     relative: float
 
-
-@dataclass(frozen=True)
-class Solution(Generic[L]):
-    """Unknowns found for a parameter; ``message`` is empty, or says why they are not."""
-
-    unknowns: Array
-    at: L
-    iterations: int
-    message: str
-
     @property
-    def converged(self) -> bool:
-        return not self.message
+    def coordinates(self) -> Array:
+        """Unknowns and parameter ``(n + 1,)``."""
+        return np.append(self.unknowns, self.parameter)
 
 
 @dataclass(frozen=True)
-class Curve:
+class SolutionCurve:
     """Points in their order; ``message`` is empty if the curve reached an end of its span."""
 
-    points: tuple[Point, ...]
+    points: tuple[CurvePoint, ...]
     message: str
 
     @property
@@ -179,77 +105,12 @@ class Curve:
     @property
     def folds(self) -> tuple[int, ...]:
         """Points before which the curve has turned back in λ."""
-        ways = [np.sign(point.tangent[-1]) for point in self.points]
-        return tuple(i for i in range(1, len(ways)) if ways[i] != ways[i - 1])
+        senses = [np.sign(point.tangent[-1]) for point in self.points]
+        return tuple(i for i in range(1, len(senses)) if senses[i] != senses[i - 1])
 
 
-def solve(
-    equations: Equations[L],
-    unknowns: Array,
-    parameter: float,
-    control: NewtonControl | None = None,
-) -> Solution[L]:
-    """Newton's method at a given λ."""
-    control = control or NewtonControl()
-    found = _newton(
-        lambda place: equations(place, parameter),
-        lambda at: solve_alone(at.jacobian, -at.residual, _left(at)),
-        unknowns,
-        control,
-    )
-    message = (
-        ""
-        if found.at.relative <= control.tolerance
-        else f"Newton's method leaves a residual of {found.at.relative:.2g} at {parameter:g} after "
-        f"{found.iterations} iterations: start from a solution nearby"
-    )
-    return Solution(found.unknowns, found.at, found.iterations, message)
-
-
-def _left(at: Linearisation) -> float:
-    """Share of the residual that an iterative solver may leave of it."""
-    return min(max(at.relative, LEFT), MOST_LEFT)
-
-
-def _newton(
-    equations_at: Callable[[Array], L],
-    correction_of: Callable[[L], Array],
-    place: Array,
-    control: NewtonControl,
-) -> Solution[L]:
-    """Newton's method from a place; what it has when it ends, converged or not.
-
-    A correction that does not lower the residual is shortened. Where shortening does not help, a
-    corner of the equations is in the way, and the whole correction leads to its other side.
-    """
-    at = equations_at(place)
-    least, waited = at.relative, 0
-    for iteration in range(control.max_iterations):
-        if at.relative <= control.tolerance or not np.isfinite(at.relative):
-            return Solution(place, at, iteration, "")
-        if waited == control.patience:
-            return Solution(place, at, iteration, "")
-        try:
-            correction = correction_of(at)
-        except np.linalg.LinAlgError:
-            return Solution(place, at, iteration, "")
-        norm, whole = np.linalg.norm(at.residual), place + correction
-        trial = whole_at = equations_at(whole)
-        shortened = 0
-        while np.linalg.norm(trial.residual) >= norm and shortened < control.max_shortened:
-            shortened += 1
-            trial = equations_at(place + 0.5**shortened * correction)
-        if np.linalg.norm(trial.residual) < norm:
-            place, at = place + 0.5**shortened * correction, trial
-        else:
-            place, at = whole, whole_at
-        waited = 0 if at.relative < least else waited + 1
-        least = min(least, at.relative)
-    return Solution(place, at, control.max_iterations, "")
-
-
-class Measure:
-    """How long ways along a curve are: shares of the unknowns less ``origin``, and of λ.
+class Scaling:
+    """In what steps along a curve are measured: shares of the unknowns less ``origin``, and of λ.
 
     Unknowns of a norm below ``rounding`` have no size.
     """
@@ -259,34 +120,45 @@ class Measure:
         self._farthest, self._largest, self.unknowns, self.parameter = farthest, 0.0, 1.0, 1.0
         self.origin = origin
 
-    def take(self, point: Point) -> None:
+    def adapt(self, point: CurvePoint) -> None:
         """Measure from this point on by the size it has."""
-        moved = point.unknowns if self.origin is None else point.unknowns - self.origin
-        norm = float(np.linalg.norm(moved))
+        vibration = point.unknowns if self.origin is None else point.unknowns - self.origin
+        norm = float(np.linalg.norm(vibration))
         norm = norm if norm > self._rounding else 0.0
         self._largest = max(self._largest, norm)
         self.unknowns = max(norm, LEAST_SHARE * self._largest) or 1.0
         self.parameter = max(abs(point.parameter), LEAST_PARAMETER * self._farthest)
 
-    def shares(self, way: Array) -> Array:
-        """A way ``(n + 1,)`` in shares."""
-        shares = way / self.unknowns
-        shares[-1] = way[-1] / self.parameter
+    def scaled(self, step: Array) -> Array:
+        """A step ``(n + 1,)`` in shares."""
+        shares = step / self.unknowns
+        shares[-1] = step[-1] / self.parameter
         return np.asarray(shares)
 
-    def way(self, shares: Array) -> Array:
-        """The inverse of :meth:`shares`."""
-        way = shares * self.unknowns
-        way[-1] = shares[-1] * self.parameter
-        return np.asarray(way)
+    def unscaled(self, shares: Array) -> Array:
+        """The inverse of :meth:`scaled`."""
+        step = shares * self.unknowns
+        step[-1] = shares[-1] * self.parameter
+        return np.asarray(step)
+
+    def column(self, slope: Array) -> Array:
+        """∂r/∂λ ``(n,)`` by shares of λ, where ∂r/∂u is by shares of u and r in units of u."""
+        return np.asarray(slope * (self.parameter / self.unknowns))
+
+    def direction(self, point: CurvePoint) -> Array:
+        """Direction ``(n + 1,)`` of the tangent in shares, of length 1."""
+        shares = self.scaled(point.tangent)
+        return np.asarray(shares / np.linalg.norm(shares))
 
 
-def first_point(solution: Solution[L], parameter: float, upward: bool, step: float) -> Point:
+def first_point(
+    solution: NewtonSolution[L], parameter: float, upward: bool, step: float
+) -> CurvePoint:
     """The point from which a curve is followed, with λ growing or falling."""
     at, last = solution.at, np.zeros(len(solution.unknowns) + 1)
     last[-1] = 1.0 if upward else -1.0
     tangent, orientation = solve_bordered(at.jacobian, at.slope, last, abs(last)[:, None])
-    return Point(
+    return CurvePoint(
         unknowns=solution.unknowns,
         parameter=parameter,
         tangent=tangent[:, 0],
@@ -298,21 +170,20 @@ def first_point(solution: Solution[L], parameter: float, upward: bool, step: flo
 
 
 def next_point(
-    equations: Equations[L], point: Point, measure: Measure, control: StepControl
-) -> tuple[Point, L] | str:
+    equations: Equations[L], point: CurvePoint, scaling: Scaling, control: ContinuationControl
+) -> tuple[CurvePoint, L] | str:
     """The next point of a curve and the equations there, or a message why there is none."""
-    shares = measure.shares(point.tangent)
-    direction = shares / np.linalg.norm(shares)
-    found = _try_steps(equations, point, direction, measure, control)
+    direction = scaling.direction(point)
+    following = _try_steps(equations, point, direction, scaling, control)
     ahead = CORNER
-    while found is None and ahead >= control.least:
-        turned = _turned(equations, point, ahead * direction, measure)
-        if turned is not None:
+    while following is None and ahead >= control.least:
+        beyond = _direction_beyond_corner(equations, point, ahead * direction, scaling)
+        if beyond is not None:
             short = replace(point, step=ahead)
-            found = _try_steps(equations, short, turned, measure, control)
+            following = _try_steps(equations, short, beyond, scaling, control)
         ahead *= 0.1
-    if found is not None:
-        return found
+    if following is not None:
+        return following
     return (
         f"the curve ends at {point.parameter:.6g}: Newton's method does not converge on it with "
         f"steps down to {control.least:g}; give smaller least steps, more samples of the period, "
@@ -322,18 +193,18 @@ def next_point(
 
 def _try_steps(
     equations: Equations[L],
-    point: Point,
+    point: CurvePoint,
     direction: Array,
-    measure: Measure,
-    control: StepControl,
-) -> tuple[Point, L] | None:
+    scaling: Scaling,
+    control: ContinuationControl,
+) -> tuple[CurvePoint, L] | None:
     """Go on in a direction (in shares), by the longest of ever shorter steps that leads on."""
     step = min(point.step, control.most)
     while step >= control.least:
-        found = _correct(equations, point, step * direction, measure, control)
-        if found is not None:
-            new, at, along = found
-            cosine = min(max(float(along @ direction), -1.0), 1.0)
+        corrected = _correct(equations, point, step * direction, scaling, control)
+        if corrected is not None:
+            new, at, tangent = corrected
+            cosine = min(max(float(tangent @ direction), -1.0), 1.0)
             angle = float(np.degrees(np.arccos(cosine)))
             same = new.orientation * point.orientation >= 0
             if (same and (angle <= control.max_angle or step <= CORNER)) or step <= CROSSING:
@@ -342,19 +213,20 @@ def _try_steps(
     return None
 
 
-def _turned(equations: Equations[L], point: Point, step: Array, measure: Measure) -> Array | None:
+def _direction_beyond_corner(
+    equations: Equations[L], point: CurvePoint, step: Array, scaling: Scaling
+) -> Array | None:
     """Direction in shares in which a curve that turns back at a corner goes on, or None.
 
     It is the tangent beyond the corner, in the sense that keeps the orientation.
     """
-    place = np.append(point.unknowns, point.parameter) + measure.way(step)
-    at = equations(place[:-1], float(place[-1]))
-    wanted = np.zeros((len(place), 1))
-    wanted[-1] = 1.0
-    column = at.slope * (measure.parameter / measure.unknowns)
+    predicted = point.coordinates + scaling.unscaled(step)
+    at = equations(predicted[:-1], float(predicted[-1]))
+    rhs = np.zeros((len(predicted), 1))
+    rhs[-1] = 1.0
     try:
         tangent, orientation = solve_bordered(
-            at.jacobian, column, step / np.linalg.norm(step), wanted
+            at.jacobian, scaling.column(at.slope), step / np.linalg.norm(step), rhs
         )
     except np.linalg.LinAlgError:
         return None
@@ -364,56 +236,59 @@ def _turned(equations: Equations[L], point: Point, step: Array, measure: Measure
 
 
 def _correct(
-    equations: Equations[L], point: Point, step: Array, measure: Measure, control: StepControl
-) -> tuple[Point, L, Array] | None:
+    equations: Equations[L],
+    point: CurvePoint,
+    step: Array,
+    scaling: Scaling,
+    control: ContinuationControl,
+) -> tuple[CurvePoint, L, Array] | None:
     """Newton's method across the tangent: the point, the equations there, its tangent in shares."""
-    first = step / np.linalg.norm(step)
+    along = step / np.linalg.norm(step)
     system: Bordered | None = None
 
     def system_of(at: L) -> Bordered:
-        return Bordered(at.jacobian, at.slope * (measure.parameter / measure.unknowns), first)
+        return Bordered(at.jacobian, scaling.column(at.slope), along)
 
     def correction_of(at: L) -> Array:
         nonlocal system
         system = system_of(at)
-        wanted = np.append(at.residual / -measure.unknowns, 0.0)
-        return measure.way(system.solve(wanted, _left(at)))
+        rhs = np.append(at.residual / -scaling.unknowns, 0.0)
+        return scaling.unscaled(system.solve(rhs, linear_tolerance(at)))
 
-    found = _newton(
-        lambda place: equations(place[:-1], float(place[-1])),
+    last = iterate(
+        lambda coordinates: equations(coordinates[:-1], float(coordinates[-1])),
         correction_of,
-        np.append(point.unknowns, point.parameter) + measure.way(step),
+        point.coordinates + scaling.unscaled(step),
         NewtonControl(control.tolerance, control.max_iterations, MAX_SHORTENED, PATIENCE),
     )
-    if not found.at.relative <= control.tolerance:
+    if not last.at.relative <= control.tolerance:
         return None
     try:
         # That of the last Jacobian but one: a last correction does not turn it.
-        along, orientation = _tangent(system or system_of(found.at), len(first))
+        tangent, orientation = _tangent(system or system_of(last.at), len(along))
     except np.linalg.LinAlgError:
         return None
-    place = found.unknowns
-    new = Point(
-        unknowns=place[:-1],
-        parameter=float(place[-1]),
-        tangent=measure.way(along),
+    new = CurvePoint(
+        unknowns=last.unknowns[:-1],
+        parameter=float(last.unknowns[-1]),
+        tangent=scaling.unscaled(tangent),
         step=point.step,
         orientation=orientation,
-        iterations=found.iterations,
-        relative=found.at.relative,
+        iterations=last.iterations,
+        relative=last.at.relative,
     )
-    return new, found.at, along
+    return new, last.at, tangent
 
 
 def _tangent(system: Bordered, size: int) -> tuple[Array, int]:
     """Direction ``(size,)`` of the curve, and the sign of the determinant, 0 if not known."""
-    wanted = np.zeros(size)
-    wanted[-1] = 1.0
-    tangent = system.solve(wanted, TANGENT_LEFT)
+    rhs = np.zeros(size)
+    rhs[-1] = 1.0
+    tangent = system.solve(rhs, TANGENT_TOLERANCE)
     return tangent / np.linalg.norm(tangent), system.sign
 
 
-def _adapted(step: float, iterations: int, angle: float, control: StepControl) -> float:
+def _adapted(step: float, iterations: int, angle: float, control: ContinuationControl) -> float:
     """The step after one that took so many iterations and turned the tangent so much."""
     by_iterations = (control.iterations + 1) / (iterations + 1)
     by_angle = 0.5 * control.max_angle / max(angle, 1e-9)
@@ -428,7 +303,7 @@ class Refinement(Generic[L]):
     equations: Equations[L]
     lift: Callable[[Array], Array]
 
-    def lifted(self, point: Point) -> Point:
+    def lifted(self, point: CurvePoint) -> CurvePoint:
         """A point of the present curve, near the one of the finer equations."""
         return replace(
             point,
@@ -440,52 +315,53 @@ class Refinement(Generic[L]):
 
 def follow(
     equations: Equations[L],
-    start: Point,
+    start: CurvePoint,
     span: tuple[float, float],
-    control: StepControl | None = None,
-    on_point: Callable[[Point, L], Refinement[L] | None] | None = None,
+    control: ContinuationControl | None = None,
+    on_point: Callable[[CurvePoint, L], Refinement[L] | None] | None = None,
     origin: Array | None = None,
     rounding: float = 0.0,
-) -> Curve:
+) -> SolutionCurve:
     """Follow a curve from a point until λ leaves the ``span``; its last point lies on the end.
 
-    ``on_point`` is told every new point; where it answers with finer equations, the point is
+    ``on_point`` is called with every new point; where it answers with finer equations, the point is
     forgotten, and found again with these. Steps are shares of what the unknowns differ from an
     ``origin``, zero unless given; below a norm of ``rounding`` they do not differ. The start is not
     repeated among the points. A curve that does not reach an end says why.
     """
-    control = control or StepControl()
-    measure, point = Measure(max(map(abs, span)), origin, rounding), start
-    points: list[Point] = []
+    control = control or ContinuationControl()
+    scaling, point = Scaling(max(map(abs, span)), origin, rounding), start
+    points: list[CurvePoint] = []
     while len(points) < control.max_points:
-        measure.take(point)
-        found = _next_within(equations, point, span, measure, control)
-        if isinstance(found, str):
-            return Curve(tuple(points), found)
-        new, at = found
+        scaling.adapt(point)
+        following = _next_within(equations, point, span, scaling, control)
+        if isinstance(following, str):
+            return SolutionCurve(tuple(points), following)
+        new, at = following
         finer = on_point(new, at) if on_point is not None else None
         if finer is not None:
             equations = finer.equations
-            measure.origin = None if measure.origin is None else finer.lift(measure.origin)
-            point = _moved(equations, finer.lifted(point), measure, control)
+            scaling.origin = None if scaling.origin is None else finer.lift(scaling.origin)
+            point = _corrected(equations, finer.lifted(point), scaling, control)
             continue
         points.append(new)
         if new.parameter in span:
-            return Curve(tuple(points), "")
+            return SolutionCurve(tuple(points), "")
         point = new
     message = (
         f"the curve has {control.max_points} points and is at {point.parameter:.6g}: go on from "
         "its last point, or allow longer steps"
     )
-    return Curve(tuple(points), message)
+    return SolutionCurve(tuple(points), message)
 
 
-def _moved(equations: Equations[L], point: Point, measure: Measure, control: StepControl) -> Point:
-    """A point near a curve moved onto it, across its tangent or at its λ; itself if that fails."""
-    measure.take(point)
-    shares = measure.shares(point.tangent)
-    direction = shares / np.linalg.norm(shares)
-    across = _correct(equations, point, control.least * direction, measure, control)
+def _corrected(
+    equations: Equations[L], point: CurvePoint, scaling: Scaling, control: ContinuationControl
+) -> CurvePoint:
+    """A point near a curve brought onto it across its tangent or at its λ; itself if that fails."""
+    scaling.adapt(point)
+    step = control.least * scaling.direction(point)
+    across = _correct(equations, point, step, scaling, control)
     if across is not None:
         return across[0]
     solution = solve(equations, point.unknowns, point.parameter, NewtonControl(control.tolerance))
@@ -494,25 +370,25 @@ def _moved(equations: Equations[L], point: Point, measure: Measure, control: Ste
 
 def _next_within(
     equations: Equations[L],
-    point: Point,
+    point: CurvePoint,
     span: tuple[float, float],
-    measure: Measure,
-    control: StepControl,
-) -> tuple[Point, L] | str:
+    scaling: Scaling,
+    control: ContinuationControl,
+) -> tuple[CurvePoint, L] | str:
     """The next point, on the end of the span if it would be beyond."""
-    found = next_point(equations, point, measure, control)
-    if isinstance(found, str) or span[0] < found[0].parameter < span[1]:
-        return found
-    return _end(equations, point, found[0], span, control)
+    following = next_point(equations, point, scaling, control)
+    if isinstance(following, str) or span[0] < following[0].parameter < span[1]:
+        return following
+    return _end(equations, point, following[0], span, control)
 
 
 def _end(
     equations: Equations[L],
-    before: Point,
-    beyond: Point,
+    before: CurvePoint,
+    beyond: CurvePoint,
     span: tuple[float, float],
-    control: StepControl,
-) -> tuple[Point, L] | str:
+    control: ContinuationControl,
+) -> tuple[CurvePoint, L] | str:
     """The point at the end of the span that lies between two points."""
     end = span[0] if beyond.parameter <= span[0] else span[1]
     share = (end - before.parameter) / (beyond.parameter - before.parameter)

@@ -1,11 +1,7 @@
-"""Energies of a periodic motion: what the forces put in, what is lost, what moves, and the damping.
+"""Energies of a periodic motion: what is lost, what moves, and the damping that this amounts to.
 
-Over a period of a motion with the amplitudes x_k under the forces a w_k, in the sense of
-Re (...) exp(ikωt), the forces do the work
-
-    W = -π a Σ k Im(w_kᴴ x_k),
-
-and the structure's own damping takes π ω Σ k² x_kᴴ C x_k; the joints say themselves what they take.
+Over a period of a motion with the amplitudes x_k, in the sense of Re (...) exp(ikωt), the
+structure's own damping takes π ω Σ k² x_kᴴ C x_k; the joints say themselves what they take.
 With T the largest kinetic energy in the period, the equivalent damping ratio is
 
     ζ = (energy lost in the period) / (4π T),
@@ -20,7 +16,7 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, HarmonicSolution
-from fe_models.dynamics.receptance import ComplexArray
+from fe_models.dynamics.harmonics import ComplexArray
 from sa_solver.types import Array
 
 # Times per period of the highest harmonic at which the kinetic energy is looked at: it has twice
@@ -28,15 +24,6 @@ from sa_solver.types import Array
 TIMES_PER_PERIOD = 16
 # Of the time of the largest kinetic energy, in shares of a step: the energy then is exact.
 TIME_TOLERANCE = 1e-7
-
-
-def work_of_forces(problem: HarmonicBalance, solution: HarmonicSolution) -> float:
-    """Work of the periodic forces in a period [N mm]. It balances :func:`energy_lost`."""
-    work = 0.0
-    for harmonic, wave in problem.load.waves.items():
-        moved = solution.motion[solution.resolution.harmonics.index(harmonic)]
-        work -= np.pi * harmonic * float(np.vdot(wave, moved).imag)
-    return solution.force * work
 
 
 def energy_lost(problem: HarmonicBalance, solution: HarmonicSolution) -> float:

@@ -8,17 +8,16 @@ from typing import Literal
 import numpy as np
 
 from fe_models.dynamics.continuation import (
-    Curve,
-    Equations,
-    Point,
+    ContinuationControl,
+    CurvePoint,
     Refinement,
-    StepControl,
+    SolutionCurve,
     first_point,
     follow,
-    solve,
 )
 from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance, HarmonicSolution
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
+from fe_models.dynamics.newton import Equations, solve
 from sa_solver.types import Array
 
 # A harmonic left out is added where it has this share of the tolerance: many may sum up.
@@ -60,14 +59,14 @@ class Motions:
 
 
 @dataclass(frozen=True)
-class Branch(Motions):
+class ResponseBranch(Motions):
     """Motions in the order in which they were found, the first one included.
 
     ``message`` is empty if the branch reached an end of its span. ``points`` are those of the
     curve, and ``problem`` is what it ended with, to go on from its last point.
     """
 
-    curve: Curve
+    curve: SolutionCurve
     problem: HarmonicBalance
 
     @property
@@ -79,12 +78,12 @@ def along_frequency(
     problem: HarmonicBalance,
     force: float,
     span: tuple[float, float],
-    start: HarmonicSolution | Branch | None = None,
+    start: HarmonicSolution | ResponseBranch | None = None,
     *,
     upward: bool = True,
-    control: StepControl | None = None,
+    control: ContinuationControl | None = None,
     accuracy: Accuracy | None = None,
-) -> Branch:
+) -> ResponseBranch:
     """Motions under a force for the frequencies of ``span`` [Hz], folds included.
 
     From its lower end upward or from its upper end downward; from a ``start`` if there is one: a
@@ -98,12 +97,12 @@ def along_force(
     problem: HarmonicBalance,
     frequency: float,
     span: tuple[float, float],
-    start: HarmonicSolution | Branch | None = None,
+    start: HarmonicSolution | ResponseBranch | None = None,
     *,
     upward: bool = True,
-    control: StepControl | None = None,
+    control: ContinuationControl | None = None,
     accuracy: Accuracy | None = None,
-) -> Branch:
+) -> ResponseBranch:
     """Motions at a frequency [Hz] for the forces of ``span``; see :func:`along_frequency`."""
     return _branch(problem, _Along("force", frequency), span, start, upward, control, accuracy)
 
@@ -131,7 +130,7 @@ class _Recorder:
         self.problem, self._along, self._accuracy = problem, along, accuracy
         self.solutions: list[HarmonicSolution] = []
 
-    def __call__(self, point: Point, at: Balance) -> Refinement[Balance] | None:
+    def __call__(self, point: CurvePoint, at: Balance) -> Refinement[Balance] | None:
         solution = replace(
             self.problem.describe(
                 point.unknowns,
@@ -181,25 +180,25 @@ def _branch(
     problem: HarmonicBalance,
     along: _Along,
     span: tuple[float, float],
-    start: HarmonicSolution | Branch | None,
+    start: HarmonicSolution | ResponseBranch | None,
     upward: bool,
-    control: StepControl | None,
+    control: ContinuationControl | None,
     accuracy: Accuracy | None,
-) -> Branch:
+) -> ResponseBranch:
     above = 0.0 if along.varies == "frequency" else -np.inf
     if not above < span[0] < span[1] < np.inf:
         raise HarmonicBalanceError(
             f"a span from {span[0]:g} to {span[1]:g}: give its lower end first, and finite ends, "
             "above 0 if they are frequencies"
         )
-    control = control or StepControl()
-    if isinstance(start, Branch):
+    control = control or ContinuationControl()
+    if isinstance(start, ResponseBranch):
         record, point = _Recorder(start.problem, along, accuracy), start.curve.points[-1]
     else:
         record = _Recorder(problem, along, accuracy)
         found = _first(record, along, span[0 if upward else 1], start, upward, control)
         if isinstance(found, str):
-            return Branch((), Curve((), found), problem)
+            return ResponseBranch((), SolutionCurve((), found), problem)
         point = found
     # Steps are shares of the vibration: the displacement under the constant load may be far larger.
     rest = record.problem.guess(None)
@@ -212,7 +211,7 @@ def _branch(
         rest,
         record.problem.rounding,
     )
-    return Branch(tuple(record.solutions), curve, record.problem)
+    return ResponseBranch(tuple(record.solutions), curve, record.problem)
 
 
 def _first(
@@ -221,8 +220,8 @@ def _first(
     parameter: float,
     start: HarmonicSolution | None,
     upward: bool,
-    control: StepControl,
-) -> Point | str:
+    control: ContinuationControl,
+) -> CurvePoint | str:
     """The first point of a branch, recorded; or why there is none."""
     frequency, force = along.frequency_and_force(parameter)
     problem, unknowns = record.problem, record.problem.guess(start)

@@ -1,4 +1,4 @@
-"""The friction rig with the specimens that rub in it: two reduced bodies and two masses.
+"""The friction rig with the two specimens in contact: two reduced bodies and two masses.
 
     ground - k1 - m1 - k2 - m2 = ring of the upper specimen, pads, ring of the lower one = ground
 

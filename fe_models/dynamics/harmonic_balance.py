@@ -24,19 +24,18 @@ import numpy as np
 from numba import njit
 
 from fe_models.dynamics.bordered import LinearMap, solve_alone
-from fe_models.dynamics.continuation import (
-    NewtonControl,
-    Solution,
-    StepControl,
-    first_point,
-    follow,
-    relative_norm,
-    solve,
+from fe_models.dynamics.continuation import ContinuationControl, first_point, follow
+from fe_models.dynamics.harmonics import (
+    ComplexArray,
+    HarmonicBalanceError,
+    Resolution,
+    by_function,
+    by_joint,
 )
-from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution, by_function, by_joint
 from fe_models.dynamics.joint_rest import Rest
 from fe_models.dynamics.model import DynamicModel
-from fe_models.dynamics.receptance import ComplexArray, Receptance, SteadyMotion
+from fe_models.dynamics.newton import NewtonControl, NewtonSolution, relative_norm, solve
+from fe_models.dynamics.receptance import Receptance, SteadyMotion
 from sa_solver.types import Array
 
 # Unknowns up to which a matrix is assembled and factorised; beyond, products with it are cheaper.
@@ -266,8 +265,8 @@ class HarmonicBalance:
         frequency: float,
         force: float,
         unknowns: Array,
-        control: StepControl | None = None,
-    ) -> Solution[Balance]:
+        control: ContinuationControl | None = None,
+    ) -> NewtonSolution[Balance]:
         """Newton's method from given unknowns; if it fails, from rest, by raising the force.
 
         A branch is followed for the latter, with the steps of ``control``. The equations of the
@@ -279,7 +278,7 @@ class HarmonicBalance:
                 f"frequency {frequency:g} Hz, force {force:g}: give a frequency above 0, and both "
                 "finite"
             )
-        control = control or StepControl()
+        control = control or ContinuationControl()
         newton = NewtonControl(control.tolerance)
         found = solve(self.by_frequency(force), unknowns, frequency, newton)
         if found.converged or force == 0.0:
@@ -463,7 +462,7 @@ class _Jacobian:
         force = (self.slopes.reshape(joints, size, size) @ columns).reshape(self.slopes.shape[:3])
         return vector + self._answer(self.steady, force, vector)
 
-    def nearly_solved(self, vector: Array) -> Array:
+    def precondition(self, vector: Array) -> Array:
         """The inverse with the joints' stiffness D at rest, for J, times a vector.
 
         (1 + R (D - κ))⁻¹ = 1 - R' (D - κ), with receptances R' of the structure stiffened by D.

@@ -14,6 +14,7 @@ import numpy as np
 from sa_solver.types import Array
 
 ComplexArray = np.ndarray
+"""Complex amplitudes."""
 
 
 def by_function(coefficients: Array) -> Array:

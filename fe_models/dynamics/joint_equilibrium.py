@@ -12,7 +12,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fe_models.dynamics.model import Joints, Response
+from fe_models.dynamics.model import IncrementResponse, Joints
 from sa_solver.types import Array
 
 # Residual of the joints' equilibrium, relative to the largest force they have had so far. Newton
@@ -39,7 +39,7 @@ class Trial(NamedTuple):
     """
 
     increment: Array
-    response: Response
+    response: IncrementResponse
     residual: Array
     size: float
     relative: float
@@ -61,7 +61,7 @@ class JointEquilibrium:
         self._weight = float(np.diag(flexibility).max(initial=0.0))
         self._inverse: Array = np.empty((0, 0))
 
-    def solve(self, before: Response, free: Array, largest: float) -> Trial:
+    def solve(self, before: IncrementResponse, free: Array, largest: float) -> Trial:
         """The best found from the state that ``before`` has ended in.
 
         ``free`` is u_free ``(j d,)`` [mm], relative to that state, and ``largest`` the largest

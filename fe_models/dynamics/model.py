@@ -24,7 +24,7 @@ class DynamicModel:
     names: tuple[str, ...]
 
 
-class Response(Protocol):
+class IncrementResponse(Protocol):
     """What joints answer to an increment of displacement; see :class:`Joints`."""
 
     @property
@@ -47,4 +47,4 @@ class Joints(Protocol):
     @property
     def directions(self) -> int: ...
     def rest(self, joints: int) -> Array: ...
-    def respond(self, state: Array, increment: Array) -> Response: ...
+    def respond(self, state: Array, increment: Array) -> IncrementResponse: ...

@@ -27,9 +27,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.dynamics.joint_equilibrium import TOLERANCE, JointEquilibrium, largest_entry
-from fe_models.dynamics.model import DynamicModel, Joints, Response
+from fe_models.dynamics.model import DynamicModel, IncrementResponse, Joints
 from fe_models.dynamics.motion import Motion, Start
-from fe_models.dynamics.record import Point, Record
+from fe_models.dynamics.record import MotionRecord, StepState
 from sa_solver.types import Array
 
 # A step is halved at most this often: to 1/4096, where any continuous law is nearly linear.
@@ -41,7 +41,7 @@ BLOCK = 1024
 
 
 @dataclass(frozen=True)
-class StepControl:
+class TimeStepControl:
     """Steps of ``step`` [s], or where ``tolerance`` is given, parts of it: halves, quarters, ...
 
     ``tolerance`` is the error of displacement one step may add, relative to the largest
@@ -69,7 +69,7 @@ def integrate(
     joints: Joints | None,
     excitation: Callable[[Array], Array] | None,
     duration: float,
-    control: StepControl,
+    control: TimeStepControl,
     start: Start | None = None,
 ) -> Motion:
     """Motion of a structure with joints from ``start`` on, at rest unless given.
@@ -112,7 +112,7 @@ class _Free:
     def rest(self, joints: int) -> Array:
         return np.zeros((joints, 0))
 
-    def respond(self, state: Array, increment: Array) -> Response:
+    def respond(self, state: Array, increment: Array) -> IncrementResponse:
         count = len(increment)
         return _FreeResponse(np.zeros((count, 1)), np.zeros((count, 1, 1)), state, np.zeros(count))
 
@@ -150,7 +150,7 @@ class _March:
         model: DynamicModel,
         joints: Joints,
         excitation: Callable[[Array], Array],
-        control: StepControl,
+        control: TimeStepControl,
         start: Start,
         allowed: float,
     ) -> None:
@@ -164,7 +164,7 @@ class _March:
         self._largest_force = largest_entry(self.at.response.force)
         self._inverse_mass = np.linalg.inv(model.mass)
 
-    def block(self, steps: int) -> list[list[Point]]:
+    def block(self, steps: int) -> list[list[StepState]]:
         """The points of up to ``steps`` whole steps; fewer if ``message`` says so."""
         times = self._time(np.arange(self.taken + 1.0, self.taken + steps + 1.0))
         found = []
@@ -176,10 +176,10 @@ class _March:
             self.taken += 1
         return found
 
-    def _whole_step(self, end: float, end_force: Array) -> list[Point]:
+    def _whole_step(self, end: float, end_force: Array) -> list[StepState]:
         """One step up to a time, in parts where that is needed."""
         whole = 1 << MAX_HALVED
-        points: list[Point] = []
+        points: list[StepState] = []
         done = 0
         while done < whole:
             part = whole >> self._halved
@@ -200,7 +200,7 @@ class _March:
                 self._halved -= 1
         return points
 
-    def _part(self, time: float, force: Array) -> tuple[Point | None, float]:
+    def _part(self, time: float, force: Array) -> tuple[StepState | None, float]:
         """A step up to a time, None if it must be smaller, and its error over what is allowed.
 
         A step without equilibrium has an infinite error.
@@ -223,14 +223,16 @@ class _March:
         motion = at.motion.copy()
         motion[:size] += step * (velocity + 0.5 * change)
         motion[size:] += change
-        point = Point(time, motion, force, found.response, -found.residual, step, found.relative)
+        point = StepState(
+            time, motion, force, found.response, -found.residual, step, found.relative
+        )
         error = self._error(point)
         if error > 1.0:
             return None, error
         self._largest_force = max(self._largest_force, largest_entry(joint_force))
         return point, error
 
-    def _error(self, point: Point) -> float:
+    def _error(self, point: StepState) -> float:
         """The error a step adds, over what is allowed."""
         if not np.isfinite(self._allowed):
             return 0.0
@@ -238,7 +240,7 @@ class _March:
         error = point.step**2 / 12.0 * float(np.sqrt(jump @ self.model.mass @ jump))
         return error / self._allowed if error > 0.0 else 0.0
 
-    def _acceleration(self, point: Point) -> Array:
+    def _acceleration(self, point: StepState) -> Array:
         model, size = self.model, len(point.force)
         return np.asarray(
             self._inverse_mass
@@ -257,7 +259,7 @@ class _March:
             self._operators[halved] = operators, equilibrium
         return self._operators[halved]
 
-    def _start(self, start: Start) -> Point:
+    def _start(self, start: Start) -> StepState:
         model, directions = self.model, self._joints.directions
         motion = start.motion(len(model.mass))
         stretch = model.connection @ motion[: len(model.mass)]
@@ -268,7 +270,7 @@ class _March:
             still = np.zeros((len(start.joint_state), directions))
             response = self._joints.respond(start.joint_state, still)
         force = self._excitation(np.array([start.time]))[0]
-        return Point(start.time, motion, force, response, np.zeros(len(stretch)), 0.0, 0.0)
+        return StepState(start.time, motion, force, response, np.zeros(len(stretch)), 0.0, 0.0)
 
     def _time(self, steps: Array) -> Array:
         return np.asarray(self._start_time + self._step * steps, dtype=np.float64)
@@ -288,9 +290,9 @@ class _March:
         )
 
 
-def _followed(march: _March, steps: int, every: int) -> Record:
+def _followed(march: _March, steps: int, every: int) -> MotionRecord:
     """The record of a march until it has taken so many steps, or says why it has not."""
-    record = Record(march.model, march.directions, every, march.at)
+    record = MotionRecord(march.model, march.directions, every, march.at)
     while march.taken < steps and not march.message:
         record.add(march.block(min(BLOCK, steps - march.taken)))
     return record

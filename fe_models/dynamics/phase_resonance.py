@@ -24,21 +24,19 @@ from itertools import pairwise
 
 import numpy as np
 
-from fe_models.dynamics.bordered import LinearMap, NearlySolved
+from fe_models.dynamics.bordered import Bordered, LinearMap
 from fe_models.dynamics.continuation import (
-    NewtonControl,
-    Point,
+    ContinuationControl,
+    CurvePoint,
     Refinement,
-    Solution,
-    StepControl,
     first_point,
     follow,
-    solve,
 )
-from fe_models.dynamics.forced_response import Accuracy, Branch, Motions, finer_resolution
+from fe_models.dynamics.forced_response import Accuracy, Motions, ResponseBranch, finer_resolution
 from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance, HarmonicSolution
-from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
-from fe_models.dynamics.receptance import ComplexArray, SteadyMotion
+from fe_models.dynamics.harmonics import ComplexArray, HarmonicBalanceError, Resolution
+from fe_models.dynamics.newton import NewtonControl, NewtonSolution, solve
+from fe_models.dynamics.receptance import SteadyMotion
 from sa_solver.types import Array
 
 # Frequencies are looked for up to this factor from the start's: Newton's method that goes farther
@@ -89,8 +87,9 @@ class PhaseBalance:
         stretch = self.frequency / scale
         by_frequency = complex(self._steady.turned(self._moved)[0] @ self._per_force)
         corner = -2.0 * np.pi * stretch * self._of_phase(by_frequency)
-        border = _Border(self.balance.slope * stretch, self._of_phase(self._by_motion), corner)
-        return border.around(inner) if isinstance(inner, np.ndarray) else _Bordered(inner, border)
+        row = np.append(self._of_phase(self._by_motion), corner)
+        bordered = Bordered(inner, self.balance.slope * stretch, row)
+        return bordered.assembled() if isinstance(inner, np.ndarray) else bordered
 
     @cached_property
     def slope(self) -> Array:
@@ -145,11 +144,11 @@ class Backbone(Motions):
 
 def along_phase_resonance(
     problem: HarmonicBalance,
-    start: HarmonicSolution | Branch,
+    start: HarmonicSolution | ResponseBranch,
     forces: tuple[float, float],
     seen: Array | None = None,
     *,
-    control: StepControl | None = None,
+    control: ContinuationControl | None = None,
     accuracy: Accuracy | None = None,
 ) -> Backbone:
     """Phase resonances for ``forces`` from a least to a largest, folds included.
@@ -165,7 +164,7 @@ def along_phase_resonance(
     the start's.
     """
     weights = _weights(problem, seen)
-    nearest = nearest_to_phase(start, weights) if isinstance(start, Branch) else start
+    nearest = nearest_to_phase(start, weights) if isinstance(start, ResponseBranch) else start
     if nearest is None:
         return Backbone(
             (), "the response does not pass through the phase: give one with its peak", problem
@@ -178,7 +177,7 @@ def along_phase_resonance(
         )
     if nearest.message:
         return Backbone((), f"the start is no solution: {nearest.message}", problem)
-    control = control or StepControl()
+    control = control or ContinuationControl()
     equations = PhaseResonance.near(problem, nearest, seen)
     first = _first(_Recorder(equations, accuracy), nearest, control)
     if isinstance(first, str):
@@ -192,7 +191,7 @@ def along_phase_resonance(
     )
 
 
-def nearest_to_phase(branch: Branch, weights: ComplexArray) -> HarmonicSolution | None:
+def nearest_to_phase(branch: ResponseBranch, weights: ComplexArray) -> HarmonicSolution | None:
     """The motion of a branch before or after which it passes through the phase, None if it never.
 
     The larger displacement wᴴ x with the ``weights`` w ``(n,)`` decides if it passes more often:
@@ -259,56 +258,6 @@ class PhaseResonance:
         return PhaseBalance(self, balance, frequency, seen)
 
 
-@dataclass(frozen=True)
-class _Border:
-    """What makes [J c; r d] of J."""
-
-    column: Array
-    row: Array
-    corner: Array
-
-    def around(self, inner: Array) -> Array:
-        size = len(self.row)
-        whole = np.empty((size + 1, size + 1))
-        whole[:-1, :-1] = inner
-        whole[:-1, -1], whole[-1, :-1], whole[-1, -1] = self.column, self.row, self.corner
-        return whole
-
-
-@dataclass(frozen=True)
-class _Bordered:
-    """[J c; r d]: what it does to a vector, and its assembly."""
-
-    inner: LinearMap
-    border: _Border
-
-    def __matmul__(self, vector: Array) -> Array:
-        column, row, corner = self.border.column, self.border.row, self.border.corner
-        upper = self.inner @ vector[:-1] + column * vector[-1]
-        return np.append(upper, row @ vector[:-1] + corner * vector[-1])
-
-    def assembled(self) -> Array:
-        return self.border.around(self.inner.assembled())
-
-    def nearly_solved(self, vector: Array) -> Array:
-        """The inverse with that of a matrix like J, if one is known, or 1 for J, times a vector."""
-        upper = self._inner_nearly(vector[:-1])
-        last = (vector[-1] - self.border.row @ upper) / self._pivot
-        return np.append(upper - last * self._near_column, last)
-
-    def _inner_nearly(self, vector: Array) -> Array:
-        inner = self.inner
-        return inner.nearly_solved(vector) if isinstance(inner, NearlySolved) else vector
-
-    @cached_property
-    def _near_column(self) -> Array:
-        return self._inner_nearly(self.border.column)
-
-    @cached_property
-    def _pivot(self) -> float:
-        return float(self.border.corner - self.border.row @ self._near_column) or 1.0
-
-
 class _Recorder:
     """Describes every new point of the curve, and asks for finer equations where needed."""
 
@@ -316,7 +265,7 @@ class _Recorder:
         self.equations, self._accuracy = equations, accuracy
         self.solutions: list[HarmonicSolution] = []
 
-    def __call__(self, point: Point, at: PhaseBalance) -> Refinement[PhaseBalance] | None:
+    def __call__(self, point: CurvePoint, at: PhaseBalance) -> Refinement[PhaseBalance] | None:
         problem, check = self.equations.problem, self._accuracy is not None
         solution = problem.describe(
             point.unknowns[:-1], at.balance, at.frequency, point.parameter, check=check
@@ -345,11 +294,13 @@ class _First:
     """The phase resonance from which the curve is followed both ways."""
 
     equations: PhaseResonance
-    found: Solution[PhaseBalance]
+    found: NewtonSolution[PhaseBalance]
     solution: HarmonicSolution
 
 
-def _first(record: _Recorder, start: HarmonicSolution, control: StepControl) -> _First | str:
+def _first(
+    record: _Recorder, start: HarmonicSolution, control: ContinuationControl
+) -> _First | str:
     """The phase resonance under the start's force; or why there is none."""
     unknowns = np.append(record.equations.problem.guess(start), 0.0)
     while True:
@@ -381,7 +332,7 @@ def _half(
     upward: bool,
     forces: tuple[float, float],
     accuracy: Accuracy | None,
-    control: StepControl,
+    control: ContinuationControl,
 ) -> _Half:
     force, problem = first.solution.force, first.equations.problem
     if force == forces[upward]:

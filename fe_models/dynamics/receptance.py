@@ -14,10 +14,9 @@ from __future__ import annotations
 import numpy as np
 import scipy.linalg as sl
 
+from fe_models.dynamics.harmonics import ComplexArray
 from fe_models.dynamics.model import DynamicModel
 from sa_solver.types import Array
-
-ComplexArray = np.ndarray
 
 # Square of a natural frequency, over the largest one, below which a mode is a rigid motion: above
 # rounding, and far below what any elastic body's first mode is.

@@ -10,12 +10,12 @@ from typing import NamedTuple
 
 import numpy as np
 
-from fe_models.dynamics.model import DynamicModel, Response
+from fe_models.dynamics.model import DynamicModel, IncrementResponse
 from fe_models.dynamics.motion import Energies, Motion, accelerations, quadratic
 from sa_solver.types import Array
 
 
-class Point(NamedTuple):
+class StepState(NamedTuple):
     """A time on the way: displacements and velocities ``(2 n,)``, and the joints.
 
     ``missing`` ``(j d,)`` [mm] is how far the joints are behind the structure, what was left of
@@ -25,16 +25,16 @@ class Point(NamedTuple):
     time: float
     motion: Array
     force: Array
-    response: Response
+    response: IncrementResponse
     missing: Array
     step: float
     residual: float
 
 
-class Record:
+class MotionRecord:
     """Rows of the result, and the energies summed until each."""
 
-    def __init__(self, model: DynamicModel, directions: int, every: int, first: Point) -> None:
+    def __init__(self, model: DynamicModel, directions: int, every: int, first: StepState) -> None:
         self._model, self._directions, self._every = model, directions, every
         self._before, self._kept = first, first
         self._sums = np.zeros((1, 3 + len(model.connection) // directions))
@@ -42,7 +42,7 @@ class Record:
         self._largest_jump = self._largest_motion = self._residual = 0.0
         self._taken = self._steps = 0
 
-    def add(self, block: list[list[Point]]) -> None:
+    def add(self, block: list[list[StepState]]) -> None:
         """Sum the energies of whole steps, each of one or more points, and keep rows."""
         points = [point for whole in block for point in whole]
         if not points:
@@ -58,7 +58,7 @@ class Record:
         self._steps += len(points)
         self._residual = max(self._residual, *(point.residual for point in points))
 
-    def _flows(self, points: list[Point]) -> Array:
+    def _flows(self, points: list[StepState]) -> Array:
         """Energies of each step ``(s, 3 + j)``: brought in, damped, into joints, lost in each."""
         model = self._model
         _, motion, force, joint_force = _columns(points)
@@ -121,7 +121,7 @@ class Record:
         )
 
 
-def _columns(points: list[Point]) -> tuple[Array, Array, Array, Array]:
+def _columns(points: list[StepState]) -> tuple[Array, Array, Array, Array]:
     """Times ``(t,)``, motion ``(t, 2 n)``, force ``(t, n)``, joint force ``(t, j d)`` of points."""
     times = np.array([point.time for point in points])
     motion = np.array([point.motion for point in points])

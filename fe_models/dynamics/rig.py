@@ -34,22 +34,6 @@ class Link:
     first: str | None = None
 
 
-def two_mass_rig(
-    masses: tuple[float, float], springs: tuple[float, float], damping_ratio: float = 0.0
-) -> DynamicModel:
-    """The friction rig: ground - k1 - m1 - k2 - m2 - joint - ground.
-
-    ``masses`` [t], ``springs`` [N/mm], ``damping_ratio`` that of both modes with the joint free.
-    Its points are ``m1`` and ``m2`` (Fantetti et al. 2019, Tribology International 138, 111).
-    """
-    return lumped_rig(
-        dict(zip(("m1", "m2"), masses, strict=True)),
-        {Link("m1"): springs[0], Link("m2", "m1"): springs[1]},
-        [[Link("m2")]],
-        damping_ratio,
-    )
-
-
 def lumped_rig(
     masses: Mapping[str, float],
     springs: Mapping[Link, float],

@@ -13,7 +13,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from fe_models.geometry.abaqus_cards import Card, Place, cards
+from fe_models.geometry.abaqus_cards import Card, SourceLine, cards
 from fe_models.geometry.abaqus_model import (
     ALLOWED_TYPES,
     Element,
@@ -37,7 +37,7 @@ from fe_models.geometry.grouped import (
 from fe_models.mesh import MeshError
 from sa_solver.types import Indices
 
-Value = TypeVar("Value")
+_Value = TypeVar("_Value")
 
 
 def read_abaqus(path: Path) -> GroupedMesh:
@@ -157,7 +157,7 @@ class _Flattened:
             by_shape.setdefault(element.shape, []).append(rows)
         return [(shape, np.array(cells)) for shape, cells in by_shape.items()]
 
-    def _node_rows(self, scope: Scope, nodes: Iterable[int], place: Place) -> list[int]:
+    def _node_rows(self, scope: Scope, nodes: Iterable[int], place: SourceLine) -> list[int]:
         known = self.row[scope.name]
         try:
             return [known[node] for node in nodes]
@@ -207,7 +207,7 @@ def _is_node_surface(card: Card) -> bool:
     return card.parameters.get("TYPE", "").upper() == "NODE"
 
 
-def _face(element: Element, number: int, side: str, place: Place) -> list[int]:
+def _face(element: Element, number: int, side: str, place: SourceLine) -> list[int]:
     """Nodes of the face of an element that goes by S1, S2, ..."""
     faces = FACES.get(element.shape, ())
     sides = [f"S{face}" for face in range(1, len(faces) + 1)]
@@ -309,7 +309,7 @@ class _Flat(_Flattened):
         return names
 
 
-def _united(first: dict[str, Value], second: dict[str, Value]) -> dict[str, Value]:
+def _united(first: dict[str, _Value], second: dict[str, _Value]) -> dict[str, _Value]:
     for name in first:
         if name in second:
             raise MeshError(f"two groups are named {name}: rename one")

@@ -11,7 +11,7 @@ from typing import NamedTuple
 from fe_models.mesh import MeshError
 
 
-class Place(NamedTuple):
+class SourceLine(NamedTuple):
     """A line of a file, for messages."""
 
     path: Path
@@ -21,10 +21,10 @@ class Place(NamedTuple):
         return f"{self.path}:{self.line}"
 
 
-class Row(NamedTuple):
+class DataLine(NamedTuple):
     """A data line: its fields without blanks, and where it stands."""
 
-    place: Place
+    place: SourceLine
     fields: list[str]
 
 
@@ -32,10 +32,10 @@ class Row(NamedTuple):
 class Card:
     """A keyword, upper case and without blanks, and what belongs to it."""
 
-    place: Place
+    place: SourceLine
     keyword: str
     parameters: dict[str, str] = field(default_factory=dict)
-    rows: list[Row] = field(default_factory=list)
+    rows: list[DataLine] = field(default_factory=list)
 
     def name(self, parameter: str) -> str:
         """The value of a parameter that has to be there."""
@@ -63,13 +63,15 @@ def cards(path: Path) -> Iterator[Card]:
         elif card is None:
             raise MeshError(f"{place}: is no Abaqus input; allowed: keywords that begin with *")
         else:
-            card.rows.append(Row(place, [part.strip() for part in text.rstrip(",").split(",")]))
+            card.rows.append(
+                DataLine(place, [part.strip() for part in text.rstrip(",").split(",")])
+            )
     if card is None:
         raise MeshError(f"{path}: has no keywords")
     yield card
 
 
-def integer(place: Place, text: str) -> int:
+def integer(place: SourceLine, text: str) -> int:
     """A number of a node or an element."""
     try:
         return int(text)
@@ -77,7 +79,7 @@ def integer(place: Place, text: str) -> int:
         raise MeshError(f"{place}: {text!r} is no whole number") from None
 
 
-def real(place: Place, text: str) -> float:
+def real(place: SourceLine, text: str) -> float:
     """A coordinate or an angle; an empty field is 0, as in Abaqus."""
     try:
         return float(text.upper().replace("D", "E")) if text else 0.0
@@ -85,7 +87,7 @@ def real(place: Place, text: str) -> float:
         raise MeshError(f"{place}: {text!r} is no number") from None
 
 
-def _lines(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[Place, str]]:
+def _lines(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[SourceLine, str]]:
     """Lines that are neither blank nor comments, those of included files in their place."""
     # Comments may be in any encoding.
     with path.open(encoding="utf-8", errors="replace") as file:
@@ -94,9 +96,9 @@ def _lines(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[Place, str
             if not text or text.startswith("**"):
                 continue
             if not text.replace(" ", "").upper().startswith("*INCLUDE,"):
-                yield Place(path, number), text
+                yield SourceLine(path, number), text
                 continue
-            card = _card(Place(path, number), text)
+            card = _card(SourceLine(path, number), text)
             included = path.parent / card.name("INPUT")
             if not included.is_file() or included in (*including, path):
                 raise MeshError(
@@ -106,7 +108,7 @@ def _lines(path: Path, including: tuple[Path, ...]) -> Iterator[tuple[Place, str
             yield from _lines(included, (*including, path))
 
 
-def _card(place: Place, text: str) -> Card:
+def _card(place: SourceLine, text: str) -> Card:
     """A keyword line; values in quotes may hold commas and blanks."""
     keyword, *parts = re.findall(r'(?:"[^"]*"|[^,"])+', text)
     parameters = {}

@@ -12,7 +12,7 @@ from typing import Generic, TypeVar
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from fe_models.geometry.abaqus_cards import Card, Place, Row, integer, real
+from fe_models.geometry.abaqus_cards import Card, DataLine, SourceLine, integer, real
 from fe_models.geometry.grouped import CORNERS
 from fe_models.mesh import MeshError
 from sa_solver.types import Array
@@ -54,19 +54,19 @@ REFUSED = (
 # Numbers of nodes or elements, or ranges of which those that exist are meant, by the instance they
 # belong to; those of the scope itself are under "".
 Members = dict[str, list[int | range]]
-Value = TypeVar("Value")
+_Value = TypeVar("_Value")
 
 
-class Names(Generic[Value]):
+class Names(Generic[_Value]):
     """Values by name. Abaqus reads upper and lower case alike; the first spelling is kept."""
 
     def __init__(self) -> None:
-        self._entries: dict[str, tuple[str, Value]] = {}
+        self._entries: dict[str, tuple[str, _Value]] = {}
 
     def __contains__(self, name: str) -> bool:
         return name.upper() in self._entries
 
-    def __getitem__(self, name: str) -> Value:
+    def __getitem__(self, name: str) -> _Value:
         return self._entries[name.upper()][1]
 
     def __len__(self) -> int:
@@ -75,11 +75,11 @@ class Names(Generic[Value]):
     def __str__(self) -> str:
         return ", ".join(name for name, _ in self.items())
 
-    def add(self, name: str, value: Value) -> Value:
+    def add(self, name: str, value: _Value) -> _Value:
         """Keep the value unless the name has one; return the one kept."""
         return self._entries.setdefault(name.upper(), (name, value))[1]
 
-    def items(self) -> Iterator[tuple[str, Value]]:
+    def items(self) -> Iterator[tuple[str, _Value]]:
         return iter(self._entries.values())
 
 
@@ -89,7 +89,7 @@ class Element:
 
     shape: str
     nodes: tuple[int, ...]
-    place: Place
+    place: SourceLine
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ class Scope:
     """
 
     name: str
-    place: Place
+    place: SourceLine
     nodes: dict[int, tuple[float, float, float]] = field(default_factory=dict)
     elements: dict[int, Element] = field(default_factory=dict)
     node_sets: Names[Members] = field(default_factory=Names)
@@ -141,7 +141,9 @@ class Scope:
         )
 
 
-def resolve(place: Place, text: str, kind: str, scope: Scope, instances: Names[Scope]) -> Members:
+def resolve(
+    place: SourceLine, text: str, kind: str, scope: Scope, instances: Names[Scope]
+) -> Members:
     """What a data line means by a number, the name of a set, or ``Instance.`` and either.
 
     ``kind`` is ``node_sets`` or ``element_sets``.
@@ -187,8 +189,8 @@ class Model:
     """What has been read so far: a flat file, or parts, their instances and the assembly."""
 
     def __init__(self, path: Path) -> None:
-        self.flat = Scope("", Place(path, 1))
-        self.assembly = Scope("", Place(path, 1))
+        self.flat = Scope("", SourceLine(path, 1))
+        self.assembly = Scope("", SourceLine(path, 1))
         self.parts: Names[Scope] = Names()
         self.instances: Names[Scope] = Names()
         self._scope = self.flat
@@ -321,7 +323,7 @@ class Model:
         return members
 
 
-def _range(place: Place, fields: list[str]) -> range:
+def _range(place: SourceLine, fields: list[str]) -> range:
     """First and last number, and step."""
     numbers = [integer(place, text) for text in fields if text]
     if len(numbers) not in (2, 3) or numbers[2:] == [0]:
@@ -349,7 +351,7 @@ def _element_type(card: Card) -> tuple[int, str]:
     return FACET_TYPES[kind]
 
 
-def _element_rows(card: Card, count: int) -> Iterator[tuple[Place, list[int]]]:
+def _element_rows(card: Card, count: int) -> Iterator[tuple[SourceLine, list[int]]]:
     """Number and nodes of each element, which may go over several lines."""
     values: list[int] = []
     for place, fields in card.rows:
@@ -365,7 +367,7 @@ def _element_rows(card: Card, count: int) -> Iterator[tuple[Place, list[int]]]:
         )
 
 
-def _placing(rows: list[Row]) -> Placing:
+def _placing(rows: list[DataLine]) -> Placing:
     """Translation, and axis (two points on it) and angle [°] of the rotation, of an instance."""
     if not rows:
         return Placing()

@@ -6,7 +6,7 @@ from collections import Counter
 from pathlib import Path
 from typing import Any
 
-from fe_models.geometry.gmsh_file import Group, grouped_entities, one_line
+from fe_models.geometry.gmsh_file import EntityGroup, first_line, grouped_entities
 from fe_models.geometry.grouped import GroupedMesh
 from fe_models.gmsh_session import gmsh_model
 from fe_models.mesh import MeshError
@@ -46,7 +46,7 @@ def read_cad(path: Path, size: float) -> GroupedMesh:
             gmsh.model.occ.importShapes(str(path))
             gmsh.model.occ.synchronize()
         except Exception as error:  # gmsh raises nothing more specific
-            raise MeshError(f"{path}: gmsh cannot read it: {one_line(error)}") from None
+            raise MeshError(f"{path}: gmsh cannot read it: {first_line(error)}") from None
         groups = _groups(gmsh.model)
         if not groups:
             raise MeshError(f"{path}: has no solids; allowed: closed solids, not loose faces")
@@ -54,25 +54,25 @@ def read_cad(path: Path, size: float) -> GroupedMesh:
             gmsh.model.mesh.generate(3)
         except Exception as error:
             raise MeshError(
-                f"{path}: gmsh cannot mesh it at size {size:g} mm: {one_line(error)}; take a "
+                f"{path}: gmsh cannot mesh it at size {size:g} mm: {first_line(error)}; take a "
                 "smaller size or repair the solids"
             ) from None
         return grouped_entities(gmsh, groups)
 
 
-def _groups(model: Any) -> list[Group]:
+def _groups(model: Any) -> list[EntityGroup]:
     """Solids and their faces, by name."""
-    groups: list[Group] = []
+    groups: list[EntityGroup] = []
     labelled: dict[str, list[int]] = {}
     solids = [tag for _, tag in model.getEntities(3)]
     for name, solid in zip(_solid_names(model, solids), solids, strict=True):
-        groups.append(Group(name, 3, [solid]))
+        groups.append(EntityGroup(name, 3, [solid]))
         faces = model.getBoundary([(3, solid)], combined=False, oriented=False)
         for number, (_, face) in enumerate(faces, start=1):
-            groups.append(Group(f"{name}.face_{number}", 2, [face]))
+            groups.append(EntityGroup(f"{name}.face_{number}", 2, [face]))
             if label := _label(model, 2, face):
                 labelled.setdefault(label, []).append(face)
-    return groups + [Group(label, 2, faces) for label, faces in labelled.items()]
+    return groups + [EntityGroup(label, 2, faces) for label, faces in labelled.items()]
 
 
 def _solid_names(model: Any, solids: list[int]) -> list[str]:

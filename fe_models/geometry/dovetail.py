@@ -13,7 +13,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from fe_models.geometry.gmsh_file import Group, generated_body
+from fe_models.geometry.gmsh_file import EntityGroup, generated_body
 from fe_models.gmsh_session import gmsh_model, grow_from
 from fe_models.mesh import (
     AXES,
@@ -33,7 +33,7 @@ FLANK_SAMPLES = 200
 # Elements round a full circle of a fillet, whose stress is asked for.
 ELEMENTS_PER_CIRCLE = 24
 
-Curve = tuple[str, list[tuple[float, float]]]
+SectionCurve = tuple[str, list[tuple[float, float]]]
 
 
 @dataclass(frozen=True)
@@ -182,7 +182,7 @@ class Dovetail:
             interfaces.append(replace(face, gap=self.flank_gap(x, y, side)))
         return StructureMesh(disk, blade, tuple(interfaces))
 
-    def blade_section(self) -> list[Curve]:
+    def blade_section(self) -> list[SectionCurve]:
         """Named curves round the right half of the blade; arcs are (start, centre, end)."""
         top, bottom = self.flank_ends()
         neck = 0.5 * self.neck_width
@@ -201,7 +201,7 @@ class Dovetail:
             ]
         )
 
-    def disk_section(self) -> list[Curve]:
+    def disk_section(self) -> list[SectionCurve]:
         """Named curves round the right half of the disk sector; arcs are (start, centre, end)."""
         top, bottom = self.flank_ends()
         radius = self.slot_fillet
@@ -227,7 +227,7 @@ class Dovetail:
         )
 
 
-def _chain(corners: list[Any]) -> list[Curve]:
+def _chain(corners: list[Any]) -> list[SectionCurve]:
     """Curves between consecutive corners; a third entry is the centre of the arc that follows."""
     following = corners[1:] + corners[:1]
     return [
@@ -238,7 +238,7 @@ def _chain(corners: list[Any]) -> list[Curve]:
 
 def _mesh_body(
     name: str,
-    section: list[Curve],
+    section: list[SectionCurve],
     dovetail: Dovetail,
     flank_nodes: tuple[int, int],
     size: float,
@@ -269,13 +269,17 @@ def _mesh_body(
             cells = [tag for dim, tag in extruded if dim == 3]
             swept = {label: _swept(model, curves, surfaces) for label, curves in swept.items()}
         model.mesh.generate(dimension)
-        boundaries = [Group(label, dimension - 1, tags) for label, tags in _sided(swept).items()]
-        points, elements, facets = generated_body(gmsh, Group(name, dimension, cells), boundaries)
+        boundaries = [
+            EntityGroup(label, dimension - 1, tags) for label, tags in _sided(swept).items()
+        ]
+        points, elements, facets = generated_body(
+            gmsh, EntityGroup(name, dimension, cells), boundaries
+        )
     return Body(name, named_mesh(points[:, AXES[dimension]], elements, facets))
 
 
 def _draw_halves(
-    occ: Any, section: list[Curve], start: Array
+    occ: Any, section: list[SectionCurve], start: Array
 ) -> tuple[list[int], dict[str, list[int]]]:
     """Draw the right and the left half of a section; return their surfaces and named curves."""
     points: dict[tuple[float, float], int] = {}

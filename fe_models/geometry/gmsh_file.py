@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.geometry.grouped import Blocks, GroupedMesh, split
+from fe_models.geometry.grouped import Blocks, GroupedMesh, split_blocks
 from fe_models.gmsh_session import gmsh_model
 from fe_models.mesh import MeshError
 from sa_solver.types import Array, Indices
@@ -21,7 +21,7 @@ SHAPES = {
 
 
 @dataclass(frozen=True)
-class Group:
+class EntityGroup:
     """A named group of entities of one dimension."""
 
     name: str
@@ -44,14 +44,14 @@ def read_msh(path: Path) -> GroupedMesh:
         try:
             gmsh.merge(str(path))
         except Exception as error:  # gmsh raises nothing more specific
-            raise MeshError(f"{path}: gmsh cannot read it: {one_line(error)}") from None
+            raise MeshError(f"{path}: gmsh cannot read it: {first_line(error)}") from None
         try:
             return grouped_entities(gmsh, _groups(gmsh.model))
         except MeshError as error:
             raise MeshError(f"{path}: {error}") from None
 
 
-def grouped_entities(gmsh: Any, groups: list[Group]) -> GroupedMesh:
+def grouped_entities(gmsh: Any, groups: list[EntityGroup]) -> GroupedMesh:
     """The mesh of the open gmsh model; ``groups`` of its highest dimension are the bodies."""
     model = gmsh.model
     tags, coordinates, _ = model.mesh.getNodes()
@@ -84,35 +84,38 @@ def grouped_entities(gmsh: Any, groups: list[Group]) -> GroupedMesh:
 
 
 def generated_body(
-    gmsh: Any, body: Group, boundaries: list[Group]
+    gmsh: Any, body: EntityGroup, boundaries: list[EntityGroup]
 ) -> tuple[Array, Indices, dict[str, Indices]]:
     """A body just meshed in the open gmsh model: points ``(n, 3)``, simplices, boundaries by name.
 
     Its nodes are numbered from zero, in gmsh's order; others are left out.
     """
     grouped = grouped_entities(gmsh, [body, *boundaries])
-    cells = split(grouped.bodies[body.name])
+    cells = split_blocks(grouped.bodies[body.name])
     used = np.unique(cells)
     named = {
-        name: np.searchsorted(used, split(blocks)) for name, blocks in grouped.surfaces.items()
+        name: np.searchsorted(used, split_blocks(blocks))
+        for name, blocks in grouped.surfaces.items()
     }
     return grouped.points[used], np.searchsorted(used, cells), named
 
 
-def _groups(model: Any) -> list[Group]:
+def _groups(model: Any) -> list[EntityGroup]:
     """The physical groups; without any, every entity by its number."""
     physical = [
-        Group(
+        EntityGroup(
             model.getPhysicalName(dim, tag) or str(tag),
             dim,
             list(model.getEntitiesForPhysicalGroup(dim, tag)),
         )
         for dim, tag in model.getPhysicalGroups()
     ]
-    return physical or [Group(str(tag), dim, [tag]) for dim, tag in model.getEntities() if dim > 0]
+    return physical or [
+        EntityGroup(str(tag), dim, [tag]) for dim, tag in model.getEntities() if dim > 0
+    ]
 
 
-def _refuse_ungrouped(model: Any, top: int, groups: list[Group]) -> None:
+def _refuse_ungrouped(model: Any, top: int, groups: list[EntityGroup]) -> None:
     """No element of the highest dimension is left out."""
     grouped = {tag for group in groups if group.dimension == top for tag in group.entities}
     for dim, tag in model.getEntities(top):
@@ -123,7 +126,7 @@ def _refuse_ungrouped(model: Any, top: int, groups: list[Group]) -> None:
             )
 
 
-def _blocks(model: Any, group: Group, numbers: Indices) -> Blocks:
+def _blocks(model: Any, group: EntityGroup, numbers: Indices) -> Blocks:
     """Elements of a group; their nodes are rows of the sorted ``numbers``."""
     blocks = []
     for entity in group.entities:
@@ -140,6 +143,6 @@ def _blocks(model: Any, group: Group, numbers: Indices) -> Blocks:
     return blocks
 
 
-def one_line(error: Exception) -> str:
+def first_line(error: Exception) -> str:
     """The first line of a message."""
     return (str(error).splitlines() or [type(error).__name__])[0]

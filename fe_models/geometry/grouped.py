@@ -76,7 +76,7 @@ def simplices(shape: str, cells: Indices) -> Indices:
     )
 
 
-def split(blocks: Blocks) -> Indices:
+def split_blocks(blocks: Blocks) -> Indices:
     """The elements of all blocks, each split by :func:`simplices`."""
     return np.concatenate([simplices(shape, cells) for shape, cells in blocks])
 

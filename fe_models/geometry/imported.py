@@ -12,7 +12,7 @@ from fe_models.geometry.abaqus import read_abaqus
 from fe_models.geometry.cad import BEGINNINGS, read_cad
 from fe_models.geometry.checked import checked_body, opposite, vector
 from fe_models.geometry.gmsh_file import read_msh
-from fe_models.geometry.grouped import DIMENSION, Blocks, GroupedMesh, split
+from fe_models.geometry.grouped import DIMENSION, Blocks, GroupedMesh, split_blocks
 from fe_models.geometry.meshio_file import read_meshio
 from fe_models.mesh import Body, MeshError, in_space
 from fe_models.remesh import element_volumes
@@ -95,7 +95,7 @@ def _grouped(path: Path, size: float | None) -> GroupedMesh:
     return READERS.get(suffix, read_meshio)(path)
 
 
-def describe(imported: ImportedMesh) -> list[str]:
+def describe_bodies(imported: ImportedMesh) -> list[str]:
     """Lines that list bodies, boundaries and node sets with their size and place."""
     lines = []
     for name, body in imported.bodies.items():
@@ -147,7 +147,7 @@ def patch(body: Body, boundary: str) -> Patch:
 def _separated(grouped: GroupedMesh) -> ImportedMesh:
     """Give every body its own nodes, boundaries and node sets."""
     coordinates = _coordinates(grouped)
-    cells = {name: split(blocks) for name, blocks in grouped.bodies.items()}
+    cells = {name: split_blocks(blocks) for name, blocks in grouped.bodies.items()}
     owner = _owners(cells, len(coordinates))
     names = list(cells)
     surfaces = {
@@ -219,7 +219,7 @@ def _owners(cells: dict[str, Indices], count: int) -> Indices:
 
 def _facets(name: str, blocks: Blocks, owner: Indices) -> Indices:
     """Distinct facets of a surface; each is on one body."""
-    facets = np.unique(np.sort(split(blocks), axis=1), axis=0)
+    facets = np.unique(np.sort(split_blocks(blocks), axis=1), axis=0)
     owners = owner[facets]
     loose = np.sum((owners != owners[:, :1]).any(axis=1) | (owners[:, 0] < 0))
     if loose:

@@ -21,7 +21,7 @@ TAG_FIELDS = ("gmsh:physical", "medit:ref", "cell_tags", "nastran:ref", "tetgen:
 ZERO_IS_NO_GROUP = ("gmsh:physical", "cell_tags")
 
 # Names of the groups that each element of a block is in, and its rows.
-Members = dict[str, Indices]
+CellGroups = dict[str, Indices]
 
 
 def read_meshio(path: Path, file_format: str | None = None) -> GroupedMesh:
@@ -91,7 +91,7 @@ def _shape(path: Path, kind: str) -> str:
     return match[1]
 
 
-def _members(path: Path, mesh: Any, dimensions: list[int]) -> list[Members]:
+def _members(path: Path, mesh: Any, dimensions: list[int]) -> list[CellGroups]:
     """The groups of every block of cells."""
     sets = {name: rows for name, rows in mesh.cell_sets.items() if not name.startswith("gmsh:")}
     if sets:
@@ -108,7 +108,7 @@ def _members(path: Path, mesh: Any, dimensions: list[int]) -> list[Members]:
         return [{} for _ in dimensions]
     members = []
     for tags, dimension in zip(mesh.cell_data[field], dimensions, strict=True):
-        groups: Members = {}
+        groups: CellGroups = {}
         values, first = np.unique(tags, return_index=True)
         for tag in values[np.argsort(first)]:
             if tag == 0 and field in ZERO_IS_NO_GROUP:
@@ -145,7 +145,7 @@ def _names(mesh: Any, tag: int, dimension: int) -> list[str]:
     return names or [str(tag)]
 
 
-def _refuse_ungrouped(path: Path, count: int, groups: Members) -> None:
+def _refuse_ungrouped(path: Path, count: int, groups: CellGroups) -> None:
     """All elements of a body's block are in a group."""
     left = count - len(np.unique(np.concatenate(list(groups.values()))))
     if left:

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from fe_models.geometry.gmsh_file import Group, generated_body
+from fe_models.geometry.gmsh_file import EntityGroup, generated_body
 from fe_models.gmsh_session import gmsh_model, grow_from
 from fe_models.mesh import Body, MeshError, StructureMesh, matched_interface, named_mesh
 from sa_solver.types import Array, Frame, Indices
@@ -139,8 +139,8 @@ class Specimen:
             fine = self.strip_width / self.pad_elements
             grow_from(gmsh, "SurfacesList", [surfaces[CONTACT]], fine, size, growth)
             gmsh.model.mesh.generate(3)
-            boundaries = [Group(name, 2, [surface]) for name, surface in surfaces.items()]
-            quarter = Group("quarter", 3, [tag for _, tag in gmsh.model.getEntities(3)])
+            boundaries = [EntityGroup(name, 2, [surface]) for name, surface in surfaces.items()]
+            quarter = EntityGroup("quarter", 3, [tag for _, tag in gmsh.model.getEntities(3)])
             points, tets, faces = generated_body(gmsh, quarter, boundaries)
         for axis in (0, 1):
             points, tets, faces = _mirrored(points, tets, faces, axis, SAME_POINT * self.diameter)

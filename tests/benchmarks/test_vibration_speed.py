@@ -18,12 +18,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from fe_models.dynamics.continuation import StepControl
-from fe_models.dynamics.forced_response import Branch, along_frequency
+from fe_models.dynamics.continuation import ContinuationControl
+from fe_models.dynamics.forced_response import ResponseBranch, along_frequency
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import Resolution
-from fe_models.dynamics.rig import two_mass_rig, unit_force
+from fe_models.dynamics.rig import unit_force
 from sa_solver.types import Array
+from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic import PeriodicMarch
@@ -47,7 +48,7 @@ MODEL = two_mass_rig((21.152e-3, 1.189e-3), (1.3469e3, 273e3), 0.001)
 KT, MU, LOAD = 45e3, 0.88, 60.0
 FORCE, SPAN = 30.0, (20.0, 400.0)
 ODD, SAMPLES = tuple(range(1, 16, 2)), 256
-STEPS = StepControl(most=0.1)
+STEPS = ContinuationControl(most=0.1)
 # pyHarm's longest step that makes about as many points, in its own units.
 PYHARM_STEP = 0.07
 # Both solve the same equations: pyHarm to 1.5e-8 of its unknowns, of the largest motion.
@@ -73,7 +74,7 @@ def problem() -> HarmonicBalance:
     )
 
 
-def response(problem: HarmonicBalance) -> Branch:
+def response(problem: HarmonicBalance) -> ResponseBranch:
     return along_frequency(problem, FORCE, SPAN, control=STEPS)
 
 

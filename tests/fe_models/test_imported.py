@@ -6,7 +6,7 @@ import pytest
 from skfem import MeshHex, MeshQuad, MeshTet, MeshTri
 
 from fe_models.geometry.grouped import CORNERS, pieces, simplices
-from fe_models.geometry.imported import describe, patch, read_bodies
+from fe_models.geometry.imported import describe_bodies, patch, read_bodies
 from fe_models.gmsh_session import gmsh_model
 from fe_models.mesh import MeshError, write_msh
 from fe_models.remesh import element_volumes
@@ -331,7 +331,7 @@ def test_pieces_are_numbered_as_they_come():
 def test_description_lists_faces_with_area_and_normal(tmp_path):
     path = tmp_path / "boxes.vtu"
     two_boxes().write(path)
-    lines = describe(read_bodies(path))
+    lines = describe_bodies(read_bodies(path))
     assert lines[0] == "body 1: 27 nodes, 48 tetrahedra, volume 2 mm³"
     assert lines[1] == (
         "  boundary 3: 8 triangles, area 2 mm², centroid (1, 0.5, 1) mm, normal (0, 0, 1)"

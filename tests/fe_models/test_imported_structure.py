@@ -9,9 +9,9 @@ from fe_models.friction import FrictionalJoint
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.imported_structure import (
     Acceleration,
+    BoundaryForce,
     ContactPair,
     Displacement,
-    Force,
     Pressure,
     Rotation,
     Support,
@@ -82,7 +82,7 @@ def precise(monkeypatch):
 
 # --- supports on a contact face -------------------------------------------------------------------
 
-PRESSED = [Pressure("lid", 50.0), Force("lid", np.array([60.0, 0.0, 0.0]))]
+PRESSED = [Pressure("lid", 50.0), BoundaryForce("lid", np.array([60.0, 0.0, 0.0]))]
 PATH = np.array([[1.0, 0.0], [1.0, 1.0], [1.0, -1.0]])
 
 
@@ -181,7 +181,7 @@ def test_slice_in_plane_strain(precise):
     upper = with_faces(upper, {"bottom": (2, 0.0), "lid": (2, 1.0)} | ends)
     held = [Support("base", "xyz"), Support("front", "y"), Support("back", "y")]
     path = np.array([[1.0, 0.0], [1.0, 1.0]])
-    tall = [Pressure("lid", 50.0), Force("lid", np.array([3.0, 0.0, 0.0]))]
+    tall = [Pressure("lid", 50.0), BoundaryForce("lid", np.array([3.0, 0.0, 0.0]))]
     joined = built(imported(lower, upper), held, tall)
     assert joined.held_faces == {"foot": 1.0}
     (history,) = solved(joined, path).histories
@@ -195,7 +195,7 @@ def test_slice_in_plane_strain(precise):
         with_faces(lower, {"base": (1, -2.0), "top": (1, 0.0)}),
         with_faces(upper, {"bottom": (1, 0.0), "lid": (1, 1.0)}),
     )
-    loads = [Pressure("lid", 50.0), Force("lid", np.array([30.0, 0.0, 0.0]))]
+    loads = [Pressure("lid", 50.0), BoundaryForce("lid", np.array([30.0, 0.0, 0.0]))]
     flat = built(section, [Support("base", "xz")], loads)
     (plane,) = solved(flat, path).histories
     moved = [
@@ -283,7 +283,7 @@ def test_displacements_add_up_on_one_boundary_only():
 
 def test_force_on_a_boundary_of_both_bodies_is_refused():
     """It would be applied twice."""
-    push = Force("plane", np.array([0.0, 0.0, -10.0]))
+    push = BoundaryForce("plane", np.array([0.0, 0.0, -10.0]))
     with pytest.raises(MeshError, match="plane is a boundary of both bodies"):
         built(block_and_pad(False, True), [Support("base", "xyz")], [push])
 
@@ -335,7 +335,9 @@ def test_pressure_on_a_dome_is_that_on_its_rim():
 
 
 def test_force_is_spread_about_the_centroid():
-    force, moment, _, _ = resultants(Force("side", np.array([5.0, -7.0, 11.0])), (2.0, 0.5, 0.5))
+    force, moment, _, _ = resultants(
+        BoundaryForce("side", np.array([5.0, -7.0, 11.0])), (2.0, 0.5, 0.5)
+    )
     np.testing.assert_allclose(force, [5.0, -7.0, 11.0], rtol=1e-12)
     np.testing.assert_allclose(moment, 0.0, atol=1e-12)
 
@@ -363,7 +365,7 @@ def test_load_across_the_plane_is_refused():
         built(
             plane_block_and_pad(True),
             [Support("base", "xz")],
-            [Force("lid", np.array([0.0, 1.0, -1.0]))],
+            [BoundaryForce("lid", np.array([0.0, 1.0, -1.0]))],
         )
 
 

@@ -18,8 +18,9 @@ from fe_models.linear_solver import (
     factorise,
     prepare,
 )
-from fe_models.multigrid import MultigridSolver, rigid_body_modes, softness
+from fe_models.multigrid import MultigridSolver, softness
 from fe_models.pardiso import Pardiso
+from fe_models.rigid_motions import rigid_body_modes
 
 SIZE = 120
 

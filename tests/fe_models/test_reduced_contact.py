@@ -1,4 +1,4 @@
-"""Contact of the reduced pair beside Hertz, Mindlin and the coupled march; wear in stints."""
+"""Contact of the reduced pair beside Hertz, Mindlin and the coupled march; wear in cycle blocks."""
 
 from dataclasses import replace
 
@@ -9,11 +9,11 @@ from scipy.optimize import nnls
 from scipy.spatial import cKDTree
 
 from fe_models.complementarity import complementary
+from fe_models.cycle_blocks import CycleBlockError, wear_in_cycle_blocks
 from fe_models.geometry.specimens import Specimen
 from fe_models.mesh import Face
-from fe_models.reduced_contact import ReducedPair, Rubbing, masing_loop
+from fe_models.reduced_contact import FrettingConditions, ReducedPair, masing_loop
 from fe_models.specimens import pad_stiffness, reduced_specimens
-from fe_models.stints import StintError, wear_in_stints
 from sa_solver.influence import rectangle_influence
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Frame, Material
@@ -51,8 +51,8 @@ def curved(pair):
     return pair.face.gap
 
 
-def rubbing(force=17.0, wear=(ALPHA, ALPHA)):
-    return Rubbing(force, STROKE, FRICTION, wear)
+def conditions(force=17.0, wear=(ALPHA, ALPHA)):
+    return FrettingConditions(force, STROKE, FRICTION, wear)
 
 
 class TestComplementary:
@@ -231,7 +231,7 @@ class TestCoupled:
     STEPS = 16
 
     def test_forces_are_in_balance(self, pair, curved):
-        cycle = pair.coupled_cycle(curved, rubbing(87.0), self.STEPS)
+        cycle = pair.coupled_cycle(curved, conditions(87.0), self.STEPS)
         assert cycle.converged
         normal = [state.force[2].sum() for state in cycle.states]
         np.testing.assert_allclose(normal, 87.0, rtol=1e-5)
@@ -240,20 +240,20 @@ class TestCoupled:
         assert abs(sliding[1].sum()) < 1e-3
 
     def test_cycle_is_closed(self, pair, curved):
-        cycle = pair.coupled_cycle(curved, rubbing(17.0), self.STEPS)
+        cycle = pair.coupled_cycle(curved, conditions(17.0), self.STEPS)
         assert cycle.loop.displacement[0] == cycle.loop.displacement[-1] == 0.5 * STROKE
         first, last = cycle.states[0].force, cycle.states[-1].force
         np.testing.assert_allclose(last, first, atol=1e-5 * first.max())
 
     def test_datum_of_the_gap_does_not_matter(self, pair, curved):
         near, far = (
-            pair.coupled_cycle(curved + lift, rubbing(), 2).loop.force for lift in (0.0, 1.0)
+            pair.coupled_cycle(curved + lift, conditions(), 2).loop.force for lift in (0.0, 1.0)
         )
         np.testing.assert_allclose(far, near, atol=1e-5 * near.max())
 
     def test_stuck_stiffness(self, pair, flat):
         """Coupled and stuck: 1ᵀH'1 along x, stiffer than with the other directions free."""
-        small = replace(rubbing(), stroke=2e-6)
+        small = replace(conditions(), stroke=2e-6)
         cycle = pair.coupled_cycle(flat, small, 1)
         slope = np.ptp(cycle.loop.force) / np.ptp(cycle.loop.displacement)
         exact = pair.joint().stiffness[::3, ::3].sum()
@@ -265,9 +265,9 @@ class TestCoupled:
     @pytest.mark.parametrize("force", [17.0, 250.0])
     def test_uncoupled_method(self, pair, flat, curved, shape, force):
         """What the source's assumptions cost: 1 % of force, 4 % of the peak force at a node."""
-        *_, worn = wear_in_stints(pair, flat, rubbing(), 2e5)
+        *_, worn = wear_in_cycle_blocks(pair, flat, conditions(), 2e5)
         gap = {"flat": flat, "curved": curved, "worn": worn.gap}[shape]
-        cycle = pair.coupled_cycle(gap, rubbing(force), self.STEPS)
+        cycle = pair.coupled_cycle(gap, conditions(force), self.STEPS)
         assert cycle.converged
         pressed = pair.normal(gap, force)
         curve = pair.virgin_curve(pressed, np.linspace(0.0, 0.5 * STROKE, 1000), FRICTION)
@@ -279,7 +279,7 @@ class TestCoupled:
         assert np.abs(expected - cycle.loop.force[fall]).max() < 1e-2 * FRICTION * force
         pressures = np.array([state.force[2] for state in cycle.states])
         assert np.abs(pressures - pressed.force).max() < 4e-2 * pressed.force.max()
-        contact = pair.rub(gap, rubbing(force))
+        contact = pair.fretting_cycle(gap, conditions(force))
         energy = np.abs(contact.tangential.shear) * contact.cycle_slip
         np.testing.assert_allclose(cycle.energy, energy, atol=5e-3 * energy.max())
         assert cycle.energy.sum() == pytest.approx(loop.energy, rel=2e-3)
@@ -287,7 +287,7 @@ class TestCoupled:
 
 class TestWear:
     def test_volume_is_alpha_times_energy(self, pair, curved):
-        *_, last = wear_in_stints(pair, curved, rubbing(wear=(ALPHA, 3.0 * ALPHA)), 1e5)
+        *_, last = wear_in_cycle_blocks(pair, curved, conditions(wear=(ALPHA, 3.0 * ALPHA)), 1e5)
         assert last.cycles == 1e5
         assert last.contact.converged
         volumes = last.depths @ pair.areas
@@ -295,12 +295,12 @@ class TestWear:
         np.testing.assert_allclose(last.gap, curved + last.depths.sum(axis=0), rtol=1e-12)
 
     def test_cycles_scale_with_the_wear_coefficients(self, pair, curved):
-        *_, slow = wear_in_stints(pair, curved, rubbing(), 1e5)
-        *_, fast = wear_in_stints(pair, curved, rubbing(wear=(20.0 * ALPHA, 0.0)), 1e4)
+        *_, slow = wear_in_cycle_blocks(pair, curved, conditions(), 1e5)
+        *_, fast = wear_in_cycle_blocks(pair, curved, conditions(wear=(20.0 * ALPHA, 0.0)), 1e4)
         np.testing.assert_allclose(fast.gap, slow.gap, rtol=1e-9)
 
     def test_flat_pads_wear_to_an_even_pressure(self, pair, flat):
-        first, *_, last = wear_in_stints(pair, flat, rubbing(), 1e6)
+        first, *_, last = wear_in_cycle_blocks(pair, flat, conditions(), 1e6)
         assert first.contact.normal.pressure.max() > 3.0 * 17.0
         # Steady: every node loses the same depth, so p varies as 1/slip, by elastic parts of it.
         wear = last.contact.wear[0]
@@ -309,7 +309,7 @@ class TestWear:
         assert last.contact.friction == pytest.approx(FRICTION, rel=SOLVER)
 
     def test_curved_pads_grow_into_contact(self, pair, curved):
-        states = list(wear_in_stints(pair, curved, rubbing(87.0), 1e6))
+        states = list(wear_in_cycle_blocks(pair, curved, conditions(87.0), 1e6))
         areas = np.array([s.contact.normal.area for s in states])
         stiffness = np.array([s.contact.stick_stiffness for s in states])
         assert areas[0] < 0.6
@@ -318,10 +318,10 @@ class TestWear:
         assert np.all(np.diff(stiffness) > -1e-6)
         assert stiffness[-1] > 1.4 * stiffness[0]
 
-    def test_shorter_stints_converge_at_first_order(self, pair, curved):
+    def test_shorter_blocks_converge_at_first_order(self, pair, curved):
         worn = []
-        for stint in (1600.0, 800.0, 400.0, 25.0):
-            *_, last = wear_in_stints(pair, curved, rubbing(), 16e3, stint=stint)
+        for block in (1600.0, 800.0, 400.0, 25.0):
+            *_, last = wear_in_cycle_blocks(pair, curved, conditions(), 16e3, block=block)
             worn.append(last.depths[0])
         errors = [np.abs(depth - worn[-1]).max() for depth in worn[:-1]]
         assert np.all(np.divide(errors[:-1], errors[1:]) > 1.6)
@@ -329,13 +329,13 @@ class TestWear:
     @pytest.mark.parametrize(("share", "grows"), [(0.95, False), (1.05, True)])
     def test_stability_limit(self, pair, flat, share, grows):
         """A small error of shape on the steady state, along the stiffest direction."""
-        *_, steady = wear_in_stints(pair, flat, rubbing(), 3e5)
-        step = share * steady.contact.stint_limit
+        *_, steady = wear_in_cycle_blocks(pair, flat, conditions(), 3e5)
+        step = share * steady.contact.stable_cycles
         error = np.random.default_rng(0).standard_normal(len(flat))
         sizes = []
         for _ in range(60):
             error *= 1e-9 / np.linalg.norm(error)
-            contact = pair.rub(steady.gap + error, rubbing())
+            contact = pair.fretting_cycle(steady.gap + error, conditions())
             change = step * (contact.wear - steady.contact.wear).sum(axis=0)
             error = error + change - (error + change).mean()
             sizes.append(np.linalg.norm(error) / 1e-9)
@@ -344,17 +344,17 @@ class TestWear:
         if grows:
             assert sizes[-1] == pytest.approx(2.0 * share - 1.0, rel=0.02)
 
-    def test_too_long_a_stint_is_refused(self, pair, flat):
-        limit = pair.rub(flat, rubbing()).stint_limit
-        with pytest.raises(StintError, match="take at most"):
-            list(wear_in_stints(pair, flat, rubbing(), 1e6, stint=1.5 * limit))
-        with pytest.raises(StintError, match="up to 1"):
-            next(wear_in_stints(pair, flat, rubbing(), 1e6, share=1.5))
+    def test_too_long_a_block_is_refused(self, pair, flat):
+        limit = pair.fretting_cycle(flat, conditions()).stable_cycles
+        with pytest.raises(CycleBlockError, match="take at most"):
+            list(wear_in_cycle_blocks(pair, flat, conditions(), 1e6, block=1.5 * limit))
+        with pytest.raises(CycleBlockError, match="up to 1"):
+            next(wear_in_cycle_blocks(pair, flat, conditions(), 1e6, share=1.5))
 
     def test_stationary_pair_does_not_wear(self, pair, flat):
-        still = replace(rubbing(), stroke=0.0)
-        first, last = wear_in_stints(pair, flat, still, 1e4)
-        assert first.contact.stint_limit == np.inf
+        still = replace(conditions(), stroke=0.0)
+        first, last = wear_in_cycle_blocks(pair, flat, still, 1e4)
+        assert first.contact.stable_cycles == np.inf
         assert not last.depths.any()
         assert last.energy == 0.0
 
@@ -383,7 +383,7 @@ class TestRig:
 
     def test_flat_pads(self, rigs):
         """Even pressure within some 1e4 cycles; the secant falls, since edges slip earlier."""
-        states = list(wear_in_stints(rigs[True], np.zeros(121), rubbing(17.0), 1.5e5))
+        states = list(wear_in_cycle_blocks(rigs[True], np.zeros(121), conditions(17.0), 1.5e5))
         cycles = np.array([s.cycles for s in states])
         peaks = np.array([s.contact.normal.pressure.max() for s in states]) / 17.0
         assert 1e4 < cycles[np.argmax(peaks < 1.2)] < 1e5
@@ -398,7 +398,9 @@ class TestRig:
         """One steady stiffness, reached after cycles as 1/F and at much the same energy."""
         steady, energies = {}, {}
         for force, cycles in ((17.0, 4e6), (87.0, 1e6), (150.0, 6e5), (250.0, 4e5)):
-            states = list(wear_in_stints(rigs[True], rigs[True].face.gap, rubbing(force), cycles))
+            states = list(
+                wear_in_cycle_blocks(rigs[True], rigs[True].face.gap, conditions(force), cycles)
+            )
             stiffness = np.array([s.contact.stick_stiffness for s in states])
             assert stiffness[-1] == pytest.approx(97.5e3, rel=0.01)
             at = int(np.argmax(stiffness > 0.99 * stiffness[-1]))

@@ -7,15 +7,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from fe_models.dynamics import continuation
-from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
-from fe_models.dynamics.excitation import Harmonic
+from fe_models.dynamics import continuation, newton
+from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.newmark import StepControl, integrate
-from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, two_mass_rig, unit_force
+from fe_models.dynamics.newmark import TimeStepControl, integrate
+from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
+from tests.oracles.event_driven import SliderJoints, integrate_exactly
+from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic import SEPARATED, SLIP, STICK, PeriodicMarch
@@ -279,7 +280,7 @@ def test_a_contact_that_is_only_just_touched(closer):
 
 # --- Folds
 
-SHORT = continuation.StepControl(most=0.03)
+SHORT = continuation.ContinuationControl(most=0.03)
 STOP = FrictionContact(KT, 1600.0, MU, gap=0.02)
 
 
@@ -327,9 +328,9 @@ def test_motions_that_coexist_are_those_that_time_integration_ends_in(folded):
         motion = integrate(
             model,
             STOP,
-            Harmonic(unit_force(model, "z"), 1.0, 106.0),
+            HarmonicForce(unit_force(model, "z"), 1.0, 106.0),
             80.0 / 106.0,
-            StepControl(1.0 / (128.0 * 106.0)),
+            TimeStepControl(1.0 / (128.0 * 106.0)),
             Start(velocity=speed * unit_force(model, "z")),
         )
         last = motion.displacement[-129:-1, 2]
@@ -345,10 +346,10 @@ def highest_point(folded):
     """The motion on the fold at 108 Hz, to 1e-9 of its frequency."""
     problem, last = stopped(), folded.solutions[folded.curve.folds[0] - 1]
     unknowns, below, above = last.coefficients.ravel(), last.frequency, last.frequency + 0.1
-    control = continuation.NewtonControl(max_iterations=8, max_shortened=1)
+    control = newton.NewtonControl(max_iterations=8, max_shortened=1)
     while above - below > 1e-9 * below:
         middle = 0.5 * (below + above)
-        found = continuation.solve(problem.by_frequency(1.0), unknowns, middle, control)
+        found = newton.solve(problem.by_frequency(1.0), unknowns, middle, control)
         # Beyond the fold Newton's method ends nowhere, or far away in the small motion.
         far = np.linalg.norm(found.unknowns - unknowns) > 0.2 * np.linalg.norm(unknowns)
         if found.converged and not far:
@@ -366,7 +367,7 @@ def test_a_branch_that_starts_on_a_fold(folded):
     for upward in (True, False):
         point = continuation.first_point(found, start.frequency, upward, 0.02)
         assert np.all(np.isfinite(point.tangent))
-        begun = replace(folded, curve=continuation.Curve((point,), ""))
+        begun = replace(folded, curve=continuation.SolutionCurve((point,), ""))
         branch = along_frequency(problem, 1.0, (60.0, 200.0), begun)
         assert branch.message == ""
         ends[branch.frequencies[-1]] = branch.solutions[-1].motion
@@ -436,7 +437,7 @@ def test_the_third_harmonic_in_resonance_with_the_second_mode(held):
     motion = integrate_exactly(
         model,
         SliderJoints(np.array([KT]), np.array([LIMIT]), np.zeros(1)),
-        Harmonic(unit_force(model, "a"), force, frequency),
+        HarmonicForce(unit_force(model, "a"), force, frequency),
         60.0 / frequency,
         1.0 / (128.0 * frequency),
     )

@@ -5,17 +5,17 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
-from fe_models.dynamics.excitation import HammerBlow, Harmonic, Recorded
+from fe_models.dynamics.excitation import HammerBlow, HarmonicForce, RecordedForce
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.newmark import StepControl, integrate
+from fe_models.dynamics.newmark import TimeStepControl, integrate
 from fe_models.dynamics.rig import (
     Link,
     lumped_rig,
     natural_frequencies,
-    two_mass_rig,
     unit_force,
 )
+from tests.oracles.event_driven import SliderJoints, integrate_exactly
+from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import JointResponse
@@ -53,7 +53,7 @@ def stop(stiffness, gap):
 def test_a_stuck_start_is_linear():
     """A slider that never reaches its limit is its spring: same motion, nothing dissipated."""
     start = Start(np.array([1e-3, 0.9e-3]))
-    control = StepControl(1e-4)
+    control = TimeStepControl(1e-4)
     stuck = integrate(RIG, Jenkins(27.3e3, 0.5, 1e6), None, 0.1, control, start)
     spring = Elastic(lambda u: 27.3e3 * u, lambda u: np.full_like(u, 27.3e3))
     linear = integrate(RIG, spring, None, 0.1, control, start)
@@ -74,7 +74,7 @@ def test_a_start_at_the_limit_slips_or_sticks_as_it_is_pushed():
     start = Start(np.array([0.0, 0.01]), np.array([0.0, 5.0]))
     joints = SliderJoints(np.array([27.3e3]), np.array([27.3]), np.array([880.0]))
     exact = integrate_exactly(RIG, joints, None, 0.01, 1e-5, start)
-    motion = integrate(RIG, Jenkins(27.3e3, 0.273, 100.0, 880.0), None, 0.01, StepControl(1e-6,
+    motion = integrate(RIG, Jenkins(27.3e3, 0.273, 100.0, 880.0), None, 0.01, TimeStepControl(1e-6,
                        every=10), start)  # fmt: skip
     assert motion.joint_force[0, 0, 0] == pytest.approx(27.3 + 8.8)
     assert motion.converged
@@ -86,9 +86,9 @@ def test_a_start_at_the_limit_slips_or_sticks_as_it_is_pushed():
 def test_without_normal_load_nothing_is_held():
     """A slider without a limit, a contact that stays apart and no joint at all are the same."""
     blow = HammerBlow(unit_force(RIG, "m1"), 100.0, 1e-3)
-    free = integrate(RIG, None, blow, 0.05, StepControl(1e-4))
-    loose = integrate(RIG, Jenkins(27.3e3, 0.5, 0.0), blow, 0.05, StepControl(1e-4))
-    apart = integrate(RIG, stop(1e5, 10.0), blow, 0.05, StepControl(1e-4))
+    free = integrate(RIG, None, blow, 0.05, TimeStepControl(1e-4))
+    loose = integrate(RIG, Jenkins(27.3e3, 0.5, 0.0), blow, 0.05, TimeStepControl(1e-4))
+    apart = integrate(RIG, stop(1e5, 10.0), blow, 0.05, TimeStepControl(1e-4))
     largest = np.abs(free.displacement).max()
     for motion in (loose, apart):
         np.testing.assert_allclose(motion.displacement, free.displacement, atol=SOLVED * largest)
@@ -110,7 +110,7 @@ def test_a_body_hits_a_stop_and_comes_back(parts):
     body = lumped_rig({"m": mass}, {}, [[Link("m")]])
     on_it = np.pi / np.sqrt(stiffness / mass)
     back = 2.0 * gap / speed + on_it
-    start, control = Start(velocity=np.array([speed])), StepControl(on_it / parts)
+    start, control = Start(velocity=np.array([speed])), TimeStepControl(on_it / parts)
     motion = integrate(body, stop(stiffness, gap), None, 2.0 * back, control, start)
     assert motion.converged
     touching = motion.joint_force[:, 0, 0] > 0.0
@@ -133,7 +133,7 @@ def test_a_contact_that_lifts_off_and_slides_is_followed():
     contact = FrictionContact(2000.0, 2600.0, 0.5, gap=1e-3)
     start = Start(np.array([0.03, 0.0, -0.02]), np.array([0.0, 8.0, 0.0]))
     found = [
-        integrate(rig, contact, None, 0.02, StepControl(1e-4 / n, every=n), start)
+        integrate(rig, contact, None, 0.02, TimeStepControl(1e-4 / n, every=n), start)
         for n in (1, 5, 10, 40)
     ]
     for motion in found:
@@ -168,9 +168,9 @@ def test_a_joint_that_lets_go_is_followed_in_parts_of_a_step():
     """Pulled slowly over its peak it falls so fast that Newton fails in a step; in halves not."""
     body = lumped_rig({"m": 1e-3}, {Link("m"): 50.0}, [[Link("m")]], 0.05)
     law = softening(20.0, 1000.0, 2e4)
-    pull = Recorded(np.ones(1), np.array([0.0, 0.1]), np.array([0.0, 25.0]))
+    pull = RecordedForce(np.ones(1), np.array([0.0, 0.1]), np.array([0.0, 25.0]))
     coarse, fine = (
-        integrate(body, law, pull, 0.1, StepControl(5e-4 / n, every=n)) for n in (1, 20)
+        integrate(body, law, pull, 0.1, TimeStepControl(5e-4 / n, every=n)) for n in (1, 20)
     )
     assert coarse.converged, coarse.message
     assert coarse.steps > len(coarse.times) - 1
@@ -182,9 +182,9 @@ def test_a_joint_that_lets_go_is_followed_in_parts_of_a_step():
 @pytest.mark.parametrize("stiffness", [1e7, 1e10])
 def test_a_joint_far_stiffer_than_a_step_resolves(stiffness):
     """Every reversal falls within a step: plain Newton would jump between the two directions."""
-    force = Harmonic(unit_force(RIG, "m1"), 75.0, 30.0)
+    force = HarmonicForce(unit_force(RIG, "m1"), 75.0, 30.0)
     stiff = Jenkins(stiffness, 0.5, 60.0)
-    coarse = integrate(RIG, stiff, force, 0.2, StepControl(1e-3))
+    coarse = integrate(RIG, stiff, force, 0.2, TimeStepControl(1e-3))
     assert coarse.converged, coarse.message
     assert coarse.residual < 1e-10
     energies = coarse.energies
@@ -196,14 +196,14 @@ def test_a_joint_far_stiffer_than_a_step_resolves(stiffness):
 @pytest.mark.parametrize("step", [0.02, 1.0])
 def test_a_step_far_too_large_says_how_wrong_it_is(step):
     """Ten and five hundred periods in a step: bounded, since the rule is stable, and useless."""
-    force = Harmonic(unit_force(RIG, "m1"), 75.0, 33.0)
+    force = HarmonicForce(unit_force(RIG, "m1"), 75.0, 33.0)
     law = Jenkins(27.3e3, 0.5, 60.0)
-    fixed = integrate(RIG, law, force, 20.0 * step, StepControl(step))
+    fixed = integrate(RIG, law, force, 20.0 * step, TimeStepControl(step))
     assert fixed.converged
     assert fixed.error > 0.3
     # Not above the quasi-static displacement of the load by orders.
     assert np.abs(fixed.displacement).max() < 20.0 * 75.0 / 1.4e3
-    asked = integrate(RIG, law, force, 20.0 * step, StepControl(step, 1e-12))
+    asked = integrate(RIG, law, force, 20.0 * step, TimeStepControl(step, 1e-12))
     assert not asked.converged
     assert "times what is allowed: give smaller steps or a larger tolerance" in asked.message
     assert len(asked.times) < 21

@@ -8,7 +8,7 @@ import pytest
 import scipy.linalg as sl
 
 from fe_models.dynamics.excitation import HammerBlow
-from fe_models.dynamics.newmark import StepControl
+from fe_models.dynamics.newmark import TimeStepControl
 from fe_models.reduction import ReducedModel, load_reduced, save_reduced
 from tests.workflow.test_time_cases import MASS, RIG, STIFF, refused, run
 from wear.joints.law import march
@@ -245,7 +245,7 @@ def test_a_stuck_body_is_linear(specimen, body):
 def test_energies_balance_while_the_contact_slides_and_lifts_off(specimen, direction):
     rig, joint = rig_of(specimen, f"structure.driven={{points: ring, direction: {direction}}}")
     blow = HammerBlow(rig.driven, 2000.0, 4e-4)
-    motion = motion_of(rig, joint, 0.0, blow, 0.02, StepControl(2e-5))
+    motion = motion_of(rig, joint, 0.0, blow, 0.02, TimeStepControl(2e-5))
     energies = motion.energies
     brought = np.abs(np.diff(energies.excitation)).sum()
     assert np.abs(energies.missing).max() < ROUNDING * brought
@@ -265,7 +265,7 @@ def test_energies_balance_while_the_contact_slides_and_lifts_off(specimen, direc
 def test_a_preload_is_balanced_at_rest(specimen):
     rig, joint = rig_of(specimen)
     still = HammerBlow(rig.driven, 0.0, 1e-3)
-    motion = motion_of(rig, joint, 0.0, still, 0.005, StepControl(5e-5))
+    motion = motion_of(rig, joint, 0.0, still, 0.005, TimeStepControl(5e-5))
     assert np.abs(motion.displacement).max() < 1e-12
     np.testing.assert_allclose(motion.joint_force[:, :, 2], LOAD / PAD, rtol=ROUNDING)
 
@@ -276,7 +276,7 @@ def test_a_gap_closes(specimen):
     rig, joint = rig_of(specimen, gap + "stiffness: 20 N/um, normal_stiffness: 30 N/um}",
                         "structure.driven={points: pad, direction: -z}")  # fmt: skip
     push = HammerBlow(rig.driven, 2000.0, 1.0)
-    motion = motion_of(rig, joint, 0.0, push, 0.5, StepControl(1e-3))
+    motion = motion_of(rig, joint, 0.0, push, 0.5, TimeStepControl(1e-3))
     touching = motion.joint_force[:, :, 2].sum(axis=1)
     down = motion.joint_displacement[:, :, 2]
     expected = KN / PAD * np.maximum(down - 0.01, 0.0)

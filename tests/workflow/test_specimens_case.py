@@ -116,7 +116,7 @@ class TestSummary:
         for load in summary["loads"]:
             expected = np.array([ALPHA, 2.0 * ALPHA]) * load["energy"]
             np.testing.assert_allclose(load["volumes"], expected, rtol=SOLVER)
-            # The last stint is a whole one.
+            # The last cycle block is a whole one.
             assert 1.2e6 <= load["energy"] < 1.3e6
 
     def test_curved_pads_wear_into_full_contact(self, summary):
@@ -364,7 +364,7 @@ class TestCase:
             ("wear.cycles=1e5", "both given; allowed: either cycles or energy"),
             ("wear.energy=null", "neither given"),
             ("wear.energy=0", "--set wear.energy=0: 0: out of range"),
-            ("wear.stint.share=150 %", "above 0 and at most 1"),
+            ("wear.cycle_block.share=150 %", "above 0 and at most 1"),
             ("wear.reported.0.normal_force=18 N", "not run; allowed: 87, 250 N"),
             ("contact.method=full", "unknown key; allowed: grid, tolerance"),
         ],
@@ -378,8 +378,11 @@ class TestCase:
     @pytest.mark.parametrize(
         ("overrides", "message"),
         [
-            (["wear.stint.length=1e7"], "wear.stint.length: a stint of 1e+07 cycles"),
-            (["wear.stint.length=1"], "more than 20000 stints"),
+            (
+                ["wear.cycle_block.length=1e7"],
+                "wear.cycle_block.length: a cycle block of 1e+07 cycles",
+            ),
+            (["wear.cycle_block.length=1"], "more than 20000 cycle blocks"),
             (["load_path.stroke=1e-9 mm"], "nothing slides at 87 N"),
             (["load_path.normal_forces.1=1e-6 N"], "a single node of the pad touches"),
         ],

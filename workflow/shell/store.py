@@ -89,7 +89,7 @@ DATASETS = {
     "friction": ("1", "largest tangential over normal force"),
     "stick_stiffness": ("N/mm", "tangential stiffness with all that touches stuck"),
     "secant_stiffness": ("N/mm", "slope of the loop up to half of its largest force"),
-    "stint_limit": ("1", "cycles of constant shape beyond which errors of shape grow"),
+    "stable_cycles": ("1", "cycles of constant shape beyond which errors of shape grow"),
     "ring_displacement": ("mm", "motion of body 2's ring along x"),
     "ring_force": ("N", "force along x that moves body 2's ring"),
     "along": ("mm", "centres of the section's cells, along its axis"),

@@ -2,23 +2,30 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
 
-from fe_models.dynamics.bordered import Bordered, NearlySolved, solve_alone, solve_bordered
-from fe_models.dynamics.continuation import (
-    Linearised,
-    NewtonControl,
-    Refinement,
-    StepControl,
-    first_point,
-    follow,
-    solve,
-)
+from fe_models.dynamics.bordered import Bordered, Preconditioned, solve_alone, solve_bordered
+from fe_models.dynamics.continuation import ContinuationControl, Refinement, first_point, follow
+from fe_models.dynamics.newton import NewtonControl, relative_norm, solve
 
 EXACT = 1e-9
+
+
+@dataclass(frozen=True)
+class Linearised:
+    """Equations at one place, with all derivatives from the beginning."""
+
+    residual: np.ndarray
+    jacobian: object
+    slope: np.ndarray
+    size: float
+
+    @property
+    def relative(self):
+        return relative_norm(self.residual, self.size)
 
 
 def scalar(value, by_unknown, by_parameter):
@@ -58,7 +65,7 @@ class LikeAnother(Products):
         super().__init__(matrix)
         self._inverse = np.linalg.inv(other)
 
-    def nearly_solved(self, vector):
+    def precondition(self, vector):
         return self._inverse @ vector
 
 
@@ -121,7 +128,7 @@ def test_a_closed_curve_ends_by_the_number_of_points():
         lambda u, p: 2.0 * u,
         lambda u, p: 2.0 * (p - 2.0),
     )
-    curve = follow(circle, start(circle, 1.0, 2.0), (0.0, 4.0), StepControl(max_points=200))
+    curve = follow(circle, start(circle, 1.0, 2.0), (0.0, 4.0), ContinuationControl(max_points=200))
     assert "200 points" in curve.message
     assert len(curve.folds) >= 4
     places = np.array([point.unknowns[0] for point in curve.points])
@@ -208,7 +215,7 @@ def test_finer_equations_take_over_on_the_way():
 
 def test_a_step_is_never_shorter_than_asked():
     first = replace(start(S_CURVE, -3.0, 1.0), step=10.0)
-    curve = follow(S_CURVE, first, (0.5, 9.5), StepControl(most=0.05))
+    curve = follow(S_CURVE, first, (0.5, 9.5), ContinuationControl(most=0.05))
     assert curve.message == ""
     assert all(1e-6 <= point.step <= 0.05 for point in curve.points)
 
@@ -241,7 +248,7 @@ def test_the_inverse_of_a_matrix_that_is_alike_saves_products():
     column, row, wanted = noise[0], rng.standard_normal(201), rng.standard_normal(201)
     exact, sign = solve_bordered(matrix, column, row, wanted[:, None])
     alike, alone = LikeAnother(matrix, other), Products(matrix)
-    assert isinstance(alike, NearlySolved)
+    assert isinstance(alike, Preconditioned)
     for products in (alike, alone):
         found = Bordered(products, column, row).solve(wanted, 1e-9)
         np.testing.assert_allclose(found, exact[:, 0], atol=1e-7 * np.abs(exact).max())

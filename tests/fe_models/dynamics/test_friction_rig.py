@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 
 from fe_models.dynamics.friction_rig import friction_rig
-from fe_models.dynamics.rig import RigError, natural_frequencies, two_mass_rig, unit_force
+from fe_models.dynamics.rig import RigError, natural_frequencies, unit_force
 from fe_models.geometry.specimens import Specimen
 from fe_models.reduced_contact import ReducedPair
 from fe_models.specimens import pad_stiffness, reduced_specimens
 from sa_solver.types import Material
+from tests.oracles.two_mass_rig import two_mass_rig
 
 SPECIMEN = Specimen(pad_elements=2, ring_nodes=4)
 STEEL = Material(200e3, 0.3, density=7.8e-9)

@@ -8,14 +8,15 @@ import numpy as np
 import pytest
 
 from fe_models.dynamics import harmonic_balance
-from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
-from fe_models.dynamics.excitation import Harmonic
+from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.receptance import Receptance, ReceptanceError
-from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, two_mass_rig, unit_force
+from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
+from tests.oracles.event_driven import SliderJoints, integrate_exactly
+from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic import SEPARATED, SLIP, STICK, PeriodicMarch
@@ -196,7 +197,7 @@ def test_products_with_the_jacobian_are_those_of_the_matrix(case, monkeypatch):
 
 
 @pytest.mark.parametrize("free", [False, True])
-def test_stuck_joints_are_undone_by_their_stiffness(free):
+def test_stuck_joints_are_preconditioned_by_their_stiffness(free):
     """Where joints do as at rest, the inverse that is known is that of the Jacobian."""
     model = contact_rig()
     if not free:
@@ -209,7 +210,7 @@ def test_stuck_joints_are_undone_by_their_stiffness(free):
     at = problem.evaluate(motion.coefficients.ravel(), 30.0, 0.1, "frequency")
     products = harmonic_balance._Jacobian(problem, at.steady, at.cycle.jacobian)
     vector = np.random.default_rng(8).standard_normal(problem.size)
-    np.testing.assert_allclose(products.nearly_solved(products @ vector), vector, atol=1e-9)
+    np.testing.assert_allclose(products.precondition(products @ vector), vector, atol=1e-9)
 
 
 def test_a_solution_keeps_no_derivatives():
@@ -353,7 +354,7 @@ def test_rig_against_its_exact_steady_state(frequency, force):
     motion = integrate_exactly(
         model,
         SliderJoints(np.array([KT]), np.array([MU * LOAD]), np.zeros(1)),
-        Harmonic(unit_force(model, "m1"), force, frequency),
+        HarmonicForce(unit_force(model, "m1"), force, frequency),
         50.0 / frequency,
         1.0 / (samples * frequency),
     )

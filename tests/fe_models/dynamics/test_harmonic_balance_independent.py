@@ -11,13 +11,14 @@ from dataclasses import dataclass
 import numpy as np
 import pytest
 
-from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
-from fe_models.dynamics.excitation import Harmonic, Recorded, Together
+from fe_models.dynamics.excitation import CombinedForces, HarmonicForce, RecordedForce
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.newmark import StepControl, integrate
-from fe_models.dynamics.rig import Link, lumped_rig, two_mass_rig, unit_force
+from fe_models.dynamics.newmark import TimeStepControl, integrate
+from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from tests.oracles.event_driven import SliderJoints, integrate_exactly
+from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic import SEPARATED, SLIP, STICK, PeriodicMarch
@@ -68,7 +69,7 @@ class ExactPeriod:
     """
 
     model: object
-    force: Harmonic
+    force: HarmonicForce
 
     def motion(self, state, parts=1):
         size, length = len(self.model.mass), 1.0 / self.force.frequency
@@ -120,7 +121,7 @@ class NewmarkPeriod:
             self.law,
             self.excitation,
             1.0 / self.frequency,
-            StepControl(1.0 / self.frequency / self.steps, every=every),
+            TimeStepControl(1.0 / self.frequency / self.steps, every=every),
             start,
         )
 
@@ -184,7 +185,9 @@ def test_jenkins_rig_is_the_fixed_point_of_event_driven_integration(
     ratio, frequency, force, highest
 ):
     model = rig(ratio)
-    wanted, lost = ExactPeriod(model, Harmonic(unit_force(model, "m1"), force, frequency)).steady()
+    wanted, lost = ExactPeriod(
+        model, HarmonicForce(unit_force(model, "m1"), force, frequency)
+    ).steady()
     solution = odd_balance(model, highest, 4096).solve(frequency, force)
     assert solution.converged
     assert {STICK, SLIP} == set(np.unique(solution.cycle.states))
@@ -200,7 +203,7 @@ def test_error_falls_with_the_third_power_of_the_harmonics(ratio):
     is left out in all as k⁻³: 3.4 is what these harmonics show.
     """
     model = rig(ratio)
-    wanted, _ = ExactPeriod(model, Harmonic(unit_force(model, "m1"), 40.0, 150.0)).steady()
+    wanted, _ = ExactPeriod(model, HarmonicForce(unit_force(model, "m1"), 40.0, 150.0)).steady()
     highest, errors, estimates, solution = np.array([31, 63, 127]), [], [], None
     for order in highest:
         problem = odd_balance(model, int(order), 16384)
@@ -217,7 +220,7 @@ def test_error_falls_with_the_third_power_of_the_harmonics(ratio):
 def test_jenkins_rig_is_the_fixed_point_of_newmark(ratio):
     """Second order in the step: what is left after extrapolation is below 1e-4."""
     model = rig(ratio)
-    force = Harmonic(unit_force(model, "m1"), 40.0, 150.0)
+    force = HarmonicForce(unit_force(model, "m1"), 40.0, 150.0)
     periods = [NewmarkPeriod(model, JENKINS, force, 150.0, steps) for steps in (1024, 2048)]
     (_, coarse, lost), (_, fine, lost_fine) = newmark_steady(periods)
     found = odd_balance(model, 63, 4096).solve(150.0, 40.0)
@@ -253,10 +256,10 @@ class PressedRig:
     @property
     def excitation(self):
         waves = [
-            Harmonic(unit_force(self.model, name), amplitude, self.frequency, phase)
+            HarmonicForce(unit_force(self.model, name), amplitude, self.frequency, phase)
             for name, (amplitude, phase) in SHAKEN.items()
         ]
-        return Together((*waves, Recorded(self.static, np.zeros(1), np.ones(1))))
+        return CombinedForces((*waves, RecordedForce(self.static, np.zeros(1), np.ones(1))))
 
     def balance(self, highest, samples):
         wave = sum(

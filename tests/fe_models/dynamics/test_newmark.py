@@ -5,11 +5,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 import pytest
 
-from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
-from fe_models.dynamics.excitation import HammerBlow, Harmonic
+from fe_models.dynamics.excitation import HammerBlow, HarmonicForce
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.newmark import StepControl, integrate
-from fe_models.dynamics.rig import Link, lumped_rig, two_mass_rig, unit_force
+from fe_models.dynamics.newmark import TimeStepControl, integrate
+from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from tests.oracles.event_driven import SliderJoints, integrate_exactly
+from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import JointResponse
 
@@ -48,7 +49,7 @@ def law():
 
 @pytest.fixture(scope="module")
 def drive(rig):
-    return Harmonic(unit_force(rig, "b"), 6.0, 90.0)
+    return HarmonicForce(unit_force(rig, "b"), 6.0, 90.0)
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +75,7 @@ def test_energy_is_kept_without_friction(held):
     rig = two_mass_rig((21.2e-3, 1.2e-3), (1.4e3, 273e3))
     joint = LinearSpring(27.3e3) if held else None
     start = Start(np.array([0.01, 0.02]), np.array([3.0, -2.0]))
-    motion = integrate(rig, joint, None, 1.0, StepControl(1e-4), start)
+    motion = integrate(rig, joint, None, 1.0, TimeStepControl(1e-4), start)
     energies = motion.energies
     held_energy = 0.5 * motion.joint_force * motion.joint_displacement
     total = energies.kinetic + energies.elastic + held_energy[:, 0, 0]
@@ -89,7 +90,7 @@ def test_implicit_friction_is_second_order(rig, law, drive, exact):
     parts = np.array([10, 20, 40, 80])
     errors = []
     for every in parts:
-        motion = integrate(rig, law, drive, 0.05, StepControl(1e-3 / every, every=int(every)))
+        motion = integrate(rig, law, drive, 0.05, TimeStepControl(1e-3 / every, every=int(every)))
         assert motion.residual < 1e-10
         errors.append(error(motion, exact))
     assert order(1.0 / parts, errors) == pytest.approx(2.0, abs=0.15)
@@ -123,7 +124,7 @@ def test_lagged_friction_is_first_order_only(rig, law, drive, exact):
         displacement = lagged(rig, law, drive, 0.05, 1e-3 / every)[::every]
         errors.append(error(replace(exact, displacement=displacement), exact))
     assert order(1.0 / parts, errors) == pytest.approx(1.0, abs=0.2)
-    implicit = integrate(rig, law, drive, 0.05, StepControl(1e-3 / 160, every=160))
+    implicit = integrate(rig, law, drive, 0.05, TimeStepControl(1e-3 / 160, every=160))
     assert errors[-1] > 10.0 * error(implicit, exact)
 
 
@@ -131,7 +132,7 @@ def test_a_tolerance_chooses_the_steps(rig, law, drive, exact):
     """Errors of h³ in a step add up to h², so the whole falls with the tolerance to 2/3."""
     tolerances, errors = 10.0 ** -np.arange(4, 8), []
     for tolerance in tolerances:
-        motion = integrate(rig, law, drive, 0.05, StepControl(1e-3, tolerance))
+        motion = integrate(rig, law, drive, 0.05, TimeStepControl(1e-3, tolerance))
         assert motion.converged
         assert motion.error <= tolerance * (1.0 + 1e-2)
         np.testing.assert_allclose(motion.times, exact.times, rtol=1e-12)
@@ -144,8 +145,8 @@ def test_a_tolerance_spends_its_steps_where_they_are_needed():
     """After a short blow the rig swings slowly: few steps do."""
     rig = two_mass_rig((20e-3, 1e-3), (1.4e3, 27.3e3), 0.05)
     blow = HammerBlow(unit_force(rig, "m1"), 100.0, 1e-3)
-    motion = integrate(rig, None, blow, 0.2, StepControl(1e-3, 1e-6))
-    fixed = integrate(rig, None, blow, 0.2, StepControl(1e-3 / 64, every=64))
+    motion = integrate(rig, None, blow, 0.2, TimeStepControl(1e-3, 1e-6))
+    fixed = integrate(rig, None, blow, 0.2, TimeStepControl(1e-3 / 64, every=64))
     assert motion.converged
     assert motion.steps < 0.3 * fixed.steps
     # Its largest error in a step is that of steps 64 times as many.
@@ -157,7 +158,7 @@ def test_a_harmonic_steady_state_is_the_closed_form():
     rig = lumped_rig({"a": 2e-3, "b": 1e-3}, {Link("a"): 400.0, Link("b", "a"): 900.0},
                      [[Link("b")]], 0.1)  # fmt: skip
     joint, shape = LinearSpring(1200.0), unit_force(rig, "a")
-    force, angular = Harmonic(shape, 6.0, 100.0), 2.0 * np.pi * 100.0
+    force, angular = HarmonicForce(shape, 6.0, 100.0), 2.0 * np.pi * 100.0
     stiffness = rig.stiffness + 1200.0 * rig.connection.T @ rig.connection
 
     def steady(w, times):
@@ -169,7 +170,7 @@ def test_a_harmonic_steady_state_is_the_closed_form():
     errors = []
     for parts in (25, 50, 100):
         step = 1e-2 / parts
-        motion = integrate(rig, joint, force, 0.6, StepControl(step))
+        motion = integrate(rig, joint, force, 0.6, TimeStepControl(step))
         late = motion.times > 0.58
         found, times = motion.displacement[late], motion.times[late]
         turned = 2.0 / step * np.tan(0.5 * step * angular)
@@ -188,7 +189,7 @@ def test_a_blow_converges_to_the_closed_form():
     exact = integrate_exactly(rig, free, blow, 0.02, 1e-3)
     parts = np.array([100, 200, 400])
     errors = [
-        error(integrate(rig, None, blow, 0.02, StepControl(1e-3 / n, every=int(n))), exact)
+        error(integrate(rig, None, blow, 0.02, TimeStepControl(1e-3 / n, every=int(n))), exact)
         for n in parts
     ]
     assert order(1.0 / parts, errors) == pytest.approx(2.0, abs=0.05)
@@ -196,7 +197,7 @@ def test_a_blow_converges_to_the_closed_form():
 
 
 def test_the_balance_of_energy_closes(rig, law, drive):
-    motion = integrate(rig, law, drive, 0.05, StepControl(5e-5))
+    motion = integrate(rig, law, drive, 0.05, TimeStepControl(5e-5))
     energies = motion.energies
     largest = energies.excitation.max()
     np.testing.assert_allclose(energies.missing, 0.0, atol=SOLVED * largest)
@@ -212,7 +213,7 @@ def test_the_balance_of_energy_closes(rig, law, drive):
 
 
 def test_accelerations_balance_the_forces(rig, law, drive):
-    motion = integrate(rig, law, drive, 0.01, StepControl(1e-4))
+    motion = integrate(rig, law, drive, 0.01, TimeStepControl(1e-4))
     left = (
         motion.acceleration @ rig.mass
         + motion.velocity @ rig.damping
@@ -223,9 +224,9 @@ def test_accelerations_balance_the_forces(rig, law, drive):
 
 
 def test_a_motion_can_be_left_and_taken_up(rig, law, drive):
-    whole = integrate(rig, law, drive, 0.04, StepControl(1e-4))
-    first = integrate(rig, law, drive, 0.02, StepControl(1e-4))
-    second = integrate(rig, law, drive, 0.02, StepControl(1e-4), first.end)
+    whole = integrate(rig, law, drive, 0.04, TimeStepControl(1e-4))
+    first = integrate(rig, law, drive, 0.02, TimeStepControl(1e-4))
+    second = integrate(rig, law, drive, 0.02, TimeStepControl(1e-4), first.end)
     largest = np.abs(whole.displacement).max()
     np.testing.assert_allclose(second.displacement, whole.displacement[200:], atol=SOLVED * largest)
     np.testing.assert_allclose(second.times, whole.times[200:], rtol=1e-12)
@@ -233,17 +234,17 @@ def test_a_motion_can_be_left_and_taken_up(rig, law, drive):
 
 def test_rows_left_out_change_nothing(rig, law, drive):
     """Over several blocks; the state at the end is that of the last row."""
-    every, full = (integrate(rig, law, drive, 0.25, StepControl(1e-4, every=n)) for n in (7, 1))
+    every, full = (integrate(rig, law, drive, 0.25, TimeStepControl(1e-4, every=n)) for n in (7, 1))
     np.testing.assert_array_equal(every.displacement, full.displacement[::7])
     np.testing.assert_array_equal(every.energies.joints, full.energies.joints[::7])
     np.testing.assert_array_equal(every.times, full.times[::7])
     assert every.steps == full.steps == 2500
-    state = integrate(rig, law, drive, float(every.times[-1]), StepControl(1e-4)).joint_state
+    state = integrate(rig, law, drive, float(every.times[-1]), TimeStepControl(1e-4)).joint_state
     np.testing.assert_array_equal(every.joint_state, state)
 
 
 def test_nothing_moves_without_force(rig, law):
-    motion = integrate(rig, law, None, 0.01, StepControl(1e-3))
+    motion = integrate(rig, law, None, 0.01, TimeStepControl(1e-3))
     for values in (motion.displacement, motion.joint_force, motion.energies.joint_work):
         np.testing.assert_array_equal(values, 0.0)
     assert motion.error == motion.residual == 0.0
@@ -254,8 +255,8 @@ def test_many_joints_are_as_good_as_their_sum():
     count = 60
     shared = lumped_rig({"m": 1e-3}, {Link("m"): 100.0}, [[Link("m")]] * count, 0.01)
     single = lumped_rig({"m": 1e-3}, {Link("m"): 100.0}, [[Link("m")]], 0.01)
-    force = Harmonic(unit_force(single, "m"), 5.0, 60.0)
-    control = StepControl(2e-4)
+    force = HarmonicForce(unit_force(single, "m"), 5.0, 60.0)
+    control = TimeStepControl(2e-4)
     many = integrate(shared, Jenkins(600.0 / count, 0.5, 4.0 / count), force, 0.05, control)
     one = integrate(single, Jenkins(600.0, 0.5, 4.0), force, 0.05, control)
     largest = np.abs(one.displacement).max()
@@ -281,7 +282,7 @@ class SignOfSlip:
 
 def test_a_structure_needs_no_joints(drive):
     bare = lumped_rig({"a": 2e-3, "b": 1e-3}, {Link("a"): 400.0, Link("b", "a"): 900.0}, [])
-    motion = integrate(bare, None, drive, 0.05, StepControl(1e-4))
+    motion = integrate(bare, None, drive, 0.05, TimeStepControl(1e-4))
     assert motion.converged
     assert motion.joint_force.shape == (501, 0, 1)
     np.testing.assert_allclose(
@@ -291,8 +292,8 @@ def test_a_structure_needs_no_joints(drive):
 
 def test_a_force_that_jumps_is_refused_with_what_to_do():
     rig = two_mass_rig((21.2e-3, 1.2e-3), (1.4e3, 273e3))
-    force = Harmonic(unit_force(rig, "m1"), 5.0, 30.0)
-    motion = integrate(rig, SignOfSlip(50.0), force, 0.1, StepControl(1e-4))
+    force = HarmonicForce(unit_force(rig, "m1"), 5.0, 30.0)
+    motion = integrate(rig, SignOfSlip(50.0), force, 0.1, TimeStepControl(1e-4))
     assert not motion.converged
     assert len(motion.times) == len(motion.displacement) == 1
     assert "not in equilibrium" in motion.message
@@ -301,12 +302,12 @@ def test_a_force_that_jumps_is_refused_with_what_to_do():
 
 def test_what_cannot_be_integrated_is_refused(rig, law, drive):
     with pytest.raises(ValueError, match="a step of 0 s"):
-        StepControl(0.0)
+        TimeStepControl(0.0)
     with pytest.raises(ValueError, match="tolerance -1"):
-        StepControl(1.0, -1.0)
+        TimeStepControl(1.0, -1.0)
 
     class Planar(LinearSpring):
         directions = 3
 
     with pytest.raises(ValueError, match="a connection of 2 rows for joints of 3 directions"):
-        integrate(rig, Planar(1.0), drive, 0.1, StepControl(1e-3))
+        integrate(rig, Planar(1.0), drive, 0.1, TimeStepControl(1e-3))

@@ -9,20 +9,20 @@ import pytest
 from scipy.optimize import brentq
 
 from fe_models.dynamics import harmonic_balance
-from fe_models.dynamics.continuation import StepControl
+from fe_models.dynamics.continuation import ContinuationControl
 from fe_models.dynamics.cycle_energy import (
     damping_ratio,
     energy_lost,
     largest_kinetic_energy,
-    work_of_forces,
 )
-from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
-from fe_models.dynamics.excitation import Harmonic
+from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.forced_response import Accuracy, along_frequency
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.phase_resonance import PhaseResonance, along_phase_resonance
-from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, two_mass_rig, unit_force
+from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
+from tests.oracles.event_driven import SliderJoints, integrate_exactly
+from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.periodic import SLIP, STICK, PeriodicMarch
@@ -34,7 +34,7 @@ ODD = tuple(range(1, 16, 2))
 # After which the rig damped by 2 % has settled to 1e-3.
 PERIODS = 20
 # Steps that show where a peak is.
-CLOSE = StepControl(most=0.05)
+CLOSE = ContinuationControl(most=0.05)
 
 
 def rig(ratio=0.001):
@@ -177,7 +177,7 @@ def test_products_with_the_jacobian_are_those_of_the_matrix(monkeypatch):
     product = matrix @ vector
     np.testing.assert_allclose(products @ vector, product, atol=1e-12 * np.abs(product).max())
     # The border is undone exactly, whatever is known of the inverse of what it is around.
-    undone, inner = products.nearly_solved(vector), products.inner.nearly_solved
+    undone, inner = products.precondition(vector), products.inner.precondition
     assert matrix[-1] @ undone == pytest.approx(vector[-1], rel=1e-9)
     wanted_inner = inner(vector[:-1]) - undone[-1] * inner(matrix[:-1, -1])
     np.testing.assert_allclose(undone[:-1], wanted_inner, atol=1e-12 * np.abs(undone).max())
@@ -236,7 +236,9 @@ def test_jenkins_oscillator_of_one_harmonic():
     model, law = oscillator(0.02), Jenkins(1500.0, 0.5, 10.0, 30.0)
     problem = balance(model, law, (1,), 65536)
     start = peak(replaced(problem, 256), 6.0, (80.0, 200.0))
-    backbone = along_phase_resonance(problem, start, (0.1, 12.0), control=StepControl(most=0.1))
+    backbone = along_phase_resonance(
+        problem, start, (0.1, 12.0), control=ContinuationControl(most=0.1)
+    )
     assert backbone.message == ""
     omega, sizes = 2.0 * np.pi * backbone.frequencies, backbone.first_amplitudes(0)
     cosine, sine = law.first_harmonic(sizes)
@@ -266,7 +268,7 @@ def test_only_friction_damps():
     wanted = (5.0 / 1500.0) / (1.0 - backbone.forces / bound)
     # Of a corner of the force, twice per period: second order in the 4096 samples.
     np.testing.assert_allclose(backbone.first_amplitudes(0), wanted, rtol=1e-5)
-    control = StepControl(max_points=60)
+    control = ContinuationControl(max_points=60)
     beyond = along_phase_resonance(problem, start, (0.5 * bound, 2.0 * bound), control=control)
     assert "upward in force" in beyond.message
     assert np.all(beyond.forces < 1.00001 * bound)
@@ -323,6 +325,15 @@ def test_any_response_leads_to_the_backbone(force, given):
         assert solution.residual <= 1e-10
 
 
+def work_of_forces(problem, solution):
+    """-π a Σ k Im(w_kᴴ x_k), the work of the periodic forces in a period."""
+    work = 0.0
+    for harmonic, wave in problem.load.waves.items():
+        moved = solution.motion[solution.resolution.harmonics.index(harmonic)]
+        work -= np.pi * harmonic * float(np.vdot(wave, moved).imag)
+    return solution.force * work
+
+
 def test_power_balances_with_the_samples():
     """All power is spent: what the joint takes is summed sample by sample, to second order."""
     left = []
@@ -363,7 +374,7 @@ def test_motion_in_time_has_the_phase(place):
     motion = integrate_exactly(
         model,
         SliderJoints(np.array([KT]), np.array([LIMIT]), np.zeros(1)),
-        Harmonic(unit_force(model, "m1"), solution.force, solution.frequency),
+        HarmonicForce(unit_force(model, "m1"), solution.force, solution.frequency),
         PERIODS / solution.frequency,
         1.0 / (samples * solution.frequency),
     )

@@ -12,10 +12,10 @@ from fe_models.dynamics.rig import (
     modal_damping,
     natural_frequencies,
     reduced_rig,
-    two_mass_rig,
     unit_force,
 )
 from fe_models.reduction import reduce_body
+from tests.oracles.two_mass_rig import two_mass_rig
 
 THESIS = two_mass_rig((21.152e-3, 1.189e-3), (1.3469e3, 273e3), 1e-3)
 PAPER_C = two_mass_rig((21.2e-3, 1.2e-3), (1.4e3, 273e3), 1e-3)

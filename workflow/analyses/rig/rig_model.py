@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import scipy.linalg as sl
 
-from fe_models.dynamics.excitation import Constant, Force, Together
+from fe_models.dynamics.excitation import CombinedForces, ConstantForce, ExcitationForce
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.motion import Motion
 from fe_models.dynamics.receptance import RIGID
@@ -69,12 +69,12 @@ class RigModel:
         force = law.respond(law.rest(self.joints), self.still).force
         return np.asarray(force.ravel() @ self.model.connection)
 
-    def shaken(self, law: Law, force: Force) -> Together:
+    def shaken(self, law: Law, force: ExcitationForce) -> CombinedForces:
         """An excitation, with the static load that balances the joints at rest."""
         preload = self.preload(law)
         if not preload.any():
-            return Together((force,))
-        return Together((force, Constant(preload)))
+            return CombinedForces((force,))
+        return CombinedForces((force, ConstantForce(preload)))
 
     def loop(self, motion: Motion) -> tuple[Array, Array]:
         """Mean displacement [mm] and force [N] of all joints ``(t,)``, along one direction."""

@@ -1,4 +1,4 @@
-"""A case of two rig specimens: pressed together, rubbed, and worn in stints of cycles."""
+"""A case of two rig specimens: pressed together, fretted, and worn in cycle blocks."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ class PressAndRub(Section):
     """One normal force after the other, each on unworn specimens."""
 
     normal_forces: Annotated[tuple[Pressing, ...], Field(min_length=1)] = entry(
-        "constant while the pair is rubbed [N]", ["17 N", "87 N", "150 N", "250 N"]
+        "constant while the pair is fretted [N]", ["17 N", "87 N", "150 N", "250 N"]
     )
     stroke: Length = entry("of body 2's ring along x, peak to peak [mm]", "14 um")
 
@@ -128,12 +128,12 @@ class PadGrid(Section):
     )
 
 
-class Stint(Section):
+class CycleBlock(Section):
     """Cycles of constant geometry."""
 
     share: Ratio = entry("of the longest that is stable [1]", 0.5, default=0.5)
     length: Cycles | None = entry(
-        "of every stint instead, refused where it would be unstable [1]", 1000, default=None
+        "of every block instead, refused where it would be unstable [1]", 1000, default=None
     )
 
 
@@ -145,24 +145,24 @@ class Reported(Section):
     cycles: Cycles = entry("when it has become steady [1]", 2.5e6)
 
 
-class StintWear(TwoBodies[EnergyBody]):
+class CycleBlockWear(TwoBodies[EnergyBody]):
     """Depth = coefficient x dissipated energy per area; ends by exactly one of cycles, energy."""
 
     law: Literal["energy"] = entry("energy", "energy")
     cycles: Cycles | None = entry("under each normal force [1]", 3e5, default=None)
     energy: Energy | None = entry("dissipated under each normal force [N*mm]", "1 kJ", default=None)
-    stint: Stint = entry("cycles of constant geometry", default=Stint())
+    cycle_block: CycleBlock = entry("cycles of constant geometry", default=CycleBlock())
     reported: tuple[Reported, ...] = entry("cycles that a source reports", default=())
 
     @model_validator(mode="after")
-    def _ends_once(self) -> StintWear:
+    def _ends_once(self) -> CycleBlockWear:
         if (self.cycles is None) == (self.energy is None):
             given = "neither" if self.cycles is None else "both"
             raise disagreement(f"{given} given; allowed: either cycles or energy", "energy")
         return self
 
     @model_validator(mode="after")
-    def _something_wears(self) -> StintWear:
+    def _something_wears(self) -> CycleBlockWear:
         if self.body_1.coefficient == self.body_2.coefficient == 0.0:
             raise disagreement("0 for both bodies; allowed: one of them at most", "body_1")
         return self
@@ -180,7 +180,7 @@ class SpecimensCase(Case):
     mesh: SpecimenMesh = entry("finite elements of each specimen", default=SpecimenMesh())
     reduction: Reduction = entry("of each specimen", default=Reduction())
     contact: PadGrid = entry("half-space beside the specimens", default=PadGrid())
-    wear: StintWear = entry("law, length of the run and stints")
+    wear: CycleBlockWear = entry("law, length of the run and of its cycle blocks")
 
     def material(self, number: int) -> ElasticMaterial:
         """Material of body ``number``, 1 or 2."""
@@ -197,14 +197,14 @@ class SpecimensCase(Case):
         forces = ", ".join(f"{force:g}" for force in self.load_path.normal_forces)
         nodes = (self.mesh.pad_elements + 1) ** 2
         end = f"{wear.energy:g} N mm" if wear.cycles is None else f"{wear.cycles:g} cycles"
-        share, length = wear.stint.share, wear.stint.length
-        stint = f"{share:.0%} of their limit" if length is None else f"{length:g} cycles"
+        share, length = wear.cycle_block.share, wear.cycle_block.length
+        block = f"{share:.0%} of their limit" if length is None else f"{length:g} cycles"
         cells = " x ".join(map(str, self.contact.grid))
         return [
             ("structure", f"specimens, pad {pad:g} x {pad:g} mm of {nodes} nodes, {shape}"),
             ("load path", f"{forces} N, stroke {self.load_path.stroke:g} mm"),
             ("contact", f"reduced specimens; beside them {cells} cells on a half-space"),
-            ("wear", f"{wear.law}, {end} each, in stints of {stint}"),
+            ("wear", f"{wear.law}, {end} each, in cycle blocks of {block}"),
         ]
 
     @model_validator(mode="after")

@@ -39,7 +39,7 @@ State = TypeVar("State", NormalState, TangentialState)
 
 @dataclass(frozen=True)
 class HalfSpaceState:
-    """One cycle on one shape, as :class:`~fe_models.reduced_contact.RubbedContact` has it.
+    """One cycle on one shape, as :class:`~fe_models.reduced_contact.FrettingCycle` has it.
 
     Fields ``(nx, ny)``: ``pressure`` [MPa], ``shear`` along x at the end of first loading [MPa] and
     ``slip`` of body 2 there [mm]; ``nodal_pressure`` and ``nodal_shear`` ``(n,)`` are their means

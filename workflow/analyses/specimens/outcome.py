@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from fe_models.cycle_blocks import BlockState
 from fe_models.reduced_contact import ReducedPair, VirginCurve
-from fe_models.stints import StintState
 from sa_solver.types import Array
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import BulkCompliance, HalfSpaceState, PadHalfSpace
@@ -16,7 +16,7 @@ from workflow.analyses.specimens.model import SpecimensModel
 class KeptState:
     """A worn state with its ``curve`` of first loading."""
 
-    stint: StintState
+    block: BlockState
     curve: VirginCurve
 
 
@@ -41,12 +41,12 @@ class MarchedCycle:
 class LoadOutcome:
     """Everything found under one normal ``force`` [N].
 
-    ``stints`` are all states, ``kept`` those with fields; ``half_space`` belongs to the first and
+    ``blocks`` are all states, ``kept`` those with fields; ``half_space`` belongs to the first and
     last of them.
     """
 
     force: float
-    stints: tuple[StintState, ...]
+    blocks: tuple[BlockState, ...]
     kept: tuple[KeptState, ...]
     half_space: tuple[HalfSpaceState, HalfSpaceState]
     marched: MarchedCycle

@@ -31,7 +31,7 @@ from workflow.shell.store import ResultsWriter, replacing
 from workflow.shell.versions import versions
 
 if TYPE_CHECKING:
-    from fe_models.stints import StintState
+    from fe_models.cycle_blocks import BlockState
     from workflow.analyses.specimens.half_space import HalfSpaceState
     from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
 
@@ -81,12 +81,12 @@ def _write_results(outcome: SpecimensOutcome, folder: OutputFolder) -> None:
 
 
 def _write_load(writer: ResultsWriter, group: str, load: LoadOutcome, areas: Array) -> None:
-    writer.put(f"{group}/kinetics", **_kinetics(load.stints, areas))
+    writer.put(f"{group}/kinetics", **_kinetics(load.blocks, areas))
     for number, kept in enumerate(load.kept):
         name = f"{group}/states/{number:05d}"
         _write_state(writer, name, kept, areas)
-        writer.file[name].attrs["cycles"] = kept.stint.cycles
-        writer.file[name].attrs["energy"] = kept.stint.energy
+        writer.file[name].attrs["cycles"] = kept.block.cycles
+        writer.file[name].attrs["energy"] = kept.block.energy
     for shape, beside in zip(SHAPES, load.half_space, strict=True):
         _write_half_space(writer, f"{group}/half_space/{shape}", beside)
     marched = load.marched
@@ -97,13 +97,13 @@ def _write_load(writer: ResultsWriter, group: str, load: LoadOutcome, areas: Arr
     )
 
 
-def _kinetics(stints: tuple[StintState, ...], areas: Array) -> dict[str, Array]:
-    """Numbers at the start of every stint, ``(stints + 1,)`` each."""
-    contacts = [state.contact for state in stints]
+def _kinetics(blocks: tuple[BlockState, ...], areas: Array) -> dict[str, Array]:
+    """Numbers at the start of every cycle block, ``(blocks + 1,)`` each."""
+    contacts = [state.contact for state in blocks]
     pressures = [contact.normal.pressure for contact in contacts]
     columns: dict[str, Any] = {
-        "cycles": [state.cycles for state in stints],
-        "energy": [state.energy for state in stints],
+        "cycles": [state.cycles for state in blocks],
+        "energy": [state.energy for state in blocks],
         "energy_per_cycle": [contact.energy for contact in contacts],
         "stick_stiffness": [contact.stick_stiffness for contact in contacts],
         "area": [contact.normal.area for contact in contacts],
@@ -112,25 +112,25 @@ def _kinetics(stints: tuple[StintState, ...], areas: Array) -> dict[str, Array]:
         "pressure_deviation": [pressure_deviation(areas, pressure) for pressure in pressures],
         "friction": [contact.friction for contact in contacts],
         # Infinite where nothing slides.
-        "stint_limit": [contact.stint_limit for contact in contacts],
+        "stable_cycles": [contact.stable_cycles for contact in contacts],
     }
     for body in (0, 1):
-        columns[f"depth_{body + 1}"] = [s.depths[body].max() for s in stints]
-        columns[f"volume_{body + 1}"] = [s.depths[body] @ areas for s in stints]
+        columns[f"depth_{body + 1}"] = [s.depths[body].max() for s in blocks]
+        columns[f"volume_{body + 1}"] = [s.depths[body] @ areas for s in blocks]
     return {name: np.array(values, dtype=np.float64) for name, values in columns.items()}
 
 
 def _write_state(writer: ResultsWriter, group: str, kept: KeptState, areas: Array) -> None:
-    stint, curve = kept.stint, kept.curve
-    contact, loop = stint.contact, masing_loop(curve)
+    block, curve = kept.block, kept.curve
+    contact, loop = block.contact, masing_loop(curve)
     writer.put(
         group,
         pressure=contact.normal.pressure,
         gap=contact.normal.gap,
         shear_x=contact.tangential.shear / areas,
         cycle_slip=contact.cycle_slip,
-        worn_1=stint.depths[0],
-        worn_2=stint.depths[1],
+        worn_1=block.depths[0],
+        worn_2=block.depths[1],
         secant_stiffness=curve.secant_stiffness(SLOPE_SHARE),
     )
     writer.put(f"{group}/loop", ring_displacement=loop.displacement, ring_force=loop.force)

@@ -1,8 +1,8 @@
-"""A run of two specimens: reduced, rubbed and worn under each normal force, and checked beside it.
+"""A run of two specimens: reduced, fretted and worn under each normal force, and checked beside it.
 
-Beside the wear in stints of the reduced pair, on the unworn and the worn shape: the same contact on
-a half-space; and, unworn, the same cycle marched with pressure and both directions of shear
-together, which the uncoupled method and Masing's rule leave out.
+Beside the wear in cycle blocks of the reduced pair, on the unworn and the worn shape: the same
+contact on a half-space; and, unworn, the same cycle marched with pressure and both directions of
+shear together, which the uncoupled method and Masing's rule leave out.
 """
 
 from __future__ import annotations
@@ -11,9 +11,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from fe_models.cycle_blocks import BlockState, CycleBlockError, wear_in_cycle_blocks
 from fe_models.mesh import MeshError
-from fe_models.reduced_contact import ReducedPair, Rubbing, VirginCurve
-from fe_models.stints import StintError, StintState, wear_in_stints
+from fe_models.reduced_contact import FrettingConditions, ReducedPair, VirginCurve
 from sa_solver.types import Array, ElasticPair
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import PadHalfSpace, bulk_compliance
@@ -40,23 +40,23 @@ HALF_SPACE_POINTS = 13
 QUARTER = 16
 # First motion of the marched cycle as a share of half the stroke: nearly all sticks.
 SMALL_MOTION = 1e-3
-# More stints than this, each some milliseconds, are a slip of the pen in the case.
-MOST_STINTS = 20_000
+# More cycle blocks than this, each some milliseconds, are a slip of the pen in the case.
+MOST_BLOCKS = 20_000
 
 
 def run_specimens(case: SpecimensCase, folder: OutputFolder, reporter: Reporter) -> None:
     """Run a case of specimens to its end.
 
-    Raises UserError where the mesher refuses or a stint would be unstable, MethodFailed where a
-    contact does not converge.
+    Raises UserError where the mesher refuses or a cycle block would be unstable, MethodFailed where
+    a contact does not converge.
     """
     reporter.say(f"run: {case.title}")
     try:
         outcome = _compute(case, reporter)
     except MeshError as error:
         raise UserError(f"{folder.case}: {error}") from error
-    except StintError as error:
-        raise UserError(f"{folder.case}: wear.stint.length: {error}") from error
+    except CycleBlockError as error:
+        raise UserError(f"{folder.case}: wear.cycle_block.length: {error}") from error
     write_specimens_output(outcome, folder, reporter)
 
 
@@ -95,85 +95,91 @@ def _rub(
 ) -> LoadOutcome:
     wear, friction = case.wear, case.friction.coefficient
     coefficients = wear.body_1.coefficient, wear.body_2.coefficient
-    rubbing = Rubbing(force, case.load_path.stroke, friction, coefficients)
+    conditions = FrettingConditions(force, case.load_path.stroke, friction, coefficients)
     with reporter.stage("wear"):
-        stints = tuple(_stints(case, pair, model.face.gap, rubbing))
-        kept = tuple(KeptState(own, first_loading(pair, own, rubbing)) for own in _chosen(stints))
+        blocks = tuple(_blocks(case, pair, model.face.gap, conditions))
+        kept = tuple(
+            KeptState(own, first_loading(pair, own, conditions)) for own in _chosen(blocks)
+        )
     grid = half_space.grid
     height = model.specimen.gap(grid.x, grid.y)
-    path = 0.5 * rubbing.stroke * rising(HALF_SPACE_POINTS)
+    path = 0.5 * conditions.stroke * rising(HALF_SPACE_POINTS)
     with reporter.stage("half-space"):
         first, last = (
-            half_space.rub(height, own.stint.depths.sum(axis=0), force, path)
+            half_space.rub(height, own.block.depths.sum(axis=0), force, path)
             for own in (kept[0], kept[-1])
         )
     with reporter.stage("coupled cycle"):
-        marched = marched_cycle(pair, model.face.gap, rubbing)
-    end = stints[-1]
-    reporter.say(f"  {force:g} N: {end.cycles:.4g} cycles in {len(stints) - 1} stints")
-    return LoadOutcome(force, stints, kept, (first, last), marched)
+        marched = marched_cycle(pair, model.face.gap, conditions)
+    end = blocks[-1]
+    reporter.say(f"  {force:g} N: {end.cycles:.4g} cycles in {len(blocks) - 1} cycle blocks")
+    return LoadOutcome(force, blocks, kept, (first, last), marched)
 
 
-def _stints(
-    case: SpecimensCase, pair: ReducedPair, gap: Array, rubbing: Rubbing
-) -> Iterator[StintState]:
+def _blocks(
+    case: SpecimensCase, pair: ReducedPair, gap: Array, conditions: FrettingConditions
+) -> Iterator[BlockState]:
     """The states of a worn pair, up to the end that the case asks for."""
     wear = case.wear
     cycles = np.inf if wear.cycles is None else wear.cycles
     target = np.inf if wear.energy is None else wear.energy
-    states = wear_in_stints(pair, gap, rubbing, cycles, wear.stint.share, wear.stint.length)
+    states = wear_in_cycle_blocks(
+        pair, gap, conditions, cycles, wear.cycle_block.share, wear.cycle_block.length
+    )
     for number, state in enumerate(states):
-        _check(state, number, rubbing, case)
+        _check(state, number, conditions, case)
         yield state
         if state.energy >= target:
             return
 
 
-def _check(state: StintState, number: int, rubbing: Rubbing, case: SpecimensCase) -> None:
+def _check(
+    state: BlockState, number: int, conditions: FrettingConditions, case: SpecimensCase
+) -> None:
     """Raise unless the state has converged and the run comes to an end."""
-    contact, force = state.contact, f"{rubbing.force:g} N"
+    contact, force = state.contact, f"{conditions.force:g} N"
     if not contact.converged:
         raise MethodFailed(
             f"contact at {force} did not converge after {state.cycles:.4g} cycles; change "
-            "mesh.pad_elements or lower wear.stint.share"
+            "mesh.pad_elements or lower wear.cycle_block.share"
         )
     if case.wear.energy is not None and contact.energy == 0.0:
         raise UserError(
             f"wear.energy: nothing slides at {force}, so that it is never dissipated; raise "
             "load_path.stroke or friction.coefficient, or give wear.cycles"
         )
-    if contact.energy > 0.0 and np.isinf(contact.stint_limit):
+    if contact.energy > 0.0 and np.isinf(contact.stable_cycles):
         raise UserError(
             f"mesh.pad_elements: a single node of the pad touches at {force}, too few to wear; "
             "raise it, or load_path.normal_forces"
         )
-    if number > MOST_STINTS or (number == 0 and _stints_needed(state, case) > MOST_STINTS):
+    if number > MOST_BLOCKS or (number == 0 and _blocks_needed(state, case) > MOST_BLOCKS):
         raise UserError(
-            f"wear: more than {MOST_STINTS} stints at {force}; lower the wear coefficients, the "
-            "cycles or the energy, or lengthen wear.stint"
+            f"wear: more than {MOST_BLOCKS} cycle blocks at {force}; lower the wear coefficients, "
+            "the cycles or the energy, or lengthen wear.cycle_block"
         )
 
 
-def _stints_needed(state: StintState, case: SpecimensCase) -> float:
-    """About as many stints as the run takes, as long as the first one."""
+def _blocks_needed(state: BlockState, case: SpecimensCase) -> float:
+    """About as many cycle blocks as the run takes, as long as the first one."""
     wear, contact = case.wear, state.contact
-    stint = wear.stint.share * contact.stint_limit
-    if wear.stint.length is not None:
-        stint = wear.stint.length
+    block = wear.cycle_block.share * contact.stable_cycles
+    if wear.cycle_block.length is not None:
+        block = wear.cycle_block.length
     if wear.cycles is not None:
-        return wear.cycles / stint
+        return wear.cycles / block
     assert wear.energy is not None
-    return wear.energy / (contact.energy * stint)
+    return wear.energy / (contact.energy * block)
 
 
-def _chosen(stints: tuple[StintState, ...]) -> list[StintState]:
+def _chosen(blocks: tuple[BlockState, ...]) -> list[BlockState]:
     """The states to keep with their fields."""
-    if len(stints) <= KEPT_STATES:
-        return list(stints)
-    cycles = np.array([state.cycles for state in stints])
+    if len(blocks) <= KEPT_STATES:
+        return list(blocks)
+    cycles = np.array([state.cycles for state in blocks])
     wanted = np.geomspace(cycles[1], cycles[-1], KEPT_STATES - 1)
     places = np.unique([0, *(int(np.abs(cycles - own).argmin()) for own in wanted)])
-    return [stints[place] for place in places]
+    return [blocks[place] for place in places]
 
 
 def rising(points: int) -> Array:
@@ -182,34 +188,37 @@ def rising(points: int) -> Array:
     return shares
 
 
-def first_loading(pair: ReducedPair, state: StintState, rubbing: Rubbing) -> VirginCurve:
+def first_loading(
+    pair: ReducedPair, state: BlockState, conditions: FrettingConditions
+) -> VirginCurve:
     """First loading to half the stroke on a worn shape."""
-    path = 0.5 * rubbing.stroke * rising(CURVE_POINTS)
-    curve = pair.virgin_curve(state.contact.normal, path, rubbing.friction)
+    path = 0.5 * conditions.stroke * rising(CURVE_POINTS)
+    curve = pair.virgin_curve(state.contact.normal, path, conditions.friction)
     if not curve.converged:
         raise MethodFailed(
-            f"first loading at {rubbing.force:g} N did not converge after {state.cycles:.4g} "
+            f"first loading at {conditions.force:g} N did not converge after {state.cycles:.4g} "
             "cycles; change mesh.pad_elements"
         )
     return curve
 
 
-def marched_cycle(pair: ReducedPair, gap: Array, rubbing: Rubbing) -> MarchedCycle:
+def marched_cycle(pair: ReducedPair, gap: Array, conditions: FrettingConditions) -> MarchedCycle:
     """March the cycle with everything coupled, and compare with the uncoupled method."""
-    small = 0.5 * SMALL_MOTION * rubbing.stroke
-    cycle = pair.coupled_cycle(gap, rubbing, QUARTER, small)
+    small = 0.5 * SMALL_MOTION * conditions.stroke
+    cycle = pair.coupled_cycle(gap, conditions, QUARTER, small)
     if not cycle.converged:
         raise MethodFailed(
-            f"the coupled cycle at {rubbing.force:g} N did not converge; lower friction.coefficient"
+            f"the coupled cycle at {conditions.force:g} N did not converge; lower "
+            "friction.coefficient"
         )
     pressed, moved = cycle.loading[:2]
     pressure = np.array([state.force[2] for state in cycle.states]) / pair.areas
     largest = float((pressed.force[2] / pair.areas).max())
-    uncoupled = pair.tangential(pair.normal(gap, rubbing.force), small, rubbing.friction)
+    uncoupled = pair.tangential(pair.normal(gap, conditions.force), small, conditions.friction)
     return MarchedCycle(
         displacement=cycle.loop.displacement,
         force=cycle.loop.force,
-        energy=(float(cycle.energy.sum()), pair.rub(gap, rubbing).energy),
+        energy=(float(cycle.energy.sum()), pair.fretting_cycle(gap, conditions).energy),
         secant_stiffness=(
             float(pressed.force[0].sum() - moved.force[0].sum()) / small,
             uncoupled.force / small,

@@ -10,8 +10,8 @@ from sa_solver.types import Array
 from workflow.analyses.specimens.half_space import BulkCompliance
 
 if TYPE_CHECKING:
+    from fe_models.cycle_blocks import BlockState
     from fe_models.reduced_contact import ReducedPair
-    from fe_models.stints import StintState
     from workflow.analyses.specimens.case import Reported
     from workflow.analyses.specimens.half_space import HalfSpaceState
     from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
@@ -41,7 +41,7 @@ def explanation(outcome: SpecimensOutcome) -> list[str]:
     bulk, first = outcome.bulk, outcome.loads[0]
     (stiff_z, stiff_x), (half_z, half_x) = bulk.specimens, bulk.half_space
     ring = outcome.case.structure.ring_distance
-    unworn, beside = first.kept[0].stint.contact.normal, first.half_space[0]
+    unworn, beside = first.kept[0].block.contact.normal, first.half_space[0]
     shares = [edge_share(outcome.pair, p) for p in (unworn.pressure, beside.nodal_pressure)]
     softer = ": they lack what a half-space has beside the strips" if bulk.tangential > 0.0 else ""
     held = f": held {ring:g} mm from the pad, where a half-space gives way"
@@ -75,12 +75,12 @@ def tied_pad(bulk: BulkCompliance) -> dict[str, Any]:
 
 def load_summary(outcome: SpecimensOutcome, load: LoadOutcome) -> dict[str, Any]:
     """Everything about one normal force."""
-    end, areas = load.stints[-1], outcome.pair.areas
-    steady = steady_states(outcome.pair, load.stints)
+    end, areas = load.blocks[-1], outcome.pair.areas
+    steady = steady_states(outcome.pair, load.blocks)
     return {
         "normal_force": load.force,
         "cycles": end.cycles,
-        "stints": len(load.stints) - 1,
+        "cycle_blocks": len(load.blocks) - 1,
         "energy": end.energy,
         "volumes": (end.depths @ areas).tolist(),
         "depths": end.depths.max(axis=1).tolist(),
@@ -108,7 +108,7 @@ def _relative(value: float, other: float) -> float:
 def _state_summary(outcome: SpecimensOutcome, load: LoadOutcome, place: int) -> dict[str, Any]:
     """The specimens on one shape, and the half-space beside them; ``place`` 0 or -1."""
     state, beside = load.kept[place], load.half_space[place]
-    contact, areas = state.stint.contact, outcome.pair.areas
+    contact, areas = state.block.contact, outcome.pair.areas
     normal = contact.normal
     return {
         **_stiffness(state),
@@ -126,7 +126,7 @@ def _state_summary(outcome: SpecimensOutcome, load: LoadOutcome, place: int) -> 
 def _stiffness(state: KeptState) -> dict[str, float]:
     """With all that touches stuck, and as the slope of the loop."""
     return {
-        "stick_stiffness": state.stint.contact.stick_stiffness,
+        "stick_stiffness": state.block.contact.stick_stiffness,
         "secant_stiffness": state.curve.secant_stiffness(SLOPE_SHARE),
     }
 
@@ -135,7 +135,7 @@ def _beside(
     outcome: SpecimensOutcome, state: KeptState, beside: HalfSpaceState, force: float
 ) -> dict[str, float]:
     """The half-space, its stiffness corrected by what it lacks, and how its fields differ."""
-    areas, contact = outcome.pair.areas, state.stint.contact
+    areas, contact = outcome.pair.areas, state.block.contact
     shear = contact.tangential.shear / areas
     return {
         "stick_stiffness": beside.stick_stiffness,
@@ -173,14 +173,14 @@ def _difference(areas: Array, field: Array, other: Array) -> float:
     return float(np.sqrt(np.sum(areas * (field - other) ** 2) / size)) if size else 0.0
 
 
-def steady_states(pair: ReducedPair, stints: tuple[StintState, ...]) -> dict[str, StintState]:
+def steady_states(pair: ReducedPair, blocks: tuple[BlockState, ...]) -> dict[str, BlockState]:
     """First states from which stiffness and evenness of pressure stay within ``STEADY``."""
-    stiffness = np.array([state.contact.stick_stiffness for state in stints])
-    pressures = (state.contact.normal.pressure for state in stints)
+    stiffness = np.array([state.contact.stick_stiffness for state in blocks])
+    pressures = (state.contact.normal.pressure for state in blocks)
     deviation = np.array([pressure_deviation(pair.areas, own) for own in pressures])
     return {
-        "stiffness": stints[_settled(stiffness / stiffness[-1])],
-        "pressure": stints[_settled(deviation)],
+        "stiffness": blocks[_settled(stiffness / stiffness[-1])],
+        "pressure": blocks[_settled(deviation)],
     }
 
 

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 
 from fe_models.dynamics.excitation import HammerBlow
-from fe_models.dynamics.frequency_response import (
+from fe_models.dynamics.free_decay import ring_down
+from fe_models.dynamics.impact_hammer import (
     FrequencyResponse,
     SignalError,
     frequency_response,
 )
 from fe_models.dynamics.motion import Motion
-from fe_models.dynamics.ring_down import ring_down
 from sa_solver.types import Array
 from workflow.analyses.rig import excitation as given
 from workflow.analyses.rig.rig_model import RigModel

@@ -6,9 +6,9 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.dynamics.excitation import Force
+from fe_models.dynamics.excitation import ExcitationForce
 from fe_models.dynamics.motion import Motion, Start
-from fe_models.dynamics.newmark import StepControl, integrate
+from fe_models.dynamics.newmark import TimeStepControl, integrate
 from sa_solver.types import Array
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.time.case import RigCase, joules
@@ -16,18 +16,18 @@ from workflow.analyses.time.joint_model import JointModel
 from workflow.errors import MethodFailed
 
 
-def step_control(case: RigCase) -> StepControl:
+def step_control(case: RigCase) -> TimeStepControl:
     """Steps as the case asks for."""
-    return StepControl(case.integration.step, case.integration.tolerance)
+    return TimeStepControl(case.integration.step, case.integration.tolerance)
 
 
 def motion_of(
     rig: RigModel,
     joint: JointModel,
     energy: float,
-    force: Force,
+    force: ExcitationForce,
     duration: float,
-    control: StepControl,
+    control: TimeStepControl,
     start: Start | None = None,
 ) -> Motion:
     """Motion of a rig whose joints have dissipated so much ``energy`` [N mm] before.
@@ -53,7 +53,7 @@ def motion_numbers(rig: RigModel, motion: Motion) -> dict[str, Any]:
     }
 
 
-def motion_curves(rig: RigModel, motion: Motion, force: Force) -> dict[str, Array]:
+def motion_curves(rig: RigModel, motion: Motion, force: ExcitationForce) -> dict[str, Array]:
     """What is kept of a motion."""
     return {
         "time": motion.times,

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 from scipy.interpolate import PchipInterpolator
 
-from fe_models.dynamics.excitation import Harmonic, Recorded
+from fe_models.dynamics.excitation import HarmonicForce, RecordedForce
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.newmark import StepControl
+from fe_models.dynamics.newmark import TimeStepControl
 from sa_solver.types import Array
 from wear.joints.ageing import LongTest
 from workflow.analyses.rig import excitation as given
@@ -88,7 +88,7 @@ def _run_recorded(
     reporter: Reporter,
 ) -> TimeOutcome:
     times, samples = excitation.read()
-    force = Recorded(rig.driven, times, samples)
+    force = RecordedForce(rig.driven, times, samples)
     control, begin = step_control(case), Start(time=float(times[0]))
     states = []
     for energy in case.energies:
@@ -177,8 +177,8 @@ class _SteadyStates:
     def _settle(self, energy: float, start: Start | None) -> SteadyCycle:
         excitation, rig = self._excitation, self._rig
         period = 1.0 / excitation.frequency
-        force = Harmonic(rig.driven, excitation.force, excitation.frequency)
-        control = StepControl(period / self._steps, self._tolerance)
+        force = HarmonicForce(rig.driven, excitation.force, excitation.frequency)
+        control = TimeStepControl(period / self._steps, self._tolerance)
         if start is not None:
             # Where a period begins, whatever came before: times must not lose their digits.
             start = replace(start, time=0.0)

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from fe_models.dynamics.continuation import StepControl
+from fe_models.dynamics.continuation import ContinuationControl
 from fe_models.dynamics.cycle_energy import damping_ratio
 from fe_models.dynamics.forced_response import (
     SAMPLES_PER_PERIOD,
     Accuracy,
-    Branch,
+    ResponseBranch,
     along_force,
     along_frequency,
     finer_resolution,
@@ -43,10 +43,10 @@ STUCK_LOOP = 1e-4
 REPEATED = 3
 
 
-def step_control(case: VibrationCase) -> StepControl:
+def step_control(case: VibrationCase) -> ContinuationControl:
     """How the case wants its curves followed."""
     own = case.continuation
-    return StepControl(
+    return ContinuationControl(
         first=own.first_step,
         least=own.shortest_step,
         most=own.longest_step,
@@ -69,7 +69,7 @@ def accuracy_of(case: VibrationCase) -> Accuracy | None:
 
 def response_under(
     case: VibrationCase, model: VibrationModel, force: float, reporter: Reporter
-) -> tuple[Response, Branch]:
+) -> tuple[Response, ResponseBranch]:
     """What the structure does under a force, and the branch of motions that it was taken from.
 
     Raises MethodFailed where there is no motion at all. A curve that ends before its span does is
@@ -140,7 +140,7 @@ def force_sweep(
 
 def _numbers(
     model: VibrationModel,
-    branch: Branch,
+    branch: ResponseBranch,
     curves: Mapping[str, Array],
     problem: HarmonicBalance,
     resonance: HarmonicSolution,
@@ -167,7 +167,7 @@ def _numbers(
     }
 
 
-def _curves(model: VibrationModel, branch: Branch) -> dict[str, Array]:
+def _curves(model: VibrationModel, branch: ResponseBranch) -> dict[str, Array]:
     solutions = branch.solutions
     seen = model.rig.seen[-1]
     return {
@@ -199,7 +199,7 @@ def share_of(model: VibrationModel, solution: HarmonicSolution, state: int) -> f
     return float((solution.cycle.states[:, model.touching] == state).mean())
 
 
-def _nodes(branch: Branch) -> dict[str, Array]:
+def _nodes(branch: ResponseBranch) -> dict[str, Array]:
     """What each joint does along the curve."""
     cycles = [own.cycle for own in branch.solutions]
     return {
@@ -237,7 +237,7 @@ def _warn_of_stroke(model: VibrationModel, motion: HarmonicSolution, reporter: R
 
 
 def _resonance(
-    model: VibrationModel, branch: Branch, curves: Mapping[str, Array]
+    model: VibrationModel, branch: ResponseBranch, curves: Mapping[str, Array]
 ) -> HarmonicSolution:
     """The motion in which what is looked at moves most: between the points beside the largest.
 
@@ -290,7 +290,7 @@ def _accurate(
 
 
 def _loops(
-    case: VibrationCase, model: VibrationModel, branch: Branch, reporter: Reporter
+    case: VibrationCase, model: VibrationModel, branch: ResponseBranch, reporter: Reporter
 ) -> tuple[Curves, ...]:
     """Loops at the frequency that the case asks for, a resolution after the other."""
     if case.loops is None:

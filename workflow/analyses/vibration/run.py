@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from fe_models.dynamics.cycle_energy import damping_ratio
-from fe_models.dynamics.forced_response import Branch
+from fe_models.dynamics.forced_response import ResponseBranch
 from fe_models.dynamics.harmonics import HarmonicBalanceError
 from fe_models.dynamics.phase_resonance import along_phase_resonance
 from fe_models.dynamics.receptance import ReceptanceError
@@ -89,7 +89,7 @@ def _across(responses: list[Response]) -> dict[str, Any]:
 
 
 def _backbone(
-    case: VibrationCase, model: VibrationModel, branch: Branch, reporter: Reporter
+    case: VibrationCase, model: VibrationModel, branch: ResponseBranch, reporter: Reporter
 ) -> Curves | None:
     """The curve of phase resonance through all forces, from the motions under one of them."""
     span = case.forces[0], case.forces[-1]

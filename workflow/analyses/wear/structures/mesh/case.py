@@ -174,11 +174,11 @@ def _stamp(file: str) -> Stamp:
 
 def described_file(file: Path, size: str | None) -> list[str]:
     """Lines that list what a mesh or CAD file has; ``size`` with its unit. Raises UserError."""
-    from fe_models.geometry.imported import describe, read_bodies
+    from fe_models.geometry.imported import describe_bodies, read_bodies
     from fe_models.mesh import MeshError
 
     try:
-        return describe(read_bodies(file, None if size is None else _length(size)))
+        return describe_bodies(read_bodies(file, None if size is None else _length(size)))
     except MeshError as error:
         raise UserError(str(error)) from error
 

@@ -60,11 +60,11 @@ class ForceLoad(_Load):
         "along the global axes; in the plane per length, N/mm [N]", [0.0, 0.0, "-1 kN"]
     )
 
-    def described(self) -> fe.Force:
+    def described(self) -> fe.BoundaryForce:
         """As the structure takes it."""
-        from fe_models.imported_structure import Force
+        from fe_models.imported_structure import BoundaryForce
 
-        return Force(self.group, np.array(self.force))
+        return BoundaryForce(self.group, np.array(self.force))
 
 
 class DisplacementLoad(_Load):

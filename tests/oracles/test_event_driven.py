@@ -3,10 +3,11 @@
 import numpy as np
 import pytest
 
-from fe_models.dynamics.event_driven import SliderJoints, integrate_exactly
-from fe_models.dynamics.excitation import HammerBlow, Harmonic, Recorded, Together
+from fe_models.dynamics.excitation import CombinedForces, HammerBlow, HarmonicForce, RecordedForce
 from fe_models.dynamics.motion import Start
-from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, two_mass_rig, unit_force
+from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
+from tests.oracles.event_driven import SliderJoints, integrate_exactly
+from tests.oracles.two_mass_rig import two_mass_rig
 
 EXACT = 1e-10
 
@@ -72,11 +73,11 @@ def test_energy_balances_with_every_kind_of_force():
     """Work, damping and friction are integrated apart; they meet to 1e-10."""
     rig = two_mass_rig((21.2e-3, 1.2e-3), (1.4e3, 273e3), 0.01)
     first, second = unit_force(rig, "m1"), unit_force(rig, "m2")
-    force = Together(
+    force = CombinedForces(
         (
-            Harmonic(first, 75.0, 100.0, ramp=0.01),
+            HarmonicForce(first, 75.0, 100.0, ramp=0.01),
             HammerBlow(second, 100.0, 1.3e-3, start=2.1e-3),
-            Recorded(first, np.array([0.004, 0.0073, 0.03]), np.array([0.0, 30.0, -40.0])),
+            RecordedForce(first, np.array([0.004, 0.0073, 0.03]), np.array([0.0, 30.0, -40.0])),
         )
     )
     joints = sliders([27.3e3], [30.0], [880.0])
@@ -142,7 +143,7 @@ def test_the_step_of_the_output_does_not_matter():
     springs = {Link("a"): 400.0, Link("b", "a"): 900.0}
     rig = lumped_rig(masses, springs, [[Link("b")], [Link("b", "a")]], 0.01)
     joints = sliders([1200.0, 700.0], [2.0, 1.1], [30.0, 0.0])
-    force = Harmonic(unit_force(rig, "b"), 6.0, 90.0)
+    force = HarmonicForce(unit_force(rig, "b"), 6.0, 90.0)
     coarse, fine = (integrate_exactly(rig, joints, force, 0.1, step) for step in (5e-3, 1.25e-3))
     largest = np.abs(fine.displacement).max()
     np.testing.assert_allclose(coarse.displacement, fine.displacement[::4], atol=EXACT * largest)
@@ -156,7 +157,7 @@ def test_the_step_of_the_output_does_not_matter():
 def test_equal_joints_side_by_side_slip_together():
     """Twins whose events coincide are one joint of twice the stiffness and limit."""
     rig = lumped_rig({"m": 1e-3}, {Link("m"): 100.0}, [[Link("m")], [Link("m")]], 0.01)
-    force = Harmonic(unit_force(rig, "m"), 5.0, 60.0)
+    force = HarmonicForce(unit_force(rig, "m"), 5.0, 60.0)
     twins = integrate_exactly(rig, sliders([300.0] * 2, [1.0] * 2, [0.0] * 2), force, 0.1, 1e-3)
     one = mass_on_springs(1e-3, 100.0, 0.01)
     single = integrate_exactly(one, sliders([600.0], [2.0], [0.0]), force, 0.1, 1e-3)

@@ -6,11 +6,8 @@ import numpy as np
 import pytest
 from scipy.linalg import expm
 
-from fe_models.dynamics.frequency_response import (
-    SignalError,
-    frequency_response,
-    resonances,
-)
+from fe_models.dynamics.impact_hammer import SignalError, frequency_response
+from tests.oracles.mode_fit import resonances
 
 # The rig with its contact stuck, in t and N/mm: 2 masses, one of 21.2 kg held by 1.4 N/µm.
 MASS = np.diag([21.2e-3, 1.2e-3])

@@ -17,9 +17,9 @@ from itertools import pairwise
 import numpy as np
 import scipy.linalg as sl
 
-from fe_models.dynamics.excitation import Signal
 from fe_models.dynamics.model import DynamicModel
 from sa_solver.types import Array
+from tests.oracles.signals import Signal
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.signal import butter, hilbert, savgol_filter, sosfiltfilt, sosfreqz
 
-from fe_models.dynamics.frequency_response import SignalError
+from fe_models.dynamics.impact_hammer import SignalError
 from sa_solver.types import Array
 
 ORDER = 2

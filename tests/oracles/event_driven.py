@@ -17,12 +17,13 @@ from typing import NamedTuple
 import numpy as np
 from scipy.optimize import brentq
 
-from fe_models.dynamics.excitation import Force, Together
-from fe_models.dynamics.linear_flow import Layout, LinearFlow, unknowns
+from fe_models.dynamics.excitation import CombinedForces, ExcitationForce
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.motion import Energies, Motion, Start, accelerations, quadratic
 from fe_models.dynamics.rig import natural_frequencies
 from sa_solver.types import Array
+from tests.oracles.linear_flow import Layout, LinearFlow, unknowns
+from tests.oracles.signals import breaks, signal_at, single_forces
 
 # Events are looked for in parts of a step, this many in the shortest period: whatever is watched
 # then has one extremum in a part at most.
@@ -59,7 +60,7 @@ class SliderJoints:
 def integrate_exactly(
     model: DynamicModel,
     joints: SliderJoints,
-    excitation: Force | Together | None,
+    excitation: ExcitationForce | CombinedForces | None,
     duration: float,
     step: float,
     start: Start | None = None,
@@ -78,7 +79,7 @@ def integrate_exactly(
     begin = start or Start()
     count = int(np.ceil(duration / step * (1.0 - 1e-12)))
     times = begin.time + step * np.arange(count + 1.0)
-    run = _Run(model, joints, () if excitation is None else excitation.forces, begin, step)
+    run = _Run(model, joints, single_forces(excitation), begin, step)
     rows = [run.row()]
     for time in times[:-1]:
         run.advance(float(time))
@@ -103,13 +104,13 @@ class _Run:
         self,
         model: DynamicModel,
         joints: SliderJoints,
-        forces: Sequence[Force],
+        forces: Sequence[ExcitationForce],
         start: Start,
         step: float,
     ) -> None:
         self._model, self._joints, self._forces, self._step = model, joints, forces, step
         self._flows: dict[tuple[Layout, bytes], LinearFlow] = {}
-        self._breaks = np.unique([time for force in forces for time in force.breaks])
+        self._breaks = np.unique([time for force in forces for time in breaks(force)])
         self._motion = start.motion(len(model.mass))
         stretch, reach = self._stretch(), joints.limit / joints.stiffness
         given = 0.0 if start.joint_state is None else start.joint_state[:, 0]
@@ -139,7 +140,7 @@ class _Run:
         for first, last in pairwise([time, *inside.tolist(), end]):
             # The same number for every step without breaks, of which exponentials are kept.
             length = self._step if len(inside) == 0 else last - first
-            signals = [force.signal(0.5 * (first + last)) for force in self._forces]
+            signals = [signal_at(force, 0.5 * (first + last)) for force in self._forces]
             waves = tuple(tuple(wave.angular for wave in signal.waves) for signal in signals)
             layout = Layout(len(self._motion) // 2, len(self._slip), waves)
             fastest = max([self._highest, *(abs(w) / (2.0 * np.pi) for own in waves for w in own)])
@@ -296,7 +297,7 @@ class _Watched:
 def _motion(
     model: DynamicModel,
     run: _Run,
-    excitation: Force | Together | None,
+    excitation: ExcitationForce | CombinedForces | None,
     times: Array,
     rows: list[_Row],
 ) -> Motion:

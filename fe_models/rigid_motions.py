@@ -1,0 +1,37 @@
+"""Small rigid motions of points: what an unsupported body does without strain."""
+
+from __future__ import annotations
+
+import numpy as np
+import scipy.sparse as sp
+from scipy.sparse.linalg import cg
+
+from sa_solver.types import Array
+
+
+def rigid_body_modes(
+    nodes: Array, axes: tuple[int, ...] = (0, 1, 2), transformation: sp.csr_matrix | None = None
+) -> Array:
+    """Translations and small rotations ``(d n, k)`` of ``nodes`` ``(n, 3)``, d their ``axes``.
+
+    Rotations are about the centre and of the size of the translations. With the ``transformation``
+    ``(d n, free)`` of constraints, u = T u_free, the nearest motions that it leaves, ``(free, k)``.
+    """
+    arms = nodes - nodes.mean(axis=0)
+    modes = rigid_motions(arms / np.abs(arms).max(), axes)
+    modes = modes[:, np.any(modes, axis=0)]
+    if transformation is None:
+        return modes
+    t = transformation
+    # T'T is all but diagonal, so that a few iterations suffice.
+    return np.stack([cg(t.T @ t, t.T @ mode, rtol=1e-12)[0] for mode in modes.T], axis=1)
+
+
+def rigid_motions(arms: Array, axes: tuple[int, ...] = (0, 1, 2)) -> Array:
+    """Unit translations and unit rotations about the origin of points ``(n, 3)``, ``(d n, 6)``.
+
+    Along the d global ``axes``; motions across a plane are zero in it.
+    """
+    turned = np.cross(np.eye(3)[:, None, :], arms)
+    shifted = np.broadcast_to(np.eye(3)[:, None, :], turned.shape)
+    return np.concatenate([shifted, turned])[..., axes].reshape(6, -1).T
