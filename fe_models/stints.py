@@ -8,13 +8,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.reduced_contact import ReducedPair, RubbedContact, Rubbing
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 
 # Share of the stability limit that a stint takes: 0.5 damps the stiffest error without overshoot.
 STINT_SHARE = 0.5
 
 
-class StintError(ValueError):
+class StintError(InputError):
     """A stint of constant geometry would be unstable; the message says which length is not."""
 
 

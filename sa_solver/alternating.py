@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from sa_solver.coupled_problem import RESULTANTS
+from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalState
 from sa_solver.tangential import TangentialContact, TangentialState
@@ -94,7 +95,7 @@ class AlternatingContact:
             changes.append(_change(lift, last, pressed))
             settled = changes[-1] <= tolerance
         if pressed is None or sheared is None:
-            raise ValueError(f"max_rounds = {max_rounds} leaves nothing to do: give 1 or more")
+            raise InputError(f"max_rounds = {max_rounds} leaves nothing to do: give 1 or more")
         converged = settled and pressed.converged and sheared.converged
         return AlternatingState(
             traction=np.stack([*sheared.shear, pressed.pressure]),

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from sa_solver.ciavarella_jaeger import first_loading
 from sa_solver.coupled import CoupledContact, CoupledStart, CoupledState
+from sa_solver.errors import InputError
 from sa_solver.friction_limit import largest_share
 from sa_solver.gross_slip import (
     Direction,
@@ -56,7 +57,7 @@ TANGENTIAL = (1, 2, 5)
 """Places of P, Mx, My and of Qx, Qy, Mz among the six resultants (P, Qx, Qy, Mx, My, Mz)."""
 
 
-class FrictionError(ValueError):
+class FrictionError(InputError):
     """The friction coefficient is not a number of 0 or more."""
 
 

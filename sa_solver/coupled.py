@@ -27,6 +27,7 @@ from sa_solver.coupled_problem import (
     RigidMotions,
     residuals,
 )
+from sa_solver.errors import ContactProblemError
 from sa_solver.friction_limit import largest_share
 from sa_solver.half_space import (
     ALL,
@@ -89,7 +90,7 @@ TANGENTIAL, TILTS = (1, 2, 5), (3, 4)
 """Qx, Qy and Mz, and Mx and My, among the resultants."""
 
 
-class CoupledContactError(ValueError):
+class CoupledContactError(ContactProblemError):
     """The data of a coupled contact problem admit no solution."""
 
 

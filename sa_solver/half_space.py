@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.fft
 
+from sa_solver.errors import InputError
 from sa_solver.influence import X, Y, Z, rectangle_influence, strip_influence
 from sa_solver.transform import SpectralFilter, Transform, plan_transform
 from sa_solver.types import Array, ElasticPair, Grid
@@ -46,12 +47,12 @@ class HalfSpace:
     ) -> None:
         """``datum`` [mm] is for line grids: how far from a line force its displacement vanishes.
 
-        Raises ValueError for a datum shorter than the grid.
+        Raises InputError for a datum shorter than the grid.
         """
         self.grid, self.pair, self.threads = grid, pair, threads
         self.datum = DATUM * grid.size[0] if datum is None else datum
         if grid.line and not grid.size[0] <= self.datum < np.inf:
-            raise ValueError(
+            raise InputError(
                 f"datum {self.datum:g} mm is not between the width of the grid, "
                 f"{grid.size[0]:g} mm, and infinity: give the depth of the bodies"
             )

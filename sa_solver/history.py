@@ -19,6 +19,7 @@ from typing import Literal
 import numpy as np
 
 from sa_solver.contact import NORMAL, TANGENTIAL, ContactState, FrictionalContact, Load
+from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.types import Array
 
@@ -28,7 +29,7 @@ STRAIGHT = 1e-9
 """How far two increments of the shear load may be from parallel: rounding of a straight leg."""
 
 
-class HistoryError(ValueError):
+class HistoryError(InputError):
     """The method asked for does not suffice for the load path."""
 
 

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from sa_solver.disk_gradient import gradients_on_disks
 from sa_solver.disk_newton import DiskSolution, newton_on_disks
+from sa_solver.errors import ContactProblemError
 from sa_solver.friction_limit import largest_share
 from sa_solver.half_space import HalfSpace
 from sa_solver.tangential_levels import ShearLevel
@@ -50,7 +51,7 @@ NAMES = ("Qx", "Qy", "Mz")
 UNITS = ("N", "N", "N mm")
 
 
-class TangentialContactError(ValueError):
+class TangentialContactError(ContactProblemError):
     """The data of a tangential contact problem admit no solution."""
 
 

@@ -27,6 +27,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, cg
 
 from sa_solver.contact import ContactState, FrictionalContact, Load
+from sa_solver.errors import ConvergenceError, InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.influence import Z
 from sa_solver.types import Array
@@ -48,11 +49,11 @@ STUCK_ITERATIONS = 2000
 Axis = Literal["x", "y"]
 
 
-class LoopError(ValueError):
+class LoopError(InputError):
     """The loop asked for makes no sense."""
 
 
-class LoopFailure(RuntimeError):
+class LoopFailure(ConvergenceError):
     """An increment of the loop, or its stuck contact, did not converge."""
 
 

@@ -10,14 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from sa_solver.contact import ContactState, FrictionalContact, Load
-from sa_solver.coupled import CoupledContactError
-from sa_solver.normal import NormalContactError
-from sa_solver.tangential import TangentialContactError
+from sa_solver.errors import ContactProblemError
 from sa_solver.types import Array, LoadHistory
 from wear.stepping import ContactFailure
-
-# Loads that no contact can carry.
-IMPOSSIBLE = (NormalContactError, TangentialContactError, CoupledContactError)
 
 
 def full_cycle(
@@ -90,7 +85,7 @@ def _advance(
         return contact.apart(height)
     try:
         state = contact.advance(before, height, load)
-    except IMPOSSIBLE as error:
+    except ContactProblemError as error:
         raise ContactFailure(f"increment {t + 1}: {error}") from error
     if not state.converged:
         raise ContactFailure(f"increment {t + 1}: {state.message}")

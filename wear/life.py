@@ -28,6 +28,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array, Material
 from wear.smallest_circle import smallest_circle
 
@@ -47,7 +48,7 @@ AWAY = np.radians(30.0)
 """Angle from the best plane beyond which another is a rival, not its neighbour."""
 
 
-class StressHistoryError(ValueError):
+class StressHistoryError(InputError):
     """A stress history, or a parameter of fatigue, that has no meaning."""
 
 

@@ -28,6 +28,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array, Grid
 
 LEAST_RESOLVED = 1.5
@@ -45,7 +46,7 @@ GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
 """Gauss points of the unit interval, of weight one half."""
 
 
-class TravelError(ValueError):
+class TravelError(InputError):
     """What wears is carried beyond the grid."""
 
 

@@ -28,6 +28,7 @@ from functools import cached_property
 
 import numpy as np
 
+from sa_solver.errors import ConvergenceError
 from sa_solver.influence import Z
 from sa_solver.normal import NormalContact, NormalStart, NormalState
 from sa_solver.transform import SpectralFilter
@@ -43,7 +44,7 @@ States = dict[int, NormalState]
 Starts = dict[int, NormalStart]
 
 
-class ContactFailure(RuntimeError):
+class ContactFailure(ConvergenceError):
     """The half-space solver did not converge; the message is its own."""
 
 

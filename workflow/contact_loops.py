@@ -15,6 +15,7 @@ import h5py
 import numpy as np
 
 from sa_solver.contact import FrictionalContact
+from sa_solver.errors import ContactProblemError
 from sa_solver.tangential_loop import (
     CLOSED,
     MOST_CYCLES,
@@ -23,7 +24,6 @@ from sa_solver.tangential_loop import (
     tangential_loop,
 )
 from sa_solver.types import Array
-from wear.full_cycle import IMPOSSIBLE
 from wear.stepping import ContactFailure
 from workflow.case.loops import Loops
 from workflow.errors import UserError
@@ -77,7 +77,7 @@ def worn_loop(
     path = loop_path(loops, name, state, peak)
     try:
         loop = tangential_loop(contact, state.surfaces.gap, path)
-    except (LoopFailure, *IMPOSSIBLE) as error:
+    except (LoopFailure, ContactProblemError) as error:
         raise ContactFailure(
             f"tangential loop: {error}; allowed: lower loops.force or loops.amplitude"
         ) from error

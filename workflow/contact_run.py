@@ -3,19 +3,14 @@
 from __future__ import annotations
 
 from sa_solver.contact import ContactState
-from sa_solver.coupled import CoupledContactError
+from sa_solver.errors import ContactProblemError
 from sa_solver.history import History, HistoryError, march
-from sa_solver.normal import NormalContactError
-from sa_solver.tangential import TangentialContactError
 from workflow.bodies import bodies_of, grid_of, half_space_of, height_of, path_of
 from workflow.case import ContactCase, LineContactCase
 from workflow.contact_output import ContactOutcome, write_contact_output, write_contact_results
 from workflow.errors import MethodFailed, UserError
 from workflow.folder import OutputFolder
 from workflow.reporter import Reporter
-
-# Loads that the contact cannot carry.
-IMPOSSIBLE = (NormalContactError, TangentialContactError, CoupledContactError)
 
 
 def run_contact(
@@ -69,7 +64,7 @@ def _march(
             )
         except HistoryError as error:
             raise UserError(f"{folder.case}: contact.history: {error}") from error
-        except IMPOSSIBLE as error:
+        except ContactProblemError as error:
             reached = max(passed, default=-1) + 1
             message = f"after increment {reached} of {len(table)}: {error}"
             history = History(list(passed.values()), list(passed), "full", "ended early")

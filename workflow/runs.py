@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workflow.case import Case
-from workflow.errors import FretscaleError, one_line
+from workflow.errors import Ending, one_line
 from workflow.runs_job import Finished, Job, Kept, cores_of, finished, kept_in, run_job
 
 __all__ = ["Finished", "Job", "Kept", "kept_in", "run_jobs"]
@@ -53,7 +53,7 @@ def run_jobs(
     for job in jobs:
         try:
             case = job.load()
-        except FretscaleError as error:
+        except Ending as error:
             end(job, one_line(error))
             continue
         if kept_in(out / job.name, case) == "finished":

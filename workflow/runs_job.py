@@ -29,7 +29,7 @@ from workflow.case import (
     dump_case,
     load_case,
 )
-from workflow.errors import FretscaleError, MethodFailed, UserError, one_line
+from workflow.errors import Ending, MethodFailed, UserError, one_line
 from workflow.folder import OutputFolder
 from workflow.workers import THREAD_SETTINGS
 
@@ -117,7 +117,7 @@ def compute(job: Job, out: Path) -> None:
     """Bring a job to its end, from where its folder has got to.
 
     A finished run of the same case stays, an unfinished wear run goes on from its last jump, and
-    what else the folder has of earlier runs gives way. Raises FretscaleError.
+    what else the folder has of earlier runs gives way. Raises Ending.
     """
     case, root = job.load(), out / job.name
     _refuse_foreign(root)
@@ -177,7 +177,7 @@ def main() -> None:
     error = ""
     try:
         compute(job, Path(given["out"]))
-    except FretscaleError as ending:
+    except Ending as ending:
         error = str(ending)
     except Exception as ending:
         error = f"{type(ending).__name__}: {ending}"

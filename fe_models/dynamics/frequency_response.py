@@ -22,6 +22,7 @@ from typing import Literal
 import numpy as np
 from scipy.signal import find_peaks
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 
 Quantity = Literal["receptance", "mobility", "accelerance"]
@@ -38,7 +39,7 @@ HALF_POWER = 0.5
 """A resonance is fitted where the response squared is above this share of its peak."""
 
 
-class SignalError(ValueError):
+class SignalError(InputError):
     """Records that say nothing about a structure."""
 
 

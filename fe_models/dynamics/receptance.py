@@ -15,6 +15,7 @@ import numpy as np
 import scipy.linalg as sl
 
 from fe_models.dynamics.model import DynamicModel
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 
 ComplexArray = np.ndarray
@@ -30,7 +31,7 @@ HELD = 1e-2
 DIAGONAL = 1e-10
 
 
-class ReceptanceError(ValueError):
+class ReceptanceError(InputError):
     """A structure without a steady motion."""
 
 

@@ -23,6 +23,7 @@ from functools import cached_property
 
 import numpy as np
 
+from sa_solver.errors import InputError
 from sa_solver.reference.hertz import Sphere
 from sa_solver.reference.masing import superpose
 from sa_solver.types import Array, ElasticPair, Material
@@ -34,7 +35,7 @@ class ShearedSphere:
 
     ``friction`` is µ. Tangential forces are those on body 2, displacements those of body 1 relative
     to body 2 far from the contact: they have the same sign on first loading. Methods raise
-    ``ValueError`` beyond |Q| = µP.
+    ``InputError`` beyond |Q| = µP.
     """
 
     load: float
@@ -111,5 +112,5 @@ class ShearedSphere:
         """1 - |Q| / µP, what is left before sliding."""
         reserve = 1.0 - abs(tangential) / self.sliding_force
         if reserve < 0.0:
-            raise ValueError(f"Q = {tangential} N slides: it is beyond µP = {self.sliding_force} N")
+            raise InputError(f"Q = {tangential} N slides: it is beyond µP = {self.sliding_force} N")
         return reserve

@@ -32,6 +32,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import ellipe, elliprd, elliprj
 
+from sa_solver.errors import InputError
 from sa_solver.reference.hertz import Sphere
 from sa_solver.reference.masing import superpose
 from sa_solver.types import Array, ElasticPair, Material
@@ -45,7 +46,7 @@ class TwistedSphere:
     """Sphere of relative ``radius`` [mm] under a constant ``load`` [N], twisted about its normal.
 
     ``friction`` is µ. Moments are those on body 2, twists those of body 1 relative to body 2: they
-    have the same sign on first loading. Methods raise ``ValueError`` beyond the sliding moment.
+    have the same sign on first loading. Methods raise ``InputError`` beyond the sliding moment.
     """
 
     load: float
@@ -81,7 +82,7 @@ class TwistedSphere:
         """c [mm] on first loading to ``moment`` [N mm]."""
         target = abs(moment)
         if target > self.sliding_moment:
-            raise ValueError(
+            raise InputError(
                 f"Mz = {moment} N mm slides: it is beyond 3πµPa/16 = {self.sliding_moment} N mm"
             )
 

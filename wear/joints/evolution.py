@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 from wear.evolution import EnergyTable
 
@@ -55,7 +56,7 @@ class Logarithmic:
 
     def __post_init__(self) -> None:
         if not self.rate >= 0.0:
-            raise ValueError(f"rate = {self.rate:g}: a logarithm of energies needs 0 or more")
+            raise InputError(f"rate = {self.rate:g}: a logarithm of energies needs 0 or more")
 
     def __call__(self, energy: Array | float) -> Array:
         return np.asarray(1.0 + self.change * np.log1p(self.rate * np.asarray(energy)))
@@ -70,7 +71,7 @@ class Arrhenius:
 
     def __post_init__(self) -> None:
         if not self.scale > 0.0:
-            raise ValueError(f"scale = {self.scale:g}: an energy scale is above 0")
+            raise InputError(f"scale = {self.scale:g}: an energy scale is above 0")
 
     def __call__(self, energy: Array | float) -> Array:
         energy = np.asarray(energy, dtype=np.float64)
@@ -107,7 +108,7 @@ class Exponentials:
     def __post_init__(self) -> None:
         for name in ("rate", "second_rate"):
             if not getattr(self, name) <= 0.0:
-                raise ValueError(f"{name} = {getattr(self, name):g}: wear dies out at 0 or below")
+                raise InputError(f"{name} = {getattr(self, name):g}: wear dies out at 0 or below")
 
     def __call__(self, energy: Array | float) -> Array:
         energy = np.asarray(energy)
@@ -121,7 +122,7 @@ class Table:
     """``values`` of a parameter at ``energies`` [N mm], which ascend.
 
     Linear between them, hence as monotone as they are, and constant beyond both ends. Raises
-    ValueError for no or unequal columns or energies that do not ascend.
+    InputError for no or unequal columns or energies that do not ascend.
     """
 
     energies: tuple[float, ...]
@@ -154,7 +155,7 @@ class JointEvolution:
     def at(self, law: Law, energy: Array | float) -> Law:
         """The ``law``, whose parameters are the initial ones, after an ``energy`` [N mm].
 
-        ``energy`` is one of all joints, or ``(n,)``, one of each. Raises ValueError for a law
+        ``energy`` is one of all joints, or ``(n,)``, one of each. Raises InputError for a law
         without a parameter that is to evolve.
         """
         values = self.values(law, energy)
@@ -167,7 +168,7 @@ class JointEvolution:
         for name, function in self._functions():
             initial = getattr(law, name, None)
             if initial is None:
-                raise ValueError(f"{type(law).__name__} has no {name} that could evolve")
+                raise InputError(f"{type(law).__name__} has no {name} that could evolve")
             value = function(energy)
             scale = np.ones_like(initial) if isinstance(function, Table) else np.asarray(initial)
             found[name] = np.maximum(value * scale, 0.0)

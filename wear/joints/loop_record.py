@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.signal import savgol_filter
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array, Indices
 
 REVERSAL = 0.5
@@ -44,7 +45,7 @@ SIGNAL = 0.5
 """Share of what smoothing takes that may go from sample to sample alike: motion then, not noise."""
 
 
-class MeasuredLoopError(ValueError):
+class MeasuredLoopError(InputError):
     """A record that holds no loop, or not what is asked of it."""
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 from wear.joints.law import JointResponse, State
 
@@ -19,7 +20,7 @@ Parameter = float | Array
 Kernel = Callable[[Array, Array, Array], tuple[Array, Array, Array, Array]]
 
 
-class JointError(ValueError):
+class JointError(InputError):
     """Parameters that a joint law cannot have, or arrays that do not fit its joints."""
 
 
