@@ -15,10 +15,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sa_solver.coupled_problem import RESULTANTS
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalState
+from sa_solver.rigid_modes import RESULTANTS
 from sa_solver.tangential import TangentialContact, TangentialState
 from sa_solver.types import Array
 

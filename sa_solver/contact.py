@@ -32,13 +32,13 @@ from sa_solver.gross_slip import (
 )
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalStart, NormalState
+from sa_solver.rigid_modes import NORMAL, PLANAR, PlanarModes
 from sa_solver.tangential import (
     FrictionLimitError,
     TangentialContact,
     TangentialContactError,
     TangentialState,
 )
-from sa_solver.tangential_problem import PlanarModes
 from sa_solver.types import Array
 
 GROSS_SHARE = 0.99
@@ -51,10 +51,6 @@ ROUNDING = 1e-12
 
 SHARE_CHECKED = 0.5
 """Share of µP or of its moment from which the largest force is computed."""
-
-NORMAL = (0, 3, 4)
-TANGENTIAL = (1, 2, 5)
-"""Places of P, Mx, My and of Qx, Qy, Mz among the six resultants (P, Qx, Qy, Mx, My, Mz)."""
 
 
 class FrictionError(InputError):
@@ -236,7 +232,7 @@ class FrictionalContact:
     ) -> TangentialState:
         names = ("Qx", "Qy", "Mz"), ("shift_x", "shift_y", "twist")
         imposed: dict[str, float] = {}
-        for place, k in enumerate(TANGENTIAL):
+        for place, k in enumerate(PLANAR):
             own = load.values[k] - (before.rigid[k] if load.motion[k] else 0.0)
             imposed[names[load.motion[k]][place]] = float(own)
         if self.grid.line:
@@ -312,10 +308,10 @@ class FrictionalContact:
         if load.energy.sum() <= 0.0:
             return False
         modes = self._modes
-        forces = load.values[[TANGENTIAL[k] for k in modes.free]]
+        forces = load.values[[PLANAR[k] for k in modes.free]]
         target = forces / (modes.lengths * self.grid.cell_area)
         carried = float(limit.sum())
-        if any(load.motion[k] for k in TANGENTIAL) or carried == 0.0:
+        if any(load.motion[k] for k in PLANAR) or carried == 0.0:
             return False
         if np.linalg.norm(target) < SHARE_CHECKED * carried:
             return False
@@ -336,9 +332,9 @@ class FrictionalContact:
     ) -> ContactState:
         shift = np.array([tangential.shift_x, tangential.shift_y, tangential.twist])
         rigid = np.array([normal.approach, 0.0, 0.0, normal.tilt_x, normal.tilt_y, 0.0])
-        rigid[list(TANGENTIAL)] = before.rigid[list(TANGENTIAL)] + shift
+        rigid[list(PLANAR)] = before.rigid[list(PLANAR)] + shift
         resultants = np.array([normal.P, 0.0, 0.0, normal.Mx, normal.My, 0.0])
-        resultants[list(TANGENTIAL)] = tangential.Qx, tangential.Qy, tangential.Mz
+        resultants[list(PLANAR)] = tangential.Qx, tangential.Qy, tangential.Mz
         messages = [own for own in (normal.message, tangential.message) if own]
         return ContactState(
             traction=np.stack([*tangential.shear, normal.pressure]),
@@ -379,13 +375,13 @@ class FrictionalContact:
             state = self._slide_together(before, height, offset, load, limit)
         else:
             values = load.values.copy()
-            for k in TANGENTIAL:
+            for k in PLANAR:
                 values[k] -= before.rigid[k] if load.motion[k] else 0.0
             state = self._coupled.solve(
                 height, offset, values, load.motion, tolerance=self.tolerance, start=before.start
             )
         rigid = state.rigid.copy()
-        rigid[list(TANGENTIAL)] += before.rigid[list(TANGENTIAL)]
+        rigid[list(PLANAR)] += before.rigid[list(PLANAR)]
         pressed = state.pressure > 0.0
         limit = self.friction * state.pressure
         return ContactState(

@@ -172,21 +172,27 @@ def continued(kernel: Array, axis: int, period: int, odd: bool) -> Array:
 class HalfSpaceResolvent:
     """``(K + ρ)⁻¹`` on the zero-padded grid, where K is circulant and the inverse exact.
 
-    Fields have the shape ``padded``; the grid is their first ``(nx, ny)`` block.
+    Fields have the shape ``(c, *padded)``; the grid is their first ``(nx, ny)`` block.
     """
 
-    def __init__(self, half_space: HalfSpace, components: Components) -> None:
-        """Plan for tractions with these ``components``."""
-        self.padded = half_space.padded
-        self._half_space = half_space
+    def __init__(
+        self, half_space: HalfSpace, components: Components, share: float | Array = SHIFT
+    ) -> None:
+        """Plan for tractions with these ``components``.
+
+        ``share``, a number or ``(c,)``, is ρ over the geometric mean of K's extreme eigenvalues.
+        """
+        self.padded_shape = half_space.padded
+        self._half_space, self._shape = half_space, half_space.grid.shape
         largest = max(float(half_space.symbol(k, k).max()) for k in components)
         smallest = SMALLEST_EIGENVALUE * min(half_space.self_compliance(k) for k in components)
-        self.shift = SHIFT * float(np.sqrt(largest * smallest))
-        """ρ [mm/MPa]."""
+        mean = float(np.sqrt(largest * smallest))
+        self.shift = (share * np.full(len(components), mean))[:, None, None]
+        """ρ of each component ``(c, 1, 1)`` [mm/MPa]."""
         symbols = [[half_space.symbol(i, j) for j in components] for i in components]
         for k, row in enumerate(symbols):
-            row[k] = row[k] + self.shift
-        transform = half_space.transform(self.padded, self.padded, len(components))
+            row[k] = row[k] + self.shift[k]
+        transform = half_space.transform(self.padded_shape, self.padded_shape, len(components))
         inverse = inverse_symbols(symbols)
         self._filter = spectral_filter(transform, inverse, components, components)
 
@@ -194,6 +200,16 @@ class HalfSpaceResolvent:
         """Traction ``(K + ρ)⁻¹ u`` for ``u`` ``(c, mx, my)`` on the padded grid [mm] → [MPa]."""
         self._half_space.count += 1
         return self._filter.apply(displacement)
+
+    def padded(self, fields: Array) -> Array:
+        """``fields`` ``(c, nx, ny)`` continued by zero to the padded grid."""
+        out = np.zeros((len(fields), *self.padded_shape))
+        self.on_grid(out)[:] = fields
+        return out
+
+    def on_grid(self, fields: Array) -> Array:
+        """The part of ``fields`` ``(c, mx, my)`` that lies on the grid."""
+        return fields[:, : self._shape[0], : self._shape[1]]
 
 
 def inverse_symbols(symbols: list[list[Array]]) -> list[list[Array]]:

@@ -18,9 +18,10 @@ from typing import Literal
 
 import numpy as np
 
-from sa_solver.contact import NORMAL, TANGENTIAL, ContactState, FrictionalContact, Load
+from sa_solver.contact import ContactState, FrictionalContact, Load
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
+from sa_solver.rigid_modes import NORMAL, PLANAR
 from sa_solver.types import Array
 
 Method = Literal["full", "reversals", "ciavarella_jaeger"]
@@ -59,7 +60,7 @@ class LoadPath:
     def shear(self) -> Array:
         """Shear load and mismatch strain, ``(n, 4)``: Qx, Qy, Mz (or their motions), strain."""
         strain = np.zeros(len(self)) if self.strain is None else self.strain
-        return np.column_stack([self.values[:, list(TANGENTIAL)], strain])
+        return np.column_stack([self.values[:, list(PLANAR)], strain])
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,9 @@ from sa_solver.few_cells import solve_few_cells
 from sa_solver.half_space import HalfSpace
 from sa_solver.nested_grids import Transfer, coarsened
 from sa_solver.normal_problem import Iterate, NormalProblem, residuals
-from sa_solver.normal_splitting import split
+from sa_solver.normal_splitting import solve_by_splitting
 from sa_solver.preconditioner import NormalPreconditioner
-from sa_solver.rigid_modes import APPROACH, TILT_X, TILT_Y, RigidModes
+from sa_solver.rigid_modes import APPROACH, TILT_X, TILT_Y, NormalModes
 from sa_solver.types import Array, Grid
 
 GRADIENT_ITERATIONS = 200
@@ -132,7 +132,7 @@ class NestedSolver:
             return Solution(few, iterations + steps, "active set")
         rigid = np.zeros(len(problem.modes.free))
         last = Iterate(pressure, problem.displacement(pressure), rigid)
-        iterate, more = split(problem, last, tolerance)
+        iterate, more = solve_by_splitting(problem, last, tolerance)
         return Solution(iterate, iterations + steps + more, "splitting")
 
     # -- coarser grids ------------------------------------------------------------------------
@@ -165,7 +165,7 @@ class NestedSolver:
             problem,
             height=transfer.averaged(problem.height),
             target=problem.target * (transfer.fine.cell_area / grid.cell_area),
-            modes=RigidModes.on(grid, problem.modes.free),
+            modes=NormalModes.on(grid, problem.modes.free),
             half_space=self.half_space,
             compliance=None if compliance is None else transfer.averaged(compliance),
         )

@@ -29,7 +29,7 @@ from sa_solver.normal_problem import (
     border_share,
     residuals,
 )
-from sa_solver.rigid_modes import APPROACH, RigidModes, mode_lengths
+from sa_solver.rigid_modes import APPROACH, NormalModes, mode_lengths
 from sa_solver.separation import separating_tilt
 from sa_solver.types import Array
 
@@ -155,7 +155,7 @@ class NormalContact:
         self, height: Array, control: NormalControl, compliance: Array | None
     ) -> NormalProblem:
         """The problem left when imposed motions are taken off the heights."""
-        modes = RigidModes.on(self.grid, control.free)
+        modes = NormalModes.on(self.grid, control.free)
         target = control.sums(self.grid, modes.free)
         delta, phi_x, phi_y = control.motions
         if delta or phi_x or phi_y:

@@ -23,11 +23,10 @@ from sa_solver.disk_newton import DiskSolution, newton_on_disks
 from sa_solver.errors import ContactProblemError
 from sa_solver.friction_limit import largest_share
 from sa_solver.half_space import HalfSpace
+from sa_solver.rigid_modes import PlanarModes, Window
 from sa_solver.tangential_levels import ShearLevel
-from sa_solver.tangential_problem import PlanarModes, TangentialProblem
+from sa_solver.tangential_problem import TangentialProblem
 from sa_solver.types import Array
-
-Window = tuple[slice, slice]
 
 TOLERANCE = 1e-8
 """Default bound on every residual of :class:`TangentialResiduals`."""
