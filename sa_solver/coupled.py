@@ -23,7 +23,7 @@ from sa_solver.contact_law import coulomb
 from sa_solver.coupled_problem import (
     CoupledProblem,
     CoupledResiduals,
-    residuals,
+    coupled_residuals,
 )
 from sa_solver.errors import ContactProblemError
 from sa_solver.friction_limit import largest_share
@@ -306,7 +306,7 @@ class CoupledContact:
             gap=relative[Z],
             rigid=(rigid + problem.imposed) / self._modes.lengths,
             resultants=self._modes.resultants(traction),
-            residuals=residuals(problem, traction, displacement, relative),
+            residuals=coupled_residuals(problem, traction, displacement, relative),
             converged=False,
             message="",
             iterations=0,

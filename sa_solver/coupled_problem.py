@@ -82,7 +82,7 @@ class CoupledResiduals:
         return max(self.force, self.moment, self.penetration, self.complementarity, self.coulomb)
 
 
-def residuals(
+def coupled_residuals(
     problem: CoupledProblem, traction: Array, displacement: Array, relative: Array
 ) -> CoupledResiduals:
     """All residuals of a state: ``t``, ``K t`` and ``v``, each ``(3, nx, ny)``."""

@@ -20,8 +20,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from sa_solver.rigid_modes import RANK_CUTOFF
-from sa_solver.tangential_problem import Mask, TangentialProblem, dot, squared
-from sa_solver.types import Array
+from sa_solver.tangential_problem import TangentialProblem, dot, squared
+from sa_solver.types import Array, Mask
 
 SETTLED = 0.3
 STEADY = 0.05

@@ -32,7 +32,7 @@ SMALLEST_EIGENVALUE = 0.5
 ones (0.2) and lines (0.1). It only sets ρ, not the solution."""
 
 Components = tuple[int, ...]
-Shape = tuple[int, int]
+GridShape = tuple[int, int]
 
 
 class HalfSpace:
@@ -59,8 +59,8 @@ class HalfSpace:
         self.padded = padded_shape(grid)
         self.count = 0
         self._filters: dict[tuple[Components, Components], SpectralFilter] = {}
-        self._symbols: dict[tuple[int, int, Shape], Array] = {}
-        self._transforms: dict[tuple[Shape, Shape, int], Transform] = {}
+        self._symbols: dict[tuple[int, int, GridShape], Array] = {}
+        self._transforms: dict[tuple[GridShape, GridShape, int], Transform] = {}
 
     def normal(self, pressure: Array) -> Array:
         """``u_z`` under ``pressure`` alone, both ``(nx, ny)`` [MPa] → [mm]."""
@@ -88,7 +88,7 @@ class HalfSpace:
         displacement: Array = self._convolve(shear, NORMAL, SHEAR)[0]
         return displacement
 
-    def symbol(self, row: int, column: int, period: Shape | None = None) -> Array:
+    def symbol(self, row: int, column: int, period: GridShape | None = None) -> Array:
         """Eigenvalues of the influence coefficients made periodic, ``(mx, my//2 + 1)`` [mm/MPa].
 
         ``period`` is the padded shape unless given; each displacement is taken at the nearest
@@ -105,7 +105,7 @@ class HalfSpace:
         edges = [np.array([-0.5, 0.5]) * pitch for pitch in self.grid.pitch]
         return float(self._influence(edges[0], edges[1], component, component)[0, 0])
 
-    def transform(self, shape: Shape, padded: Shape, components: int) -> Transform:
+    def transform(self, shape: GridShape, padded: GridShape, components: int) -> Transform:
         """A transform planned once for all who need this size."""
         key = (shape, padded, components)
         if key not in self._transforms:
@@ -125,7 +125,7 @@ class HalfSpace:
             return strip_influence(edges_x, self.pair, row, column, self.datum)[:, None]
         return rectangle_influence(edges_x, edges_y, self.pair, row, column)
 
-    def _compute_symbol(self, row: int, column: int, period: Shape) -> Array:
+    def _compute_symbol(self, row: int, column: int, period: GridShape) -> Array:
         """DFT of a quarter of the kernel, continued by its parity along x and along y."""
         edges = [
             (np.arange(m // 2 + 2, dtype=np.float64) - 0.5) * pitch
@@ -152,7 +152,7 @@ def spectral_filter(
     return SpectralFilter(transform, symbols, (imaginary[0], imaginary[1]))
 
 
-def padded_shape(grid: Grid) -> Shape:
+def padded_shape(grid: Grid) -> GridShape:
     """The fast transform lengths that hold the linear convolution on ``grid``."""
     nx, ny = (int(scipy.fft.next_fast_len(2 * n - 1, real=True)) for n in grid.shape)
     return nx, ny

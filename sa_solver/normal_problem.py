@@ -95,7 +95,7 @@ def contact_residuals(pressure: Array, displacement: Array, gap: Array) -> tuple
     return max(0.0, -float(gap.min())) / scale, float(largest / (pressure.max() * scale))
 
 
-def residuals(problem: NormalProblem, iterate: Iterate) -> NormalResiduals:
+def normal_residuals(problem: NormalProblem, iterate: Iterate) -> NormalResiduals:
     """All four residuals of ``iterate``."""
     total = iterate.pressure.sum()
     if not total > 0.0:

@@ -6,7 +6,7 @@ import numpy as np
 
 from sa_solver.contact_law import unilateral
 from sa_solver.half_space import NORMAL, HalfSpaceResolvent
-from sa_solver.normal_problem import Iterate, NormalProblem, residuals
+from sa_solver.normal_problem import Iterate, NormalProblem, normal_residuals
 from sa_solver.padded_splitting import PaddedSplitting, RigidResponse
 from sa_solver.splitting import douglas_rachford
 from sa_solver.types import Array
@@ -55,7 +55,7 @@ def solve_by_splitting(
         iterations += result.iterations
         problem.work[resolvent.padded_shape] += result.iterations
         iterate = _balanced(problem, resolvent.on_grid(result.solution)[0]) or iterate
-        if residuals(problem, iterate).largest <= tolerance or not result.converged:
+        if normal_residuals(problem, iterate).largest <= tolerance or not result.converged:
             break
     return iterate, iterations
 

@@ -16,7 +16,6 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sa_solver.disk_gradient import gradients_on_disks
 from sa_solver.disk_newton import DiskSolution, newton_on_disks
@@ -26,7 +25,7 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.rigid_modes import PlanarModes, Window
 from sa_solver.tangential_levels import ShearLevel
 from sa_solver.tangential_problem import TangentialProblem
-from sa_solver.types import Array
+from sa_solver.types import Array, Mask
 
 TOLERANCE = 1e-8
 """Default bound on every residual of :class:`TangentialResiduals`."""
@@ -99,7 +98,7 @@ class TangentialState:
     shear: Array
     slip: Array
     displacement: Array
-    sticking: NDArray[np.bool_]
+    sticking: Mask
     shift_x: float
     shift_y: float
     twist: float

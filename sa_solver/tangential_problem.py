@@ -15,14 +15,11 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sa_solver.half_space import SHEAR, HalfSpace, inverse_symbols, spectral_filter
 from sa_solver.rigid_modes import PlanarModes
 from sa_solver.transform import SpectralFilter
-from sa_solver.types import Array
-
-Mask = NDArray[np.bool_]
+from sa_solver.types import Array, Mask
 
 BALANCE_TOLERANCE = 1e-13
 """Resultants left by a balance, relative to the largest shear force: rounding of a sum."""

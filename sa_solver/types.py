@@ -36,6 +36,7 @@ from sa_solver.errors import InputError
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -246,7 +247,7 @@ class LoadHistory:
     Mz: Array
     Edx: Array
     Edy: Array
-    sliding: NDArray[np.bool_]
+    sliding: Mask
     share: Array = field(default_factory=lambda: np.empty(0))
     block: Indices = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from sa_solver.contact import ContactState
 from sa_solver.errors import ContactProblemError
-from sa_solver.history import History, HistoryError, march
+from sa_solver.history import History, HistoryError, march_history
 from workflow.bodies import bodies_of, grid_of, half_space_of, height_of, path_of
 from workflow.case import ContactCase, LineContactCase
 from workflow.contact_output import ContactOutcome, write_contact_output, write_contact_results
@@ -52,7 +52,7 @@ def _march(
             )
 
         try:
-            history = march(
+            history = march_history(
                 half_space,
                 height,
                 path_of(case, table),

@@ -20,7 +20,7 @@ from wear.steppers import (
     Implicit,
     SecondOrder,
     Stepper,
-    advance,
+    advance_cycles,
     first_cycles,
 )
 from wear.stepping import CycleResult, SlidingCycle, Starts, WearingContact, WearState
@@ -225,7 +225,7 @@ class ContactStage:
     ) -> tuple[InterfaceState, Spent]:
         """Wear ``cycles`` of the ``left`` cycles of the run; also what it took."""
         before = self._spent
-        result = advance(self._stepper, state, cycles, left, self._contact_at)
+        result = advance_cycles(self._stepper, state, cycles, left, self._contact_at)
         after = result.state
         assert isinstance(after, InterfaceState)
         # Friction of the half-space on the new surfaces: for the record now, to wear by next.

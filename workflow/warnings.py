@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from sa_solver.reference.flat_rounded import FlatRounded
+from sa_solver.reference.flat_rounded import FlatRoundedPunch
 from workflow.case import DovetailCase, WearCase
 from workflow.checkpoint import RunState
 from workflow.contact_stage import ContactStage, FirstContact
@@ -115,9 +115,8 @@ def edge_peak_errors(case: DovetailCase, stage: ContactStage, load: float) -> di
     if not stage.grid.line:
         per_length = load / (dovetail.slot_length - 2.0 * dovetail.end_width)
         radii["end"] = dovetail.end_radius
+    modulus = stage.pair.contact_modulus
     return {
-        edge: FlatRounded(half_width, radius, per_length, stage.pair.contact_modulus).peak_error(
-            pitch
-        )
+        edge: FlatRoundedPunch(half_width, radius, per_length, modulus).peak_error(pitch)
         for (edge, radius), pitch in zip(radii.items(), stage.grid.pitch, strict=False)
     }

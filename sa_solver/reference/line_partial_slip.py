@@ -23,7 +23,7 @@ from typing import Literal
 import numpy as np
 
 from sa_solver.errors import InputError
-from sa_solver.reference.hertz import Cylinder
+from sa_solver.reference.hertz import HertzCylinder
 from sa_solver.reference.masing import superpose
 from sa_solver.types import Array
 
@@ -57,7 +57,7 @@ class ShearedCylinder:
     to body 2. Methods raise ``InputError`` beyond |Q| = µP.
     """
 
-    contact: Cylinder
+    contact: HertzCylinder
     friction: float
 
     @property
@@ -76,7 +76,7 @@ class ShearedCylinder:
         return shear
 
     def displacement(self, tangential: float, datum: float) -> float:
-        """δx [mm] on first loading, for the ``datum`` L [mm] of :meth:`Cylinder.approach`.
+        """δx [mm] on first loading, for the ``datum`` L [mm] of :meth:`HertzCylinder.approach`.
 
         (2 / π E*) {Q [ln(2 L/a) + 1/2] + (1/2)(µP - Q) ln(1 - Q/µP)}.
         """
@@ -126,7 +126,7 @@ class BulkStressedCylinder:
     Raises ``InputError`` where the bulk stress is not moderate or |Q| > µP.
     """
 
-    contact: Cylinder
+    contact: HertzCylinder
     friction: float
     tangential: float
     bulk_stress: float
@@ -206,7 +206,7 @@ class BulkStressedCylinder:
         return float(np.sign(tangential)) * strain * self.contact.contact_modulus / gradient
 
 
-def _shear(contact: Cylinder, friction: float, x: Array, stick: float, offset: float) -> Array:
+def _shear(contact: HertzCylinder, friction: float, x: Array, stick: float, offset: float) -> Array:
     """µ p less its like on ``|x - offset| < stick``, ``(µ p0 / a) [sqrt(a² - x²) - ...]``."""
     sliding = np.sqrt(np.maximum(0.0, contact.half_width**2 - x**2))
     stuck = np.sqrt(np.maximum(0.0, stick**2 - (x - offset) ** 2))

@@ -18,10 +18,10 @@ from typing import TypeVar
 from sa_solver.errors import InputError
 from sa_solver.types import Array
 
-Response = TypeVar("Response", float, Array)
+_Response = TypeVar("_Response", float, Array)
 
 
-def superpose(first_loading: Callable[[float], Response], loads: Sequence[float]) -> Response:
+def superpose(first_loading: Callable[[float], _Response], loads: Sequence[float]) -> _Response:
     """Response after ``loads``, the turning points of the load in order up to the present one.
 
     ``first_loading(load)`` is the response on first loading, an odd function of the load: a float

@@ -24,7 +24,7 @@ from functools import cached_property
 import numpy as np
 
 from sa_solver.errors import InputError
-from sa_solver.reference.hertz import Sphere
+from sa_solver.reference.hertz import HertzSphere
 from sa_solver.reference.masing import superpose
 from sa_solver.types import Array, ElasticPair, Material
 
@@ -45,9 +45,11 @@ class ShearedSphere:
     friction: float
 
     @cached_property
-    def contact(self) -> Sphere:
+    def contact(self) -> HertzSphere:
         """The normal contact, which shear does not change."""
-        return Sphere(self.load, self.radius, ElasticPair(self.body_1, self.body_2).contact_modulus)
+        return HertzSphere(
+            self.load, self.radius, ElasticPair(self.body_1, self.body_2).contact_modulus
+        )
 
     @property
     def sliding_force(self) -> float:

@@ -33,7 +33,7 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, elliprd, elliprj
 
 from sa_solver.errors import InputError
-from sa_solver.reference.hertz import Sphere
+from sa_solver.reference.hertz import HertzSphere
 from sa_solver.reference.masing import superpose
 from sa_solver.types import Array, ElasticPair, Material
 
@@ -56,9 +56,11 @@ class TwistedSphere:
     friction: float
 
     @cached_property
-    def contact(self) -> Sphere:
+    def contact(self) -> HertzSphere:
         """The normal contact, which twist does not change."""
-        return Sphere(self.load, self.radius, ElasticPair(self.body_1, self.body_2).contact_modulus)
+        return HertzSphere(
+            self.load, self.radius, ElasticPair(self.body_1, self.body_2).contact_modulus
+        )
 
     @property
     def sliding_moment(self) -> float:

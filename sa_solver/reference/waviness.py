@@ -120,7 +120,7 @@ class ChebyshevPunch:
         return self._potential(x / self.half_width) - self._potential(np.zeros(()))
 
     def approach(self, datum: float) -> float:
-        """δz [mm] of x = 0, for the ``datum`` L [mm] as in :meth:`hertz.Cylinder.approach`."""
+        """δz [mm] of x = 0, for the ``datum`` L [mm] as in :meth:`hertz.HertzCylinder.approach`."""
         point = 2.0 * self.load * float(np.log(datum / self.half_width))
         return point / (np.pi * self.contact_modulus) - float(self._potential(np.zeros(())))
 

@@ -7,9 +7,9 @@ touch again as if they never had.
 import numpy as np
 import pytest
 
-from sa_solver.contact import FrictionalContact, Load
+from sa_solver.contact import ContactLoad, FrictionalContact
 from sa_solver.half_space import HalfSpace
-from sa_solver.history import LoadPath, march
+from sa_solver.history import ContactLoadPath, march_history
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Grid, LoadHistory
 from tests.limits.scenes import ALIKE, BOTH, FRICTION, RADIUS, SOLVED, P, sphere
@@ -21,7 +21,7 @@ def follow(contact, height, *loads):
     state = contact.apart(height)
     for load in loads:
         values = np.array([load[0], load[1], 0.0, 0.0, 0.0, 0.0])
-        state = contact.advance(state, height, Load(values))
+        state = contact.advance(state, height, ContactLoad(values))
         assert state.converged, state.message
     return state
 
@@ -80,7 +80,7 @@ def test_a_bulk_strain_while_apart_is_not_felt(kind):
     state = contact.apart(height)
     for load, strain in ((P, 0.0), (0.0, 1e-3), (P, 1e-3)):
         values = np.array([load, 0.0, 0.0, 0.0, 0.0, 0.0])
-        state = contact.advance(state, height, Load(values, strain=strain))
+        state = contact.advance(state, height, ContactLoad(values, strain=strain))
         assert state.converged
     np.testing.assert_allclose(state.traction, fresh.traction, atol=1e-5 * fresh.pressure.max())
 
@@ -93,7 +93,7 @@ def test_motions_that_part_the_bodies_and_join_them(kind):
     state, states = contact.apart(height), []
     for dz in (depth, -depth, 0.5 * depth, depth):
         values = np.array([dz, 0.0, 0.0, 0.0, 0.0, 0.0])
-        load = Load(values, (True, False, False, True, True, False))
+        load = ContactLoad(values, (True, False, False, True, True, False))
         state = contact.advance(state, height, load)
         assert state.converged
         states.append(state)
@@ -110,7 +110,7 @@ def test_legs_are_not_taken_in_one_step_across_a_parting(kind):
     values = np.zeros((6, 6))
     values[:, 0] = [P, P, 0.0, P, P, P]
     values[:, 1] = [0.0, 30.0, 0.0, 0.0, 15.0, 30.0]
-    found = march(contact.half_space, height, LoadPath(values), FRICTION)
+    found = march_history(contact.half_space, height, ContactLoadPath(values), FRICTION)
     assert found.method == "full"
     assert len(found.states) == 6
     fresh = follow(contact, height, (P, 0.0), (P, 15.0), (P, 30.0))
@@ -183,8 +183,8 @@ def test_an_energy_of_zero_leaves_the_force_to_be_carried(kind):
     contact, height = sphere(kind, 16)
     pressed = follow(contact, height, (P, 0.0))
     values = np.array([P, 0.995 * FRICTION * P, 0.0, 0.0, 0.0, 0.0])
-    zero = contact.advance(pressed, height, Load(values, energy=np.zeros(2)))
-    unknown = contact.advance(pressed, height, Load(values))
+    zero = contact.advance(pressed, height, ContactLoad(values, energy=np.zeros(2)))
+    unknown = contact.advance(pressed, height, ContactLoad(values))
     assert zero.converged
     assert not zero.sliding
     np.testing.assert_array_equal(zero.traction, unknown.traction)

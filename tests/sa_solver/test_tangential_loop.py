@@ -6,7 +6,7 @@ import pytest
 from sa_solver import tangential_loop as loops
 from sa_solver.contact import FrictionalContact
 from sa_solver.half_space import HalfSpace
-from sa_solver.reference.hertz import Cylinder
+from sa_solver.reference.hertz import HertzCylinder
 from sa_solver.reference.line_partial_slip import ShearedCylinder
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.tangential import FrictionLimitError, TangentialContact
@@ -141,7 +141,7 @@ def test_both_axes_are_alike_for_a_sphere():
 
 def test_line_contact():
     pair = ElasticPair(TITANIUM, TITANIUM)
-    line = ShearedCylinder(Cylinder(LOAD, RADIUS, pair.contact_modulus), FRICTION)
+    line = ShearedCylinder(HertzCylinder(LOAD, RADIUS, pair.contact_modulus), FRICTION)
     grid = Grid.strips(2.2 * line.contact.half_width, 128)
     contact = FrictionalContact(HalfSpace(grid, pair), FRICTION)
     height = line.contact.gap(grid.x)

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sa_solver.contact import FrictionalContact, Load
+from sa_solver.contact import ContactLoad, FrictionalContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.types import ElasticPair, Grid, LoadHistory, Material
 from wear.full_cycle import full_cycle
@@ -79,7 +79,7 @@ def test_a_cycle_that_ends_loaded_is_closed():
     states = full_cycle(contact(pair), GAP, loads)
     values = np.array([loads.P[0], loads.Qx[0], 0.0, 0.0, 0.0, 0.0])
     repeated = contact(pair).advance(
-        states[-1], GAP, Load(values, energy=np.array([loads.Edx[0], 0.0]))
+        states[-1], GAP, ContactLoad(values, energy=np.array([loads.Edx[0], 0.0]))
     )
     np.testing.assert_allclose(
         repeated.shear, states[0].shear, atol=1e-3 * FRICTION * states[0].pressure.max()
