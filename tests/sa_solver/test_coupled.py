@@ -6,13 +6,13 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 import sa_solver.coupled as coupled
-from sa_solver.alternating import AlternatingContact
 from sa_solver.coupled import CoupledContact, CoupledContactError
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.rigid_modes import RigidModes
 from sa_solver.tangential import FrictionLimitError, TangentialContact
 from sa_solver.types import ElasticPair, Grid, Material, resultants
+from tests.oracles.alternating import AlternatingContact
 
 TOLERANCE = 1e-8
 STEEL = Material(200e3, 0.3)

@@ -5,9 +5,9 @@ import pytest
 from scipy.integrate import dblquad, quad
 
 from sa_solver.reference.hertz import HertzCylinder
-from sa_solver.reference.love import UniformRectangle, UniformStrip, love_displacement
 from sa_solver.reference.waviness import ChebyshevPunch, WavySurface
 from sa_solver.types import ElasticPair, Material
+from tests.oracles.uniform_traction import UniformRectangle, UniformStrip, love_displacement
 
 STEEL, RUBBERY = Material(210e3, 0.3), Material(5e3, 0.45)
 MODULUS = ElasticPair(STEEL, RUBBERY).contact_modulus

@@ -3,7 +3,7 @@
 The plain iteration of the papers: pressure for a given shear, then shear for that pressure, until
 the normal displacement under shear no longer changes. Where the contact slides, every round shrinks
 the change by about µβ (β of Dundurs): the iteration slows down towards µβ = 1 and fails beyond,
-where :mod:`sa_solver.coupled` still converges. It is here for comparison.
+where :mod:`sa_solver.coupled` still converges.
 
 Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914.
 """
@@ -15,7 +15,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalState
 from sa_solver.rigid_modes import RESULTANTS
@@ -95,7 +94,7 @@ class AlternatingContact:
             changes.append(_change(lift, last, pressed))
             settled = changes[-1] <= tolerance
         if pressed is None or sheared is None:
-            raise InputError(f"max_rounds = {max_rounds} leaves nothing to do: give 1 or more")
+            raise ValueError(f"max_rounds = {max_rounds} leaves nothing to do: give 1 or more")
         converged = settled and pressed.converged and sheared.converged
         return AlternatingState(
             traction=np.stack([*sheared.shear, pressed.pressure]),
