@@ -118,7 +118,7 @@ class PartialSlip:
         return np.where(self.normal.pressure > 0.0, self.shift[sticking], 0.0)
 
 
-def partial_slip(
+def partial_slip_curve(
     contact: NormalContact,
     height: Array,
     P: float,

@@ -192,7 +192,7 @@ class TangentialLoop:
         return (displacement[: n + 1], force[: n + 1]), (displacement[n:], force[n:])
 
 
-def tangential_loop(contact: FrictionalContact, height: Array, path: LoopPath) -> TangentialLoop:
+def march_loop(contact: FrictionalContact, height: Array, path: LoopPath) -> TangentialLoop:
     """Press and move to and fro on surfaces that do not wear.
 
     ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies. Raises LoopFailure where a solve

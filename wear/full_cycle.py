@@ -15,7 +15,7 @@ from sa_solver.types import Array, LoadHistory
 from wear.stepping import ContactFailure
 
 
-def full_cycle(
+def march_cycle(
     contact: FrictionalContact, height: Array, loads: LoadHistory, motion: Array | None = None
 ) -> list[ContactState]:
     """States at the ends of the increments of one closed cycle, on surfaces that do not change.

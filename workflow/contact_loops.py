@@ -21,7 +21,7 @@ from sa_solver.tangential_loop import (
     MOST_CYCLES,
     LoopFailure,
     LoopPath,
-    tangential_loop,
+    march_loop,
 )
 from sa_solver.types import Array
 from wear.stepping import ContactFailure
@@ -76,7 +76,7 @@ def worn_loop(
     """
     path = loop_path(loops, name, state, peak)
     try:
-        loop = tangential_loop(contact, state.surfaces.gap, path)
+        loop = march_loop(contact, state.surfaces.gap, path)
     except (LoopFailure, ContactProblemError) as error:
         raise ContactFailure(
             f"tangential loop: {error}; allowed: lower loops.force or loops.amplitude"

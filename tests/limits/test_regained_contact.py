@@ -13,7 +13,7 @@ from sa_solver.history import ContactLoadPath, march_history
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Grid, LoadHistory
 from tests.limits.scenes import ALIKE, BOTH, FRICTION, RADIUS, SOLVED, P, sphere
-from wear.full_cycle import full_cycle
+from wear.full_cycle import march_cycle
 
 
 def follow(contact, height, *loads):
@@ -140,8 +140,8 @@ def cycle(load, shear, energy=0.0):
 @BOTH
 def test_what_a_cycle_did_before_it_parted_does_not_matter_after(kind):
     contact, height = sphere(kind, 16)
-    one = full_cycle(contact, height, cycle([P, P, 0.0, 0.5 * P, P], [5.0, 30.0, 0.0, 3.0, -9.0]))
-    other = full_cycle(
+    one = march_cycle(contact, height, cycle([P, P, 0.0, 0.5 * P, P], [5.0, 30.0, 0.0, 3.0, -9.0]))
+    other = march_cycle(
         contact, height, cycle([P, P, 0.0, 0.5 * P, P], [0.0, -20.0, 0.0, 3.0, -9.0])
     )
     assert not one[2].traction.any()
@@ -164,14 +164,14 @@ def test_a_flat_that_sticks_dissipates_nothing_and_one_that_slides_does():
     grid = Grid.strips(2.0, 64)
     height = np.where(np.abs(grid.x) < 0.75, 0.0, 1.0)
     contact = FrictionalContact(HalfSpace(grid, ElasticPair(ALIKE, ALIKE)), FRICTION, SOLVED)
-    held = full_cycle(contact, height, cycle([P, P, P], [0.0, 0.95 * FRICTION * P, -10.0]))
+    held = march_cycle(contact, height, cycle([P, P, P], [0.0, 0.95 * FRICTION * P, -10.0]))
     work = P * np.abs([state.rigid[1] for state in held]).max()
     for state in held:
         assert state.sticking.sum() == 48
         assert abs(state.energy.sum()) < 1e-7 * work
         assert np.abs(state.slip).max() < 1e-7 * abs(held[1].rigid[1])
     energy = [0.0, 0.3, 0.0]
-    slid = full_cycle(contact, height, cycle([P, P, P], [0.0, FRICTION * P, -10.0], energy))
+    slid = march_cycle(contact, height, cycle([P, P, P], [0.0, FRICTION * P, -10.0], energy))
     assert [state.sliding for state in slid] == [False, True, False]
     assert slid[1].energy.sum() == pytest.approx(0.3, rel=1e-5)
     assert abs(slid[2].energy.sum()) < 1e-7 * work

@@ -10,7 +10,7 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from wear.evolution import EnergyTable
-from wear.full_cycle import full_cycle
+from wear.full_cycle import march_cycle
 from wear.laws import EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
 from wear.stepping import SlidingCycle, WearingContact, WearState
 
@@ -172,8 +172,8 @@ def sheared(scale: float, last: float) -> LoadHistory:
 def test_each_cycle_of_a_mix_is_closed_by_itself(last: float) -> None:
     contact = FrictionalContact(HALF_SPACE, FRICTION, 1e-8)
     cycles = [sheared(1.0, last), sheared(0.6, last), sheared(1.0, last)]
-    mixed = full_cycle(contact, BALL, LoadHistory.mix(cycles, (0.5, 0.3, 0.2)))
-    alone = [state for own in cycles for state in full_cycle(contact, BALL, own)]
+    mixed = march_cycle(contact, BALL, LoadHistory.mix(cycles, (0.5, 0.3, 0.2)))
+    alone = [state for own in cycles for state in march_cycle(contact, BALL, own)]
     assert len(mixed) == len(alone) == 15
     for one, two in zip(mixed, alone, strict=True):
         np.testing.assert_array_equal(one.shear, two.shear)
