@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.reduced_contact import FrettingConditions, FrettingCycle, ReducedPair
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 
 # Share of the stability limit that a cycle block takes: 0.5 damps the stiffest error without
@@ -15,7 +16,7 @@ from sa_solver.types import Array
 STABLE_SHARE = 0.5
 
 
-class CycleBlockError(ValueError):
+class CycleBlockError(InputError):
     """A cycle block would be unstable; the message says which length is not."""
 
 

@@ -19,6 +19,7 @@ from fe_models import superlu
 from fe_models.memory import available_bytes
 from fe_models.multigrid import MultigridSolver, softness
 from fe_models.pardiso import Pardiso, PardisoError
+from sa_solver.errors import ConvergenceError
 from sa_solver.types import Array, Indices
 
 # A backward-stable factorisation leaves about 1e-13; anything above this is a wrong answer.
@@ -35,7 +36,7 @@ SINGULAR = (
 )
 
 
-class SolverError(RuntimeError):
+class SolverError(ConvergenceError):
     """A linear system could not be solved; the message says what is likely wrong with it."""
 
 

@@ -11,6 +11,7 @@ from scipy.spatial import cKDTree
 from skfem import MeshTet, MeshTri
 
 from fe_models.gmsh_session import gmsh_model
+from sa_solver.errors import InputError
 from sa_solver.types import Array, Frame, Indices
 
 # Two nodes are the same point when they are closer than this share of the interface's size.
@@ -21,7 +22,7 @@ AXES = {2: (0, 2), 3: (0, 1, 2)}
 GMSH_CELL, GMSH_FACET = {2: 2, 3: 4}, {2: 1, 3: 2}
 
 
-class MeshError(ValueError):
+class MeshError(InputError):
     """The geometry or its mesh cannot be used; the message says what to change."""
 
 

@@ -16,6 +16,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
+from sa_solver.errors import ConvergenceError
 from sa_solver.types import Array, Indices
 
 ANALYSE, FACTORISE, SOLVE, RELEASE = 11, 22, 33, -1
@@ -31,7 +32,7 @@ POSITIVE_DEFINITE = 2
 KILOBYTE = 1024
 
 
-class PardisoError(RuntimeError):
+class PardisoError(ConvergenceError):
     """PARDISO is not installed or refuses a matrix: indefinite, an empty row, no memory."""
 
 

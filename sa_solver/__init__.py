@@ -1,1 +1,99 @@
-"""Contact mechanics on elastic half-spaces, and the shared types, frames and signs."""
+"""Contact mechanics on elastic half-spaces, and the types, frames and signs that all share.
+
+What is given
+    - ``Material``: an isotropic elastic material.
+    - ``ElasticPair``: two of them in contact, as the compliances that count.
+    - ``Grid``: a uniform grid of cells over a contact, or the strips of a line contact.
+    - ``Frame``: the origin and axes of an interface.
+    - ``LoadHistory``: the resultants of an interface over a closed cycle.
+
+What is solved
+    - ``HalfSpace``: displacement of two half-spaces under tractions on a grid, by FFT.
+    - ``NormalContact``: pressure under a force or an approach.
+    - ``TangentialContact``: shear and slip under a given pressure.
+    - ``CoupledContact``: pressure and shear of dissimilar bodies, together.
+    - ``FrictionalContact``: one increment after the other, whatever the bodies.
+    - ``ContactLoad``: what is imposed at the end of an increment.
+    - ``ContactLoadPath``: a sequence of such loads.
+    - ``march_history``: the states along a path, all of them or only those that count.
+    - ``LoopPath``: a motion or force to and fro.
+    - ``march_loop``: the hysteresis loop that it leads to, with stiffness and friction.
+    - ``partial_slip_curve``: force against motion up to sliding, from normal problems alone.
+    - ``SubsurfaceStress``: stress inside either body under the tractions.
+
+What is raised
+    - ``FretscaleError``: the base of all.
+    - ``InputError``: data without a meaning or a solution.
+    - ``ConvergenceError``: a method that did not come to its end.
+
+Closed forms to compare with are in :mod:`sa_solver.reference`. Units are N, mm and MPa; signs are
+those of :mod:`sa_solver.types`. A sphere on a flat, against Hertz:
+
+>>> from sa_solver import ElasticPair, Grid, HalfSpace, Material, NormalContact
+>>> from sa_solver.reference.hertz import HertzSphere
+>>> steel, grid = Material(young=210e3, poisson=0.3), Grid.covering((1.0, 1.0), (64, 64))
+>>> half_space = HalfSpace(grid, ElasticPair(steel, steel))
+>>> hertz = HertzSphere(load=100.0, radius=10.0, contact_modulus=half_space.pair.contact_modulus)
+>>> state = NormalContact(half_space).solve(hertz.gap(grid.x, grid.y), P=100.0)
+>>> print(f"{state.approach * 1e3:.2f} um, Hertz {hertz.approach * 1e3:.2f} um")
+3.48 um, Hertz 3.48 um
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sa_solver.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from sa_solver.contact import ContactLoad, FrictionalContact
+    from sa_solver.coupled import CoupledContact
+    from sa_solver.errors import ConvergenceError, FretscaleError, InputError
+    from sa_solver.half_space import HalfSpace
+    from sa_solver.history import ContactLoadPath, march_history
+    from sa_solver.normal import NormalContact
+    from sa_solver.partial_slip import partial_slip_curve
+    from sa_solver.subsurface import SubsurfaceStress
+    from sa_solver.tangential import TangentialContact
+    from sa_solver.tangential_loop import LoopPath, march_loop
+    from sa_solver.types import ElasticPair, Frame, Grid, LoadHistory, Material
+
+__all__ = [
+    "ContactLoad",
+    "ContactLoadPath",
+    "ConvergenceError",
+    "CoupledContact",
+    "ElasticPair",
+    "Frame",
+    "FretscaleError",
+    "FrictionalContact",
+    "Grid",
+    "HalfSpace",
+    "InputError",
+    "LoadHistory",
+    "LoopPath",
+    "Material",
+    "NormalContact",
+    "SubsurfaceStress",
+    "TangentialContact",
+    "march_history",
+    "march_loop",
+    "partial_slip_curve",
+]
+
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "contact": ("ContactLoad", "FrictionalContact"),
+        "coupled": ("CoupledContact",),
+        "errors": ("ConvergenceError", "FretscaleError", "InputError"),
+        "half_space": ("HalfSpace",),
+        "history": ("ContactLoadPath", "march_history"),
+        "normal": ("NormalContact",),
+        "partial_slip": ("partial_slip_curve",),
+        "subsurface": ("SubsurfaceStress",),
+        "tangential": ("TangentialContact",),
+        "tangential_loop": ("LoopPath", "march_loop"),
+        "types": ("ElasticPair", "Frame", "Grid", "LoadHistory", "Material"),
+    },
+)

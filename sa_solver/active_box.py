@@ -8,9 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sa_solver.rigid_modes import Window
-from sa_solver.types import Array
-
-Mask = NDArray[np.bool_]
+from sa_solver.types import Array, Mask
 
 MARGIN = 0.06
 """Rim left around the pressed cells, over their extent. It must hold the error of a coarser grid's

@@ -16,15 +16,12 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sa_solver.contact_law import unilateral
-from sa_solver.normal_problem import Iterate, NormalProblem, residuals
+from sa_solver.normal_problem import Iterate, NormalProblem, normal_residuals
 from sa_solver.preconditioner import NormalPreconditioner
 from sa_solver.rigid_modes import RANK_CUTOFF
-from sa_solver.types import Array
-
-Mask = NDArray[np.bool_]
+from sa_solver.types import Array, Mask
 
 SETTLED = 0.4
 """The contact set is revised once the preconditioned residual on it has fallen by this factor.
@@ -121,7 +118,7 @@ class _Search:
         # The displacement of the last revision is near enough to rule out most iterates.
         if self._pressure.min() < 0.0 or -self._gap.min() > 2.0 * tolerance * self._scale:
             return False
-        return residuals(self._problem, self.iterate()).largest <= tolerance
+        return normal_residuals(self._problem, self.iterate()).largest <= tolerance
 
     def iterate(self) -> Iterate:
         """The present pressure, displacement and rigid motion."""

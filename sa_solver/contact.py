@@ -14,31 +14,31 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sa_solver.ciavarella_jaeger import first_loading
 from sa_solver.coupled import CoupledContact, CoupledStart, CoupledState
+from sa_solver.errors import InputError
 from sa_solver.friction_limit import largest_share
 from sa_solver.gross_slip import (
-    Direction,
     GrossSlip,
-    Sliding,
-    State,
+    SlidingRule,
+    SlidingTrial,
     gross_slip,
     sliding_direction,
 )
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalStart, NormalState
+from sa_solver.rigid_modes import NORMAL, PLANAR, PlanarModes
 from sa_solver.tangential import (
     FrictionLimitError,
     TangentialContact,
     TangentialContactError,
     TangentialState,
 )
-from sa_solver.tangential_problem import PlanarModes
-from sa_solver.types import Array
+from sa_solver.types import Array, Mask
 
 GROSS_SHARE = 0.99
 """Share of the largest shear force from which the contact counts as sliding, where energies are at
@@ -51,17 +51,16 @@ ROUNDING = 1e-12
 SHARE_CHECKED = 0.5
 """Share of µP or of its moment from which the largest force is computed."""
 
-NORMAL = (0, 3, 4)
-TANGENTIAL = (1, 2, 5)
-"""Places of P, Mx, My and of Qx, Qy, Mz among the six resultants (P, Qx, Qy, Mx, My, Mz)."""
+
+_State = TypeVar("_State")
 
 
-class FrictionError(ValueError):
+class FrictionError(InputError):
     """The friction coefficient is not a number of 0 or more."""
 
 
 @dataclass(frozen=True)
-class Load:
+class ContactLoad:
     """What is imposed at the end of an increment.
 
     ``values`` (6,) are (P, Qx, Qy, Mx, My, Mz) [N, N mm; per mm on line grids] or, where
@@ -83,17 +82,17 @@ class ContactState:
     Fields: ``traction`` ``(3, nx, ny)`` ordered qx, qy, p [MPa], its ``displacement`` K t
     ``(3, nx, ny)`` [mm], ``slip`` ``(2, nx, ny)`` of the increment [mm], ``gap`` ``(nx, ny)`` [mm],
     ``sticking`` ``(nx, ny)``. ``resultants`` (6,) and ``rigid`` (6,) are ordered as in
-    :class:`Load`; ``rigid`` counts from the bodies apart. ``energy`` (2,) is dissipated in the
-    increment in x and y [N mm]. ``sliding`` says that the whole contact slipped by its energy: then
-    the Q in ``resultants`` follows, and need not be the one given. ``residual`` is the largest of
-    the residuals of the problems solved; ``message`` is empty when ``converged``.
+    :class:`ContactLoad`; ``rigid`` counts from the bodies apart. ``energy`` (2,) is dissipated in
+    the increment in x and y [N mm]. ``sliding`` says that the whole contact slipped by its energy:
+    then the Q in ``resultants`` follows, and need not be the one given. ``residual`` is the largest
+    of the residuals of the problems solved; ``message`` is empty when ``converged``.
     """
 
     traction: Array
     displacement: Array
     slip: Array
     gap: Array
-    sticking: NDArray[np.bool_]
+    sticking: Mask
     resultants: Array
     rigid: Array
     strain: float
@@ -126,7 +125,7 @@ class FrictionalContact:
         half_space: HalfSpace,
         friction: float,
         tolerance: float = 1e-8,
-        sliding: Direction = "force",
+        sliding: SlidingRule = "force",
     ) -> None:
         """Plan for ``half_space`` and Coulomb's coefficient ``friction`` µ.
 
@@ -161,7 +160,7 @@ class FrictionalContact:
             border_load=0.0,
         )
 
-    def advance(self, before: ContactState, height: Array, load: Load) -> ContactState:
+    def advance(self, before: ContactState, height: Array, load: ContactLoad) -> ContactState:
         """The state under ``load``, from the state ``before`` it.
 
         ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies. Raises what the solvers
@@ -185,14 +184,14 @@ class FrictionalContact:
             tangential = self._shear(before, limit, offset, load)
         return self._state(before, load, normal, tangential, sliding)
 
-    def two_normal_problems(self, before: ContactState, load: Load) -> bool:
+    def two_normal_problems(self, before: ContactState, load: ContactLoad) -> bool:
         """Whether the shear follows from two normal problems: first loading of a line contact."""
         along_x = load.values[1] != 0.0 and load.values[2] == 0.0
         by_force = not any(load.motion[k] for k in (0, 1, 2, 4))
         fresh = not before.shear.any() and load.strain == before.strain
         return self.grid.line and self.friction > 0.0 and along_x and by_force and fresh
 
-    def offset(self, before: ContactState, load: Load) -> Array:
+    def offset(self, before: ContactState, load: ContactLoad) -> Array:
         """Tangential displacement ``(2, nx, ny)`` [mm] of the increment without its tractions."""
         offset = -before.displacement[:2]
         offset[0] += (load.strain - before.strain) * self.grid.x
@@ -207,7 +206,7 @@ class FrictionalContact:
     def tangential(self) -> TangentialContact:
         return TangentialContact(self.half_space)
 
-    def _press(self, before: ContactState, height: Array, load: Load) -> NormalState:
+    def _press(self, before: ContactState, height: Array, load: ContactLoad) -> NormalState:
         P, Mx, My, approach, tilt_x, tilt_y = (
             float(load.values[k]) if load.motion[k] is moved else None
             for moved in (False, True)
@@ -231,11 +230,11 @@ class FrictionalContact:
         )
 
     def _shear(
-        self, before: ContactState, limit: Array, offset: Array, load: Load
+        self, before: ContactState, limit: Array, offset: Array, load: ContactLoad
     ) -> TangentialState:
         names = ("Qx", "Qy", "Mz"), ("shift_x", "shift_y", "twist")
         imposed: dict[str, float] = {}
-        for place, k in enumerate(TANGENTIAL):
+        for place, k in enumerate(PLANAR):
             own = load.values[k] - (before.rigid[k] if load.motion[k] else 0.0)
             imposed[names[load.motion[k]][place]] = float(own)
         if self.grid.line:
@@ -245,7 +244,7 @@ class FrictionalContact:
         )
 
     def _held(
-        self, before: ContactState, limit: Array, offset: Array, load: Load
+        self, before: ContactState, limit: Array, offset: Array, load: ContactLoad
     ) -> TangentialState | None:
         """The contact that creeps under its force, where that is still below the limit.
 
@@ -258,7 +257,9 @@ class FrictionalContact:
             return None
         return state if state.converged else None
 
-    def _slide(self, limit: Array, offset: Array, load: Load) -> tuple[TangentialState, bool]:
+    def _slide(
+        self, limit: Array, offset: Array, load: ContactLoad
+    ) -> tuple[TangentialState, bool]:
         """Gross slip by the energy of ``load``, and whether it creeps: see :class:`GrossSlip`."""
         area = self.grid.cell_area
         start = limit * sliding_direction(load.values[1:3])[:, None, None]
@@ -266,7 +267,7 @@ class FrictionalContact:
         twist = {} if self.grid.line else {"twist": 0.0}
         spent = 0
 
-        def slide(shift: Array, tolerance: float) -> Sliding[TangentialState]:
+        def slide(shift: Array, tolerance: float) -> SlidingTrial[TangentialState]:
             nonlocal start, spent
             x, y = map(float, shift)
             state = self.tangential.solve(
@@ -274,7 +275,7 @@ class FrictionalContact:
             )
             start, spent = state.shear, spent + state.convolutions
             energy = self._dissipated(state.shear, state.slip)
-            return Sliding(state, np.array([state.Qx, state.Qy]), energy)
+            return SlidingTrial(state, np.array([state.Qx, state.Qy]), energy)
 
         stored = float(np.vdot(start, moved))
         found = self._by_energy(slide, float(limit.sum()) * area, load, stored)
@@ -284,11 +285,11 @@ class FrictionalContact:
 
     def _by_energy(
         self,
-        slide: Callable[[Array, float], Sliding[State]],
+        slide: Callable[[Array, float], SlidingTrial[_State]],
         carried: float,
-        load: Load,
+        load: ContactLoad,
         stored: float,
-    ) -> GrossSlip[State]:
+    ) -> GrossSlip[_State]:
         assert load.energy is not None
         return gross_slip(
             slide,
@@ -300,7 +301,7 @@ class FrictionalContact:
             stored * self.grid.cell_area,
         )
 
-    def _slides(self, limit: Array, load: Load) -> bool:
+    def _slides(self, limit: Array, load: ContactLoad) -> bool:
         """Whether the energy is known and forces are within 1 % of the largest friction carries."""
         if load.energy is None:
             return False
@@ -311,10 +312,10 @@ class FrictionalContact:
         if load.energy.sum() <= 0.0:
             return False
         modes = self._modes
-        forces = load.values[[TANGENTIAL[k] for k in modes.free]]
+        forces = load.values[[PLANAR[k] for k in modes.free]]
         target = forces / (modes.lengths * self.grid.cell_area)
         carried = float(limit.sum())
-        if any(load.motion[k] for k in TANGENTIAL) or carried == 0.0:
+        if any(load.motion[k] for k in PLANAR) or carried == 0.0:
             return False
         if np.linalg.norm(target) < SHARE_CHECKED * carried:
             return False
@@ -328,16 +329,16 @@ class FrictionalContact:
     def _state(
         self,
         before: ContactState,
-        load: Load,
+        load: ContactLoad,
         normal: NormalState,
         tangential: TangentialState,
         sliding: bool,
     ) -> ContactState:
         shift = np.array([tangential.shift_x, tangential.shift_y, tangential.twist])
         rigid = np.array([normal.approach, 0.0, 0.0, normal.tilt_x, normal.tilt_y, 0.0])
-        rigid[list(TANGENTIAL)] = before.rigid[list(TANGENTIAL)] + shift
+        rigid[list(PLANAR)] = before.rigid[list(PLANAR)] + shift
         resultants = np.array([normal.P, 0.0, 0.0, normal.Mx, normal.My, 0.0])
-        resultants[list(TANGENTIAL)] = tangential.Qx, tangential.Qy, tangential.Mz
+        resultants[list(PLANAR)] = tangential.Qx, tangential.Qy, tangential.Mz
         messages = [own for own in (normal.message, tangential.message) if own]
         return ContactState(
             traction=np.stack([*tangential.shear, normal.pressure]),
@@ -367,7 +368,7 @@ class FrictionalContact:
     def _coupled(self) -> CoupledContact:
         return CoupledContact(self.half_space, self.friction)
 
-    def _together(self, before: ContactState, height: Array, load: Load) -> ContactState:
+    def _together(self, before: ContactState, height: Array, load: ContactLoad) -> ContactState:
         offset = self.offset(before, load)
         sliding = False
         if load.energy is not None:
@@ -378,13 +379,13 @@ class FrictionalContact:
             state = self._slide_together(before, height, offset, load, limit)
         else:
             values = load.values.copy()
-            for k in TANGENTIAL:
+            for k in PLANAR:
                 values[k] -= before.rigid[k] if load.motion[k] else 0.0
             state = self._coupled.solve(
                 height, offset, values, load.motion, tolerance=self.tolerance, start=before.start
             )
         rigid = state.rigid.copy()
-        rigid[list(TANGENTIAL)] += before.rigid[list(TANGENTIAL)]
+        rigid[list(PLANAR)] += before.rigid[list(PLANAR)]
         pressed = state.pressure > 0.0
         limit = self.friction * state.pressure
         return ContactState(
@@ -407,7 +408,7 @@ class FrictionalContact:
         )
 
     def _slide_together(
-        self, before: ContactState, height: Array, offset: Array, load: Load, limit: Array
+        self, before: ContactState, height: Array, offset: Array, load: ContactLoad, limit: Array
     ) -> CoupledState:
         """Gross slip by the energy of ``load``."""
         values, start = load.values.copy(), before.start
@@ -418,7 +419,7 @@ class FrictionalContact:
 
         spent = 0
 
-        def slide(shift: Array, tolerance: float) -> Sliding[CoupledState]:
+        def slide(shift: Array, tolerance: float) -> SlidingTrial[CoupledState]:
             nonlocal start, spent
             values[1:3] = shift
             state = self._coupled.solve(
@@ -426,7 +427,7 @@ class FrictionalContact:
             )
             start, spent = state.start, spent + state.convolutions
             energy = self._dissipated(state.shear, state.slip)
-            return Sliding(state, state.resultants[1:3], energy)
+            return SlidingTrial(state, state.resultants[1:3], energy)
 
         carried = self.friction * float(load.values[0])
         found = self._by_energy(slide, carried, load, float(np.vdot(shear, moved)))

@@ -2,11 +2,11 @@
 
 Where the bodies differ, pressure moves the surfaces tangentially and shear moves them normally
 (:mod:`sa_solver.coupled_problem` states the problem of one increment). Adjusting the normal and the
-tangential problem to each other in turns slows down with µ times Dundurs' β and fails from µβ = 1
-(:mod:`sa_solver.alternating`); here both are one problem, solved by Douglas-Rachford splitting
-(:mod:`sa_solver.splitting`) with the exact inverse of the coupled half-space. The friction limit
-follows the pressure, so that no minimum principle and no proof of convergence exist: a result
-carries residuals that do not depend on the method.
+tangential problem to each other in turns slows down with µ times Dundurs' β and fails from µβ = 1;
+here both are one problem, solved by Douglas-Rachford splitting (:mod:`sa_solver.splitting`) with
+the exact inverse of the coupled half-space. The friction limit follows the pressure, so that no
+minimum principle and no proof of convergence exist: a result carries residuals that do not depend
+on the method.
 
 Source: Gallego, Nélias & Jacq 2006, J. Tribol. 128, 476, doi:10.1115/1.2194914 (the problem).
 """
@@ -21,23 +21,18 @@ import numpy as np
 
 from sa_solver.contact_law import coulomb
 from sa_solver.coupled_problem import (
-    RESULTANTS,
     CoupledProblem,
     CoupledResiduals,
-    RigidMotions,
-    residuals,
+    coupled_residuals,
 )
+from sa_solver.errors import ContactProblemError
 from sa_solver.friction_limit import largest_share
-from sa_solver.half_space import (
-    ALL,
-    SMALLEST_EIGENVALUE,
-    HalfSpace,
-    inverse_symbols,
-    spectral_filter,
-)
+from sa_solver.half_space import ALL, HalfSpace, HalfSpaceResolvent
 from sa_solver.influence import Z
 from sa_solver.normal import NormalContact
 from sa_solver.normal_problem import border_share
+from sa_solver.padded_splitting import PaddedSplitting, RigidResponse
+from sa_solver.rigid_modes import PLANAR, RESULTANTS, RigidModes
 from sa_solver.splitting import douglas_rachford
 from sa_solver.tangential import UNCARRIED, FrictionLimitError
 from sa_solver.types import Array
@@ -85,11 +80,11 @@ of random rough contacts those that failed had 0 to 3 cells."""
 ALL_FORCES = (False,) * 6
 """Every resultant imposed, no motion."""
 
-TANGENTIAL, TILTS = (1, 2, 5), (3, 4)
-"""Qx, Qy and Mz, and Mx and My, among the resultants."""
+TILTS = (3, 4)
+"""Places of Mx and My among the resultants."""
 
 
-class CoupledContactError(ValueError):
+class CoupledContactError(ContactProblemError):
     """The data of a coupled contact problem admit no solution."""
 
 
@@ -155,8 +150,14 @@ class CoupledContact:
             raise CoupledContactError(f"friction {friction} must be finite and 0 or more")
         self.half_space, self.friction = half_space, friction
         self.grid = half_space.grid
-        self._motions = RigidMotions(half_space.grid)
-        self._inverse = _PaddedInverse(half_space, self._motions, friction)
+        self._modes = RigidModes(half_space.grid)
+        shares = _shift_shares(half_space, friction)
+        self._resolvent = HalfSpaceResolvent(half_space, ALL, shares)
+        present = list(self._modes.present)
+        motions = np.array([self._modes.motion(np.eye(6)[k]) for k in present])
+        self._response = RigidResponse.of(
+            self._resolvent, motions, lambda traction: self._modes.sums(traction)[present]
+        )
 
     def solve(
         self,
@@ -194,8 +195,8 @@ class CoupledContact:
     ) -> CoupledState:
         """Iterate the splitting until the residuals of its solution are met, or cannot be."""
         before = self.half_space.count
-        splitting = _Splitting(problem, self._inverse)
-        state = self._inverse.state(start) if start else splitting.touching()
+        splitting, free = self._splitting(problem), list(problem.free)
+        state = self._started(start) if start else self._touching(problem)
         inner, iterations, message, begun_anew = tolerance, 0, "", False
         while True:
             result = douglas_rachford(
@@ -206,7 +207,9 @@ class CoupledContact:
                 max_iterations=min(CHUNK, ITERATIONS - iterations),
             )
             state, iterations = result.state, iterations + result.iterations
-            found = self._state(problem, self._inverse.on_grid(result.solution), splitting.rigid)
+            rigid = np.zeros(6)
+            rigid[free] = splitting.rigid
+            found = self._state(problem, self._resolvent.on_grid(result.solution), rigid)
             converged = found.residuals.largest <= tolerance
             if converged:
                 break
@@ -231,6 +234,39 @@ class CoupledContact:
             start=CoupledStart(state),
         )
 
+    def _splitting(self, problem: CoupledProblem) -> PaddedSplitting:
+        free, modes, shift = list(problem.free), self._modes, self._resolvent.shift[Z]
+        yielding = shift / (shift + problem.compliance)
+
+        def law(trial: Array) -> Array:
+            """Coulomb's law, with the compliance of the pressure."""
+            yielded = trial.copy()
+            yielded[Z] *= yielding
+            return coulomb(yielded, self.friction)
+
+        return PaddedSplitting(
+            self._resolvent,
+            self._response.only([modes.present.index(k) for k in free]),
+            lambda traction: modes.sums(traction)[free],
+            problem.target,
+            problem.offset,
+            law,
+        )
+
+    def _started(self, start: CoupledStart) -> Array:
+        """The splitting's state that ``start`` holds."""
+        if start.splitting.shape != (3, *self._resolvent.padded_shape):
+            raise CoupledContactError("start belongs to another grid: start from a state on this")
+        return start.splitting
+
+    def _touching(self, problem: CoupledProblem) -> Array:
+        """The splitting's state ``t + v/ρ`` of bodies that touch without load."""
+        gap = problem.offset[Z]
+        lowest = float(gap.min()) if problem.load is not None else 0.0
+        state = np.zeros((3, *self.grid.shape))
+        state[Z] = np.maximum(0.0, gap - lowest) / self._resolvent.shift[Z]
+        return self._resolvent.padded(state)
+
     def _problem(
         self,
         height: Array,
@@ -239,23 +275,23 @@ class CoupledContact:
         motion: tuple[bool, ...],
         compliance: Array | None,
     ) -> CoupledProblem:
-        motions = self._motions
-        imposed = np.where(motion, values * motions.lengths, 0.0)
+        modes = self._modes
+        imposed = np.where(motion, values * modes.lengths, 0.0)
         if not motion[0]:
             # Counted from where the bodies touch, a small displacement keeps its digits.
             imposed[0] = height.min()
-        free = tuple(k for k in motions.present if not motion[k])
+        free = tuple(k for k in modes.present if not motion[k])
         moved = np.zeros((3, *self.grid.shape))
         moved[:Z] = 0.0 if offset is None else offset
         moved[Z] = height
         return CoupledProblem(
             half_space=self.half_space,
-            motions=motions,
+            modes=modes,
             friction=self.friction,
-            offset=moved - motions.motion(imposed),
+            offset=moved - modes.motion(imposed),
             imposed=imposed,
             free=free,
-            target=(values / (motions.lengths * self.grid.cell_area))[list(free)],
+            target=(values / (modes.lengths * self.grid.cell_area))[list(free)],
             compliance=0.0 if compliance is None else compliance,
         )
 
@@ -268,9 +304,9 @@ class CoupledContact:
             displacement=displacement,
             slip=np.where(traction[Z] > 0.0, relative[:Z], 0.0),
             gap=relative[Z],
-            rigid=(rigid + problem.imposed) / self._motions.lengths,
-            resultants=self._motions.resultants(traction),
-            residuals=residuals(problem, traction, displacement, relative),
+            rigid=(rigid + problem.imposed) / self._modes.lengths,
+            resultants=self._modes.resultants(traction),
+            residuals=coupled_residuals(problem, traction, displacement, relative),
             converged=False,
             message="",
             iterations=0,
@@ -281,9 +317,9 @@ class CoupledContact:
 
     def _pressed(self, problem: CoupledProblem) -> Array:
         """The splitting's state ``t + v/ρ`` of the bodies pressed without friction."""
-        units = self._motions.lengths * self.grid.cell_area
+        units = self._modes.lengths * self.grid.cell_area
         loads = {k: float(problem.target[n] * units[k]) for n, k in enumerate(problem.free)}
-        tilts = [0.0 if k in self._motions.present and k not in loads else None for k in TILTS]
+        tilts = [0.0 if k in self._modes.present and k not in loads else None for k in TILTS]
         compliance = problem.compliance
         pressed = self._normal.solve(
             problem.offset[Z],
@@ -294,10 +330,10 @@ class CoupledContact:
             tilt_y=tilts[1],
             compliance=None if isinstance(compliance, float) else compliance,
         )
-        state = np.zeros((3, *self.half_space.padded))
+        state = np.zeros((3, *self.grid.shape))
         elastic = pressed.gap - compliance * pressed.pressure
-        self._inverse.on_grid(state)[Z] = pressed.pressure + elastic / self._inverse.shift[Z]
-        return state
+        state[Z] = pressed.pressure + elastic / self._resolvent.shift[Z]
+        return self._resolvent.padded(state)
 
     @cached_property
     def _normal(self) -> NormalContact:
@@ -313,7 +349,7 @@ class CoupledContact:
 
     def _unloaded(self, problem: CoupledProblem) -> CoupledState:
         """No load: the bodies just touch, or stay apart where their motion is imposed."""
-        if any(own for k, own in zip(problem.free, problem.target, strict=True) if k in TANGENTIAL):
+        if any(own for k, own in zip(problem.free, problem.target, strict=True) if k in PLANAR):
             raise FrictionLimitError(0.0, UNCARRIED)
         traction = np.zeros((3, *self.grid.shape))
         rigid = np.zeros(6)
@@ -324,7 +360,7 @@ class CoupledContact:
             residuals=CoupledResiduals(*[0.0] * 5),
             converged=True,
             border_load=0.0,
-            start=CoupledStart(self._inverse.padded(traction)),
+            start=CoupledStart(self._resolvent.padded(traction)),
         )
 
     def _failure(self, problem: CoupledProblem, found: CoupledState, tolerance: float) -> str:
@@ -351,14 +387,14 @@ class CoupledContact:
         The pressure is that found.
         """
         limit = self.friction * found.pressure
-        planar = [k for k in problem.free if k in TANGENTIAL]
+        planar = [k for k in problem.free if k in PLANAR]
         target = np.array([problem.target[problem.free.index(k)] for k in planar])
         resolved = np.all(np.isfinite(limit)) and np.count_nonzero(limit) >= FEW_CELLS
         if not (resolved and target.any()):
             return ""
-        shapes = np.array([self._motions.motion(np.eye(6)[k])[:Z] for k in planar])
+        shapes = np.array([self._modes.motion(np.eye(6)[k])[:Z] for k in planar])
         share = largest_share(limit.ravel(), shapes.reshape(len(planar), 2, -1), target)
-        return _beyond_friction(self._motions, planar, target, share) if share < least else ""
+        return _beyond_friction(self._modes, planar, target, share) if share < least else ""
 
     # -- what is refused ----------------------------------------------------------------------
     def _check(
@@ -383,7 +419,7 @@ class CoupledContact:
         if not np.all(np.isfinite(values)):
             raise CoupledContactError(f"values {values} must be finite: check the load history")
         for k, name in enumerate(RESULTANTS):
-            if k not in self._motions.present and values[k] != 0.0:
+            if k not in self._modes.present and values[k] != 0.0:
                 raise CoupledContactError(
                     f"{name} or its motion has no meaning on this grid (a line contact or a "
                     "single row of cells): give 0"
@@ -415,97 +451,11 @@ class CoupledContact:
             )
 
 
-class _PaddedInverse:
-    """``(K + ρ)⁻¹`` and its answers to the rigid motions, on the zero-padded grid."""
-
-    def __init__(self, half_space: HalfSpace, motions: RigidMotions, friction: float) -> None:
-        """Plan for ``half_space``; ``friction`` µ only sets ρ."""
-        self._half_space = half_space
-        self._grid, self._padded = half_space.grid.shape, half_space.padded
-        self.shift = _shifts(half_space, friction)
-        """ρ of each component ``(3, 1, 1)`` [mm/MPa]."""
-        symbols = [[half_space.symbol(i, j) for j in ALL] for i in ALL]
-        for k, own in enumerate(self.shift.ravel()):
-            symbols[k][k] = symbols[k][k] + own
-        transform = half_space.transform(self._padded, self._padded, len(ALL))
-        self._filter = spectral_filter(transform, inverse_symbols(symbols), ALL, ALL)
-        self.answers = np.zeros((6, 3, *self._padded))
-        for k in motions.present:
-            self.answers[k] = self.solve(self.padded(motions.motion(np.eye(6)[k])))
-        self.products = np.stack([motions.sums(self.on_grid(own)) for own in self.answers])
-
-    def solve(self, displacement: Array) -> Array:
-        """Traction ``(K + ρ)⁻¹ u`` for ``u`` ``(3, mx, my)`` [mm] → [MPa]."""
-        self._half_space.count += 1
-        return self._filter.apply(displacement)
-
-    def padded(self, fields: Array) -> Array:
-        """``fields`` ``(3, nx, ny)`` continued by zero to the padded grid."""
-        out = np.zeros((3, *self._padded))
-        self.on_grid(out)[:] = fields
-        return out
-
-    def on_grid(self, fields: Array) -> Array:
-        """The part of ``fields`` ``(3, mx, my)`` that lies on the grid."""
-        return fields[:, : self._grid[0], : self._grid[1]]
-
-    def state(self, start: CoupledStart) -> Array:
-        """The splitting's state that ``start`` holds."""
-        if start.splitting.shape != (3, *self._padded):
-            raise CoupledContactError("start belongs to another grid: start from a state on this")
-        return start.splitting
-
-
-def _shifts(half_space: HalfSpace, friction: float) -> Array:
-    """ρ for shear, shear and pressure, ``(3, 1, 1)`` [mm/MPa]."""
-    largest = max(float(half_space.symbol(k, k).max()) for k in ALL)
-    smallest = SMALLEST_EIGENVALUE * min(half_space.self_compliance(k) for k in ALL)
-    shift = np.full(3, SHIFT * np.sqrt(largest * smallest))
+def _shift_shares(half_space: HalfSpace, friction: float) -> Array:
+    """ρ of shear, shear and pressure over the geometric mean of K's extreme eigenvalues."""
     beta = abs(half_space.pair.dundurs_beta)
-    shift[:Z] *= max(1.0, min(LARGEST_WEIGHT, beta / max(friction, np.finfo(float).tiny)))
-    return shift[:, None, None]
-
-
-class _Splitting:
-    """The two steps of the splitting, on tractions of the zero-padded grid.
-
-    Off the grid the law is t = 0, which is what makes the circulant exact there.
-    """
-
-    def __init__(self, problem: CoupledProblem, inverse: _PaddedInverse) -> None:
-        self._problem, self._inverse = problem, inverse
-        free = list(problem.free)
-        self._offset = inverse.padded(problem.offset)
-        self._answers = inverse.answers[free]
-        self._gain = np.linalg.pinv(inverse.products[np.ix_(free, free)].T)
-        shift = inverse.shift[Z]
-        self._yield = shift / (shift + problem.compliance)
-        self.rigid = np.zeros(6)
-        """Free motions of the last elastic step."""
-
-    def touching(self) -> Array:
-        """The state ``t + v/ρ`` of bodies that touch without load."""
-        gap = self._problem.offset[Z]
-        lowest = float(gap.min()) if self._problem.load is not None else 0.0
-        state = np.zeros_like(self._offset)
-        self._inverse.on_grid(state)[Z] = np.maximum(0.0, gap - lowest) / self._inverse.shift[Z]
-        return state
-
-    def elastic_step(self, state: Array) -> Array:
-        """``(K + ρ)⁻¹ (ρ s - offset + R c)`` with the motions c that meet the resultants."""
-        problem, inverse = self._problem, self._inverse
-        free = list(problem.free)
-        traction = inverse.solve(inverse.shift * state - self._offset)
-        sums = problem.motions.sums(inverse.on_grid(traction))[free]
-        self.rigid[free] = self._gain @ (problem.target - sums)
-        traction += np.tensordot(self.rigid[free], self._answers, 1)
-        return traction
-
-    def local_law(self, trial: Array) -> Array:
-        """Coulomb's law on the grid, with the compliance of the pressure, and 0 off it."""
-        on_grid = self._inverse.on_grid(trial).copy()
-        on_grid[Z] *= self._yield
-        return self._inverse.padded(coulomb(on_grid, self._problem.friction))
+    weight = max(1.0, min(LARGEST_WEIGHT, beta / max(friction, np.finfo(float).tiny)))
+    return SHIFT * np.array([weight, weight, 1.0])
 
 
 def _check_field(name: str, field: Array, shape: tuple[int, ...]) -> None:
@@ -515,11 +465,11 @@ def _check_field(name: str, field: Array, shape: tuple[int, ...]) -> None:
         raise CoupledContactError(f"{name} hold NaN or infinity: fill or crop the missing points")
 
 
-def _beyond_friction(motions: RigidMotions, planar: list[int], target: Array, share: float) -> str:
-    physical = target * (motions.lengths * motions.grid.cell_area)[planar]
+def _beyond_friction(modes: RigidModes, planar: list[int], target: Array, share: float) -> str:
+    physical = target * (modes.lengths * modes.grid.cell_area)[planar]
     given, largest = (
         ", ".join(
-            f"{RESULTANTS[k]} = {scale * value:.6g} {'N mm' if k == TANGENTIAL[2] else 'N'}"
+            f"{RESULTANTS[k]} = {scale * value:.6g} {'N mm' if k == PLANAR[2] else 'N'}"
             for k, value in zip(planar, physical, strict=True)
         )
         for scale in (1.0, share)

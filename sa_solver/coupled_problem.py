@@ -18,63 +18,12 @@ import numpy as np
 from sa_solver.contact_law import project_on_disk
 from sa_solver.half_space import HalfSpace
 from sa_solver.influence import X, Z
-from sa_solver.types import Array, Grid
+from sa_solver.rigid_modes import RigidModes
+from sa_solver.types import Array
 
 SMALLEST_SHARE = 1e-4
 """Where the tangential displacement is below this share of the normal one, friction hardly acts:
 its residual is measured against that share, since against rounding it would never be small."""
-
-RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
-"""Order of resultants, and of the motions conjugate to them: δz, δx, δy, φx, φy, φz."""
-
-
-class RigidMotions:
-    """The six rigid motions on a grid, and the resultants that are their conjugates.
-
-    Coefficients ``(6,)`` are in mm: rotations times ``lengths``, half the grid's size across their
-    axis. Resultants ``(6,)`` are in MPa: over the cell area, and moments over ``lengths`` too.
-    ``present`` are the motions that move some cell of the grid.
-    """
-
-    def __init__(self, grid: Grid) -> None:
-        """Motions of ``grid``. A line contact goes on along y and knows neither φx nor φz."""
-        half_x, half_y = (0.5 * size for size in grid.size)
-        half = max(half_x, half_y)
-        self.grid = grid
-        self.lengths = np.array([1.0, 1.0, 1.0, half_y, half_x, half])
-        self._x, self._y = grid.x.ravel(), grid.y.ravel()
-        tilts = not grid.line and bool(self._y.any()), bool(self._x.any())
-        self._felt = np.array([True, True, True, *tilts, not grid.line and any(tilts)])
-        self.present = tuple(int(k) for k in np.flatnonzero(self._felt))
-
-    def motion(self, coefficients: Array) -> Array:
-        """The field ``R c`` ``(3, nx, ny)`` [mm] of ``coefficients`` ``(6,)``."""
-        dz, dx, dy, tilt_x, tilt_y, twist = coefficients / self.lengths
-        field = np.empty((3, *self.grid.shape))
-        field[0] = dx - twist * self._y
-        field[1] = (dy + twist * self._x)[:, None]
-        field[2] = (dz - tilt_y * self._x)[:, None] + tilt_x * self._y
-        return field
-
-    def sums(self, traction: Array) -> Array:
-        """Products ``(6,)`` of ``traction`` ``(3, nx, ny)`` with the motions of unit size.
-
-        0 for motions that are not present.
-        """
-        along_x, along_y = traction.sum(axis=2), traction.sum(axis=1)
-        qx, qy, p = along_x.sum(axis=1)
-        moments = (
-            along_y[2] @ self._y,
-            -(along_x[2] @ self._x),
-            along_x[1] @ self._x - along_y[0] @ self._y,
-        )
-        sums: Array = self._felt * np.array([p, qx, qy, *moments]) / self.lengths
-        return sums
-
-    def resultants(self, traction: Array) -> Array:
-        """``(P, Qx, Qy, Mx, My, Mz)`` [N, N mm] of ``traction`` ``(3, nx, ny)`` [MPa]."""
-        physical: Array = self.sums(traction) * self.lengths * self.grid.cell_area
-        return physical
 
 
 @dataclass(frozen=True)
@@ -88,7 +37,7 @@ class CoupledProblem:
     """
 
     half_space: HalfSpace
-    motions: RigidMotions
+    modes: RigidModes
     friction: float
     offset: Array
     imposed: Array
@@ -103,7 +52,7 @@ class CoupledProblem:
 
     def relative(self, traction: Array, displacement: Array, rigid: Array) -> Array:
         """``v`` ``(3, nx, ny)`` [mm] under tractions t, K t and free motions ``rigid`` ``(6,)``."""
-        relative = displacement + self.offset - self.motions.motion(rigid)
+        relative = displacement + self.offset - self.modes.motion(rigid)
         relative[Z] += self.compliance * traction[Z]
         return relative
 
@@ -133,7 +82,7 @@ class CoupledResiduals:
         return max(self.force, self.moment, self.penetration, self.complementarity, self.coulomb)
 
 
-def residuals(
+def coupled_residuals(
     problem: CoupledProblem, traction: Array, displacement: Array, relative: Array
 ) -> CoupledResiduals:
     """All residuals of a state: ``t``, ``K t`` and ``v``, each ``(3, nx, ny)``."""
@@ -144,7 +93,7 @@ def residuals(
         return CoupledResiduals(*[np.inf] * 5)
     errors = np.zeros(6)
     errors[list(problem.free)] = np.abs(
-        problem.motions.sums(traction)[list(problem.free)] - problem.target
+        problem.modes.sums(traction)[list(problem.free)] - problem.target
     )
     errors /= problem.load or load
     return CoupledResiduals(

@@ -19,8 +19,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from sa_solver.tangential_problem import Mask, TangentialProblem, dot, squared
-from sa_solver.types import Array
+from sa_solver.rigid_modes import RANK_CUTOFF
+from sa_solver.tangential_problem import TangentialProblem, dot, squared
+from sa_solver.types import Array, Mask
 
 SETTLED = 0.3
 STEADY = 0.05
@@ -45,9 +46,6 @@ BACKTRACKS = 12
 
 ROUNDING = 1e-12
 """Rise of the energy that rounding explains, relative to the work of shear on displacement."""
-
-RANK_CUTOFF = 1e-12
-"""Relative singular value below which the free cells cannot feel a rigid motion."""
 
 
 @dataclass(frozen=True)

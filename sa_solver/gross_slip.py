@@ -19,7 +19,7 @@ import numpy as np
 
 from sa_solver.types import Array
 
-Direction = Literal["force", "energies"]
+SlidingRule = Literal["force", "energies"]
 
 ACCURACY = 1e-6
 """Error of the energy, relative, and of the direction, in rad, at which the search ends. Shear
@@ -32,20 +32,20 @@ LOOSER = 0.01
 ITERATIONS = 30
 """Contact problems solved; 3 to 8 are usual."""
 
-State = TypeVar("State")
+_State = TypeVar("_State")
 
 
 @dataclass(frozen=True)
-class Sliding(Generic[State]):
+class SlidingTrial(Generic[_State]):
     """A state under imposed motion, its shear force (Qx, Qy) [N] and energy (Edx, Edy) [N mm]."""
 
-    state: State
+    state: _State
     force: Array
     energy: Array
 
 
 @dataclass(frozen=True)
-class GrossSlip(Generic[State]):
+class GrossSlip(Generic[_State]):
     """State of the sliding contact, and its error: see :data:`ACCURACY`.
 
     ``missing`` is the error of the energy alone. Shear is coupled by Poisson's ratio, so no
@@ -54,7 +54,7 @@ class GrossSlip(Generic[State]):
     than given: its force is then below what sliding takes, and to be believed.
     """
 
-    state: State
+    state: _State
     error: float
     missing: float
     creeps: bool
@@ -71,14 +71,14 @@ class GrossSlip(Generic[State]):
 
 
 def gross_slip(
-    slide: Callable[[Array, float], Sliding[State]],
+    slide: Callable[[Array, float], SlidingTrial[_State]],
     carried: float,
     energy: Array,
     force: Array,
     tolerance: float,
-    direction: Direction = "force",
+    direction: SlidingRule = "force",
     stored: float = 0.0,
-) -> GrossSlip[State]:
+) -> GrossSlip[_State]:
     """State of a sliding contact that dissipates ``energy`` (Edx, Edy) [N mm], their sum above 0.
 
     ``slide`` solves the contact for a motion (Δδx, Δδy) [mm] to a tolerance, ``carried`` is µP [N]

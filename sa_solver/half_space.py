@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.fft
 
+from sa_solver.errors import InputError
 from sa_solver.influence import X, Y, Z, rectangle_influence, strip_influence
 from sa_solver.transform import SpectralFilter, Transform, plan_transform
 from sa_solver.types import Array, ElasticPair, Grid
@@ -31,7 +32,7 @@ SMALLEST_EIGENVALUE = 0.5
 ones (0.2) and lines (0.1). It only sets ρ, not the solution."""
 
 Components = tuple[int, ...]
-Shape = tuple[int, int]
+GridShape = tuple[int, int]
 
 
 class HalfSpace:
@@ -46,20 +47,20 @@ class HalfSpace:
     ) -> None:
         """``datum`` [mm] is for line grids: how far from a line force its displacement vanishes.
 
-        Raises ValueError for a datum shorter than the grid.
+        Raises InputError for a datum shorter than the grid.
         """
         self.grid, self.pair, self.threads = grid, pair, threads
         self.datum = DATUM * grid.size[0] if datum is None else datum
         if grid.line and not grid.size[0] <= self.datum < np.inf:
-            raise ValueError(
+            raise InputError(
                 f"datum {self.datum:g} mm is not between the width of the grid, "
                 f"{grid.size[0]:g} mm, and infinity: give the depth of the bodies"
             )
         self.padded = padded_shape(grid)
         self.count = 0
         self._filters: dict[tuple[Components, Components], SpectralFilter] = {}
-        self._symbols: dict[tuple[int, int, Shape], Array] = {}
-        self._transforms: dict[tuple[Shape, Shape, int], Transform] = {}
+        self._symbols: dict[tuple[int, int, GridShape], Array] = {}
+        self._transforms: dict[tuple[GridShape, GridShape, int], Transform] = {}
 
     def normal(self, pressure: Array) -> Array:
         """``u_z`` under ``pressure`` alone, both ``(nx, ny)`` [MPa] → [mm]."""
@@ -87,7 +88,7 @@ class HalfSpace:
         displacement: Array = self._convolve(shear, NORMAL, SHEAR)[0]
         return displacement
 
-    def symbol(self, row: int, column: int, period: Shape | None = None) -> Array:
+    def symbol(self, row: int, column: int, period: GridShape | None = None) -> Array:
         """Eigenvalues of the influence coefficients made periodic, ``(mx, my//2 + 1)`` [mm/MPa].
 
         ``period`` is the padded shape unless given; each displacement is taken at the nearest
@@ -104,7 +105,7 @@ class HalfSpace:
         edges = [np.array([-0.5, 0.5]) * pitch for pitch in self.grid.pitch]
         return float(self._influence(edges[0], edges[1], component, component)[0, 0])
 
-    def transform(self, shape: Shape, padded: Shape, components: int) -> Transform:
+    def transform(self, shape: GridShape, padded: GridShape, components: int) -> Transform:
         """A transform planned once for all who need this size."""
         key = (shape, padded, components)
         if key not in self._transforms:
@@ -124,7 +125,7 @@ class HalfSpace:
             return strip_influence(edges_x, self.pair, row, column, self.datum)[:, None]
         return rectangle_influence(edges_x, edges_y, self.pair, row, column)
 
-    def _compute_symbol(self, row: int, column: int, period: Shape) -> Array:
+    def _compute_symbol(self, row: int, column: int, period: GridShape) -> Array:
         """DFT of a quarter of the kernel, continued by its parity along x and along y."""
         edges = [
             (np.arange(m // 2 + 2, dtype=np.float64) - 0.5) * pitch
@@ -151,7 +152,7 @@ def spectral_filter(
     return SpectralFilter(transform, symbols, (imaginary[0], imaginary[1]))
 
 
-def padded_shape(grid: Grid) -> Shape:
+def padded_shape(grid: Grid) -> GridShape:
     """The fast transform lengths that hold the linear convolution on ``grid``."""
     nx, ny = (int(scipy.fft.next_fast_len(2 * n - 1, real=True)) for n in grid.shape)
     return nx, ny
@@ -171,21 +172,27 @@ def continued(kernel: Array, axis: int, period: int, odd: bool) -> Array:
 class HalfSpaceResolvent:
     """``(K + ρ)⁻¹`` on the zero-padded grid, where K is circulant and the inverse exact.
 
-    Fields have the shape ``padded``; the grid is their first ``(nx, ny)`` block.
+    Fields have the shape ``(c, *padded)``; the grid is their first ``(nx, ny)`` block.
     """
 
-    def __init__(self, half_space: HalfSpace, components: Components) -> None:
-        """Plan for tractions with these ``components``."""
-        self.padded = half_space.padded
-        self._half_space = half_space
+    def __init__(
+        self, half_space: HalfSpace, components: Components, share: float | Array = SHIFT
+    ) -> None:
+        """Plan for tractions with these ``components``.
+
+        ``share``, a number or ``(c,)``, is ρ over the geometric mean of K's extreme eigenvalues.
+        """
+        self.padded_shape = half_space.padded
+        self._half_space, self._shape = half_space, half_space.grid.shape
         largest = max(float(half_space.symbol(k, k).max()) for k in components)
         smallest = SMALLEST_EIGENVALUE * min(half_space.self_compliance(k) for k in components)
-        self.shift = SHIFT * float(np.sqrt(largest * smallest))
-        """ρ [mm/MPa]."""
+        mean = float(np.sqrt(largest * smallest))
+        self.shift = (share * np.full(len(components), mean))[:, None, None]
+        """ρ of each component ``(c, 1, 1)`` [mm/MPa]."""
         symbols = [[half_space.symbol(i, j) for j in components] for i in components]
         for k, row in enumerate(symbols):
-            row[k] = row[k] + self.shift
-        transform = half_space.transform(self.padded, self.padded, len(components))
+            row[k] = row[k] + self.shift[k]
+        transform = half_space.transform(self.padded_shape, self.padded_shape, len(components))
         inverse = inverse_symbols(symbols)
         self._filter = spectral_filter(transform, inverse, components, components)
 
@@ -193,6 +200,16 @@ class HalfSpaceResolvent:
         """Traction ``(K + ρ)⁻¹ u`` for ``u`` ``(c, mx, my)`` on the padded grid [mm] → [MPa]."""
         self._half_space.count += 1
         return self._filter.apply(displacement)
+
+    def padded(self, fields: Array) -> Array:
+        """``fields`` ``(c, nx, ny)`` continued by zero to the padded grid."""
+        out = np.zeros((len(fields), *self.padded_shape))
+        self.on_grid(out)[:] = fields
+        return out
+
+    def on_grid(self, fields: Array) -> Array:
+        """The part of ``fields`` ``(c, mx, my)`` that lies on the grid."""
+        return fields[:, : self._shape[0], : self._shape[1]]
 
 
 def inverse_symbols(symbols: list[list[Array]]) -> list[list[Array]]:

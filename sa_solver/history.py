@@ -18,8 +18,10 @@ from typing import Literal
 
 import numpy as np
 
-from sa_solver.contact import NORMAL, TANGENTIAL, ContactState, FrictionalContact, Load
+from sa_solver.contact import ContactLoad, ContactState, FrictionalContact
+from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
+from sa_solver.rigid_modes import NORMAL, PLANAR
 from sa_solver.types import Array
 
 Method = Literal["full", "reversals", "ciavarella_jaeger"]
@@ -28,16 +30,16 @@ STRAIGHT = 1e-9
 """How far two increments of the shear load may be from parallel: rounding of a straight leg."""
 
 
-class HistoryError(ValueError):
+class HistoryError(InputError):
     """The method asked for does not suffice for the load path."""
 
 
 @dataclass(frozen=True)
-class LoadPath:
+class ContactLoadPath:
     """Loads at the ends of n increments, from bodies apart.
 
     ``values`` ``(n, 6)``, ``motion`` (6,) and ``strain`` ``(n,)`` as in
-    :class:`~sa_solver.contact.Load`; ``energy`` ``(n, 2)`` or None.
+    :class:`~sa_solver.contact.ContactLoad`; ``energy`` ``(n, 2)`` or None.
     """
 
     values: Array
@@ -48,17 +50,17 @@ class LoadPath:
     def __len__(self) -> int:
         return len(self.values)
 
-    def load(self, row: int) -> Load:
+    def load(self, row: int) -> ContactLoad:
         """The load at the end of increment ``row``."""
         strain = 0.0 if self.strain is None else float(self.strain[row])
         energy = None if self.energy is None else self.energy[row]
-        return Load(self.values[row], self.motion, strain, energy)
+        return ContactLoad(self.values[row], self.motion, strain, energy)
 
     @property
     def shear(self) -> Array:
         """Shear load and mismatch strain, ``(n, 4)``: Qx, Qy, Mz (or their motions), strain."""
         strain = np.zeros(len(self)) if self.strain is None else self.strain
-        return np.column_stack([self.values[:, list(TANGENTIAL)], strain])
+        return np.column_stack([self.values[:, list(PLANAR)], strain])
 
 
 @dataclass(frozen=True)
@@ -78,10 +80,10 @@ class History:
     error_of: str = ""
 
 
-def march(
+def march_history(
     half_space: HalfSpace,
     height: Array,
-    path: LoadPath,
+    path: ContactLoadPath,
     friction: float,
     *,
     history: Literal["auto", "full", "reversals"] = "auto",
@@ -111,14 +113,14 @@ def march(
     return _reversals(contact, height, path, progress)
 
 
-def turning_points(path: LoadPath) -> list[int]:
+def turning_points(path: ContactLoadPath) -> list[int]:
     """Rows where a load, normal or shear, is about to begin or to leave its direction; the last."""
     changes = _changes(np.column_stack([path.values[:, list(NORMAL)], path.shear]))
     rows = [row for row in range(len(path) - 1) if _turns(changes[row], changes[row + 1])]
     return [*rows, len(path) - 1]
 
 
-def _obstacle_to_legs(half_space: HalfSpace, path: LoadPath) -> str:
+def _obstacle_to_legs(half_space: HalfSpace, path: ContactLoadPath) -> str:
     """Why a leg of the shear load may not be taken in one step; empty if it may."""
     if not half_space.pair.similar:
         return "the bodies are dissimilar"
@@ -155,7 +157,7 @@ def _proportional(shear: Array) -> bool:
 
 
 def _rows(
-    contact: FrictionalContact, height: Array, path: LoadPath, rows: list[int]
+    contact: FrictionalContact, height: Array, path: ContactLoadPath, rows: list[int]
 ) -> Iterator[ContactState]:
     """States at the given rows; ends with the first that has not converged."""
     state = contact.apart(height)
@@ -169,7 +171,7 @@ def _rows(
 def _solve(
     contact: FrictionalContact,
     height: Array,
-    path: LoadPath,
+    path: ContactLoadPath,
     rows: list[int],
     progress: Callable[[int, ContactState], None] | None,
 ) -> list[ContactState]:
@@ -184,7 +186,7 @@ def _solve(
 def _full(
     contact: FrictionalContact,
     height: Array,
-    path: LoadPath,
+    path: ContactLoadPath,
     reason: str,
     estimate_error: bool,
     progress: Callable[[int, ContactState], None] | None,
@@ -206,7 +208,7 @@ def _full(
 def _reversals(
     contact: FrictionalContact,
     height: Array,
-    path: LoadPath,
+    path: ContactLoadPath,
     progress: Callable[[int, ContactState], None] | None,
 ) -> History:
     rows = turning_points(path)
@@ -229,7 +231,7 @@ def _reversals(
 
 
 def _one_leg(
-    contact: FrictionalContact, states: list[ContactState], path: LoadPath, rows: list[int]
+    contact: FrictionalContact, states: list[ContactState], path: ContactLoadPath, rows: list[int]
 ) -> bool:
     """Whether the last leg is the first loading of a line contact."""
     before = states[-2] if len(states) > 1 else states[-1]
@@ -237,13 +239,15 @@ def _one_leg(
     return begun and contact.two_normal_problems(before, path.load(rows[-1]))
 
 
-def _with_midpoint(path: LoadPath, first: int, last: int) -> Load:
+def _with_midpoint(path: ContactLoadPath, first: int, last: int) -> ContactLoad:
     """The load half way along a leg."""
     begin, end = path.load(first), path.load(last)
-    return Load(0.5 * (begin.values + end.values), path.motion, 0.5 * (begin.strain + end.strain))
+    return ContactLoad(
+        0.5 * (begin.values + end.values), path.motion, 0.5 * (begin.strain + end.strain)
+    )
 
 
-def _every_second(path: LoadPath) -> list[int]:
+def _every_second(path: ContactLoadPath) -> list[int]:
     """Every second row, with the last and those where the shear load turns back kept."""
     changes = _changes(path.shear)
     back = {row for row in range(len(path) - 1) if _turns_back(changes[row], changes[row + 1])}

@@ -15,10 +15,10 @@ from sa_solver.bound_cg import SearchResult, bound_conjugate_gradients
 from sa_solver.few_cells import solve_few_cells
 from sa_solver.half_space import HalfSpace
 from sa_solver.nested_grids import Transfer, coarsened
-from sa_solver.normal_problem import Iterate, NormalProblem, residuals
-from sa_solver.normal_splitting import split
+from sa_solver.normal_problem import Iterate, NormalProblem, normal_residuals
+from sa_solver.normal_splitting import solve_by_splitting
 from sa_solver.preconditioner import NormalPreconditioner
-from sa_solver.rigid_modes import APPROACH, TILT_X, TILT_Y, RigidModes
+from sa_solver.rigid_modes import APPROACH, TILT_X, TILT_Y, NormalModes
 from sa_solver.types import Array, Grid
 
 GRADIENT_ITERATIONS = 200
@@ -36,7 +36,7 @@ BOXES = 4
 
 
 @dataclass(frozen=True)
-class Solution:
+class NestedSolution:
     """The last iterate on the whole grid, and how it was found."""
 
     iterate: Iterate
@@ -73,7 +73,7 @@ class NestedSolver:
 
     def solve(
         self, problem: NormalProblem, pressure: Array, displacement: Array | None, tolerance: float
-    ) -> Solution:
+    ) -> NestedSolution:
         """Solve from a balanced ``pressure`` >= 0, whose ``displacement`` may be known."""
         box, iterations = Box.around(pressure > 0.0), 0
         while True:
@@ -83,14 +83,14 @@ class NestedSolver:
             if not found.converged:
                 return self._rescue(problem, box.placed(iterate.pressure), iterations, tolerance)
             if box.size == box.shape:
-                return Solution(iterate, iterations, "conjugate gradients")
+                return NestedSolution(iterate, iterations, "conjugate gradients")
             pressure = box.placed(iterate.pressure)
             displacement = problem.displacement(pressure)
             iterate = Iterate(pressure, displacement, iterate.rigid)
             missed = iterate.gap(problem) < -tolerance * displacement.max()
             missed[box.window] = False
             if not missed.any():
-                return Solution(iterate, iterations, "conjugate gradients")
+                return NestedSolution(iterate, iterations, "conjugate gradients")
             missed[box.window] = True
             box = Box.around(missed)
 
@@ -125,15 +125,15 @@ class NestedSolver:
 
     def _rescue(
         self, problem: NormalProblem, pressure: Array, iterations: int, tolerance: float
-    ) -> Solution:
+    ) -> NestedSolution:
         """Solve on the whole grid by slower methods, from the last ``pressure`` of the search."""
         few, steps = solve_few_cells(problem, tolerance)
-        if few is not None and residuals(problem, few).largest <= tolerance:
-            return Solution(few, iterations + steps, "active set")
+        if few is not None and normal_residuals(problem, few).largest <= tolerance:
+            return NestedSolution(few, iterations + steps, "active set")
         rigid = np.zeros(len(problem.modes.free))
         last = Iterate(pressure, problem.displacement(pressure), rigid)
-        iterate, more = split(problem, last, tolerance)
-        return Solution(iterate, iterations + steps + more, "splitting")
+        iterate, more = solve_by_splitting(problem, last, tolerance)
+        return NestedSolution(iterate, iterations + steps + more, "splitting")
 
     # -- coarser grids ------------------------------------------------------------------------
     @cached_property
@@ -165,7 +165,7 @@ class NestedSolver:
             problem,
             height=transfer.averaged(problem.height),
             target=problem.target * (transfer.fine.cell_area / grid.cell_area),
-            modes=RigidModes.on(grid, problem.modes.free),
+            modes=NormalModes.on(grid, problem.modes.free),
             half_space=self.half_space,
             compliance=None if compliance is None else transfer.averaged(compliance),
         )

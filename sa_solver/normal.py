@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sa_solver.half_space import HalfSpace
-from sa_solver.nested_solver import NestedSolver, Solution
+from sa_solver.nested_solver import NestedSolution, NestedSolver
 from sa_solver.normal_control import NormalContactError as NormalContactError
 from sa_solver.normal_control import NormalControl
 from sa_solver.normal_problem import (
@@ -27,9 +27,9 @@ from sa_solver.normal_problem import (
     NormalResiduals,
     Work,
     border_share,
-    residuals,
+    normal_residuals,
 )
-from sa_solver.rigid_modes import APPROACH, RigidModes, mode_lengths
+from sa_solver.rigid_modes import APPROACH, NormalModes, mode_lengths
 from sa_solver.separation import separating_tilt
 from sa_solver.types import Array
 
@@ -155,7 +155,7 @@ class NormalContact:
         self, height: Array, control: NormalControl, compliance: Array | None
     ) -> NormalProblem:
         """The problem left when imposed motions are taken off the heights."""
-        modes = RigidModes.on(self.grid, control.free)
+        modes = NormalModes.on(self.grid, control.free)
         target = control.sums(self.grid, modes.free)
         delta, phi_x, phi_y = control.motions
         if delta or phi_x or phi_y:
@@ -182,10 +182,14 @@ class NormalContact:
         return cold, None
 
     def _state(
-        self, problem: NormalProblem, control: NormalControl, solution: Solution, tolerance: float
+        self,
+        problem: NormalProblem,
+        control: NormalControl,
+        solution: NestedSolution,
+        tolerance: float,
     ) -> NormalState:
         iterate = solution.iterate
-        measured = residuals(problem, iterate)
+        measured = normal_residuals(problem, iterate)
         converged = measured.largest <= tolerance
         elastic = iterate.displacement
         if problem.compliance is not None:

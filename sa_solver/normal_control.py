@@ -6,11 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sa_solver.errors import ContactProblemError
 from sa_solver.rigid_modes import APPROACH, mode_lengths
 from sa_solver.types import Array, Grid
 
 
-class NormalContactError(ValueError):
+class NormalContactError(ContactProblemError):
     """The data of a normal contact problem admit no solution."""
 
 

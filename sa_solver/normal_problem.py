@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sa_solver.half_space import HalfSpace
-from sa_solver.rigid_modes import APPROACH, RigidModes, Window
+from sa_solver.rigid_modes import APPROACH, NormalModes, Window
 from sa_solver.types import Array
 
 Work = Counter[tuple[int, int]]
@@ -26,7 +26,7 @@ class NormalProblem:
 
     height: Array
     target: Array
-    modes: RigidModes
+    modes: NormalModes
     half_space: HalfSpace
     compliance: Array | None
     work: Work
@@ -95,7 +95,7 @@ def contact_residuals(pressure: Array, displacement: Array, gap: Array) -> tuple
     return max(0.0, -float(gap.min())) / scale, float(largest / (pressure.max() * scale))
 
 
-def residuals(problem: NormalProblem, iterate: Iterate) -> NormalResiduals:
+def normal_residuals(problem: NormalProblem, iterate: Iterate) -> NormalResiduals:
     """All four residuals of ``iterate``."""
     total = iterate.pressure.sum()
     if not total > 0.0:

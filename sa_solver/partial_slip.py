@@ -32,11 +32,13 @@ from functools import cached_property
 import numpy as np
 from scipy.sparse.linalg import LinearOperator, cg
 
+from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalStart, NormalState
 from sa_solver.tangential_loop import (
     STUCK_ITERATIONS,
     STUCK_TOLERANCE,
+    LoopFailure,
     LoopPath,
     stuck_stiffness,
 )
@@ -54,7 +56,7 @@ ROUNDING = 1e-9
 """Share of the stuck stiffness below which a slope has not changed."""
 
 
-class PartialSlipError(ValueError):
+class PartialSlipError(InputError):
     """A contact that cannot be moved to and fro in this way."""
 
 
@@ -116,7 +118,7 @@ class PartialSlip:
         return np.where(self.normal.pressure > 0.0, self.shift[sticking], 0.0)
 
 
-def partial_slip(
+def partial_slip_curve(
     contact: NormalContact,
     height: Array,
     P: float,
@@ -128,8 +130,8 @@ def partial_slip(
     """What a contact of alike bodies does when it is moved along x under a load ``P`` [N].
 
     ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies, free to tilt under P. Raises
-    PartialSlipError for bodies that are not alike or a load that is not above 0, and where a
-    normal problem does not converge.
+    PartialSlipError for bodies that are not alike or a load that is not above 0, LoopFailure where
+    a normal problem does not converge.
     """
     if not contact.half_space.pair.similar:
         raise PartialSlipError("bodies that are not alike: their pressure follows the shear")
@@ -212,14 +214,14 @@ def _stiffness(half_space: HalfSpace, normal: NormalState) -> tuple[float, float
     operator = LinearOperator((count, count), matvec=indented, dtype=np.float64)
     pressure, status = cg(operator, np.ones(count), rtol=STUCK_TOLERANCE, maxiter=STUCK_ITERATIONS)
     if status != 0:
-        raise PartialSlipError(
+        raise LoopFailure(
             f"the pressed contact of {count} cells did not converge in {STUCK_ITERATIONS} "
-            "iterations: smooth or refine the heights, or smooth or refine the heights"
+            "iterations: smooth or refine the heights"
         )
     return tangential, float(pressure.sum()) * half_space.grid.cell_area / tangential
 
 
 def _converged(state: NormalState) -> NormalState:
     if not state.converged:
-        raise PartialSlipError(state.message)
+        raise LoopFailure(state.message)
     return state

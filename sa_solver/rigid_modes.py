@@ -1,8 +1,17 @@
-"""Rigid approach and tilts on cells, and the resultants that are their conjugates."""
+"""Rigid motions on cells, and the resultants that are their conjugates.
+
+A rigid motion (δx, δy, δz, φx, φy, φz) displaces the cell at (x, y) by
+
+    u_x = δx - φz y,    u_y = δy + φz x,    u_z = δz + φx y - φy x
+
+The normal problem knows the three of u_z (:class:`NormalModes`), the tangential problem the three
+of u_x and u_y (:class:`PlanarModes`), the contact of dissimilar bodies all six
+(:class:`RigidModes`). Signs are those of :mod:`sa_solver.types`.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,7 +19,7 @@ import numpy as np
 from sa_solver.types import Array, Grid
 
 BALANCE_TOLERANCE = 1e-13
-"""Resultants left by :meth:`RigidModes.balance`, relative to the load: rounding of a sum."""
+"""Resultants left by :meth:`NormalModes.balance`, relative to the load: rounding of a sum."""
 
 BALANCE_ITERATIONS = 100
 """Newton takes 2 to 5; the rest lets a load close to the edge of its support be reached."""
@@ -20,16 +29,22 @@ LARGEST_EXPONENT_STEP = 2.0
 
 RANK_CUTOFF = 1e-12
 """Relative singular value below which a set of cells is one point or one line, and cannot feel
-the corresponding tilt."""
+the corresponding rotation."""
 
 APPROACH, TILT_X, TILT_Y = range(3)
-"""The modes δz, φx and φy."""
+"""The normal modes δz, φx and φy."""
+
+RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
+"""Order of the six resultants, and of the motions conjugate to them: δz, δx, δy, φx, φy, φz."""
+
+NORMAL, PLANAR = (0, 3, 4), (1, 2, 5)
+"""Places among the six of P, Mx, My and of Qx, Qy, Mz, and of their motions."""
 
 Window = tuple[slice, slice]
 
 
 @dataclass(frozen=True)
-class RigidModes:
+class NormalModes:
     """Those modes of ``δz + φx y - φy x`` that are ``free``, on a box of cells.
 
     ``x`` ``(nx,)`` and ``y`` ``(ny,)`` are the cell centres over half the size of the whole grid,
@@ -43,7 +58,7 @@ class RigidModes:
     free: tuple[int, ...]
 
     @classmethod
-    def on(cls, grid: Grid, free: tuple[int, ...] = (APPROACH, TILT_X, TILT_Y)) -> RigidModes:
+    def on(cls, grid: Grid, free: tuple[int, ...] = (APPROACH, TILT_X, TILT_Y)) -> NormalModes:
         """Modes of a whole grid; a tilt that moves none of its cells is never free."""
         x, y = (
             centres.ravel() / (0.5 * size)
@@ -52,9 +67,9 @@ class RigidModes:
         still = {TILT_X: not y.any(), TILT_Y: not x.any()}
         return cls(x, y, tuple(mode for mode in free if not still.get(mode, False)))
 
-    def cropped(self, window: Window) -> RigidModes:
+    def cropped(self, window: Window) -> NormalModes:
         """The same modes on part of the cells."""
-        return RigidModes(self.x[window[0]], self.y[window[1]], self.free)
+        return replace(self, x=self.x[window[0]], y=self.y[window[1]])
 
     def sums(self, fields: Array) -> Array:
         """Products ``(..., k)`` of fields ``(..., nx, ny)`` with the modes."""
@@ -165,5 +180,137 @@ class RigidModes:
 
 
 def mode_lengths(grid: Grid) -> Array:
-    """1, Ly, Lx: coefficients over these are δz [mm], φx and φy [rad], ``(3,)``."""
+    """1, Ly, Lx: coefficients of normal modes over these are δz [mm], φx and φy [rad], ``(3,)``."""
     return np.array([1.0, 0.5 * grid.size[1], 0.5 * grid.size[0]])
+
+
+@dataclass(frozen=True)
+class PlanarModes:
+    """Those rigid motions δx, δy, φz in the contact plane that are ``free``, on a box of cells.
+
+    The rotation is scaled by ``length``, half the larger side of the grid: ``x`` ``(nx,)`` and
+    ``y`` ``(ny,)`` are cell centres over that. Coefficients and sums ``(k,)`` are of the free
+    modes; products with a shear field are Qx/S, Qy/S, Mz/(L S), all in MPa.
+    """
+
+    x: Array
+    y: Array
+    length: float
+    free: tuple[int, ...] = (0, 1, 2)
+
+    @classmethod
+    def on(cls, grid: Grid) -> PlanarModes:
+        """All modes of a whole grid; a line contact knows no rotation."""
+        length = 0.5 * max(grid.size)
+        free = (0, 1) if grid.line else (0, 1, 2)
+        return cls(grid.x[:, 0] / length, grid.y[0] / length, length, free)
+
+    def cropped(self, window: Window) -> PlanarModes:
+        """The same modes on part of the cells."""
+        return replace(self, x=self.x[window[0]], y=self.y[window[1]])
+
+    def only(self, free: tuple[int, ...]) -> PlanarModes:
+        """Fewer of the modes."""
+        return replace(self, free=free)
+
+    @property
+    def lengths(self) -> Array:
+        """Resultants over sums and cell area, ``(k,)``: 1, 1 and the length."""
+        return np.array([1.0, 1.0, self.length])[list(self.free)]
+
+    def sums(self, field: Array) -> Array:
+        """Products ``(k,)`` of a field ``(2, nx, ny)`` with the modes."""
+        along_x, along_y = field @ self._lines_y
+        turned = self.x @ along_y[:, 0] - along_x[:, 1].sum()
+        every = np.array([along_x[:, 0].sum(), along_y[:, 0].sum(), turned])
+        return every[list(self.free)]
+
+    def add_motion(self, field: Array, coefficients: Array) -> None:
+        """Add the rigid motion with these coefficients ``(k,)`` to a field ``(2, nx, ny)``."""
+        along_x, along_y = self._profiles(coefficients)
+        field[0] += along_x
+        field[1] += along_y[:, None]
+
+    def add_weighted(self, field: Array, weight: Array, coefficients: Array) -> None:
+        """Add ``weight`` ``(nx, ny)`` times a rigid motion to a field ``(2, nx, ny)``."""
+        along_x, along_y = self._profiles(coefficients)
+        field[0] += weight * along_x
+        field[1] += weight * along_y[:, None]
+
+    def fields(self) -> Array:
+        """The modes themselves, ``(k, 2, nx, ny)``."""
+        fields = np.zeros((len(self.free), 2, self.x.size, self.y.size))
+        for field, unit in zip(fields, np.eye(len(self.free)), strict=True):
+            self.add_motion(field, unit)
+        return fields
+
+    def products(self, xx: Array, xy: Array, yy: Array) -> Array:
+        """Products ``(k, k)`` of the modes with one another under a field of tensors."""
+        moments = np.array([tensor @ self._lines_y for tensor in (xx, xy, yy)])
+        (xx_, xy_, yy_), x = moments, self.x
+        turned_x = x @ xy_[:, 0] - xx_[:, 1].sum()
+        turned_y = x @ yy_[:, 0] - xy_[:, 1].sum()
+        twice = xx_[:, 2].sum() - 2.0 * (x @ xy_[:, 1]) + (x * x) @ yy_[:, 0]
+        both = xy_[:, 0].sum()
+        every = np.array(
+            [
+                [xx_[:, 0].sum(), both, turned_x],
+                [both, yy_[:, 0].sum(), turned_y],
+                [turned_x, turned_y, twice],
+            ]
+        )
+        return every[np.ix_(self.free, self.free)]
+
+    @cached_property
+    def _lines_y(self) -> Array:
+        """1, y and y² as columns, ``(ny, 3)``."""
+        return np.stack([np.ones_like(self.y), self.y, self.y * self.y], axis=1)
+
+    def _profiles(self, coefficients: Array) -> tuple[Array, Array]:
+        """The motion along x, ``(ny,)``, and along y, ``(nx,)``."""
+        every = np.zeros(3)
+        every[list(self.free)] = coefficients
+        return every[0] - every[2] * self.y, every[1] + every[2] * self.x
+
+
+class RigidModes:
+    """All six rigid motions on a grid, in the order of :data:`RESULTANTS`.
+
+    Coefficients ``(6,)`` are in mm: rotations times ``lengths``, half the grid's size across their
+    axis. Resultants ``(6,)`` are in MPa: over the cell area, and moments over ``lengths`` too.
+    ``present`` are the motions that move some cell of the grid.
+    """
+
+    def __init__(self, grid: Grid) -> None:
+        """Modes of ``grid``. A line contact goes on along y and knows neither φx nor φz."""
+        self.grid = grid
+        self._normal, self._planar = NormalModes.on(grid), PlanarModes.on(grid)
+        self.lengths = np.ones(6)
+        self.lengths[list(NORMAL)] = mode_lengths(grid)
+        self.lengths[PLANAR[-1]] = self._planar.length
+        # On a single cell a twist moves nothing.
+        planar = self._planar.free if max(grid.shape) > 1 else self._planar.free[:2]
+        self._planar = self._planar.only(planar)
+        self._places = [NORMAL[k] for k in self._normal.free], [PLANAR[k] for k in planar]
+        self.present = tuple(sorted([*self._places[0], *self._places[1]]))
+
+    def motion(self, coefficients: Array) -> Array:
+        """The displacement ``(3, nx, ny)`` [mm] with ``coefficients`` ``(6,)``."""
+        normal, planar = self._places
+        field = np.zeros((3, *self.grid.shape))
+        self._planar.add_motion(field[:2], coefficients[planar])
+        field[2] = self._normal.motion(coefficients[normal])
+        return field
+
+    def sums(self, traction: Array) -> Array:
+        """Products ``(6,)`` of ``traction`` ``(3, nx, ny)`` with the modes, 0 if not present."""
+        normal, planar = self._places
+        sums = np.zeros(6)
+        sums[normal] = self._normal.sums(traction[2])
+        sums[planar] = self._planar.sums(traction[:2])
+        return sums
+
+    def resultants(self, traction: Array) -> Array:
+        """``(P, Qx, Qy, Mx, My, Mz)`` [N, N mm] of ``traction`` ``(3, nx, ny)`` [MPa]."""
+        physical: Array = self.sums(traction) * self.lengths * self.grid.cell_area
+        return physical

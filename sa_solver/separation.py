@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.optimize
 
-from sa_solver.rigid_modes import RigidModes
+from sa_solver.rigid_modes import NormalModes
 from sa_solver.types import Array
 
 CUTS = 200
@@ -15,7 +15,7 @@ TOUCHING = 1e-12
 """Penetration taken for touching, over the range of heights: rounding of the linear programme."""
 
 
-def separating_tilt(height: Array, modes: RigidModes) -> Array | None:
+def separating_tilt(height: Array, modes: NormalModes) -> Array | None:
     """Coefficients ``(k,)`` of the free tilts that leave ``height`` ``(nx, ny)`` nowhere negative.
 
     None where there are none, and the bodies press. Without moment the bodies come apart unless

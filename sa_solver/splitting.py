@@ -55,7 +55,7 @@ ROUNDING = float(np.finfo(np.float64).eps)
 TINY = np.finfo(float).tiny
 """Keeps divisions by a vanishing size finite."""
 
-Step = Callable[[Array], Array]
+SplittingStep = Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
@@ -75,8 +75,8 @@ class SplittingResult:
 
 
 def douglas_rachford(
-    elastic_step: Step,
-    local_law: Step,
+    elastic_step: SplittingStep,
+    local_law: SplittingStep,
     start: Array,
     *,
     scale: float | None = None,

@@ -26,6 +26,7 @@ from typing import Literal
 import numpy as np
 import scipy.fft
 
+from sa_solver.errors import InputError
 from sa_solver.half_space import continued, padded_shape
 from sa_solver.subsurface_influence import (
     INDICES,
@@ -55,7 +56,7 @@ MIRROR = {1: np.array([-1.0, -1.0, 1.0]), 2: np.ones(3)}
 """Tractions on the half-space z > 0 that a body is or mirrors, over those on body 2."""
 
 
-class SubsurfaceError(ValueError):
+class SubsurfaceError(InputError):
     """A body, depth, section or field of tractions that does not fit."""
 
 

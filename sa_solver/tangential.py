@@ -16,17 +16,16 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sa_solver.disk_gradient import gradients_on_disks
 from sa_solver.disk_newton import DiskSolution, newton_on_disks
+from sa_solver.errors import ContactProblemError
 from sa_solver.friction_limit import largest_share
 from sa_solver.half_space import HalfSpace
+from sa_solver.rigid_modes import PlanarModes, Window
 from sa_solver.tangential_levels import ShearLevel
-from sa_solver.tangential_problem import PlanarModes, TangentialProblem
-from sa_solver.types import Array
-
-Window = tuple[slice, slice]
+from sa_solver.tangential_problem import TangentialProblem
+from sa_solver.types import Array, Mask
 
 TOLERANCE = 1e-8
 """Default bound on every residual of :class:`TangentialResiduals`."""
@@ -50,7 +49,7 @@ NAMES = ("Qx", "Qy", "Mz")
 UNITS = ("N", "N", "N mm")
 
 
-class TangentialContactError(ValueError):
+class TangentialContactError(ContactProblemError):
     """The data of a tangential contact problem admit no solution."""
 
 
@@ -99,7 +98,7 @@ class TangentialState:
     shear: Array
     slip: Array
     displacement: Array
-    sticking: NDArray[np.bool_]
+    sticking: Mask
     shift_x: float
     shift_y: float
     twist: float

@@ -23,13 +23,13 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, cg
 
-from sa_solver.contact import ContactState, FrictionalContact, Load
+from sa_solver.contact import ContactLoad, ContactState, FrictionalContact
+from sa_solver.errors import ConvergenceError, InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.influence import Z
-from sa_solver.types import Array
+from sa_solver.types import Array, Mask
 
 MOST_CYCLES = 4
 """Cycles marched for one that closes. Similar bodies close the first; dissimilar ones forget how
@@ -45,14 +45,14 @@ STUCK_TOLERANCE = 1e-10
 STUCK_ITERATIONS = 2000
 """Conjugate gradients of the stuck contact: 40 on 32² cells, 100 on 256², growing with the root."""
 
-Axis = Literal["x", "y"]
+LoopAxis = Literal["x", "y"]
 
 
-class LoopError(ValueError):
+class LoopError(InputError):
     """The loop asked for makes no sense."""
 
 
-class LoopFailure(RuntimeError):
+class LoopFailure(ConvergenceError):
     """An increment of the loop, or its stuck contact, did not converge."""
 
 
@@ -70,7 +70,7 @@ class LoopPath:
     amplitude: float
     by: Literal["motion", "force"] = "motion"
     increments: int = 12
-    axis: Axis = "x"
+    axis: LoopAxis = "x"
     moments: tuple[float, float] | None = (0.0, 0.0)
 
     def __post_init__(self) -> None:
@@ -192,7 +192,7 @@ class TangentialLoop:
         return (displacement[: n + 1], force[: n + 1]), (displacement[n:], force[n:])
 
 
-def tangential_loop(contact: FrictionalContact, height: Array, path: LoopPath) -> TangentialLoop:
+def march_loop(contact: FrictionalContact, height: Array, path: LoopPath) -> TangentialLoop:
     """Press and move to and fro on surfaces that do not wear.
 
     ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies. Raises LoopFailure where a solve
@@ -221,7 +221,7 @@ def tangential_loop(contact: FrictionalContact, height: Array, path: LoopPath) -
     )
 
 
-def stuck_stiffness(half_space: HalfSpace, pressed: NDArray[np.bool_], path: LoopPath) -> float:
+def stuck_stiffness(half_space: HalfSpace, pressed: Mask, path: LoopPath) -> float:
     """Force per motion along the axis with the cells ``pressed`` ``(nx, ny)`` stuck [N/mm].
 
     Minimises ½ t·K t - Σ t_axis over tractions of these cells whose pressure keeps P and, where
@@ -257,7 +257,7 @@ def stuck_stiffness(half_space: HalfSpace, pressed: NDArray[np.bool_], path: Loo
     return float(motion.ravel() @ traction) * grid.cell_area
 
 
-def _balanced_modes(half_space: HalfSpace, pressed: NDArray[np.bool_], tilting: bool) -> Array:
+def _balanced_modes(half_space: HalfSpace, pressed: Mask, tilting: bool) -> Array:
     """Orthonormal pressures ``(cells, modes)`` whose amounts P, and Mx, My if ``tilting``, fix."""
     grid = half_space.grid
     modes = [np.ones(grid.shape)]
@@ -283,7 +283,7 @@ def _press(contact: FrictionalContact, height: Array, path: LoopPath) -> Contact
     state = contact.apart(height)
     for step in range(1, steps + 1):
         values = np.array([path.P, 0.0, 0.0, Mx, My, 0.0]) * (step / steps)
-        state = _converged(contact.advance(state, height, Load(values, motion)))
+        state = _converged(contact.advance(state, height, ContactLoad(values, motion)))
     return state
 
 
@@ -313,7 +313,7 @@ def _states(
 class _Imposed:
     """Loads of the loop: ``rest`` is imposed at rest, ``step`` more of it at the amplitude."""
 
-    rest: Load
+    rest: ContactLoad
     step: Array
 
     @classmethod
@@ -331,9 +331,9 @@ class _Imposed:
             values[[3, 5]] = 0.0
         step = np.zeros(6)
         step[path.place] = path.amplitude
-        return cls(Load(values, tuple(motion), pressed.strain), step)
+        return cls(ContactLoad(values, tuple(motion), pressed.strain), step)
 
-    def at(self, share: float) -> Load:
+    def at(self, share: float) -> ContactLoad:
         """The load at ``share`` of the amplitude."""
         return replace(self.rest, values=self.rest.values + share * self.step)
 

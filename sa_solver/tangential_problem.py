@@ -11,17 +11,15 @@ the minimum of ½ q·Kq + q·offset over the disks, and unique.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sa_solver.half_space import SHEAR, HalfSpace, inverse_symbols, spectral_filter
+from sa_solver.rigid_modes import PlanarModes
 from sa_solver.transform import SpectralFilter
-from sa_solver.types import Array, Grid
-
-Mask = NDArray[np.bool_]
+from sa_solver.types import Array, Mask
 
 BALANCE_TOLERANCE = 1e-13
 """Resultants left by a balance, relative to the largest shear force: rounding of a sum."""
@@ -73,95 +71,6 @@ def dot(one: Array, other: Array) -> Array:
     product: Array = one[0] * other[0]
     product += one[1] * other[1]
     return product
-
-
-@dataclass(frozen=True)
-class PlanarModes:
-    """Those rigid motions δx, δy, φz in the contact plane that are ``free``, on a box of cells.
-
-    The rotation is scaled by ``length``, half the larger side of the grid: ``x`` ``(nx,)`` and
-    ``y`` ``(ny,)`` are cell centres over that. Coefficients and sums ``(k,)`` are of the free
-    modes; products with a shear field are Qx/S, Qy/S, Mz/(L S), all in MPa.
-    """
-
-    x: Array
-    y: Array
-    length: float
-    free: tuple[int, ...] = (0, 1, 2)
-
-    @classmethod
-    def on(cls, grid: Grid) -> PlanarModes:
-        """All modes of a whole grid; a line contact has no rotation."""
-        length = 0.5 * max(grid.size)
-        free = (0, 1) if grid.line else (0, 1, 2)
-        return cls(grid.x[:, 0] / length, grid.y[0] / length, length, free)
-
-    def cropped(self, window: tuple[slice, slice]) -> PlanarModes:
-        """The same modes on part of the cells."""
-        return replace(self, x=self.x[window[0]], y=self.y[window[1]])
-
-    def only(self, free: tuple[int, ...]) -> PlanarModes:
-        """Fewer of the modes."""
-        return replace(self, free=free)
-
-    @property
-    def lengths(self) -> Array:
-        """Resultants over sums and cell area, ``(k,)``: 1, 1 and the length."""
-        return np.array([1.0, 1.0, self.length])[list(self.free)]
-
-    def sums(self, field: Array) -> Array:
-        """Products ``(k,)`` of a field ``(2, nx, ny)`` with the modes."""
-        along_x, along_y = field @ self._lines_y
-        turned = self.x @ along_y[:, 0] - along_x[:, 1].sum()
-        every = np.array([along_x[:, 0].sum(), along_y[:, 0].sum(), turned])
-        return every[list(self.free)]
-
-    def add_motion(self, field: Array, coefficients: Array) -> None:
-        """Add the rigid motion with these coefficients ``(k,)`` to a field ``(2, nx, ny)``."""
-        along_x, along_y = self._profiles(coefficients)
-        field[0] += along_x
-        field[1] += along_y[:, None]
-
-    def add_weighted(self, field: Array, weight: Array, coefficients: Array) -> None:
-        """Add ``weight`` ``(nx, ny)`` times a rigid motion to a field ``(2, nx, ny)``."""
-        along_x, along_y = self._profiles(coefficients)
-        field[0] += weight * along_x
-        field[1] += weight * along_y[:, None]
-
-    def fields(self) -> Array:
-        """The modes themselves, ``(k, 2, nx, ny)``."""
-        fields = np.zeros((len(self.free), 2, self.x.size, self.y.size))
-        for field, unit in zip(fields, np.eye(len(self.free)), strict=True):
-            self.add_motion(field, unit)
-        return fields
-
-    def products(self, xx: Array, xy: Array, yy: Array) -> Array:
-        """Products ``(k, k)`` of the modes with one another under a field of tensors."""
-        moments = np.array([tensor @ self._lines_y for tensor in (xx, xy, yy)])
-        (xx_, xy_, yy_), x = moments, self.x
-        turned_x = x @ xy_[:, 0] - xx_[:, 1].sum()
-        turned_y = x @ yy_[:, 0] - xy_[:, 1].sum()
-        twice = xx_[:, 2].sum() - 2.0 * (x @ xy_[:, 1]) + (x * x) @ yy_[:, 0]
-        both = xy_[:, 0].sum()
-        every = np.array(
-            [
-                [xx_[:, 0].sum(), both, turned_x],
-                [both, yy_[:, 0].sum(), turned_y],
-                [turned_x, turned_y, twice],
-            ]
-        )
-        return every[np.ix_(self.free, self.free)]
-
-    @cached_property
-    def _lines_y(self) -> Array:
-        """1, y and y² as columns, ``(ny, 3)``."""
-        return np.stack([np.ones_like(self.y), self.y, self.y * self.y], axis=1)
-
-    def _profiles(self, coefficients: Array) -> tuple[Array, Array]:
-        """The motion along x, ``(ny,)``, and along y, ``(nx,)``."""
-        every = np.zeros(3)
-        every[list(self.free)] = coefficients
-        return every[0] - every[2] * self.y, every[1] + every[2] * self.x
 
 
 @dataclass(frozen=True)

@@ -32,8 +32,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from sa_solver.errors import InputError
+
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -65,7 +68,7 @@ class ElasticPair:
 
     All in 1/MPa: ``normal`` Σ (1-ν)/G, ``shear`` Σ 1/G, ``poisson`` Σ ν/G and ``coupling``
     ½ [(1-2ν2)/G2 - (1-2ν1)/G1], exactly 0 for identical materials. An infinite Young's modulus is
-    a rigid body; both rigid are not an elastic pair (ValueError).
+    a rigid body; both rigid are not an elastic pair (InputError).
     """
 
     body_1: Material
@@ -74,12 +77,12 @@ class ElasticPair:
     def __post_init__(self) -> None:
         for material in (self.body_1, self.body_2):
             if not (material.young > 0.0 and 0.0 <= material.poisson <= 0.5):
-                raise ValueError(
+                raise InputError(
                     f"Young's modulus {material.young:g} MPa, Poisson's ratio "
                     f"{material.poisson:g}: give a modulus above 0 and a ratio of 0 to 0.5"
                 )
         if not self.normal > 0.0:
-            raise ValueError("two rigid bodies: give one of them a finite Young's modulus")
+            raise InputError("two rigid bodies: give one of them a finite Young's modulus")
 
     @property
     def normal(self) -> float:
@@ -131,9 +134,9 @@ class Grid:
 
     def __post_init__(self) -> None:
         if min(self.shape) < 1 or not all(0.0 < pitch < np.inf for pitch in self.pitch):
-            raise ValueError(f"a grid of {self.shape} cells of {self.pitch} mm has no area")
+            raise InputError(f"a grid of {self.shape} cells of {self.pitch} mm has no area")
         if self.line and (self.shape[1] != 1 or self.pitch[1] != 1.0):
-            raise ValueError("a line grid has one row of cells 1 mm long: use Grid.strips")
+            raise InputError("a line grid has one row of cells 1 mm long: use Grid.strips")
 
     @classmethod
     def strips(cls, width: float, count: int) -> Grid:
@@ -244,7 +247,7 @@ class LoadHistory:
     Mz: Array
     Edx: Array
     Edy: Array
-    sliding: NDArray[np.bool_]
+    sliding: Mask
     share: Array = field(default_factory=lambda: np.empty(0))
     block: Indices = field(default_factory=lambda: np.empty(0, dtype=np.int64))
 
@@ -254,7 +257,7 @@ class LoadHistory:
             object.__setattr__(self, "block", np.zeros(len(self.P), dtype=np.int64))
         lengths = {len(getattr(self, f.name)) for f in fields(self)}
         if len(lengths) != 1:
-            raise ValueError(f"columns of a load history differ in length: {sorted(lengths)}")
+            raise InputError(f"columns of a load history differ in length: {sorted(lengths)}")
 
     def __len__(self) -> int:
         return len(self.P)

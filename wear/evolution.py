@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 
 
@@ -16,7 +17,7 @@ class EnergyTable:
 
     ``energy`` ascends [N mm, or N/mm where it is per area]. Below ``threshold`` the factor is 0:
     with a constant factor the worn volume is V = α (ΣEd - Ed_th) (Fouvry et al., Wear 255, 2003).
-    Raises ValueError for a table of no or unequal columns, or that does not ascend.
+    Raises InputError for a table of no or unequal columns, or that does not ascend.
     """
 
     energy: tuple[float, ...] = (0.0,)
@@ -25,12 +26,12 @@ class EnergyTable:
 
     def __post_init__(self) -> None:
         if not self.energy or len(self.energy) != len(self.factor):
-            raise ValueError(
+            raise InputError(
                 f"{len(self.energy)} energies and {len(self.factor)} factors: give one or more, "
                 "as many of both"
             )
         if any(after <= before for before, after in pairwise(self.energy)):
-            raise ValueError("energies that do not ascend: give each once, the smallest first")
+            raise InputError("energies that do not ascend: give each once, the smallest first")
 
     def at(self, energy: Array | float) -> Array:
         """Factor at an energy, of its shape."""

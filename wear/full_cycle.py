@@ -9,18 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from sa_solver.contact import ContactState, FrictionalContact, Load
-from sa_solver.coupled import CoupledContactError
-from sa_solver.normal import NormalContactError
-from sa_solver.tangential import TangentialContactError
+from sa_solver.contact import ContactLoad, ContactState, FrictionalContact
+from sa_solver.errors import ContactProblemError
 from sa_solver.types import Array, LoadHistory
 from wear.stepping import ContactFailure
 
-# Loads that no contact can carry.
-IMPOSSIBLE = (NormalContactError, TangentialContactError, CoupledContactError)
 
-
-def full_cycle(
+def march_cycle(
     contact: FrictionalContact, height: Array, loads: LoadHistory, motion: Array | None = None
 ) -> list[ContactState]:
     """States at the ends of the increments of one closed cycle, on surfaces that do not change.
@@ -47,7 +42,7 @@ def full_cycle(
 
 
 def _closed_cycle(
-    contact: FrictionalContact, heights: Array, loads: list[Load], first: int
+    contact: FrictionalContact, heights: Array, loads: list[ContactLoad], first: int
 ) -> list[ContactState]:
     """States of one closed cycle, whose first increment is number ``first`` of all."""
     state = contact.apart(heights[0])
@@ -70,27 +65,27 @@ def _shifts(motion: Array) -> Array:
     return shifts
 
 
-def _force(loads: LoadHistory, t: int) -> Load:
+def _force(loads: LoadHistory, t: int) -> ContactLoad:
     """The resultants of an increment, and what it dissipates."""
     columns = (loads.P, loads.Qx, loads.Qy, loads.Mx, loads.My, loads.Mz)
     values = np.array([column[t] for column in columns])
-    return Load(values, energy=np.array([loads.Edx[t], loads.Edy[t]]))
+    return ContactLoad(values, energy=np.array([loads.Edx[t], loads.Edy[t]]))
 
 
-def _motion(loads: LoadHistory, t: int, shift: Array) -> Load:
+def _motion(loads: LoadHistory, t: int, shift: Array) -> ContactLoad:
     """The pressing resultants of an increment, and the shift (2,) [mm] of body 1."""
     values = np.array([loads.P[t], *shift, loads.Mx[t], loads.My[t], 0.0])
-    return Load(values, motion=(False, True, True, False, False, True))
+    return ContactLoad(values, motion=(False, True, True, False, False, True))
 
 
 def _advance(
-    contact: FrictionalContact, before: ContactState, height: Array, load: Load, t: int
+    contact: FrictionalContact, before: ContactState, height: Array, load: ContactLoad, t: int
 ) -> ContactState:
     if load.values[0] <= 0.0:
         return contact.apart(height)
     try:
         state = contact.advance(before, height, load)
-    except IMPOSSIBLE as error:
+    except ContactProblemError as error:
         raise ContactFailure(f"increment {t + 1}: {error}") from error
     if not state.converged:
         raise ContactFailure(f"increment {t + 1}: {state.message}")

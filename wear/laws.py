@@ -15,7 +15,7 @@ from wear.evolution import EnergyTable
 
 
 @dataclass(frozen=True)
-class Sliding:
+class SlidingConditions:
     """What one body's wear during a step may depend on.
 
     ``slip`` ``(t, nx, ny)`` is the size of the slip in each increment of the cycle [mm] and
@@ -33,34 +33,34 @@ class Sliding:
 class WearLaw(Protocol):
     """Wear of one body."""
 
-    def depth_per_pressure(self, sliding: Sliding) -> Array:
+    def depth_per_pressure(self, sliding: SlidingConditions) -> Array:
         """Depth per pressure worn in each increment ``(t, nx, ny)`` [mm/MPa per cycle]."""
         ...
 
 
 @dataclass(frozen=True)
-class Archard:
+class ArchardLaw:
     """V = K s P / H: ``coefficient`` K [1], ``hardness`` H [MPa] (Archard 1953)."""
 
     coefficient: float
     hardness: float
 
-    def depth_per_pressure(self, sliding: Sliding) -> Array:
+    def depth_per_pressure(self, sliding: SlidingConditions) -> Array:
         return self.coefficient / self.hardness * sliding.slip
 
 
 @dataclass(frozen=True)
-class Energy:
+class EnergyLaw:
     """V = α Σ Ed: ``coefficient`` α [1/MPa] (Fouvry; Gallego 2007, eq. 1)."""
 
     coefficient: float
 
-    def depth_per_pressure(self, sliding: Sliding) -> Array:
+    def depth_per_pressure(self, sliding: SlidingConditions) -> Array:
         return self.coefficient * sliding.friction * sliding.slip
 
 
 @dataclass(frozen=True)
-class EnergyAmplitude:
+class EnergyAmplitudeLaw:
     """Energy law whose coefficient grows with the local slip amplitude (Gallego 2007, eq. 3).
 
     Depth per cycle = α / (4 δ_ref) (Σ|Δs|) (Σ|q·Δs|): ``coefficient`` α [1/MPa] holds at the
@@ -70,14 +70,14 @@ class EnergyAmplitude:
     coefficient: float
     reference_amplitude: float
 
-    def depth_per_pressure(self, sliding: Sliding) -> Array:
+    def depth_per_pressure(self, sliding: SlidingConditions) -> Array:
         amplitude = sliding.slip.sum(axis=0) / 4.0 / self.reference_amplitude
         depth: Array = self.coefficient * sliding.friction * sliding.slip * amplitude
         return depth
 
 
 @dataclass(frozen=True)
-class Evolving:
+class EvolvingLaw:
     """Any law, times a factor that changes with cumulative energy.
 
     ``scope`` local: with the energy per area of this body's own surface [N/mm]; global: with that
@@ -88,6 +88,6 @@ class Evolving:
     factor: EnergyTable
     scope: Literal["local", "global"]
 
-    def depth_per_pressure(self, sliding: Sliding) -> Array:
+    def depth_per_pressure(self, sliding: SlidingConditions) -> Array:
         before, after = sliding.work if self.scope == "local" else sliding.energy
         return self.factor.mean(before, after) * self.law.depth_per_pressure(sliding)

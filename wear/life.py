@@ -28,6 +28,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array, Material
 from wear.smallest_circle import smallest_circle
 
@@ -47,7 +48,7 @@ AWAY = np.radians(30.0)
 """Angle from the best plane beyond which another is a rival, not its neighbour."""
 
 
-class StressHistoryError(ValueError):
+class StressHistoryError(InputError):
     """A stress history, or a parameter of fatigue, that has no meaning."""
 
 
@@ -157,7 +158,7 @@ DEFAULT_SEARCH = PlaneSearch()
 Tried = tuple[Array, Array, Array]
 """Value, amplitude and normal stress of a plane at each point, each ``(n,)``."""
 
-Parameter = Callable[[Array, Array, Array], Tried]
+PlaneParameter = Callable[[Array, Array, Array], Tried]
 """From stress ``(6, t, n)``, normals ``(3,)`` or ``(3, n)`` and the value to beat ``(n,)``; planes
 that cannot beat it may come back as -inf."""
 
@@ -210,7 +211,7 @@ def _check(stress: Array) -> None:
         raise StressHistoryError("stress that is infinite or not a number: must be finite")
 
 
-def _search(stress: Array, parameter: Parameter, search: PlaneSearch) -> CriticalPlane:
+def _search(stress: Array, parameter: PlaneParameter, search: PlaneSearch) -> CriticalPlane:
     """The plane with the largest value of ``parameter``, at every point."""
     _check(stress)
     shape = stress.shape[2:]
@@ -223,7 +224,7 @@ def _search(stress: Array, parameter: Parameter, search: PlaneSearch) -> Critica
     return CriticalPlane(value, found[3:].reshape(3, *shape), amplitude, peak)
 
 
-def _search_part(stress: Array, parameter: Parameter, search: PlaneSearch) -> Array:
+def _search_part(stress: Array, parameter: PlaneParameter, search: PlaneSearch) -> Array:
     """Value, amplitude, normal stress and normal ``(6, n)`` at the points of ``(6, t, n)``.
 
     Samples are apart, so that one beside the worst plane may be beaten by one beside another that
@@ -255,7 +256,7 @@ class _Planes:
     ``best`` ``(6, n)`` holds value, amplitude, normal stress and normal.
     """
 
-    def __init__(self, stress: Array, parameter: Parameter) -> None:
+    def __init__(self, stress: Array, parameter: PlaneParameter) -> None:
         self.best = np.zeros((6, stress.shape[2]))
         self.best[0], self.best[5] = -np.inf, 1.0
         self._stress, self._parameter = stress, parameter

@@ -26,9 +26,9 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from sa_solver.types import Array, Grid
+from sa_solver.errors import InputError
+from sa_solver.types import Array, Grid, Mask
 
 LEAST_RESOLVED = 1.5
 """Strokes, in pitches, below which moving cells blur a surface more than the motion does."""
@@ -45,7 +45,7 @@ GAUSS = 0.5 - 0.5 / np.sqrt(3.0), 0.5 + 0.5 / np.sqrt(3.0)
 """Gauss points of the unit interval, of weight one half."""
 
 
-class TravelError(ValueError):
+class TravelError(InputError):
     """What wears is carried beyond the grid."""
 
 
@@ -168,7 +168,7 @@ def offsets(slip: Array, weight: Array) -> Array:
     return path - middle
 
 
-def moves(path: Array, pressed: NDArray[np.bool_], grid: Grid) -> bool:
+def moves(path: Array, pressed: Mask, grid: Grid) -> bool:
     """Whether the motion along ``path`` ``(t + 1, 2)`` [mm] counts, and the grid can follow it.
 
     The stroke is held against the extent of the cells ``pressed`` ``(nx, ny)`` along it.

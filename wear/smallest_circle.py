@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from sa_solver.errors import ConvergenceError
 from sa_solver.types import Array
 
 Places = NDArray[np.intp]
@@ -27,7 +28,7 @@ def smallest_circle(x: Array, y: Array) -> Array:
 
     Two or three points hold a circle; as long as some lie outside, the farthest enters and the
     smallest circle round the four takes over. Its radius grows each time, so this ends, exactly.
-    Raises ArithmeticError if it has not in 100 rounds.
+    Raises ConvergenceError if it has not in 100 rounds.
 
     Source: Elzinga & Hearn 1972, Transp. Sci. 6, 379, doi:10.1287/trsc.6.4.379.
     """
@@ -45,7 +46,7 @@ def smallest_circle(x: Array, y: Array) -> Array:
         left, x, y, slack = left[outside], x[:, outside], y[:, outside], slack[outside]
         four = np.concatenate([held, farthest])[:, outside]
         held, circle = _round_four(four, _taken(x, four), _taken(y, four))
-    raise ArithmeticError(f"{len(left)} smallest circles not found in {MAX_ROUNDS} rounds")
+    raise ConvergenceError(f"{len(left)} smallest circles not found in {MAX_ROUNDS} rounds")
 
 
 def _start(x: Array, y: Array) -> tuple[Places, Array]:

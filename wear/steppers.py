@@ -244,7 +244,7 @@ class Advance:
     convolutions: int
 
 
-def advance(
+def advance_cycles(
     stepper: Stepper, state: WearState, cycles: float, left: float, contact_at: ContactAt
 ) -> Advance:
     """Wear ``cycles`` cycles of the ``left`` ones of the run, in as many steps as it takes."""

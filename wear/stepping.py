@@ -28,11 +28,12 @@ from functools import cached_property
 
 import numpy as np
 
+from sa_solver.errors import ConvergenceError
 from sa_solver.influence import Z
 from sa_solver.normal import NormalContact, NormalStart, NormalState
 from sa_solver.transform import SpectralFilter
 from sa_solver.types import Array, LoadHistory
-from wear.laws import Sliding, WearLaw
+from wear.laws import SlidingConditions, WearLaw
 from wear.moving import Passage, TravelError
 from wear.surfaces import Surfaces
 
@@ -43,7 +44,7 @@ States = dict[int, NormalState]
 Starts = dict[int, NormalStart]
 
 
-class ContactFailure(RuntimeError):
+class ContactFailure(ConvergenceError):
     """The half-space solver did not converge; the message is its own."""
 
 
@@ -203,7 +204,7 @@ class WearingContact:
         """Depth per pressure of one body: each closed cycle of a mix for itself, by its share."""
         loads, slip = self._cycle.loads, self._cycle.slip
         parts = [
-            law.depth_per_pressure(Sliding(slip[block], self._friction, work, energies))
+            law.depth_per_pressure(SlidingConditions(slip[block], self._friction, work, energies))
             for block in loads.blocks
         ]
         depth: Array = loads.share[:, None, None] * np.concatenate(parts)

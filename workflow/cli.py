@@ -12,6 +12,7 @@ from typing import Any, NoReturn
 
 import click
 
+from sa_solver.errors import FretscaleError
 from workflow import errors
 
 
@@ -22,7 +23,7 @@ class _OneLineGroup(click.Group):
         settings["standalone_mode"] = False
         try:
             code = super().main(*args, **settings)
-        except (errors.FretscaleError, OSError, ImportError, MemoryError) as error:
+        except (FretscaleError, OSError, ImportError, MemoryError) as error:
             code = _report(error)
         except click.Abort:
             told = "a run continues with `resume DIR`, many with the same command"
@@ -47,10 +48,10 @@ def _report(error: Exception) -> int:
 
 def _ending(error: Exception) -> tuple[str, int]:
     """Message and exit code of ``error``."""
-    if isinstance(error, errors.FretscaleError):
-        return str(error), error.exit_code
     if isinstance(error, MemoryError):
         return f"out of memory: {error}".rstrip(": "), errors.OutOfMemory.exit_code
+    if isinstance(error, FretscaleError):
+        return str(error), errors.exit_code(error)
     from workflow.shell.system_check import remedy
 
     if missing := remedy(error):

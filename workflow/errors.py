@@ -1,28 +1,30 @@
 """What can end a command early, and the exit code each ending has.
 
-Imports nothing, so that the command line answers at once. Each message is written for the person
-who started the command: one line, what is wrong and what to do about it.
+Imports nothing heavy, so that the command line answers at once. Each message is written for the
+person who started the command: one line, what is wrong and what to do about it.
 """
 
 from __future__ import annotations
+
+from sa_solver.errors import FretscaleError, InputError
 
 DONE = 0
 INTERRUPTED = 130
 
 
-class FretscaleError(Exception):
+class Ending(FretscaleError):
     """An ending the user should read as one line, without a traceback."""
 
     exit_code = 3
 
 
-class ExpectationMissed(FretscaleError):
+class ExpectationMissed(Ending):
     """A computed quantity is outside the tolerance its case states."""
 
     exit_code = 1
 
 
-class UserError(FretscaleError):
+class UserError(Ending):
     """A bad case, argument or file: nothing was computed."""
 
     exit_code = 2
@@ -32,16 +34,23 @@ class CaseError(UserError, ValueError):
     """A case file that cannot be run; one line ``file:line: key: ...`` for each thing wrong."""
 
 
-class MethodFailed(FretscaleError):
+class MethodFailed(Ending):
     """A numerical method did not converge; the message carries its residual and a remedy."""
 
     exit_code = 3
 
 
-class OutOfMemory(FretscaleError):
+class OutOfMemory(Ending):
     """The case needs more memory than there is."""
 
     exit_code = 4
+
+
+def exit_code(error: FretscaleError) -> int:
+    """The exit code of an error; one of the library's own says bad data or a failed method."""
+    if isinstance(error, Ending):
+        return error.exit_code
+    return UserError.exit_code if isinstance(error, InputError) else MethodFailed.exit_code
 
 
 def one_line(said: object) -> str:

@@ -10,10 +10,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 
 
-class ExcitationError(ValueError):
+class ExcitationError(InputError):
     """A signal that no force can have."""
 
 

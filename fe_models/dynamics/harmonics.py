@@ -11,6 +11,7 @@ from functools import cached_property
 
 import numpy as np
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 
 ComplexArray = np.ndarray
@@ -27,7 +28,7 @@ def by_joint(rows: Array, directions: int) -> Array:
     return np.ascontiguousarray(rows.reshape(len(rows), -1, directions).transpose(1, 0, 2))
 
 
-class HarmonicBalanceError(ValueError):
+class HarmonicBalanceError(InputError):
     """Harmonics, samples or forces that do not make a problem."""
 
 

@@ -20,6 +20,7 @@ from typing import Literal
 
 import numpy as np
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 
 ResponseQuantity = Literal["receptance", "mobility", "accelerance"]
@@ -30,7 +31,7 @@ REST = 0.05
 """Share at the end of a record that is looked at for what is left of the response."""
 
 
-class SignalError(ValueError):
+class SignalError(InputError):
     """Records that say nothing about a structure."""
 
 

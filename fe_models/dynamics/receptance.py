@@ -16,6 +16,7 @@ import scipy.linalg as sl
 
 from fe_models.dynamics.harmonics import ComplexArray
 from fe_models.dynamics.model import DynamicModel
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 
 # Square of a natural frequency, over the largest one, below which a mode is a rigid motion: above
@@ -29,7 +30,7 @@ HELD = 1e-2
 DIAGONAL = 1e-10
 
 
-class ReceptanceError(ValueError):
+class ReceptanceError(InputError):
     """A structure without a steady motion."""
 
 

@@ -15,6 +15,7 @@ import scipy.linalg as sl
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.receptance import RIGID
 from fe_models.reduction import ReducedModel
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 
 NOTHING: Mapping[str, float] = {}
@@ -22,7 +23,7 @@ NOTHING: Mapping[str, float] = {}
 MOST_TOLD = 12
 
 
-class RigError(ValueError):
+class RigError(InputError):
     """A rig that cannot be built from what was given."""
 
 

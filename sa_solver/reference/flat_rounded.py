@@ -32,7 +32,7 @@ PHASES = 32
 
 
 @dataclass(frozen=True)
-class FlatRounded:
+class FlatRoundedPunch:
     """Flat of ``half_width`` a with edges of ``radius`` R [mm] under ``load`` per length [N/mm].
 
     ``contact_modulus`` is E* [MPa].

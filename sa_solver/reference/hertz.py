@@ -19,7 +19,7 @@ from sa_solver.types import Array
 
 
 @dataclass(frozen=True)
-class Sphere:
+class HertzSphere:
     """Sphere of relative ``radius`` [mm] pressed with ``load`` [N] at E* ``contact_modulus``."""
 
     load: float
@@ -52,7 +52,7 @@ class Sphere:
 
 
 @dataclass(frozen=True)
-class Ellipse:
+class HertzEllipse:
     """Relative radii ``radius_x`` and ``radius_y`` [mm] pressed with ``load`` [N] at E* [MPa].
 
     x and y are the principal directions, ``radius_x`` curves the section ``y = 0``; either may be
@@ -115,7 +115,7 @@ class Ellipse:
 
 
 @dataclass(frozen=True)
-class Cylinder:
+class HertzCylinder:
     """Parallel cylinders of relative ``radius`` [mm] under ``load`` per length [N/mm], E* [MPa]."""
 
     load: float

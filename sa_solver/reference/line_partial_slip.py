@@ -22,7 +22,8 @@ from typing import Literal
 
 import numpy as np
 
-from sa_solver.reference.hertz import Cylinder
+from sa_solver.errors import InputError
+from sa_solver.reference.hertz import HertzCylinder
 from sa_solver.reference.masing import superpose
 from sa_solver.types import Array
 
@@ -38,7 +39,7 @@ def ciavarella_jaeger(
     ``pressure(load)`` is the normal solution at fixed points for a load per length [N/mm], an array
     of any shape; it is not called with 0. ``load`` and ``tangential`` in N/mm. What sticks is the
     contact zone of the load P - |Q|/µ. Valid for elastically similar half-planes pressed by P,
-    then sheared, ``pressure`` being that of one tilt for all loads. Raises ``ValueError`` beyond
+    then sheared, ``pressure`` being that of one tilt for all loads. Raises ``InputError`` beyond
     |Q| = µP.
     """
     reserve = load * _reserve(tangential, friction * load)
@@ -53,10 +54,10 @@ class ShearedCylinder:
     """Hertz line ``contact`` under a constant load, with ``friction`` µ, sheared along x.
 
     Tangential loads per length [N/mm] are those on body 2, displacements those of body 1 relative
-    to body 2. Methods raise ``ValueError`` beyond |Q| = µP.
+    to body 2. Methods raise ``InputError`` beyond |Q| = µP.
     """
 
-    contact: Cylinder
+    contact: HertzCylinder
     friction: float
 
     @property
@@ -75,7 +76,7 @@ class ShearedCylinder:
         return shear
 
     def displacement(self, tangential: float, datum: float) -> float:
-        """δx [mm] on first loading, for the ``datum`` L [mm] of :meth:`Cylinder.approach`.
+        """δx [mm] on first loading, for the ``datum`` L [mm] of :meth:`HertzCylinder.approach`.
 
         (2 / π E*) {Q [ln(2 L/a) + 1/2] + (1/2)(µP - Q) ln(1 - Q/µP)}.
         """
@@ -122,10 +123,10 @@ class BulkStressedCylinder:
     the way back, for the changes of σ and Q.
     A stress that was there before the bodies touched does not count: only its change since does.
 
-    Raises ``ValueError`` where the bulk stress is not moderate or |Q| > µP.
+    Raises ``InputError`` where the bulk stress is not moderate or |Q| > µP.
     """
 
-    contact: Cylinder
+    contact: HertzCylinder
     friction: float
     tangential: float
     bulk_stress: float
@@ -135,7 +136,7 @@ class BulkStressedCylinder:
         traction = self.friction * self.contact.peak_pressure
         moderate = 4.0 * (1.0 - self.stick_half_width / self.contact.half_width)
         if abs(self.bulk_stress) > (moderate + ROUNDING) * traction:
-            raise ValueError(
+            raise InputError(
                 f"bulk stress {self.bulk_stress} MPa reverses slip at one edge: this solution "
                 "needs |σ|/µp0 <= 4 (1 - sqrt(1 - |Q|/µP))"
             )
@@ -168,22 +169,22 @@ class BulkStressedCylinder:
         |ΔQ|/2µP) and e' = ± sign(ΔQ) a Δσ / 8 µ p0. So a stress that is held leaves it centred,
         and one that cycles with Q brings it to e at the other end of the cycle.
 
-        Raises ``ValueError`` if Q does not turn back, if ΔQ is beyond 2µP, or if the zone leaves
+        Raises ``InputError`` if Q does not turn back, if ΔQ is beyond 2µP, or if the zone leaves
         the contact or does not contain the one of first loading: then no superposition holds. A
         held stress so restricts how far Q may come back.
         """
         change = tangential - self.tangential
         if change * self.tangential >= 0.0:
-            raise ValueError(f"Q = {tangential} N/mm does not turn back from {self.tangential}")
+            raise InputError(f"Q = {tangential} N/mm does not turn back from {self.tangential}")
         line = ShearedCylinder(self.contact, self.friction)
         stick = line.stick_half_width(0.5 * change)
         strain = self._mismatch(bulk_stress) - self.mismatch_strain
         centre = self._offset(change, 0.5 * strain)
         slack = ROUNDING * self.contact.half_width
         if abs(centre) + stick > self.contact.half_width + slack:
-            raise ValueError("the change of bulk stress reverses slip at one edge")
+            raise InputError("the change of bulk stress reverses slip at one edge")
         if abs(centre - self.offset) + self.stick_half_width > stick + slack:
-            raise ValueError("slip on the way back reaches what stuck on first loading")
+            raise InputError("slip on the way back reaches what stuck on first loading")
         return stick, centre
 
     def reversed_shear(self, x: Array, tangential: float, bulk_stress: float) -> Array:
@@ -205,7 +206,7 @@ class BulkStressedCylinder:
         return float(np.sign(tangential)) * strain * self.contact.contact_modulus / gradient
 
 
-def _shear(contact: Cylinder, friction: float, x: Array, stick: float, offset: float) -> Array:
+def _shear(contact: HertzCylinder, friction: float, x: Array, stick: float, offset: float) -> Array:
     """µ p less its like on ``|x - offset| < stick``, ``(µ p0 / a) [sqrt(a² - x²) - ...]``."""
     sliding = np.sqrt(np.maximum(0.0, contact.half_width**2 - x**2))
     stuck = np.sqrt(np.maximum(0.0, stick**2 - (x - offset) ** 2))
@@ -217,7 +218,7 @@ def _reserve(tangential: float, sliding_force: float) -> float:
     """1 - |Q| / µP, what is left before sliding."""
     reserve = 1.0 - abs(tangential) / sliding_force
     if reserve < 0.0:
-        raise ValueError(f"Q = {tangential} N/mm slides: it is beyond µP = {sliding_force} N/mm")
+        raise InputError(f"Q = {tangential} N/mm slides: it is beyond µP = {sliding_force} N/mm")
     return reserve
 
 

@@ -15,20 +15,21 @@ from collections.abc import Callable, Sequence
 from itertools import pairwise
 from typing import TypeVar
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 
-Response = TypeVar("Response", float, Array)
+_Response = TypeVar("_Response", float, Array)
 
 
-def superpose(first_loading: Callable[[float], Response], loads: Sequence[float]) -> Response:
+def superpose(first_loading: Callable[[float], _Response], loads: Sequence[float]) -> _Response:
     """Response after ``loads``, the turning points of the load in order up to the present one.
 
     ``first_loading(load)`` is the response on first loading, an odd function of the load: a float
     or an array of any shape. The body starts unloaded. Points on the way from one turning point to
-    the next may be listed too. Raises ``ValueError`` if ``loads`` is empty.
+    the next may be listed too. Raises ``InputError`` if ``loads`` is empty.
     """
     if not loads:
-        raise ValueError("a loading history needs at least one load")
+        raise InputError("a loading history needs at least one load")
     remembered = _remembered(loads)
     total = first_loading(remembered[1])
     for start, end in pairwise(remembered[1:]):

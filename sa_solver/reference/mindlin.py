@@ -23,7 +23,8 @@ from functools import cached_property
 
 import numpy as np
 
-from sa_solver.reference.hertz import Sphere
+from sa_solver.errors import InputError
+from sa_solver.reference.hertz import HertzSphere
 from sa_solver.reference.masing import superpose
 from sa_solver.types import Array, ElasticPair, Material
 
@@ -34,7 +35,7 @@ class ShearedSphere:
 
     ``friction`` is µ. Tangential forces are those on body 2, displacements those of body 1 relative
     to body 2 far from the contact: they have the same sign on first loading. Methods raise
-    ``ValueError`` beyond |Q| = µP.
+    ``InputError`` beyond |Q| = µP.
     """
 
     load: float
@@ -44,9 +45,11 @@ class ShearedSphere:
     friction: float
 
     @cached_property
-    def contact(self) -> Sphere:
+    def contact(self) -> HertzSphere:
         """The normal contact, which shear does not change."""
-        return Sphere(self.load, self.radius, ElasticPair(self.body_1, self.body_2).contact_modulus)
+        return HertzSphere(
+            self.load, self.radius, ElasticPair(self.body_1, self.body_2).contact_modulus
+        )
 
     @property
     def sliding_force(self) -> float:
@@ -111,5 +114,5 @@ class ShearedSphere:
         """1 - |Q| / µP, what is left before sliding."""
         reserve = 1.0 - abs(tangential) / self.sliding_force
         if reserve < 0.0:
-            raise ValueError(f"Q = {tangential} N slides: it is beyond µP = {self.sliding_force} N")
+            raise InputError(f"Q = {tangential} N slides: it is beyond µP = {self.sliding_force} N")
         return reserve

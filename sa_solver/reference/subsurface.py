@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sa_solver.reference.hertz import Cylinder, Sphere
+from sa_solver.reference.hertz import HertzCylinder, HertzSphere
 from sa_solver.types import Array
 
 EXCHANGED = [1, 0, 2, 3, 5, 4]
@@ -70,7 +70,7 @@ def _boussinesq(x: Array, y: Array, z: Array, poisson: float) -> Array:
 
 
 def cylinder_stress(
-    contact: Cylinder, friction: float, x: Array, z: Array, poisson: float
+    contact: HertzCylinder, friction: float, x: Array, z: Array, poisson: float
 ) -> Array:
     """Stress ``(6, ...)`` [MPa] under Hertz's pressure p and a shear q = ``friction`` p along x.
 
@@ -94,7 +94,7 @@ def cylinder_stress(
     return np.stack([xx, poisson * (xx + zz), zz, zero, zero, zx])
 
 
-def sphere_axis_stress(contact: Sphere, z: Array, poisson: float) -> Array:
+def sphere_axis_stress(contact: HertzSphere, z: Array, poisson: float) -> Array:
     """Stress ``(6, ...)`` [MPa] on the axis at depths ``z`` > 0 under Hertz's pressure."""
     ratio = z / contact.contact_radius
     fall = 1.0 / (1.0 + ratio**2)
@@ -104,7 +104,7 @@ def sphere_axis_stress(contact: Sphere, z: Array, poisson: float) -> Array:
 
 
 def sphere_surface_stress(
-    contact: Sphere, friction: float, x: Array, y: Array, poisson: float
+    contact: HertzSphere, friction: float, x: Array, y: Array, poisson: float
 ) -> Array:
     """Surface stress ``(6, ...)`` [MPa] for r <= a, under p and a shear ``friction`` p along x.
 

@@ -32,7 +32,8 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import ellipe, elliprd, elliprj
 
-from sa_solver.reference.hertz import Sphere
+from sa_solver.errors import InputError
+from sa_solver.reference.hertz import HertzSphere
 from sa_solver.reference.masing import superpose
 from sa_solver.types import Array, ElasticPair, Material
 
@@ -45,7 +46,7 @@ class TwistedSphere:
     """Sphere of relative ``radius`` [mm] under a constant ``load`` [N], twisted about its normal.
 
     ``friction`` is µ. Moments are those on body 2, twists those of body 1 relative to body 2: they
-    have the same sign on first loading. Methods raise ``ValueError`` beyond the sliding moment.
+    have the same sign on first loading. Methods raise ``InputError`` beyond the sliding moment.
     """
 
     load: float
@@ -55,9 +56,11 @@ class TwistedSphere:
     friction: float
 
     @cached_property
-    def contact(self) -> Sphere:
+    def contact(self) -> HertzSphere:
         """The normal contact, which twist does not change."""
-        return Sphere(self.load, self.radius, ElasticPair(self.body_1, self.body_2).contact_modulus)
+        return HertzSphere(
+            self.load, self.radius, ElasticPair(self.body_1, self.body_2).contact_modulus
+        )
 
     @property
     def sliding_moment(self) -> float:
@@ -81,7 +84,7 @@ class TwistedSphere:
         """c [mm] on first loading to ``moment`` [N mm]."""
         target = abs(moment)
         if target > self.sliding_moment:
-            raise ValueError(
+            raise InputError(
                 f"Mz = {moment} N mm slides: it is beyond 3πµPa/16 = {self.sliding_moment} N mm"
             )
 

@@ -17,6 +17,7 @@ import numpy as np
 from numpy.polynomial import Chebyshev
 from scipy.special import eval_chebyt, eval_chebyu
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 
 
@@ -29,7 +30,7 @@ class WavySurface:
     pressure that varies slowly, as λ/L for L the length over which it varies: compare the middle
     waves of a long contact, with p̄ the local mean of the computed pressure.
 
-    Raises ``ValueError`` at or beyond p*, where contact is full and p = p̄ + p* cos 2πx/λ.
+    Raises ``InputError`` at or beyond p*, where contact is full and p = p̄ + p* cos 2πx/λ.
     """
 
     amplitude: float
@@ -39,7 +40,7 @@ class WavySurface:
 
     def __post_init__(self) -> None:
         if not 0.0 < self.mean_pressure < self.full_contact_pressure:
-            raise ValueError(
+            raise InputError(
                 f"mean pressure {self.mean_pressure} MPa must lie between 0 and p* = "
                 f"{self.full_contact_pressure} MPa, at which contact is full"
             )
@@ -78,7 +79,7 @@ class ChebyshevPunch:
     the gap grows away from both ends (ε >= 0). ``contact_modulus`` is E* [MPa]. A profile fits one
     load only.
 
-    Raises ``ValueError`` for another order, ε < 0, or an ε for which the pressure is negative.
+    Raises ``InputError`` for another order, ε < 0, or an ε for which the pressure is negative.
     """
 
     half_width: float
@@ -89,9 +90,9 @@ class ChebyshevPunch:
 
     def __post_init__(self) -> None:
         if self.order < 2 or self.order % 2:
-            raise ValueError(f"order {self.order} is not even and at least 2")
+            raise InputError(f"order {self.order} is not even and at least 2")
         if not 0.0 <= self.waviness <= self.largest_waviness:
-            raise ValueError(
+            raise InputError(
                 f"waviness {self.waviness} must lie between 0 and {self.largest_waviness}"
             )
 
@@ -119,7 +120,7 @@ class ChebyshevPunch:
         return self._potential(x / self.half_width) - self._potential(np.zeros(()))
 
     def approach(self, datum: float) -> float:
-        """δz [mm] of x = 0, for the ``datum`` L [mm] as in :meth:`hertz.Cylinder.approach`."""
+        """δz [mm] of x = 0, for the ``datum`` L [mm] as in :meth:`hertz.HertzCylinder.approach`."""
         point = 2.0 * self.load * float(np.log(datum / self.half_width))
         return point / (np.pi * self.contact_modulus) - float(self._potential(np.zeros(())))
 

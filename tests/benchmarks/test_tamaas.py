@@ -22,13 +22,13 @@ import pytest
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.normal_problem import contact_residuals
-from sa_solver.reference.hertz import Sphere
+from sa_solver.reference.hertz import HertzSphere
 from sa_solver.types import Array, ElasticPair, Grid, Material
 
 RESIDUAL = 1e-6
 TITANIUM = Material(115e3, 0.29)
 PAIR = ElasticPair(TITANIUM, TITANIUM)
-SPHERE = Sphere(400.0, 10.0, PAIR.contact_modulus)
+SPHERE = HertzSphere(400.0, 10.0, PAIR.contact_modulus)
 CONTACT_SHARE = 0.6
 GOAL = 12.0
 

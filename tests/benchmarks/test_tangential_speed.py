@@ -6,15 +6,15 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from sa_solver.contact import FrictionalContact, Load
+from sa_solver.contact import ContactLoad, FrictionalContact
 from sa_solver.half_space import HalfSpace
-from sa_solver.reference.hertz import Sphere
+from sa_solver.reference.hertz import HertzSphere
 from sa_solver.tangential import TangentialContact
 from sa_solver.types import ElasticPair, Grid, Material
 
 TITANIUM = Material(115e3, 0.29)
 PAIR = ElasticPair(TITANIUM, TITANIUM)
-SPHERE = Sphere(400.0, 10.0, PAIR.contact_modulus)
+SPHERE = HertzSphere(400.0, 10.0, PAIR.contact_modulus)
 FRICTION = 0.7
 SLIDING = FRICTION * 400.0
 
@@ -80,7 +80,7 @@ def test_a_cycle_of_22_increments() -> None:
     def cycle() -> int:
         state, convolutions = contact.apart(height), 0
         for values in loads:
-            state = contact.advance(state, height, Load(values))
+            state = contact.advance(state, height, ContactLoad(values))
             assert state.converged
             convolutions += state.convolutions
         return convolutions

@@ -451,10 +451,10 @@ class HertzPair:
         modulus = MATERIAL.young / (2.0 * (1.0 - MATERIAL.poisson**2))
         if dimension == 2:
             load = np.pi * modulus / (4.0 * self.RADIUS)
-            self.exact = hertz.Cylinder(load, self.RADIUS, modulus)
+            self.exact = hertz.HertzCylinder(load, self.RADIUS, modulus)
         else:
             load = 4.0 * modulus / (3.0 * self.RADIUS)
-            self.exact = hertz.Sphere(load, self.RADIUS, modulus)
+            self.exact = hertz.HertzSphere(load, self.RADIUS, modulus)
         self.lower, self.upper = (self._block(cells, side) for side in (-1.0, 1.0))
         self.nodes = self.lower.body.vertices("contact")
         assert np.array_equal(self.nodes, self.upper.body.vertices("contact"))

@@ -3,7 +3,7 @@
 import numpy as np
 
 from sa_solver.half_space import HalfSpace
-from sa_solver.reference.love import love_displacement
+from tests.oracles.uniform_traction import love_displacement
 
 SMALLEST = 1e-4
 """Tangential displacements count as at least this share of the normal ones."""

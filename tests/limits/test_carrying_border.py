@@ -20,11 +20,11 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from sa_solver.contact import FrictionalContact, Load
+from sa_solver.contact import ContactLoad, FrictionalContact
 from sa_solver.coupled import CoupledContactError
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalContactError
-from sa_solver.reference.hertz import Sphere
+from sa_solver.reference.hertz import HertzSphere
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.limits.conditions import normal_error
 from workflow.cli import cli
@@ -113,7 +113,7 @@ def test_a_load_acts_within_the_cell_centres_or_is_refused(pair, side, axis):
     def state(share):
         values = np.array([P, 0.0, 0.0, 0.0, 0.0, 0.0])
         values[[4, 3][axis]] = side * P * reach * share
-        return contact.advance(contact.apart(height), height, Load(values))
+        return contact.advance(contact.apart(height), height, ContactLoad(values))
 
     inside = state(0.999)
     assert inside.converged, inside.message
@@ -125,13 +125,15 @@ def test_a_load_acts_within_the_cell_centres_or_is_refused(pair, side, axis):
 @pytest.mark.parametrize("pair", [PAIR, UNLIKE], ids=["alike", "unlike"])
 def test_a_contact_reaches_the_border_of_its_grid_or_not(pair):
     """Half the grid at 1.1 and 0.9 contact radii: only the second is said to be cut off."""
-    sphere = Sphere(P, 10.0, pair.contact_modulus)
+    sphere = HertzSphere(P, 10.0, pair.contact_modulus)
     for share, cut in ((1.1, False), (0.9, True)):
         size = 2.0 * share * sphere.contact_radius
         grid = Grid.covering((size, size), (40, 40))
         height = sphere.gap(grid.x, grid.y)
         contact = FrictionalContact(HalfSpace(grid, pair), 0.1)
-        state = contact.advance(contact.apart(height), height, Load(np.array([P, 0, 0, 0, 0, 0.0])))
+        state = contact.advance(
+            contact.apart(height), height, ContactLoad(np.array([P, 0, 0, 0, 0, 0.0]))
+        )
         assert state.converged
         assert (state.border_load > 0.0) == cut
         if pair is PAIR and not cut:
@@ -143,7 +145,7 @@ def test_a_contact_reaches_the_border_of_its_grid_or_not(pair):
 
 def test_what_is_cut_off_is_solved_as_if_the_body_ended_there():
     """The same cells on a larger grid with nothing to touch beside them carry the same pressure."""
-    sphere = Sphere(P, 10.0, PAIR.contact_modulus)
+    sphere = HertzSphere(P, 10.0, PAIR.contact_modulus)
     pitch = 0.045 * sphere.contact_radius
     small, large = Grid((40, 40), (pitch, pitch)), Grid((60, 60), (pitch, pitch))
     height = sphere.gap(large.x, large.y) + STEP
@@ -172,7 +174,7 @@ output: {paraview: false, figures: false}
 @pytest.mark.parametrize(("share", "cut"), [(1.15, False), (0.9, True)])
 def test_a_run_warns_of_a_contact_that_is_cut_off(tmp_path, share, cut):
     (tmp_path / "case.yaml").write_text(CASE, encoding="utf-8")
-    size = 2.0 * share * Sphere(100.0, 10.0, PAIR.contact_modulus).contact_radius
+    size = 2.0 * share * HertzSphere(100.0, 10.0, PAIR.contact_modulus).contact_radius
     arguments = ["run", str(tmp_path / "case.yaml"), "--out", str(tmp_path / "out")]
     done = CliRunner().invoke(cli, [*arguments, "--set", f"contact.size=[{size}, {size}]"])
     assert done.exit_code == 0, done.stderr

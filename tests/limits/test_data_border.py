@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from sa_solver.contact import FrictionalContact, Load
+from sa_solver.contact import ContactLoad, FrictionalContact
 from sa_solver.coupled import CoupledContactError
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalContactError
-from sa_solver.reference.hertz import Sphere
+from sa_solver.reference.hertz import HertzSphere
 from sa_solver.tangential import TangentialContactError
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.limits.conditions import frictional_error
@@ -23,7 +23,7 @@ SOLVED = 1e-8
 
 
 def force(P, Qx=0.0, Qy=0.0):
-    return Load(np.array([P, Qx, Qy, 0.0, 0.0, 0.0]))
+    return ContactLoad(np.array([P, Qx, Qy, 0.0, 0.0, 0.0]))
 
 
 def ball(grid):
@@ -61,7 +61,7 @@ def test_long_cells_find_the_same_contact():
 
     Their length is a seventh of the contact's, whose ends are then coarse.
     """
-    exact = Sphere(P, RADIUS, PAIRS["alike"].contact_modulus)
+    exact = HertzSphere(P, RADIUS, PAIRS["alike"].contact_modulus)
     pitch = exact.contact_radius / 140.0
     grid = Grid((350, 19), (pitch, 20.0 * pitch))
     state = NormalContact(HalfSpace(grid, PAIRS["alike"])).solve(ball(grid), P)
@@ -132,10 +132,10 @@ def test_numbers_that_are_none_are_refused(kind, bad):
         values = force(P).values
         values[place] = bad
         with pytest.raises(refused, match=r"finite|outside the cells"):
-            contact.advance(pressed, height, Load(values))
+            contact.advance(pressed, height, ContactLoad(values))
     with pytest.raises(refused, match="NaN or infinity"):
-        contact.advance(pressed, height, Load(force(P).values, strain=bad))
+        contact.advance(pressed, height, ContactLoad(force(P).values, strain=bad))
     with pytest.raises(refused, match=r"energies .* must be finite"):
-        contact.advance(pressed, height, Load(force(P).values, energy=np.array([bad, 0.0])))
+        contact.advance(pressed, height, ContactLoad(force(P).values, energy=np.array([bad, 0.0])))
     with pytest.raises(ValueError, match="no area"):
         Grid((4, 4), (bad, 1.0))

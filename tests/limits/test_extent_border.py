@@ -19,7 +19,7 @@ do not close their gap h1: up to p = h1 / (K00 - K01), with Love's coefficients.
 import numpy as np
 import pytest
 
-from sa_solver.contact import FrictionalContact, Load
+from sa_solver.contact import ContactLoad, FrictionalContact
 from sa_solver.coupled import CoupledContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
@@ -39,7 +39,7 @@ SOLVED = 1e-8
 
 
 def force(P, Qx=0.0, Mz=0.0):
-    return Load(np.array([P, Qx, 0.0, 0.0, 0.0, Mz]))
+    return ContactLoad(np.array([P, Qx, 0.0, 0.0, 0.0, Mz]))
 
 
 # --- everything in contact -----------------------------------------------------------------------

@@ -8,7 +8,7 @@ import pytest
 from wear.joints.bouc_wen import BoucWen
 from wear.joints.iwan import FourParameterIwan, UniformIwan
 from wear.joints.jenkins import Jenkins
-from wear.joints.law import march
+from wear.joints.law import march_joints
 
 LIMIT, RESIDUAL = 30.0, 900.0
 COMMON = (40e3, 0.5, 60.0, RESIDUAL)
@@ -27,7 +27,7 @@ RNG_SEED = 11
 def lead(law, displacement, state=None, start=0.0):
     path = np.asarray(displacement, float)[:, None, None]
     state = law.rest(1) if state is None else state
-    return march(law, state, np.full((1, 1), start), path)
+    return march_joints(law, state, np.full((1, 1), start), path)
 
 
 @EVERY

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from sa_solver.contact import FrictionalContact, Load
+from sa_solver.contact import ContactLoad, FrictionalContact
 from sa_solver.half_space import HalfSpace
-from sa_solver.reference.hertz import Sphere
+from sa_solver.reference.hertz import HertzSphere
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.limits.conditions import frictional_error
 
@@ -16,12 +16,12 @@ POISSON = [0.0, 0.3, 0.499, 0.5]
 
 def sphere(pair, cells=48, friction=FRICTION):
     """A contact over two thirds of the grid, and its states under P, then also under Qx = µP/2."""
-    own = Sphere(P, RADIUS, pair.contact_modulus)
+    own = HertzSphere(P, RADIUS, pair.contact_modulus)
     size = 3.0 * own.contact_radius
     grid = Grid.covering((size, size), (cells, cells))
     contact = FrictionalContact(HalfSpace(grid, pair), friction, SOLVED)
     height = own.gap(grid.x, grid.y)
-    loads = [Load(np.array([P, Q, 0.0, 0.0, 0.0, 0.0])) for Q in (0.0, 0.5 * friction * P)]
+    loads = [ContactLoad(np.array([P, Q, 0.0, 0.0, 0.0, 0.0])) for Q in (0.0, 0.5 * friction * P)]
     states = [contact.apart(height)]
     for load in loads:
         states.append(contact.advance(states[-1], height, load))
@@ -42,7 +42,7 @@ def test_poissons_ratio_scales_a_contact_of_equal_bodies(poisson):
     own, contact, (pressed, _) = sphere(ElasticPair(body, body), friction=friction)
     assert pressed.rigid[0] == pytest.approx(own.approach, rel=1e-3)
     height = own.gap(contact.grid.x, contact.grid.y)
-    state = contact.advance(pressed, height, Load(np.array([P, Q, 0.0, 0.0, 0.0, 0.0])))
+    state = contact.advance(pressed, height, ContactLoad(np.array([P, Q, 0.0, 0.0, 0.0, 0.0])))
     compliance = 2.0 * (2.0 - poisson) / body.shear_modulus / (8.0 * own.contact_radius)
     assert state.rigid[1] == pytest.approx(compliance * Q, rel=0.01)
 
@@ -80,14 +80,14 @@ def test_a_thousand_times_stiffer_is_almost_rigid(stiffer):
         bodies = [Material(70e3, 0.2), Material(young, 0.3)]
         pair = ElasticPair(*(bodies if stiffer == 2 else bodies[::-1]))
         # The same grid for all: that of the rigid pair.
-        own = Sphere(P, RADIUS, 70e3 / (1 - 0.2**2))
+        own = HertzSphere(P, RADIUS, 70e3 / (1 - 0.2**2))
         size = 3.0 * own.contact_radius
         grid = Grid.covering((size, size), (24, 24))
         contact = FrictionalContact(HalfSpace(grid, pair), FRICTION, 1e-10)
         height = own.gap(grid.x, grid.y)
         state = contact.apart(height)
         for Q in (0.0, 0.5 * FRICTION * P):
-            before, load = state, Load(np.array([P, Q, 0.0, 0.0, 0.0, 0.0]))
+            before, load = state, ContactLoad(np.array([P, Q, 0.0, 0.0, 0.0, 0.0]))
             state = contact.advance(before, height, load)
             assert state.converged
             assert frictional_error(contact, before, height, state, load) < SOLVED
@@ -111,7 +111,9 @@ def test_bodies_that_are_almost_alike_are_solved_as_if_they_were():
         contact = FrictionalContact(HalfSpace(grid, pair), FRICTION, 1e-10)
         state = contact.apart(height)
         for Q in (0.0, 20.0, -10.0):
-            state = contact.advance(state, height, Load(np.array([P, Q, 0.0, 0.0, 0.0, 0.0])))
+            state = contact.advance(
+                state, height, ContactLoad(np.array([P, Q, 0.0, 0.0, 0.0, 0.0]))
+            )
             assert state.converged
         results.append(state)
     one, other = results

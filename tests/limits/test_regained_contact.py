@@ -7,13 +7,13 @@ touch again as if they never had.
 import numpy as np
 import pytest
 
-from sa_solver.contact import FrictionalContact, Load
+from sa_solver.contact import ContactLoad, FrictionalContact
 from sa_solver.half_space import HalfSpace
-from sa_solver.history import LoadPath, march
+from sa_solver.history import ContactLoadPath, march_history
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Grid, LoadHistory
 from tests.limits.scenes import ALIKE, BOTH, FRICTION, RADIUS, SOLVED, P, sphere
-from wear.full_cycle import full_cycle
+from wear.full_cycle import march_cycle
 
 
 def follow(contact, height, *loads):
@@ -21,7 +21,7 @@ def follow(contact, height, *loads):
     state = contact.apart(height)
     for load in loads:
         values = np.array([load[0], load[1], 0.0, 0.0, 0.0, 0.0])
-        state = contact.advance(state, height, Load(values))
+        state = contact.advance(state, height, ContactLoad(values))
         assert state.converged, state.message
     return state
 
@@ -80,7 +80,7 @@ def test_a_bulk_strain_while_apart_is_not_felt(kind):
     state = contact.apart(height)
     for load, strain in ((P, 0.0), (0.0, 1e-3), (P, 1e-3)):
         values = np.array([load, 0.0, 0.0, 0.0, 0.0, 0.0])
-        state = contact.advance(state, height, Load(values, strain=strain))
+        state = contact.advance(state, height, ContactLoad(values, strain=strain))
         assert state.converged
     np.testing.assert_allclose(state.traction, fresh.traction, atol=1e-5 * fresh.pressure.max())
 
@@ -93,7 +93,7 @@ def test_motions_that_part_the_bodies_and_join_them(kind):
     state, states = contact.apart(height), []
     for dz in (depth, -depth, 0.5 * depth, depth):
         values = np.array([dz, 0.0, 0.0, 0.0, 0.0, 0.0])
-        load = Load(values, (True, False, False, True, True, False))
+        load = ContactLoad(values, (True, False, False, True, True, False))
         state = contact.advance(state, height, load)
         assert state.converged
         states.append(state)
@@ -110,7 +110,7 @@ def test_legs_are_not_taken_in_one_step_across_a_parting(kind):
     values = np.zeros((6, 6))
     values[:, 0] = [P, P, 0.0, P, P, P]
     values[:, 1] = [0.0, 30.0, 0.0, 0.0, 15.0, 30.0]
-    found = march(contact.half_space, height, LoadPath(values), FRICTION)
+    found = march_history(contact.half_space, height, ContactLoadPath(values), FRICTION)
     assert found.method == "full"
     assert len(found.states) == 6
     fresh = follow(contact, height, (P, 0.0), (P, 15.0), (P, 30.0))
@@ -140,8 +140,8 @@ def cycle(load, shear, energy=0.0):
 @BOTH
 def test_what_a_cycle_did_before_it_parted_does_not_matter_after(kind):
     contact, height = sphere(kind, 16)
-    one = full_cycle(contact, height, cycle([P, P, 0.0, 0.5 * P, P], [5.0, 30.0, 0.0, 3.0, -9.0]))
-    other = full_cycle(
+    one = march_cycle(contact, height, cycle([P, P, 0.0, 0.5 * P, P], [5.0, 30.0, 0.0, 3.0, -9.0]))
+    other = march_cycle(
         contact, height, cycle([P, P, 0.0, 0.5 * P, P], [0.0, -20.0, 0.0, 3.0, -9.0])
     )
     assert not one[2].traction.any()
@@ -164,14 +164,14 @@ def test_a_flat_that_sticks_dissipates_nothing_and_one_that_slides_does():
     grid = Grid.strips(2.0, 64)
     height = np.where(np.abs(grid.x) < 0.75, 0.0, 1.0)
     contact = FrictionalContact(HalfSpace(grid, ElasticPair(ALIKE, ALIKE)), FRICTION, SOLVED)
-    held = full_cycle(contact, height, cycle([P, P, P], [0.0, 0.95 * FRICTION * P, -10.0]))
+    held = march_cycle(contact, height, cycle([P, P, P], [0.0, 0.95 * FRICTION * P, -10.0]))
     work = P * np.abs([state.rigid[1] for state in held]).max()
     for state in held:
         assert state.sticking.sum() == 48
         assert abs(state.energy.sum()) < 1e-7 * work
         assert np.abs(state.slip).max() < 1e-7 * abs(held[1].rigid[1])
     energy = [0.0, 0.3, 0.0]
-    slid = full_cycle(contact, height, cycle([P, P, P], [0.0, FRICTION * P, -10.0], energy))
+    slid = march_cycle(contact, height, cycle([P, P, P], [0.0, FRICTION * P, -10.0], energy))
     assert [state.sliding for state in slid] == [False, True, False]
     assert slid[1].energy.sum() == pytest.approx(0.3, rel=1e-5)
     assert abs(slid[2].energy.sum()) < 1e-7 * work
@@ -183,8 +183,8 @@ def test_an_energy_of_zero_leaves_the_force_to_be_carried(kind):
     contact, height = sphere(kind, 16)
     pressed = follow(contact, height, (P, 0.0))
     values = np.array([P, 0.995 * FRICTION * P, 0.0, 0.0, 0.0, 0.0])
-    zero = contact.advance(pressed, height, Load(values, energy=np.zeros(2)))
-    unknown = contact.advance(pressed, height, Load(values))
+    zero = contact.advance(pressed, height, ContactLoad(values, energy=np.zeros(2)))
+    unknown = contact.advance(pressed, height, ContactLoad(values))
     assert zero.converged
     assert not zero.sliding
     np.testing.assert_array_equal(zero.traction, unknown.traction)

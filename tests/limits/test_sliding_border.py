@@ -8,7 +8,7 @@ known, the contact slides by it.
 import numpy as np
 import pytest
 
-from sa_solver.contact import FrictionalContact, Load
+from sa_solver.contact import ContactLoad, FrictionalContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.reference.mindlin import ShearedSphere
@@ -34,7 +34,7 @@ def pressed_on(scene, kind, *cells):
 
 
 def load(Qx=0.0, Mz=0.0, energy=None):
-    return Load(np.array([P, Qx, 0.0, 0.0, 0.0, Mz]), energy=energy)
+    return ContactLoad(np.array([P, Qx, 0.0, 0.0, 0.0, Mz]), energy=energy)
 
 
 # --- Q = µP --------------------------------------------------------------------------------------
@@ -220,4 +220,4 @@ def test_bodies_apart_carry_neither(kind, shear):
     values = load(**shear).values
     values[0] = 0.0
     with pytest.raises(FrictionLimitError, match=r"no cell is in contact|µP = 0 N"):
-        contact.advance(pressed, height, Load(values))
+        contact.advance(pressed, height, ContactLoad(values))

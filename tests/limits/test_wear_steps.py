@@ -11,7 +11,7 @@ import pytest
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
-from wear.laws import Energy
+from wear.laws import EnergyLaw
 from wear.stepping import SlidingCycle, WearingContact, WearState
 
 BODY = Material(115e3, 0.29)
@@ -35,7 +35,7 @@ def punch(grid: Grid) -> WearingContact:
     slip = np.full((1, *grid.shape), SLIP)
     contact = NormalContact(HalfSpace(grid, PAIR))
     cycle = SlidingCycle(history, slip)
-    return WearingContact(contact, (Energy(1e-8), Energy(2e-8)), FRICTION, cycle, 1e-12)
+    return WearingContact(contact, (EnergyLaw(1e-8), EnergyLaw(2e-8)), FRICTION, cycle, 1e-12)
 
 
 def unevenness(own: WearingContact, kind: str, limits: float, steps: int) -> Array:

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sa_solver.contact import FrictionalContact, FrictionError, Load
+from sa_solver.contact import ContactLoad, FrictionalContact, FrictionError
 from sa_solver.half_space import HalfSpace
 from sa_solver.tangential import FrictionLimitError
 from sa_solver.types import ElasticPair, Grid, Material
@@ -21,7 +21,7 @@ def contact(friction=FRICTION):
 
 
 def load(P, Qx=0.0, Qy=0.0, Mz=0.0, **more):
-    return Load(np.array([P, Qx, Qy, 0.0, 0.0, Mz]), **more)
+    return ContactLoad(np.array([P, Qx, Qy, 0.0, 0.0, Mz]), **more)
 
 
 def test_resultants_motions_and_energy_add_up():
@@ -52,7 +52,7 @@ def test_motions_bring_the_same_state_as_their_forces():
     solver = contact()
     pressed = solver.advance(solver.apart(HEIGHT), HEIGHT, load(300.0, 30.0))
     forced = solver.advance(pressed, HEIGHT, load(250.0, 100.0, -20.0, 2.0))
-    motion = Load(forced.rigid, motion=(True,) * 6)
+    motion = ContactLoad(forced.rigid, motion=(True,) * 6)
     moved = solver.advance(pressed, HEIGHT, motion)
     scale = forced.pressure.max()
     np.testing.assert_allclose(moved.traction, forced.traction, atol=1e-5 * scale)
@@ -143,7 +143,7 @@ def test_any_rough_history(seed):
         angle, share = rng.uniform(0.0, 2.0 * np.pi), 0.95 * friction * rng.random()
         values = np.array([P, P * share * np.cos(angle), P * share * np.sin(angle), 0, 0, 0])
         motion = (False, False, False, True, True, True)
-        state = solver.advance(state, height, Load(values, motion))
+        state = solver.advance(state, height, ContactLoad(values, motion))
         assert state.converged
         np.testing.assert_allclose(state.resultants[:3], values[:3], atol=1e-7 * P)
         assert np.all(np.hypot(*state.shear) <= friction * state.pressure * (1.0 + 1e-12))

@@ -7,11 +7,11 @@ pitch; what is an integral of them (approach, twist, shift) does about as its 3/
 import numpy as np
 import pytest
 
-from sa_solver.contact import FrictionalContact, Load
+from sa_solver.contact import ContactLoad, FrictionalContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
-from sa_solver.reference.flat_rounded import FlatRounded
-from sa_solver.reference.hertz import Cylinder, Ellipse
+from sa_solver.reference.flat_rounded import FlatRoundedPunch
+from sa_solver.reference.hertz import HertzCylinder, HertzEllipse
 from sa_solver.reference.line_partial_slip import BulkStressedCylinder
 from sa_solver.reference.torsion import TwistedSphere
 from sa_solver.reference.waviness import ChebyshevPunch
@@ -33,7 +33,7 @@ def mean_square(found, expected):
 
 
 def test_elliptical_contact():
-    ellipse = Ellipse(400.0, 8.0, 30.0, MODULUS)
+    ellipse = HertzEllipse(400.0, 8.0, 30.0, MODULUS)
     a, b = ellipse.semi_axes
     pressures, approaches = [], []
     for cells in (24, 48, 96, 192):
@@ -56,7 +56,7 @@ def test_twisted_sphere(share):
         grid = Grid.covering((2.5 * a, 2.5 * a), (cells, cells))
         contact = FrictionalContact(HalfSpace(grid, PAIR), FRICTION)
         height = sphere.contact.gap(grid.x, grid.y)
-        load = Load(np.array([400.0, 0.0, 0.0, 0.0, 0.0, moment]))
+        load = ContactLoad(np.array([400.0, 0.0, 0.0, 0.0, 0.0, moment]))
         state = contact.advance(contact.apart(height), height, load)
         expected = sphere.shear(np.hypot(grid.x, grid.y), moment)
         shears.append(mean_square(np.hypot(*state.shear), expected))
@@ -68,7 +68,7 @@ def test_twisted_sphere(share):
 
 @pytest.mark.parametrize("body", [1, 2])
 def test_cylinder_with_bulk_stress(body):
-    cylinder = Cylinder(400.0, 50.0, MODULUS)
+    cylinder = HertzCylinder(400.0, 50.0, MODULUS)
     form = BulkStressedCylinder(cylinder, FRICTION, 100.0, 60.0, body)
     shears = []
     for strips in (64, 128, 256, 512):
@@ -76,9 +76,9 @@ def test_cylinder_with_bulk_stress(body):
         contact = FrictionalContact(HalfSpace(grid, PAIR), FRICTION)
         height = cylinder.gap(grid.x)
         pressed = contact.advance(
-            contact.apart(height), height, Load(np.array([400.0, 0, 0, 0, 0, 0]))
+            contact.apart(height), height, ContactLoad(np.array([400.0, 0, 0, 0, 0, 0]))
         )
-        load = Load(np.array([400.0, 100.0, 0, 0, 0, 0]), strain=form.mismatch_strain)
+        load = ContactLoad(np.array([400.0, 100.0, 0, 0, 0, 0]), strain=form.mismatch_strain)
         state = contact.advance(pressed, height, load)
         shears.append(mean_square(state.shear[0], form.shear(grid.x)))
     assert rate(shears) > 0.7
@@ -87,7 +87,7 @@ def test_cylinder_with_bulk_stress(body):
 
 @pytest.mark.parametrize(
     "form",
-    [ChebyshevPunch(0.5, 400.0, 0.05, 8, MODULUS), FlatRounded(4.0, 30.0, 400.0, MODULUS)],
+    [ChebyshevPunch(0.5, 400.0, 0.05, 8, MODULUS), FlatRoundedPunch(4.0, 30.0, 400.0, MODULUS)],
     ids=["waves", "rounded flat"],
 )
 def test_line_contacts_without_friction(form):

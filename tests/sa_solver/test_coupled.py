@@ -6,13 +6,13 @@ from scipy.optimize import brentq
 from scipy.special import ellipk
 
 import sa_solver.coupled as coupled
-from sa_solver.alternating import AlternatingContact
 from sa_solver.coupled import CoupledContact, CoupledContactError
-from sa_solver.coupled_problem import RigidMotions
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
+from sa_solver.rigid_modes import RigidModes
 from sa_solver.tangential import FrictionLimitError, TangentialContact
 from sa_solver.types import ElasticPair, Grid, Material, resultants
+from tests.oracles.alternating import AlternatingContact
 
 TOLERANCE = 1e-8
 STEEL = Material(200e3, 0.3)
@@ -83,7 +83,7 @@ def assert_solves(contact, height, offset, state):
     """Every condition of the problem, from the tractions alone."""
     friction, scale = contact.friction, np.abs(state.displacement).max()
     displacement = contact.half_space.displacement(state.traction)
-    rigid = RigidMotions(contact.grid)
+    rigid = RigidModes(contact.grid)
     relative = displacement - rigid.motion(state.rigid * rigid.lengths)
     relative[2] += height
     relative[:2] += 0.0 if offset is None else offset

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from sa_solver import gross_slip as module
-from sa_solver.gross_slip import Sliding, gross_slip
+from sa_solver.gross_slip import SlidingTrial, gross_slip
 from sa_solver.half_space import HalfSpace
 from sa_solver.tangential import TangentialContact
 from sa_solver.types import ElasticPair, Grid, Material
@@ -25,7 +25,7 @@ def slide(limit, energy, force, offset=REST, direction="energies", half_space=HA
         twist = {} if half_space.grid.line else {"twist": 0.0}
         state = contact.solve(limit, offset, shift_x=x, shift_y=y, **twist, tolerance=tolerance)
         spent = -np.sum(state.shear * state.slip, axis=(1, 2)) * area
-        return Sliding(state, np.array([state.Qx, state.Qy]), spent)
+        return SlidingTrial(state, np.array([state.Qx, state.Qy]), spent)
 
     carried = float(limit.sum()) * area
     return gross_slip(solve, carried, np.array(energy), np.array(force), 1e-9, direction)

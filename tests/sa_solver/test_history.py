@@ -7,7 +7,7 @@ import pytest
 
 from sa_solver.contact import FrictionalContact
 from sa_solver.half_space import HalfSpace
-from sa_solver.history import HistoryError, LoadPath, march, turning_points
+from sa_solver.history import ContactLoadPath, HistoryError, march_history, turning_points
 from sa_solver.normal import NormalContact
 from sa_solver.reference.line_partial_slip import ciavarella_jaeger
 from sa_solver.types import ElasticPair, Grid, Material
@@ -39,7 +39,7 @@ def path(shares, press=3, strain=None, turned=0.0):
     values[press:, 2] = SLIDING * shares * np.sin(turned)
     if strain is not None:
         strain = np.r_[np.zeros(press), strain * shares]
-    return LoadPath(values, strain=strain)
+    return ContactLoadPath(values, strain=strain)
 
 
 def legs(*points, steps=6):
@@ -59,8 +59,8 @@ def test_turning_points():
 @pytest.mark.parametrize("contact", [cylinder(), ball(0.0)], ids=["line", "nu=0"])
 def test_legs_in_one_step_are_exact_where_slip_keeps_its_direction(contact):
     half_space, height = contact
-    full = march(half_space, height, path(CYCLE), FRICTION, history="full", tolerance=1e-10)
-    auto = march(half_space, height, path(CYCLE), FRICTION, tolerance=1e-10)
+    full = march_history(half_space, height, path(CYCLE), FRICTION, history="full", tolerance=1e-10)
+    auto = march_history(half_space, height, path(CYCLE), FRICTION, tolerance=1e-10)
     assert auto.method == "reversals"
     assert auto.reason == "similar bodies, pressure constant while the shear load turns"
     assert auto.error is None
@@ -76,8 +76,8 @@ def test_legs_in_one_step_are_exact_where_slip_keeps_its_direction(contact):
 
 def test_legs_with_poisson_ratio_have_a_measured_error():
     half_space, height = ball(0.45)
-    full = march(half_space, height, path(CYCLE), FRICTION, history="full")
-    auto = march(half_space, height, path(CYCLE), FRICTION)
+    full = march_history(half_space, height, path(CYCLE), FRICTION, history="full")
+    auto = march_history(half_space, height, path(CYCLE), FRICTION)
     scale = FRICTION * full.states[-1].pressure.max()
     true = np.abs(auto.states[-1].shear - full.states[-1].shear).max() / scale
     assert auto.method == "reversals"
@@ -90,8 +90,8 @@ def test_legs_with_poisson_ratio_have_a_measured_error():
 def test_bulk_stress_in_proportion_is_a_leg_too():
     half_space, height = cylinder()
     loading = path(CYCLE, strain=2e-4)
-    full = march(half_space, height, loading, FRICTION, history="full", tolerance=1e-10)
-    auto = march(half_space, height, loading, FRICTION, tolerance=1e-10)
+    full = march_history(half_space, height, loading, FRICTION, history="full", tolerance=1e-10)
+    auto = march_history(half_space, height, loading, FRICTION, tolerance=1e-10)
     scale = FRICTION * full.states[-1].pressure.max()
     assert auto.method == "reversals"
     np.testing.assert_allclose(auto.states[-1].shear, full.states[-1].shear, atol=1e-5 * scale)
@@ -119,14 +119,14 @@ def test_auto_says_why_it_takes_every_increment(change, reason):
     if change == "dissimilar":
         pair = ElasticPair(Material(115e3, 0.3), Material(70e3, 0.3))
         half_space = HalfSpace(half_space.grid, pair)
-    loading = LoadPath(loading.values, energy=energy)
-    found = march(half_space, height, loading, FRICTION)
+    loading = ContactLoadPath(loading.values, energy=energy)
+    found = march_history(half_space, height, loading, FRICTION)
     assert found.method == "full"
     assert found.reason == reason
     assert found.indices == list(range(6))
     if change != "direction":
         with pytest.raises(HistoryError, match="use full or auto"):
-            march(half_space, height, loading, FRICTION, history="reversals")
+            march_history(half_space, height, loading, FRICTION, history="reversals")
 
 
 def test_the_error_of_a_full_path_falls_with_its_increments():
@@ -140,7 +140,11 @@ def test_the_error_of_a_full_path_falls_with_its_increments():
         values[1:, 1] = 0.8 * SLIDING
         values[2:, 1] = 0.8 * SLIDING * np.cos(angle)
         values[2:, 2] = 0.8 * SLIDING * np.sin(angle)
-        found.append(march(half_space, height, LoadPath(values), FRICTION, estimate_error=True))
+        found.append(
+            march_history(
+                half_space, height, ContactLoadPath(values), FRICTION, estimate_error=True
+            )
+        )
     errors = [own.error for own in found]
     scale = FRICTION * found[0].states[-1].pressure.max()
     true = np.abs(found[1].states[-1].shear - found[2].states[-1].shear).max() / scale
@@ -153,7 +157,7 @@ def test_the_error_of_a_full_path_falls_with_its_increments():
 def test_no_error_where_every_increment_turns_back():
     half_space, height = cylinder(32)
     zigzag = path([0.5, -0.5, 0.5, -0.5], press=1)
-    found = march(half_space, height, zigzag, FRICTION, history="full", estimate_error=True)
+    found = march_history(half_space, height, zigzag, FRICTION, history="full", estimate_error=True)
     assert found.error is None
 
 
@@ -164,12 +168,12 @@ def test_first_loading_of_a_line_contact_is_two_normal_problems(monkeypatch):
     height = np.maximum(np.abs(grid.x) - 0.4, 0.0) ** 2 / 20.0
     for sign in (1.0, -1.0):
         loading = path(sign * np.asarray(legs(0.7)))
-        found = march(half_space, height, loading, FRICTION, tolerance=1e-10)
+        found = march_history(half_space, height, loading, FRICTION, tolerance=1e-10)
         assert found.method == "ciavarella_jaeger"
         two = found.states[-1]
         with monkeypatch.context() as patch:
             patch.setattr(FrictionalContact, "two_normal_problems", lambda *_: False)
-            newton = march(half_space, height, loading, FRICTION, tolerance=1e-10)
+            newton = march_history(half_space, height, loading, FRICTION, tolerance=1e-10)
         assert newton.method == "reversals"
         one = newton.states[-1]
         limit = FRICTION * one.pressure.max()
@@ -192,7 +196,7 @@ def test_first_loading_of_a_line_contact_is_two_normal_problems(monkeypatch):
 def test_progress_and_failure(monkeypatch):
     half_space, height = cylinder(32)
     rows = []
-    march(
+    march_history(
         half_space,
         height,
         path([0.3, 0.6]),
@@ -209,6 +213,6 @@ def test_progress_and_failure(monkeypatch):
         return state
 
     monkeypatch.setattr(FrictionalContact, "advance", fails)
-    stopped = march(half_space, height, path([0.3, 0.6]), FRICTION, history="full")
+    stopped = march_history(half_space, height, path([0.3, 0.6]), FRICTION, history="full")
     assert stopped.indices == [0, 1, 2, 3]
     assert not stopped.states[-1].converged

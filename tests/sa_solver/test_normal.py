@@ -8,14 +8,14 @@ import pytest
 from sa_solver import few_cells, nested_solver, normal_splitting
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalContactError
-from sa_solver.reference.flat_rounded import FlatRounded
-from sa_solver.reference.hertz import Sphere
+from sa_solver.reference.flat_rounded import FlatRoundedPunch
+from sa_solver.reference.hertz import HertzSphere
 from sa_solver.types import ElasticPair, Grid, Material
 
 TITANIUM = Material(115e3, 0.29)
 PAIR = ElasticPair(TITANIUM, TITANIUM)
 MODULUS = PAIR.contact_modulus
-SPHERE = Sphere(400.0, 10.0, MODULUS)
+SPHERE = HertzSphere(400.0, 10.0, MODULUS)
 SOLVED = 1e-8
 """What the solver imposes: resultants, penetration, complementarity."""
 
@@ -133,7 +133,7 @@ def test_middle_of_a_long_flat_is_the_plane_closed_form():
     grid, height = flat((256, 64))
     state = NormalContact(HalfSpace(grid, PAIR)).solve(height, 9e4)
     profile = state.pressure[:, 32]
-    closed = FlatRounded(4.0, 30.0, profile.sum() * grid.pitch[0], MODULUS)
+    closed = FlatRoundedPunch(4.0, 30.0, profile.sum() * grid.pitch[0], MODULUS)
     assert profile.max() == pytest.approx(closed.peak[0], rel=0.01)
     inner = np.abs(grid.x[:, 0]) < 4.3
     expected = closed.cell_averages(grid.pitch[0], 256)
@@ -148,7 +148,7 @@ def test_the_peak_error_foretold_bounds_the_one_made(radius, cells):
     dy = np.maximum(np.abs(grid.y) - 27.0, 0.0)
     height = dx**2 / (2.0 * radius) + dy**2 / 300.0
     profile = NormalContact(HalfSpace(grid, PAIR)).solve(height, 9e4).pressure[:, 32]
-    closed = FlatRounded(4.0, radius, profile.sum() * grid.pitch[0], MODULUS)
+    closed = FlatRoundedPunch(4.0, radius, profile.sum() * grid.pitch[0], MODULUS)
     made = profile.max() / closed.peak[0] - 1.0
     assert abs(made) <= abs(closed.peak_error(grid.pitch[0])) + 2e-4
 

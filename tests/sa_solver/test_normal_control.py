@@ -7,7 +7,7 @@ import pytest
 
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalContactError
-from sa_solver.reference.hertz import Cylinder
+from sa_solver.reference.hertz import HertzCylinder
 from sa_solver.types import ElasticPair, Grid, Material
 
 PAIR = ElasticPair(Material(115e3, 0.29), Material(115e3, 0.29))
@@ -88,7 +88,7 @@ def test_one_of_each_pair_is_imposed(given, words):
 
 
 # -- line contact --
-LINE = Cylinder(120.0, 20.0, PAIR.contact_modulus)
+LINE = HertzCylinder(120.0, 20.0, PAIR.contact_modulus)
 
 
 def cylinder(count, load=LINE.load, **given):

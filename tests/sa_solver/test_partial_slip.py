@@ -6,9 +6,9 @@ import pytest
 from sa_solver.contact import FrictionalContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
-from sa_solver.partial_slip import PartialSlipError, partial_slip
+from sa_solver.partial_slip import PartialSlipError, partial_slip_curve
 from sa_solver.reference.mindlin import ShearedSphere
-from sa_solver.tangential_loop import LoopPath, tangential_loop
+from sa_solver.tangential_loop import LoopPath, march_loop
 from sa_solver.types import ElasticPair, Grid, Material
 
 LOAD, RADIUS, FRICTION = 60.0, 47.619, 0.5
@@ -34,7 +34,7 @@ def moved(case, cells=CELLS, height=None, **settings):
     grid = grid_of(case, cells)
     half_space = HalfSpace(grid, ElasticPair(case.body_1, case.body_2))
     gap = case.contact.gap(grid.x, grid.y) if height is None else height(grid)
-    found = partial_slip(NormalContact(half_space), gap, LOAD, tolerance=1e-9, **settings)
+    found = partial_slip_curve(NormalContact(half_space), gap, LOAD, tolerance=1e-9, **settings)
     return found, half_space, gap
 
 
@@ -91,7 +91,7 @@ def test_without_poissons_ratio_it_is_the_discrete_solution(height, share):
     curve, half_space, gap = moved(sphere(PLAIN), 32, height)
     stage = int(share * len(curve.shift)) + 1
     path = LoopPath(LOAD, FRICTION * curve.shift[stage], increments=2)
-    loop = tangential_loop(FrictionalContact(half_space, FRICTION), gap, path)
+    loop = march_loop(FrictionalContact(half_space, FRICTION), gap, path)
     force = loop.loading[1][-1]
     assert force == pytest.approx(FRICTION * curve.force[stage], rel=1e-5)
     # The energy of the grid itself, from the cells that have slipped.
@@ -105,7 +105,7 @@ def test_with_poissons_ratio_loops_differ_little_from_the_whole_problem():
     for share, allowed in ((0.5, 0.02), (2.0, 1e-3)):
         amplitude = share * curve.shift[-1]
         path = LoopPath(LOAD, FRICTION * amplitude)
-        loop = tangential_loop(FrictionalContact(half_space, FRICTION), gap, path)
+        loop = march_loop(FrictionalContact(half_space, FRICTION), gap, path)
         lost = FRICTION**2 * float(curve.slider_load @ travel_of(curve, amplitude))
         assert lost == pytest.approx(loop.energy, rel=allowed)
 
@@ -160,7 +160,7 @@ def test_unlike_bodies_and_no_load_are_refused():
     gap = (grid.x**2 + grid.y**2) / (2.0 * RADIUS)
     unlike = NormalContact(HalfSpace(grid, ElasticPair(STEEL, SOFT)))
     with pytest.raises(PartialSlipError, match="not alike"):
-        partial_slip(unlike, gap, LOAD, tolerance=1e-8)
+        partial_slip_curve(unlike, gap, LOAD, tolerance=1e-8)
     alike = NormalContact(HalfSpace(grid, ElasticPair(STEEL, STEEL)))
     with pytest.raises(PartialSlipError, match="a load of 0 N"):
-        partial_slip(alike, gap, 0.0, tolerance=1e-8)
+        partial_slip_curve(alike, gap, 0.0, tolerance=1e-8)

@@ -4,24 +4,24 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from sa_solver.reference.flat_rounded import FlatRounded
-from sa_solver.reference.hertz import Cylinder, Sphere
+from sa_solver.reference.flat_rounded import FlatRoundedPunch
+from sa_solver.reference.hertz import HertzCylinder, HertzSphere
 from sa_solver.types import ElasticPair, Material
 
 TITANIUM = Material(115e3, 0.29)
 MODULUS = ElasticPair(TITANIUM, TITANIUM).contact_modulus
-PRODUCTION = FlatRounded(4.0, 30.0, 1440.0, MODULUS)
+PRODUCTION = FlatRoundedPunch(4.0, 30.0, 1440.0, MODULUS)
 
 
 def test_sphere_of_the_dovetail_paper():
-    sphere = Sphere(400.0, 10.0, MODULUS)
+    sphere = HertzSphere(400.0, 10.0, MODULUS)
     assert sphere.contact_radius == pytest.approx(0.36288, abs=5e-6)
     assert sphere.peak_pressure == pytest.approx(1450.3, abs=0.05)
     assert sphere.approach == pytest.approx(13.168e-3, abs=5e-7)
 
 
 def test_hertz_pressure_carries_the_load():
-    sphere, cylinder = Sphere(400.0, 10.0, MODULUS), Cylinder(100.0, 10.0, MODULUS)
+    sphere, cylinder = HertzSphere(400.0, 10.0, MODULUS), HertzCylinder(100.0, 10.0, MODULUS)
     a = sphere.contact_radius
     carried = quad(lambda r: 2.0 * np.pi * r * float(sphere.pressure(r, 0.0)), 0.0, a)[0]
     assert carried == pytest.approx(400.0, rel=1e-8)
@@ -31,7 +31,7 @@ def test_hertz_pressure_carries_the_load():
 
 @pytest.mark.parametrize("load", [20.0, 1440.0, 20000.0])
 def test_flat_rounded_carries_the_load(load):
-    contact = FlatRounded(4.0, 30.0, load, MODULUS)
+    contact = FlatRoundedPunch(4.0, 30.0, load, MODULUS)
     b = contact.contact_half_width
     halves = [(0.0, 4.0), (4.0, b)]
     carried = 2.0 * sum(quad(contact.pressure, *half, limit=200)[0] for half in halves)
@@ -39,7 +39,10 @@ def test_flat_rounded_carries_the_load(load):
 
 
 def test_without_flat_it_is_a_cylinder():
-    contact, cylinder = FlatRounded(1e-5, 30.0, 1440.0, MODULUS), Cylinder(1440.0, 30.0, MODULUS)
+    contact, cylinder = (
+        FlatRoundedPunch(1e-5, 30.0, 1440.0, MODULUS),
+        HertzCylinder(1440.0, 30.0, MODULUS),
+    )
     assert contact.contact_half_width == pytest.approx(cylinder.half_width, rel=1e-4)
     x = np.linspace(-1.25, 1.25, 26) * cylinder.half_width
     tolerance = 1e-4 * cylinder.peak_pressure
@@ -47,7 +50,7 @@ def test_without_flat_it_is_a_cylinder():
 
 
 def test_with_sharp_edges_it_is_a_flat_punch():
-    contact = FlatRounded(4.0, 1e-4, 1440.0, MODULUS)
+    contact = FlatRoundedPunch(4.0, 1e-4, 1440.0, MODULUS)
     x = np.linspace(0.0, 3.0, 7)
     punch = 1440.0 / (np.pi * np.sqrt(16.0 - x**2))
     np.testing.assert_allclose(contact.pressure(x), punch, rtol=1e-4)
@@ -77,7 +80,7 @@ def test_peak_is_the_largest_pressure():
 @pytest.mark.parametrize("radius", [3.0, 30.0, 150.0])
 @pytest.mark.parametrize("load", [20.0, 1440.0])
 def test_five_percent_needs_a_third_of_the_rounded_band(radius, load):
-    contact = FlatRounded(4.0, radius, load, MODULUS)
+    contact = FlatRoundedPunch(4.0, radius, load, MODULUS)
     band = contact.contact_half_width - contact.half_width
     assert -0.05 <= contact.peak_error(0.33 * band) < -0.035
     assert contact.peak_error(0.4 * band) < -0.05

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.integrate import dblquad, quad
 
-from sa_solver.reference.hertz import Cylinder
-from sa_solver.reference.love import UniformRectangle, UniformStrip, love_displacement
+from sa_solver.reference.hertz import HertzCylinder
 from sa_solver.reference.waviness import ChebyshevPunch, WavySurface
 from sa_solver.types import ElasticPair, Material
+from tests.oracles.uniform_traction import UniformRectangle, UniformStrip, love_displacement
 
 STEEL, RUBBERY = Material(210e3, 0.3), Material(5e3, 0.45)
 MODULUS = ElasticPair(STEEL, RUBBERY).contact_modulus
@@ -160,7 +160,7 @@ def test_waves_close_the_gap(x):
 def test_light_waves_are_hertz_and_heavy_ones_are_full():
     light = WavySurface(1e-3, 2.0, 1e-4 * WAVES.full_contact_pressure, MODULUS)
     crest = (2.0 / (2.0 * np.pi)) ** 2 / 1e-3
-    line = Cylinder(light.mean_pressure * 2.0, crest, MODULUS)
+    line = HertzCylinder(light.mean_pressure * 2.0, crest, MODULUS)
     assert light.half_width == pytest.approx(line.half_width, rel=1e-3)
     assert float(light.pressure(0.0)) == pytest.approx(line.peak_pressure, rel=1e-3)
     star = WAVES.full_contact_pressure
@@ -219,7 +219,7 @@ def test_largest_waviness_touches_zero():
 def test_without_waves_it_is_a_cylinder():
     plain = ChebyshevPunch(1.5, 300.0, 0.0, 2, MODULUS)
     radius = np.pi * MODULUS * 1.5**2 / (4.0 * 300.0)
-    line, x = Cylinder(300.0, radius, MODULUS), np.linspace(-1.6, 1.6, 17)
+    line, x = HertzCylinder(300.0, radius, MODULUS), np.linspace(-1.6, 1.6, 17)
     np.testing.assert_allclose(plain.pressure(x), line.pressure(x), atol=1e-10)
     np.testing.assert_allclose(plain.gap(x), line.gap(x), rtol=1e-12, atol=1e-15)
     assert plain.approach(7.0) == pytest.approx(line.approach(7.0), rel=1e-12)

@@ -4,13 +4,13 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from sa_solver.reference.hertz import Cylinder, Ellipse, Sphere
+from sa_solver.reference.hertz import HertzCylinder, HertzEllipse, HertzSphere
 
 MODULUS = 62777.0
 LOAD = 400.0
 
 
-def displacement_inside(contact: Ellipse, x: float, y: float) -> float:
+def displacement_inside(contact: HertzEllipse, x: float, y: float) -> float:
     """u_z at a point inside: ∫∫ p dρ dθ / π E*, in polar coordinates about the point."""
     a, b = contact.semi_axes
 
@@ -34,14 +34,14 @@ def displacement_inside(contact: Ellipse, x: float, y: float) -> float:
 
 
 def test_equal_radii_make_a_sphere():
-    ellipse, sphere = Ellipse(LOAD, 10.0, 10.0, MODULUS), Sphere(LOAD, 10.0, MODULUS)
+    ellipse, sphere = HertzEllipse(LOAD, 10.0, 10.0, MODULUS), HertzSphere(LOAD, 10.0, MODULUS)
     assert ellipse.semi_axes == pytest.approx([sphere.contact_radius] * 2, rel=1e-12)
     assert ellipse.peak_pressure == pytest.approx(sphere.peak_pressure, rel=1e-12)
     assert ellipse.approach == pytest.approx(sphere.approach, rel=1e-12)
 
 
 def test_exchange_of_axes():
-    one, other = Ellipse(LOAD, 5.0, 80.0, MODULUS), Ellipse(LOAD, 80.0, 5.0, MODULUS)
+    one, other = HertzEllipse(LOAD, 5.0, 80.0, MODULUS), HertzEllipse(LOAD, 80.0, 5.0, MODULUS)
     assert one.semi_axes == pytest.approx(other.semi_axes[::-1], rel=1e-12)
     assert one.semi_axes[0] < one.semi_axes[1]
     assert one.approach == pytest.approx(other.approach, rel=1e-12)
@@ -49,7 +49,7 @@ def test_exchange_of_axes():
 
 @pytest.mark.parametrize("radius_y", [3.0, 10.0, 200.0])
 def test_ellipse_closes_the_gap(radius_y):
-    contact = Ellipse(LOAD, 10.0, radius_y, MODULUS)
+    contact = HertzEllipse(LOAD, 10.0, radius_y, MODULUS)
     a, b = contact.semi_axes
     for x, y in ((0.0, 0.0), (0.6 * a, 0.0), (0.0, 0.7 * b), (-0.4 * a, 0.5 * b)):
         gap = contact.gap(x, y) + displacement_inside(contact, x, y) - contact.approach
@@ -58,10 +58,10 @@ def test_ellipse_closes_the_gap(radius_y):
 
 def test_a_long_ellipse_is_a_cylinder():
     """Where b >> a every section is a line contact under its own load per length."""
-    contact = Ellipse(LOAD, 10.0, 1e7, MODULUS)
+    contact = HertzEllipse(LOAD, 10.0, 1e7, MODULUS)
     a, b = contact.semi_axes
     per_length = 1.5 * LOAD / (2.0 * b)  # at y = 0, of a parabola along y
-    line = Cylinder(per_length, 10.0, MODULUS)
+    line = HertzCylinder(per_length, 10.0, MODULUS)
     assert b / a > 200.0
     assert a == pytest.approx(line.half_width, rel=1e-3)
     assert contact.peak_pressure == pytest.approx(line.peak_pressure, rel=1e-3)
@@ -69,7 +69,7 @@ def test_a_long_ellipse_is_a_cylinder():
 
 @pytest.mark.parametrize("position", [0.0, 0.3, -0.8])
 def test_cylinder_closes_the_gap_at_its_datum(position):
-    line, datum = Cylinder(100.0, 10.0, MODULUS), 7.0
+    line, datum = HertzCylinder(100.0, 10.0, MODULUS), 7.0
     a, x = line.half_width, position * line.half_width
     displacement = quad(
         lambda s: float(line.pressure(s)) * np.log(abs(x - s) / datum), -a, a, points=[x], limit=200

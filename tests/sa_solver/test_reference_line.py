@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from sa_solver.reference.flat_rounded import FlatRounded
-from sa_solver.reference.hertz import Cylinder
+from sa_solver.reference.flat_rounded import FlatRoundedPunch
+from sa_solver.reference.hertz import HertzCylinder
 from sa_solver.reference.line_partial_slip import (
     BulkStressedCylinder,
     ShearedCylinder,
@@ -17,7 +17,7 @@ from sa_solver.types import ElasticPair, Material
 
 STEEL = Material(210e3, 0.3)
 MODULUS = ElasticPair(STEEL, STEEL).contact_modulus
-LINE = Cylinder(200.0, 30.0, MODULUS)
+LINE = HertzCylinder(200.0, 30.0, MODULUS)
 FRICTION = 0.6
 SLIDING = FRICTION * LINE.load
 A = LINE.half_width
@@ -201,7 +201,7 @@ def test_a_held_stress_limits_the_way_back():
 def test_ciavarella_jaeger_of_a_cylinder_is_cattaneo_mindlin():
     x = np.linspace(-1.1 * A, 1.1 * A, 101)
     found = ciavarella_jaeger(
-        lambda load: Cylinder(load, 30.0, MODULUS).pressure(x), 200.0, -70.0, FRICTION
+        lambda load: HertzCylinder(load, 30.0, MODULUS).pressure(x), 200.0, -70.0, FRICTION
     )
     expected = ShearedCylinder(LINE, FRICTION).shear(x, -70.0)
     np.testing.assert_allclose(found, expected, atol=1e-10)
@@ -210,8 +210,8 @@ def test_ciavarella_jaeger_of_a_cylinder_is_cattaneo_mindlin():
 def test_ciavarella_jaeger_sticks_a_rounded_flat():
     """No strain where p(P*) is in contact, slip against the shear beyond, and the load Q."""
     load, tangential = 400.0, 160.0
-    whole = FlatRounded(1.0, 60.0, load, MODULUS)
-    inner = FlatRounded(1.0, 60.0, load - tangential / FRICTION, MODULUS)
+    whole = FlatRoundedPunch(1.0, 60.0, load, MODULUS)
+    inner = FlatRoundedPunch(1.0, 60.0, load - tangential / FRICTION, MODULUS)
     b, c = whole.contact_half_width, inner.contact_half_width
 
     def shear(x: float) -> float:
@@ -235,7 +235,7 @@ def test_ciavarella_jaeger_sticks_a_rounded_flat():
 def test_ciavarella_jaeger_at_and_beyond_sliding():
     x = np.linspace(-A, A, 11)
     sliding = ciavarella_jaeger(
-        lambda load: Cylinder(load, 30.0, MODULUS).pressure(x), 200.0, 0.5 * 200.0, 0.5
+        lambda load: HertzCylinder(load, 30.0, MODULUS).pressure(x), 200.0, 0.5 * 200.0, 0.5
     )
     np.testing.assert_allclose(sliding, 0.5 * LINE.pressure(x))
     with pytest.raises(ValueError, match="slides"):

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from sa_solver.reference.hertz import Cylinder, Sphere
+from sa_solver.reference.hertz import HertzCylinder, HertzSphere
 from sa_solver.reference.subsurface import (
     cylinder_stress,
     point_force_stress,
@@ -28,8 +28,8 @@ from sa_solver.types import Grid, Material
 
 STEEL = Material(200e3, 0.3)
 MODULUS = 1.1e5
-SPHERE = Sphere(400.0, 10.0, MODULUS)
-CYLINDER = Cylinder(500.0, 10.0, MODULUS)
+SPHERE = HertzSphere(400.0, 10.0, MODULUS)
+CYLINDER = HertzCylinder(500.0, 10.0, MODULUS)
 FRICTION = 0.4
 SIZE = (0.8, 0.5)
 RATIOS = [0.0, 0.3, 0.5]

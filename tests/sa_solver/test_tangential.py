@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from sa_solver import tangential
 from sa_solver.half_space import HalfSpace
-from sa_solver.reference.hertz import Cylinder
+from sa_solver.reference.hertz import HertzCylinder
 from sa_solver.reference.line_partial_slip import BulkStressedCylinder, ShearedCylinder
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.reference.torsion import TwistedSphere
@@ -32,7 +32,7 @@ def sphere(cells, material=TITANIUM, width=0.8, friction=FRICTION):
 
 def line(cells, material=TITANIUM):
     pair = ElasticPair(material, material)
-    contact = Cylinder(200.0, 30.0, pair.contact_modulus)
+    contact = HertzCylinder(200.0, 30.0, pair.contact_modulus)
     grid = Grid.strips(2.5 * contact.half_width, cells)
     limit = FRICTION * contact.pressure(grid.x)
     half_space = HalfSpace(grid, pair)

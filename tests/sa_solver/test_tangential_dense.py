@@ -5,8 +5,9 @@ import pytest
 
 from sa_solver.disk_gradient import gradients_on_disks
 from sa_solver.half_space import HalfSpace
+from sa_solver.rigid_modes import PlanarModes
 from sa_solver.tangential import TangentialContact
-from sa_solver.tangential_problem import BoxOperator, PlanarModes, TangentialProblem
+from sa_solver.tangential_problem import BoxOperator, TangentialProblem
 from sa_solver.types import ElasticPair, Grid, Material
 
 MATERIAL = Material(115e3, 0.35)

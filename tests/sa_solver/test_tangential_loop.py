@@ -6,11 +6,11 @@ import pytest
 from sa_solver import tangential_loop as loops
 from sa_solver.contact import FrictionalContact
 from sa_solver.half_space import HalfSpace
-from sa_solver.reference.hertz import Cylinder
+from sa_solver.reference.hertz import HertzCylinder
 from sa_solver.reference.line_partial_slip import ShearedCylinder
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.tangential import FrictionLimitError, TangentialContact
-from sa_solver.tangential_loop import LoopError, LoopFailure, LoopPath, tangential_loop
+from sa_solver.tangential_loop import LoopError, LoopFailure, LoopPath, march_loop
 from sa_solver.types import ElasticPair, Grid, Material
 
 LOAD, RADIUS, FRICTION = 400.0, 10.0, 0.7
@@ -33,14 +33,14 @@ def run(case, path, cells=CELLS):
     grid = Grid.covering((size, size), (cells, cells))
     pair = ElasticPair(case.body_1, case.body_2)
     contact = FrictionalContact(HalfSpace(grid, pair), case.friction)
-    return tangential_loop(contact, case.contact.gap(grid.x, grid.y), path)
+    return march_loop(contact, case.contact.gap(grid.x, grid.y), path)
 
 
 def press_flat(pair, cells, path, friction=FRICTION):
     """A flat punch 2 mm wide, in the plane."""
     grid = Grid.strips(2.0, cells)
     contact = FrictionalContact(HalfSpace(grid, pair), friction)
-    return tangential_loop(contact, np.zeros(grid.shape), path)
+    return march_loop(contact, np.zeros(grid.shape), path)
 
 
 @pytest.fixture(scope="module")
@@ -141,11 +141,11 @@ def test_both_axes_are_alike_for_a_sphere():
 
 def test_line_contact():
     pair = ElasticPair(TITANIUM, TITANIUM)
-    line = ShearedCylinder(Cylinder(LOAD, RADIUS, pair.contact_modulus), FRICTION)
+    line = ShearedCylinder(HertzCylinder(LOAD, RADIUS, pair.contact_modulus), FRICTION)
     grid = Grid.strips(2.2 * line.contact.half_width, 128)
     contact = FrictionalContact(HalfSpace(grid, pair), FRICTION)
     height = line.contact.gap(grid.x)
-    found = tangential_loop(contact, height, LoopPath(LOAD, 0.75 * SLIDING, "force", 6))
+    found = march_loop(contact, height, LoopPath(LOAD, 0.75 * SLIDING, "force", 6))
     datum = contact.half_space.datum
     expected = line.displacement(0.75 * SLIDING, datum)
     assert found.energy == pytest.approx(line.loop_energy(0.75 * SLIDING), rel=GRID_ERROR)
@@ -270,7 +270,7 @@ def test_moments_and_tilts():
     assert pressed[0.0, -40.0].resultants[4] == pytest.approx(-40.0, rel=1e-8)
     assert pressed[0.0, -40.0].rigid[4] != 0.0
     np.testing.assert_allclose(pressed[None].traction, pressed[0.0, 0.0].traction, atol=1e-3)
-    found = tangential_loop(contact, height, LoopPath(LOAD, 1e-4, moments=(0.0, -40.0)))
+    found = march_loop(contact, height, LoopPath(LOAD, 1e-4, moments=(0.0, -40.0)))
     assert found.amplitude == pytest.approx(1e-4, rel=1e-9)
 
 

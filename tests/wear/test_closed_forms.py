@@ -30,7 +30,7 @@ import scipy.linalg
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
-from wear.laws import Energy
+from wear.laws import EnergyLaw
 from wear.moving import LARGE_STROKE, passages
 from wear.stepping import SlidingCycle, WearingContact, WearState
 from wear.surfaces import Surfaces
@@ -63,7 +63,7 @@ class March:
         self, grid: Grid, form: Array, load: float, shares: tuple[float, float] = (1.0, 1.0)
     ) -> None:
         cycle = SlidingCycle(cycle_of(load, 1), np.full((1, *grid.shape), 2.0 * STROKE))
-        laws = Energy(shares[0] * COEFFICIENT), Energy(shares[1] * COEFFICIENT)
+        laws = EnergyLaw(shares[0] * COEFFICIENT), EnergyLaw(shares[1] * COEFFICIENT)
         contact = NormalContact(HalfSpace(grid, PAIR))
         self._wearing = WearingContact(contact, laws, FRICTION, cycle, TOLERANCE)
         self._state = unworn(grid, form)
@@ -261,7 +261,7 @@ class MovingMarch:
         path = np.stack([x, np.zeros_like(x)], axis=1)
         count, own = 2 * each_way, passages(grid, np.stack([path[:-1], path[1:]], axis=1))
         slip = np.full((count, *grid.shape), stroke / each_way)
-        laws = Energy(share * COEFFICIENT), Energy((1.0 - share) * COEFFICIENT)
+        laws = EnergyLaw(share * COEFFICIENT), EnergyLaw((1.0 - share) * COEFFICIENT)
         cycle = SlidingCycle(cycle_of(load, count), slip, passages=own)
         contact = NormalContact(HalfSpace(grid, PAIR))
         self._wearing = WearingContact(contact, laws, FRICTION, cycle, TOLERANCE)

@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sa_solver.contact import FrictionalContact, Load
+from sa_solver.contact import ContactLoad, FrictionalContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.types import ElasticPair, Grid, LoadHistory, Material
-from wear.full_cycle import full_cycle
+from wear.full_cycle import march_cycle
 from wear.stepping import ContactFailure
 
 TITANIUM, STEEL = Material(115e3, 0.29), Material(200e3, 0.3)
@@ -50,7 +50,7 @@ def contact(pair: ElasticPair) -> FrictionalContact:
 def test_sliding_dissipates_what_the_structure_does(first):
     """Pressing unlike bodies turns some of the shear of a sliding flank sideways."""
     loads = mission()
-    states = full_cycle(contact(ElasticPair(first, TITANIUM)), GAP, loads)
+    states = march_cycle(contact(ElasticPair(first, TITANIUM)), GAP, loads)
     assert [state.sliding for state in states] == loads.sliding.tolist()
     for t in np.flatnonzero(loads.sliding):
         state = states[t]
@@ -64,7 +64,7 @@ def test_sliding_dissipates_what_the_structure_does(first):
 
 def test_what_sticks_carries_the_given_force():
     loads = mission()
-    states = full_cycle(contact(ElasticPair(TITANIUM, TITANIUM)), GAP, loads)
+    states = march_cycle(contact(ElasticPair(TITANIUM, TITANIUM)), GAP, loads)
     for t in np.flatnonzero(~loads.sliding & (loads.P > 0.0)):
         given = [getattr(loads, name)[t] for name in ("P", "Qx", "Qy", "Mx", "My", "Mz")]
         np.testing.assert_allclose(states[t].resultants, given, atol=1e-7 * loads.P[t])
@@ -76,10 +76,10 @@ def test_a_cycle_that_ends_loaded_is_closed():
     """One more increment repeats the first: what a sliding contact forgets, to 1e-3 of µp."""
     pair = ElasticPair(TITANIUM, TITANIUM)
     loads = mission(last=4e3)
-    states = full_cycle(contact(pair), GAP, loads)
+    states = march_cycle(contact(pair), GAP, loads)
     values = np.array([loads.P[0], loads.Qx[0], 0.0, 0.0, 0.0, 0.0])
     repeated = contact(pair).advance(
-        states[-1], GAP, Load(values, energy=np.array([loads.Edx[0], 0.0]))
+        states[-1], GAP, ContactLoad(values, energy=np.array([loads.Edx[0], 0.0]))
     )
     np.testing.assert_allclose(
         repeated.shear, states[0].shear, atol=1e-3 * FRICTION * states[0].pressure.max()
@@ -87,7 +87,7 @@ def test_a_cycle_that_ends_loaded_is_closed():
 
 
 def test_no_load_no_slip():
-    states = full_cycle(contact(ElasticPair(TITANIUM, TITANIUM)), GAP, mission())
+    states = march_cycle(contact(ElasticPair(TITANIUM, TITANIUM)), GAP, mission())
     assert not states[-1].traction.any()
     assert not states[-1].slip.any()
 
@@ -101,7 +101,7 @@ def test_an_increment_that_fails_is_named(monkeypatch):
 
     monkeypatch.setattr(own, "advance", fails)
     with pytest.raises(ContactFailure, match=r"increment 1: .*refine the grid"):
-        full_cycle(own, GAP, mission())
+        march_cycle(own, GAP, mission())
 
 
 @pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["alike", "unlike"])
@@ -109,7 +109,7 @@ def test_energy_that_is_not_met_is_told(monkeypatch, first):
     """One contact problem is too few for the elastic part to be known."""
     monkeypatch.setattr("sa_solver.gross_slip.ITERATIONS", 1)
     with pytest.raises(ContactFailure, match=r"increment 1: .*energy off by .*smaller increments"):
-        full_cycle(contact(ElasticPair(first, TITANIUM)), GAP, mission())
+        march_cycle(contact(ElasticPair(first, TITANIUM)), GAP, mission())
 
 
 @pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["alike", "unlike"])
@@ -122,6 +122,6 @@ def test_loads_that_no_contact_carries_are_told(first, column):
     loads = replace(mission(), Edx=np.zeros(len(P)), Qx=0.1 * SHARE * FRICTION * mission().P)
     values = np.where(np.arange(len(P)) == 2, 1e6, 0.0)
     with pytest.raises(ContactFailure, match=f"increment 3: .*({column}|shear)") as info:
-        full_cycle(contact(ElasticPair(first, TITANIUM)), GAP, replace(loads, **{column: values}))
+        march_cycle(contact(ElasticPair(first, TITANIUM)), GAP, replace(loads, **{column: values}))
     for error in (info.value, info.value.__cause__):
         assert str(pickle.loads(pickle.dumps(error))) == str(error)

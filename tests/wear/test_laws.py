@@ -7,29 +7,29 @@ import pytest
 
 from sa_solver.types import Array
 from wear.evolution import EnergyTable
-from wear.laws import Archard, Energy, EnergyAmplitude, Evolving, Sliding
+from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, SlidingConditions
 
 UM3_PER_J = 1e-12  # [1/MPa]: 1e-9 mm³ per 1e3 N mm
 FRICTION = 0.4
 
 
-def sliding(slip: Array, friction: float = FRICTION) -> Sliding:
+def sliding(slip: Array, friction: float = FRICTION) -> SlidingConditions:
     """Slip on surfaces that are new and stay so."""
     unworn = np.zeros(slip.shape[1:])
-    return Sliding(slip, friction, (unworn, unworn), (0.0, 0.0))
+    return SlidingConditions(slip, friction, (unworn, unworn), (0.0, 0.0))
 
 
 def test_energy_law_by_hand() -> None:
     """200 MPa at µ 0.4 over 50 um are 4 mJ/mm²; 1e4 um³/J make 0.04 nm of it."""
     slip = np.full((1, 1, 1), 0.05)
-    depth = Energy(1e4 * UM3_PER_J).depth_per_pressure(sliding(slip)) * 200.0
+    depth = EnergyLaw(1e4 * UM3_PER_J).depth_per_pressure(sliding(slip)) * 200.0
     assert depth.item() == pytest.approx(4e-8, rel=1e-12)
 
 
 def test_archard_law_by_hand() -> None:
     """V = K s P / H: 1e-4 x 0.05 mm x 200 MPa / 3500 MPa, whatever the friction."""
     slip = np.full((1, 1, 1), 0.05)
-    law = Archard(coefficient=1e-4, hardness=3500.0)
+    law = ArchardLaw(coefficient=1e-4, hardness=3500.0)
     for friction in (0.0, FRICTION):
         depth = law.depth_per_pressure(sliding(slip, friction)) * 200.0
         assert depth.item() == pytest.approx(1e-4 * 0.05 * 200.0 / 3500.0, rel=1e-12)
@@ -37,8 +37,8 @@ def test_archard_law_by_hand() -> None:
 
 def test_archard_is_the_energy_law_with_its_coefficient_over_hardness_and_friction() -> None:
     slip = np.random.default_rng(1).random((5, 3, 4))
-    archard = Archard(1e-4, 3500.0).depth_per_pressure(sliding(slip))
-    energy = Energy(1e-4 / 3500.0 / FRICTION).depth_per_pressure(sliding(slip))
+    archard = ArchardLaw(1e-4, 3500.0).depth_per_pressure(sliding(slip))
+    energy = EnergyLaw(1e-4 / 3500.0 / FRICTION).depth_per_pressure(sliding(slip))
     np.testing.assert_allclose(archard, energy, rtol=1e-13)
 
 
@@ -56,14 +56,14 @@ def test_amplitude_law_is_the_energy_law_at_its_reference(increments: int) -> No
     reference = 0.075
     slip = np.random.default_rng(2).random((increments, 3, 4))
     slip *= 4.0 * reference / slip.sum(axis=0)
-    amplitude = EnergyAmplitude(1e-8, reference).depth_per_pressure(sliding(slip))
-    energy = Energy(1e-8).depth_per_pressure(sliding(slip))
+    amplitude = EnergyAmplitudeLaw(1e-8, reference).depth_per_pressure(sliding(slip))
+    energy = EnergyLaw(1e-8).depth_per_pressure(sliding(slip))
     np.testing.assert_allclose(amplitude, energy, rtol=1e-13)
 
 
 def test_amplitude_law_is_quadratic_in_slip() -> None:
     slip = np.random.default_rng(3).random((5, 3, 4))
-    law = EnergyAmplitude(1e-8, 0.075)
+    law = EnergyAmplitudeLaw(1e-8, 0.075)
     once, thrice = (law.depth_per_pressure(sliding(scale * slip)) for scale in (1.0, 3.0))
     np.testing.assert_allclose(thrice, 9.0 * once, rtol=1e-13)
 
@@ -71,13 +71,15 @@ def test_amplitude_law_is_quadratic_in_slip() -> None:
 def test_amplitude_law_by_hand() -> None:
     """α / (4 δ_ref) (Σ|Δs|) (Σ|q·Δs|), with pressures of its own in every increment."""
     slip, pressure = np.array([0.01, 0.0, 0.03]), np.array([100.0, 300.0, 200.0])
-    law = EnergyAmplitude(1e-8, 0.075)
+    law = EnergyAmplitudeLaw(1e-8, 0.075)
     depth = law.depth_per_pressure(sliding(slip[:, None, None])).ravel() @ pressure
     dissipated = FRICTION * (100.0 * 0.01 + 200.0 * 0.03)
     assert depth == pytest.approx(1e-8 / (4.0 * 0.075) * 0.04 * dissipated, rel=1e-12)
 
 
-@pytest.mark.parametrize("law", [Archard(1e-4, 3500.0), Energy(1e-8), EnergyAmplitude(1e-8, 0.075)])
+@pytest.mark.parametrize(
+    "law", [ArchardLaw(1e-4, 3500.0), EnergyLaw(1e-8), EnergyAmplitudeLaw(1e-8, 0.075)]
+)
 def test_no_slip_no_wear(law) -> None:
     slip = np.zeros((4, 2, 2))
     slip[1, 0, 0] = 0.01
@@ -142,37 +144,39 @@ def test_tables_that_are_none(energy: tuple[float, ...], factor: tuple[float, ..
         EnergyTable(energy, factor)
 
 
-def random_step(seed: int) -> Sliding:
+def random_step(seed: int) -> SlidingConditions:
     """Energies that pass all the kinks of the table somewhere."""
     rng = np.random.default_rng(seed)
     before = rng.uniform(0.0, 50.0, (3, 4))
     work = before, before + rng.uniform(0.0, 20.0, (3, 4))
-    return Sliding(rng.random((5, 3, 4)), FRICTION, work, (20.0, 35.0))
+    return SlidingConditions(rng.random((5, 3, 4)), FRICTION, work, (20.0, 35.0))
 
 
-@pytest.mark.parametrize("base", [Archard(1e-4, 3500.0), Energy(1e-8), EnergyAmplitude(1e-8, 0.1)])
+@pytest.mark.parametrize(
+    "base", [ArchardLaw(1e-4, 3500.0), EnergyLaw(1e-8), EnergyAmplitudeLaw(1e-8, 0.1)]
+)
 def test_evolving_law_is_its_base_times_the_mean_factor(base) -> None:
     step = random_step(6)
     plain = base.depth_per_pressure(step)
-    local = Evolving(base, TABLE, "local").depth_per_pressure(step) / plain
+    local = EvolvingLaw(base, TABLE, "local").depth_per_pressure(step) / plain
     means = TABLE.mean(*step.work)
     np.testing.assert_allclose(local, np.broadcast_to(means, local.shape), rtol=1e-13)
-    whole = Evolving(base, TABLE, "global").depth_per_pressure(step) / plain
+    whole = EvolvingLaw(base, TABLE, "global").depth_per_pressure(step) / plain
     np.testing.assert_allclose(whole, float(TABLE.mean(20.0, 35.0)), rtol=1e-13)
 
 
 def test_laws_may_be_nested() -> None:
     """A local factor times a global one."""
-    step, base = random_step(7), Energy(1e-8)
-    both = Evolving(Evolving(base, TABLE, "local"), TABLE, "global").depth_per_pressure(step)
-    once = Evolving(base, TABLE, "local").depth_per_pressure(step)
+    step, base = random_step(7), EnergyLaw(1e-8)
+    both = EvolvingLaw(EvolvingLaw(base, TABLE, "local"), TABLE, "global").depth_per_pressure(step)
+    once = EvolvingLaw(base, TABLE, "local").depth_per_pressure(step)
     np.testing.assert_allclose(both, float(TABLE.mean(20.0, 35.0)) * once, rtol=1e-13)
 
 
 def test_nothing_wears_below_the_threshold() -> None:
     """V = α (ΣEd - Ed_th): per area and by place where the threshold is local."""
     step = random_step(8)
-    law = Evolving(Energy(1e-8), EnergyTable(threshold=30.0), "local")
+    law = EvolvingLaw(EnergyLaw(1e-8), EnergyTable(threshold=30.0), "local")
     pressure = (step.work[1] - step.work[0]) / (FRICTION * step.slip.sum(axis=0))
     depth = (law.depth_per_pressure(step) * pressure).sum(axis=0)
     beyond = np.maximum(step.work[1], 30.0) - np.maximum(step.work[0], 30.0)

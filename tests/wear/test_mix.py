@@ -10,8 +10,8 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from wear.evolution import EnergyTable
-from wear.full_cycle import full_cycle
-from wear.laws import Energy, EnergyAmplitude, Evolving, WearLaw
+from wear.full_cycle import march_cycle
+from wear.laws import EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
 from wear.stepping import SlidingCycle, WearingContact, WearState
 
 GRID = Grid.covering((4.0, 4.0), (16, 16))
@@ -20,7 +20,7 @@ HALF_SPACE = HalfSpace(GRID, ElasticPair(BODY, BODY))
 BALL = (GRID.x**2 + GRID.y**2) / 80.0
 FRICTION = 0.4
 ALPHA = 1e-8
-LAWS: tuple[WearLaw, WearLaw] = (Energy(ALPHA), Energy(3.0 * ALPHA))
+LAWS: tuple[WearLaw, WearLaw] = (EnergyLaw(ALPHA), EnergyLaw(3.0 * ALPHA))
 KINDS = "explicit", "implicit", "second_order"
 
 
@@ -116,7 +116,7 @@ def test_worn_volume_is_coefficient_times_mean_energy(kind: str) -> None:
 
 def test_depth_is_the_mean_of_the_cycles_by_their_shares() -> None:
     """In one explicit step, with laws linear and not in the slip of a cycle."""
-    for law in (Energy(ALPHA), EnergyAmplitude(ALPHA, 0.03)):
+    for law in (EnergyLaw(ALPHA), EnergyAmplitudeLaw(ALPHA, 0.03)):
         laws = law, law
         parts = [wearing(own, laws=laws) for own in (HEAVY, LIGHT)]
         mixed = wearing(HEAVY, LIGHT, shares=(0.7, 0.3), laws=laws)
@@ -143,7 +143,10 @@ def test_order_of_cycles_matters_to_first_order_in_the_step() -> None:
 def test_evolving_coefficients_follow_the_energy_of_the_mix() -> None:
     """Explicit steps from known pressures wear ∫ factor dE, exactly, whatever the mix."""
     table = EnergyTable((0.0, 1e4, 3e4), (1.0, 2.0, 0.5), threshold=2e3)
-    laws = Evolving(Energy(ALPHA), table, "global"), Evolving(Energy(ALPHA), table, "global")
+    laws = (
+        EvolvingLaw(EnergyLaw(ALPHA), table, "global"),
+        EvolvingLaw(EnergyLaw(ALPHA), table, "global"),
+    )
     mixed = wearing(HEAVY, LIGHT, shares=(0.7, 0.3), laws=laws)
     state = WearState.unworn(BALL)
     starts = {t: own.start for t, own in mixed.cycle(state, mixed.working).states.items()}
@@ -169,8 +172,8 @@ def sheared(scale: float, last: float) -> LoadHistory:
 def test_each_cycle_of_a_mix_is_closed_by_itself(last: float) -> None:
     contact = FrictionalContact(HALF_SPACE, FRICTION, 1e-8)
     cycles = [sheared(1.0, last), sheared(0.6, last), sheared(1.0, last)]
-    mixed = full_cycle(contact, BALL, LoadHistory.mix(cycles, (0.5, 0.3, 0.2)))
-    alone = [state for own in cycles for state in full_cycle(contact, BALL, own)]
+    mixed = march_cycle(contact, BALL, LoadHistory.mix(cycles, (0.5, 0.3, 0.2)))
+    alone = [state for own in cycles for state in march_cycle(contact, BALL, own)]
     assert len(mixed) == len(alone) == 15
     for one, two in zip(mixed, alone, strict=True):
         np.testing.assert_array_equal(one.shear, two.shear)

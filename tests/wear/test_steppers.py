@@ -9,14 +9,14 @@ import pytest
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
-from wear.laws import Energy
+from wear.laws import EnergyLaw
 from wear.steppers import (
     Advance,
     ErrorControl,
     Explicit,
     Implicit,
     SecondOrder,
-    advance,
+    advance_cycles,
     root_mean_square,
 )
 from wear.stepping import SlidingCycle, WearingContact, WearState
@@ -27,7 +27,7 @@ HALF_SPACE = HalfSpace(GRID, ElasticPair(BODY, BODY))
 CONTACT = NormalContact(HALF_SPACE)
 X = GRID.x / 4.0
 FRICTION, MEAN = 0.4, 200.0
-LAWS = Energy(1e-8), Energy(2e-8)
+LAWS = EnergyLaw(1e-8), EnergyLaw(2e-8)
 
 
 def history(P: Array, My: Array) -> LoadHistory:
@@ -122,7 +122,7 @@ def automatic(stepper, cycles: float) -> Advance:
     starts = {t: own.start for t, own in first.states.items()}
     limit = CONSTANT.stable_cycles(state)
     state = replace(state, starts=starts, next_cycles=4.0 * limit)
-    end = advance(stepper, state, cycles, cycles, unchanging)
+    end = advance_cycles(stepper, state, cycles, cycles, unchanging)
     return replace(end, contact_solves=end.contact_solves + len(first.states))
 
 
@@ -181,14 +181,14 @@ def test_a_step_that_was_too_long_is_taken_again() -> None:
     """A first guess a hundred times too long costs contact problems, not accuracy."""
     cycles = 100.0 * CONSTANT.stable_cycles(rounded())
     exact = exact_depth(cycles)
-    end = advance(Implicit(ErrorControl(0.01)), rounded(), cycles, cycles, unchanging)
+    end = advance_cycles(Implicit(ErrorControl(0.01)), rounded(), cycles, cycles, unchanging)
     assert end.contact_solves > 3 * end.steps
     assert end.state.surfaces.depth.max() == pytest.approx(exact.max(), rel=0.01)
 
 
 def test_explicit_steps_keep_to_their_share_of_the_limit() -> None:
     limit = CONSTANT.stable_cycles(rounded())
-    end = advance(Explicit(fraction=0.5), rounded(), 10.0 * limit, 10.0 * limit, unchanging)
+    end = advance_cycles(Explicit(fraction=0.5), rounded(), 10.0 * limit, 10.0 * limit, unchanging)
     assert end.steps >= 20
 
 
@@ -198,11 +198,11 @@ def test_explicit_steps_keep_to_their_share_of_the_limit() -> None:
 def test_steps_add_up_to_the_cycles_asked_for(stepper) -> None:
     """Energy of gross sliding is that of so many cycles: µ Σ p s over them."""
     cycles = 3.3 * LIMIT
-    state = advance(stepper, waved(), cycles, 10.0 * cycles, unchanging).state
+    state = advance_cycles(stepper, waved(), cycles, 10.0 * cycles, unchanging).state
     volume = state.surfaces.depth.sum() * GRID.cell_area
     assert volume == pytest.approx(3e-8 * state.energy, rel=1e-10)
     assert state.energy == pytest.approx(
-        advance(Implicit(), waved(), cycles, cycles, unchanging).state.energy, rel=0.01
+        advance_cycles(Implicit(), waved(), cycles, cycles, unchanging).state.energy, rel=0.01
     )
 
 
@@ -212,7 +212,7 @@ def test_the_volume_has_an_error_of_its_own() -> None:
     reference = waved()
     for _ in range(40):
         reference = SecondOrder().step(reference, cycles / 40, cycles, evolving).state
-    state = advance(Implicit(control), waved(), cycles, cycles, evolving).state
+    state = advance_cycles(Implicit(control), waved(), cycles, cycles, evolving).state
     exact = reference.surfaces.depth.sum() * GRID.cell_area
     error = state.surfaces.depth.sum() * GRID.cell_area - exact
     # Slip grows by half over the run, and errors with it.

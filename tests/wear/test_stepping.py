@@ -11,7 +11,7 @@ import pytest
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
-from wear.laws import Archard, Energy, EnergyAmplitude, WearLaw
+from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, WearLaw
 from wear.stepping import ContactFailure, SlidingCycle, WearingContact, WearState, WearStep
 from wear.surfaces import Surfaces
 
@@ -24,7 +24,7 @@ FRICTION, SLIP = 0.4, 0.02
 TOLERANCE = 1e-9
 BALL = (GRID.x**2 + GRID.y**2) / (2.0 * RADIUS)
 KINDS = "explicit", "implicit", "second_order"
-EQUAL: tuple[WearLaw, WearLaw] = (Energy(1e-8), Energy(1e-8))
+EQUAL: tuple[WearLaw, WearLaw] = (EnergyLaw(1e-8), EnergyLaw(1e-8))
 
 
 def loads(*normal: float) -> LoadHistory:
@@ -67,7 +67,7 @@ def march(own: WearingContact, kind: str, cycles: float, jumps: int) -> WearStat
 @pytest.mark.parametrize("kind", KINDS)
 def test_worn_volume_is_coefficient_times_energy(kind: str) -> None:
     """V = α E for each body by its own α, over a cycle of unequal loads and uneven slips."""
-    laws = Energy(1e-8), Energy(3.7e-8)
+    laws = EnergyLaw(1e-8), EnergyLaw(3.7e-8)
     history = loads(500.0, 2000.0, 1200.0)
     slip = SLIP * np.random.default_rng(0).random((3, *GRID.shape))
     own, state = wearing(laws, history, slip), unworn()
@@ -97,7 +97,7 @@ def test_energy_of_a_sliding_cycle_is_friction_times_load_times_slip(kind: str) 
 @pytest.mark.parametrize("kind", KINDS)
 def test_mixed_laws_wear_each_body_by_its_own(kind: str) -> None:
     """Archard on body 1, energy on body 2; only their shares of the pressure differ."""
-    laws = Archard(1e-4, 3500.0), Energy(1e-8)
+    laws = ArchardLaw(1e-4, 3500.0), EnergyLaw(1e-8)
     state = step(wearing(laws), kind, unworn(), 1000.0).state
     surfaces, share = state.surfaces, 1e-4 / 3500.0 / (1e-8 * FRICTION)
     np.testing.assert_allclose(surfaces.depth_1, share * surfaces.depth_2, rtol=1e-12)
@@ -139,7 +139,7 @@ def test_uniform_wear_of_both_bodies_changes_no_pressure() -> None:
 
 
 def test_a_law_without_coefficient_wears_nothing() -> None:
-    own = wearing((Energy(0.0), Energy(0.0)))
+    own = wearing((EnergyLaw(0.0), EnergyLaw(0.0)))
     for kind in KINDS:
         state = step(own, kind, unworn(), 1e6).state
         assert not state.surfaces.depth.any()
@@ -209,7 +209,7 @@ def test_nothing_wears_where_nothing_slips(kind: str) -> None:
 # --- convergence --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("laws", [EQUAL, (EnergyAmplitude(4e-8, 0.02),) * 2])
+@pytest.mark.parametrize("laws", [EQUAL, (EnergyAmplitudeLaw(4e-8, 0.02),) * 2])
 def test_explicit_and_implicit_meet_at_first_order(laws: tuple[WearLaw, WearLaw]) -> None:
     """Their difference halves as jumps double, and both extrapolate to one depth."""
     own = wearing(laws, loads(1000.0, LOAD))

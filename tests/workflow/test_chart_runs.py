@@ -17,7 +17,7 @@ import pytest
 from click.testing import CliRunner, Result
 
 import workflow.chart.run
-from sa_solver.reference.hertz import Sphere
+from sa_solver.reference.hertz import HertzSphere
 from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.chart import axes, chart_case
@@ -28,7 +28,7 @@ from workflow.runs.job import Finished, Job
 from workflow.runs.run import run_case
 from workflow.shell.folder import OutputFolder
 
-HERTZ = Sphere(load=400.0, radius=10.0, contact_modulus=0.5 * 115e3 / (1.0 - 0.29**2))
+HERTZ = HertzSphere(load=400.0, radius=10.0, contact_modulus=0.5 * 115e3 / (1.0 - 0.29**2))
 HERTZ_EXPECTED = f"""\
 expect:
   - quantity: states.-1.approach

@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 
+from fe_models.linear_solver import FactorMemoryError
+from sa_solver.errors import ConvergenceError, InputError
 from workflow import errors
 from workflow.cli import cli
 from workflow.kinds import load_case
@@ -17,7 +19,7 @@ from workflow.shell import system_check
 
 CASES = Path(__file__).parents[2] / "cases"
 # Only these outside the standard library may be imported to print the help.
-LIGHT = {"click", "workflow"}
+LIGHT = {"click", "sa_solver", "workflow"}
 
 
 def invoke(*arguments):
@@ -145,6 +147,9 @@ LIBRARY_MISSING = "libGLU.so.1: cannot open shared object file: No such file or 
         (errors.ExpectationMissed("depth 3 instead of 2"), 1, "depth 3 instead of 2"),
         (errors.UserError("out: exists"), 2, "out: exists"),
         (errors.MethodFailed("residual 1e-2 after 500; try more"), 3, "residual 1e-2"),
+        (InputError("a load of -3 N pulls: give P >= 0"), 2, "pulls"),
+        (ConvergenceError("stopped at a residual of 1e-2"), 3, "residual of 1e-2"),
+        (FactorMemoryError("condensing", 90e9, 8e9), 4, "90 GB"),
         (errors.OutOfMemory("needs 90 GB, there are 8"), 4, "90 GB"),
         (MemoryError(), 4, "out of memory"),
         (KeyboardInterrupt(), 130, "interrupted"),

@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from wear.joints.jenkins import Jenkins
-from wear.joints.law import march
+from wear.joints.law import march_joints
 from workflow.analyses.wear.loop_table import read_loop_table
 from workflow.cli import cli
 
@@ -24,7 +24,9 @@ def record(stroke=STROKE):
     time = np.arange(int(CYCLES * 200 + 220)) / 20e3
     displacement = 0.5 * stroke * np.sin(2.0 * np.pi * 100.0 * time)
     law = Jenkins(STIFFNESS, FRICTION, LOAD)
-    force = march(law, law.rest(1), np.zeros((1, 1)), displacement[:, None, None]).force[:, 0, 0]
+    force = march_joints(law, law.rest(1), np.zeros((1, 1)), displacement[:, None, None]).force[
+        :, 0, 0
+    ]
     noise = np.random.default_rng(0).standard_normal((2, len(time)))
     return time, displacement + 5e-4 * stroke * noise[0], force + 0.2 * noise[1]
 

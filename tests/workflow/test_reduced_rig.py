@@ -11,7 +11,7 @@ from fe_models.dynamics.excitation import HammerBlow
 from fe_models.dynamics.newmark import TimeStepControl
 from fe_models.reduction import ReducedModel, load_reduced, save_reduced
 from tests.workflow.test_time_cases import MASS, RIG, STIFF, refused, run
-from wear.joints.law import march
+from wear.joints.law import march_joints
 from workflow.analyses.rig.building import rig_model
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.specimens.model import SpecimensModel
@@ -194,7 +194,7 @@ def test_joints_that_move_alike_are_together_the_one_they_share(specimen, law):
         own = JointModel.of(case, count).at(0.0)
         path = 0.01 * np.array([1.0, -1.0, 0.5])[:, None, None] * np.ones(own.directions)
         alike = np.repeat(path, count, axis=1)
-        followed = march(own, own.rest(count), np.zeros(alike.shape[1:]), alike)
+        followed = march_joints(own, own.rest(count), np.zeros(alike.shape[1:]), alike)
         forces.append((followed.force.sum(axis=1), followed.dissipated.sum(axis=1)))
     assert forces[0][1].sum() > 0.1
     for one, four in zip(*forces, strict=True):

@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 from fe_models.mesh import Face
 from fe_models.reduction import free_frequencies, load_reduced
-from sa_solver.reference.hertz import Sphere
+from sa_solver.reference.hertz import HertzSphere
 from sa_solver.types import ElasticPair, Frame, Material
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import NodeGrid, PadHalfSpace
@@ -143,7 +143,7 @@ class TestSummary:
         assert worn["half_space"]["stick_stiffness"] == pytest.approx(exact, rel=0.1)
 
     def test_half_space_beside_the_unworn_pair_is_hertzs(self, summary):
-        hertz = Sphere(87.0, 1000.0 * 50.0 / 1050.0, ElasticPair(STEEL, STEEL).contact_modulus)
+        hertz = HertzSphere(87.0, 1000.0 * 50.0 / 1050.0, ElasticPair(STEEL, STEEL).contact_modulus)
         own = summary["loads"][0]["unworn"]["half_space"]
         # First order in a cell over the contact radius, 1/7.
         assert own["approach"] == pytest.approx(hertz.approach, rel=5e-3)

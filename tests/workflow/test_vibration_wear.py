@@ -12,7 +12,7 @@ from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import Resolution
 from tests.workflow.conftest import invoke
 from wear.joints.periodic import PeriodicMarch
-from wear.steppers import ErrorControl, Implicit, advance, first_cycles
+from wear.steppers import ErrorControl, Implicit, advance_cycles, first_cycles
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.rig.structure import Rig
 from workflow.analyses.vibration_wear.case import VibrationWearCase
@@ -86,7 +86,7 @@ def worn(contact, cycles, tolerance=0.1):
     state = contact.unworn()
     state = replace(state, next_cycles=first_cycles(contact.wearing(state), state, cycles))
     stepper = Implicit(ErrorControl(tolerance))
-    return advance(stepper, state, cycles, cycles, contact.wearing).state
+    return advance_cycles(stepper, state, cycles, cycles, contact.wearing).state
 
 
 @pytest.fixture(scope="module")
@@ -180,7 +180,7 @@ def test_energy_adds_up_from_cycle_to_cycle(tmp_path):
     stepper = Implicit(ErrorControl(0.01))
     for length in (0.0, *np.diff(cycles)):
         if length:
-            state = advance(stepper, state, length, cycles[-1], contact.wearing).state
+            state = advance_cycles(stepper, state, length, cycles[-1], contact.wearing).state
         energies.append(float(contact.at(state).by_slider.sum()))
         spent.append(state.energy)
     weights = np.array([1.0, 4.0, 2.0, 4.0, 1.0]) / 3.0 * cycles[1]

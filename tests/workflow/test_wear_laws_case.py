@@ -8,7 +8,7 @@ from workflow.case.schema import json_schema
 
 from sa_solver.types import Array
 from wear.evolution import EnergyTable
-from wear.laws import Archard, Energy, EnergyAmplitude, Evolving
+from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case, template
@@ -36,9 +36,9 @@ def refused(path, *overrides):
 
 
 def test_both_bodies_wear_by_the_law_of_the_section(dovetail_path):
-    assert laws(dovetail_path) == (Energy(1e-8), Energy(1e-8))
+    assert laws(dovetail_path) == (EnergyLaw(1e-8), EnergyLaw(1e-8))
     amplitude = ["wear.law=energy_amplitude", "wear.reference_amplitude=75 um"]
-    assert laws(dovetail_path, *amplitude) == (EnergyAmplitude(1e-8, 0.075),) * 2
+    assert laws(dovetail_path, *amplitude) == (EnergyAmplitudeLaw(1e-8, 0.075),) * 2
 
 
 @pytest.mark.parametrize("law", ["energy", "archard", "energy_amplitude"])
@@ -47,21 +47,21 @@ def test_a_body_may_name_its_own_law(dovetail_path, law):
     needed = {"archard": ["wear.blade.coefficient=1e-4", "wear.blade.hardness=4 GPa"],
               "energy_amplitude": ["wear.reference_amplitude=75 um"]}  # fmt: skip
     blade = {
-        "energy": Energy(1e-8),
-        "archard": Archard(1e-4, 4000.0),
-        "energy_amplitude": EnergyAmplitude(1e-8, 0.075),
+        "energy": EnergyLaw(1e-8),
+        "archard": ArchardLaw(1e-4, 4000.0),
+        "energy_amplitude": EnergyAmplitudeLaw(1e-8, 0.075),
     }[law]
     section = [f"wear.law={law}", *needed.get(law, [])]
-    for own, disk in ((ARCHARD, Archard(1e-4, 3500.0)), (ENERGY, Energy(2e-8))):
+    for own, disk in ((ARCHARD, ArchardLaw(1e-4, 3500.0)), (ENERGY, EnergyLaw(2e-8))):
         assert laws(dovetail_path, *section, f"wear.disk={own}") == (disk, blade)
 
 
 def test_reference_amplitude_is_of_the_section_or_of_the_body(dovetail_path):
     disk = f"wear.disk={AMPLITUDE}"
     first, _ = laws(dovetail_path, disk, "wear.reference_amplitude=50 um")
-    assert first == EnergyAmplitude(3e-8, 0.05)
+    assert first == EnergyAmplitudeLaw(3e-8, 0.05)
     own, _ = laws(dovetail_path, disk, "wear.disk.reference_amplitude=20 um")
-    assert own == EnergyAmplitude(3e-8, 0.02)
+    assert own == EnergyAmplitudeLaw(3e-8, 0.02)
 
 
 @pytest.mark.parametrize(
@@ -141,9 +141,9 @@ def test_evolution_reaches_the_law_in_base_units(dovetail_path):
         f"wear.blade={ARCHARD}",
         "wear.blade.evolution={scope: global, threshold: 3 J}",
     )
-    assert disk == Evolving(Energy(1e-8), EnergyTable((0.0, 2000.0), (1.0, 0.3)), "local")
+    assert disk == EvolvingLaw(EnergyLaw(1e-8), EnergyTable((0.0, 2000.0), (1.0, 0.3)), "local")
     constant = EnergyTable((0.0,), (1.0,), threshold=3000.0)
-    assert blade == Evolving(Archard(1e-4, 3500.0), constant, "global")
+    assert blade == EvolvingLaw(ArchardLaw(1e-4, 3500.0), constant, "global")
 
 
 def test_friction_follows_its_table(dovetail_path):

@@ -1,1 +1,107 @@
-"""Joint laws: what a contact transmits when it is one spring of a vibrating structure."""
+"""Joint laws: what a contact transmits when it is one spring of a vibrating structure.
+
+The laws, all of :mod:`wear.joints.law`'s one interface
+    - ``JointLaw``: that interface, force and tangent from a displacement and a state.
+    - ``Jenkins``: a spring in series with a Coulomb slider.
+    - ``BoucWen``: a smooth way from sticking to sliding.
+    - ``UniformIwan``, ``FourParameterIwan``: sliders in parallel, by Masing's rule.
+    - ``FrictionContact``: a point in three dimensions, which may separate.
+    - ``JointError``: parameters that a joint cannot have.
+
+Their marches
+    - ``march_joints``: through any displacements.
+    - ``PeriodicMarch``: round a period until the forces repeat, with their derivative.
+    - ``ParallelSliders``: sliders side by side as one joint of such a march.
+
+How they wear
+    - ``JointEvolution``: which parameter follows which function of the dissipated energy.
+    - ``LogarithmicEvolution``, ``ArrheniusEvolution``, ``LinearEvolution``,
+      ``ExponentialEvolution``, ``TabulatedEvolution``: those functions.
+    - ``long_test``: cycles against energy of a long test, by jumps.
+    - ``steady_stroke``: the energy of its cycles at a prescribed stroke.
+
+What is measured
+    - ``measure_loops``: friction, stiffness and energy of recorded hysteresis loops.
+
+A slider pulled beyond its limit of 50 N and pushed back:
+
+>>> import numpy as np
+>>> from wear.joints import Jenkins, march_joints
+>>> law = Jenkins(stiffness=1e4, friction=0.5, normal_load=100.0)
+>>> path = np.array([0.01, -0.01]).reshape(2, 1, 1)
+>>> history = march_joints(law, law.rest(1), np.zeros((1, 1)), path)
+>>> print(history.force.ravel(), history.dissipated.ravel())
+[ 50. -50.] [0.25 0.5 ]
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sa_solver.lazy import lazy_names
+
+if TYPE_CHECKING:
+    from wear.joints.ageing import long_test, steady_stroke
+    from wear.joints.bouc_wen import BoucWen
+    from wear.joints.evolution import (
+        ArrheniusEvolution,
+        ExponentialEvolution,
+        JointEvolution,
+        LinearEvolution,
+        LogarithmicEvolution,
+        TabulatedEvolution,
+    )
+    from wear.joints.friction_contact import FrictionContact
+    from wear.joints.iwan import FourParameterIwan, UniformIwan
+    from wear.joints.jenkins import Jenkins
+    from wear.joints.law import JointLaw, march_joints
+    from wear.joints.measured_loops import measure_loops
+    from wear.joints.parallel import ParallelSliders
+    from wear.joints.parameters import JointError
+    from wear.joints.periodic import PeriodicMarch
+
+__all__ = [
+    "ArrheniusEvolution",
+    "BoucWen",
+    "ExponentialEvolution",
+    "FourParameterIwan",
+    "FrictionContact",
+    "Jenkins",
+    "JointError",
+    "JointEvolution",
+    "JointLaw",
+    "LinearEvolution",
+    "LogarithmicEvolution",
+    "ParallelSliders",
+    "PeriodicMarch",
+    "TabulatedEvolution",
+    "UniformIwan",
+    "long_test",
+    "march_joints",
+    "measure_loops",
+    "steady_stroke",
+]
+
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "ageing": ("long_test", "steady_stroke"),
+        "bouc_wen": ("BoucWen",),
+        "evolution": (
+            "ArrheniusEvolution",
+            "ExponentialEvolution",
+            "JointEvolution",
+            "LinearEvolution",
+            "LogarithmicEvolution",
+            "TabulatedEvolution",
+        ),
+        "friction_contact": ("FrictionContact",),
+        "iwan": ("FourParameterIwan", "UniformIwan"),
+        "jenkins": ("Jenkins",),
+        "law": ("JointLaw", "march_joints"),
+        "measured_loops": ("measure_loops",),
+        "parallel": ("ParallelSliders",),
+        "parameters": ("JointError",),
+        "periodic": ("PeriodicMarch",),
+    },
+)

@@ -28,6 +28,7 @@ import numpy as np
 from numpy.polynomial import Chebyshev, chebyshev
 from scipy.optimize import brentq
 
+from sa_solver.errors import ConvergenceError, InputError
 from sa_solver.types import Array
 from wear.joints.evolution import JointEvolution
 from wear.joints.law import JointLaw
@@ -68,7 +69,7 @@ EnergyPerCycle = Callable[[float], float]
 """Energy that a cycle dissipates [N mm] where the joint has dissipated so much before [N mm]."""
 
 
-class AgeingError(RuntimeError):
+class AgeingError(ConvergenceError):
     """The energy per cycle makes no sense, or is not smooth enough to be jumped."""
 
 
@@ -153,11 +154,11 @@ class LongTest:
     def energy_at(self, cycles: Array | float) -> Array:
         """Energy after ``cycles``, of their shape [N mm].
 
-        Raises ValueError for cycles that the test does not have.
+        Raises InputError for cycles that the test does not have.
         """
         cycles = np.asarray(cycles, dtype=np.float64)
         if np.any((cycles < 0.0) | (cycles > self.total_cycles)):
-            raise ValueError(f"cycles outside a test of {self.total_cycles:g}; allowed: within it")
+            raise InputError(f"cycles outside a test of {self.total_cycles:g}; allowed: within it")
         starts = [jump.cycles for jump in self.jumps]
         places = np.searchsorted(starts, cycles, side="right") - 1
         pairs = zip(places.ravel(), cycles.ravel(), strict=True)
@@ -167,11 +168,11 @@ class LongTest:
     def cycles_at(self, energy: Array | float) -> Array:
         """Cycles after which the joint has dissipated ``energy`` [N mm], of its shape.
 
-        NaN where it has not by the end of the test. Raises ValueError below the energy before it.
+        NaN where it has not by the end of the test. Raises InputError below the energy before it.
         """
         energy = np.asarray(energy, dtype=np.float64)
         if np.any(energy < self.energy_before):
-            raise ValueError(
+            raise InputError(
                 f"energies below {self.energy_before:g} N mm, which were there before the test"
             )
         starts = [jump.start for jump in self.jumps]
@@ -210,20 +211,20 @@ def long_test(
     ``tolerance`` is the error allowed in the number of cycles after which any energy is reached,
     relative to it. ``breaks`` [N mm] are energies at which ``energy_per_cycle`` has a kink
     (:attr:`~wear.joints.evolution.JointEvolution.breaks`): cycles across it are counted. Where a
-    cycle dissipates nothing the energy stays for good. Raises ValueError for cycles, energies or a
+    cycle dissipates nothing the energy stays for good. Raises InputError for cycles, energies or a
     tolerance that make no sense, AgeingError for an energy per cycle that is negative, not finite
     or too rough to be jumped, NeverReachedError for an energy never reached, cycles not limited.
     """
     if not cycles > 0.0:
-        raise ValueError(f"{cycles:g} cycles; allowed: more than 0")
+        raise InputError(f"{cycles:g} cycles; allowed: more than 0")
     if not 0.0 <= start < np.inf:
-        raise ValueError(f"{start:g} N mm dissipated before; allowed: 0 or more")
+        raise InputError(f"{start:g} N mm dissipated before; allowed: 0 or more")
     if not until > start:
-        raise ValueError(f"until {until:g} N mm; allowed: above {start:g}, there before the test")
+        raise InputError(f"until {until:g} N mm; allowed: above {start:g}, there before the test")
     if cycles == until == np.inf:
-        raise ValueError("a test without end; allowed: a number of cycles or an energy that end it")
+        raise InputError("a test without end; allowed: a number of cycles or an energy that end it")
     if not SMALLEST_TOLERANCE <= tolerance < 1.0:
-        raise ValueError(f"tolerance {tolerance:g}; allowed: {SMALLEST_TOLERANCE:g} to 1")
+        raise InputError(f"tolerance {tolerance:g}; allowed: {SMALLEST_TOLERANCE:g} to 1")
     return _Jumper(energy_per_cycle, (cycles, until), tolerance, sorted(breaks)).run(start)
 
 
@@ -448,10 +449,10 @@ def integrated_stretch(
     """Integrate ``cycles`` of a long test directly, from cycle ``first`` on, and compare.
 
     ``energy_per_cycle`` is called once for every cycle, in order: it may be that of the test or an
-    independent one with a memory of its own. Raises ValueError for cycles the test does not have.
+    independent one with a memory of its own. Raises InputError for cycles the test does not have.
     """
     if cycles < 1:
-        raise ValueError(f"{cycles} cycles; allowed: a stretch of one or more")
+        raise InputError(f"{cycles} cycles; allowed: a stretch of one or more")
     numbers = np.arange(cycles + 1, dtype=np.float64) + first
     jumped = test.energy_at(numbers)
     energy = np.empty(cycles + 1)

@@ -26,8 +26,8 @@ import numpy as np
 from numba import njit, vectorize
 
 from sa_solver.types import Array
-from wear.joints.law import JointResponse, State
-from wear.joints.parameters import JointError, LineLaw, Parameter, answer, side_by_side
+from wear.joints.law import JointResponse, JointState
+from wear.joints.parameters import JointError, Parameter, UniaxialLaw, answer, parameter_columns
 
 # Largest step n s of the fourth-order rule, and the largest as a share of |ξ| or, by ξ = 0, at all:
 # there |ξ|^n has few derivatives. ξ and the loss of a branch are then within 2e-9 of the solution.
@@ -122,7 +122,7 @@ def travel(eta: float, s: float, exponent: float, gain: float) -> tuple[float, f
 
 
 @njit(cache=True)
-def advance(
+def advance_bouc_wen(
     stiffness: float,
     residual: float,
     limit: float,
@@ -162,14 +162,14 @@ def advance(
 
 @njit(cache=True)
 def _respond(
-    parameters: Array, state: State, increment: Array
+    parameters: Array, state: JointState, increment: Array
 ) -> tuple[Array, Array, Array, Array]:
     joints = len(state)
     force, tangent = np.empty((joints, 1)), np.empty((joints, 1, 1))
     new, lost = np.empty((joints, 2)), np.empty(joints)
     for j in range(joints):
         own = parameters[j % len(parameters)]
-        force[j, 0], tangent[j, 0, 0], new[j, 0], new[j, 1], lost[j] = advance(
+        force[j, 0], tangent[j, 0, 0], new[j, 0], new[j, 1], lost[j] = advance_bouc_wen(
             own[0], own[1], own[2], own[3], own[4], state[j, 0], state[j, 1], increment[j, 0]
         )
     return force, tangent, new, lost
@@ -201,7 +201,7 @@ def _loop_energy(
 
 
 @dataclass(frozen=True)
-class BoucWen(LineLaw):
+class BoucWen(UniaxialLaw):
     """Bouc and Wen's joint with a macroslip slope.
 
     ``stiffness`` kt [N/mm], the whole initial slope, ``friction`` µ and ``normal_load`` N [N],
@@ -242,12 +242,12 @@ class BoucWen(LineLaw):
 
     @cached_property
     def _parameters(self) -> Array:
-        return side_by_side(*self._constants)
+        return parameter_columns(*self._constants)
 
-    def rest(self, joints: int) -> State:
+    def rest(self, joints: int) -> JointState:
         return np.zeros((joints, 2))
 
-    def respond(self, state: State, increment: Array) -> JointResponse:
+    def respond(self, state: JointState, increment: Array) -> JointResponse:
         return answer(_respond, self._parameters, state, increment)
 
     def loop_energy(self, amplitude: Parameter) -> Array:

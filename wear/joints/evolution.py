@@ -4,10 +4,10 @@ The forms are those of two papers; E is the cumulative energy in N mm (1 J = 1e3
 and all but tables are factors of the initial value:
 
 - Fantetti et al. 2019, Tribology International 138, 111, doi:10.1016/j.triboint.2019.05.023, table
-  4.2: :class:`Logarithmic` friction, :class:`Arrhenius` contact stiffness, :class:`Linear`
-  macroslip slope;
-- Li et al. 2020, table 3: :class:`Exponentials`, a single one for the bolt's preload;
-- :class:`Table`: values themselves, measured or of a wear computation.
+  4.2: :class:`LogarithmicEvolution` of friction, :class:`ArrheniusEvolution` of the contact
+  stiffness, :class:`LinearEvolution` of the macroslip slope;
+- Li et al. 2020, table 3: :class:`ExponentialEvolution`, a single one for the bolt's preload;
+- :class:`TabulatedEvolution`: values themselves, measured or of a wear computation.
 
 Misprints, and what holds here:
 
@@ -29,6 +29,7 @@ from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array
 from wear.evolution import EnergyTable
 
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 
 
 class WearFunction(Protocol):
-    """A factor, or for a :class:`Table` a value, against cumulative energy."""
+    """A factor, or for a :class:`TabulatedEvolution` a value, against cumulative energy."""
 
     def __call__(self, energy: Array | float) -> Array:
         """At an ``energy`` >= 0 [N mm] of any shape."""
@@ -47,7 +48,7 @@ class WearFunction(Protocol):
 
 
 @dataclass(frozen=True)
-class Logarithmic:
+class LogarithmicEvolution:
     """1 + a ln(1 + b E): ``change`` a, ``rate`` b [1/(N mm)], not negative."""
 
     change: float
@@ -55,14 +56,14 @@ class Logarithmic:
 
     def __post_init__(self) -> None:
         if not self.rate >= 0.0:
-            raise ValueError(f"rate = {self.rate:g}: a logarithm of energies needs 0 or more")
+            raise InputError(f"rate = {self.rate:g}: a logarithm of energies needs 0 or more")
 
     def __call__(self, energy: Array | float) -> Array:
         return np.asarray(1.0 + self.change * np.log1p(self.rate * np.asarray(energy)))
 
 
 @dataclass(frozen=True)
-class Arrhenius:
+class ArrheniusEvolution:
     """1 + a exp(-b / E): ``change`` a, reached late; ``scale`` b [N mm], above 0. 1 for E = 0."""
 
     change: float
@@ -70,7 +71,7 @@ class Arrhenius:
 
     def __post_init__(self) -> None:
         if not self.scale > 0.0:
-            raise ValueError(f"scale = {self.scale:g}: an energy scale is above 0")
+            raise InputError(f"scale = {self.scale:g}: an energy scale is above 0")
 
     def __call__(self, energy: Array | float) -> Array:
         energy = np.asarray(energy, dtype=np.float64)
@@ -82,7 +83,7 @@ class Arrhenius:
 
 
 @dataclass(frozen=True)
-class Linear:
+class LinearEvolution:
     """1 + a E: ``slope`` a [1/(N mm)]."""
 
     slope: float
@@ -92,7 +93,7 @@ class Linear:
 
 
 @dataclass(frozen=True)
-class Exponentials:
+class ExponentialEvolution:
     """a + (1 - a) [b exp(c E) + (1 - b) exp(d E)], from 1 to ``final`` a.
 
     ``share`` b is that of the ``rate`` c [1/(N mm)], the rest that of ``second_rate`` d; with all
@@ -107,7 +108,7 @@ class Exponentials:
     def __post_init__(self) -> None:
         for name in ("rate", "second_rate"):
             if not getattr(self, name) <= 0.0:
-                raise ValueError(f"{name} = {getattr(self, name):g}: wear dies out at 0 or below")
+                raise InputError(f"{name} = {getattr(self, name):g}: wear dies out at 0 or below")
 
     def __call__(self, energy: Array | float) -> Array:
         energy = np.asarray(energy)
@@ -117,11 +118,11 @@ class Exponentials:
 
 
 @dataclass(frozen=True)
-class Table:
+class TabulatedEvolution:
     """``values`` of a parameter at ``energies`` [N mm], which ascend.
 
     Linear between them, hence as monotone as they are, and constant beyond both ends. Raises
-    ValueError for no or unequal columns or energies that do not ascend.
+    InputError for no or unequal columns or energies that do not ascend.
     """
 
     energies: tuple[float, ...]
@@ -154,7 +155,7 @@ class JointEvolution:
     def at(self, law: Law, energy: Array | float) -> Law:
         """The ``law``, whose parameters are the initial ones, after an ``energy`` [N mm].
 
-        ``energy`` is one of all joints, or ``(n,)``, one of each. Raises ValueError for a law
+        ``energy`` is one of all joints, or ``(n,)``, one of each. Raises InputError for a law
         without a parameter that is to evolve.
         """
         values = self.values(law, energy)
@@ -167,16 +168,20 @@ class JointEvolution:
         for name, function in self._functions():
             initial = getattr(law, name, None)
             if initial is None:
-                raise ValueError(f"{type(law).__name__} has no {name} that could evolve")
+                raise InputError(f"{type(law).__name__} has no {name} that could evolve")
             value = function(energy)
-            scale = np.ones_like(initial) if isinstance(function, Table) else np.asarray(initial)
+            scale = (
+                np.ones_like(initial)
+                if isinstance(function, TabulatedEvolution)
+                else np.asarray(initial)
+            )
             found[name] = np.maximum(value * scale, 0.0)
         return {name: np.asarray(value) for name, value in found.items()}
 
     @property
     def breaks(self) -> tuple[float, ...]:
         """Energies at which a parameter has a kink: those of the tables, ascending [N mm]."""
-        tables = [own for _, own in self._functions() if isinstance(own, Table)]
+        tables = [own for _, own in self._functions() if isinstance(own, TabulatedEvolution)]
         return tuple(sorted({energy for table in tables for energy in table.energies}))
 
     def _functions(self) -> Iterator[tuple[str, WearFunction]]:

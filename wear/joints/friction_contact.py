@@ -43,13 +43,13 @@ import numpy as np
 from numba import njit
 
 from sa_solver.types import Array
-from wear.joints.law import JointResponse, State
+from wear.joints.law import JointResponse, JointState
 from wear.joints.parameters import (
     JointError,
     Parameter,
+    parameter_columns,
     require_not_negative,
     require_positive,
-    side_by_side,
 )
 
 LONGEST = 300.0  # L: nothing is left of the angle long before, and exp(-2 L) is still a number
@@ -63,7 +63,7 @@ NODES, WEIGHTS = (0.5 * rule for rule in np.polynomial.legendre.leggauss(6))
 NODES = NODES + 0.5
 
 
-class Path(NamedTuple):
+class ForcePath(NamedTuple):
     """A straight path in contact, told in forces [N].
 
     Force of the tangential spring at its start (within the circle there), ``pull`` that the path
@@ -102,7 +102,7 @@ class Slip(NamedTuple):
 
 
 @njit(cache=True, error_model="numpy")
-def _held(path: Path) -> float:
+def _held(path: ForcePath) -> float:
     """Fraction of a path on which the slider holds: first root of |t0 + k s| = R(s), or 1."""
     (x, y), (px, py), limit = path[:2], path[2:4], path.start
     change = path.end - limit
@@ -146,7 +146,7 @@ def _inverse_mean_slopes(a: float, b: float) -> tuple[float, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def _slip(path: Path, held: float) -> Slip:
+def _slip(path: ForcePath, held: float) -> Slip:
     """Slip that begins at the fraction ``held`` of a path and lasts to its end."""
     limit = path.start + held * (path.end - path.start)
     x, y = path.force_x + held * path.pull_x, path.force_y + held * path.pull_y
@@ -182,7 +182,7 @@ def _direction(slip: Slip) -> tuple[float, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def _turning(path: Path, slip: Slip) -> tuple[float, float, float, float, float, float]:
+def _turning(path: ForcePath, slip: Slip) -> tuple[float, float, float, float, float, float]:
     """Derivative of the angle of the force at the end of a slip.
 
     With respect to the six numbers of the path, in the order force, limit at the start, pull,
@@ -213,7 +213,7 @@ def _turning(path: Path, slip: Slip) -> tuple[float, float, float, float, float,
 
 
 @njit(cache=True, error_model="numpy")
-def _lost_in_slip(path: Path, slip: Slip) -> float:
+def _lost_in_slip(path: ForcePath, slip: Slip) -> float:
     """kt times the energy lost in a slip, ∫ R (k·e - R') ds [N²].
 
     As if the force had the direction of the pull, less ∫ R |k| (1 - cos ψ) ds, over the share η of
@@ -246,7 +246,7 @@ def _lost_in_slip(path: Path, slip: Slip) -> float:
 
 
 @njit(cache=True, error_model="numpy")
-def _follow(path: Path, jacobian: Array) -> tuple[float, float, float]:
+def _follow(path: ForcePath, jacobian: Array) -> tuple[float, float, float]:
     """Tangential force at the end of a path in contact, and kt times the energy lost.
 
     Its derivative is written into ``jacobian[:2]``, in the order of :func:`_turning`.
@@ -266,10 +266,10 @@ def _follow(path: Path, jacobian: Array) -> tuple[float, float, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def _lost_in_lift_off(path: Path, contact: float) -> float:
+def _lost_in_lift_off(path: ForcePath, contact: float) -> float:
     """kt times the energy lost on a path that lifts off after the fraction ``contact``."""
     share = contact * (1.0 - LAST)
-    last = Path(
+    last = ForcePath(
         path.force_x,
         path.force_y,
         share * path.pull_x,
@@ -320,7 +320,7 @@ def _touching(entry: float, pull_x: float, pull_y: float, change: float, jacobia
 
 
 @njit(cache=True, error_model="numpy")
-def _tangential(path: Path, jacobian: Array) -> tuple[float, float, float]:
+def _tangential(path: ForcePath, jacobian: Array) -> tuple[float, float, float]:
     """Tangential force at the end of an increment, and kt times the energy lost.
 
     The limits of ``path`` may be negative here: no contact. A force outside the circle at the start
@@ -334,12 +334,12 @@ def _tangential(path: Path, jacobian: Array) -> tuple[float, float, float]:
         x, y = x * start / force, y * start / force
     if path.end <= 0.0:
         if start > 0.0:
-            leaving = Path(x, y, path.pull_x, path.pull_y, start, path.end)
+            leaving = ForcePath(x, y, path.pull_x, path.pull_y, start, path.end)
             lost += _lost_in_lift_off(leaving, start / (start - path.end))
         return 0.0, 0.0, lost
     entry = 0.0 if path.start > 0.0 else path.start / (path.start - path.end)
     pull_x, pull_y = (1.0 - entry) * path.pull_x, (1.0 - entry) * path.pull_y
-    end_x, end_y, slipped = _follow(Path(x, y, pull_x, pull_y, start, path.end), jacobian)
+    end_x, end_y, slipped = _follow(ForcePath(x, y, pull_x, pull_y, start, path.end), jacobian)
     if path.start <= 0.0:
         _touching(entry, path.pull_x, path.pull_y, path.end - path.start, jacobian)
     elif force > start:
@@ -348,7 +348,7 @@ def _tangential(path: Path, jacobian: Array) -> tuple[float, float, float]:
 
 
 @njit(cache=True, error_model="numpy")
-def advance(
+def advance_contact(
     parameters: Array, start: Array, increment: Array, force: Array, end: Array, jacobian: Array
 ) -> float:
     """Lead one joint along an increment of displacement ``(3,)``; return the energy it loses.
@@ -364,7 +364,7 @@ def advance(
     before = parameters[3] + normal_stiffness * (start[2] - parameters[4])
     approach = start[2] + increment[2]
     after = parameters[3] + normal_stiffness * (approach - parameters[4])
-    path = Path(
+    path = ForcePath(
         stiffness * start[0],
         stiffness * start[1],
         stiffness * increment[0],
@@ -387,13 +387,13 @@ def advance(
 def _advance_all(
     parameters: Array, start: Array, increment: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """:func:`advance` for every joint: forces, states, derivatives and energies lost."""
+    """:func:`advance_contact` for every joint: forces, states, derivatives and energies lost."""
     joints = len(start)
     force, end, jacobian = np.empty((joints, 3)), np.empty((joints, 3)), np.empty((joints, 3, 6))
     dissipated = np.empty(joints)
     for j in range(joints):
         own = parameters[j % len(parameters)]
-        dissipated[j] = advance(own, start[j], increment[j], force[j], end[j], jacobian[j])
+        dissipated[j] = advance_contact(own, start[j], increment[j], force[j], end[j], jacobian[j])
     return force, end, jacobian, dissipated
 
 
@@ -439,15 +439,15 @@ class FrictionContact:
 
     @cached_property
     def parameters(self) -> Array:
-        """What :func:`advance` takes, ``(n, 5)``, or ``(1, 5)`` where all are numbers."""
-        return side_by_side(
+        """What :func:`advance_contact` takes, ``(n, 5)``, or ``(1, 5)`` where all are numbers."""
+        return parameter_columns(
             self.stiffness, self.normal_stiffness, self.friction, self.normal_load, self.gap
         )
 
-    def rest(self, joints: int) -> State:
+    def rest(self, joints: int) -> JointState:
         return np.zeros((joints, 3))
 
-    def respond(self, state: State, increment: Array) -> JointResponse:
+    def respond(self, state: JointState, increment: Array) -> JointResponse:
         joints = len(state)
         if increment.shape != (joints, 3):
             raise JointError(f"the increment has shape {increment.shape}: it must be ({joints}, 3)")

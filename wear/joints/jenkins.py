@@ -10,12 +10,12 @@ import numpy as np
 from numba import njit
 
 from sa_solver.types import Array
-from wear.joints.law import JointResponse, State
-from wear.joints.parameters import LineLaw, Parameter, answer, side_by_side
+from wear.joints.law import JointResponse, JointState
+from wear.joints.parameters import Parameter, UniaxialLaw, answer, parameter_columns
 
 
 @njit(cache=True)
-def advance(
+def advance_jenkins(
     stiffness: float,
     residual: float,
     limit: float,
@@ -43,21 +43,21 @@ def advance(
 
 @njit(cache=True)
 def _respond(
-    parameters: Array, state: State, increment: Array
+    parameters: Array, state: JointState, increment: Array
 ) -> tuple[Array, Array, Array, Array]:
     joints = len(state)
     force, tangent = np.empty((joints, 1)), np.empty((joints, 1, 1))
     new, lost = np.empty((joints, 2)), np.empty(joints)
     for j in range(joints):
         own = parameters[j % len(parameters)]
-        force[j, 0], tangent[j, 0, 0], new[j, 0], new[j, 1], lost[j] = advance(
+        force[j, 0], tangent[j, 0, 0], new[j, 0], new[j, 1], lost[j] = advance_jenkins(
             own[0], own[1], own[2], state[j, 0], state[j, 1], increment[j, 0]
         )
     return force, tangent, new, lost
 
 
 @dataclass(frozen=True)
-class Jenkins(LineLaw):
+class Jenkins(UniaxialLaw):
     """Jenkins's element.
 
     ``stiffness`` kt [N/mm] of the spring, ``friction`` µ and ``normal_load`` N [N], whose product
@@ -72,12 +72,12 @@ class Jenkins(LineLaw):
 
     @cached_property
     def _parameters(self) -> Array:
-        return side_by_side(self.stiffness, self.residual_stiffness, self.limit)
+        return parameter_columns(self.stiffness, self.residual_stiffness, self.limit)
 
-    def rest(self, joints: int) -> State:
+    def rest(self, joints: int) -> JointState:
         return np.zeros((joints, 2))
 
-    def respond(self, state: State, increment: Array) -> JointResponse:
+    def respond(self, state: JointState, increment: Array) -> JointResponse:
         return answer(_respond, self._parameters, state, increment)
 
     def loop_energy(self, amplitude: Parameter) -> Array:

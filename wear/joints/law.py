@@ -5,7 +5,7 @@ relative to the first, and its force is the one that resists: the joint pushes t
 ``-force``. Work of the force on the displacement is what the joint stores and dissipates.
 
 A law holds the parameters of ``n`` joints, as numbers or ``(n,)`` arrays, and no state. What it
-remembers is a :data:`State`, an array ``(n, k)`` with one row per joint, whose columns are the
+remembers is a :data:`JointState`, an array ``(n, k)`` with one row per joint, whose columns are the
 law's own affair; a state is never changed, a new one is returned.
 """
 
@@ -18,7 +18,7 @@ import numpy as np
 
 from sa_solver.types import Array
 
-State = Array
+JointState = Array
 
 
 @dataclass(frozen=True)
@@ -32,7 +32,7 @@ class JointResponse:
 
     force: Array
     tangent: Array
-    state: State
+    state: JointState
     dissipated: Array
 
 
@@ -44,11 +44,11 @@ class JointLaw(Protocol):
         """Components of a joint's displacement: 1, or 3 (x, y tangential, z normal)."""
         ...
 
-    def rest(self, joints: int) -> State:
+    def rest(self, joints: int) -> JointState:
         """State of ``joints`` joints that have never moved."""
         ...
 
-    def respond(self, state: State, increment: Array) -> JointResponse:
+    def respond(self, state: JointState, increment: Array) -> JointResponse:
         """Answer to an increment of displacement ``(n, d)`` [mm] along a straight path."""
         ...
 
@@ -63,10 +63,12 @@ class JointHistory:
 
     force: Array
     dissipated: Array
-    state: State
+    state: JointState
 
 
-def march(law: JointLaw, state: State, start: Array, displacement: Array) -> JointHistory:
+def march_joints(
+    law: JointLaw, state: JointState, start: Array, displacement: Array
+) -> JointHistory:
     """Lead joints through ``displacement`` ``(t, n, d)`` [mm], from ``start`` ``(n, d)``."""
     forces, dissipated = np.empty(displacement.shape), np.empty(displacement.shape[:2])
     for step, increment in enumerate(np.diff(displacement, axis=0, prepend=start[None])):

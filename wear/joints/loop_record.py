@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.signal import savgol_filter
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array, Indices
 
 REVERSAL = 0.5
@@ -44,12 +45,12 @@ SIGNAL = 0.5
 """Share of what smoothing takes that may go from sample to sample alike: motion then, not noise."""
 
 
-class MeasuredLoopError(ValueError):
+class MeasuredLoopError(InputError):
     """A record that holds no loop, or not what is asked of it."""
 
 
 @dataclass(frozen=True)
-class Branch:
+class LoopBranch:
     """From a reversal to the next: their samples ``begin`` and ``end``, and ``sense`` ±1."""
 
     begin: int
@@ -72,11 +73,11 @@ class LoopRecord:
     force: Array
     normal_load: Array
 
-    def travel(self, branch: Branch) -> float:
+    def travel(self, branch: LoopBranch) -> float:
         """Displacement that the branch covers, above 0 [mm]."""
         return float(branch.sense * np.diff(self.displacement[[branch.begin, branch.end]])[0])
 
-    def rise(self, branch: Branch) -> float:
+    def rise(self, branch: LoopBranch) -> float:
         """What the force gains along the branch in its sense [N]."""
         return float(branch.sense * np.diff(self.force[[branch.begin, branch.end]])[0])
 
@@ -192,7 +193,7 @@ def _amid(motion: Array, places: tuple[int, int, int], band: float) -> int:
 # --- branches -----------------------------------------------------------------------------------
 
 
-def branches(record: LoopRecord) -> tuple[LoopRecord, tuple[Branch, ...]]:
+def branches(record: LoopRecord) -> tuple[LoopRecord, tuple[LoopBranch, ...]]:
     """The two branches of every complete cycle, one after the other, and the record they are of.
 
     In that record the displacement is smoothed; one closed period that begins anywhere is turned
@@ -212,7 +213,7 @@ def branches(record: LoopRecord) -> tuple[LoopRecord, tuple[Branch, ...]]:
     return replace(record, displacement=_smoothed(record.displacement, found)), tuple(found)
 
 
-def _complete(record: LoopRecord, places: Indices) -> list[Branch]:
+def _complete(record: LoopRecord, places: Indices) -> list[LoopBranch]:
     """Branches from reversal to reversal; those at the ends of a record only if there are few."""
     if len(places) < 3:
         return []
@@ -222,7 +223,7 @@ def _complete(record: LoopRecord, places: Indices) -> list[Branch]:
     if len(places) >= ENOUGH:
         whole[[0, -1]] = False
     pairs = zip(pairwise(places.tolist()), np.sign(moved).astype(int).tolist(), whole, strict=True)
-    return [Branch(begin, end, sense) for (begin, end), sense, taken in pairs if taken]
+    return [LoopBranch(begin, end, sense) for (begin, end), sense, taken in pairs if taken]
 
 
 def _closed(record: LoopRecord) -> bool:
@@ -243,7 +244,7 @@ def _begun_at(record: LoopRecord, start: int) -> LoopRecord:
     return LoopRecord(*(column[order] for column in columns))
 
 
-def _smoothed(motion: Array, found: Sequence[Branch]) -> Array:
+def _smoothed(motion: Array, found: Sequence[LoopBranch]) -> Array:
     """The displacement without some of its noise, or as it is if that would bend the motion."""
     period = 2.0 * float(np.median([branch.end - branch.begin for branch in found]))
     half = int(0.5 * SMOOTHING * period)

@@ -32,10 +32,10 @@ import numpy as np
 from numba import njit, vectorize
 
 from sa_solver.types import Array
-from wear.joints.law import JointResponse, State
-from wear.joints.parameters import LineLaw, Parameter, answer, side_by_side
+from wear.joints.law import JointResponse, JointState
+from wear.joints.parameters import Parameter, UniaxialLaw, answer, parameter_columns
 
-Curve = tuple[float, float, float, float]
+SliderCurve = tuple[float, float, float, float]
 """K, limit, c, m."""
 
 # Columns of a state: displacement; number of turning points; the curve (K, limit, c, m) that the
@@ -46,7 +46,7 @@ FEWEST_POINTS = 4
 
 
 @njit(cache=True)
-def first_curve(curve: Curve, distance: float) -> tuple[float, float, float]:
+def first_curve(curve: SliderCurve, distance: float) -> tuple[float, float, float]:
     """T, T' and L at ``distance`` >= 0 of the curve (K, limit, c, m)."""
     stiffness, limit, share, exponent = curve
     reach = limit / (stiffness * (1.0 - share / exponent))
@@ -65,7 +65,7 @@ def first_curve(curve: Curve, distance: float) -> tuple[float, float, float]:
 
 @njit(cache=True)
 def _on_curve(
-    curve: Curve, memory: Array, depth: int, displacement: float
+    curve: SliderCurve, memory: Array, depth: int, displacement: float
 ) -> tuple[float, float, float]:
     """Force, slope and energy lost since the last of ``depth`` turning points, or since rest."""
     if depth == 0:
@@ -78,7 +78,7 @@ def _on_curve(
 
 
 @njit(cache=True)
-def _renew(curve: Curve, memory: Array) -> None:
+def _renew(curve: SliderCurve, memory: Array) -> None:
     """Compute the forces at the turning points anew where they belong to other parameters."""
     if (memory[CURVE], memory[CURVE + 1], memory[CURVE + 2], memory[CURVE + 3]) == curve:
         return
@@ -105,8 +105,8 @@ def _closing(memory: Array, depth: int) -> float:
 
 
 @njit(cache=True)
-def advance(
-    curve: Curve, residual: float, memory: Array, increment: float
+def advance_masing(
+    curve: SliderCurve, residual: float, memory: Array, increment: float
 ) -> tuple[float, float, float]:
     """One joint by one increment, its ``memory`` changed in place: force, tangent, energy lost.
 
@@ -140,7 +140,7 @@ def advance(
 
 
 @njit(cache=True)
-def _columns_for(state: State) -> int:
+def _columns_for(state: JointState) -> int:
     """Columns with room for a turning point more: doubled when full, halved when mostly empty."""
     needed = 0
     for j in range(len(state)):
@@ -155,7 +155,7 @@ def _columns_for(state: State) -> int:
 
 @njit(cache=True)
 def _respond(
-    parameters: Array, state: State, increment: Array
+    parameters: Array, state: JointState, increment: Array
 ) -> tuple[Array, Array, Array, Array]:
     joints = len(state)
     force, tangent = np.empty((joints, 1)), np.empty((joints, 1, 1))
@@ -165,7 +165,9 @@ def _respond(
         used = POINTS + 2 * int(state[j, DEPTH])
         new[j, :used] = state[j, :used]
         curve = (own[0], own[2], own[3], own[4])
-        force[j, 0], tangent[j, 0, 0], lost[j] = advance(curve, own[1], new[j], increment[j, 0])
+        force[j, 0], tangent[j, 0, 0], lost[j] = advance_masing(
+            curve, own[1], new[j], increment[j, 0]
+        )
     return force, tangent, new, lost
 
 
@@ -177,7 +179,7 @@ def _loop_energy(
 
 
 @dataclass(frozen=True)
-class MasingLaw(LineLaw, ABC):
+class MasingLaw(UniaxialLaw, ABC):
     """A joint of spread sliders, whichever way they are spread.
 
     ``stiffness`` K [N/mm] when all of them stick, ``friction`` µ and ``normal_load`` N [N], whose
@@ -196,12 +198,12 @@ class MasingLaw(LineLaw, ABC):
 
     @cached_property
     def _parameters(self) -> Array:
-        return side_by_side(self.stiffness, self.residual_stiffness, self.limit, *self.spread)
+        return parameter_columns(self.stiffness, self.residual_stiffness, self.limit, *self.spread)
 
-    def rest(self, joints: int) -> State:
+    def rest(self, joints: int) -> JointState:
         return np.zeros((joints, POINTS + 2 * FEWEST_POINTS))
 
-    def respond(self, state: State, increment: Array) -> JointResponse:
+    def respond(self, state: JointState, increment: Array) -> JointResponse:
         return answer(_respond, self._parameters, state, increment)
 
     def loop_energy(self, amplitude: Parameter) -> Array:

@@ -35,9 +35,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from sa_solver.types import Array, Indices
-from wear.joints.loop_record import Branch, LoopRecord, MeasuredLoopError, branches, loop_record
+from wear.joints.loop_record import LoopBranch, LoopRecord, MeasuredLoopError, branches, loop_record
 
-__all__ = ["Estimate", "MeasuredLoopError", "MeasuredLoops", "estimate", "measure_loops"]
+__all__ = [
+    "MeanEstimate",
+    "MeasuredLoopError",
+    "MeasuredLoops",
+    "mean_estimate",
+    "measure_loops",
+]
 
 WINDOW = 0.5
 """The stick slope is taken until the force has risen through this share of the loop's height:
@@ -71,18 +77,18 @@ noise), which is the error to be expected of the friction force."""
 
 
 @dataclass(frozen=True)
-class Estimate:
+class MeanEstimate:
     """Mean over cycles and its standard error, which is NaN for a single cycle."""
 
     value: float
     error: float
 
 
-def estimate(values: Array) -> Estimate:
+def mean_estimate(values: Array) -> MeanEstimate:
     """Mean of the cycles' ``values`` ``(c,)``."""
     count = len(values)
     error = float(np.std(values, ddof=1)) / np.sqrt(count) if count > 1 else np.nan
-    return Estimate(float(np.mean(values)), float(error))
+    return MeanEstimate(float(np.mean(values)), float(error))
 
 
 @dataclass(frozen=True)
@@ -116,11 +122,13 @@ class MeasuredLoops:
         return self.sliding > 0.0
 
     @property
-    def stick_estimate(self) -> Estimate:
+    def stick_estimate(self) -> MeanEstimate:
         """Stick stiffness of all cycles [N/mm]: that of their mean compliance."""
-        compliance = estimate(1.0 / self.stick_stiffness)
+        compliance = mean_estimate(1.0 / self.stick_stiffness)
         value = 1.0 / compliance.value
-        return Estimate(value, float(np.hypot(compliance.error * value, self.bend_spread)) * value)
+        return MeanEstimate(
+            value, float(np.hypot(compliance.error * value, self.bend_spread)) * value
+        )
 
     @property
     def contact_stiffness(self) -> Array:
@@ -208,7 +216,7 @@ def _of_cycles(values: Sequence[float] | Array) -> Array:
     return np.asarray(np.reshape(values, (-1, 2)).mean(axis=1))
 
 
-def _energy(record: LoopRecord, pair: tuple[Branch, Branch]) -> float:
+def _energy(record: LoopRecord, pair: tuple[LoopBranch, LoopBranch]) -> float:
     """∮ T dδ of the closed polygon [N mm]."""
     here = slice(pair[0].begin, pair[1].end + 1)
     motion, force = record.displacement[here], record.force[here]
@@ -236,7 +244,7 @@ class _Stick:
 
 
 def _stick_slopes(
-    record: LoopRecord, own: Sequence[Branch], rises: Sequence[float]
+    record: LoopRecord, own: Sequence[LoopBranch], rises: Sequence[float]
 ) -> tuple[Array, float]:
     """Slopes of the force at the reversals that begin the branches, ``(b,)`` [N/mm].
 
@@ -253,7 +261,7 @@ def _stick_slopes(
     return 1.0 / np.array(compliances), error * float(np.mean(leverages))
 
 
-def _stick(record: LoopRecord, branch: Branch, rise: float) -> _Stick:
+def _stick(record: LoopRecord, branch: LoopBranch, rise: float) -> _Stick:
     """The part of a branch until the force has risen by ``rise``."""
     force = branch.sense * (record.force[branch.samples] - record.force[branch.begin])
     count = _passage(force, rise)
@@ -302,14 +310,14 @@ def _centred_powers(values: Array) -> Array:
 # --- sliding ------------------------------------------------------------------------------------
 
 
-def _tail(record: LoopRecord, branch: Branch, share: float) -> slice:
+def _tail(record: LoopRecord, branch: LoopBranch, share: float) -> slice:
     """The samples of the last ``share`` of a branch's stroke."""
     motion = branch.sense * record.displacement[branch.samples]
     level = motion[-1] - share * record.travel(branch)
     return slice(branch.begin + _passage(motion, level), branch.end + 1)
 
 
-def _sliding_share(record: LoopRecord, own: Sequence[Branch], stick_slope: float) -> float:
+def _sliding_share(record: LoopRecord, own: Sequence[LoopBranch], stick_slope: float) -> float:
     """The largest of ``SHARES`` over which the branches end straight and flat, less a margin."""
     span = float(np.mean([record.rise(branch) for branch in own]))
     for share in SHARES:
@@ -327,7 +335,7 @@ def _sliding_share(record: LoopRecord, own: Sequence[Branch], stick_slope: float
     return 0.0
 
 
-def _shape(record: LoopRecord, tail: slice, branch: Branch) -> tuple[float, ...]:
+def _shape(record: LoopRecord, tail: slice, branch: LoopBranch) -> tuple[float, ...]:
     """Slope of a tail, its change from end to end, its bend [N], standard errors of the latter."""
     motion = branch.sense * record.displacement[tail]
     middle, half = 0.5 * (motion[-1] + motion[0]), 0.5 * (motion[-1] - motion[0])
@@ -343,7 +351,7 @@ def _shape(record: LoopRecord, tail: slice, branch: Branch) -> tuple[float, ...]
 
 
 def _sliding_lines(
-    record: LoopRecord, pair: tuple[Branch, Branch], share: float
+    record: LoopRecord, pair: tuple[LoopBranch, LoopBranch], share: float
 ) -> tuple[float, float]:
     """Common slope of the two sliding branches [N/mm], and half the height between them [N]."""
     tails = [_tail(record, branch, share) for branch in pair]

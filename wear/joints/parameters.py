@@ -12,14 +12,15 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array
-from wear.joints.law import JointResponse, State
+from wear.joints.law import JointResponse, JointState
 
 Parameter = float | Array
-Kernel = Callable[[Array, Array, Array], tuple[Array, Array, Array, Array]]
+ResponseKernel = Callable[[Array, Array, Array], tuple[Array, Array, Array, Array]]
 
 
-class JointError(ValueError):
+class JointError(InputError):
     """Parameters that a joint law cannot have, or arrays that do not fit its joints."""
 
 
@@ -49,7 +50,7 @@ def require_one_each(*values: Parameter) -> None:
         )
 
 
-def side_by_side(*values: Parameter) -> Array:
+def parameter_columns(*values: Parameter) -> Array:
     """Parameters, numbers or ``(n,)``, as columns ``(m, p)``; one row where all are numbers."""
     columns = np.empty((max(np.size(value) for value in values), len(values)))
     for place, value in enumerate(values):
@@ -57,7 +58,9 @@ def side_by_side(*values: Parameter) -> Array:
     return columns
 
 
-def answer(kernel: Kernel, parameters: Array, state: State, increment: Array) -> JointResponse:
+def answer(
+    kernel: ResponseKernel, parameters: Array, state: JointState, increment: Array
+) -> JointResponse:
     """Lead the joints of ``state`` by ``increment`` ``(n, 1)`` [mm].
 
     Raises :class:`JointError` where shapes differ: the kernel itself checks no bounds.
@@ -71,7 +74,7 @@ def answer(kernel: Kernel, parameters: Array, state: State, increment: Array) ->
 
 
 @dataclass(frozen=True)
-class LineLaw:
+class UniaxialLaw:
     """What the laws along one direction have in common: parameters, as numbers or ``(n,)``.
 
     ``stiffness`` [N/mm] of the stuck joint, ``friction`` µ, ``normal_load`` N [N] and

@@ -29,7 +29,7 @@ from wear.joints.bouc_wen import BoucWen
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.masing import MasingLaw
-from wear.joints.parameters import JointError, side_by_side
+from wear.joints.parameters import JointError, parameter_columns
 from wear.joints.periodic_contact import settle_contacts
 from wear.joints.periodic_sliders import BOUC_WEN, JENKINS, settle_curves, settle_sliders
 
@@ -37,7 +37,7 @@ STICK, SLIP, SEPARATED = 0, 1, 2
 """States of a joint at a sample. A spread or smooth joint slips where less than half of the
 stiffness that it may lose is left."""
 
-Kernel = Callable[..., None]
+SettlingKernel = Callable[..., None]
 
 
 @dataclass(frozen=True)
@@ -116,7 +116,7 @@ class PeriodicMarch:
         return SettledCycle(projected, jacobian, force.transpose(1, 0, 2), states.T, lost, change)
 
     @cached_property
-    def _kernel(self) -> tuple[Kernel, Array]:
+    def _kernel(self) -> tuple[SettlingKernel, Array]:
         return _kernel_of(self.law)
 
     def _in_shares(self, joints: int, work: Callable[[slice], None]) -> None:
@@ -145,21 +145,23 @@ class PeriodicMarch:
             raise JointError(f"the law is that of {laws} joints, the coefficients of {joints}")
 
 
-def _kernel_of(law: Jenkins | BoucWen | MasingLaw | FrictionContact) -> tuple[Kernel, Array]:
+def _kernel_of(
+    law: Jenkins | BoucWen | MasingLaw | FrictionContact,
+) -> tuple[SettlingKernel, Array]:
     """The compiled march of a law, and its parameters ``(1 or j, p)``."""
     if isinstance(law, FrictionContact):
         return settle_contacts, law.parameters
     limit = np.multiply(law.friction, law.normal_load)
     if isinstance(law, MasingLaw):
-        return settle_curves, side_by_side(
+        return settle_curves, parameter_columns(
             law.stiffness, law.residual_stiffness, limit, *law.spread
         )
     if isinstance(law, Jenkins):
-        return settle_sliders, side_by_side(
+        return settle_sliders, parameter_columns(
             JENKINS, law.stiffness, law.residual_stiffness, limit, 1.0, 0.0
         )
     spring = np.subtract(law.stiffness, law.residual_stiffness)
     gain = np.multiply(2.0, law.sigma) - 1.0
-    return settle_sliders, side_by_side(
+    return settle_sliders, parameter_columns(
         BOUC_WEN, spring, law.residual_stiffness, limit, law.exponent, gain
     )

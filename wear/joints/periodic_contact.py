@@ -15,7 +15,7 @@ import numpy as np
 from numba import njit
 
 from sa_solver.types import Array
-from wear.joints.friction_contact import advance
+from wear.joints.friction_contact import advance_contact
 from wear.joints.periodic_sliders import (
     DERIVATIVE_REPEATED,
     FORGETTING,
@@ -100,7 +100,7 @@ class Memory(NamedTuple):
     slopes: Array
 
 
-class Record(NamedTuple):
+class PeriodRecord(NamedTuple):
     """What is written of a period: ``gradient`` ``(t, 2, 3, m)`` of the stretch, and the rest."""
 
     force: Array
@@ -115,7 +115,7 @@ def _move(own: Array, memory: Memory, end: Array) -> float:
     ``memory.increment`` has the tangential part of it already.
     """
     memory.increment[2] = end[2] - memory.state[2]
-    lost: float = advance(
+    lost: float = advance_contact(
         own, memory.state, memory.increment, memory.force, memory.state, memory.slopes
     )
     memory.state[2] = end[2]
@@ -140,7 +140,13 @@ def _lead_in(own: Array, memory: Memory, before: Array, lead: Array) -> None:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _round(
-    own: Array, memory: Memory, way: Array, basis: Array, steps: Array, record: Record, total: Array
+    own: Array,
+    memory: Memory,
+    way: Array,
+    basis: Array,
+    steps: Array,
+    record: PeriodRecord,
+    total: Array,
 ) -> tuple[float, bool]:
     """One period: energy lost, and whether it sticks throughout.
 
@@ -166,7 +172,7 @@ def _round(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _settle_contact(
-    own: Array, memory: Memory, way: Array, basis: Array, steps: Array, record: Record
+    own: Array, memory: Memory, way: Array, basis: Array, steps: Array, record: PeriodRecord
 ) -> tuple[float, float, bool]:
     """March until stretch and derivative repeat: energy lost, change of force, all stuck."""
     total, stretch, derivative = np.empty((2, 2)), np.empty(2), np.empty_like(memory.derivative)
@@ -196,7 +202,12 @@ def _settle_contact(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _project_stuck(
-    stiffness: float, basis: Array, weights: Array, shares: Array, record: Record, jacobian: Array
+    stiffness: float,
+    basis: Array,
+    weights: Array,
+    shares: Array,
+    record: PeriodRecord,
+    jacobian: Array,
 ) -> None:
     """Tangential part of the derivative where all samples stick.
 
@@ -216,7 +227,7 @@ def _project_stuck(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _project(stiffness: float, weights: Array, record: Record, jacobian: Array) -> None:
+def _project(stiffness: float, weights: Array, record: PeriodRecord, jacobian: Array) -> None:
     """Tangential part of the derivative."""
     size = weights.shape[0]
     flat = record.gradient.reshape(len(record.gradient), 6 * size)
@@ -274,7 +285,7 @@ def settle_contacts(
     steps, shares = differences(basis), np.dot(weights, basis)
     memory = Memory(np.empty(3), np.empty((2, 3, size)), np.empty(3), np.empty(3), np.empty((3, 6)))
     for j in range(len(parameters)):
-        own, record = parameters[j], Record(force[j], states[j], gradient)
+        own, record = parameters[j], PeriodRecord(force[j], states[j], gradient)
         _lead_in(own, memory, before[j], lead)
         dissipated[j], missing, sticks = _settle_contact(own, memory, way[j], basis, steps, record)
         largest = np.max(np.abs(force[j]))

@@ -14,11 +14,9 @@ import numpy as np
 from numba import njit
 
 from sa_solver.types import Array
-from wear.joints.bouc_wen import NO_FRICTION, xi_rate
-from wear.joints.bouc_wen import advance as advance_bouc_wen
-from wear.joints.jenkins import advance as advance_jenkins
-from wear.joints.masing import DEPTH, DISPLACEMENT, POINTS, turns
-from wear.joints.masing import advance as advance_masing
+from wear.joints.bouc_wen import NO_FRICTION, advance_bouc_wen, xi_rate
+from wear.joints.jenkins import advance_jenkins
+from wear.joints.masing import DEPTH, DISPLACEMENT, POINTS, advance_masing, turns
 
 JENKINS, BOUC_WEN = 0.0, 1.0
 """First parameter of a joint with one number of memory; K, kr, µN, n and 2 σ - 1 follow."""

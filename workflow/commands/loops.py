@@ -9,7 +9,7 @@ import numpy as np
 
 from sa_solver.types import Array
 from wear.joints.loop_record import MeasuredLoopError
-from wear.joints.measured_loops import Estimate, MeasuredLoops, estimate, measure_loops
+from wear.joints.measured_loops import MeanEstimate, MeasuredLoops, mean_estimate, measure_loops
 from workflow.analyses.wear.loop_table import write_table
 from workflow.case.units import UnitError, to_base
 from workflow.commands.loop_file import BASE_UNITS, LoopFile, read_loop_file
@@ -91,7 +91,7 @@ def report(found: MeasuredLoops) -> list[str]:
     return [*lines, *_notes(found)]
 
 
-def _shown(found: MeasuredLoops) -> dict[str, tuple[Array, Estimate]]:
+def _shown(found: MeasuredLoops) -> dict[str, tuple[Array, MeanEstimate]]:
     """Values ``(c,)`` and their mean, by heading."""
     per_micron = 1e-3
     stick = found.stick_estimate
@@ -100,7 +100,7 @@ def _shown(found: MeasuredLoops) -> dict[str, tuple[Array, Estimate]]:
         "energy [mJ]": _with_mean(found.energy),
         "kt [N/um]": (
             found.stick_stiffness * per_micron,
-            Estimate(stick.value * per_micron, stick.error * per_micron),
+            MeanEstimate(stick.value * per_micron, stick.error * per_micron),
         ),
     }
     if found.slides:
@@ -114,8 +114,8 @@ def _shown(found: MeasuredLoops) -> dict[str, tuple[Array, Estimate]]:
     return columns
 
 
-def _with_mean(values: Array) -> tuple[Array, Estimate]:
-    return values, estimate(values)
+def _with_mean(values: Array) -> tuple[Array, MeanEstimate]:
+    return values, mean_estimate(values)
 
 
 def _few(count: int) -> list[int]:

@@ -18,8 +18,9 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from sa_solver.errors import FretscaleError
 from workflow.case.sections import Case
-from workflow.errors import FretscaleError, MethodFailed, one_line
+from workflow.errors import MethodFailed, one_line
 from workflow.kinds import load_case
 from workflow.runs.run import bring_to_end
 from workflow.shell.folder import OutputFolder

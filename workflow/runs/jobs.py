@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from workflow.case.sections import Case
-from workflow.errors import FretscaleError, one_line
+from workflow.errors import Ending, one_line
 from workflow.runs.cluster import run_on_cluster
 from workflow.runs.job import Finished, Job, finished, run_job
 from workflow.runs.run import kept_in
@@ -53,7 +53,7 @@ def run_jobs(
     for job in jobs:
         try:
             case = job.load()
-        except FretscaleError as error:
+        except Ending as error:
             end(job, one_line(error))
             continue
         if kept_in(out / job.name, case) == "finished":

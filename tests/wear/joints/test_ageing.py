@@ -19,7 +19,7 @@ from wear.joints.ageing import (
     steady_stroke,
 )
 from wear.joints.bouc_wen import BoucWen
-from wear.joints.evolution import JointEvolution, Linear, Table
+from wear.joints.evolution import JointEvolution, LinearEvolution, TabulatedEvolution
 from wear.joints.iwan import UniformIwan
 from wear.joints.jenkins import Jenkins
 
@@ -127,7 +127,9 @@ def test_a_joint_that_wears_until_nothing_slides(power) -> None:
 def test_preload_worn_to_nothing_ends_the_ageing() -> None:
     """A Jenkins joint that stops where 4 µN (A - µN/kt) does, N falling to 0 at 1 kJ."""
     joint = Jenkins(stiffness=1e5, friction=0.5, normal_load=100.0)
-    test = long_test(steady_stroke(joint, JointEvolution(normal_load=Linear(-1.0 / KJ)), 0.01), 3e7)
+    test = long_test(
+        steady_stroke(joint, JointEvolution(normal_load=LinearEvolution(-1.0 / KJ)), 0.01), 3e7
+    )
     assert test.final_energy == pytest.approx(KJ, rel=1e-6)
     assert test.error <= 30.0
 
@@ -162,7 +164,7 @@ def test_an_energy_that_is_never_reached_is_told() -> None:
 def test_kinks_that_are_named_cost_nothing() -> None:
     """A table's kinks: the count of every straight stretch is a logarithm."""
     joint = Jenkins(stiffness=1e9, friction=1.0, normal_load=1.0)
-    table = Table((0.0, 1e4, 3e4), (1.0, 3.0, 2.0))
+    table = TabulatedEvolution((0.0, 1e4, 3e4), (1.0, 3.0, 2.0))
     evolution = JointEvolution(normal_load=table)
     rate = steady_stroke(joint, evolution, 0.5)
     named = long_test(rate, 4e4, tolerance=1e-9, breaks=evolution.breaks)

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from wear.joints.bouc_wen import BoucWen
 from wear.joints.iwan import UniformIwan
-from wear.joints.law import march
+from wear.joints.law import march_joints
 
 LAW = BoucWen(stiffness=40e3, friction=0.5, normal_load=60.0, residual_stiffness=900.0)
 LIMIT, SPRING = 30.0, 40e3 - 900.0
@@ -29,7 +29,7 @@ SHAPES = [
 def lead(law, displacement, state=None, start=0.0):
     path = np.asarray(displacement, float)[:, None, None]
     state = law.rest(1) if state is None else state
-    return march(law, state, np.full((1, 1), start), path)
+    return march_joints(law, state, np.full((1, 1), start), path)
 
 
 @pytest.mark.parametrize("exponent", [1.0, 2.0])

@@ -8,22 +8,22 @@ import pytest
 from sa_solver.types import Array
 from tests.wear.joints.papers import BOLTED, KJ, RIG, RIG_EVOLUTION, J
 from wear.joints.evolution import (
-    Arrhenius,
-    Exponentials,
+    ArrheniusEvolution,
+    ExponentialEvolution,
     JointEvolution,
-    Linear,
-    Logarithmic,
-    Table,
+    LinearEvolution,
+    LogarithmicEvolution,
+    TabulatedEvolution,
 )
 
 FORMS = [
-    Logarithmic(0.26, 1.3e6),
-    Arrhenius(1.32, 150e3),
-    Linear(2.4e-7),
-    Exponentials(0.72, -3e-7),
-    Exponentials(1.31, -3e-7, 0.8, -5e-6),
+    LogarithmicEvolution(0.26, 1.3e6),
+    ArrheniusEvolution(1.32, 150e3),
+    LinearEvolution(2.4e-7),
+    ExponentialEvolution(0.72, -3e-7),
+    ExponentialEvolution(1.31, -3e-7, 0.8, -5e-6),
 ]
-TABLE = Table((1e3, 3e3, 4e3), (10.0, 30.0, 5.0))
+TABLE = TabulatedEvolution((1e3, 3e3, 4e3), (10.0, 30.0, 5.0))
 
 
 @dataclass(frozen=True)
@@ -61,19 +61,19 @@ def test_forms_say_what_the_papers_write() -> None:
 
 
 def test_forms_end_where_they_must() -> None:
-    assert Arrhenius(1.32, 150e3)(1e12) == pytest.approx(2.32, rel=1e-6)
-    assert Exponentials(1.31, -3e-7, 0.8, -5e-6)(1e12) == pytest.approx(1.31, rel=1e-12)
+    assert ArrheniusEvolution(1.32, 150e3)(1e12) == pytest.approx(2.32, rel=1e-6)
+    assert ExponentialEvolution(1.31, -3e-7, 0.8, -5e-6)(1e12) == pytest.approx(1.31, rel=1e-12)
 
 
 @pytest.mark.parametrize(
     ("make", "complaint"),
     [
-        (lambda: Logarithmic(0.2, -1.0), "rate = -1"),
-        (lambda: Arrhenius(0.2, 0.0), "scale = 0"),
-        (lambda: Exponentials(0.7, 0.3), "rate = 0.3"),
-        (lambda: Exponentials(0.7, -0.3, 0.5, 5.0), "second_rate = 5"),
-        (lambda: Table((), ()), "0 energies and 0 factors"),
-        (lambda: Table((1.0, 1.0), (1.0, 2.0)), "do not ascend"),
+        (lambda: LogarithmicEvolution(0.2, -1.0), "rate = -1"),
+        (lambda: ArrheniusEvolution(0.2, 0.0), "scale = 0"),
+        (lambda: ExponentialEvolution(0.7, 0.3), "rate = 0.3"),
+        (lambda: ExponentialEvolution(0.7, -0.3, 0.5, 5.0), "second_rate = 5"),
+        (lambda: TabulatedEvolution((), ()), "0 energies and 0 factors"),
+        (lambda: TabulatedEvolution((1.0, 1.0), (1.0, 2.0)), "do not ascend"),
     ],
 )
 def test_what_makes_no_sense_is_refused(make, complaint) -> None:
@@ -86,14 +86,14 @@ def test_a_table_is_linear_and_constant_beyond_its_ends() -> None:
     np.testing.assert_allclose(TABLE(energy), [10.0, 10.0, 20.0, 30.0, 17.5, 5.0, 5.0])
     inside = TABLE(np.linspace(1e3, 3e3, 101))
     assert np.all(np.diff(inside) > 0.0)  # as monotone as its values
-    assert Table((0.0,), (7.0,))(123.0) == 7.0
+    assert TabulatedEvolution((0.0,), (7.0,))(123.0) == 7.0
 
 
 # --- a law that follows -------------------------------------------------------------------------
 
 
 def test_factors_multiply_and_tables_replace() -> None:
-    evolution = JointEvolution(friction=Linear(1e-3), normal_load=TABLE)
+    evolution = JointEvolution(friction=LinearEvolution(1e-3), normal_load=TABLE)
     law = evolution.at(Law(), 2e3)
     assert law == Law(friction=1.5, normal_load=20.0)
     assert type(law.friction) is float
@@ -102,7 +102,7 @@ def test_factors_multiply_and_tables_replace() -> None:
 
 
 def test_every_joint_has_an_energy_of_its_own() -> None:
-    evolution = JointEvolution(friction=Linear(1e-3), normal_load=TABLE)
+    evolution = JointEvolution(friction=LinearEvolution(1e-3), normal_load=TABLE)
     energy = np.array([0.0, 1e3, 2e3])
     law = evolution.at(Law(), energy)
     np.testing.assert_allclose(law.friction, [0.5, 1.0, 1.5])
@@ -115,19 +115,19 @@ def test_every_joint_has_an_energy_of_its_own() -> None:
 
 
 def test_what_is_worn_to_nothing_stays_so() -> None:
-    law = JointEvolution(normal_load=Linear(-1e-3)).at(Law(), 5e3)
+    law = JointEvolution(normal_load=LinearEvolution(-1e-3)).at(Law(), 5e3)
     assert law.normal_load == 0.0
 
 
 def test_a_law_without_the_parameter_is_refused() -> None:
     with pytest.raises(ValueError, match="Law has no residual_stiffness that could evolve"):
-        JointEvolution(residual_stiffness=Linear(1.0)).at(Law(), 1.0)
+        JointEvolution(residual_stiffness=LinearEvolution(1.0)).at(Law(), 1.0)
 
 
 def test_kinks_are_those_of_the_tables() -> None:
-    tables = JointEvolution(friction=Table((0.0, 3e3), (0.1, 0.2)), normal_load=TABLE)
+    tables = JointEvolution(friction=TabulatedEvolution((0.0, 3e3), (0.1, 0.2)), normal_load=TABLE)
     assert tables.breaks == (0.0, 1e3, 3e3, 4e3)
-    assert JointEvolution(friction=Linear(1.0)).breaks == ()
+    assert JointEvolution(friction=LinearEvolution(1.0)).breaks == ()
 
 
 # --- the papers ---------------------------------------------------------------------------------
@@ -146,7 +146,7 @@ def test_rig_as_printed() -> None:
 def test_macroslip_slope_per_joule_would_pass_the_stiffness() -> None:
     """The misprint: as printed, 2800 J are impossible; per kJ the slope grows to 1.47 N/µm."""
     assert RIG_EVOLUTION.at(RIG, 2800.0 * J).residual_stiffness == pytest.approx(1471.0, abs=1.0)
-    printed = replace(RIG_EVOLUTION, residual_stiffness=Linear(0.24 / J))
+    printed = replace(RIG_EVOLUTION, residual_stiffness=LinearEvolution(0.24 / J))
     values = printed.values(RIG, np.array([200.0, 220.0, 2800.0]) * J)
     passed = values["residual_stiffness"] > values["stiffness"]
     np.testing.assert_array_equal(passed, [False, True, True])

@@ -10,8 +10,8 @@ import pytest
 from numba import njit
 from scipy.integrate import quad, solve_ivp
 
-from wear.joints.friction_contact import FrictionContact, advance
-from wear.joints.law import march
+from wear.joints.friction_contact import FrictionContact, advance_contact
+from wear.joints.law import march_joints
 from wear.joints.parameters import JointError
 
 KT, KN, MU, LOAD = 10.0, 13.0, 0.6, 2.0
@@ -29,7 +29,7 @@ def one(law, state, increment):
 def derivative(law, state, increment):
     """Force and its derivative with respect to state and increment, from the scalar kernel."""
     force, end, jacobian = np.empty(3), np.empty(3), np.empty((3, 6))
-    advance(law.parameters[0], np.asarray(state, float), increment, force, end, jacobian)
+    advance_contact(law.parameters[0], np.asarray(state, float), increment, force, end, jacobian)
     return force, jacobian
 
 
@@ -53,7 +53,7 @@ def random_path(seed, points, size=3.0 * REACH, lift=1.6 * LIFT):
 def lead(law, path, state=None, start=(0.0, 0.0, 0.0)):
     """March one joint through ``path`` ``(t, 3)``."""
     state = law.rest(1) if state is None else np.atleast_2d(state)
-    return march(law, state, np.array([start]), path[:, None, :])
+    return march_joints(law, state, np.array([start]), path[:, None, :])
 
 
 def split(path, parts):
@@ -377,7 +377,7 @@ def test_derivative_of_a_whole_march():
     directional, end = [], np.empty(3)
     for increment, further in zip(np.diff(path, axis=0), np.diff(change, axis=0), strict=True):
         force, jacobian = np.empty(3), np.empty((3, 6))
-        advance(LAW.parameters[0], state, increment, force, end, jacobian)
+        advance_contact(LAW.parameters[0], state, increment, force, end, jacobian)
         slope = jacobian @ np.concatenate([moved, further])
         moved = np.array([slope[0] / KT, slope[1] / KT, moved[2] + further[2]])
         directional.append(slope)
@@ -551,7 +551,7 @@ def compiled_march(parameters, state, increments, forces):
     """A march in one compiled loop, the state advanced in place."""
     lost, jacobian = 0.0, np.empty((3, 6))
     for step in range(len(increments)):
-        lost += advance(parameters, state, increments[step], forces[step], state, jacobian)
+        lost += advance_contact(parameters, state, increments[step], forces[step], state, jacobian)
     return lost
 
 

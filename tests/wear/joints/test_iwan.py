@@ -7,7 +7,7 @@ import pytest
 
 from wear.joints.iwan import FourParameterIwan, UniformIwan
 from wear.joints.jenkins import Jenkins
-from wear.joints.law import march
+from wear.joints.law import march_joints
 from wear.joints.masing import MasingLaw
 
 STIFFNESS, FRICTION, LOAD, RESIDUAL = 100e3, 0.3, 700.0, 2e3
@@ -33,7 +33,7 @@ class MasingJenkins(MasingLaw):
 def lead(law, displacement, state=None, start=0.0):
     path = np.asarray(displacement, float)[:, None, None]
     state = law.rest(1) if state is None else state
-    return march(law, state, np.full((1, 1), start), path)
+    return march_joints(law, state, np.full((1, 1), start), path)
 
 
 def force_at(law, displacement):
@@ -132,7 +132,7 @@ def test_many_sliders_approach_the_law_at_second_order(law):
         stiffness, reach = sliders(law, number)
         bank = Jenkins(stiffness, 1.0, stiffness * reach)
         n = len(stiffness)
-        history = march(
+        history = march_joints(
             bank, bank.rest(n), np.zeros((n, 1)), np.tile(path[:, None, None], (1, n, 1))
         )
         force = history.force.sum(axis=1)[:, 0] + RESIDUAL * path

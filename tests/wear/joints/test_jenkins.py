@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from wear.joints.jenkins import Jenkins
-from wear.joints.law import march
+from wear.joints.law import march_joints
 
 LAW = Jenkins(stiffness=40e3, friction=0.5, normal_load=60.0, residual_stiffness=900.0)
 REACH = 0.5 * 60.0 / 40e3
@@ -20,7 +20,7 @@ def cycle(amplitude):
 @pytest.mark.parametrize("amplitude", AMPLITUDES)
 def test_energy_of_a_loop(amplitude):
     exact = max(4.0 * 30.0 * (amplitude - REACH), 0.0)
-    history = march(LAW, LAW.rest(1), np.zeros((1, 1)), cycle(amplitude))
+    history = march_joints(LAW, LAW.rest(1), np.zeros((1, 1)), cycle(amplitude))
     assert history.dissipated[1:].sum() == pytest.approx(exact, rel=1e-12)
     assert LAW.loop_energy(amplitude) == pytest.approx(exact, rel=1e-12)
 
@@ -31,7 +31,7 @@ def test_first_harmonic_is_that_of_the_loop(amplitude):
     # the stretches over which Gauss's rule is spectrally exact.
     points, weights = np.polynomial.legendre.leggauss(30)
     switch = np.arccos(max(1.0 - 2.0 * REACH / amplitude, -1.0))
-    state = march(LAW, LAW.rest(1), np.zeros((1, 1)), cycle(amplitude)).state
+    state = march_joints(LAW, LAW.rest(1), np.zeros((1, 1)), cycle(amplitude)).state
     cosine = sine = 0.0
     for begin, end in ((0.0, switch), (switch, np.pi)):
         angles = begin + 0.5 * (end - begin) * (1.0 + points)

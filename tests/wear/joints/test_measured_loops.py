@@ -13,9 +13,9 @@ from sa_solver.types import Material
 from wear.joints.bouc_wen import BoucWen
 from wear.joints.iwan import UniformIwan
 from wear.joints.jenkins import Jenkins
-from wear.joints.law import march
+from wear.joints.law import march_joints
 from wear.joints.loop_record import reversals
-from wear.joints.measured_loops import MeasuredLoopError, estimate, measure_loops
+from wear.joints.measured_loops import MeasuredLoopError, mean_estimate, measure_loops
 
 STIFFNESS, RESIDUAL, FRICTION, LOAD = 60e3, 900.0, 0.9, 60.0
 LIMIT = FRICTION * LOAD
@@ -42,7 +42,7 @@ def triangular(amplitude, samples, cycles):
 
 
 def forces(law, displacement):
-    marched = march(law, law.rest(1), np.zeros((1, 1)), displacement[:, None, None])
+    marched = march_joints(law, law.rest(1), np.zeros((1, 1)), displacement[:, None, None])
     return marched.force[:, 0, 0]
 
 
@@ -99,10 +99,10 @@ def test_noisy_loops_give_friction_and_stiffness_within_a_percent(name, seed, no
     assert stick.value == pytest.approx(STICK[name], rel=0.01)
     assert stick.error < 0.005 * stick.value
     assert abs(stick.value - STICK[name]) < 4.0 * stick.error
-    assert estimate(found.friction).value == pytest.approx(FRICTION, rel=0.01)
+    assert mean_estimate(found.friction).value == pytest.approx(FRICTION, rel=0.01)
     # Of the height of a loop, 1 % is what kr may be wrong by over the stroke.
     allowed = 0.01 * 2.0 * LIMIT / (2.0 * AMPLITUDE)
-    assert estimate(found.residual_stiffness).value == pytest.approx(RESIDUAL, abs=allowed)
+    assert mean_estimate(found.residual_stiffness).value == pytest.approx(RESIDUAL, abs=allowed)
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -118,7 +118,7 @@ def test_errors_are_as_large_as_stated(name):
 def test_energy_is_that_dissipated(name):
     displacement = harmonic(AMPLITUDE, 4000, 3)
     law = LAWS[name]
-    marched = march(law, law.rest(1), np.zeros((1, 1)), displacement[:, None, None])
+    marched = march_joints(law, law.rest(1), np.zeros((1, 1)), displacement[:, None, None])
     found = measure_loops(displacement, marched.force[:, 0, 0])
     for energy, (begin, _, end) in zip(found.energy, found.reversals, strict=True):
         # Trapezoids of the step: second order, 4e-7 of a loop here, and more at Jenkins's corners.
@@ -128,7 +128,7 @@ def test_energy_is_that_dissipated(name):
 
 def test_noise_does_not_bias_the_energy():
     exact, found = loops("jenkins", cycles=3), loops("jenkins", 1, 0.01)
-    measured = estimate(found.energy)
+    measured = mean_estimate(found.energy)
     assert measured.value == pytest.approx(exact.energy[0], abs=4.0 * measured.error)
     assert measured.error < 2e-3 * measured.value
 
@@ -166,13 +166,13 @@ def test_stuck_and_partly_slipping_loops_say_so():
             with pytest.raises(MeasuredLoopError, match=r"lower bound of 0.* larger stroke"):
                 _ = found.friction
             bound = (LIMIT * share * (2.0 - share) + RESIDUAL * amplitude) / LOAD
-            assert estimate(found.mobilised).value == pytest.approx(bound, rel=0.01)
+            assert mean_estimate(found.mobilised).value == pytest.approx(bound, rel=0.01)
 
 
 def test_barely_sliding_loops_are_found():
     found = loops("jenkins", 0, amplitude=1.5 * LIMIT / STIFFNESS)
     assert found.slides
-    assert estimate(found.friction).value == pytest.approx(FRICTION, rel=0.01)
+    assert mean_estimate(found.friction).value == pytest.approx(FRICTION, rel=0.01)
 
 
 def test_normal_load_is_the_mean_of_each_cycle():
@@ -220,7 +220,7 @@ def test_uneven_times_are_evened():
     displacement = AMPLITUDE * np.sin(2.0 * np.pi * time)
     found = measure_loops(displacement, forces(LAWS["iwan"], displacement), LOAD, time)
     assert found.stick_estimate.value == pytest.approx(STICK["iwan"], rel=0.01)
-    assert estimate(found.friction).value == pytest.approx(FRICTION, rel=1e-3)
+    assert mean_estimate(found.friction).value == pytest.approx(FRICTION, rel=1e-3)
 
 
 def test_displacement_may_drift():
@@ -229,7 +229,7 @@ def test_displacement_may_drift():
     drift = AMPLITUDE * np.linspace(0.0, 1.0, len(force))
     found = measure_loops(displacement + drift, force, LOAD)
     assert len(found.energy) >= 29
-    assert estimate(found.friction).value == pytest.approx(FRICTION, rel=0.01)
+    assert mean_estimate(found.friction).value == pytest.approx(FRICTION, rel=0.01)
     assert found.stick_estimate.value == pytest.approx(STICK["jenkins"], rel=0.01)
 
 
@@ -262,8 +262,8 @@ def test_a_motion_that_is_not_harmonic_is_not_smoothed_away() -> None:
     law = Jenkins(stiffness=3e4, friction=0.1, normal_load=60.0)
     angle = np.linspace(0.0, 6.0 * np.pi, 3001)
     moved = 0.012 * (np.cos(angle) + 0.003 * np.cos(25.0 * angle))
-    settled = march(law, law.rest(1), np.zeros((1, 1)), moved[:1000, None, None])
-    cycles = march(law, settled.state, moved[999:1000, None], moved[1000:, None, None])
+    settled = march_joints(law, law.rest(1), np.zeros((1, 1)), moved[:1000, None, None])
+    cycles = march_joints(law, settled.state, moved[999:1000, None], moved[1000:, None, None])
     found = measure_loops(moved[1000:], cycles.force[:, 0, 0], 60.0)
     assert found.stick_estimate.value == pytest.approx(3e4, rel=1e-3)
     assert np.mean(found.friction) == pytest.approx(0.1, rel=1e-3)

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from wear.joints.bouc_wen import BoucWen
 from wear.joints.iwan import FourParameterIwan, UniformIwan
 from wear.joints.jenkins import Jenkins
-from wear.joints.law import march
+from wear.joints.law import march_joints
 from wear.joints.parameters import JointError
 
 # One friction limit of 30 N, reached after about 1 µm.
@@ -40,7 +40,7 @@ def tolerance(law):
 def lead(law, displacement, state=None, start=0.0):
     path = np.asarray(displacement, float)[:, None, None]
     state = law.rest(1) if state is None else state
-    return march(law, state, np.full((1, 1), start), path)
+    return march_joints(law, state, np.full((1, 1), start), path)
 
 
 def force_after(law, state, increment):
@@ -172,7 +172,7 @@ def test_joints_side_by_side_are_joints_alone(law):
     scales = np.array([0.1, 1.0, 3.0, 0.0])
     path = np.random.default_rng(RNG_SEED).uniform(-1.0, 1.0, (40, 1, 4)) * scales * REACH
     path[20:, :, 1] = path[19, :, 1]
-    together = march(several, several.rest(4), np.zeros((4, 1)), path.transpose(0, 2, 1))
+    together = march_joints(several, several.rest(4), np.zeros((4, 1)), path.transpose(0, 2, 1))
     for j in range(4):
         alone = replace(law, normal_load=loads[j], friction=frictions[j])
         single = lead(alone, path[:, 0, j])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from wear.joints.jenkins import Jenkins
-from wear.joints.law import march
+from wear.joints.law import march_joints
 from wear.joints.parallel import ParallelSliders
 from wear.joints.parameters import JointError
 from wear.joints.periodic import SLIP, STICK, PeriodicMarch
@@ -33,7 +33,7 @@ def test_they_are_the_sum_of_joints_with_the_same_motion():
 def test_forces_are_those_of_the_law_itself():
     joint = ParallelSliders(SLIDERS).settle(MOTION, BASIS, WEIGHTS)
     path = np.tile((BASIS @ MOTION[0])[:, None], (2, 4, 1))
-    history = march(SLIDERS, SLIDERS.rest(4), np.zeros((4, 1)), path)
+    history = march_joints(SLIDERS, SLIDERS.rest(4), np.zeros((4, 1)), path)
     force = history.force[SAMPLES:].sum(axis=1)
     np.testing.assert_allclose(joint.samples[:, 0], force, atol=1e-12)
 

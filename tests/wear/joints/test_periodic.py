@@ -11,7 +11,7 @@ from wear.joints.bouc_wen import BoucWen
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.iwan import FourParameterIwan, UniformIwan
 from wear.joints.jenkins import Jenkins
-from wear.joints.law import march
+from wear.joints.law import march_joints
 from wear.joints.parameters import JointError
 from wear.joints.periodic import SEPARATED, SLIP, STICK, PeriodicMarch
 
@@ -161,7 +161,9 @@ def test_settled_cycle_is_the_one_that_many_periods_lead_to(name):
     before = (lead @ motion).transpose(1, 0, 2)
     periods = 40
     rest = np.zeros_like(way[0])
-    history = march(law, law.rest(len(motion)), rest, np.vstack([before[:-1], *[way] * periods]))
+    history = march_joints(
+        law, law.rest(len(motion)), rest, np.vstack([before[:-1], *[way] * periods])
+    )
     # Bouc-Wen's joint forgets by shares, not at once.
     scale = np.abs(history.force).max()
     np.testing.assert_allclose(cycle.samples, history.force[-64:], atol=1e-9 * scale)
@@ -244,7 +246,7 @@ def test_slow_forgetting_is_not_waited_for():
     state = law.respond(state, motion[:, 0]).state
     here = motion[:, 0]
     for _ in range(3000):
-        history = march(law, state, here, way)
+        history = march_joints(law, state, here, way)
         state, here = history.state, way[-1]
     # Across the motion the stretch decays like exp(-0.04 n).
     np.testing.assert_allclose(cycle.samples[:, 0], history.force[:, 0], atol=1e-9 * MU * LOAD)

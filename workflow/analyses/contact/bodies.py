@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from sa_solver.half_space import HalfSpace
-from sa_solver.history import LoadPath
+from sa_solver.history import ContactLoadPath
 from sa_solver.types import Array, ElasticPair, Grid, Material
 from workflow.analyses.contact.case import (
     Body,
@@ -76,9 +76,9 @@ def _material(body: Body) -> Material:
     return RIGID if body == "rigid" else body.elastic()
 
 
-def path_of(case: ContactCase | LineContactCase, table: LoadTable) -> LoadPath:
+def path_of(case: ContactCase | LineContactCase, table: LoadTable) -> ContactLoadPath:
     """The path as the solver marches it."""
-    return LoadPath(table.imposed, table.is_motion, bulk_strain(table, bodies_of(case)))
+    return ContactLoadPath(table.imposed, table.is_motion, bulk_strain(table, bodies_of(case)))
 
 
 def bulk_strain(table: LoadTable, bodies: tuple[Material, Material]) -> Array:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from sa_solver.contact import ContactState
-from sa_solver.coupled import CoupledContactError
-from sa_solver.history import History, HistoryError, march
-from sa_solver.normal import NormalContactError
-from sa_solver.tangential import TangentialContactError
+from sa_solver.errors import ContactProblemError
+from sa_solver.history import History, HistoryError, march_history
 from workflow.analyses.contact.bodies import bodies_of, grid_of, half_space_of, height_of, path_of
 from workflow.analyses.contact.case import ContactCase, LineContactCase
 from workflow.analyses.contact.results import (
@@ -17,9 +15,6 @@ from workflow.analyses.contact.results import (
 from workflow.errors import MethodFailed, UserError
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
-
-# Loads that the contact cannot carry.
-IMPOSSIBLE = (NormalContactError, TangentialContactError, CoupledContactError)
 
 
 def run_contact(
@@ -61,7 +56,7 @@ def _march(
             )
 
         try:
-            history = march(
+            history = march_history(
                 half_space,
                 height,
                 path_of(case, table),
@@ -73,7 +68,7 @@ def _march(
             )
         except HistoryError as error:
             raise UserError(f"{folder.case}: contact.history: {error}") from error
-        except IMPOSSIBLE as error:
+        except ContactProblemError as error:
             reached = max(passed, default=-1) + 1
             message = f"after increment {reached} of {len(table)}: {error}"
             history = History(list(passed.values()), list(passed), "full", "ended early")

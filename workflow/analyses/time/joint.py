@@ -17,7 +17,7 @@ from wear.joints.ageing import (
     long_test,
     steady_stroke,
 )
-from wear.joints.law import march
+from wear.joints.law import march_joints
 from wear.joints.measured_loops import MeasuredLoopError, measure_loops
 from workflow.analyses.rig.laws import Law
 from workflow.analyses.time.case import Ageing, JointCase, joules
@@ -83,8 +83,8 @@ def steady_loop(law: Law, amplitude: float) -> tuple[Array, Array, float]:
     moved = amplitude * np.cos(phase)[:, None, None]
     settling = np.array([amplitude, *[-amplitude, amplitude] * SETTLING])[:, None, None]
     begin = np.zeros((1, 1))
-    settled = march(law, law.rest(1), begin, settling)
-    cycle = march(law, settled.state, settling[-1], moved)
+    settled = march_joints(law, law.rest(1), begin, settling)
+    cycle = march_joints(law, settled.state, settling[-1], moved)
     return moved[:, 0, 0], cycle.force[:, 0, 0], float(cycle.dissipated.sum())
 
 

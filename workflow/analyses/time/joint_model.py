@@ -71,14 +71,16 @@ def _evolution(case: TimeCase) -> JointEvolution:
 def _function(factor: given.Factor, initial: float) -> WearFunction:
     """A factor of a parameter that begins with an ``initial`` value."""
     if isinstance(factor, given.Logarithmic):
-        return forms.Logarithmic(factor.change, factor.rate)
+        return forms.LogarithmicEvolution(factor.change, factor.rate)
     if isinstance(factor, given.Arrhenius):
-        return forms.Arrhenius(factor.change, factor.scale)
+        return forms.ArrheniusEvolution(factor.change, factor.scale)
     if isinstance(factor, given.Linear):
-        return forms.Linear(factor.slope)
+        return forms.LinearEvolution(factor.slope)
     if isinstance(factor, given.Exponential):
-        return forms.Exponentials(factor.final, -factor.rate, factor.share, -factor.second_rate)
-    return forms.Table(factor.energy, tuple(initial * own for own in factor.factor))
+        return forms.ExponentialEvolution(
+            factor.final, -factor.rate, factor.share, -factor.second_rate
+        )
+    return forms.TabulatedEvolution(factor.energy, tuple(initial * own for own in factor.factor))
 
 
 def _measured(file: str, case: TimeCase) -> dict[str, WearFunction]:
@@ -95,8 +97,8 @@ def _measured(file: str, case: TimeCase) -> dict[str, WearFunction]:
         beside = getattr(case.joint, "residual_stiffness", 0.0)
     try:
         return {
-            "friction": forms.Table(energy, tuple(table.mu.tolist())),
-            "stiffness": forms.Table(energy, tuple((table.kt - beside).tolist())),
+            "friction": forms.TabulatedEvolution(energy, tuple(table.mu.tolist())),
+            "stiffness": forms.TabulatedEvolution(energy, tuple((table.kt - beside).tolist())),
         }
     except ValueError as error:
         raise UserError(f"{file}: {error}") from error

@@ -23,7 +23,7 @@ from wear.steppers import (
     Implicit,
     SecondOrder,
     Stepper,
-    advance,
+    advance_cycles,
     first_cycles,
 )
 from wear.stepping import WearState
@@ -77,7 +77,7 @@ def wear_half_space(case: VibrationWearCase, reporter: Reporter) -> VibrationWea
             with reporter.stage("wear"):
                 while cycles - done > ROUNDING * cycles:
                     most = contact.alike_cycles(state, cycles - done, FRICTION_CHANGE)
-                    worn = advance(stepper, state, most, total - done, contact.wearing)
+                    worn = advance_cycles(stepper, state, most, total - done, contact.wearing)
                     state, done, steps = worn.state, done + most, steps + worn.steps
             done = cycles
             states.append(keeper.keep(state, cycles, steps))

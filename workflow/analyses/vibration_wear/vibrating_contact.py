@@ -19,8 +19,8 @@ from fe_models.dynamics.receptance import Receptance
 from sa_solver.contact import FrictionalContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
-from sa_solver.partial_slip import PartialSlip, PartialSlipError, partial_slip
-from sa_solver.tangential_loop import LoopFailure, LoopPath, TangentialLoop, tangential_loop
+from sa_solver.partial_slip import PartialSlip, PartialSlipError, partial_slip_curve
+from sa_solver.tangential_loop import LoopFailure, LoopPath, TangentialLoop, march_loop
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
 from wear.joints.jenkins import Jenkins
 from wear.joints.parallel import ParallelSliders
@@ -162,7 +162,7 @@ class VibratingContact:
         contact = FrictionalContact(half_space, rubbing.friction, tolerance)
         path = LoopPath(self.load, amplitude, increments=LOOP_INCREMENTS)
         try:
-            return tangential_loop(contact, rubbing.state.surfaces.gap, path)
+            return march_loop(contact, rubbing.state.surfaces.gap, path)
         except LoopFailure as error:
             raise ContactFailure(f"tangential loop: {error}") from error
 
@@ -171,7 +171,7 @@ class VibratingContact:
         tolerance = self._case.contact.tolerance
         start = state.starts.get(0)
         try:
-            slipping = partial_slip(
+            slipping = partial_slip_curve(
                 self._contact, state.surfaces.gap, self.load, tolerance=tolerance, start=start
             )
         except (PartialSlipError, LoopFailure) as error:

@@ -15,15 +15,15 @@ import h5py
 import numpy as np
 
 from sa_solver.contact import FrictionalContact
+from sa_solver.errors import ContactProblemError
 from sa_solver.tangential_loop import (
     CLOSED,
     MOST_CYCLES,
     LoopFailure,
     LoopPath,
-    tangential_loop,
+    march_loop,
 )
 from sa_solver.types import Array
-from wear.full_cycle import IMPOSSIBLE
 from wear.stepping import ContactFailure
 from workflow.analyses.wear.case.loops import Loops
 from workflow.analyses.wear.loop_table import COLUMNS, write_table
@@ -76,8 +76,8 @@ def worn_loop(
     """
     path = loop_path(loops, name, state, peak)
     try:
-        loop = tangential_loop(contact, state.surfaces.gap, path)
-    except (LoopFailure, *IMPOSSIBLE) as error:
+        loop = march_loop(contact, state.surfaces.gap, path)
+    except (LoopFailure, ContactProblemError) as error:
         raise ContactFailure(
             f"tangential loop: {error}; allowed: lower loops.force or loops.amplitude"
         ) from error

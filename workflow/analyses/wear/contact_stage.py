@@ -13,7 +13,7 @@ from sa_solver.contact import ContactState, FrictionalContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
-from wear.full_cycle import full_cycle
+from wear.full_cycle import march_cycle
 from wear.moving import followed, passages
 from wear.steppers import (
     ErrorControl,
@@ -21,7 +21,7 @@ from wear.steppers import (
     Implicit,
     SecondOrder,
     Stepper,
-    advance,
+    advance_cycles,
     first_cycles,
 )
 from wear.stepping import CycleResult, SlidingCycle, Starts, WearingContact, WearState
@@ -197,7 +197,7 @@ class ContactStage:
     ) -> tuple[InterfaceState, Spent]:
         """Wear ``cycles`` of the ``left`` cycles of the run; also what it took."""
         before = self._spent
-        result = advance(self._stepper, state, cycles, left, self._contact_at)
+        result = advance_cycles(self._stepper, state, cycles, left, self._contact_at)
         after = result.state
         assert isinstance(after, InterfaceState)
         # Friction of the half-space on the new surfaces: for the record now, to wear by next.
@@ -336,7 +336,7 @@ class ContactStage:
         """The closed cycle with the half-space's own friction, on the present surfaces."""
         gaps = np.stack([sliding.gap(state.surfaces, t) for t in range(len(state.loads))])
         motion = state.slip.mean(axis=2) if self._contact_face.driven else None
-        cycle = tuple(full_cycle(self._rubbed(friction), gaps, state.loads, motion))
+        cycle = tuple(march_cycle(self._rubbed(friction), gaps, state.loads, motion))
         self._spent += Spent(len(cycle), sum(own.convolutions for own in cycle))
         return cycle
 

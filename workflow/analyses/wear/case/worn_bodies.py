@@ -33,12 +33,12 @@ class Worn(Section):
 
     def described(self) -> WearLaw:
         """As the wear steps take it."""
-        from wear.laws import Evolving
+        from wear.laws import EvolvingLaw
 
         law = self._base()
         if self.evolution is None:
             return law
-        return Evolving(law, self.evolution.described(), self.evolution.scope)
+        return EvolvingLaw(law, self.evolution.described(), self.evolution.scope)
 
     @abstractmethod
     def _base(self) -> WearLaw:
@@ -61,9 +61,9 @@ class WornByEnergy(Worn, EnergyBody):
     law: Literal["energy"] = entry("of this body; without it wear.law", "energy", default=None)
 
     def _base(self) -> WearLaw:
-        from wear.laws import Energy
+        from wear.laws import EnergyLaw
 
-        return Energy(self.coefficient)
+        return EnergyLaw(self.coefficient)
 
 
 class WornByEnergyAmplitude(Worn, EnergyBody):
@@ -79,10 +79,10 @@ class WornByEnergyAmplitude(Worn, EnergyBody):
     )
 
     def _base(self) -> WearLaw:
-        from wear.laws import EnergyAmplitude
+        from wear.laws import EnergyAmplitudeLaw
 
         assert self.reference_amplitude is not None
-        return EnergyAmplitude(self.coefficient, self.reference_amplitude)
+        return EnergyAmplitudeLaw(self.coefficient, self.reference_amplitude)
 
 
 class WornByArchard(Worn):
@@ -97,9 +97,9 @@ class WornByArchard(Worn):
     ] = entry("of the worn body [MPa]", "3.5 GPa")
 
     def _base(self) -> WearLaw:
-        from wear.laws import Archard
+        from wear.laws import ArchardLaw
 
-        return Archard(self.coefficient, self.hardness)
+        return ArchardLaw(self.coefficient, self.hardness)
 
 
 class _LawMayBeLeftOut:

@@ -15,7 +15,7 @@ import numpy as np
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, resultant_change
-from wear.steppers import Implicit, advance
+from wear.steppers import Implicit, advance_cycles
 from wear.stepping import SlidingCycle, WearingContact, WearState
 from workflow.analyses.wear.case.sections import Contact, ContactStress, Life, Step
 from workflow.analyses.wear.contact_stage import ContactStage, StageSettings
@@ -176,7 +176,7 @@ def _worn_away(contact: WearingContact, state: WearState, cycles: float) -> Arra
     """Depth of both bodies after so many cycles."""
     at = partial(_always, contact)
     for _ in range(STEPS):
-        state = advance(Implicit(), state, cycles / STEPS, cycles, at).state
+        state = advance_cycles(Implicit(), state, cycles / STEPS, cycles, at).state
     return state.surfaces.depth
 
 

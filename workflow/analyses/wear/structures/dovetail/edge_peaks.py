@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from sa_solver.reference.flat_rounded import FlatRounded
+from sa_solver.reference.flat_rounded import FlatRoundedPunch
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 
@@ -36,9 +36,8 @@ def edge_peak_errors(case: DovetailCase, stage: ContactStage, load: float) -> di
     if not stage.grid.line:
         per_length = load / (dovetail.slot_length - 2.0 * dovetail.end_width)
         radii["end"] = dovetail.end_radius
+    modulus = stage.pair.contact_modulus
     return {
-        edge: FlatRounded(half_width, radius, per_length, stage.pair.contact_modulus).peak_error(
-            pitch
-        )
+        edge: FlatRoundedPunch(half_width, radius, per_length, modulus).peak_error(pitch)
         for (edge, radius), pitch in zip(radii.items(), stage.grid.pitch, strict=False)
     }

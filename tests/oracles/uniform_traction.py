@@ -27,7 +27,7 @@ from scipy.integrate import quad_vec
 
 from sa_solver.types import Array, ElasticPair, Material
 
-Kernel = Callable[[float, float], Array]
+GreensFunction = Callable[[float, float], Array]
 """Displacement (3,) at ``(x, y)`` from a unit force at the origin, homogeneous of degree -1."""
 
 
@@ -143,7 +143,9 @@ def _x_log(x: Array, datum: float) -> Array:
     return x * np.log(np.where(distance > 0.0, distance, datum) / datum)
 
 
-def _over_rectangle(kernel: Kernel, x: float, y: float, half_sides: tuple[float, float]) -> Array:
+def _over_rectangle(
+    kernel: GreensFunction, x: float, y: float, half_sides: tuple[float, float]
+) -> Array:
     """Integral over the rectangle of ``kernel`` from its points to ``(x, y)``, ``(3,)``."""
     a, b = half_sides
     left, right, below, above = x - a, x + a, y - b, y + b
@@ -156,7 +158,7 @@ def _over_rectangle(kernel: Kernel, x: float, y: float, half_sides: tuple[float,
     return across + along
 
 
-def _along_edge(kernel: Kernel, distance: float, start: float, end: float) -> Array:
+def _along_edge(kernel: GreensFunction, distance: float, start: float, end: float) -> Array:
     """``d ∫ kernel(d, t) dt`` from ``start`` to ``end``, which tends to 0 with d, ``(3,)``.
 
     With t = |d| sinh s and homogeneity of degree -1 the integrand is smooth, however near the edge.

@@ -1,0 +1,83 @@
+"""What the library shows of itself, and what it needs to be installed."""
+
+import ast
+import doctest
+import importlib
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+FACES = ["sa_solver", "wear", "wear.joints"]
+LARGEST = 21
+INSTALLED = {"numpy", "scipy", "numba", "llvmlite", "pyfftw"}
+
+REFUSING = """
+import importlib, pkgutil, sys
+
+ALLOWED = {allowed} | set(sys.stdlib_module_names)
+
+class Refuse:
+    def find_spec(self, name, path=None, target=None):
+        package = name.partition(".")[0]
+        if package not in ALLOWED and not package.startswith("_sysconfigdata"):
+            raise ModuleNotFoundError(f"No module named {{name!r}}", name=name)
+
+sys.meta_path.insert(0, Refuse())
+for package in map(importlib.import_module, {packages}):
+    for module in pkgutil.walk_packages(package.__path__, package.__name__ + "."):
+        importlib.import_module(module.name)
+    for name in package.__all__:
+        getattr(package, name)
+"""
+
+
+@pytest.mark.parametrize("package", [["sa_solver"], ["sa_solver", "wear"]], ids=lambda p: p[-1])
+def test_all_modules_import_with_the_numerical_libraries_alone(package):
+    """As after ``pip install numpy scipy numba pyfftw``: everything else is refused."""
+    code = REFUSING.format(allowed=INSTALLED | set(package), packages=package)
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, cwd=ROOT, check=False
+    )
+    assert done.returncode == 0, done.stderr
+
+
+def test_the_library_itself_imports_nothing_heavy():
+    code = "import sys, sa_solver, wear, wear.joints; assert 'numpy' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], cwd=ROOT, check=True)
+
+
+@pytest.mark.parametrize("name", FACES)
+def test_every_public_name_is_there_with_a_sentence(name):
+    package = importlib.import_module(name)
+    assert list(package.__all__) == sorted(package.__all__)
+    assert len(package.__all__) <= (20 if name == "sa_solver" else LARGEST)
+    for public in package.__all__:
+        assert getattr(package, public).__doc__
+        assert f"``{public}``" in package.__doc__
+        assert public in dir(package)
+    with pytest.raises(AttributeError, match="no attribute 'nothing'"):
+        _ = package.nothing
+
+
+@pytest.mark.parametrize("name", FACES)
+def test_type_checkers_see_the_same_names(name):
+    package = importlib.import_module(name)
+    tree = ast.parse(Path(package.__file__).read_text(encoding="utf-8"))
+    (checked,) = [node for node in tree.body if isinstance(node, ast.If)]
+    seen = [alias.name for node in checked.body for alias in node.names]
+    assert sorted(seen) == package.__all__
+
+
+@pytest.mark.parametrize("name", FACES)
+def test_the_example_of_a_package_runs(name):
+    failed, tried = doctest.testmod(importlib.import_module(name))
+    assert tried > 0
+    assert failed == 0
+
+
+@pytest.mark.parametrize("package", ["sa_solver", "wear", "fe_models", "workflow"])
+def test_packages_say_that_they_are_typed(package):
+    assert (ROOT / package / "py.typed").is_file()
