@@ -15,7 +15,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, HarmonicSolution
+from fe_models.dynamics.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import ComplexArray
 from sa_solver.types import Array
 

@@ -15,7 +15,8 @@ from fe_models.dynamics.continuation import (
     first_point,
     follow,
 )
-from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance, HarmonicSolution
+from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.newton import Equations, solve
 from sa_solver.types import Array

@@ -33,7 +33,8 @@ from fe_models.dynamics.continuation import (
     follow,
 )
 from fe_models.dynamics.forced_response import Accuracy, Motions, ResponseBranch, finer_resolution
-from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance, HarmonicSolution
+from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import ComplexArray, HarmonicBalanceError, Resolution
 from fe_models.dynamics.newton import NewtonControl, NewtonSolution, solve
 from fe_models.dynamics.receptance import SteadyMotion
@@ -85,7 +86,9 @@ class PhaseBalance:
         scale, inner = self.equations.scale, self.balance.jacobian
         # Hz per unknown.
         stretch = self.frequency / scale
-        by_frequency = complex(self._steady.turned(self._moved)[0] @ self._per_force)
+        by_frequency = complex(
+            self._steady.stiffness_slope(self._first_harmonic)[0] @ self._per_force
+        )
         corner = -2.0 * np.pi * stretch * self._of_phase(by_frequency)
         row = np.append(self._of_phase(self._by_motion), corner)
         bordered = Bordered(inner, self.balance.slope * stretch, row)
@@ -104,7 +107,7 @@ class PhaseBalance:
         return np.asarray(self.equations.scale * turned / self.seen.imag)
 
     @property
-    def _moved(self) -> ComplexArray:
+    def _first_harmonic(self) -> ComplexArray:
         """The modes at harmonic 1 ``(1, n)``."""
         return self.balance.motion[self.equations.first][None]
 
