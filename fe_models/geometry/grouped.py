@@ -83,8 +83,8 @@ def split_blocks(blocks: Blocks) -> Indices:
 
 def _halved(quads: Indices) -> Indices:
     """Two triangles of each quadrilateral, beside the diagonal from its lowest node."""
-    turned = (np.argmin(quads, axis=1)[:, None] + np.arange(4)) % 4
-    quads = np.take_along_axis(quads, turned, axis=1)
+    cyclic = (np.argmin(quads, axis=1)[:, None] + np.arange(4)) % 4
+    quads = np.take_along_axis(quads, cyclic, axis=1)
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
@@ -108,8 +108,8 @@ def pieces(blocks: Blocks) -> list[Indices]:
     links = np.concatenate([edge for _, cells in blocks for edge in _links(cells)])
     graph = sp.coo_matrix((np.ones(len(links)), links.T), shape=(count, count))
     _, label = connected_components(graph, directed=False)
-    found = np.concatenate([label[cells[:, 0]] for _, cells in blocks])
-    _, first, piece = np.unique(found, return_index=True, return_inverse=True)
+    labels = np.concatenate([label[cells[:, 0]] for _, cells in blocks])
+    _, first, piece = np.unique(labels, return_index=True, return_inverse=True)
     ordered = np.argsort(np.argsort(first))[piece]
     return np.split(ordered, np.cumsum([len(cells) for _, cells in blocks])[:-1])
 
