@@ -22,7 +22,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from fe_models.geometry.gmsh_file import EntityGroup, generated_body
 from fe_models.gmsh_session import gmsh_model, grow_from
@@ -113,6 +112,8 @@ class Specimen:
         side = np.sign(body.mesh.p[2].mean())
         points = 0.5 * self.diameter * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
         points[:, 2] = side * self.ring_distance
+        from scipy.spatial import cKDTree
+
         distance, nodes = cKDTree(body.mesh.p.T).query(points)
         if distance.max() > SAME_POINT * self.diameter:
             raise MeshError(f"{body.name} has no nodes on the ring: mesh it with Specimen.mesh")

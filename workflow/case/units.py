@@ -27,13 +27,27 @@ FORCE = {GRAM: 1, METER: 1, SECOND: -2}
 STRESS = {GRAM: 1, METER: -1, SECOND: -2}
 ENERGY = {GRAM: 1, METER: 2, SECOND: -2}
 FREQUENT: dict[str, tuple[str, dict[str, int]]] = {
-    **{"m": ("1", LENGTH), "mm": ("1e-3", LENGTH), "um": ("1e-6", LENGTH)},
-    **{"g": ("1", MASS), "kg": ("1e3", MASS), "t": ("1e6", MASS)},
-    **{"s": ("1", TIME), "ms": ("1e-3", TIME), "us": ("1e-6", TIME)},
-    **{"N": ("1e3", FORCE), "kN": ("1e6", FORCE), "MN": ("1e9", FORCE)},
-    **{"Pa": ("1e3", STRESS), "MPa": ("1e9", STRESS), "GPa": ("1e12", STRESS)},
-    **{"J": ("1e3", ENERGY), "mJ": ("1", ENERGY), "kJ": ("1e6", ENERGY)},
-    **{"rad": ("1", ANGLE), "%": ("1e-2", {}), "Hz": ("1", {SECOND: -1})},
+    "m": ("1", LENGTH),
+    "mm": ("1e-3", LENGTH),
+    "um": ("1e-6", LENGTH),
+    "g": ("1", MASS),
+    "kg": ("1e3", MASS),
+    "t": ("1e6", MASS),
+    "s": ("1", TIME),
+    "ms": ("1e-3", TIME),
+    "us": ("1e-6", TIME),
+    "N": ("1e3", FORCE),
+    "kN": ("1e6", FORCE),
+    "MN": ("1e9", FORCE),
+    "Pa": ("1e3", STRESS),
+    "MPa": ("1e9", STRESS),
+    "GPa": ("1e12", STRESS),
+    "J": ("1e3", ENERGY),
+    "mJ": ("1", ENERGY),
+    "kJ": ("1e6", ENERGY),
+    "rad": ("1", ANGLE),
+    "%": ("1e-2", {}),
+    "Hz": ("1", {SECOND: -1}),
 }
 FACTOR_PATTERN = re.compile(r"(?P<unit>[A-Za-z%]+)(?:\^(?P<power>[1-9]))?")
 
