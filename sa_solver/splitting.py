@@ -50,7 +50,7 @@ AT_REST = 1e-9
 constant speed until it meets something: differences are rounding, and would throw it far off."""
 
 ROUNDING = float(np.finfo(np.float64).eps)
-"""A state this much larger than the steps that are to be told says nothing of them."""
+"""A state larger than its steps by more than the inverse of this holds no digit of them."""
 
 TINY = np.finfo(float).tiny
 """Keeps divisions by a vanishing size finite."""

@@ -167,25 +167,26 @@ class _Attempts:
 
 
 def _estimated(
-    own: _Attempts, control: ErrorControl | None, state: WearState, most: float, left: float
+    attempts: _Attempts, control: ErrorControl | None, state: WearState, most: float, left: float
 ) -> WearStep:
     """A step with the error of the depth after it, tried again shorter until ``control`` agrees."""
     cycles = most if control is None else min(most, state.next_cycles)
     solves = convolutions = 0
     while True:
-        step = own.attempt(cycles)
+        step = attempts.attempt(cycles)
         solves, convolutions = solves + step.contact_solves, convolutions + step.convolutions
         # Nothing wears, and any length is stable, until an energy threshold is passed.
-        stable = min(own.contact.stable_cycles(ends) for ends in (state, step.state))
+        stable = min(attempts.contact.stable_cycles(ends) for ends in (state, step.state))
         shortest = SHORTEST * stable if np.isfinite(stable) else 0.0
-        raw = own.error(step)
-        carried, added = own.contact.lasting([state.error, raw], state, cycles)
+        raw = attempts.error(step)
+        carried, added = attempts.contact.lasting([state.error, raw], state, cycles)
         fits, proposed = True, cycles
         if control is not None:
             fits, change = _judged(control, state, step, left, carried, added, raw)
             proposed = max(cycles * float(np.clip(change, SHRINKAGE, GROWTH)), shortest)
         if fits or cycles <= shortest:
-            volume_error = state.volume_error + abs(float(raw.sum())) * own.contact.grid.cell_area
+            area = attempts.contact.grid.cell_area
+            volume_error = state.volume_error + abs(float(raw.sum())) * area
             after = replace(
                 step.state,
                 error=carried + added,

@@ -183,8 +183,8 @@ class WearingContact:
     def depth_per_pressure(self, state: WearState, cycles: float = 0.0) -> tuple[Array, Array]:
         """Depth per pressure of both bodies over a step from ``state``, each ``(t, nx, ny)``.
 
-        In mm/MPa and mean cycle. Laws that change with energy are told that of the state, and
-        that expected after so many cycles at its pressures.
+        In mm/MPa and mean cycle. Laws that change with energy take that of the state and that
+        expected after so many cycles at its pressures.
         """
         surfaces, area = state.surfaces, self.grid.cell_area
         work_1, work_2 = (cycles * work for work in self._work(state.starts))
@@ -255,27 +255,27 @@ class WearingContact:
 
     def cycle(self, state: WearState, increments: list[int]) -> CycleResult:
         """Solve the given increments on the surfaces of ``state``."""
-        found: States = {}
+        states: States = {}
         for t in increments:
-            before = found[t - 1].start if t - 1 in found else None
-            found[t] = self.solve(state.surfaces, t, state.starts.get(t, before))
-        return self._result(state, found)
+            before = states[t - 1].start if t - 1 in states else None
+            states[t] = self.solve(state.surfaces, t, state.starts.get(t, before))
+        return self._result(state, states)
 
     def _result(self, state: WearState, states: States) -> CycleResult:
         wear_1, wear_2 = self.depth_per_pressure(state)
         energy = np.zeros(len(self._cycle.loads))
         worn = Surfaces.unworn(state.surfaces.initial_gap)
-        for t, own in states.items():
-            worn = self._worn(worn, t, own.pressure, (wear_1, wear_2))
-            energy[t] = self._dissipated(t, own.pressure).sum() * self.grid.cell_area
+        for t, solved in states.items():
+            worn = self._worn(worn, t, solved.pressure, (wear_1, wear_2))
+            energy[t] = self._dissipated(t, solved.pressure).sum() * self.grid.cell_area
         return CycleResult(states, energy, worn.depth_1, worn.depth_2)
 
     # -- steps ----------------------------------------------------------------------------------
     def explicit_step(self, state: WearState, cycles: float) -> WearStep:
         """Wear ``cycles`` cycles at the pressures of the present surfaces."""
         march = _March(self, state, cycles)
-        for t, own in self.cycle(state, self.working).states.items():
-            march.wear(t, own, cycles)
+        for t, solved in self.cycle(state, self.working).states.items():
+            march.wear(t, solved, cycles)
         return march.step()
 
     def implicit_step(self, state: WearState, cycles: float) -> WearStep:
@@ -334,7 +334,7 @@ class WearingContact:
         per_pressure: tuple[Array, Array],
     ) -> Surfaces:
         """The surfaces after the pressure times cycles [MPa] of an increment."""
-        wear_1, wear_2 = (own[increment] * pressure_cycles for own in per_pressure)
+        wear_1, wear_2 = (body[increment] * pressure_cycles for body in per_pressure)
         work = self._dissipated(increment, pressure_cycles)
         return surfaces.worn(
             self._on_body_1(increment, wear_1), wear_2, self._on_body_1(increment, work), work
@@ -378,7 +378,7 @@ class _March:
 
     def solve(self, increment: int, cycles: float) -> NormalState:
         """Contact whose wear over ``cycles`` is part of its gap."""
-        wear_1, wear_2 = (own[increment] for own in self._per_pressure)
+        wear_1, wear_2 = (body[increment] for body in self._per_pressure)
         state = self._contact._solve(
             self.surfaces, increment, self._starts.get(increment), (wear_1 + wear_2) * cycles
         )
@@ -409,8 +409,8 @@ class _March:
             self._before,
             surfaces=after,
             energy=self._before.energy + float((after.work_2 - before.work_2).sum()) * area,
-            depth_rate=float(max(own.max() for own in lost)) / self._cycles,
-            volume_rate=float(sum(own.sum() for own in lost)) * area / self._cycles,
+            depth_rate=float(max(depth.max() for depth in lost)) / self._cycles,
+            volume_rate=float(sum(depth.sum() for depth in lost)) * area / self._cycles,
             starts=self._starts,
         )
         return WearStep(state, self._cycles, self._solves, self._convolutions)

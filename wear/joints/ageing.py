@@ -162,8 +162,8 @@ class LongTest:
         starts = [jump.cycles for jump in self.jumps]
         places = np.searchsorted(starts, cycles, side="right") - 1
         pairs = zip(places.ravel(), cycles.ravel(), strict=True)
-        found = [self._energy(int(place), float(own)) for place, own in pairs]
-        return np.array(found).reshape(cycles.shape)
+        energies = [self._energy(int(place), float(number)) for place, number in pairs]
+        return np.array(energies).reshape(cycles.shape)
 
     def cycles_at(self, energy: Array | float) -> Array:
         """Cycles after which the joint has dissipated ``energy`` [N mm], of its shape.
@@ -178,8 +178,8 @@ class LongTest:
         starts = [jump.start for jump in self.jumps]
         places = np.searchsorted(starts, energy, side="right") - 1
         pairs = zip(places.ravel(), energy.ravel(), strict=True)
-        found = [self._cycles(int(place), float(own)) for place, own in pairs]
-        return np.array(found).reshape(energy.shape)
+        numbers = [self._cycles(int(place), float(value)) for place, value in pairs]
+        return np.array(numbers).reshape(energy.shape)
 
     def _energy(self, place: int, cycles: float) -> float:
         return self.jumps[place].energy_at(cycles) if self.jumps else self.energy_before
@@ -238,7 +238,7 @@ class _Jumper:
         tolerance: float,
         breaks: list[float],
     ) -> None:
-        self._own_rate = rate
+        self._energy_per_cycle = rate
         self._total, self._until = ends
         self._tolerance = tolerance
         self._breaks = breaks
@@ -342,7 +342,7 @@ class _Jumper:
                 "of a cycle: they are not smooth to the tolerance; allow a larger one, or name "
                 "the energies at which they have kinks"
             )
-        rate = float(self._own_rate(energy))
+        rate = float(self._energy_per_cycle(energy))
         if not 0.0 <= rate < np.inf:
             raise AgeingError(
                 f"a cycle dissipates {rate:g} N mm where {energy:g} were before; allowed: 0 or more"
