@@ -167,7 +167,7 @@ class WearingContact:
         return WearingContact(self.contact, self._laws, friction, cycle, self._tolerance)
 
     @cached_property
-    def working(self) -> list[int]:
+    def dissipating(self) -> list[int]:
         """Increments that dissipate, loaded and with slip somewhere, the heaviest load last.
 
         Over thousands of cycles it does not matter where a cycle begins. A step that ends with the
@@ -233,7 +233,9 @@ class WearingContact:
         softest = float(self.contact.half_space.symbol(Z, Z).min())
         return 2.0 * softest / fastest if fastest > 0.0 else np.inf
 
-    def lasting(self, errors: Sequence[Array], state: WearState, cycles: float) -> list[Array]:
+    def damped_errors(
+        self, errors: Sequence[Array], state: WearState, cycles: float
+    ) -> list[Array]:
         """What implicit wear over ``cycles`` leaves of ``errors`` of the depth ``(nx, ny)`` [mm].
 
         A depth e is pressed away to K (K + D)⁻¹ e, with D the largest depth per pressure of all
@@ -274,7 +276,7 @@ class WearingContact:
     def explicit_step(self, state: WearState, cycles: float) -> WearStep:
         """Wear ``cycles`` cycles at the pressures of the present surfaces."""
         march = _March(self, state, cycles)
-        for t, solved in self.cycle(state, self.working).states.items():
+        for t, solved in self.cycle(state, self.dissipating).states.items():
             march.wear(t, solved, cycles)
         return march.step()
 
@@ -284,7 +286,7 @@ class WearingContact:
         Stable at any length, at given slips.
         """
         march = _March(self, state, cycles)
-        for t in self.working:
+        for t in self.dissipating:
             march.wear(t, march.solve(t, cycles), cycles)
         return march.step()
 
@@ -292,10 +294,10 @@ class WearingContact:
         """Wear ``cycles`` cycles, second order in them and stable at any length, at given slips."""
         march = _March(self, state, cycles)
         half = 0.5 * cycles
-        for t in reversed(self.working):
+        for t in reversed(self.dissipating):
             march.two_stages(t, half)
         midway = march.surfaces.depth
-        for t in self.working:
+        for t in self.dissipating:
             march.two_stages(t, half)
         return replace(march.step(), midway=midway)
 

@@ -5,8 +5,8 @@ relative to the first, and its force is the one that resists: the joint pushes t
 ``-force``. Work of the force on the displacement is what the joint stores and dissipates.
 
 A law holds the parameters of ``n`` joints, as numbers or ``(n,)`` arrays, and no state. What it
-remembers is a :data:`JointState`, an array ``(n, k)`` with one row per joint, whose columns are the
-law's own affair; a state is never changed, a new one is returned.
+remembers is a :data:`JointState`, an array ``(n, k)`` with one row per joint, whose columns the
+law defines; a state is never changed, a new one is returned.
 """
 
 from __future__ import annotations

@@ -5,7 +5,7 @@ with the basis Φ ``(t, m)`` and coefficients c ``(m, d)``. The joint is driven 
 from sample to sample, period after period, until its state is the same after one as before. Its
 forces are then projected, F = W f with the weights W ``(m, t)``, and so is their exact derivative
 with respect to c, which passes through everything the joint remembers: where its slider is, where
-it turned round, when it touched. What the functions are is the caller's affair.
+it turned round, when it touched. The caller chooses the functions.
 
 A joint is driven into the period from rest, through the points Φ_lead c: the rows ``lead``
 ``(p, m)``, of which the last is the first sample. This decides between the many periodic forces of
@@ -63,7 +63,7 @@ class SettledCycle:
 class PeriodicMarch:
     """A joint law over whole periods.
 
-    ``threads`` march so many shares of the joints at once.
+    ``threads`` march that many shares of the joints at once.
     """
 
     law: Jenkins | BoucWen | MasingLaw | FrictionContact
