@@ -111,7 +111,7 @@ class VibratingContact:
         unworn = WearState.unworn(np.ascontiguousarray(np.broadcast_to(gap, self.grid.shape)))
         rubbing = self.at(unworn)
         starts = {0: rubbing.slipping.normal.start}
-        result = rubbing.wearing.cycle(replace(unworn, starts=starts), rubbing.wearing.working)
+        result = rubbing.wearing.cycle(replace(unworn, starts=starts), rubbing.wearing.dissipating)
         depth_rate, volume_rate = result.per_cycle(self.grid.cell_area)
         return replace(unworn, starts=starts, depth_rate=depth_rate, volume_rate=volume_rate)
 
