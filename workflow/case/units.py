@@ -45,7 +45,10 @@ FREQUENT: dict[str, tuple[str, dict[str, int]]] = {
     "J": ("1e3", ENERGY),
     "mJ": ("1", ENERGY),
     "kJ": ("1e6", ENERGY),
+    "h": ("3600", TIME),
     "rad": ("1", ANGLE),
+    "deg": ("0.01745329251994329576923690768", ANGLE),
+    "rpm": ("0.1047197551196597746154214461", {RADIAN: 1, SECOND: -1}),
     "%": ("1e-2", {}),
     "Hz": ("1", {SECOND: -1}),
 }
@@ -116,11 +119,13 @@ def _parse(unit: str) -> _Unit:
 
 
 def _frequent(unit: str) -> _Unit | None:
-    """Products and quotients of frequent units, such as kg/m^3; None for anything else."""
+    """Products and quotients of frequent units, such as kg/m^3 and 1/J; None for anything else."""
     factor, powers = Decimal(1), dict[str, Decimal]()
     for place, part in enumerate(re.split(r"([*/])", f"*{unit}")[1:]):
         if place % 2 == 0:
             sign = 1 if part == "*" else -1
+            continue
+        if part == "1" and place == 1:
             continue
         match = FACTOR_PATTERN.fullmatch(part)
         if match is None or match["unit"] not in FREQUENT:
