@@ -248,15 +248,21 @@ def describe(file: Path, size: str | None) -> None:
         click.echo(line)
 
 
-@cli.command()
+class _KindsInHelp(click.Command):
+    """A command whose help ends with the kinds of case that there are."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        from workflow.kinds import kinds
+
+        formatter.write_paragraph()
+        formatter.write_text(f"KIND is one of {', '.join(kinds())}.")
+
+
+@cli.command(cls=_KindsInHelp)
 @click.argument("kind")
 @click.argument("file", required=False, type=click.Path(path_type=Path))
 def new(kind: str, file: Path | None) -> None:
-    """Write a commented case of KIND to FILE, or print it.
-
-    KIND is dovetail, mesh, resultants, specimens, bodies, line, bodies_wear, line_wear, joint, rig,
-    vibration, vibration_wear or friction_rig_wear.
-    """
+    """Write a commented case of KIND to FILE, or print it."""
     from workflow.kinds import template
 
     try:

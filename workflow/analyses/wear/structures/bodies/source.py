@@ -14,7 +14,12 @@ from workflow.analyses.contact.bodies import Shape, height_at
 from workflow.analyses.contact.case import Heights
 from workflow.analyses.wear.gaps import GapFunction, GridHeights
 from workflow.analyses.wear.load_source import ContactFace, UserFace
-from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
+from workflow.analyses.wear.structures.bodies.case import (
+    BodiesWearCase,
+    Flat,
+    FlatStrip,
+    LineBodiesWearCase,
+)
 from workflow.case.input_files import read_heights
 
 NAME = "interface"
@@ -129,8 +134,18 @@ class BodiesSource:
         return Face(NAME, frame, corners, np.array([[0, 1, 2], [0, 2, 3]]))
 
 
-def gap_of(shape: Shape | Heights, grid: Grid) -> GapFunction:
+def gap_of(shape: Shape | Flat | FlatStrip | Heights, grid: Grid) -> GapFunction:
     """Gap [mm] of the unloaded bodies at x and y of the face that ``grid`` covers."""
     if isinstance(shape, Heights):
         return GridHeights(grid, read_heights(shape.file))
+    if isinstance(shape, Flat | FlatStrip):
+        return partial(step_around, shape)
     return partial(height_at, shape)
+
+
+def step_around(shape: Flat | FlatStrip, x: Array, y: Array) -> Array:
+    """Gap [mm] around a flat rectangle or strip, at ``x`` and ``y``, which broadcast."""
+    on_top = np.abs(x) < shape.half_width
+    if isinstance(shape, Flat):
+        on_top = on_top & (np.abs(y) < shape.half_length)
+    return np.where(on_top, 0.0, shape.step)
