@@ -10,8 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from sa_solver.types import Array, Indices
 
@@ -104,6 +102,10 @@ def pieces(blocks: Blocks) -> list[Indices]:
 
     Elements that share a node are in one piece; pieces are numbered as the blocks name them first.
     """
+    # Sparse matrices take a fifth of a second to load: where they are used.
+    import scipy.sparse as sp
+    from scipy.sparse.csgraph import connected_components
+
     count = 1 + max(int(cells.max()) for _, cells in blocks)
     links = np.concatenate([edge for _, cells in blocks for edge in _links(cells)])
     graph = sp.coo_matrix((np.ones(len(links)), links.T), shape=(count, count))

@@ -30,6 +30,8 @@ def test_frequent_units_are_pints():
         assert (float(known.factor), known.powers) == (float(pints.factor), pints.powers), text
 
 
-@pytest.mark.parametrize("text", ["furlong", "mm^0", "mm^-1", "mm mm", "(N/mm)", "N//mm", "mmm"])
+@pytest.mark.parametrize(
+    "text", ["furlong", "mm^0", "mm^-1", "mm mm", "(N/mm)", "N/(mm/s)", "N//mm", "mmm"]
+)
 def test_anything_else_is_left_to_pint(text):
     assert units._frequent(text) is None

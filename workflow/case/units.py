@@ -121,6 +121,7 @@ def _parse(unit: str) -> _Unit:
 def _frequent(unit: str) -> _Unit | None:
     """Products and quotients of frequent units, such as kg/m^3 and 1/J; None for anything else."""
     factor, powers = Decimal(1), dict[str, Decimal]()
+    unit = re.sub(r"/\(([^()*/]+)\*([^()*/]+)\)", r"/\1/\2", unit)  # 1/(N*mm) is 1/N/mm
     for place, part in enumerate(re.split(r"([*/])", f"*{unit}")[1:]):
         if place % 2 == 0:
             sign = 1 if part == "*" else -1
