@@ -49,6 +49,29 @@ class ContactFailure(ConvergenceError):
 
 
 @dataclass(frozen=True)
+class Spent:
+    """Contact problems of an increment solved, convolutions they took, and wear steps."""
+
+    contact_solves: int = 0
+    convolutions: int = 0
+    steps: int = 0
+
+    def __add__(self, other: Spent) -> Spent:
+        return Spent(
+            self.contact_solves + other.contact_solves,
+            self.convolutions + other.convolutions,
+            self.steps + other.steps,
+        )
+
+    def __sub__(self, other: Spent) -> Spent:
+        return Spent(
+            self.contact_solves - other.contact_solves,
+            self.convolutions - other.convolutions,
+            self.steps - other.steps,
+        )
+
+
+@dataclass(frozen=True)
 class SlidingCycle:
     """One closed cycle as the wear of a contact feels it.
 

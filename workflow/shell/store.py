@@ -18,7 +18,7 @@ from sa_solver.types import Array, Frame, Grid
 
 if TYPE_CHECKING:
     from fe_models.mesh import Face
-    from workflow.analyses.wear.load_source import FaceLoads
+    from wear.interface import FaceLoads
 
 # Name of the only interface of a contact case.
 BODIES = "bodies"

@@ -30,7 +30,7 @@ from workflow.analyses.wear.loop_table import COLUMNS, write_table
 from workflow.errors import UserError
 
 if TYPE_CHECKING:
-    from workflow.analyses.wear.interface_state import InterfaceState
+    from wear.interface import InterfaceState
     from workflow.shell.folder import OutputFolder
     from workflow.shell.reporter import Reporter
     from workflow.shell.store import ResultsWriter

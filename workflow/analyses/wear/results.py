@@ -13,10 +13,11 @@ import numpy as np
 
 from sa_solver.normal import NormalContactError
 from sa_solver.types import Array, LoadHistory
+from wear.coupled import KINETICS, CoupledState
+from wear.interface import CycleTractions, FaceLoads, FirstContact
 from wear.kinetics import LinearRegime, linear_regime
 from wear.steppers import root_mean_square
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.checkpoint import KINETICS, RunState
 from workflow.analyses.wear.comparison import comparison_summary, write_comparison
 from workflow.analyses.wear.contact_loops import (
     loops_sentence,
@@ -24,10 +25,10 @@ from workflow.analyses.wear.contact_loops import (
     write_loop_tables,
     write_loops,
 )
-from workflow.analyses.wear.contact_stage import ContactStage, CycleTractions, FirstContact
+from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.contact_stress import InterfaceStress, contact_stresses
 from workflow.analyses.wear.figures.wear import EXTRAPOLATION, figures_of
-from workflow.analyses.wear.load_source import FaceLoads, LoadSource
+from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.paraview.wear import write_wear
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.uniformity import uniformities
@@ -52,7 +53,7 @@ class Outcome:
     case: WearCase
     source: LoadSource
     stages: list[ContactStage]
-    state: RunState
+    state: CoupledState
     unworn: Sequence[FaceLoads]
     first: list[FirstContact]
     worn: list[CycleTractions]
