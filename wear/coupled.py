@@ -116,6 +116,27 @@ class LoadSource(Protocol):
         ...
 
 
+@dataclass(frozen=True)
+class ConstantLoads:
+    """A source of loads that wear does not change: one ``histories`` per contact."""
+
+    histories: Sequence[FaceLoads]
+
+    def worn(
+        self, depths: list[Array], friction: Sequence[float] | None = None
+    ) -> Sequence[FaceLoads]:
+        return self.histories
+
+    def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
+        """Resultants where each contact is loaded most."""
+        rows = []
+        for own in self.histories:
+            loads, t = own.loads, int(np.argmax(own.loads.P))
+            columns = loads.P, loads.Qx, loads.Qy, loads.Mx, loads.My, loads.Mz
+            rows.append([column[t] for column in columns])
+        return np.array(rows)
+
+
 class Contacts(Protocol):
     """The contacts of all interfaces, which may wear side by side.
 

@@ -33,10 +33,16 @@ class ContactStage(InterfaceContact):
     """One face of a case on its grid."""
 
     def __init__(self, settings: StageSettings) -> None:
-        super().__init__(_interface(settings.case, settings.contact))
-        self._case, self._contact_face = settings.case, settings.contact
-        self.face = settings.contact.face
-        _check_section(settings.case.stress, self.grid)
+        case, contact = settings.case, settings.contact
+        grid = contact.grid(case.contact.grid)
+        _check_section(case.stress, grid)
+        self._case, self._contact_face, self.face = case, contact, contact.face
+        self._transfer = FaceTransfer.between(contact.face, grid)
+        super().__init__(_interface(case, contact, self._transfer))
+
+    @property
+    def transfer(self) -> FaceTransfer:
+        return self._transfer
 
     @property
     def remedy(self) -> str:
@@ -72,14 +78,14 @@ class ContactStage(InterfaceContact):
         return worn_loop(contact, self._case.loops, self.name, state, peak)
 
 
-def _interface(case: WearCase, contact: ContactFace) -> InterfaceSettings:
+def _interface(case: WearCase, contact: ContactFace, transfer: FaceTransfer) -> InterfaceSettings:
     """A face and how it wears, as the library takes it."""
-    grid, own = contact.grid(case.contact.grid), case.contact
+    grid, own = transfer.grid, case.contact
     return InterfaceSettings(
         name=contact.face.name,
         grid=grid,
         gap=_gap(contact, grid),
-        transfer=FaceTransfer.between(contact.face, grid),
+        transfer=transfer,
         pair=ElasticPair(case.material(1), case.material(2)),
         laws=(case.wear_of(1).described(), case.wear_of(2).described()),
         friction=case.friction.at,
