@@ -13,6 +13,7 @@ from fe_models.mesh import Face, Interface
 from fe_models.structure import InterfaceHistory
 from fe_models.transfer import FaceTransfer
 from sa_solver.types import Frame, Grid, LoadHistory, resultants
+from workflow.analyses.wear.datasets import put_face
 from workflow.analyses.wear.structures.resultants.faces import FaceError, facets_over
 from workflow.analyses.wear.structures.resultants.reading import read_resultants
 from workflow.analyses.wear.structures.resultants.writing import (
@@ -26,7 +27,7 @@ from workflow.analyses.wear.worn_nodes import (
     write_worn_nodes,
 )
 from workflow.case.input_files import InputFileError
-from workflow.shell.store import ResultsWriter
+from workflow.shell.results import writing
 
 FRICTION, SIZE = 0.4, (10.0, 60.0)
 RECIPE = Path(workflow.analyses.wear.structures.resultants.__file__).with_name("RECIPE.md")
@@ -137,16 +138,8 @@ def test_slip_on_the_grid_is_the_same_bit_for_bit(tmp_path):
 def test_results_of_a_run_are_read_from_their_group(tmp_path):
     """``results.h5:structure`` holds what a run wrote of its structure."""
     history, path = face_history(), tmp_path / "results.h5"
-    with h5py.File(path, "w") as file:
-        writer = ResultsWriter(file)
-        writer.put("structure/intrados/load_history", **vars(history.loads))
-        writer.put(
-            "structure/intrados",
-            coordinates=history.interface.coordinates,
-            facets=history.interface.facets,
-            pressure=history.pressure,
-            slip=history.slip,
-        )
+    with writing(path) as writer:
+        put_face(writer, "structure/intrados", history.interface, history)
     found = read_resultants(f"{path}:structure")["intrados"]
     assert_same(found.loads, history.loads)
     assert found.frame is None

@@ -14,7 +14,7 @@ from sa_solver.types import Array, Grid
 from workflow.analyses.wear.case.base import WearCase
 from workflow.shell.analysis import Comparison, Summary
 from workflow.shell.folder import OutputFolder
-from workflow.shell.store import grid_of
+from workflow.shell.results import grid_of
 
 WORN = ("depth_1", "depth_2", "volume_1", "volume_2")
 MIDDLE = "middle"

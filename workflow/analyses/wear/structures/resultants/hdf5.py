@@ -26,7 +26,7 @@ from workflow.analyses.wear.structures.resultants.imported import (
 from workflow.analyses.wear.structures.resultants.table import check_unit
 from workflow.case import units
 from workflow.case.input_files import InputFileError
-from workflow.shell.store import frame_of
+from workflow.shell.results import frame_of
 
 LOADS = "load_history"
 # In a group beside the loads: what is read, and what our results hold besides.
