@@ -7,7 +7,6 @@ How much of it they carry is measured: ``NodalDepths.volume_share``.
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -20,7 +19,7 @@ from fe_models.transfer import FaceTransfer
 from sa_solver.types import Array, Frame, Grid, Indices
 from workflow.analyses.wear.structures.resultants.faces import FaceError, facets_over
 from workflow.analyses.wear.structures.resultants.table import read_table
-from workflow.shell.store import replacing
+from workflow.shell.tables import write_table
 
 NODE = "node"
 AXES = ("X", "Y", "Z")
@@ -101,11 +100,8 @@ def worn_displacement(depth: Array, frame: Frame, body: Literal[1, 2]) -> Array:
 
 def write_worn_nodes(path: Path, nodes: Indices, displacement: Array) -> None:
     """Write displacements ``(n, 3)`` [mm] by node number, such that they read back the same."""
-    with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow([NODE, "ux [mm]", "uy [mm]", "uz [mm]"])
-        for node, row in zip(nodes.tolist(), displacement.tolist(), strict=True):
-            writer.writerow([node, *map(repr, row)])
+    along = {f"u{axis.lower()} [mm]": own for axis, own in zip(AXES, displacement.T, strict=True)}
+    write_table(path, {NODE: nodes} | along)
 
 
 def _in_plane(points: Array, frame: Frame, line: bool) -> Array:
