@@ -54,7 +54,7 @@ def test_measured_tables_may_have_units_of_their_own(tmp_path):
     [
         ("", ":1: no rows; allowed: a header"),
         ("energy,P,kt,mu\n", ":1: no rows"),
-        ("energy,P,kt,mu,colour\n0,1,1,1,1\n", "'colour': no column; allowed: cycles, energy"),
+        ("energy,P,kt,mu,colour\n0,1,1,1,1\n", "'colour': unknown column; allowed: cycles, energy"),
         (
             "energy,P,kt\n0,1,1\n",
             "no column mu; this file has 'energy', 'P', 'kt'; allowed: at least energy, P",

@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.case.fields import Quantity, shown
+from workflow.case.fields import Quantity
 from workflow.case.input_files import InputFileError
 from workflow.case.table_file import TableFile, read_table_file
 from workflow.case.units import UnitError, to_base
@@ -103,15 +103,16 @@ def read_loop_table(path: Path) -> LoopTable:
     """
     try:
         table = read_table_file(path)
-        _refuse_unknown(table)
-        for name in NEEDED:
-            table.require(name, f"at least {', '.join(NEEDED)}")
+        table.require(NEEDED, f"at least {', '.join(NEEDED)}")
         per_length = _per_length(table)
+        units = {column.name: column.units(per_length)[0] for column in COLUMNS}
+        # Other columns may be slips of the pen for those that need not be given.
+        table.check(units)
         columns = {
-            column.name: table.column(column.name, Quantity(column.units(per_length)[0]))
-            if column.name in table.names
-            else np.full(len(table.rows), np.nan)
-            for column in COLUMNS
+            name: table.column(name, Quantity(unit))
+            if name in table.names
+            else np.full(len(table), np.nan)
+            for name, unit in units.items()
         }
     except InputFileError as error:
         raise UserError(str(error)) from error
@@ -120,16 +121,6 @@ def read_loop_table(path: Path) -> LoopTable:
         line = table.rows[falls[0] + 1][0]
         raise UserError(f"{path}:{line}: the energy falls; allowed: rows in order of their energy")
     return LoopTable(**columns, per_length=per_length)
-
-
-def _refuse_unknown(table: TableFile) -> None:
-    """Refuse other columns, which may be slips of the pen for those that need not be given."""
-    known = [column.name for column in COLUMNS]
-    for name, written in zip(table.names, table.headings, strict=True):
-        if name not in known:
-            raise InputFileError(
-                f"{table.place}: {shown(written)}: no column; allowed: {', '.join(known)}"
-            )
 
 
 def _per_length(table: TableFile) -> bool:

@@ -18,7 +18,8 @@ from fe_models.mesh import Face
 from fe_models.transfer import FaceTransfer
 from sa_solver.types import Array, Frame, Grid, Indices
 from workflow.analyses.wear.structures.resultants.faces import FaceError, facets_over
-from workflow.analyses.wear.structures.resultants.table import read_table
+from workflow.case.fields import Quantity
+from workflow.case.table_file import read_table_file
 from workflow.shell.tables import write_table
 
 NODE = "node"
@@ -56,15 +57,20 @@ def read_nodes(file: str | Path) -> NodeTable:
 
     Raises InputFileError.
     """
-    table = read_table(str(file), {NODE: "1", **dict.fromkeys(AXES, "mm")}, [NODE, "X", "Y"])
+    table, needed = read_table_file(file), (NODE, "X", "Y")
+    table.check({NODE: "1", **dict.fromkeys(AXES, "mm")})
+    table.require(needed, ", ".join(needed))
     numbers = table.whole(NODE)
     seen: set[int] = set()
     for row, number in enumerate(numbers):
         if number in seen:
             raise table.refusal(row, NODE, "node given twice", "once")
         seen.add(number)
-    zeros = np.zeros(len(table))
-    points = np.stack([table.numbers.get(axis, zeros) for axis in AXES], axis=1)
+    columns = [
+        table.column(axis, Quantity("mm")) if axis in table.names else np.zeros(len(table))
+        for axis in AXES
+    ]
+    points = np.stack(columns, axis=1)
     return NodeTable(np.array(numbers, dtype=np.int64), points)
 
 
