@@ -32,7 +32,8 @@ from workflow.analyses.wear.recording import Recorder
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case
 from workflow.shell.folder import OutputFolder
-from workflow.shell.store import ResultsWriter, write_arrays
+from workflow.shell.results import writing
+from workflow.shell.store import write_arrays
 
 BODY = Material(115e3, 0.0)
 SPHERE = ShearedSphere(400.0, 10.0, BODY, BODY, 0.7)
@@ -166,10 +167,9 @@ def written(sphere, tmp_path):
     for jump in range(3):
         arrays = kept_loops(["sphere"], [sphere]) if jump != 1 else {"other": np.zeros(1)}
         write_arrays(folder.jump(jump), arrays, {"cycles": 100.0 * jump})
-    with h5py.File(folder.results, "w") as file:
-        write_loops(ResultsWriter(file), folder, 2)
-        group = file.create_group("grid/sphere")
-        group.attrs.update(shape=(32, 32), pitch=(0.1, 0.1))
+    with writing(folder.results) as writer:
+        write_loops(writer, folder, 2)
+        writer.put_grid("grid/sphere", Grid((32, 32), (0.1, 0.1)))
     return folder
 
 

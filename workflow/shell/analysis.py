@@ -22,12 +22,13 @@ Summary = Mapping[str, Any]
 class Run(Generic[AnyCase]):
     """A run that an analysis is to bring to its end.
 
-    It goes on from where ``folder`` has got to if it is to ``resume``. ``choice`` is the record of
-    the settings that were chosen for the case, None where they stand as written. ``compute`` runs
-    another case file into a folder, from where an earlier run there has got to; False if that was
-    finished already.
+    ``kind`` is the name of its kind of case. It goes on from where ``folder`` has got to if it is
+    to ``resume``. ``choice`` is the record of the settings that were chosen for the case, None
+    where they stand as written. ``compute`` runs another case file into a folder, from where an
+    earlier run there has got to; False if that was finished already.
     """
 
+    kind: str
     case: AnyCase
     folder: OutputFolder
     reporter: Reporter

@@ -47,7 +47,7 @@ def worn_depths(folder: Path, names: Iterable[str]) -> dict[str, tuple[Grid, Arr
     import h5py
 
     from workflow.shell.folder import OutputFolder
-    from workflow.shell.store import grid_of
+    from workflow.shell.results import grid_of
 
     found = {}
     with h5py.File(OutputFolder(folder).results) as file:

@@ -35,7 +35,8 @@ def run_wear(run: Run[WearCase]) -> None:
     folder = run.folder
     say(run.choice, run.reporter)
     try:
-        WearRun(run.case, folder, run.reporter).execute(run.resume)
+        outcome = WearRun(run.case, folder, run.reporter).execute(run.resume)
+        write_output(outcome, run)
     except (ContactFailure, NormalContactError, MethodFailed) as error:
         remedy = f"; the state is kept, see `fretscale resume {folder.root}`"
         raise MethodFailed(f"{error}{remedy if folder.checkpoint.exists() else ''}") from error
@@ -58,8 +59,8 @@ class WearRun:
         self._reporter = reporter
         self._source = structure_of(case).source(case)
 
-    def execute(self, resume: bool) -> None:
-        """Run to the end and write everything."""
+    def execute(self, resume: bool) -> Outcome:
+        """Run to the end."""
         self._reporter.say(f"{'resume' if resume else 'run'}: {self._case.title}")
         # Read first, so that a damaged one is told before anything is computed.
         resumed = resume and self._folder.checkpoint.exists()
@@ -85,8 +86,7 @@ class WearRun:
             if self._case.stress.wanted:
                 with self._reporter.stage("stress under the contacts"):
                     worn = contacts.tractions(state.interfaces)
-        outcome = Outcome(self._case, source, stages, state, unworn, first, worn)
-        write_output(outcome, self._folder, self._reporter)
+        return Outcome(self._case, source, stages, state, unworn, first, worn)
 
     def _march(
         self,
