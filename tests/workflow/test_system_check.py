@@ -8,7 +8,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from workflow import system_check
+from workflow.shell import system_check
 
 APT = ["env", "DEBIAN_FRONTEND=noninteractive", "apt-get"]
 

@@ -4,8 +4,8 @@ The gmsh wheel brings its library but not the X11 and OpenGL libraries that it i
 a bare Debian has no ``ensurepip``. All that is missing is found at once here, with the Debian
 packages that have it. Standard library only; run by path, for this package may need more:
 
-    python3 -I workflow/shell/system_check.py            # installs what is missing, or says how and stops
-    python -I workflow/shell/system_check.py --imports   # afterwards: can what was installed be used?
+    python3 -I workflow/shell/system_check.py            # installs what is missing, or says how
+    python -I workflow/shell/system_check.py --imports   # later: can what was installed be used?
 """
 
 from __future__ import annotations
