@@ -21,10 +21,9 @@ from workflow.analyses.vibration_wear.outcome import (
 )
 from workflow.pictures.drawing import write_pictures
 from workflow.shell.analysis import Run
-from workflow.shell.reporter import Reporter
 from workflow.shell.results import run_results
+from workflow.shell.summary import finish
 from workflow.shell.tables import write_curves
-from workflow.shell.versions import versions
 
 VibrationWearRun = Run[VibrationWearCase | FrictionRigWearCase]
 
@@ -42,12 +41,7 @@ def write_vibration_wear_output(outcome: VibrationWearOutcome, run: VibrationWea
         _write_tables(outcome, folder.root)
     with reporter.stage("paraview and figures"):
         write_pictures(outcome.case.output, folder, figures_of)
-    summary = _summary(outcome, reporter)
-    folder.write_summary(summary)
-    for state in outcome.states:
-        reporter.say(f"  {_line(state)}")
-    seconds = ", ".join(f"{name} {value:.1f}" for name, value in summary["seconds"].items())
-    reporter.say(f"  seconds: {seconds}")
+    finish(run, _summary(outcome), (f"  {_line(state)}" for state in outcome.states))
 
 
 # --- results ------------------------------------------------------------------------------------
@@ -86,12 +80,10 @@ def _write_tables(outcome: VibrationWearOutcome, root: Path) -> None:
 # --- summary ------------------------------------------------------------------------------------
 
 
-def _summary(outcome: VibrationWearOutcome, reporter: Reporter) -> dict[str, Any]:
+def _summary(outcome: VibrationWearOutcome) -> dict[str, Any]:
     states, last = outcome.states, outcome.states[-1].numbers
     energy = last["energy"]
     return {
-        "title": outcome.case.title,
-        "assumed": list(outcome.case.assumed),
         "volume_per_energy": last["volume"] / energy if energy > 0.0 else 0.0,
         "states": [_of_state(state) for state in states],
         "trend": {
@@ -100,9 +92,6 @@ def _summary(outcome: VibrationWearOutcome, reporter: Reporter) -> dict[str, Any
             if name in states[0].numbers
         }
         | {"resonance": trend([state.responses[0].numbers["resonance"] for state in states])},
-        "warnings": reporter.warnings,
-        "seconds": {name: round(value, 2) for name, value in reporter.seconds.items()},
-        "versions": versions(),
     }
 
 
