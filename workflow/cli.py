@@ -242,21 +242,27 @@ def loops(
 @click.option("--size", metavar="LENGTH", help="Of the elements, for a CAD file, such as '2 mm'.")
 def describe(file: Path, size: str | None) -> None:
     """List bodies, boundaries and node sets of a mesh or CAD FILE, as a case may name them."""
-    from workflow.analyses.wear.structures.mesh.case import described_file
+    from workflow.commands.describe import described_file
 
     for line in described_file(file, size):
         click.echo(line)
 
 
-@cli.command()
+class _KindsInHelp(click.Command):
+    """A command whose help ends with the kinds of case that there are."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        from workflow.kinds import kinds
+
+        formatter.write_paragraph()
+        formatter.write_text(f"KIND is one of {', '.join(kinds())}.")
+
+
+@cli.command(cls=_KindsInHelp)
 @click.argument("kind")
 @click.argument("file", required=False, type=click.Path(path_type=Path))
 def new(kind: str, file: Path | None) -> None:
-    """Write a commented case of KIND to FILE, or print it.
-
-    KIND is dovetail, mesh, resultants, specimens, bodies, line, bodies_wear, line_wear, joint, rig,
-    vibration, vibration_wear or friction_rig_wear.
-    """
+    """Write a commented case of KIND to FILE, or print it."""
     from workflow.kinds import template
 
     try:

@@ -1,11 +1,15 @@
 """Every entry of a case refuses a wrong type, a wrong unit and a value out of range.
 
-The entries are found by walking the schema, so that a new one cannot be forgotten.
+The entries are found by walking the kinds of case there are, so that a new one cannot be forgotten.
+One that several sections inherit, or that stands in several places, is the same entry there: it is
+tried once, in the first of its places.
 """
 
 import functools
+import inspect
 import math
 import shutil
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path as Folder
 from typing import Any, Literal, get_args, get_origin
@@ -17,7 +21,7 @@ from pydantic import BaseModel
 from workflow.analyses.contact.load_table import FORCES, MOTIONS
 from workflow.case import source
 from workflow.case.fields import File, Path, Quantity, Text, Whole
-from workflow.case.sections import entry_of, sections_of
+from workflow.case.sections import Section, entry_of, sections_of
 from workflow.errors import CaseError
 from workflow.kinds import kinds, load_case, parse_case, template
 
@@ -191,12 +195,16 @@ CELLS |= dict.fromkeys(("line", "line_wear"), (512,))
 
 @dataclass(frozen=True)
 class Leaf:
-    """An entry of a kind of case: its dotted key, and the kinds of the sections it is in."""
+    """An entry in one of its places: a kind of case, a dotted key there, the kinds of sections.
+
+    ``declared`` is the section that declares it, be it for those that inherit from it.
+    """
 
     kind: str
     key: str
     tags: tuple[str, ...]
     field: Any
+    declared: type[Section]
 
     def __str__(self) -> str:
         return ":".join((self.kind, self.key, *self.tags))
@@ -209,7 +217,7 @@ class Leaf:
     def needed(self) -> list[str]:
         """Overrides that make the template have it."""
         found = []
-        for section, given in ({"expect": {ALWAYS: EXPECT}} | GIVEN[self.kind]).items():
+        for section, given in ({"expect": {ALWAYS: EXPECT}} | GIVEN.get(self.kind, {})).items():
             if self.key.startswith(f"{section}."):
                 chosen = [given[tag] for tag in (*self.tags, ALWAYS) if tag in given]
                 found += [f"{section}={value}" for value in chosen[:1]]
@@ -228,8 +236,16 @@ class Leaf:
         return f"[{', '.join([first] * (len(self.field.examples[0]) - 1) + [last])}]"
 
 
+def declaring(model: type[Section], name: str) -> type[Section]:
+    """The section that declares an entry which ``model`` has or inherits."""
+    return next(base for base in model.__mro__ if name in inspect.get_annotations(base))
+
+
 def leaves(model, path=(), tags=()):
-    """``(path, tags, field)`` of every leaf; lists are entered at 0, unions at all their kinds."""
+    """``(path, tags, field, declaring section)`` of every leaf, in every place.
+
+    Lists are entered at 0, unions at all their kinds.
+    """
     for name, field in model.model_fields.items():
         sections = list(sections_of(field.annotation))
         index = (0,) if get_origin(field.annotation) is tuple and sections else ()
@@ -239,22 +255,35 @@ def leaves(model, path=(), tags=()):
             tag = [get_args(choice.annotation)[0] for choice in choices[:1]]
             yield from leaves(section, (*path, name, *index), (*tags, *tag))
         if not sections:
-            yield (*path, name), tags, field
+            yield (*path, name), tags, field, declaring(model, name)
 
 
-def all_leaves():
+def in_all_places() -> Iterator[Leaf]:
     for kind, model in kinds().items():
-        for path, tags, field in leaves(model):
-            yield Leaf(kind, ".".join(map(str, path)), tags, field)
+        for path, tags, field, declared in leaves(model):
+            yield Leaf(kind, ".".join(map(str, path)), tags, field, declared)
+
+
+def first_of_each(places: list[Leaf]) -> list[Leaf]:
+    """Every declared entry, in the first of its places."""
+    first: dict[tuple[type[Section], str], Leaf] = {}
+    for leaf in places:
+        first.setdefault((leaf.declared, leaf.name), leaf)
+    return list(first.values())
 
 
 PARSED = functools.cache(source.parse_yaml)
-LEAVES = list(all_leaves())
-QUANTITIES = [leaf for leaf in LEAVES if isinstance(entry_of(leaf.field), Quantity)]
-each_leaf = pytest.mark.parametrize("leaf", LEAVES, ids=str)
-each_quantity = pytest.mark.parametrize("leaf", QUANTITIES, ids=str)
+TEMPLATE = functools.cache(template)
+PLACES = list(in_all_places())
+LEAVES = first_of_each(PLACES)
+SECTIONS: dict[type[Section], list[Leaf]] = {}
+for _leaf in LEAVES:
+    SECTIONS.setdefault(_leaf.declared, []).append(_leaf)
+each_section = pytest.mark.parametrize(
+    "entries", SECTIONS.values(), ids=[section.__name__ for section in SECTIONS]
+)
 # Every set of sections that some entry needs.
-VARIANTS = {(leaf.kind, *leaf.needed): leaf for leaf in LEAVES}
+VARIANTS = {(leaf.kind, *leaf.needed): leaf for leaf in PLACES}
 
 
 @pytest.fixture(autouse=True)
@@ -282,79 +311,100 @@ def folders(tmp_path_factory, template_files) -> dict[str, Folder]:
 def load(leaf, folders, *overrides):
     """The template of the leaf's kind with the overrides that it needs and more."""
     path = folders[leaf.kind] / "case.yaml"
-    return parse_case(template(leaf.kind), str(path), [*leaf.needed, *overrides])
+    return parse_case(TEMPLATE(leaf.kind), str(path), [*leaf.needed, *overrides])
 
 
 def refused(leaf, folders, value):
     """The message that refuses ``value``: one line, which names the entry."""
-    with pytest.raises(CaseError) as refusal:
+    try:
         load(leaf, folders, f"{leaf.key}={value}")
-    (line,) = str(refusal.value).splitlines()
-    assert line.startswith(f"--set {leaf.key}"), line
-    assert "allowed: " in line, line
-    return line
+    except CaseError as refusal:
+        lines = str(refusal).splitlines()
+        assert len(lines) == 1, f"{leaf}: {lines}"
+        assert lines[0].startswith(f"--set {leaf.key}"), f"{leaf}: {lines[0]}"
+        assert "allowed: " in lines[0], f"{leaf}: {lines[0]}"
+        return lines[0]
+    pytest.fail(f"{leaf}: takes {value}")
 
 
 def test_walk_finds_the_leaves():
-    found = {leaf.key for leaf in LEAVES}
+    found = {leaf.key for leaf in PLACES}
     assert {"wear.blade.hardness", "wear.reference_amplitude", "expect.0.tolerance"} <= found
     assert {"load_path.legs.0.approach", "structure.radius_y", "contact.datum"} <= found
     assert {"structure.contacts.0.gap.file", "structure.loads.0.speed"} <= found
     assert {"wear.reported.0.steady", "structure.form.across", "nonlinearity.check"} <= found
-    assert len(LEAVES) > 400
-    assert len(set(map(str, LEAVES))) == len(LEAVES)
+    assert len(set(map(str, PLACES))) == len(PLACES) > 1000
+    assert len(set(map(str, LEAVES))) == len(LEAVES) > 350
 
 
-@each_leaf
-def test_wrong_type_is_refused(leaf, folders):
-    values = ["{a: 1}"]
-    if leaf.is_list:
-        values += ["3", "word", "true"]
-    elif isinstance(entry_of(leaf.field), Quantity | Whole):
-        values += ["true", "word", "'1'", ".nan", ".inf", "-.inf", "[1]"]
-    elif isinstance(entry_of(leaf.field), Text | Path | File):
-        values += ["3", "true", "' '", r'"a\nb"', "[a]"]
-    elif leaf.field.annotation is bool:
-        values += ["1", "yes", "[true]"]
-    for value in values:
-        refused(leaf, folders, value)
+def test_every_declared_entry_is_tried_once():
+    """Whatever place an entry stands in: none is left out, and none is tried again elsewhere."""
+    tried = [(leaf.declared, leaf.name) for entries in SECTIONS.values() for leaf in entries]
+    assert len(set(tried)) == len(tried)
+    assert set(tried) == {(leaf.declared, leaf.name) for leaf in PLACES}
 
 
-@each_quantity
-def test_wrong_unit_is_refused(leaf, folders):
-    wrong = leaf.listed("1", "{}") if leaf.is_list else "{}"
-    assert "unknown unit" in refused(leaf, folders, wrong.format("1 furlongs_per_bushel"))
-    if entry_of(leaf.field).unit is not None:
-        assert "cannot be converted" in refused(leaf, folders, wrong.format("1 K^3/mol"))
+@each_section
+def test_wrong_type_is_refused(entries, folders):
+    for leaf in entries:
+        values = ["{a: 1}"]
+        if leaf.is_list:
+            values += ["3", "word", "true"]
+        elif isinstance(entry_of(leaf.field), Quantity | Whole):
+            values += ["true", "word", "'1'", ".nan", ".inf", "-.inf", "[1]"]
+        elif isinstance(entry_of(leaf.field), Text | Path | File):
+            values += ["3", "true", "' '", r'"a\nb"', "[a]"]
+        elif leaf.field.annotation is bool:
+            values += ["1", "yes", "[true]"]
+        for value in values:
+            refused(leaf, folders, value)
 
 
-@each_leaf
-def test_value_out_of_range_is_refused(leaf, folders):
+@each_section
+def test_wrong_unit_is_refused(entries, folders):
+    for leaf in entries:
+        if not isinstance(entry_of(leaf.field), Quantity):
+            continue
+        wrong = leaf.listed("1", "{}") if leaf.is_list else "{}"
+        assert "unknown unit" in refused(leaf, folders, wrong.format("1 furlongs_per_bushel"))
+        if entry_of(leaf.field).unit is not None:
+            assert "cannot be converted" in refused(leaf, folders, wrong.format("1 K^3/mol"))
+
+
+def limits(leaf) -> list[float]:
+    """The nearest values that are no longer within the limits of an entry."""
     entry = entry_of(leaf.field)
-    limits = []
     if isinstance(entry, Whole):
-        limits = [entry.at_least - 1, entry.at_most + 1]
-    if isinstance(entry, Quantity) and entry.unit is not None:
-        limits = [
-            *(entry.above, entry.below),
-            *(math.nextafter(entry.at_least, -math.inf), math.nextafter(entry.at_most, math.inf)),
-        ]
-        limits = [limit for limit in limits if math.isfinite(limit)]
-        assert len(limits) >= 2, "a quantity needs two limits, or says nothing about its unit"
-    for limit in limits:
-        inside = getattr(entry, "at_least", 0)
-        first = repr(inside if isinstance(entry, Whole) else 1.0)
-        refused(leaf, folders, leaf.listed(first, repr(limit)) if leaf.is_list else repr(limit))
+        return [entry.at_least - 1, entry.at_most + 1]
+    if not isinstance(entry, Quantity) or entry.unit is None:
+        return []
+    beyond = [
+        *(entry.above, entry.below),
+        *(math.nextafter(entry.at_least, -math.inf), math.nextafter(entry.at_most, math.inf)),
+    ]
+    beyond = [limit for limit in beyond if math.isfinite(limit)]
+    assert len(beyond) >= 2, f"{leaf} needs two limits, or says nothing about its unit"
+    return beyond
 
 
-@each_leaf
-def test_entry_is_described(leaf):
-    assert leaf.field.description
-    entry = entry_of(leaf.field)
-    choice = leaf.field.annotation is bool or get_origin(leaf.field.annotation) is Literal
-    assert choice or entry is not None, "no limits: neither a choice nor an Entry"
-    if isinstance(entry, Quantity) and entry.unit is not None:
-        assert leaf.field.description.endswith(f"[{entry.unit}]")
+@each_section
+def test_value_out_of_range_is_refused(entries, folders):
+    for leaf in entries:
+        entry = entry_of(leaf.field)
+        for limit in limits(leaf):
+            first = repr(entry.at_least if isinstance(entry, Whole) else 1.0)
+            value = leaf.listed(first, repr(limit)) if leaf.is_list else repr(limit)
+            refused(leaf, folders, value)
+
+
+def test_entries_are_described():
+    for leaf in LEAVES:
+        assert leaf.field.description, leaf
+        entry = entry_of(leaf.field)
+        choice = leaf.field.annotation is bool or get_origin(leaf.field.annotation) is Literal
+        assert choice or entry is not None, f"{leaf} has no limits: neither a choice nor an Entry"
+        if isinstance(entry, Quantity) and entry.unit is not None:
+            assert leaf.field.description.endswith(f"[{entry.unit}]"), leaf
 
 
 def stated(leaf):
@@ -386,31 +436,40 @@ def stated(leaf):
     return [plain]
 
 
-@each_leaf
-def test_example_is_accepted(leaf, folders):
-    case = load(leaf, folders, *stated(leaf))
-    assert isinstance(case, kinds()[leaf.kind])
-    node = case
-    for key in leaf.key.split("."):
-        node = node[int(key)] if key.isdecimal() else getattr(node, key)
-    assert node is not None
+@each_section
+def test_example_is_accepted(entries, folders):
+    for leaf in entries:
+        case = load(leaf, folders, *stated(leaf))
+        assert isinstance(case, kinds()[leaf.kind]), leaf
+        node = case
+        for key in leaf.key.split("."):
+            node = node[int(key)] if key.isdecimal() else getattr(node, key)
+        assert node is not None, leaf
 
 
-@pytest.mark.parametrize("leaf", VARIANTS.values(), ids=str)
-def test_unknown_key_is_refused_in_every_section(leaf, folders):
-    def sections(node, path=()):
-        if isinstance(node, BaseModel):
-            yield path
-            for name in type(node).model_fields:
-                yield from sections(getattr(node, name), (*path, name))
-        if isinstance(node, tuple):
-            for index, item in enumerate(node):
-                yield from sections(item, (*path, str(index)))
+def sections(node, path=(), place=()):
+    """Path and place of every section: the entry that holds it, and its model."""
+    if isinstance(node, BaseModel):
+        yield path, (*place, type(node))
+        for name in type(node).model_fields:
+            place = (declaring(type(node), name), name)
+            yield from sections(getattr(node, name), (*path, name), place)
+    if isinstance(node, tuple):
+        for index, item in enumerate(node):
+            yield from sections(item, (*path, str(index)), place)
 
-    for path in sections(load(leaf, folders)):
-        key = ".".join((*path, "zzz"))
-        with pytest.raises(CaseError, match=rf"^--set {key}=1: unknown key; allowed: .*$"):
-            load(leaf, folders, f"{key}=1")
+
+def test_unknown_key_is_refused_in_every_section(folders):
+    tried = set()
+    for leaf in VARIANTS.values():
+        for path, place in sections(load(leaf, folders)):
+            if place in tried:
+                continue
+            tried.add(place)
+            key = ".".join((*path, "zzz"))
+            with pytest.raises(CaseError, match=rf"^--set {key}=1: unknown key; allowed: .*$"):
+                load(leaf, folders, f"{key}=1")
+    assert len(tried) > 100
 
 
 @pytest.mark.parametrize(

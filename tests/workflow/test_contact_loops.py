@@ -28,6 +28,7 @@ from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.figures import loops as loops_figure
 from workflow.analyses.wear.figures import wear as figures
 from workflow.analyses.wear.loop_table import read_loop_table
+from workflow.analyses.wear.recording import Recorder
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case
 from workflow.shell.folder import OutputFolder
@@ -320,15 +321,15 @@ def test_resumed_run_keeps_its_earlier_loops(
     start_balls, resume, rubbed, tmp_path, monkeypatch, every
 ):
     """The same loops as without the interruption; with ``end`` the first and the last of them."""
-    keep = workflow.analyses.wear.run.WearLoop.keep
+    keep = Recorder.keep
 
-    def interrupting(loop, state):
-        keep(loop, state)
+    def interrupting(recorder, state):
+        keep(recorder, state)
         if state.jump == 2:
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(workflow.analyses.wear.run.WearLoop, "keep", interrupting)
+        patch.setattr(Recorder, "keep", interrupting)
         begun = start_balls(tmp_path / "out", *ASKED, f"loops.every={every}")
         assert begun.ending.exit_code == 130
     run = resume(tmp_path / "out")

@@ -9,8 +9,8 @@ import pytest
 
 from sa_solver.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Grid, Material
+from wear.interface import CycleTractions
 from workflow.analyses.wear.case.sections import ContactStress, Life
-from workflow.analyses.wear.contact_stage import CycleTractions
 from workflow.analyses.wear.contact_stress import Planes, _tell_of_stick, life_maps
 from workflow.analyses.wear.layout import jump_names
 from workflow.shell.results import grid_of

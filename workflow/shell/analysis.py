@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from workflow.case.sections import Case
-from workflow.shell.folder import OutputFolder
 from workflow.shell.memory import Memory
-from workflow.shell.reporter import Reporter
+
+if TYPE_CHECKING:
+    from workflow.shell.folder import OutputFolder
+    from workflow.shell.reporter import Reporter
 
 AnyCase = TypeVar("AnyCase", bound=Case)
 Summary = Mapping[str, Any]

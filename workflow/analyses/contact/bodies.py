@@ -18,10 +18,9 @@ from workflow.analyses.contact.case import (
     Sphere,
 )
 from workflow.analyses.contact.load_table import LoadTable
-from workflow.analyses.wear.structures.bodies.case import Flat, FlatStrip
 from workflow.case.input_files import read_heights
 
-Shape = Sphere | Ellipsoid | Cylinder | FlatRounded | Flat | FlatStrip
+Shape = Sphere | Ellipsoid | Cylinder | FlatRounded
 
 RIGID = Material(young=np.inf, poisson=0.0)
 
@@ -52,11 +51,6 @@ def height_at(shape: Shape, x: Array, y: Array) -> Array:
         case FlatRounded():
             beyond = np.maximum(np.abs(x) - shape.half_width, 0.0)
             height = beyond**2 / (2.0 * shape.edge_radius)
-        case Flat():
-            on_top = (np.abs(x) < shape.half_width) & (np.abs(y) < shape.half_length)
-            height = np.where(on_top, 0.0, shape.step)
-        case FlatStrip():
-            height = np.where(np.abs(x) < shape.half_width, 0.0, shape.step)
     return height
 
 

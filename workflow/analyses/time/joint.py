@@ -13,7 +13,7 @@ from wear.joints.ageing import (
     LongTest,
     MarchedStroke,
     NeverReachedError,
-    integrated_stretch,
+    integrate_cycles,
     long_test,
     steady_stroke,
 )
@@ -194,7 +194,7 @@ def _ageing_numbers(model: JointModel, test: LongTest, amplitude: float) -> dict
         return numbers
     begin = float(test.energy_at(first))
     marched = MarchedStroke(model.line_law, model.evolution, amplitude, start=begin)
-    stretch = integrated_stretch(test, marched, first, cycles)
+    stretch = integrate_cycles(test, marched, first, cycles)
     return numbers | {
         "stretch": {
             "first": stretch.first,

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, HarmonicSolution, PeriodicLoad
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.receptance import Receptance
 from sa_solver.types import Array

@@ -19,7 +19,8 @@ from fe_models.dynamics.forced_response import (
     along_frequency,
     finer_resolution,
 )
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, HarmonicSolution
+from fe_models.dynamics.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import Resolution
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact

@@ -31,7 +31,7 @@ from workflow.errors import UserError
 from workflow.shell.dataset import Dataset
 
 if TYPE_CHECKING:
-    from workflow.analyses.wear.interface_state import InterfaceState
+    from wear.interface import InterfaceState
     from workflow.shell.folder import OutputFolder
     from workflow.shell.reporter import Reporter
     from workflow.shell.results import ResultsWriter

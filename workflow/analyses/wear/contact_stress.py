@@ -17,11 +17,11 @@ import numpy as np
 from fe_models.elasticity import von_mises
 from sa_solver.subsurface import COMPONENTS, SubsurfaceStress
 from sa_solver.types import Array, Grid, Material
+from wear.interface import CycleTractions, FaceLoads, FirstContact
 from wear.life import Ruiz, findley, ruiz, smith_watson_topper
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Life
-from workflow.analyses.wear.contact_stage import ContactStage, CycleTractions, FirstContact
-from workflow.analyses.wear.load_source import FaceLoads
+from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 from workflow.shell.results import ResultsWriter
@@ -61,7 +61,7 @@ class ContactMoment:
     """Both bodies under one contact, unworn or worn.
 
     ``left_out`` are the increments, counted from 0, whose shear is not known (see
-    :class:`workflow.analyses.wear.contact_stage.CycleTractions`) and that the maps do without.
+    :class:`wear.interface.CycleTractions`) and that the maps do without.
     """
 
     bodies: tuple[BodyStress, BodyStress]

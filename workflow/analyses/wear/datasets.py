@@ -19,7 +19,7 @@ from workflow.shell.results import ResultsWriter
 
 if TYPE_CHECKING:
     from fe_models.mesh import Face
-    from workflow.analyses.wear.load_source import FaceLoads
+    from wear.interface import FaceLoads
 
 
 def face_mesh(face: Face) -> dict[str, Dataset]:

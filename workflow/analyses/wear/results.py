@@ -13,11 +13,12 @@ import numpy as np
 
 from sa_solver.normal import NormalContactError
 from sa_solver.types import LoadHistory
+from wear.coupled import KINETICS, CoupledState
+from wear.interface import CycleTractions, FaceLoads, FirstContact
 from wear.kinetics import LinearRegime, linear_regime
 from wear.steppers import root_mean_square
 from workflow.analyses.contact.datasets import pressure_field, traction_fields
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.checkpoint import KINETICS, RunState
 from workflow.analyses.wear.comparison import comparison_summary, write_comparison
 from workflow.analyses.wear.contact_loops import (
     loops_sentence,
@@ -25,7 +26,7 @@ from workflow.analyses.wear.contact_loops import (
     write_loop_tables,
     write_loops,
 )
-from workflow.analyses.wear.contact_stage import ContactStage, CycleTractions, FirstContact
+from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.contact_stress import InterfaceStress, contact_stresses
 from workflow.analyses.wear.datasets import (
     cycles_column,
@@ -34,7 +35,7 @@ from workflow.analyses.wear.datasets import (
     surface_heights,
 )
 from workflow.analyses.wear.figures.wear import EXTRAPOLATION, figures_of
-from workflow.analyses.wear.load_source import FaceLoads, LoadSource
+from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.paraview.wear import write_wear
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.uniformity import uniformities
@@ -64,7 +65,7 @@ class Outcome:
     case: WearCase
     source: LoadSource
     stages: list[ContactStage]
-    state: RunState
+    state: CoupledState
     unworn: Sequence[FaceLoads]
     first: list[FirstContact]
     worn: list[CycleTractions]

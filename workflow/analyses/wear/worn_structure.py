@@ -13,8 +13,8 @@ from fe_models.remesh import worn_mesh, worn_volume
 from fe_models.stress import StressField
 from fe_models.structure import CycleSolution
 from sa_solver.types import LoadHistory
+from wear.coupled import CoupledState
 from workflow.analyses.wear.case.evolution import EvolvingFriction
-from workflow.analyses.wear.checkpoint import RunState
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.datasets import put_face
 from workflow.analyses.wear.structure_stage import StructureStage
@@ -51,7 +51,7 @@ class WornStructure:
             for body, field in bodies:
                 writer.put(f"bodies/{body.name}/{moment}", _body(body, field))
 
-    def summary(self, state: RunState) -> dict[str, Any]:
+    def summary(self, state: CoupledState) -> dict[str, Any]:
         """What the solver says of itself, and the largest stresses."""
         stage, unworn = self.stage, self.stage.unworn_cycle
         bodies = self.mesh.body_1, self.mesh.body_2
@@ -110,7 +110,7 @@ def _body(body: Body, field: StressField) -> dict[str, Dataset]:
 def worn_structure(
     stage: StructureStage,
     contacts: list[ContactStage],
-    state: RunState,
+    state: CoupledState,
     friction: EvolvingFriction,
     folder: OutputFolder,
     reporter: Reporter,

@@ -1,5 +1,6 @@
 """The structures that may load contacts. A new one is a folder here and a name below."""
 
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from workflow.analyses.wear.case.base import WearCase
@@ -13,6 +14,19 @@ STRUCTURES: tuple[WearStructure[Any], ...] = (
     bodies.STRUCTURE,
     bodies.LINE_STRUCTURE,
 )
+
+
+class CasesOfStructures(Mapping[str, type[WearCase]]):
+    """The kinds of case of the structures that there are when it is asked, by their names."""
+
+    def __getitem__(self, name: str) -> type[WearCase]:
+        return {own.name: own.case for own in STRUCTURES}[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(own.name for own in STRUCTURES)
+
+    def __len__(self) -> int:
+        return len(STRUCTURES)
 
 
 def structure_of(case: WearCase) -> WearStructure[Any]:

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
 
 from fe_models.mesh import Face
 from sa_solver.types import Array, Frame, Grid, LoadHistory
+from wear.interface import CycleLoads
 from workflow.analyses.contact.bodies import Shape, height_at
 from workflow.analyses.contact.case import Heights
 from workflow.analyses.wear.gaps import GapFunction, GridHeights
 from workflow.analyses.wear.load_source import ContactFace, UserFace
-from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
+from workflow.analyses.wear.structures.bodies.case import (
+    BodiesWearCase,
+    Flat,
+    FlatStrip,
+    LineBodiesWearCase,
+)
 from workflow.case.input_files import read_heights
 
 NAME = "interface"
@@ -23,14 +28,6 @@ COARSER = 4
 # Cells below which a contact is hardly one.
 FEWEST = 8
 REMEDY = "enlarge contact.size, and contact.grid with it"
-
-
-@dataclass(frozen=True)
-class Sliding:
-    """What the contact carries over a cycle: ``slip`` ``(t, 2, n)`` [mm] of the rigid bodies."""
-
-    loads: LoadHistory
-    slip: Array
 
 
 class BodiesSource:
@@ -63,12 +60,12 @@ class BodiesSource:
     def prepare(self) -> None:
         """Nothing is costly."""
 
-    def unworn(self) -> tuple[Sliding, ...]:
+    def unworn(self) -> tuple[CycleLoads, ...]:
         return self._sliding(self._case.friction.coefficient)
 
     def worn(
         self, depths: Sequence[Array], friction: Sequence[float] | None = None
-    ) -> tuple[Sliding, ...]:
+    ) -> tuple[CycleLoads, ...]:
         """As unworn but for the friction: no structure answers to wear."""
         return self._sliding(*friction) if friction else self.unworn()
 
@@ -90,10 +87,12 @@ class BodiesSource:
         there = np.tile(step, (path.increments, 1))
         return np.concatenate([there, -there])
 
-    def _sliding(self, friction: float) -> tuple[Sliding]:
+    def _sliding(self, friction: float) -> tuple[CycleLoads]:
         """The cycle of the only contact."""
         nodes = len(self.faces[0].face)
-        return (Sliding(self._loads(friction), np.repeat(self.motion[:, :, None], nodes, axis=2)),)
+        return (
+            CycleLoads(self._loads(friction), np.repeat(self.motion[:, :, None], nodes, axis=2)),
+        )
 
     def _loads(self, friction: float) -> LoadHistory:
         """Friction against the motion, and what it dissipates."""
@@ -129,8 +128,18 @@ class BodiesSource:
         return Face(NAME, frame, corners, np.array([[0, 1, 2], [0, 2, 3]]))
 
 
-def gap_of(shape: Shape | Heights, grid: Grid) -> GapFunction:
+def gap_of(shape: Shape | Flat | FlatStrip | Heights, grid: Grid) -> GapFunction:
     """Gap [mm] of the unloaded bodies at x and y of the face that ``grid`` covers."""
     if isinstance(shape, Heights):
         return GridHeights(grid, read_heights(shape.file))
+    if isinstance(shape, Flat | FlatStrip):
+        return partial(step_around, shape)
     return partial(height_at, shape)
+
+
+def step_around(shape: Flat | FlatStrip, x: Array, y: Array) -> Array:
+    """Gap [mm] around a flat rectangle or strip, at ``x`` and ``y``, which broadcast."""
+    on_top = np.abs(x) < shape.half_width
+    if isinstance(shape, Flat):
+        on_top = on_top & (np.abs(y) < shape.half_length)
+    return np.where(on_top, 0.0, shape.step)

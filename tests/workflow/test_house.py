@@ -1,0 +1,105 @@
+"""The plan of the house: no circle of imports, nobody asks what kind a case is, few files flat.
+
+Layers are contracts of import-linter (pyproject.toml). Everything is read, nothing imported:
+imports inside functions and those for types count like all others.
+"""
+
+import ast
+from collections.abc import Iterator
+from functools import cache
+from graphlib import TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parents[2]
+WORKFLOW = ROOT / "workflow"
+PACKAGES = "workflow", "fe_models", "wear", "sa_solver"
+# What lies flat in workflow/: the door, the kinds there are, and what they fail with.
+MOST_FLAT_FILES = 6
+
+
+@cache
+def modules(package: str) -> dict[str, ast.Module]:
+    """The modules of a package by their dotted names."""
+    found = {}
+    for path in sorted((ROOT / package).rglob("*.py")):
+        parts = path.relative_to(ROOT).with_suffix("").parts
+        name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
+        found[name] = ast.parse(path.read_text(encoding="utf-8"))
+    return found
+
+
+def imported(module: ast.Module, known: dict[str, ast.Module]) -> Iterator[str]:
+    """The modules among those ``known`` that one imports, wherever in it."""
+    for node in ast.walk(module):
+        if isinstance(node, ast.ImportFrom):
+            assert node.level == 0, "relative imports are not looked for here"
+            for alias in node.names:
+                names = f"{node.module}.{alias.name}", str(node.module)
+                yield from [name for name in names if name in known][:1]
+        elif isinstance(node, ast.Import):
+            yield from (alias.name for alias in node.names if alias.name in known)
+
+
+@pytest.mark.parametrize("package", PACKAGES)
+def test_no_circle_of_imports(package: str) -> None:
+    known = modules(package)
+    graph = {name: set(imported(module, known)) - {name} for name, module in known.items()}
+    # Raises CycleError, which names the modules of the circle.
+    TopologicalSorter(graph).prepare()
+
+
+def owner(module: str) -> str:
+    """The folder that a module belongs to: an analysis, or what else there is in workflow."""
+    parts = module.split(".")
+    return ".".join(parts[:3] if parts[1:2] == ["analyses"] else parts[:2])
+
+
+def kinds_of_case(known: dict[str, ast.Module]) -> dict[str, str]:
+    """The classes that derive from Case, however far, and the folder of each."""
+    classes = {
+        node.name: (owner(name), {ast.unparse(base).partition("[")[0] for base in node.bases})
+        for name, module in known.items()
+        for node in ast.walk(module)
+        if isinstance(node, ast.ClassDef)
+    }
+    found = {"Case": owner("workflow.case")}
+    while True:
+        more = {name: own for name, (own, bases) in classes.items() if bases & found.keys()}
+        if more.keys() <= found.keys():
+            return found
+        found |= more
+
+
+def names_asked_for(module: ast.Module) -> Iterator[tuple[int, str]]:
+    """Line and name of every class that something is held against."""
+    for node in ast.walk(module):
+        asked: ast.AST | None = None
+        if isinstance(node, ast.Call) and ast.unparse(node.func) in ("isinstance", "issubclass"):
+            asked = node.args[1]
+        elif isinstance(node, ast.MatchClass):
+            asked = node.cls
+        elif isinstance(node, ast.Compare) and ast.unparse(node.left).startswith("type("):
+            asked = node.comparators[0]
+        for part in ast.walk(asked) if asked is not None else ():
+            if isinstance(part, ast.Name | ast.Attribute):
+                yield part.lineno, ast.unparse(part)
+
+
+def test_nobody_asks_what_kind_a_case_is_but_its_own_analysis() -> None:
+    known = modules("workflow")
+    kinds = kinds_of_case(known)
+    assert len(kinds) > 10
+    asked = [
+        f"{name}:{line}: {kind}"
+        for name, module in known.items()
+        for line, kind in names_asked_for(module)
+        if kind.rpartition(".")[2] in kinds and owner(name) != kinds[kind.rpartition(".")[2]]
+    ]
+    assert not asked, "\n".join(asked)
+
+
+def test_few_files_lie_flat() -> None:
+    flat = sorted(path.name for path in WORKFLOW.iterdir() if path.is_file())
+    assert len(flat) <= MOST_FLAT_FILES, flat
