@@ -47,9 +47,10 @@ def write_specimens_output(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -
     """Write all files of a finished run; the summary comes last and marks it as finished."""
     folder, reporter = run.folder, run.reporter
     with reporter.stage("results"):
-        folder.reduced.mkdir(exist_ok=True)
+        reduced = folder.reserve("reduced", "reduced models of the specimens, to build rigs of")
+        reduced.mkdir(exist_ok=True)
         for number, model in enumerate(outcome.model.reduction.models, 1):
-            with replacing(folder.reduced / f"body_{number}.h5") as partial:
+            with replacing(reduced / f"body_{number}.h5") as partial:
                 save_reduced(partial, model)
         _write_results(outcome, run)
     with reporter.stage("paraview and figures"):

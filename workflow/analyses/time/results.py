@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
-from workflow.analyses.time.case import JointCase, RigCase
+from workflow.analyses.time.case import JointCase, RigCase, joules
 from workflow.analyses.time.figures import figures_of
 from workflow.analyses.time.outcome import MOTION, State, TimeOutcome
 from workflow.pictures.drawing import write_pictures
 from workflow.shell.analysis import Run
+from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
 from workflow.shell.results import run_results
 from workflow.shell.summary import finish, number_at
@@ -26,7 +26,7 @@ def write_time_output(outcome: TimeOutcome, run: TimeRun) -> None:
     folder, reporter = run.folder, run.reporter
     with reporter.stage("results"):
         _write_results(outcome, run)
-        _write_tables(outcome, folder.root)
+        _write_tables(outcome, folder)
     with reporter.stage("paraview and figures"):
         write_pictures(outcome.case.output, folder, figures_of)
     summary = _summary(outcome, reporter)
@@ -50,13 +50,15 @@ def _write_results(outcome: TimeOutcome, run: TimeRun) -> None:
                 writer.put(f"{place}/{group}", curves)
 
 
-def _write_tables(outcome: TimeOutcome, root: Path) -> None:
+def _write_tables(outcome: TimeOutcome, folder: OutputFolder) -> None:
     """The evolution, and the curves of every state, as CSV in base units; motions are too long."""
-    write_curves(root / f"{EVOLUTION}.csv", outcome.evolution)
+    what = "parameters of the joint over the energy it has dissipated"
+    write_curves(folder.reserve(f"{EVOLUTION}.csv", what), outcome.evolution)
     for number, state in enumerate(outcome.states):
         for group, curves in state.curves.items():
             if group != MOTION:
-                write_curves(root / f"{group}_{number:05d}.csv", curves)
+                what = f"{group.replace('_', ' ')} at {joules(state.energy)}"
+                write_curves(folder.reserve(f"{group}_{number:05d}.csv", what), curves)
 
 
 # --- summary ------------------------------------------------------------------------------------

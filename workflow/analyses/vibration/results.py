@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 from workflow.analyses.vibration.case import VibrationCase
@@ -20,6 +19,7 @@ from workflow.analyses.vibration.outcome import (
 from workflow.analyses.vibration.paraview import write_vibration
 from workflow.pictures.drawing import write_pictures
 from workflow.shell.analysis import Run
+from workflow.shell.folder import OutputFolder
 from workflow.shell.results import ResultsWriter, run_results
 from workflow.shell.summary import finish
 from workflow.shell.tables import write_curves
@@ -33,7 +33,7 @@ def write_vibration_output(outcome: VibrationOutcome, run: Run[VibrationCase]) -
     folder, reporter = run.folder, run.reporter
     with reporter.stage("results"):
         _write_results(outcome, run)
-        _write_tables(outcome, folder.root)
+        _write_tables(outcome, folder)
     with reporter.stage("paraview and figures"):
         write_pictures(outcome.case.output, folder, figures_of, write_vibration)
     finish(run, _summary(outcome), _lines(outcome))
@@ -75,16 +75,21 @@ def put_response_curves(writer: ResultsWriter, place: str, response: Response) -
 # --- tables -------------------------------------------------------------------------------------
 
 
-def _write_tables(outcome: VibrationOutcome, root: Path) -> None:
+def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
     """Responses, loops (the finest of each force), backbone and force sweeps as CSV."""
     for number, response in enumerate(outcome.responses):
-        write_curves(root / f"frf_{number:05d}.csv", response.curves)
+        under = f"under {response.force:g} N"
+        path = folder.reserve(f"frf_{number:05d}.csv", f"response {under}, over frequency")
+        write_curves(path, response.curves)
         if response.loops:
-            write_curves(root / f"loop_{number:05d}.csv", response.loops[-1].datasets)
+            path = folder.reserve(f"loop_{number:05d}.csv", f"loop of the joints {under}")
+            write_curves(path, response.loops[-1].datasets)
     if outcome.backbone is not None:
-        write_curves(root / f"{BACKBONE}.csv", outcome.backbone.datasets)
+        path = folder.reserve(f"{BACKBONE}.csv", "phase resonance, over the force")
+        write_curves(path, outcome.backbone.datasets)
     for number, sweep in enumerate(outcome.force_sweeps):
-        write_curves(root / f"force_sweep_{number:05d}.csv", sweep.datasets)
+        what = f"response at {sweep.numbers['frequency']:g} Hz, over the force"
+        write_curves(folder.reserve(f"force_sweep_{number:05d}.csv", what), sweep.datasets)
 
 
 # --- summary ------------------------------------------------------------------------------------

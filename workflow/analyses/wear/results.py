@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -130,7 +129,7 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
         *(f"  {loops_sentence(name, own, outcome.source.line)}" for name, own in loops.items()),
     ]
     finish(run, summary, lines)
-    shutil.rmtree(folder.jumps)
+    folder.discard(folder.jumps.name)
 
 
 def _write_worn_nodes(
@@ -143,7 +142,7 @@ def _write_worn_nodes(
         for number, (stage, state) in enumerate(pairs)
         for face in worn_faces(outcome.source.user_faces(number), stage, state)
     ]
-    return write_worn_faces(faces, folder.root, reporter)
+    return write_worn_faces(faces, folder, reporter)
 
 
 def _write_results(
