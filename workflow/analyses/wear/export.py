@@ -25,7 +25,7 @@ from workflow.analyses.wear.warnings import warn_of_structure
 from workflow.case.writing import dump_case
 from workflow.errors import UserError
 from workflow.shell.reporter import Reporter
-from workflow.shell.store import replacing
+from workflow.shell.store import write_text
 
 # How other codes write such files.
 RECIPE = Path(resultants.__file__).with_name("RECIPE.md")
@@ -85,9 +85,7 @@ def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter
     loads = {name: history.loads for name, history in histories.items()}
     write_resultants_csv(out / TABLE, loads, source.line)
     write_resultants_h5(out / FIELDS, histories, heights)
-    text = dump_case(_imported(case, faces, out))
-    with replacing(out / CASE) as partial:
-        partial.write_text(text, encoding="utf-8")
+    write_text(out / CASE, dump_case(_imported(case, faces, out)))
 
 
 def _numbered(source: StructureStage, history: InterfaceHistory) -> InterfaceHistory:
