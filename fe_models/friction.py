@@ -73,16 +73,16 @@ class FrictionalJoint:
         floor = LOAD_FLOOR * np.linalg.norm(loads, axis=1).max()
         displacement = np.zeros((3, len(gap))) if previous is None else previous
         heaviest = loads[np.argmax(np.linalg.norm(loads, axis=1))]
-        found: list[Array] = []
+        states: list[Array] = []
         for increment, load in enumerate(loads):
-            starts = _starts(found, guess, loads[: increment + 1], gap)
+            starts = _starts(states, guess, loads[: increment + 1], gap)
             state = self._solve(load, gap, displacement, starts, floor)
-            if not state.converged and not found:
+            if not state.converged and not states:
                 # A light first load would take a body long to where worn faces meet: pressed hard
                 # it is there at once, and from there what the light load does is near.
                 pressed = self._solve(heaviest, gap, displacement, starts, floor)
                 state = self._solve(load, gap, displacement, [pressed.state], floor)
-            found.append(state.state)
+            states.append(state.state)
             displacement = state.displacement
             yield state
 
@@ -175,25 +175,25 @@ class _Problem:
         )
 
 
-def _starts(found: list[Array], guess: Sequence[Array], loads: Array, gap: Array) -> list[Array]:
+def _starts(states: list[Array], guess: Sequence[Array], loads: Array, gap: Array) -> list[Array]:
     """Where the next increment, whose load is the last of ``loads``, may start from.
 
     The previous state; the change that the guess makes there; and the change in proportion to the
     load, as long as that goes on in the same sense. The first one from rest or, where no node
     touches, from where all do: a body that floats would be long on its way there.
     """
-    increment = len(found)
-    if not found:
+    increment = len(states)
+    if not states:
         rest = np.zeros((len(gap), loads.shape[1] // len(gap)))
         if gap.min() > 0.0:
             rest[:, -1] = -gap
         return [*guess[:1], *guess[-1:], rest.ravel()]
-    starts = [found[-1]]
+    starts = [states[-1]]
     if increment < len(guess):
-        starts.append(guess[increment] + found[-1] - guess[increment - 1])
+        starts.append(guess[increment] + states[-1] - guess[increment - 1])
     if increment > 1:
         step, before = np.diff(loads[-3:], axis=0)[::-1]
         if step @ before > 0.0:
             ratio = (step @ before) / (before @ before)
-            starts.append(found[-1] + ratio * (found[-1] - found[-2]))
+            starts.append(states[-1] + ratio * (states[-1] - states[-2]))
     return starts

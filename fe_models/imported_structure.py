@@ -101,9 +101,9 @@ def imported_mesh(
     Raises :class:`MeshError` for names that are not in the file or faces that do not meet.
     """
     body_1, body_2 = (named_body(imported, name) for name in names)
-    own = [pair.name for pair in pairs]
-    body_1 = _with_interfaces(imported, body_1, [pair.face_1 for pair in pairs], own)
-    body_2 = _with_interfaces(imported, body_2, [pair.face_2 for pair in pairs], own)
+    interface_names = [pair.name for pair in pairs]
+    body_1 = _with_interfaces(imported, body_1, [pair.face_1 for pair in pairs], interface_names)
+    body_2 = _with_interfaces(imported, body_2, [pair.face_2 for pair in pairs], interface_names)
     interfaces = []
     for pair in pairs:
         faces = (body_1, pair.face_1, body_2, pair.face_2)
@@ -153,10 +153,10 @@ def named_body(imported: ImportedMesh, name: str) -> Body:
 
 def contact_facets(imported: ImportedMesh, body: Body, boundary: str) -> Indices:
     """Facets of a boundary of a body. Raises :class:`MeshError` if it is not on that body."""
-    own = body.mesh.boundaries or {}
-    if boundary in own:
-        return np.asarray(own[boundary])
-    known = ", ".join(own) or "none"
+    boundaries = body.mesh.boundaries or {}
+    if boundary in boundaries:
+        return np.asarray(boundaries[boundary])
+    known = ", ".join(boundaries) or "none"
     others = [b.name for b in imported.bodies.values() if boundary in (b.mesh.boundaries or {})]
     if others:
         wrong = f"boundary {boundary} is on body {', '.join(others)}, not on {body.name}"
@@ -296,9 +296,9 @@ def _supported(
     body = (mesh.body_1, mesh.body_2)[number - 1]
     elastic = ElasticBody(body, material, order)
     constraints = Constraints(len(elastic.nodes), elastic.dimension)
-    own = set[str]().union(*_groups(imported, [body]))
+    groups = set[str]().union(*_groups(imported, [body]))
     for support in supports:
-        if support.group in own:
+        if support.group in groups:
             _hold(constraints, elastic, imported.points[body.name], support)
     free, supported_motions = constraints.free, constraints.transformation()
     imposed = np.zeros((elastic.size, len(loads)))
@@ -306,10 +306,10 @@ def _supported(
     moved = []
     for case, load in enumerate(loads):
         if isinstance(load, Displacement):
-            if load.boundary in own:
+            if load.boundary in groups:
                 moved.append(load)
                 imposed[:, case] = _impose(constraints, elastic, load)
-        elif _boundary(load) is None or _boundary(load) in own:
+        elif _boundary(load) is None or _boundary(load) in groups:
             forces[:, case] = _forces(elastic, load)
     _check_against_supports(loads, imposed, supported_motions @ imposed[free])
     _check_against_each_other(elastic, moved)
@@ -383,8 +383,8 @@ def _impose(constraints: Constraints, elastic: ElasticBody, load: Displacement) 
 
 def _check_against_supports(loads: Sequence[AppliedLoad], imposed: Array, allowed: Array) -> None:
     """Raise unless supports leave the ``imposed`` displacements ``(size, loads)`` as they are."""
-    for load, own, left in zip(loads, imposed.T, allowed.T, strict=True):
-        if np.abs(left - own).max() > HELD_SHARE * np.abs(own).max():
+    for load, displacement, left in zip(loads, imposed.T, allowed.T, strict=True):
+        if np.abs(left - displacement).max() > HELD_SHARE * np.abs(displacement).max():
             raise MeshError(
                 f"a displacement is imposed on {_boundary(load)} along what a support holds of its "
                 "nodes; hold them across it alone, such as xy for one along z"

@@ -43,7 +43,8 @@ class JointStiffness:
     component`` over all interfaces in d dimensions, per length in the plane; ``rigid_modes`` counts
     H's null space; ``smallest`` and ``largest`` are its extreme elastic eigenvalues. Of the
     displacements that ``held`` ``(d n,)`` marks, which stay zero, there are no rows and columns. A
-    joint with a mirror symmetry, which holds none, is split into what the mirror keeps and turns.
+    joint with a mirror symmetry, which holds none, is split into its symmetric and antisymmetric
+    parts.
     """
 
     stiffness: Array | SplitMatrix
@@ -60,8 +61,8 @@ class JointStiffness:
         """
         rho = float(np.sqrt(self.smallest * self.largest))
         if isinstance(self.stiffness, SplitMatrix):
-            kept, turned = (_shifted_inverse(block, rho) for block in self.stiffness.blocks)
-            split = SplitMatrix(self.stiffness.mirror, (kept, turned))
+            symmetric, antisymmetric = (_shifted_inverse(b, rho) for b in self.stiffness.blocks)
+            split = SplitMatrix(self.stiffness.mirror, (symmetric, antisymmetric))
             return JointResolvent(split, rho, self.loads, self.rigid_modes)
         inverse = _shifted_inverse(self.stiffness, rho)
         loads = self.loads
@@ -112,10 +113,11 @@ def join_halves(
     halves_1: tuple[Condensed, ...], halves_2: tuple[Condensed, ...], mirror: Mirror
 ) -> JointStiffness:
     """Join bodies that meet node to node, condensed in halves of the same ``mirror``."""
-    kept, turned = (_joined(*pair, None) for pair in zip(halves_1, halves_2, strict=True))
-    counts, smallest, largest = zip(*(_spectrum(block) for block, _ in (kept, turned)), strict=True)
-    loads = mirror.bases[0] @ kept[1] + mirror.bases[1] @ turned[1]
-    stiffness = SplitMatrix(mirror, (kept[0], turned[0]))
+    joined = [_joined(*pair, None) for pair in zip(halves_1, halves_2, strict=True)]
+    (symmetric, symmetric_loads), (antisymmetric, antisymmetric_loads) = joined
+    counts, smallest, largest = zip(*(_spectrum(block) for block, _ in joined), strict=True)
+    loads = mirror.bases[0] @ symmetric_loads + mirror.bases[1] @ antisymmetric_loads
+    stiffness = SplitMatrix(mirror, (symmetric, antisymmetric))
     return JointStiffness(stiffness, loads, sum(counts), min(smallest), max(largest))
 
 
@@ -127,15 +129,15 @@ def _joined(
     """H and f0 of the load cases."""
     (stiffness_1, loads_1), (stiffness_2, loads_2) = condensed_1, condensed_2
     if projection is None:
-        coupling, carried, handed = stiffness_2, stiffness_2, loads_2
+        coupling, carried, transferred = stiffness_2, stiffness_2, loads_2
     else:
-        coupling, handed = projection.T @ stiffness_2, projection.T @ loads_2
+        coupling, transferred = projection.T @ stiffness_2, projection.T @ loads_2
         carried = coupling @ projection
     factor = sl.cholesky(stiffness_1 + carried, lower=True, overwrite_a=True)
     # S_2 N C⁻¹ NᵀS_2 = XᵀX with X = L⁻¹ NᵀS_2: half the work of solving with both factors.
     half = sl.solve_triangular(factor, coupling, lower=True)
     stiffness = stiffness_2 - half.T @ half
-    loads = half.T @ sl.solve_triangular(factor, loads_1 + handed, lower=True) - loads_2
+    loads = half.T @ sl.solve_triangular(factor, loads_1 + transferred, lower=True) - loads_2
     return stiffness, loads
 
 

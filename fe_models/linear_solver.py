@@ -129,10 +129,10 @@ def condense(
     # A load whose displacements are known tells whether the result is right.
     displacement = np.random.default_rng(0).standard_normal(matrix.shape[0])
     every = np.column_stack([loads, matrix @ displacement])
-    found = _condense_by_pardiso(matrix, every, kept, limit)
-    if found is None or not _is_condensed(*found, displacement[kept]):
-        found = _condense_by_columns(matrix, every, kept, limit)
-    return found[0], found[1][:, :-1]
+    condensed = _condense_by_pardiso(matrix, every, kept, limit)
+    if condensed is None or not _is_condensed(*condensed, displacement[kept]):
+        condensed = _condense_by_columns(matrix, every, kept, limit)
+    return condensed[0], condensed[1][:, :-1]
 
 
 class _Iterative:
@@ -151,20 +151,20 @@ class _Iterative:
         return np.stack([self._column(column) for column in columns], axis=1).reshape(rhs.shape)
 
     def _column(self, rhs: Array) -> Array:
-        found = self._grids.solve(rhs, self._choice.tolerance, self._choice.iterations)
-        if not found.converged:
+        result = self._grids.solve(rhs, self._choice.tolerance, self._choice.iterations)
+        if not result.converged:
             raise SolverError(
-                f"conjugate gradients did not converge: residual {found.residual:.1e} of the load "
-                f"after {found.iterations} iterations; factorise, allow more iterations, or see "
+                f"conjugate gradients did not converge: residual {result.residual:.1e} of the load "
+                f"after {result.iterations} iterations; factorise, allow more iterations, or see "
                 "that all bodies are held and no element is degenerate"
             )
-        return found.solution
+        return result.solution
 
 
 def _limit(memory: float | None) -> float:
     """The memory allowed; no limit where the system does not tell."""
-    found = available_bytes() if memory is None else memory
-    return inf if found is None else found
+    free = available_bytes() if memory is None else memory
+    return inf if free is None else free
 
 
 class _Checked:

@@ -15,7 +15,7 @@ def available_bytes() -> float | None:
 
     In a container with a limit of its own, what that leaves if it is less.
     """
-    amounts = [found for found in (_machine(), _container()) if found is not None]
+    amounts = [amount for amount in (_machine(), _container()) if amount is not None]
     return min(amounts, default=None)
 
 

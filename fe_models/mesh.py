@@ -4,15 +4,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.spatial import cKDTree
-from skfem import MeshTet, MeshTri
 
 from fe_models.gmsh_session import gmsh_model
 from sa_solver.errors import InputError
 from sa_solver.types import Array, Frame, Indices
+
+if TYPE_CHECKING:
+    import scipy.sparse as sp
+    from skfem import MeshTet, MeshTri
 
 # Two nodes are the same point when they are closer than this share of the interface's size.
 MATCHING_TOLERANCE = 1e-9
@@ -161,6 +163,10 @@ def named_mesh(points: Array, cells: Indices, boundaries: dict[str, Indices]) ->
     Tetrahedra: ``points`` ``(n, 3)``, ``cells`` ``(m, 4)``, each boundary ``(k, 3)``; triangles in
     the plane (X, Z): ``(n, 2)``, ``(m, 3)`` and ``(k, 2)``.
     """
+    # Finite elements take a second to load: where they are used.
+    from scipy.spatial import cKDTree
+    from skfem import MeshTet, MeshTri
+
     kind = MeshTet if points.shape[1] == 3 else MeshTri
     mesh = kind(np.ascontiguousarray(points.T), np.ascontiguousarray(cells.T))
     lookup = cKDTree(np.sort(mesh.facets, axis=0).T)
@@ -180,6 +186,8 @@ def matched_interface(
 
     Raises :class:`MatchError` if a vertex of one face has no partner on the other.
     """
+    from scipy.spatial import cKDTree
+
     nodes_2 = body_2.vertices(boundary)
     nodes_1 = body_1.vertices(boundary)
     points_2 = body_2.points[nodes_2]

@@ -168,10 +168,10 @@ class _Projected:
                 "no area: leave it out of the face, turn the frame or mend the mesh"
             )
         # Corners anticlockwise, segments from left to right.
-        turned = determinants < 0.0
+        clockwise = determinants < 0.0
         self.facets = facets.copy()
-        self.facets[turned] = facets[turned][:, ::-1]
-        self.corners[turned] = self.corners[turned][:, ::-1]
+        self.facets[clockwise] = facets[clockwise][:, ::-1]
+        self.corners[clockwise] = self.corners[clockwise][:, ::-1]
         self.sizes = np.abs(determinants) / (facets.shape[1] - 1)
 
     @property
@@ -232,8 +232,8 @@ def _neighbours(first: Array, second: Array) -> tuple[Indices, Indices]:
         for corners, centre in zip((first, second), centres, strict=True)
     ]
     near = cKDTree(centres[1]).query_ball_point(centres[0], radii[0] + radii[1].max())
-    one = np.repeat(np.arange(len(first)), [len(found) for found in near])
-    other = np.concatenate([np.asarray(found, dtype=np.int64) for found in near])
+    one = np.repeat(np.arange(len(first)), [len(neighbours) for neighbours in near])
+    other = np.concatenate([np.asarray(neighbours, dtype=np.int64) for neighbours in near])
     low = np.maximum(first.min(axis=1)[one], second.min(axis=1)[other])
     high = np.minimum(first.max(axis=1)[one], second.max(axis=1)[other])
     touch = np.all(low < high, axis=1)

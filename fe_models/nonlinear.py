@@ -93,8 +93,8 @@ def check_nonlinearity(
         slip_change=slip_change(newton.state.slip, linear.slip),
         slide=_slide(structure, newton.state.slip),
         displacements=newton.displacements,
-        largest_strain=max(own.largest_strain(u) for own, u in pairs),
-        largest_rotation=max(own.largest_rotation(u) for own, u in pairs),
+        largest_strain=max(body.largest_strain(u) for body, u in pairs),
+        largest_rotation=max(body.largest_rotation(u) for body, u in pairs),
         face_rotation=_turn(structure, structure, newton.displacements),
         iterations=newton.iterations,
         residual=newton.residual,
@@ -185,7 +185,7 @@ def _turn(undeformed: Structure, framed: Structure, displacements: Displacements
     body_1 = undeformed.mesh.body_1
     pairs = zip(undeformed.mesh.interfaces, framed.mesh.interfaces, strict=True)
     turns = [
-        turned_interface(own, body_1, displacements[0]).frame.axes @ other.frame.axes.T
-        for own, other in pairs
+        turned_interface(face, body_1, displacements[0]).frame.axes @ other.frame.axes.T
+        for face, other in pairs
     ]
     return float(rotation_angle(np.array(turns)).max())

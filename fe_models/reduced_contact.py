@@ -201,15 +201,15 @@ class ReducedPair:
         """
         if not force > 0.0:
             raise ValueError(f"a normal force of {force:g} N: give one above 0")
-        found = complementary(self.block(Z), gap, force, guess)
+        contact = complementary(self.block(Z), gap, force, guess)
         return NormalSolution(
-            force=found.force,
-            pressure=found.force / self.areas,
-            gap=found.gap,
-            approach=found.level,
-            area=float(self.areas[found.force > 0.0].sum()),
-            iterations=found.iterations,
-            converged=found.converged,
+            force=contact.force,
+            pressure=contact.force / self.areas,
+            gap=contact.gap,
+            approach=contact.level,
+            area=float(self.areas[contact.force > 0.0].sum()),
+            iterations=contact.iterations,
+            converged=contact.converged,
         )
 
     def tangential(
@@ -225,19 +225,19 @@ class ReducedPair:
         limit = friction * normal.force[touching]
         # Unknown is how far each node's shear stays below its limit; slip is what it meets.
         offset = displacement - A[np.ix_(touching, touching)] @ limit
-        found = complementary(A[np.ix_(touching, touching)], offset)
+        stick = complementary(A[np.ix_(touching, touching)], offset)
         shear = np.zeros(len(self.face))
-        shear[touching] = found.force - limit
+        shear[touching] = stick.force - limit
         # Beyond twice the limit a node would slide against the motion.
-        admissible = bool(np.all(found.force <= (2.0 + ROUNDING) * limit))
+        admissible = bool(np.all(stick.force <= (2.0 + ROUNDING) * limit))
         slip = displacement + A @ shear
-        slip[touching] = found.gap
+        slip[touching] = stick.gap
         return TangentialSolution(
             displacement=displacement,
             force=-float(shear.sum()),
             shear=shear,
             slip=np.where(normal.touching, slip, 0.0),
-            converged=found.converged and admissible,
+            converged=stick.converged and admissible,
         )
 
     def stick_stiffness(self, normal: NormalSolution, axis: int = X) -> float:

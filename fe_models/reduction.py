@@ -141,8 +141,8 @@ def free_frequencies(
     shift = -SHIFT_SHARE * float(np.median(stiffness.diagonal() / mass.diagonal()))
     shifted = stiffness - shift * mass
     if isinstance(shifted, np.ndarray):
-        wanted = size - count, size - 1
-        inverses = sl.eigh(mass, shifted, eigvals_only=True, subset_by_index=wanted)
+        largest = size - count, size - 1
+        inverses = sl.eigh(mass, shifted, eigvals_only=True, subset_by_index=largest)
         squares = 1.0 / inverses + shift
     else:
         inverse = LinearOperator(shifted.shape, matvec=factorise(shifted.tocsr()), dtype=np.float64)
@@ -170,13 +170,13 @@ def load_reduced(path: Path) -> ReducedModel:
     Raises ``OSError`` for a file that is not HDF5, ``ValueError`` for one that holds no model.
     """
     with h5py.File(path, "r") as file:
-        found: dict[str, Any] = {name: file[name][()] for name in DATASETS if name in file}
-    missing = [name for name in DATASETS if name not in found and name not in OPTIONAL]
+        datasets: dict[str, Any] = {name: file[name][()] for name in DATASETS if name in file}
+    missing = [name for name in DATASETS if name not in datasets and name not in OPTIONAL]
     if missing:
         raise ValueError(f"{path}: no dataset {missing[0]}: not a reduced model")
-    if "names" in found:
-        found["names"] = tuple(name.decode() for name in found["names"])
-    return ReducedModel(**({"mass": None} | found))
+    if "names" in datasets:
+        datasets["names"] = tuple(name.decode() for name in datasets["names"])
+    return ReducedModel(**({"mass": None} | datasets))
 
 
 def _others(size: int, kept: Indices) -> Indices:

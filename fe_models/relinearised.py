@@ -153,8 +153,8 @@ def turned_interface(interface: Interface, body_1: Body, displacement: Array) ->
     turned = replace(interface, frame=_turned(interface.frame, rotation))
     if interface.face_1 is None:
         return turned
-    own = replace(interface.face_1, frame=_turned(interface.face_1.frame, rotation))
-    return replace(turned, face_1=own)
+    face_1 = replace(interface.face_1, frame=_turned(interface.face_1.frame, rotation))
+    return replace(turned, face_1=face_1)
 
 
 def mean_rotation(before: Array, after: Array, weights: Array) -> Array:

@@ -32,6 +32,6 @@ def rigid_motions(arms: Array, axes: tuple[int, ...] = (0, 1, 2)) -> Array:
 
     Along the d global ``axes``; motions across a plane are zero in it.
     """
-    turned = np.cross(np.eye(3)[:, None, :], arms)
-    shifted = np.broadcast_to(np.eye(3)[:, None, :], turned.shape)
-    return np.concatenate([shifted, turned])[..., axes].reshape(6, -1).T
+    rotations = np.cross(np.eye(3)[:, None, :], arms)
+    translations = np.broadcast_to(np.eye(3)[:, None, :], rotations.shape)
+    return np.concatenate([translations, rotations])[..., axes].reshape(6, -1).T

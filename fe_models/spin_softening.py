@@ -45,9 +45,9 @@ def spin_softening(
     own_axes = list(elastic.body.axes)
     across = sp.csr_matrix((np.eye(3) - np.outer(axis, axis))[np.ix_(own_axes, own_axes)])
     mass = elastic.mass @ sp.kron(sp.identity(elastic.size // elastic.dimension), across)
-    for own in carried:
-        motion = carried_motion(elastic, own)
-        mass = mass + own.mass * (motion.T @ across @ motion)
+    for body in carried:
+        motion = carried_motion(elastic, body)
+        mass = mass + body.mass * (motion.T @ across @ motion)
     return (speed**2 * mass).tocsr()
 
 
@@ -68,7 +68,7 @@ def carried_motion(elastic: ElasticBody, carried: CarriedMass) -> sp.csr_matrix:
     blocks = motion[:, axes][:, :, axes]
     columns = elastic.dimension * nodes[:, None, None] + np.arange(elastic.dimension)
     rows = np.arange(elastic.dimension)[:, None]
-    places = tuple(np.broadcast_to(own, blocks.shape).ravel() for own in (rows, columns))
+    places = tuple(np.broadcast_to(part, blocks.shape).ravel() for part in (rows, columns))
     return sp.csr_matrix((blocks.ravel(), places), shape=(elastic.dimension, elastic.size))
 
 

@@ -75,7 +75,7 @@ class CycleSolution:
     def fields(self) -> dict[str, Array]:
         """Force, displacement and slip over all interfaces, to keep and to restore from."""
         return {
-            name: np.concatenate([getattr(own, name) for own in self.histories], axis=-1)
+            name: np.concatenate([getattr(history, name) for history in self.histories], axis=-1)
             for name in FIELDS
         }
 
@@ -139,7 +139,7 @@ class Structure:
         A plane of symmetry holds some of them, a slice in plane strain all.
         """
         held = self.body_2.held.reshape(-1, self.body_2.elastic.dimension)
-        shares = {i.name: float(held[own].mean(axis=0).max()) for i, own in self._shares()}
+        shares = {i.name: float(held[nodes].mean(axis=0).max()) for i, nodes in self._shares()}
         return {name: share for name, share in shares.items() if share > 0.0}
 
     def gap(self) -> Array:
@@ -202,9 +202,9 @@ class Structure:
         """Histories of the interfaces from the fields ``(t, components, n)`` over all of them."""
         histories = []
         nodal = np.broadcast_to(friction, force.shape[-1:])
-        for interface, own in self._shares():
-            parts = force[..., own], displacement[..., own], slip[..., own]
-            loads = load_history(interface, parts[0], parts[2], nodal[own])
+        for interface, nodes in self._shares():
+            parts = force[..., nodes], displacement[..., nodes], slip[..., nodes]
+            loads = load_history(interface, parts[0], parts[2], nodal[nodes])
             histories.append(InterfaceHistory(interface, loads, *parts))
         return tuple(histories)
 
@@ -212,8 +212,8 @@ class Structure:
         """``(P, Qx, Qy, Mx, My, Mz)`` of every interface, ``(interfaces, 6)``."""
         return np.array(
             [
-                resultants(state.force[:, own], *interface.coordinates.T)
-                for interface, own in self._shares()
+                resultants(state.force[:, nodes], *interface.coordinates.T)
+                for interface, nodes in self._shares()
             ]
         )
 
@@ -231,7 +231,7 @@ class Structure:
         errors, scales = np.empty((2, len(states)))
         for t, state in enumerate(states):
             forces = np.concatenate(
-                [i.frame.to_global(state.force[:, own].T) for i, own in self._shares()]
+                [i.frame.to_global(state.force[:, nodes].T) for i, nodes in self._shares()]
             )
             moments = np.cross(points - middle, forces).sum(axis=0)
             applied = self.body_2.load_resultants(amplitudes[t], middle)

@@ -74,12 +74,12 @@ class SupportedBody:
         loads need not.
         """
         free = self.constraints.free
-        every = mirror_of_nodes(self.elastic.nodes, self.elastic.body.axes, axis)
-        own = None if every is None else every.restricted(free)
-        if own is None:
+        of_nodes = mirror_of_nodes(self.elastic.nodes, self.elastic.body.axes, axis)
+        of_free = None if of_nodes is None else of_nodes.restricted(free)
+        if of_free is None:
             return None
         rotation = self._transformation[free]
-        return Mirror.of(rotation.T @ own.matrix() @ rotation)
+        return Mirror.of(rotation.T @ of_free.matrix() @ rotation)
 
     def on_interface(self, mirror: Mirror) -> Mirror | None:
         """What a mirror of all displacements does to the interface's; None if it leaves them."""
@@ -88,7 +88,7 @@ class SupportedBody:
     def condense_halves(
         self, mirror: Mirror, on_interface: Mirror
     ) -> tuple[tuple[Array, Array], ...] | None:
-        """As :meth:`condense`, but what the mirror keeps and what it turns round apart.
+        """As :meth:`condense`, but symmetric and antisymmetric displacements apart.
 
         The coordinates are those of the bases of ``on_interface``, the mirror there. None if the
         stiffness is not its own mirror image.
@@ -101,11 +101,11 @@ class SupportedBody:
         for part, basis, coordinates in zip(
             stiffnesses, mirror.bases, on_interface.bases, strict=True
         ):
-            own = basis[self._interface]
-            kept = np.unique(own.indices)
+            on_faces = basis[self._interface]
+            kept = np.unique(on_faces.indices)
             model = reduce_body(part, None, kept, loads=basis.T @ loads)
             # The same motions, in another order and some with the opposite sign.
-            renamed = coordinates.T @ own[:, kept]
+            renamed = coordinates.T @ on_faces[:, kept]
             condensed.append(
                 (renamed @ (renamed @ model.static_stiffness).T, renamed @ model.loads)
             )
@@ -219,10 +219,10 @@ def _interface_displacements(
     for node, frame in enumerate(frames):
         entries = slice(rows.indptr[d * node], rows.indptr[d * (node + 1)])
         columns, place = np.unique(rows.indices[entries], return_inverse=True)
-        own = np.zeros((d, len(columns)))
-        own[np.repeat(np.arange(d), counts[node]), place] = rows.data[entries]
-        own = frame @ own
-        zero = np.linalg.norm(own, axis=1) <= ALONG_AXIS
+        local = np.zeros((d, len(columns)))
+        local[np.repeat(np.arange(d), counts[node]), place] = rows.data[entries]
+        local = frame @ local
+        zero = np.linalg.norm(local, axis=1) <= ALONG_AXIS
         if len(columns) > np.sum(~zero):
             raise ValueError(TIED)
         if len(columns) < np.sum(~zero):
@@ -232,7 +232,7 @@ def _interface_displacements(
             )
         held.append(zero)
         used.append(columns)
-        blocks.append(own[~zero])
+        blocks.append(local[~zero])
     interface = np.concatenate(used).astype(np.int64)
     if len(np.unique(interface)) < len(interface):
         raise ValueError(TIED)
@@ -245,9 +245,9 @@ def _rotation(size: int, interface: Indices, blocks: Sequence[Array] | Array) ->
     ``interface`` are those of all the nodes, one after the other; frames are such blocks.
     """
     others = np.setdiff1d(np.arange(size), interface)
-    own = np.split(interface, np.cumsum([len(block) for block in blocks])[:-1])
-    rows = np.concatenate([np.repeat(dofs, len(dofs)) for dofs in own] + [others])
-    columns = np.concatenate([np.tile(dofs, len(dofs)) for dofs in own] + [others])
+    by_node = np.split(interface, np.cumsum([len(block) for block in blocks])[:-1])
+    rows = np.concatenate([np.repeat(dofs, len(dofs)) for dofs in by_node] + [others])
+    columns = np.concatenate([np.tile(dofs, len(dofs)) for dofs in by_node] + [others])
     inverses = [np.linalg.inv(block).ravel() for block in blocks]
     values = np.concatenate([*inverses, np.ones(len(others))])
     return sp.csr_matrix((values, (rows, columns)), shape=(size, size))

@@ -1,7 +1,7 @@
 """Systems with a mirror symmetry, solved as two of half the size.
 
-A symmetric matrix K that a mirror leaves as it is does not couple displacements that the mirror
-keeps with those that it turns round. With an orthonormal basis Q₊ of the first and Q₋ of the second
+A symmetric matrix K that a mirror leaves as it is does not couple displacements that are symmetric
+about it with antisymmetric ones. With an orthonormal basis Q₊ of the first and Q₋ of the second
 
     K = Q₊ K₊ Q₊ᵀ + Q₋ K₋ Q₋ᵀ,   K± = Q±ᵀ K Q±,
 
@@ -45,23 +45,23 @@ class Mirror:
     @classmethod
     def of(cls, matrix: sp.csr_matrix) -> Mirror | None:
         """The mirror that a matrix ``(n, n)`` describes; None if it describes none."""
-        found = matrix.tocsr()
-        found.data = np.round(found.data, ROUNDED)
-        found.eliminate_zeros()
-        own = np.arange(found.shape[0])
-        if np.any(np.diff(found.indptr) != 1) or np.any(np.abs(found.data) != 1.0):
+        permutation = matrix.tocsr()
+        permutation.data = np.round(permutation.data, ROUNDED)
+        permutation.eliminate_zeros()
+        rows = np.arange(permutation.shape[0])
+        if np.any(np.diff(permutation.indptr) != 1) or np.any(np.abs(permutation.data) != 1.0):
             return None
-        partner = found.indices.astype(np.int64)
-        return cls(partner, found.data) if np.array_equal(partner[partner], own) else None
+        partner = permutation.indices.astype(np.int64)
+        return cls(partner, permutation.data) if np.array_equal(partner[partner], rows) else None
 
     def matrix(self) -> sp.csr_matrix:
         """What takes unknowns to their image ``(n, n)``."""
-        own = np.arange(len(self.partner))
-        return sp.csr_matrix((self.sign, (own, self.partner)), (len(own), len(own)))
+        rows = np.arange(len(self.partner))
+        return sp.csr_matrix((self.sign, (rows, self.partner)), (len(rows), len(rows)))
 
     @cached_property
     def bases(self) -> tuple[sp.csr_matrix, sp.csr_matrix]:
-        """Orthonormal bases ``(n, n₊)`` of what the mirror keeps, ``(n, n₋)`` of what it turns."""
+        """Orthonormal bases of symmetric ``(n, n₊)`` and of antisymmetric unknowns ``(n, n₋)``."""
         return self._basis(1.0), self._basis(-1.0)
 
     def restricted(self, unknowns: Indices) -> Mirror | None:
@@ -102,9 +102,8 @@ class SplitMatrix:
         return len(self.mirror.partner)
 
     def __matmul__(self, vectors: Array) -> Array:
-        (kept, turned), (first, second) = self.mirror.bases, self.blocks
-        product = kept @ (first @ (kept.T @ vectors)) + turned @ (second @ (turned.T @ vectors))
-        return np.asarray(product)
+        parts = zip(self.mirror.bases, self.blocks, strict=True)
+        return np.asarray(sum(basis @ (block @ (basis.T @ vectors)) for basis, block in parts))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         return np.asarray(self @ np.eye(len(self)), dtype)
@@ -125,15 +124,18 @@ def mirror_of_nodes(nodes: Array, axes: tuple[int, ...], axis: int) -> Mirror | 
     if not np.array_equal(partner[partner], np.arange(len(nodes))):
         return None
     d = len(axes)
-    turned = np.where(np.array(axes) == axis, -1.0, 1.0)
-    return Mirror((d * partner[:, None] + np.arange(d)).ravel(), np.tile(turned, len(nodes)))
+    signs = np.where(np.array(axes) == axis, -1.0, 1.0)
+    return Mirror((d * partner[:, None] + np.arange(d)).ravel(), np.tile(signs, len(nodes)))
 
 
 def halves(matrix: sp.csr_matrix, mirror: Mirror) -> tuple[sp.csr_matrix, ...] | None:
     """K₊ and K₋ of a symmetric sparse matrix; None if the mirror does not leave it as it is."""
-    kept, turned = mirror.bases
-    on_turned = (matrix @ turned).tocsr()
-    coupling = (kept.T @ on_turned).tocsr()
+    symmetric, antisymmetric = mirror.bases
+    on_antisymmetric = (matrix @ antisymmetric).tocsr()
+    coupling = (symmetric.T @ on_antisymmetric).tocsr()
     if np.abs(coupling.data).max(initial=0.0) > UNCOUPLED * np.abs(matrix.data).max():
         return None
-    return (kept.T @ matrix @ kept).tocsr(), (turned.T @ on_turned).tocsr()
+    return (
+        (symmetric.T @ matrix @ symmetric).tocsr(),
+        (antisymmetric.T @ on_antisymmetric).tocsr(),
+    )

@@ -39,7 +39,9 @@ class TotalLagrangian:
         self._element_nodes = basis.element_dofs.T
         self._weights = np.asarray(basis.dx)
         # (axes, elements, element nodes, points)
-        self._gradients = np.stack([np.asarray(own[0].grad) for own in basis.basis], axis=2)
+        self._gradients = np.stack(
+            [np.asarray(function[0].grad) for function in basis.basis], axis=2
+        )
 
     def internal_force(self, displacement: Array) -> Array:
         """Nodal forces ``(size,)`` that hold the body at the displacements [N]."""
@@ -48,7 +50,9 @@ class TotalLagrangian:
         nominal = _product(deformation, self._stress(green_strain(gradient))) * self._weights
         forces = np.einsum("abeq,beiq->aei", nominal, self._gradients)
         nodes = self._element_nodes.ravel()
-        total = np.stack([np.bincount(nodes, own.ravel(), self._nodes) for own in forces], axis=1)
+        total = np.stack(
+            [np.bincount(nodes, force.ravel(), self._nodes) for force in forces], axis=1
+        )
         return np.asarray(total, dtype=np.float64).ravel()
 
     def tangent(self, displacement: Array) -> sp.csr_matrix:
@@ -110,11 +114,11 @@ class TotalLagrangian:
 
     def _gradient_products(self, tensor: Array) -> Array:
         """∫ ∇φi·A ∇φj of a symmetric A ``(d, d, elements, points)``, by element."""
-        turned = np.einsum("abeq,beiq->aeiq", tensor, self._gradients)
+        mapped = np.einsum("abeq,beiq->aeiq", tensor, self._gradients)
         return np.sum(
             [
-                self._products(own, other)
-                for own, other in zip(turned, self._gradients, strict=True)
+                self._products(left, right)
+                for left, right in zip(mapped, self._gradients, strict=True)
             ],
             axis=0,
         )
@@ -134,8 +138,8 @@ class TotalLagrangian:
 
 def green_strain(gradient: Array) -> Array:
     """E = (H + Hᵀ + HᵀH) / 2 of displacement gradients ``(d, d, ...)``."""
-    turned = gradient.swapaxes(0, 1)
-    return 0.5 * (gradient + turned + _product(turned, gradient))
+    transposed = gradient.swapaxes(0, 1)
+    return 0.5 * (gradient + transposed + _product(transposed, gradient))
 
 
 def rotation_angle(rotations: Array) -> Array:

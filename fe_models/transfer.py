@@ -87,7 +87,7 @@ def _shared_areas(face: Face, grid: Grid) -> sp.csr_matrix:
         for c, d in zip((grid.x, grid.y), grid.pitch, strict=True)
     ]
     parts = [_triangle(face, triangle, borders, grid.shape[1]) for triangle in face.facets]
-    values, cells, nodes = (np.concatenate(own) for own in zip(*parts, strict=True))
+    values, cells, nodes = (np.concatenate(part) for part in zip(*parts, strict=True))
     shape = grid.shape[0] * grid.shape[1], len(face)
     return sp.csr_matrix((values, (cells, nodes)), shape=shape)
 
@@ -102,7 +102,7 @@ def _triangle(
         slice(max(np.searchsorted(lines, low) - 1, 0), np.searchsorted(lines, high) + 1)
         for lines, low, high in zip(borders, corners.min(axis=0), corners.max(axis=0), strict=True)
     ]
-    x, y = (lines[own] - c for lines, own, c in zip(borders, near, middle, strict=True))
+    x, y = (lines[share] - c for lines, share, c in zip(borders, near, middle, strict=True))
     local = corners - middle
     moments = _left_and_below(local, x, y)
     shapes = np.linalg.inv(np.column_stack([np.ones(3), local]))

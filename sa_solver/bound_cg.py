@@ -236,10 +236,10 @@ class _Search:
         """Rigid motion that makes the gap orthogonal to the punches, and that gap."""
         lifted = np.multiply(self._punch, self._lifted, out=self._scratch)
         self._rigid = self._inverse @ self._modes.sums(lifted)
-        self._modes.take_off(self._lifted, self._rigid, out=self._gap)
+        self._modes.subtract(self._lifted, self._rigid, out=self._gap)
 
     def _remove_resultants(self, field: Array) -> None:
         """Take from ``field`` what is off the set, and the punches that carry its resultants."""
         field *= self._on_set
         share = self._inverse @ self._modes.sums(field)
-        self._modes.take_off_weighted(field, self._punch, share, self._scratch)
+        self._modes.subtract_weighted(field, self._punch, share, self._scratch)

@@ -235,10 +235,11 @@ class FrictionalContact:
         names = ("Qx", "Qy", "Mz"), ("shift_x", "shift_y", "twist")
         imposed: dict[str, float] = {}
         for place, k in enumerate(PLANAR):
-            own = load.values[k] - (before.rigid[k] if load.motion[k] else 0.0)
-            imposed[names[load.motion[k]][place]] = float(own)
+            value = load.values[k] - (before.rigid[k] if load.motion[k] else 0.0)
+            imposed[names[load.motion[k]][place]] = float(value)
         if self.grid.line:
-            imposed = {name: own for name, own in imposed.items() if name not in ("Mz", "twist")}
+            imposed.pop("Mz", None)
+            imposed.pop("twist", None)
         return self.tangential.solve(
             limit, offset, **imposed, tolerance=self.tolerance, start=before.shear
         )
@@ -278,10 +279,10 @@ class FrictionalContact:
             return SlidingTrial(state, np.array([state.Qx, state.Qy]), energy)
 
         stored = float(np.vdot(start, moved))
-        found = self._by_energy(slide, float(limit.sum()) * area, load, stored)
-        state, message = found.state, found.state.message or found.message
+        solution = self._by_energy(slide, float(limit.sum()) * area, load, stored)
+        state, message = solution.state, solution.state.message or solution.message
         state = replace(state, convolutions=spent, converged=not message, message=message)
-        return state, found.creeps
+        return state, solution.creeps
 
     def _by_energy(
         self,
@@ -339,7 +340,7 @@ class FrictionalContact:
         rigid[list(PLANAR)] = before.rigid[list(PLANAR)] + shift
         resultants = np.array([normal.P, 0.0, 0.0, normal.Mx, normal.My, 0.0])
         resultants[list(PLANAR)] = tangential.Qx, tangential.Qy, tangential.Mz
-        messages = [own for own in (normal.message, tangential.message) if own]
+        messages = [message for message in (normal.message, tangential.message) if message]
         return ContactState(
             traction=np.stack([*tangential.shear, normal.pressure]),
             displacement=np.stack([*tangential.displacement, normal.displacement]),
@@ -430,6 +431,6 @@ class FrictionalContact:
             return SlidingTrial(state, state.resultants[1:3], energy)
 
         carried = self.friction * float(load.values[0])
-        found = self._by_energy(slide, carried, load, float(np.vdot(shear, moved)))
-        state, message = found.state, found.state.message or found.message
+        solution = self._by_energy(slide, carried, load, float(np.vdot(shear, moved)))
+        state, message = solution.state, solution.state.message or solution.message
         return replace(state, convolutions=spent, converged=not message, message=message)

@@ -209,24 +209,24 @@ class CoupledContact:
             state, iterations = result.state, iterations + result.iterations
             rigid = np.zeros(6)
             rigid[free] = splitting.rigid
-            found = self._state(problem, self._resolvent.on_grid(result.solution), rigid)
-            converged = found.residuals.largest <= tolerance
+            solution = self._state(problem, self._resolvent.on_grid(result.solution), rigid)
+            converged = solution.residuals.largest <= tolerance
             if converged:
                 break
             if not result.converged:
-                message = self._overload(problem, found)
-                if not (message or begun_anew or found.residuals.largest <= LOST):
+                message = self._overload(problem, solution)
+                if not (message or begun_anew or solution.residuals.largest <= LOST):
                     state, begun_anew = self._pressed(problem), True
             elif inner > TIGHTEST * tolerance:
                 inner *= TIGHTENING
             else:
-                message = self._failure(problem, found, tolerance)
+                message = self._failure(problem, solution, tolerance)
             if iterations >= ITERATIONS or not np.all(np.isfinite(state)):
-                message = message or self._failure(problem, found, tolerance)
+                message = message or self._failure(problem, solution, tolerance)
             if message:
                 break
         return replace(
-            found,
+            solution,
             converged=converged,
             message=message,
             iterations=iterations,
@@ -349,7 +349,7 @@ class CoupledContact:
 
     def _unloaded(self, problem: CoupledProblem) -> CoupledState:
         """No load: the bodies just touch, or stay apart where their motion is imposed."""
-        if any(own for k, own in zip(problem.free, problem.target, strict=True) if k in PLANAR):
+        if any(value for k, value in zip(problem.free, problem.target, strict=True) if k in PLANAR):
             raise FrictionLimitError(0.0, UNCARRIED)
         traction = np.zeros((3, *self.grid.shape))
         rigid = np.zeros(6)
@@ -363,12 +363,12 @@ class CoupledContact:
             start=CoupledStart(self._resolvent.padded(traction)),
         )
 
-    def _failure(self, problem: CoupledProblem, found: CoupledState, tolerance: float) -> str:
-        measured, cells = found.residuals, np.count_nonzero(found.pressure)
+    def _failure(self, problem: CoupledProblem, state: CoupledState, tolerance: float) -> str:
+        measured, cells = state.residuals, np.count_nonzero(state.pressure)
         remedy = "take smaller increments, loosen the tolerance, or smooth or refine the heights"
         if cells < FEW_CELLS:
             remedy = f"only {cells} cells carry the load, refine the grid or smooth the heights"
-        elif self._overload(problem, found, BARELY):
+        elif self._overload(problem, state, BARELY):
             remedy = (
                 "the shear load is all that friction can carry, within 0.1 %, lower it or impose "
                 "the sliding motion instead"
@@ -380,13 +380,13 @@ class CoupledContact:
         )
 
     def _overload(
-        self, problem: CoupledProblem, found: CoupledState, least: float = OVERLOAD
+        self, problem: CoupledProblem, state: CoupledState, least: float = OVERLOAD
     ) -> str:
         """The load, where friction carries less than ``least`` of it, and the largest; or nothing.
 
         The pressure is that found.
         """
-        limit = self.friction * found.pressure
+        limit = self.friction * state.pressure
         planar = [k for k in problem.free if k in PLANAR]
         target = np.array([problem.target[problem.free.index(k)] for k in planar])
         resolved = np.all(np.isfinite(limit)) and np.count_nonzero(limit) >= FEW_CELLS

@@ -108,8 +108,8 @@ def coupled_residuals(
 def _coulomb_residual(
     problem: CoupledProblem, traction: Array, displacement: Array, slip: Array
 ) -> float:
-    own = problem.half_space.self_compliance(X)
+    compliance = problem.half_space.self_compliance(X)
     shear, limit = traction[:Z], problem.friction * traction[Z]
-    step = own * np.hypot(*(shear - project_on_disk(shear - slip / own, limit)))
+    step = compliance * np.hypot(*(shear - project_on_disk(shear - slip / compliance, limit)))
     tangential, normal = float(np.hypot(*displacement[:Z]).max()), float(displacement[Z].max())
     return float(step.max()) / max(tangential, SMALLEST_SHARE * normal)

@@ -35,10 +35,10 @@ def gradients_on_disks(
     ahead, ahead_displacement = shear, displacement
     for iteration in range(1, max_iterations + 1):
         trial = ahead - stiffness * (ahead_displacement + problem.offset) * everywhere
-        found = problem.balance(trial, weight=everywhere)
-        if found is None:
+        balance = problem.balance(trial, weight=everywhere)
+        if balance is None:
             break
-        new, coefficients = found
+        new, coefficients = balance
         # Momentum that would carry the shear back where it came from is dropped.
         restart = float(np.vdot(ahead - new, new - shear)) > 0.0
         following = 1.0 if restart else 0.5 * (1.0 + np.sqrt(1.0 + 4.0 * momentum**2))

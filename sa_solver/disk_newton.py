@@ -32,7 +32,7 @@ phases project more often, longer ones solve for wrong sets."""
 STALE = 0.01
 """Punches are computed again once this share of the cells has begun to slip or stick; until then
 those at hand, cut to the free components, do as well. Computed only once, they are so far from
-rigid stamps close to sliding in torsion that hundreds of iterations follow."""
+rigid punches close to sliding in torsion that hundreds of iterations follow."""
 
 SLOW = 8
 """Steps of a phase after which punches are computed again too: 2 to 4 are usual."""
@@ -175,7 +175,7 @@ class _Search:
         self._find_rigid()
 
     def _set_punches(self) -> None:
-        """Shear fields that carry the resultants, about those of rigid stamps on the free cells."""
+        """Shear fields that carry the resultants, close to those of rigid punches on free cells."""
         before, changed = self._punch_set, True
         if before is not None:
             turned = int(np.count_nonzero(self._slipping ^ before))

@@ -65,20 +65,20 @@ def _rigid_contact(problem: NormalProblem) -> tuple[Cells, Array] | None:
     points = [0, columns - 1, height.size - columns, height.size - 1]
     scale, target = float(np.ptp(height)) or 1.0, problem.target / problem.target[0]
     for _ in range(CUTS):
-        found = scipy.optimize.linprog(
+        programme = scipy.optimize.linprog(
             -target,
             shapes[:, points].T,
             (height[points] - height.min()) / scale,
             bounds=(None, None),
         )
-        if not found.success:
+        if not programme.success:
             return None
-        gap = (height - height.min()) / scale - found.x @ shapes
+        gap = (height - height.min()) / scale - programme.x @ shapes
         lowest = int(np.argmin(gap))
         if gap[lowest] >= -TOUCHING or lowest in points:
             # Cells that touch without force hold the tilt that the others leave undetermined.
-            touching = found.slack <= TOUCHING
-            pressure = -found.ineqlin.marginals * problem.target[0]
+            touching = programme.slack <= TOUCHING
+            pressure = -programme.ineqlin.marginals * problem.target[0]
             return np.array(points)[touching], np.maximum(pressure[touching], 0.0)
         points.append(lowest)
     return None
@@ -125,8 +125,8 @@ class _ActiveSet:
         matrix[count:, :count] = self._shapes[:, self.cells]
         heights = -self._problem.height.ravel()[self.cells] / unit
         right = np.concatenate([heights, self._problem.target])
-        found = np.linalg.lstsq(matrix, right, rcond=None)[0]
-        return found[:count], found[count:] * unit
+        solution = np.linalg.lstsq(matrix, right, rcond=None)[0]
+        return solution[:count], solution[count:] * unit
 
     def _compliance(self) -> Array:
         i, j = np.unravel_index(self.cells, self._problem.height.shape)

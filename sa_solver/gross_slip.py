@@ -93,9 +93,9 @@ def gross_slip(
     length = max(0.0, total + stored) / carried
     inner = LOOSEST
     for _ in range(ITERATIONS):
-        found = slide(length * sliding_direction(force, angle), max(inner, tolerance))
-        measured = _angle(found.force if direction == "force" else np.sqrt(found.energy.clip(0.0)))
-        missing = total - float(found.energy.sum())
+        trial = slide(length * sliding_direction(force, angle), max(inner, tolerance))
+        measured = _angle(trial.force if direction == "force" else np.sqrt(trial.energy.clip(0.0)))
+        missing = total - float(trial.energy.sum())
         turned = float(np.clip(angle + wanted - measured, 0.0, 0.5 * np.pi))
         change = max(abs(missing) / total, abs(turned - angle))
         if change <= ACCURACY and inner <= tolerance:
@@ -105,7 +105,7 @@ def gross_slip(
         angle = turned
     lacking = abs(missing) / total
     creeps = length == 0.0 and missing < -ACCURACY * total
-    return GrossSlip(found.state, max(lacking, abs(wanted - measured)), lacking, creeps)
+    return GrossSlip(trial.state, max(lacking, abs(wanted - measured)), lacking, creeps)
 
 
 def sliding_direction(force: Array, angle: float | None = None) -> Array:

@@ -62,6 +62,10 @@ class HalfSpace:
         self._symbols: dict[tuple[int, int, GridShape], Array] = {}
         self._transforms: dict[tuple[GridShape, GridShape, int], Transform] = {}
 
+    def on(self, grid: Grid) -> HalfSpace:
+        """The same bodies under another ``grid``."""
+        return HalfSpace(grid, self.pair, self.threads, self.datum)
+
     def normal(self, pressure: Array) -> Array:
         """``u_z`` under ``pressure`` alone, both ``(nx, ny)`` [MPa] → [mm]."""
         displacement: Array = self._convolve(pressure[None], NORMAL, NORMAL)[0]
@@ -146,10 +150,11 @@ def spectral_filter(
     """A filter with components ``rows`` out and ``columns`` in, from real symbols."""
     if rows == columns == NORMAL:
         return SpectralFilter(transform, symbols)
-    imaginary = [
-        [k for k, component in enumerate(own) if component == Z] for own in (columns, rows)
-    ]
-    return SpectralFilter(transform, symbols, (imaginary[0], imaginary[1]))
+    return SpectralFilter(transform, symbols, (_normal_places(columns), _normal_places(rows)))
+
+
+def _normal_places(components: Components) -> list[int]:
+    return [place for place, component in enumerate(components) if component == Z]
 
 
 def padded_shape(grid: Grid) -> GridShape:

@@ -96,8 +96,8 @@ def march_history(
     ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies. ``history`` ``auto`` takes the
     cheapest method that suffices; ``reversals`` raises HistoryError where legs cannot be taken in
     one step. ``estimate_error`` adds a coarser full march, half as long (none where the load turns
-    back at every increment). An increment that has not
-    converged ends the march: it is the last state. ``progress`` is told each row and state.
+    back at every increment). An increment that has not converged ends the march: it is the last
+    state. ``progress`` is called with each row and its state.
 
     Raises what :meth:`FrictionalContact.advance` raises.
     """

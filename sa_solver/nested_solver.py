@@ -19,7 +19,7 @@ from sa_solver.normal_problem import Iterate, NormalProblem, normal_residuals
 from sa_solver.normal_splitting import solve_by_splitting
 from sa_solver.preconditioner import NormalPreconditioner
 from sa_solver.rigid_modes import APPROACH, TILT_X, TILT_Y, NormalModes
-from sa_solver.types import Array, Grid
+from sa_solver.types import Array
 
 GRADIENT_ITERATIONS = 200
 """Conjugate gradients took at most 20 on smooth contacts and 125 on the roughest; beyond this they
@@ -77,10 +77,10 @@ class NestedSolver:
         """Solve from a balanced ``pressure`` >= 0, whose ``displacement`` may be known."""
         box, iterations = Box.around(pressure > 0.0), 0
         while True:
-            box, found = self._search(problem, box, pressure, displacement, tolerance)
-            iterations += found.iterations
-            iterate = found.iterate
-            if not found.converged:
+            box, result = self._search(problem, box, pressure, displacement, tolerance)
+            iterations += result.iterations
+            iterate = result.iterate
+            if not result.converged:
                 return self._rescue(problem, box.placed(iterate.pressure), iterations, tolerance)
             if box.size == box.shape:
                 return NestedSolution(iterate, iterations, "conjugate gradients")
@@ -109,7 +109,7 @@ class NestedSolver:
             stage.preconditioner.include(inner.compliance)
             inside = np.ascontiguousarray(pressure[box.window])
             moved = inner.displacement(inside) if displacement is None else displacement[box.window]
-            found = bound_conjugate_gradients(
+            result = bound_conjugate_gradients(
                 inner,
                 stage.preconditioner,
                 inside,
@@ -118,9 +118,9 @@ class NestedSolver:
                 GRADIENT_ITERATIONS,
                 box.left_by,
             )
-            if not found.left:
-                return box, found
-            pressure, displacement = box.placed(found.iterate.pressure), None
+            if not result.left:
+                return box, result
+            pressure, displacement = box.placed(result.iterate.pressure), None
             box = box.grown()
 
     def _rescue(
@@ -139,11 +139,11 @@ class NestedSolver:
     @cached_property
     def _coarser(self) -> tuple[NestedSolver, Transfer] | None:
         """The solver on the next coarser grid, and how fields pass to and from it."""
-        own = self.half_space
-        grid = coarsened(own.grid)
+        half_space = self.half_space
+        grid = coarsened(half_space.grid)
         if grid is None:
             return None
-        return NestedSolver(_half_space_on(grid, own)), Transfer(own.grid, grid)
+        return NestedSolver(half_space.on(grid)), Transfer(half_space.grid, grid)
 
     def _from_coarser(self, problem: NormalProblem) -> Array | None:
         if self._coarser is None:
@@ -154,8 +154,8 @@ class NestedSolver:
         if start is None:
             return None
         box = Box.around(start > 0.0)
-        box, found = solver._search(coarse, box, start, None, COARSE_TOLERANCE)
-        pressure = transfer.interpolated(box.placed(found.iterate.pressure))
+        box, result = solver._search(coarse, box, start, None, COARSE_TOLERANCE)
+        pressure = transfer.interpolated(box.placed(result.iterate.pressure))
         return problem.modes.balance(pressure, problem.target)
 
     def _coarse(self, problem: NormalProblem, transfer: Transfer) -> NormalProblem:
@@ -179,11 +179,7 @@ class NestedSolver:
         return _Stage(self.half_space)
 
     def _plan(self, size: tuple[int, int]) -> _Stage:
-        return _Stage(_half_space_on(replace(self.half_space.grid, shape=size), self.half_space))
-
-
-def _half_space_on(grid: Grid, like: HalfSpace) -> HalfSpace:
-    return HalfSpace(grid, like.pair, like.threads, like.datum)
+        return _Stage(self.half_space.on(replace(self.half_space.grid, shape=size)))
 
 
 def _uniform(problem: NormalProblem) -> Array | None:

@@ -59,7 +59,7 @@ class Iterate:
     def gap(self, problem: NormalProblem) -> Array:
         """``g = h + (K + D) p - rigid`` [mm]."""
         gap = problem.height + self.displacement
-        problem.modes.take_off(gap, self.rigid, out=gap)
+        problem.modes.subtract(gap, self.rigid, out=gap)
         return gap
 
 

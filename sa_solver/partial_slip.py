@@ -174,9 +174,9 @@ def _bending(curve: PartialSlip) -> PartialSlip:
     shift, force, kept = curve.shift, curve.force, [0]
     for stage in range(1, len(shift)):
         while len(kept) > 1:
-            (before, last), own = kept[-2:], stage
+            before, last = kept[-2:]
             rise, run = force[last] - force[before], shift[last] - shift[before]
-            onward = (force[own] - force[last]) / (shift[own] - shift[last])
+            onward = (force[stage] - force[last]) / (shift[stage] - shift[last])
             if onward < rise / run - ROUNDING * curve.stiffness:
                 break
             kept.pop()

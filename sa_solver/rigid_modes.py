@@ -84,14 +84,14 @@ class NormalModes:
         field: Array = along_x[:, None] + along_y
         return field
 
-    def take_off(self, field: Array, coefficients: Array, out: Array) -> None:
+    def subtract(self, field: Array, coefficients: Array, out: Array) -> None:
         """``field - motion(coefficients)`` into ``out``, all ``(nx, ny)``."""
         along_x, along_y = self._profiles(coefficients)
         np.subtract(field, along_x[:, None], out=out)
         if along_y.any():
             out -= along_y
 
-    def take_off_weighted(
+    def subtract_weighted(
         self, field: Array, weight: Array, coefficients: Array, scratch: Array
     ) -> None:
         """``field -= weight * motion(coefficients)`` in place, all ``(nx, ny)``."""

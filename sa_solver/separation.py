@@ -34,10 +34,10 @@ def separating_tilt(height: Array, modes: NormalModes) -> Array | None:
         # Largest t with t + tilt · shape <= height at the points.
         matrix = np.column_stack([np.ones(len(points)), shapes[:, points].T])
         objective = np.r_[-1.0, np.zeros(len(modes.free))]
-        found = scipy.optimize.linprog(objective, matrix, heights[points], bounds=(None, None))
-        if not found.success or found.x[0] < -touching:
+        programme = scipy.optimize.linprog(objective, matrix, heights[points], bounds=(None, None))
+        if not programme.success or programme.x[0] < -touching:
             return None
-        tilt: Array = found.x[1:]
+        tilt: Array = programme.x[1:]
         gap = heights - tilt @ shapes
         lowest = int(np.argmin(gap))
         if gap[lowest] >= -touching:

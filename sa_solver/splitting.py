@@ -41,7 +41,7 @@ GRAM_CUTOFF = 1e-13
 their directions are left out of the least-squares problem."""
 
 RETURN_GROWTH = 10.0
-"""An extrapolation to a residual so many times the least so far is taken back: it may have thrown
+"""An extrapolation to a residual this many times the least so far is taken back: it may have thrown
 a body off its contacts, where it would float on for ever. Plain steps get on, if slowly. A body
 that floats towards its contacts must not be held back so: there the residual grows on landing."""
 
@@ -50,7 +50,7 @@ AT_REST = 1e-9
 constant speed until it meets something: differences are rounding, and would throw it far off."""
 
 ROUNDING = float(np.finfo(np.float64).eps)
-"""A state this much larger than the steps that are to be told says nothing of them."""
+"""A state larger than its steps by more than the inverse of this holds no digit of them."""
 
 TINY = np.finfo(float).tiny
 """Keeps divisions by a vanishing size finite."""

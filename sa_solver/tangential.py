@@ -186,10 +186,10 @@ class TangentialContact:
             window.append(slice(first, first + length))
         box = window[0].stop - window[0].start, window[1].stop - window[1].start
         if box not in self._levels:
-            own = self.half_space
+            half_space = self.half_space
             if box != self.grid.shape:
-                own = HalfSpace(replace(self.grid, shape=box), own.pair, own.threads, own.datum)
-            self._levels[box] = ShearLevel(own)
+                half_space = half_space.on(replace(self.grid, shape=box))
+            self._levels[box] = ShearLevel(half_space)
         return (window[0], window[1]), self._levels[box]
 
     def _problem(
@@ -324,7 +324,7 @@ class TangentialContact:
             raise TangentialContactError(
                 "limits µp must be 0 or more: check the sign of friction and pressure"
             )
-        given = [*forces, *(own for own in motions if own is not None)]
+        given = [*forces, *(motion for motion in motions if motion is not None)]
         if not all(np.isfinite(given)):
             raise TangentialContactError(f"loads {given} must be finite: check the load history")
         if self.grid.line and (forces[2] != 0.0 or motions[2]):

@@ -32,7 +32,7 @@ class ShearLevel:
     def begin(self, problem: TangentialProblem, shear: Array) -> Array | None:
         """Admissible, balanced shear ``(2, nx, ny)`` to search from, near ``shear``.
 
-        Better than ``shear`` by what coarser grids can tell. None if there is no such shear.
+        Corrected by the solutions on coarser grids. None if there is no such shear.
         """
         improved = self._improved(problem, shear)
         return problem.balanced(shear) if improved is None else improved
@@ -43,12 +43,13 @@ class ShearLevel:
             return None
         level, transfer = self._coarser
         coarse = level.restricted(problem, transfer)
-        before = np.array([transfer.averaged(own) for own in shear])
+        before = np.array([transfer.averaged(component) for component in shear])
         start = level.begin(coarse, before)
         if start is None:
             return None
         solution = newton_on_disks(coarse, start, COARSE_TOLERANCE, COARSE_ITERATIONS)
-        change = np.array([transfer.interpolated(own) for own in solution.shear - before])
+        changes = solution.shear - before
+        change = np.array([transfer.interpolated(component) for component in changes])
         slipping = transfer.interpolated(solution.slipping.astype(np.float64)) > 0.5
         return problem.balanced((shear + change) * problem.pressed, slipping & problem.pressed)
 
@@ -62,7 +63,7 @@ class ShearLevel:
         )
         return TangentialProblem(
             limit=transfer.averaged(fine.limit),
-            offset=np.array([transfer.averaged(own) for own in fine.offset]),
+            offset=np.array([transfer.averaged(component) for component in fine.offset]),
             modes=modes,
             target=fine.target * (transfer.fine.cell_area / grid.cell_area),
             operator=self.operator,
@@ -74,5 +75,4 @@ class ShearLevel:
         grid = coarsened(fine.grid)
         if grid is None:
             return None
-        coarse = HalfSpace(grid, fine.pair, fine.threads, fine.datum)
-        return ShearLevel(coarse), Transfer(fine.grid, grid)
+        return ShearLevel(fine.on(grid)), Transfer(fine.grid, grid)

@@ -121,16 +121,16 @@ class TangentialProblem:
         compliance. Relative to the largest displacement |K q + offset| of a pressed cell, but at
         least to ``SMALLEST_INCREMENT`` of K q.
         """
-        own = self.operator.self_compliance
+        compliance = self.operator.self_compliance
         step = self.slip(displacement, rigid)
-        step *= -1.0 / own
+        step *= -1.0 / compliance
         step += shear
         step *= self.limit / np.maximum(np.sqrt(squared(step)), np.maximum(self.limit, TINY))
         step -= shear
         increment = float(squared(displacement + self.offset)[self.pressed].max())
         present = SMALLEST_INCREMENT**2 * float(squared(displacement)[self.pressed].max())
         scale = np.sqrt(max(increment, present))
-        largest = own * float(np.sqrt(squared(step).max()))
+        largest = compliance * float(np.sqrt(squared(step).max()))
         return float(largest / scale) if scale > 0.0 else largest
 
     def on_circle(self, shear: Array) -> Mask:
@@ -140,8 +140,8 @@ class TangentialProblem:
 
     def balanced(self, shear: Array, on_circle: Mask | None = None) -> Array | None:
         """The shear that :meth:`balance` finds, or None."""
-        found = self.balance(shear, on_circle)
-        return found[0] if found else None
+        balance = self.balance(shear, on_circle)
+        return balance[0] if balance else None
 
     def balance(
         self, shear: Array, on_circle: Mask | None = None, weight: Array | None = None

@@ -172,7 +172,7 @@ class SpectralFilter:
         """``transform`` needs as many spectra as there are inputs or outputs."""
         self._transform = transform
         # Spectra are multiplied as pairs of reals: numpy would make a real factor complex first.
-        self._symbols = [[np.repeat(own, 2, axis=1) for own in row] for row in symbols]
+        self._symbols = [[np.repeat(symbol, 2, axis=1) for symbol in row] for row in symbols]
         self._inputs, self._outputs = imaginary
         rows = transform.padded[0]
         row_size = transform.spectra[0].size // rows

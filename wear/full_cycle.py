@@ -33,11 +33,11 @@ def march_cycle(
     states: list[ContactState] = []
     heights = np.broadcast_to(height, (len(loads), *contact.grid.shape))
     for block in loads.blocks:
-        own = [_force(loads, t) for t in range(block.start, block.stop)]
+        increments = [_force(loads, t) for t in range(block.start, block.stop)]
         if motion is not None:
             shifts = _shifts(motion[block])
-            own = [_motion(loads, t, shift) for t, shift in enumerate(shifts, block.start)]
-        states += _closed_cycle(contact, heights[block], own, block.start)
+            increments = [_motion(loads, t, shift) for t, shift in enumerate(shifts, block.start)]
+        states += _closed_cycle(contact, heights[block], increments, block.start)
     return states
 
 
@@ -60,8 +60,8 @@ def _shifts(motion: Array) -> Array:
     A contact that slips in part remembers from where it first moved: met at one end of the way,
     its loop would not be centred.
     """
-    way = np.concatenate([np.zeros((1, 2)), np.cumsum(motion, axis=0)])
-    shifts: Array = 0.5 * (way.max(axis=0) + way.min(axis=0)) - way[1:]
+    path = np.concatenate([np.zeros((1, 2)), np.cumsum(motion, axis=0)])
+    shifts: Array = 0.5 * (path.max(axis=0) + path.min(axis=0)) - path[1:]
     return shifts
 
 

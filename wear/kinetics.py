@@ -79,7 +79,7 @@ def linear_regime(cycles: Array, values: Array) -> LinearRegime | None:
 
 
 def _regime(cycles: Array, values: Array) -> LinearRegime | None:
-    """The stretch as a regime, None if it is not straight or cannot be told to be."""
+    """The stretch as a regime, None if it is not straight, or not shown to be."""
     ends = _interval_ends(cycles)
     lengths = np.diff(cycles[ends])
     length = float(cycles[-1] - cycles[0])

@@ -174,7 +174,7 @@ def findley(
         raise StressHistoryError(f"sensitivity k = {sensitivity:g}: must be 0 or more")
 
     def parameter(stress: Array, normal: Array, to_beat: Array) -> Tried:
-        first, second = (_resolved(stress, normal, own) for own in _tangents(normal))
+        first, second = (_resolved(stress, normal, tangent) for tangent in _tangents(normal))
         peak = _resolved(stress, normal, normal).max(axis=0)
         # A circle round the middle of both ranges is too large if anything.
         bound = np.hypot(first - _middle(first), second - _middle(second)).max(axis=0)
@@ -216,12 +216,12 @@ def _search(stress: Array, parameter: PlaneParameter, search: PlaneSearch) -> Cr
     _check(stress)
     shape = stress.shape[2:]
     points = np.moveaxis(stress.reshape(len(stress), 6, -1), 0, 1)
-    found = np.empty((6, points.shape[2]))
+    best = np.empty((6, points.shape[2]))
     for start in range(0, points.shape[2], CHUNK):
         part = slice(start, start + CHUNK)
-        found[:, part] = _search_part(np.ascontiguousarray(points[:, :, part]), parameter, search)
-    value, amplitude, peak = (own.reshape(shape) for own in found[:3])
-    return CriticalPlane(value, found[3:].reshape(3, *shape), amplitude, peak)
+        best[:, part] = _search_part(np.ascontiguousarray(points[:, :, part]), parameter, search)
+    value, amplitude, peak = (values.reshape(shape) for values in best[:3])
+    return CriticalPlane(value, best[3:].reshape(3, *shape), amplitude, peak)
 
 
 def _search_part(stress: Array, parameter: PlaneParameter, search: PlaneSearch) -> Array:
@@ -230,9 +230,9 @@ def _search_part(stress: Array, parameter: PlaneParameter, search: PlaneSearch) 
     Samples are apart, so that one beside the worst plane may be beaten by one beside another that
     is nearly as bad: the best away from the first found is refined too.
     """
-    found = _climb(_Planes(stress, parameter), search, None)
-    rival = _climb(_Planes(stress, parameter), search, found[3:])
-    return np.where(rival[0] > found[0], rival, found)
+    best = _climb(_Planes(stress, parameter), search, None)
+    rival = _climb(_Planes(stress, parameter), search, best[3:])
+    return np.where(rival[0] > best[0], rival, best)
 
 
 def _climb(planes: _Planes, search: PlaneSearch, away_from: Array | None) -> Array:
@@ -269,8 +269,8 @@ class _Planes:
             to_beat = np.where(near, np.inf, to_beat)
         tried = self._parameter(self._stress, normal, to_beat)
         better = tried[0] > to_beat
-        for own, new in zip(self.best, (*tried, *normal), strict=True):
-            np.copyto(own, new, where=better)
+        for best, new in zip(self.best, (*tried, *normal), strict=True):
+            np.copyto(best, new, where=better)
 
 
 def _resolved(stress: Array, normal: Array, direction: Array) -> Array:

@@ -49,6 +49,29 @@ class ContactFailure(ConvergenceError):
 
 
 @dataclass(frozen=True)
+class Spent:
+    """Contact problems of an increment solved, convolutions they took, and wear steps."""
+
+    contact_solves: int = 0
+    convolutions: int = 0
+    steps: int = 0
+
+    def __add__(self, other: Spent) -> Spent:
+        return Spent(
+            self.contact_solves + other.contact_solves,
+            self.convolutions + other.convolutions,
+            self.steps + other.steps,
+        )
+
+    def __sub__(self, other: Spent) -> Spent:
+        return Spent(
+            self.contact_solves - other.contact_solves,
+            self.convolutions - other.convolutions,
+            self.steps - other.steps,
+        )
+
+
+@dataclass(frozen=True)
 class SlidingCycle:
     """One closed cycle as the wear of a contact feels it.
 
@@ -167,7 +190,7 @@ class WearingContact:
         return WearingContact(self.contact, self._laws, friction, cycle, self._tolerance)
 
     @cached_property
-    def working(self) -> list[int]:
+    def dissipating(self) -> list[int]:
         """Increments that dissipate, loaded and with slip somewhere, the heaviest load last.
 
         Over thousands of cycles it does not matter where a cycle begins. A step that ends with the
@@ -183,8 +206,8 @@ class WearingContact:
     def depth_per_pressure(self, state: WearState, cycles: float = 0.0) -> tuple[Array, Array]:
         """Depth per pressure of both bodies over a step from ``state``, each ``(t, nx, ny)``.
 
-        In mm/MPa and mean cycle. Laws that change with energy are told that of the state, and
-        that expected after so many cycles at its pressures.
+        In mm/MPa and mean cycle. Laws that change with energy take that of the state and that
+        expected after so many cycles at its pressures.
         """
         surfaces, area = state.surfaces, self.grid.cell_area
         work_1, work_2 = (cycles * work for work in self._work(state.starts))
@@ -233,7 +256,9 @@ class WearingContact:
         softest = float(self.contact.half_space.symbol(Z, Z).min())
         return 2.0 * softest / fastest if fastest > 0.0 else np.inf
 
-    def lasting(self, errors: Sequence[Array], state: WearState, cycles: float) -> list[Array]:
+    def damped_errors(
+        self, errors: Sequence[Array], state: WearState, cycles: float
+    ) -> list[Array]:
         """What implicit wear over ``cycles`` leaves of ``errors`` of the depth ``(nx, ny)`` [mm].
 
         A depth e is pressed away to K (K + D)⁻¹ e, with D the largest depth per pressure of all
@@ -255,27 +280,27 @@ class WearingContact:
 
     def cycle(self, state: WearState, increments: list[int]) -> CycleResult:
         """Solve the given increments on the surfaces of ``state``."""
-        found: States = {}
+        states: States = {}
         for t in increments:
-            before = found[t - 1].start if t - 1 in found else None
-            found[t] = self.solve(state.surfaces, t, state.starts.get(t, before))
-        return self._result(state, found)
+            before = states[t - 1].start if t - 1 in states else None
+            states[t] = self.solve(state.surfaces, t, state.starts.get(t, before))
+        return self._result(state, states)
 
     def _result(self, state: WearState, states: States) -> CycleResult:
         wear_1, wear_2 = self.depth_per_pressure(state)
         energy = np.zeros(len(self._cycle.loads))
         worn = Surfaces.unworn(state.surfaces.initial_gap)
-        for t, own in states.items():
-            worn = self._worn(worn, t, own.pressure, (wear_1, wear_2))
-            energy[t] = self._dissipated(t, own.pressure).sum() * self.grid.cell_area
+        for t, solved in states.items():
+            worn = self._worn(worn, t, solved.pressure, (wear_1, wear_2))
+            energy[t] = self._dissipated(t, solved.pressure).sum() * self.grid.cell_area
         return CycleResult(states, energy, worn.depth_1, worn.depth_2)
 
     # -- steps ----------------------------------------------------------------------------------
     def explicit_step(self, state: WearState, cycles: float) -> WearStep:
         """Wear ``cycles`` cycles at the pressures of the present surfaces."""
         march = _March(self, state, cycles)
-        for t, own in self.cycle(state, self.working).states.items():
-            march.wear(t, own, cycles)
+        for t, solved in self.cycle(state, self.dissipating).states.items():
+            march.wear(t, solved, cycles)
         return march.step()
 
     def implicit_step(self, state: WearState, cycles: float) -> WearStep:
@@ -284,7 +309,7 @@ class WearingContact:
         Stable at any length, at given slips.
         """
         march = _March(self, state, cycles)
-        for t in self.working:
+        for t in self.dissipating:
             march.wear(t, march.solve(t, cycles), cycles)
         return march.step()
 
@@ -292,10 +317,10 @@ class WearingContact:
         """Wear ``cycles`` cycles, second order in them and stable at any length, at given slips."""
         march = _March(self, state, cycles)
         half = 0.5 * cycles
-        for t in reversed(self.working):
+        for t in reversed(self.dissipating):
             march.two_stages(t, half)
         midway = march.surfaces.depth
-        for t in self.working:
+        for t in self.dissipating:
             march.two_stages(t, half)
         return replace(march.step(), midway=midway)
 
@@ -334,7 +359,7 @@ class WearingContact:
         per_pressure: tuple[Array, Array],
     ) -> Surfaces:
         """The surfaces after the pressure times cycles [MPa] of an increment."""
-        wear_1, wear_2 = (own[increment] * pressure_cycles for own in per_pressure)
+        wear_1, wear_2 = (body[increment] * pressure_cycles for body in per_pressure)
         work = self._dissipated(increment, pressure_cycles)
         return surfaces.worn(
             self._on_body_1(increment, wear_1), wear_2, self._on_body_1(increment, work), work
@@ -378,7 +403,7 @@ class _March:
 
     def solve(self, increment: int, cycles: float) -> NormalState:
         """Contact whose wear over ``cycles`` is part of its gap."""
-        wear_1, wear_2 = (own[increment] for own in self._per_pressure)
+        wear_1, wear_2 = (body[increment] for body in self._per_pressure)
         state = self._contact._solve(
             self.surfaces, increment, self._starts.get(increment), (wear_1 + wear_2) * cycles
         )
@@ -409,8 +434,8 @@ class _March:
             self._before,
             surfaces=after,
             energy=self._before.energy + float((after.work_2 - before.work_2).sum()) * area,
-            depth_rate=float(max(own.max() for own in lost)) / self._cycles,
-            volume_rate=float(sum(own.sum() for own in lost)) * area / self._cycles,
+            depth_rate=float(max(depth.max() for depth in lost)) / self._cycles,
+            volume_rate=float(sum(depth.sum() for depth in lost)) * area / self._cycles,
             starts=self._starts,
         )
         return WearStep(state, self._cycles, self._solves, self._convolutions)

@@ -242,7 +242,7 @@ def loops(
 @click.option("--size", metavar="LENGTH", help="Of the elements, for a CAD file, such as '2 mm'.")
 def describe(file: Path, size: str | None) -> None:
     """List bodies, boundaries and node sets of a mesh or CAD FILE, as a case may name them."""
-    from workflow.analyses.wear.structures.mesh.case import described_file
+    from workflow.commands.describe import described_file
 
     for line in described_file(file, size):
         click.echo(line)

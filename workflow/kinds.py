@@ -34,6 +34,11 @@ def analysis_of(case: Case) -> Analysis[Any]:
     return next(own for own in ANALYSES if type(case) in own.cases.values())
 
 
+def kind_of(case: Case) -> str:
+    """The name of a case's kind."""
+    return next(name for name, own in kinds().items() if type(case) is own)
+
+
 def load_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:
     """The case of whatever kind in a file: see :func:`workflow.case.loading.load_case`."""
     return loading.load_case(path, list(kinds().values()), overrides)

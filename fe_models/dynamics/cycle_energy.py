@@ -15,7 +15,8 @@ from __future__ import annotations
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, HarmonicSolution
+from fe_models.dynamics.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import ComplexArray
 from sa_solver.types import Array
 
@@ -35,8 +36,8 @@ def energy_lost(problem: HarmonicBalance, solution: HarmonicSolution) -> float:
     motion = solution.motion
     orders = np.array(solution.resolution.harmonics, dtype=float)
     of_harmonics = (motion.conj() * _times(motion, problem.model.damping)).real.sum(axis=1)
-    own = np.pi * 2.0 * np.pi * solution.frequency * float(orders**2 @ of_harmonics)
-    return own + float(np.sum(solution.cycle.dissipated))
+    damped = np.pi * 2.0 * np.pi * solution.frequency * float(orders**2 @ of_harmonics)
+    return damped + float(np.sum(solution.cycle.dissipated))
 
 
 def largest_kinetic_energy(problem: HarmonicBalance, solution: HarmonicSolution) -> float:
@@ -54,13 +55,13 @@ def largest_kinetic_energy(problem: HarmonicBalance, solution: HarmonicSolution)
 
     times = TIMES_PER_PERIOD * int(orders[-1])
     best = int(np.argmax([energy(time / times) for time in range(times)]))
-    found = minimize_scalar(
+    peak = minimize_scalar(
         lambda step: -energy((best + step) / times),
         bounds=(-1.0, 1.0),
         method="bounded",
         options={"xatol": TIME_TOLERANCE},
     )
-    return max(energy(best / times), -float(found.fun))
+    return max(energy(best / times), -float(peak.fun))
 
 
 def damping_ratio(problem: HarmonicBalance, solution: HarmonicSolution) -> float:

@@ -15,7 +15,8 @@ from fe_models.dynamics.continuation import (
     first_point,
     follow,
 )
-from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance, HarmonicSolution
+from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.newton import Equations, solve
 from sa_solver.types import Array
@@ -161,8 +162,8 @@ def finer_resolution(
     problem: HarmonicBalance, solution: HarmonicSolution, accuracy: Accuracy
 ) -> Resolution | None:
     """The resolution that a solution asks for, None if its own will do or is the finest allowed."""
-    own, tolerance = problem.resolution, accuracy.tolerance
-    harmonics, samples = own.harmonics, own.samples
+    present, tolerance = problem.resolution, accuracy.tolerance
+    harmonics, samples = present.harmonics, present.samples
     if solution.left_out > tolerance:
         shares = problem.left_out(solution.coefficients, solution.cycle, solution.frequency)
         missing = np.flatnonzero(shares > ADDED * tolerance)
@@ -172,8 +173,8 @@ def finer_resolution(
         samples *= 2
     while samples < SAMPLES_PER_PERIOD * harmonics[-1]:
         samples *= 2
-    finer = Resolution(harmonics, min(samples, max(accuracy.most_samples, own.samples)))
-    return None if finer == own else finer
+    finer = Resolution(harmonics, min(samples, max(accuracy.most_samples, present.samples)))
+    return None if finer == present else finer
 
 
 def _branch(
@@ -196,10 +197,10 @@ def _branch(
         record, point = _Recorder(start.problem, along, accuracy), start.curve.points[-1]
     else:
         record = _Recorder(problem, along, accuracy)
-        found = _first(record, along, span[0 if upward else 1], start, upward, control)
-        if isinstance(found, str):
-            return ResponseBranch((), SolutionCurve((), found), problem)
-        point = found
+        first = _first(record, along, span[0 if upward else 1], start, upward, control)
+        if isinstance(first, str):
+            return ResponseBranch((), SolutionCurve((), first), problem)
+        point = first
     # Steps are shares of the vibration: the displacement under the constant load may be far larger.
     rest = record.problem.guess(None)
     curve = follow(
@@ -226,13 +227,13 @@ def _first(
     frequency, force = along.frequency_and_force(parameter)
     problem, unknowns = record.problem, record.problem.guess(start)
     while True:
-        found = problem.find(frequency, force, unknowns, control)
-        if not found.converged:
-            return found.message
+        solution = problem.find(frequency, force, unknowns, control)
+        if not solution.converged:
+            return solution.message
         if along.varies == "force":
-            found = solve(along.equations(problem), found.unknowns, parameter)
-        point = first_point(found, parameter, upward, control.first)
-        finer = record(point, found.at)
+            solution = solve(along.equations(problem), solution.unknowns, parameter)
+        point = first_point(solution, parameter, upward, control.first)
+        finer = record(point, solution.at)
         if finer is None:
             return point
-        problem, unknowns = record.problem, finer.lift(found.unknowns)
+        problem, unknowns = record.problem, finer.lift(solution.unknowns)

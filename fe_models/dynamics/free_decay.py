@@ -1,6 +1,6 @@
 """Frequency and damping against amplitude from a ring-down, measured or computed.
 
-The record is led through a Butterworth band-pass forwards and backwards (no phase), which leaves
+The record is passed through a Butterworth band-pass forwards and backwards (no phase), which leaves
 one mode; its analytic signal (Hilbert transform) a exp(iφ) gives the amplitude a(t) and the
 frequency φ'/2π. In one period of a slowly varying vibration a' = -ζ ω0 a and φ' = ω0 sqrt(1 - ζ²),
 so that with λ = -a'/a
@@ -89,9 +89,9 @@ def ring_down(
     analytic = hilbert(filtered)[2 * settling : -2 * settling]
     with np.errstate(divide="ignore"):
         level, phase = np.log(np.abs(analytic)), np.unwrap(np.angle(analytic))
-    found = _measured(level, phase, step, half, cut, band)
-    _, gain = sosfreqz(sections, worN=found.frequency, fs=1.0 / step)
-    return replace(found, amplitude=found.amplitude / np.abs(gain) ** 2)
+    decay = _measured(level, phase, step, half, cut, band)
+    _, gain = sosfreqz(sections, worN=decay.frequency, fs=1.0 / step)
+    return replace(decay, amplitude=decay.amplitude / np.abs(gain) ** 2)
 
 
 def _checked(response: Array, step: float, band: tuple[float, float], periods: float) -> Array:
@@ -140,10 +140,10 @@ def _measured(
             f"the mode decays at {decay[:end].max():.3g} 1/s, about as fast as the filter of the "
             f"band {band[0]:g} to {band[1]:g} Hz; allowed: a wider band"
         )
-    own = np.hypot(rate[:end], decay[:end])
+    angular = np.hypot(rate[:end], decay[:end])
     return RingDown(
         np.asarray(step * np.arange(cut, cut + end), dtype=float),
         np.exp(smooth[:end]),
         rate[:end] / (2.0 * np.pi),
-        decay[:end] / own,
+        decay[:end] / angular,
     )

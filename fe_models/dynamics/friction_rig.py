@@ -83,8 +83,8 @@ def _held(
     tie = np.zeros((len(ring), len(free) + len(holder)))
     tie[free, np.arange(len(free))] = 1.0
     for column, direction in enumerate(holder, len(free)):
-        own = [name.endswith(f" {direction}") for name in body.names]
-        tie[: len(own), column] = np.logical_and(ring[: len(own)], own)
+        along = [name.endswith(f" {direction}") for name in body.names]
+        tie[: len(along), column] = np.logical_and(ring[: len(along)], along)
     every = [*body.names, *modes]
     names = [f"{label} {every[place]}" for place in free] + list(holder.values())
     return tie.T @ body.mass @ tie, tie.T @ body.stiffness @ tie, names

@@ -63,11 +63,11 @@ class Resolution:
     @cached_property
     def places(self) -> tuple[np.ndarray, np.ndarray]:
         """Function of time that is the cosine, and the sine, of each harmonic; -1 for no sine."""
-        still = int(0 in self.harmonics)
-        cosine = 2 * np.arange(len(self.harmonics)) - still
+        has_mean = int(0 in self.harmonics)
+        cosine = 2 * np.arange(len(self.harmonics)) - has_mean
         cosine[0] = 0
         sine = cosine + 1
-        if still:
+        if has_mean:
             sine[0] = -1
         return cosine, sine
 
@@ -94,27 +94,27 @@ class Resolution:
 
     @cached_property
     def lead(self) -> Array:
-        """Joints are led to the mean displacement first, then to that at the first time."""
+        """Joints are marched to the mean displacement first, then to that at the first time."""
         mean = np.eye(1, self.size) if 0 in self.harmonics else self.basis[:0]
         return np.vstack([mean, self.basis[:1]])
 
     def combined(self, rows: Array) -> ComplexArray:
         """Complex amplitudes ``(k, n)`` of coefficients ``(m, n)``: a cosine less i its sine."""
         cosine, sine = self.places
-        still = int(sine[0] < 0)
+        has_mean = int(sine[0] < 0)
         amplitudes = np.empty((len(cosine), rows.shape[1]), dtype=complex)
         amplitudes.real = rows[cosine]
-        amplitudes.imag[:still] = 0.0
-        np.negative(rows[sine[still:]], out=amplitudes.imag[still:])
+        amplitudes.imag[:has_mean] = 0.0
+        np.negative(rows[sine[has_mean:]], out=amplitudes.imag[has_mean:])
         return amplitudes
 
     def separated(self, amplitudes: ComplexArray) -> Array:
         """The inverse of :meth:`combined`."""
         cosine, sine = self.places
-        still = int(sine[0] < 0)
+        has_mean = int(sine[0] < 0)
         rows = np.empty((self.size, amplitudes.shape[1]))
         rows[cosine] = amplitudes.real
-        rows[sine[still:]] = -amplitudes.imag[still:]
+        rows[sine[has_mean:]] = -amplitudes.imag[has_mean:]
         return rows
 
     def amplitudes(self, coefficients: Array) -> ComplexArray:
@@ -131,9 +131,9 @@ class Resolution:
         Harmonics that only the other has are dropped.
         """
         adopted = np.zeros((len(coefficients), self.size, coefficients.shape[2]))
-        for own, theirs in zip(self.places, other.places, strict=True):
-            for place, harmonic in zip(own, self.harmonics, strict=True):
+        for here, there in zip(self.places, other.places, strict=True):
+            for place, harmonic in zip(here, self.harmonics, strict=True):
                 if place >= 0 and harmonic in other.harmonics:
-                    there = theirs[other.harmonics.index(harmonic)]
-                    adopted[:, place] = coefficients[:, there]
+                    source = there[other.harmonics.index(harmonic)]
+                    adopted[:, place] = coefficients[:, source]
         return adopted

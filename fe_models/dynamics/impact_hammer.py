@@ -87,19 +87,19 @@ def frequency_response(
     struck = window if blow_end is None else window * (time <= blow_end)
     if not np.any(forces * struck, axis=1).all():
         raise SignalError("a record has no blow; allowed: forces that are not 0 before blow_end")
-    spectra = np.fft.rfft(forces * struck)[:, 1:]
-    answers = np.fft.rfft(responses * window)[:, 1:]
-    own = np.sum(np.abs(spectra) ** 2, axis=0)
-    if not (own > 0.0).all():
+    force_spectra = np.fft.rfft(forces * struck)[:, 1:]
+    response_spectra = np.fft.rfft(responses * window)[:, 1:]
+    power = np.sum(np.abs(force_spectra) ** 2, axis=0)
+    if not (power > 0.0).all():
         raise SignalError("the force has no part at some frequency; allowed: blows")
-    cross = np.sum(answers * spectra.conj(), axis=0)
+    cross = np.sum(response_spectra * force_spectra.conj(), axis=0)
     coherence = None
     if len(forces) > 1:
-        product = own * np.sum(np.abs(answers) ** 2, axis=0)
-        coherence = np.divide(np.abs(cross) ** 2, product, where=product > 0.0, out=0.0 * own)
+        product = power * np.sum(np.abs(response_spectra) ** 2, axis=0)
+        coherence = np.divide(np.abs(cross) ** 2, product, where=product > 0.0, out=0.0 * power)
     frequency = np.fft.rfftfreq(forces.shape[1], step)[1:].astype(float)
     remaining = _remaining(responses * window)
-    return FrequencyResponse(frequency, cross / own, quantity, coherence, decay, remaining)
+    return FrequencyResponse(frequency, cross / power, quantity, coherence, decay, remaining)
 
 
 def _records(force: Array, response: Array) -> tuple[Array, Array]:

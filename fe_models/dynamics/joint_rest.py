@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cached_property
-from typing import Protocol
 
 import numpy as np
 
 from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.model import DynamicModel
+from fe_models.dynamics.periodic_joints import Cycle, PeriodicJoints
 from fe_models.dynamics.receptance import Receptance
 from sa_solver.types import Array
 
@@ -22,30 +22,11 @@ SOFT = 1e-3
 SMALL_SAMPLES = 8
 
 
-class StillCycle(Protocol):
-    """Forces of joints and their derivative; see :class:`StillJoints`."""
-
-    @property
-    def force(self) -> Array: ...
-    @property
-    def jacobian(self) -> Array: ...
-
-
-class StillJoints(Protocol):
-    """Joints led round a period; :class:`fe_models.dynamics.harmonic_balance.PeriodicJoints`."""
-
-    @property
-    def directions(self) -> int: ...
-    def settle(
-        self, coefficients: Array, basis: Array, weights: Array, lead: Array | None
-    ) -> StillCycle: ...
-
-
 class Rest:
     """The joints at rest under a constant load ``(n,)`` on the modes."""
 
     def __init__(
-        self, model: DynamicModel, receptance: Receptance, joints: StillJoints, load: Array
+        self, model: DynamicModel, receptance: Receptance, joints: PeriodicJoints, load: Array
     ) -> None:
         self._model, self._receptance, self._joints, self._load = model, receptance, joints, load
         self._shape = len(model.connection) // joints.directions, joints.directions
@@ -53,8 +34,8 @@ class Rest:
     @cached_property
     def loaded(self) -> Array:
         """Displacement ``(j d,)`` of the joints under the load without them; held."""
-        still = self._receptance.at(np.zeros(1)).respond(self._load[None])
-        return np.asarray((still @ self._receptance.at_joints.T)[0].real)
+        motion = self._receptance.at(np.zeros(1)).respond(self._load[None])
+        return np.asarray((motion @ self._receptance.at_joints.T)[0].real)
 
     @cached_property
     def displacement(self) -> Array:
@@ -65,7 +46,7 @@ class Rest:
         """
         if not self._load.any():
             return np.zeros(self._shape)
-        compliance, held = self._receptance.still_joints, self._receptance.held
+        compliance, held = self._receptance.static_flexibility, self._receptance.held
         displacement = np.zeros(len(compliance))
         softest = 1.0 / float(np.diagonal(compliance).mean())
         previous, added = np.inf, 10.0 * SOFT * softest
@@ -99,18 +80,18 @@ class Rest:
         cycle = self._joints.settle(
             coefficients, mean_and_wave.basis, mean_and_wave.weights, mean_and_wave.lead
         )
-        own = cycle.jacobian[:, 1, :, 1]
-        return np.asarray(0.5 * (own + own.transpose(0, 2, 1)))
+        tangents = cycle.jacobian[:, 1, :, 1]
+        return np.asarray(0.5 * (tangents + tangents.transpose(0, 2, 1)))
 
     @cached_property
     def stiffened(self) -> Receptance:
         """The structure with springs of these :attr:`tangents`; damping between modes left out."""
         by_joint = self._model.connection.reshape(*self._shape, -1)
-        pulled = (self.tangents @ by_joint).reshape(self._model.connection.shape)
-        stiffness = self._model.stiffness + self._model.connection.T @ pulled
+        springs = (self.tangents @ by_joint).reshape(self._model.connection.shape)
+        stiffness = self._model.stiffness + self._model.connection.T @ springs
         return Receptance(replace(self._model, stiffness=stiffness), mixed=False)
 
-    def _settled(self, displacement: Array) -> StillCycle:
+    def _settled(self, displacement: Array) -> Cycle:
         one = np.ones((1, 1))
         joints, directions = self._shape
         return self._joints.settle(displacement.reshape(joints, 1, directions), one, one, one)

@@ -15,7 +15,7 @@ class Start:
     """State at the first time: at rest in every respect unless given.
 
     ``displacement`` and ``velocity`` ``(n,)`` [mm, mm/s]. Without a ``joint_state`` ``(j, k)`` the
-    joints have been led from rest straight to the displacement.
+    joints have been loaded from rest straight to the displacement.
     """
 
     displacement: Array | None = None

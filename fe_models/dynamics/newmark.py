@@ -79,32 +79,32 @@ def integrate(
     ``duration`` [s]. A motion that has not been found to the end says so in its ``message``.
     Raises ``ValueError`` if joints and connection do not have the same directions.
     """
-    laws = joints if joints is not None else _Free()
+    laws = joints if joints is not None else _FreeJoints()
     if len(model.connection) % laws.directions:
         raise ValueError(
             f"a connection of {len(model.connection)} rows for joints of {laws.directions} "
             "directions: give a row for each direction of each joint"
         )
     steps = int(np.ceil(duration / control.step * (1.0 - 1e-12)))
-    shake = excitation if excitation is not None else _Silence(len(model.mass))
+    forcing = excitation if excitation is not None else _NoForce(len(model.mass))
     begin = start or Start()
     allowed = np.inf
     if control.tolerance is not None:
-        whole = _March(model, laws, shake, control, begin, np.inf)
+        whole = _March(model, laws, forcing, control, begin, np.inf)
         allowed = control.tolerance * _followed(whole, steps, steps).largest_displacement
-    march = _March(model, laws, shake, control, begin, allowed)
+    march = _March(model, laws, forcing, control, begin, allowed)
     return _followed(march, steps, control.every).motion(march.message)
 
 
 @dataclass(frozen=True)
-class _FreeResponse:
+class _NoResponse:
     force: Array
     tangent: Array
     state: Array
     dissipated: Array
 
 
-class _Free:
+class _FreeJoints:
     """Joints that transmit nothing."""
 
     directions = 1
@@ -114,11 +114,11 @@ class _Free:
 
     def respond(self, state: Array, increment: Array) -> IncrementResponse:
         count = len(increment)
-        return _FreeResponse(np.zeros((count, 1)), np.zeros((count, 1, 1)), state, np.zeros(count))
+        return _NoResponse(np.zeros((count, 1)), np.zeros((count, 1, 1)), state, np.zeros(count))
 
 
 @dataclass(frozen=True)
-class _Silence:
+class _NoForce:
     size: int
 
     def __call__(self, times: Array) -> Array:
@@ -143,7 +143,7 @@ class _Operators:
 
 
 class _March:
-    """The structure on its way, step by step; ``allowed`` is the error one may add (mass norm)."""
+    """The structure marched step by step; ``allowed`` is the error one may add (mass norm)."""
 
     def __init__(
         self,
@@ -167,14 +167,14 @@ class _March:
     def block(self, steps: int) -> list[list[StepState]]:
         """The points of up to ``steps`` whole steps; fewer if ``message`` says so."""
         times = self._time(np.arange(self.taken + 1.0, self.taken + steps + 1.0))
-        found = []
+        whole_steps = []
         for time, force in zip(times.tolist(), self._excitation(times), strict=True):
             points = self._whole_step(time, force)
             if self.message:
                 break
-            found.append(points)
+            whole_steps.append(points)
             self.taken += 1
-        return found
+        return whole_steps
 
     def _whole_step(self, end: float, end_force: Array) -> list[StepState]:
         """One step up to a time, in parts where that is needed."""
@@ -214,17 +214,17 @@ class _March:
         )
         velocity = at.motion[size:]
         free = step * (self.model.connection @ (velocity + 0.5 * change)) + at.missing
-        found = equilibrium.solve(at.response, free, self._largest_force)
-        if not found.solved:
-            self._missed = found.relative
+        trial = equilibrium.solve(at.response, free, self._largest_force)
+        if not trial.solved:
+            self._missed = trial.relative
             return None, np.inf
-        joint_force = found.response.force.ravel()
+        joint_force = trial.response.force.ravel()
         change -= operators.joint_gain @ joint_force
         motion = at.motion.copy()
         motion[:size] += step * (velocity + 0.5 * change)
         motion[size:] += change
         point = StepState(
-            time, motion, force, found.response, -found.residual, step, found.relative
+            time, motion, force, trial.response, -trial.residual, step, trial.relative
         )
         error = self._error(point)
         if error > 1.0:
@@ -267,8 +267,8 @@ class _March:
             rest = self._joints.rest(len(stretch) // directions)
             response = self._joints.respond(rest, stretch.reshape(-1, directions))
         else:
-            still = np.zeros((len(start.joint_state), directions))
-            response = self._joints.respond(start.joint_state, still)
+            unmoved = np.zeros((len(start.joint_state), directions))
+            response = self._joints.respond(start.joint_state, unmoved)
         force = self._excitation(np.array([start.time]))[0]
         return StepState(start.time, motion, force, response, np.zeros(len(stretch)), 0.0, 0.0)
 

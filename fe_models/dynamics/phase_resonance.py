@@ -33,7 +33,8 @@ from fe_models.dynamics.continuation import (
     follow,
 )
 from fe_models.dynamics.forced_response import Accuracy, Motions, ResponseBranch, finer_resolution
-from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance, HarmonicSolution
+from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import ComplexArray, HarmonicBalanceError, Resolution
 from fe_models.dynamics.newton import NewtonControl, NewtonSolution, solve
 from fe_models.dynamics.receptance import SteadyMotion
@@ -50,19 +51,19 @@ SAME_PHASE = 1e-9
 class PhaseBalance:
     """The equations of phase resonance at one motion, and their derivatives when asked for.
 
-    ``balance`` is the motion's own, with the frequency as parameter, and ``seen`` the complex x of
-    the module, that ``frequency`` [Hz] and the motion have.
+    ``balance`` is the motion's own, with the frequency as parameter, and ``output`` the complex x
+    of the module, that ``frequency`` [Hz] and the motion have.
     """
 
     equations: PhaseResonance
     balance: Balance
     frequency: float
-    seen: complex
+    output: complex
 
     @property
     def cotangent(self) -> float:
         """Of the phase; infinite where no power is spent: no frequency has the phase then."""
-        return self.seen.real / self.seen.imag if self.seen.imag else np.inf
+        return self.output.real / self.output.imag if self.output.imag else np.inf
 
     @cached_property
     def residual(self) -> Array:
@@ -85,7 +86,9 @@ class PhaseBalance:
         scale, inner = self.equations.scale, self.balance.jacobian
         # Hz per unknown.
         stretch = self.frequency / scale
-        by_frequency = complex(self._steady.turned(self._moved)[0] @ self._per_force)
+        by_frequency = complex(
+            self._steady.stiffness_slope(self._first_harmonic)[0] @ self._per_force
+        )
         corner = -2.0 * np.pi * stretch * self._of_phase(by_frequency)
         row = np.append(self._of_phase(self._by_motion), corner)
         bordered = Bordered(inner, self.balance.slope * stretch, row)
@@ -100,11 +103,11 @@ class PhaseBalance:
 
     def _of_phase(self, change: ComplexArray | complex) -> Array:
         """By how much a change of x changes the last of the equations."""
-        turned = np.real(change) - self.cotangent * np.imag(change)
-        return np.asarray(self.equations.scale * turned / self.seen.imag)
+        cotangent = np.real(change) - self.cotangent * np.imag(change)
+        return np.asarray(self.equations.scale * cotangent / self.output.imag)
 
     @property
-    def _moved(self) -> ComplexArray:
+    def _first_harmonic(self) -> ComplexArray:
         """The modes at harmonic 1 ``(1, n)``."""
         return self.balance.motion[self.equations.first][None]
 
@@ -120,14 +123,14 @@ class PhaseBalance:
 
     @property
     def _by_motion(self) -> ComplexArray:
-        """x by the unknowns ``(n,)``, through what the joints answer to them."""
+        """x by the unknowns ``(n,)``, through the forces of the joints."""
         problem, first = self.equations.problem, self.equations.first
         by_joint = problem.receptance.at_joints @ self._per_force
         cosine, sine = (places[first] for places in problem.resolution.places)
         slopes = self.balance.cycle.jacobian
-        pulls = slopes[:, cosine] - 1j * slopes[:, sine]
+        by_motion = slopes[:, cosine] - 1j * slopes[:, sine]
         by_joint = by_joint.reshape(-1, problem.joints.directions)
-        return np.asarray(-np.einsum("jd,jdme->jme", by_joint, pulls).ravel())
+        return np.asarray(-np.einsum("jd,jdme->jme", by_joint, by_motion).ravel())
 
 
 @dataclass(frozen=True)
@@ -146,7 +149,7 @@ def along_phase_resonance(
     problem: HarmonicBalance,
     start: HarmonicSolution | ResponseBranch,
     forces: tuple[float, float],
-    seen: Array | None = None,
+    output: Array | None = None,
     *,
     control: ContinuationControl | None = None,
     accuracy: Accuracy | None = None,
@@ -155,15 +158,15 @@ def along_phase_resonance(
 
     They begin where a response ``start`` passes through the phase with the largest displacement, or
     near one motion, best its peak. Newton's method finds the phase resonance under its force, from
-    which the curve is followed both ways. ``seen`` ``(n,)`` is the displacement whose phase counts,
-    as a combination of those of the structure; the force's own if it is not given. Without
+    which the curve is followed both ways. ``output`` ``(n,)`` is the displacement whose phase
+    counts, as a combination of those of the structure; the force's own if it is not given. Without
     ``accuracy`` the resolution is that of the problem.
 
-    Raises :class:`HarmonicBalanceError` for a load without a first harmonic, a ``seen`` that is
-    nothing or lags a force of several phases, and forces that are not above zero or do not include
-    the start's.
+    Raises :class:`HarmonicBalanceError` for a load without a first harmonic, an ``output`` that
+    is nothing or lags a force of several phases, and forces that are not above zero or do not
+    include the start's.
     """
-    weights = _weights(problem, seen)
+    weights = _weights(problem, output)
     nearest = nearest_to_phase(start, weights) if isinstance(start, ResponseBranch) else start
     if nearest is None:
         return Backbone(
@@ -178,7 +181,7 @@ def along_phase_resonance(
     if nearest.message:
         return Backbone((), f"the start is no solution: {nearest.message}", problem)
     control = control or ContinuationControl()
-    equations = PhaseResonance.near(problem, nearest, seen)
+    equations = PhaseResonance.near(problem, nearest, output)
     first = _first(_Recorder(equations, accuracy), nearest, control)
     if isinstance(first, str):
         return Backbone((), first, problem)
@@ -197,20 +200,20 @@ def nearest_to_phase(branch: ResponseBranch, weights: ComplexArray) -> HarmonicS
     The larger displacement wᴴ x with the ``weights`` w ``(n,)`` decides if it passes more often:
     between two resonances it also does.
     """
-    seen = [
+    outputs = [
         complex(np.vdot(weights, solution.motion[solution.resolution.harmonics.index(1)]))
         for solution in branch.solutions
     ]
     passing = [
         (abs(before) + abs(after), place)
-        for place, (before, after) in enumerate(pairwise(seen))
+        for place, (before, after) in enumerate(pairwise(outputs))
         if before.real * after.real <= 0.0 < before.imag * after.imag
     ]
     if not passing:
         return None
     _, place = max(passing)
-    left = [abs(x.real / x.imag) for x in seen[place : place + 2]]
-    return branch.solutions[place + int(np.argmin(left))]
+    cotangents = [abs(x.real / x.imag) for x in outputs[place : place + 2]]
+    return branch.solutions[place + int(np.argmin(cotangents))]
 
 
 @dataclass(frozen=True)
@@ -228,13 +231,13 @@ class PhaseResonance:
 
     @classmethod
     def near(
-        cls, problem: HarmonicBalance, start: HarmonicSolution, seen: Array | None = None
+        cls, problem: HarmonicBalance, start: HarmonicSolution, output: Array | None = None
     ) -> PhaseResonance:
         """The equations near a motion; see :func:`along_phase_resonance`."""
         vibration = problem.guess(start) - problem.guess(None)
         # Where no joint moves there is nothing to be measured with the frequency.
         scale = float(np.linalg.norm(vibration)) or 1.0
-        return cls(problem, _weights(problem, seen), start.frequency, scale)
+        return cls(problem, _weights(problem, output), start.frequency, scale)
 
     @cached_property
     def first(self) -> int:
@@ -254,8 +257,8 @@ class PhaseResonance:
     def __call__(self, unknowns: Array, parameter: float) -> PhaseBalance:
         frequency = self.frequency_of(unknowns)
         balance = self.problem.evaluate(unknowns[:-1], frequency, parameter, "frequency")
-        seen = complex(self.of_modes @ balance.motion[self.first])
-        return PhaseBalance(self, balance, frequency, seen)
+        output = complex(self.of_modes @ balance.motion[self.first])
+        return PhaseBalance(self, balance, frequency, output)
 
 
 class _Recorder:
@@ -294,7 +297,7 @@ class _First:
     """The phase resonance from which the curve is followed both ways."""
 
     equations: PhaseResonance
-    found: NewtonSolution[PhaseBalance]
+    resonance: NewtonSolution[PhaseBalance]
     solution: HarmonicSolution
 
 
@@ -304,18 +307,19 @@ def _first(
     """The phase resonance under the start's force; or why there is none."""
     unknowns = np.append(record.equations.problem.guess(start), 0.0)
     while True:
-        found = solve(record.equations, unknowns, start.force, NewtonControl(control.tolerance))
-        if not found.converged:
+        resonance = solve(record.equations, unknowns, start.force, NewtonControl(control.tolerance))
+        if not resonance.converged:
             return (
                 f"no phase resonance is found under {start.force:g} N from {start.frequency:.6g} "
-                f"Hz: Newton's method leaves {found.at.relative:.2g} after {found.iterations} "
-                "iterations; start from a motion nearer to the peak of the response"
+                f"Hz: Newton's method leaves {resonance.at.relative:.2g} after "
+                f"{resonance.iterations} iterations; start from a motion nearer to the peak of the "
+                "response"
             )
-        point = first_point(found, start.force, True, control.first)
-        finer = record(point, found.at)
+        point = first_point(resonance, start.force, True, control.first)
+        finer = record(point, resonance.at)
         if finer is None:
-            return _First(record.equations, found, record.solutions[-1])
-        unknowns = finer.lift(found.unknowns)
+            return _First(record.equations, resonance, record.solutions[-1])
+        unknowns = finer.lift(resonance.unknowns)
 
 
 @dataclass(frozen=True)
@@ -338,7 +342,7 @@ def _half(
     if force == forces[upward]:
         return _Half((), "", problem)
     record = _Recorder(first.equations, accuracy)
-    point = first_point(first.found, force, upward, control.first)
+    point = first_point(first.resonance, force, upward, control.first)
     # Steps are shares of the vibration, as those of forced responses.
     rest = np.append(problem.guess(None), 0.0)
     curve = follow(first.equations, point, forces, control, record, rest)
@@ -350,23 +354,23 @@ def _half(
     return _Half(tuple(record.solutions), message, record.equations.problem)
 
 
-def _weights(problem: HarmonicBalance, seen: Array | None) -> ComplexArray:
-    """Weights ``(n,)`` whose product wᴴ x is the displacement seen, relative to the force."""
+def _weights(problem: HarmonicBalance, output: Array | None) -> ComplexArray:
+    """Weights ``(n,)`` whose product wᴴ x is the output displacement, relative to the force."""
     wave = problem.load.waves.get(1)
     if wave is None or not np.any(wave):
         raise HarmonicBalanceError("the load has no harmonic 1: no phase is relative to it")
-    if seen is None:
+    if output is None:
         return np.asarray(wave, dtype=complex)
-    if np.shape(seen) != wave.shape or not np.any(seen):
+    if np.shape(output) != wave.shape or not np.any(output):
         raise HarmonicBalanceError(
-            f"the displacement seen has shape {np.shape(seen)}: give a combination, not zero, of "
-            f"the {len(wave)} of the structure"
+            f"the output displacement has shape {np.shape(output)}: give a combination, not zero, "
+            f"of the {len(wave)} of the structure"
         )
     largest = wave[np.argmax(np.abs(wave))]
     turn = largest / abs(largest)
     if np.abs((wave * np.conj(turn)).imag).max() > SAME_PHASE * abs(largest):
         raise HarmonicBalanceError(
             "the force has several phases, so that no displacement lags it by a quarter: leave out "
-            "what is seen"
+            "the output"
         )
-    return np.asarray(turn * seen)
+    return np.asarray(turn * output)

@@ -60,18 +60,18 @@ class SteadyMotion:
         """Displacements under forces; held at ω = 0."""
         moving, response = self._moving, np.empty(force.shape, dtype=complex)
         if moving:
-            response[0] = sl.cho_solve(self.structure.still, force[0].real)
+            response[0] = sl.cho_solve(self.structure.static_factors, force[0].real)
         if not self._mixed:
             np.multiply(force[moving:], self._flexibility, out=response[moving:])
         else:
             response[moving:] = np.linalg.solve(self._stiffness, force[moving:, :, None])[..., 0]
         return response
 
-    def turned(self, motion: ComplexArray) -> ComplexArray:
-        """Forces that a motion needs more per rad/s."""
+    def stiffness_slope(self, motion: ComplexArray) -> ComplexArray:
+        """∂(K + iωC - ω²M)/∂ω x: forces that a motion needs more per rad/s."""
         damping = self.structure.damping
-        own = motion * damping if damping.ndim == 1 else motion @ damping.T
-        return np.asarray(1j * own - 2.0 * self.angular[:, None] * motion)
+        damped = motion * damping if damping.ndim == 1 else motion @ damping.T
+        return np.asarray(1j * damped - 2.0 * self.angular[:, None] * motion)
 
     def between_joints(self) -> ComplexArray:
         """Displacements of joints by forces on joints ``(k, j d, j d)`` [mm/N]; held at ω = 0."""
@@ -79,7 +79,7 @@ class SteadyMotion:
         size = len(at_joints)
         between = np.empty((len(self.angular), size, size), dtype=complex)
         if moving:
-            between[0] = self.structure.still_joints
+            between[0] = self.structure.static_flexibility
         if not self._mixed:
             inverse = self._flexibility[:, None, :]
             # Two real products cost half of a complex one.
@@ -108,14 +108,14 @@ class Receptance:
         rigid = squares < RIGID * squares[-1]
         self.squares = np.where(rigid, 0.0, squares)
         damping = shapes.T @ model.damping @ shapes
-        own = np.diag(damping).copy()
-        across = np.abs(damping - np.diag(own)).max()
-        diagonal = not mixed or across <= DIAGONAL * np.abs(damping).max()
-        # Of the modes: (n,), or (n, n) where it mixes them.
-        self.damping = own if diagonal else damping
-        self.held = self._holding() if rigid.any() else 0.0
+        of_modes = np.diag(damping).copy()
+        between_modes = np.abs(damping - np.diag(of_modes)).max()
+        diagonal = not mixed or between_modes <= DIAGONAL * np.abs(damping).max()
+        # (n,), or (n, n) where it mixes the modes.
+        self.damping = of_modes if diagonal else damping
+        self.held = self._holding_stiffness() if rigid.any() else 0.0
         try:
-            self.still = sl.cho_factor(
+            self.static_factors = sl.cho_factor(
                 np.diag(self.squares) + self.held * self.at_joints.T @ self.at_joints
             )
         except np.linalg.LinAlgError:
@@ -123,13 +123,15 @@ class Receptance:
                 "the structure moves freely without moving a joint: hold it"
             ) from None
         # Displacements of joints by constant forces on joints (j d, j d), held.
-        self.still_joints = self.at_joints @ sl.cho_solve(self.still, self.at_joints.T)
+        self.static_flexibility = self.at_joints @ sl.cho_solve(
+            self.static_factors, self.at_joints.T
+        )
 
     def at(self, angular: Array) -> SteadyMotion:
         """The structure at ``k`` frequencies [rad/s]."""
         return SteadyMotion(self, angular)
 
-    def _holding(self) -> float:
+    def _holding_stiffness(self) -> float:
         """κ, a share of what the structure opposes to its joints where it strains."""
         strained = self.squares > 0.0
         at_joints = self.at_joints[:, strained]

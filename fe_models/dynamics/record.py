@@ -16,10 +16,10 @@ from sa_solver.types import Array
 
 
 class StepState(NamedTuple):
-    """A time on the way: displacements and velocities ``(2 n,)``, and the joints.
+    """The end of a step: displacements and velocities ``(2 n,)``, and the joints.
 
     ``missing`` ``(j d,)`` [mm] is how far the joints are behind the structure, what was left of
-    the ``residual``; ``step`` [s] led here.
+    the ``residual``; ``step`` [s] ended here.
     """
 
     time: float

@@ -20,7 +20,7 @@ from sa_solver.types import Array
 
 NOTHING: Mapping[str, float] = {}
 # Names that fit into a message.
-MOST_TOLD = 12
+MOST_LISTED = 12
 
 
 class RigError(InputError):
@@ -175,7 +175,7 @@ def _stretch(names: tuple[str, ...], link: Link) -> Array:
 
 def _place(names: tuple[str, ...], name: str) -> int:
     if name not in names:
-        more = ", ..." if len(names) > MOST_TOLD else ""
-        told = ", ".join(names[:MOST_TOLD]) + more
-        raise RigError(f"there is no point {name!r}: the rig has {told}")
+        more = ", ..." if len(names) > MOST_LISTED else ""
+        listed = ", ".join(names[:MOST_LISTED]) + more
+        raise RigError(f"there is no point {name!r}: the rig has {listed}")
     return names.index(name)

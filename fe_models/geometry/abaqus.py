@@ -127,26 +127,26 @@ class _Flattened:
 
     def surfaces(self) -> dict[str, Blocks]:
         """Facets of the element surfaces."""
-        found = {}
+        surfaces = {}
         for name, scope, card in self._named("surfaces"):
             if not _is_node_surface(card):
-                found[name] = self._faces(scope, card)
-        return found
+                surfaces[name] = self._faces(scope, card)
+        return surfaces
 
     def node_sets(self) -> dict[str, Indices]:
         """Rows of the nodes of node sets and node surfaces."""
-        found = {}
+        sets = {}
         for name, scope, members in self._named("node_sets"):
-            found[name] = self._rows(name, scope, members)
+            sets[name] = self._rows(name, scope, members)
         for name, scope, card in self._named("surfaces"):
             if _is_node_surface(card):
-                if name in found:
+                if name in sets:
                     raise MeshError(f"{card.place}: a node set is named {name}, too; rename one")
                 nodes: Members = {}
                 for place, fields in card.rows:
                     extend(nodes, resolve(place, fields[0], "node_sets", scope, self.instances))
-                found[name] = self._rows(name, scope, nodes)
-        return found
+                sets[name] = self._rows(name, scope, nodes)
+        return sets
 
     def blocks(self, scope: Scope, numbers: Iterable[int]) -> Blocks:
         """Elements of a scope by shape."""
@@ -189,9 +189,9 @@ class _Flattened:
         """Facets of an element surface."""
         by_shape: dict[str, list[list[int]]] = {}
         for place, fields in card.rows:
-            found = resolve(place, fields[0], "element_sets", scope, self.instances)
+            named = resolve(place, fields[0], "element_sets", scope, self.instances)
             side = fields[1].upper() if len(fields) > 1 else ""
-            for instance, members in found.items():
+            for instance, members in named.items():
                 owner = self.instances[instance] if instance else scope
                 for number in existing(members, owner.elements, f"{place}: the surface"):
                     element = owner.elements[number]
@@ -273,12 +273,12 @@ class _Flat(_Flattened):
 
     def _sets_of_level(self, level: int) -> dict[str, Blocks]:
         """Element sets all of whose elements are of a level."""
-        found = {}
+        sets = {}
         for name, _ in self.common.element_sets.items():
             numbers = self._members(name)
             if {self._level(self.common.elements[number]) for number in numbers} == {level}:
-                found[name] = self.blocks(self.common, numbers)
-        return found
+                sets[name] = self.blocks(self.common, numbers)
+        return sets
 
     def _piece_names(self, piece_of: dict[int, int]) -> dict[int, str]:
         """The element set that is just one piece; sets that divide one between them are refused.

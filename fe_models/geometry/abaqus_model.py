@@ -158,8 +158,8 @@ def resolve(
     for dot in (match.start() for match in re.finditer(r"\.", text)):
         if text[:dot] in instances:
             inner = instances[text[:dot]]
-            found = resolve(place, text[dot + 1 :], kind, inner, Names())
-            return {inner.name: found.get("", [])}
+            members = resolve(place, text[dot + 1 :], kind, inner, Names())
+            return {inner.name: members.get("", [])}
     raise MeshError(
         f"{place}: no {kind[:-1].replace('_', ' ')} {text or '(no name)'}; allowed: "
         f"{sets or 'those defined above'}"
@@ -174,15 +174,15 @@ def extend(members: Members, more: Members) -> None:
 
 def existing(members: list[int | range], known: Collection[int], what: str) -> list[int]:
     """All numbers meant, of ranges those that exist; raises if any other does not."""
-    found: list[int] = []
+    numbers: list[int] = []
     for member in members:
         if isinstance(member, range):
-            found.extend(number for number in member if number in known)
+            numbers.extend(number for number in member if number in known)
         elif member in known:
-            found.append(member)
+            numbers.append(member)
         else:
             raise MeshError(f"{what} names number {member}, which is not defined")
-    return found
+    return numbers
 
 
 class Model:
@@ -318,8 +318,8 @@ class Model:
                 extend(members, {owner: [_range(place, fields)]})
                 continue
             for text in filter(None, fields):
-                found = resolve(place, text, kind, scope, self.instances)
-                extend(members, {key or owner: numbers for key, numbers in found.items()})
+                named = resolve(place, text, kind, scope, self.instances)
+                extend(members, {key or owner: numbers for key, numbers in named.items()})
         return members
 
 

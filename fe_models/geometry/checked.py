@@ -45,11 +45,11 @@ def _check_cells(name: str, points: Array, cells: Indices) -> None:
     _, count = np.unique(ordered, axis=0, return_counts=True)
     if np.any(count > 1):
         raise MeshError(f"{np.sum(count > 1)} elements of body {name} come more than once")
-    found = 1 + int(pieces([("", cells)])[0].max())
-    if found > 1:
+    separate = 1 + int(pieces([("", cells)])[0].max())
+    if separate > 1:
         raise MeshError(
-            f"body {name} is in {found} pieces that share no nodes: merge their nodes if they are "
-            "one body, or name each"
+            f"body {name} is in {separate} pieces that share no nodes: merge their nodes if they "
+            "are one body, or name each"
         )
 
 

@@ -10,8 +10,6 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.sparse as sp
-from scipy.sparse.csgraph import connected_components
 
 from sa_solver.types import Array, Indices
 
@@ -83,8 +81,8 @@ def split_blocks(blocks: Blocks) -> Indices:
 
 def _halved(quads: Indices) -> Indices:
     """Two triangles of each quadrilateral, beside the diagonal from its lowest node."""
-    turned = (np.argmin(quads, axis=1)[:, None] + np.arange(4)) % 4
-    quads = np.take_along_axis(quads, turned, axis=1)
+    cyclic = (np.argmin(quads, axis=1)[:, None] + np.arange(4)) % 4
+    quads = np.take_along_axis(quads, cyclic, axis=1)
     return np.concatenate([quads[:, [0, 1, 2]], quads[:, [0, 2, 3]]])
 
 
@@ -104,12 +102,16 @@ def pieces(blocks: Blocks) -> list[Indices]:
 
     Elements that share a node are in one piece; pieces are numbered as the blocks name them first.
     """
+    # Sparse matrices take a fifth of a second to load: where they are used.
+    import scipy.sparse as sp
+    from scipy.sparse.csgraph import connected_components
+
     count = 1 + max(int(cells.max()) for _, cells in blocks)
     links = np.concatenate([edge for _, cells in blocks for edge in _links(cells)])
     graph = sp.coo_matrix((np.ones(len(links)), links.T), shape=(count, count))
     _, label = connected_components(graph, directed=False)
-    found = np.concatenate([label[cells[:, 0]] for _, cells in blocks])
-    _, first, piece = np.unique(found, return_index=True, return_inverse=True)
+    labels = np.concatenate([label[cells[:, 0]] for _, cells in blocks])
+    _, first, piece = np.unique(labels, return_index=True, return_inverse=True)
     ordered = np.argsort(np.argsort(first))[piece]
     return np.split(ordered, np.cumsum([len(cells) for _, cells in blocks])[:-1])
 

@@ -108,11 +108,11 @@ def describe_bodies(imported: ImportedMesh) -> list[str]:
             + (f"volume {volume:.6g} mm³" if solid else f"area {volume:.6g} mm²")
         )
         for boundary in body.mesh.boundaries or {}:
-            found = patch(body, boundary)
+            face = patch(body, boundary)
             lines.append(
                 f"  boundary {boundary}: {len(body.facets(boundary))} {facet}, {measure} "
-                f"{found.area:.6g} {unit}, centroid {vector(found.centroid)} mm, "
-                + (f"normal {vector(found.normal)}" if np.any(found.normal) else "closed")
+                f"{face.area:.6g} {unit}, centroid {vector(face.centroid)} mm, "
+                + (f"normal {vector(face.normal)}" if np.any(face.normal) else "closed")
             )
         for points, vertices in imported.points[name].items():
             centre = body.points[vertices].mean(axis=0)

@@ -69,17 +69,17 @@ def _read(path: Path, file_format: str | None) -> Any:
     """The file as meshio sees it; what meshio says meanwhile becomes the error or a warning."""
     import meshio
 
-    said = io.StringIO()
+    output = io.StringIO()
     try:
-        with redirect_stdout(said), redirect_stderr(said):
+        with redirect_stdout(output), redirect_stderr(output):
             mesh = meshio.read(path, file_format)
     # Its readers let anything through, and its dispatch ends the process.
     except (Exception, SystemExit) as error:
-        reason = said.getvalue() if isinstance(error, SystemExit) else str(error)
+        reason = output.getvalue() if isinstance(error, SystemExit) else str(error)
         reason = " ".join(reason.split()) or type(error).__name__
         raise MeshError(f"{path}: meshio cannot read it: {reason}") from None
-    if said.getvalue().strip():
-        warnings.warn(f"{path}: meshio: {' '.join(said.getvalue().split())}", stacklevel=3)
+    if output.getvalue().strip():
+        warnings.warn(f"{path}: meshio: {' '.join(output.getvalue().split())}", stacklevel=3)
     return mesh
 
 
@@ -154,14 +154,14 @@ def _refuse_ungrouped(path: Path, count: int, groups: CellGroups) -> None:
 
 def _node_sets(mesh: Any, lower: list[dict[str, Blocks]]) -> dict[str, Indices]:
     """The file's point sets and the nodes of groups below the boundaries."""
-    found: dict[str, list[Indices]] = {}
+    sets: dict[str, list[Indices]] = {}
     for groups in lower:
         for name, blocks in groups.items():
-            found.setdefault(name, []).extend(cells.ravel() for _, cells in blocks)
+            sets.setdefault(name, []).extend(cells.ravel() for _, cells in blocks)
     for name, rows in mesh.point_sets.items():
-        found.setdefault(name, []).append(np.asarray(rows, dtype=np.int64))
+        sets.setdefault(name, []).append(np.asarray(rows, dtype=np.int64))
     tags = mesh.point_data.get("point_tags")
     for tag, names in getattr(mesh, "point_tags", {}).items():
         for name in names:
-            found.setdefault(name, []).append(np.flatnonzero(tags == tag))
-    return {name: np.unique(np.concatenate(rows)) for name, rows in found.items()}
+            sets.setdefault(name, []).append(np.flatnonzero(tags == tag))
+    return {name: np.unique(np.concatenate(rows)) for name, rows in sets.items()}

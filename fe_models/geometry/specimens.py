@@ -22,7 +22,6 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from fe_models.geometry.gmsh_file import EntityGroup, generated_body
 from fe_models.gmsh_session import gmsh_model, grow_from
@@ -113,6 +112,8 @@ class Specimen:
         side = np.sign(body.mesh.p[2].mean())
         points = 0.5 * self.diameter * np.stack([np.cos(angle), np.sin(angle), 0.0 * angle], axis=1)
         points[:, 2] = side * self.ring_distance
+        from scipy.spatial import cKDTree
+
         distance, nodes = cKDTree(body.mesh.p.T).query(points)
         if distance.max() > SAME_POINT * self.diameter:
             raise MeshError(f"{body.name} has no nodes on the ring: mesh it with Specimen.mesh")
@@ -124,9 +125,9 @@ class Specimen:
         Vertices on the boundary of the body lie there; the ring's own are left out.
         """
         side = np.sign(body.mesh.p[2].mean())
-        wanted = np.array([0.5 * self.diameter, 0.0, side * distance])
+        place = np.array([0.5 * self.diameter, 0.0, side * distance])
         free = np.setdiff1d(body.mesh.boundary_nodes(), self.ring(body))
-        away = np.linalg.norm(body.mesh.p[:, free].T - wanted, axis=1)
+        away = np.linalg.norm(body.mesh.p[:, free].T - place, axis=1)
         return free[[away.argmin()]].astype(np.int64)
 
     def _mesh(self, size: float, growth: float) -> Any:
@@ -189,14 +190,14 @@ def _chamfer(occ: Any, specimen: Specimen) -> list[tuple[int, int]]:
 def _entity(model: Any, dim: int, low: Sequence[float], high: Sequence[float]) -> int:
     """The only entity of that dimension with the bounding box ``low``, ``high``."""
     box = np.array([*low, *high])
-    found = [
+    tags = [
         tag
         for _, tag in model.getEntities(dim)
         if np.abs(np.array(model.getBoundingBox(dim, tag)) - box).max() < BOX_MARGIN
     ]
-    if len(found) != 1:
-        raise MeshError(f"the specimen has {len(found)} faces or edges in the box {low}, {high}")
-    return int(found[0])
+    if len(tags) != 1:
+        raise MeshError(f"the specimen has {len(tags)} faces or edges in the box {low}, {high}")
+    return int(tags[0])
 
 
 def _mesh_pad(model: Any, pad: int, half: float, squares: int) -> None:

@@ -85,13 +85,13 @@ class FlatRoundedPunch:
         end = self.contact_half_width
         samples = np.linspace(0.0, end, 2001)
         highest = int(np.argmax(self.pressure(samples)))
-        found = minimize_scalar(
+        minimum = minimize_scalar(
             lambda x: -float(self.pressure(np.array(x))),
             bounds=(samples[max(highest - 1, 0)], samples[min(highest + 1, 2000)]),
             method="bounded",
             options={"xatol": 1e-10 * end},
         )
-        return -float(found.fun), float(found.x)
+        return -float(minimum.fun), float(minimum.x)
 
     def cell_averages(self, pitch: float, cells: int) -> Array:
         """Mean pressure on ``cells`` cells of ``pitch`` [mm] centred on x = 0, ``(cells,)``."""

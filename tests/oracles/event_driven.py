@@ -143,7 +143,9 @@ class _Run:
             signals = [signal_at(force, 0.5 * (first + last)) for force in self._forces]
             waves = tuple(tuple(wave.angular for wave in signal.waves) for signal in signals)
             layout = Layout(len(self._motion) // 2, len(self._slip), waves)
-            fastest = max([self._highest, *(abs(w) / (2.0 * np.pi) for own in waves for w in own)])
+            fastest = max(
+                [self._highest, *(abs(w) / (2.0 * np.pi) for angular in waves for w in angular)]
+            )
             parts = int(np.ceil(length * fastest * PARTS))
             for part in range(parts):
                 start = first + part * length / parts
@@ -180,14 +182,14 @@ class _Run:
         self, flow: LinearFlow, layout: Layout, y: Array, after: Array, left: float
     ) -> tuple[float, tuple[int, float] | None]:
         """When the first joint changes its state, which, and in which direction; None: not yet."""
-        found: tuple[float, tuple[int, float] | None] = (left, None)
+        first: tuple[float, tuple[int, float] | None] = (left, None)
         for joint, slip in enumerate(self._slip):
             for direction in (1.0, -1.0) if slip == 0.0 else (slip,):
                 watched = _Watched(flow, *self._watch(joint, direction, layout))
                 time = watched.first_passage(y, after, left)
-                if time is not None and time <= found[0]:
-                    found = time, (joint, direction)
-        return found
+                if time is not None and time <= first[0]:
+                    first = time, (joint, direction)
+        return first
 
     def _watch(self, joint: int, direction: float, layout: Layout) -> tuple[Array, float]:
         """A row and an offset; with y they are above zero where a joint must change its state.

@@ -113,10 +113,10 @@ class LinearFlow:
         blocks[: 2 * n, 2 * n :] = self._powers.reshape(2 * n, n)
         blocks[2 * n :, 2 * n :] = self._generator
         grown = sl.expm(blocks * time)[:, 2 * n :].reshape(3, n, n)
-        found = grown[2], grown[2].T @ grown[:2]
+        operators = grown[2], grown[2].T @ grown[:2]
         if known:
-            self._known[time] = found
-        return found
+            self._known[time] = operators
+        return operators
 
 
 def unknowns(layout: Layout, motion: Array, signals: Sequence[Signal], time: float) -> Array:

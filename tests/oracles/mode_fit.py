@@ -59,16 +59,18 @@ def _resonance(response: FrequencyResponse, size: Array, peak: int) -> Resonance
     equations = np.hstack([value[:, None] * powers[:, :2], -powers])
     both = np.vstack([equations.real, equations.imag])
     right = np.concatenate([(-value * rate**2).real, (-value * rate**2).imag])
-    own, *_ = np.linalg.lstsq(both, right, rcond=None)
-    natural = np.sqrt(own[0]) if own[0] > 0.0 else np.nan
+    coefficients, *_ = np.linalg.lstsq(both, right, rcond=None)
+    natural = np.sqrt(coefficients[0]) if coefficients[0] > 0.0 else np.nan
     fine = np.linspace(rate[0], rate[-1], FINE)
-    fitted = np.polyval(own[4:1:-1], fine) / (fine**2 + own[1] * fine + own[0])
+    fitted = np.polyval(coefficients[4:1:-1], fine) / (
+        fine**2 + coefficients[1] * fine + coefficients[0]
+    )
     top = int(np.abs(fitted).argmax())
     return Resonance(
         reference * float(fine[top].imag),
         float(size[peak] * np.abs(fitted[top])),
         float(reference * natural),
-        float(own[1] / (2.0 * natural)),
+        float(coefficients[1] / (2.0 * natural)),
     )
 
 

@@ -30,6 +30,7 @@ import scipy.linalg
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from tests.oracles.worn_shapes import worn_cylinder, worn_sphere
 from wear.laws import EnergyLaw
 from wear.moving import LARGE_STROKE, passages
 from wear.stepping import SlidingCycle, WearingContact, WearState
@@ -159,43 +160,16 @@ def test_pressure_on_a_patch_becomes_uniform_as_its_modes_decay() -> None:
 # --- a cylinder and a sphere --------------------------------------------------------------------
 
 
-def worn_cylinder(load: float, volume: float) -> tuple[float, float, float]:
-    """b [mm], W(0) [mm] and p(0) [MPa]."""
-    a = np.sqrt(4.0 * load * RADIUS / (np.pi * MODULUS))
-    (b,) = (
-        root.real
-        for root in np.roots([2.0 / 3.0, 0.0, -0.5 * a**2, -volume * RADIUS])
-        if abs(root.imag) < 1e-12 and root.real > a
-    )
-    ratio = (a / b) ** 2
-    depth = 0.5 * b**2 / RADIUS * (1.0 - ratio * np.log(2.0))
-    return b, depth, load / (2.0 * b) / (1.0 - 0.25 * ratio)
-
-
-def worn_sphere(load: float, volume: float) -> tuple[float, float, float]:
-    """b [mm], W(0) [mm] and p(0) [MPa]."""
-    a3 = 0.75 * load * RADIUS / MODULUS
-    (b,) = (
-        root.real
-        for root in np.roots([0.25 * np.pi, 0.0, 0.0, -16.0 * a3 / (9.0 * np.pi), -volume * RADIUS])
-        if abs(root.imag) < 1e-12 and root.real**3 > a3
-    )
-    ratio, share = a3 / b**3, (1.0 - 2.0 / np.pi) / np.pi
-    depth = 0.5 * b**2 / RADIUS * (1.0 - 16.0 / 3.0 * share * ratio)
-    rise = (1.0 + 8.0 / 3.0 * share * ratio) / (1.0 - 16.0 / (9.0 * np.pi**2) * ratio)
-    return b, depth, load / (np.pi * b**2) * rise
-
-
 @pytest.mark.parametrize("shares", [(1.0, 1.0), (0.0, 2.0), (1.5, 0.5)])
 def test_a_cylinder_becomes_conforming(shares: tuple[float, float]) -> None:
     """At a/b = 0.2, whichever body wears: 0.2 % of depth and pressure, a cell of the width."""
     grid, load, volume = Grid.strips(1.4, 140), 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS
     march = March(grid, grid.x**2 / (2.0 * RADIUS), load, shares)
     middle = march.to_volume(volume, load, 60)
-    b, depth, _ = worn_cylinder(load, volume)
+    b, depth, _ = worn_cylinder(load, volume, RADIUS, MODULUS)
     assert march.depth.sum() * grid.cell_area == pytest.approx(volume, rel=1e-9)
     assert march.depth.max() == pytest.approx(depth, rel=2e-3)
-    *_, pressure = worn_cylinder(load, middle)
+    *_, pressure = worn_cylinder(load, middle, RADIUS, MODULUS)
     np.testing.assert_allclose(march.pressure[65:75], pressure, rtol=2e-3)
     half = 0.5 * np.count_nonzero(march.depth) * grid.pitch[0]
     assert half == pytest.approx(b, abs=grid.pitch[0])
@@ -209,10 +183,10 @@ def test_a_sphere_becomes_conforming() -> None:
     volume = 0.25 * np.pi * 0.5**4 / RADIUS
     march = March(grid, (grid.x**2 + grid.y**2) / (2.0 * RADIUS), load)
     middle = march.to_volume(volume, load, 30)
-    b, depth, _ = worn_sphere(load, volume)
+    b, depth, _ = worn_sphere(load, volume, RADIUS, MODULUS)
     assert march.depth.sum() * grid.cell_area == pytest.approx(volume, rel=1e-9)
     assert march.depth.max() == pytest.approx(depth, rel=3e-3)
-    *_, pressure = worn_sphere(load, middle)
+    *_, pressure = worn_sphere(load, middle, RADIUS, MODULUS)
     np.testing.assert_allclose(march.pressure[27:33, 27:33], pressure, rtol=3e-3)
     area = np.count_nonzero(march.depth) * grid.cell_area
     assert np.sqrt(area / np.pi) == pytest.approx(b, abs=grid.pitch[0])
@@ -222,7 +196,7 @@ def test_a_sphere_becomes_conforming() -> None:
 def test_the_worn_cylinder_converges_with_grid_and_jumps() -> None:
     """Depth with pitch and steps refined together: first order, to within the (a/b)⁴ left out."""
     load, volume = 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS
-    _, depth, _ = worn_cylinder(load, volume)
+    _, depth, _ = worn_cylinder(load, volume, RADIUS, MODULUS)
     errors = []
     for count in (35, 70, 140, 280):
         grid = Grid.strips(1.4, count)
@@ -292,7 +266,7 @@ def test_a_flat_that_does_not_wear_stays_out_of_it(stroke: float) -> None:
     volume = 2.0 / 3.0 * 0.5**3 / RADIUS
     march = MovingMarch(grid, grid.x**2 / (2.0 * RADIUS), load, stroke, 4, 0.0)
     march.to_volume(volume, 15)
-    _, depth, _ = worn_cylinder(load, volume)
+    _, depth, _ = worn_cylinder(load, volume, RADIUS, MODULUS)
     assert not march.depth_1.any()
     assert march.depth_2.max() == pytest.approx(depth, rel=3e-3)
 
@@ -309,7 +283,7 @@ def test_over_a_long_stroke_the_slider_wears_alone_and_the_flat_evenly(stroke: f
     grid = Grid.strips(width, round(width / 0.02))
     march = MovingMarch(grid, grid.x**2 / (2.0 * RADIUS), load, stroke, 10, 0.5)
     march.to_volume(2.0 * volume, 12)
-    b, depth, _ = worn_cylinder(load, volume)
+    b, depth, _ = worn_cylinder(load, volume, RADIUS, MODULUS)
     tolerance = (b / stroke) ** 2
     for own in (march.depth_1, march.depth_2):
         assert own.sum() * grid.cell_area == pytest.approx(volume, rel=1e-9)

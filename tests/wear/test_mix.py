@@ -149,7 +149,7 @@ def test_evolving_coefficients_follow_the_energy_of_the_mix() -> None:
     )
     mixed = wearing(HEAVY, LIGHT, shares=(0.7, 0.3), laws=laws)
     state = WearState.unworn(BALL)
-    starts = {t: own.start for t, own in mixed.cycle(state, mixed.working).states.items()}
+    starts = {t: own.start for t, own in mixed.cycle(state, mixed.dissipating).states.items()}
     after = mixed.explicit_step(replace(state, starts=starts), 1500.0).state
     volume = after.surfaces.depth_1.sum() * GRID.cell_area
     assert after.energy > 3e4

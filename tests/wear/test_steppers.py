@@ -118,7 +118,7 @@ def advance_in(stepper, state: WearState, cycles: float, jumps: int) -> Array:
 def automatic(stepper, cycles: float) -> Advance:
     """A run whose steps choose their own length."""
     state = rounded()
-    first = CONSTANT.cycle(state, CONSTANT.working)
+    first = CONSTANT.cycle(state, CONSTANT.dissipating)
     starts = {t: own.start for t, own in first.states.items()}
     limit = CONSTANT.stable_cycles(state)
     state = replace(state, starts=starts, next_cycles=4.0 * limit)

@@ -154,14 +154,14 @@ def test_working_increments_end_with_the_heaviest() -> None:
     history = loads(100.0, 500.0, 300.0, 0.0, 200.0, 400.0)
     slip = np.full((6, *GRID.shape), SLIP)
     slip[5] = 0.0
-    assert wearing(history=history, slip=slip).working == [2, 4, 0, 1]
+    assert wearing(history=history, slip=slip).dissipating == [2, 4, 0, 1]
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_stuck_cycle_wears_nothing(kind: str) -> None:
     own = wearing(slip=np.zeros((1, *GRID.shape)))
     state = step(own, kind, unworn(), 1e6).state
-    assert own.working == []
+    assert own.dissipating == []
     assert not state.surfaces.depth.any()
     assert state.energy == 0.0
     assert own.stable_cycles(state) == np.inf

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from click.testing import CliRunner, Result
 
+from wear.interface import InterfaceState
 from workflow.analyses.wear.contact_stage import ContactStage, StageSettings
-from workflow.analyses.wear.interface_state import InterfaceState
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
 from workflow.analyses.wear.structures.bodies.source import BodiesSource
 from workflow.case.writing import dump_case
@@ -43,7 +43,7 @@ def worn(
     """The contact after the cycles of the case, in this process."""
     source = BodiesSource(case)
     stage = ContactStage(StageSettings(case, source.faces[0]))
-    state, _ = stage.begin(source.unworn()[0])
+    state, _ = stage.begin(source.unworn()[0], case.wear.cycles)
     for jump in range(jumps):
         left = case.wear.cycles * (1.0 - jump / jumps)
         state, _ = stage.jump(state, case.wear.cycles / jumps, left)
@@ -236,7 +236,7 @@ def test_partial_slip_over_a_given_stroke_is_that_of_mindlin() -> None:
     )
     source = BodiesSource(case)
     stage = ContactStage(StageSettings(case, source.faces[0]))
-    _, first = stage.begin(source.unworn()[0])
+    _, first = stage.begin(source.unworn()[0], case.wear.cycles)
     assert first.energy.sum() == pytest.approx(0.414092, rel=2e-2)
     forces = [state.resultants[1] for state in first.cycle]
     assert max(forces) == pytest.approx(210.0, rel=2e-2)

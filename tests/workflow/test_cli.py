@@ -14,7 +14,7 @@ from fe_models.linear_solver import FactorMemoryError
 from sa_solver.errors import ConvergenceError, InputError
 from workflow import errors
 from workflow.cli import cli
-from workflow.kinds import load_case
+from workflow.kinds import kinds, load_case
 from workflow.shell import system_check
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -108,8 +108,8 @@ def test_new_writes_a_case_that_checks(tmp_path, template_files, kind, words):
 
 def test_schema_is_json_with_descriptions():
     schema = json.loads(invoke("schema").stdout)
-    kinds = [kind["$ref"].rpartition("/")[2] for kind in schema["anyOf"]]
-    assert kinds == [model.__name__ for model in kinds().values()]
+    named = [kind["$ref"].rpartition("/")[2] for kind in schema["anyOf"]]
+    assert named == [model.__name__ for model in kinds().values()]
     for name, section in schema["$defs"].items():
         assert section["additionalProperties"] is False, name
         for key, entry in section["properties"].items():

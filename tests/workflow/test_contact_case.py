@@ -159,9 +159,10 @@ def with_file(base):
     return base[:start] + " {file: history.csv}" + base[end:]
 
 
-def test_file_and_legs_are_the_same_path(tmp_path):
-    rows = "".join(f"400,{q}\n" for q in (0, 52.5, 105, 157.5, 210))
-    (tmp_path / "history.csv").write_text(f"P, Qx\n{rows}", encoding="utf-8")
+@pytest.mark.parametrize(("heading", "load"), [("P", "400"), ("P [kN]", "0.4")])
+def test_file_and_legs_are_the_same_path(tmp_path, heading, load):
+    rows = "".join(f"{load},{q}\n" for q in (0, 52.5, 105, 157.5, 210))
+    (tmp_path / "history.csv").write_text(f"{heading}, Qx\n{rows}", encoding="utf-8")
     by_file = parse_case(with_file(BALL), str(tmp_path / "case.yaml"))
     by_legs = parse_case(BALL, "case.yaml")
     np.testing.assert_array_equal(

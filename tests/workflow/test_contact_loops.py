@@ -28,10 +28,12 @@ from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.figures import loops as loops_figure
 from workflow.analyses.wear.figures import wear as figures
 from workflow.analyses.wear.loop_table import read_loop_table
+from workflow.analyses.wear.recording import Recorder
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case
 from workflow.shell.folder import OutputFolder
-from workflow.shell.store import ResultsWriter, write_arrays
+from workflow.shell.results import writing
+from workflow.shell.store import write_arrays
 
 BODY = Material(115e3, 0.0)
 SPHERE = ShearedSphere(400.0, 10.0, BODY, BODY, 0.7)
@@ -165,10 +167,9 @@ def written(sphere, tmp_path):
     for jump in range(3):
         arrays = kept_loops(["sphere"], [sphere]) if jump != 1 else {"other": np.zeros(1)}
         write_arrays(folder.jump(jump), arrays, {"cycles": 100.0 * jump})
-    with h5py.File(folder.results, "w") as file:
-        write_loops(ResultsWriter(file), folder, 2)
-        group = file.create_group("grid/sphere")
-        group.attrs.update(shape=(32, 32), pitch=(0.1, 0.1))
+    with writing(folder.results) as writer:
+        write_loops(writer, folder, 2)
+        writer.put_grid("grid/sphere", Grid((32, 32), (0.1, 0.1)))
     return folder
 
 
@@ -320,15 +321,15 @@ def test_resumed_run_keeps_its_earlier_loops(
     start_balls, resume, rubbed, tmp_path, monkeypatch, every
 ):
     """The same loops as without the interruption; with ``end`` the first and the last of them."""
-    keep = workflow.analyses.wear.run.WearLoop.keep
+    keep = Recorder.keep
 
-    def interrupting(loop, state):
-        keep(loop, state)
+    def interrupting(recorder, state):
+        keep(recorder, state)
         if state.jump == 2:
             raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr(workflow.analyses.wear.run.WearLoop, "keep", interrupting)
+        patch.setattr(Recorder, "keep", interrupting)
         begun = start_balls(tmp_path / "out", *ASKED, f"loops.every={every}")
         assert begun.ending.exit_code == 130
     run = resume(tmp_path / "out")

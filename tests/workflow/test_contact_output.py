@@ -22,7 +22,7 @@ from workflow.case.writing import dump_case
 from workflow.kinds import parse_case
 from workflow.pictures.drawing import write_figures, write_paraview
 from workflow.shell.folder import OutputFolder
-from workflow.shell.store import grid_of
+from workflow.shell.results import grid_of
 
 MATERIAL = Material(115e3, 0.29)
 FRICTION, LOAD, TANGENTIAL, RADIUS = 0.7, 400.0, 210.0, 10.0
@@ -110,7 +110,7 @@ def outcome():
 def folder(outcome, tmp_path_factory):
     folder = OutputFolder(tmp_path_factory.mktemp("contact") / "out")
     folder.claim(outcome.case, force=False, resumable=False)
-    write_contact_results(outcome, folder)
+    write_contact_results(outcome, SimpleNamespace(kind="bodies", folder=folder))
     return folder
 
 
@@ -320,11 +320,12 @@ def test_line_has_no_maps_and_no_images(tmp_path):
     outcome = ContactOutcome(case, grid, grid.x**2, table, history(states))
     folder = OutputFolder(tmp_path / "out")
     folder.claim(case, force=False, resumable=False)
-    write_contact_results(outcome, folder)
+    write_contact_results(outcome, SimpleNamespace(kind="line", folder=folder))
     assert write_paraview(write_contact, folder.results, folder.paraview) == []
     written = write_figures(figures_of, folder.results, folder.figures)
     assert {path.stem for path in written} == {"profiles", "forces"}
     with h5py.File(folder.results) as file:
+        assert file.attrs["kind"] == "line"
         assert grid_of(file["grid/bodies"]).line
         assert file["history/P"].attrs["unit"] == "N/mm"
         assert file["history/Edx"].attrs["unit"] == "N mm/mm"

@@ -10,7 +10,7 @@ import pytest
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.case.sections import Coupling, Step
 from workflow.analyses.wear.fidelity import axes, dimension
-from workflow.analyses.wear.fidelity.decision import Decision, changed
+from workflow.analyses.wear.fidelity.decision import Decision
 from workflow.analyses.wear.fidelity.estimate import estimate
 from workflow.analyses.wear.fidelity.probe import (
     STEPS,
@@ -22,6 +22,7 @@ from workflow.analyses.wear.fidelity.probe import (
 )
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+from workflow.case.changing import changed
 from workflow.case.writing import dump_case
 from workflow.errors import MethodFailed
 from workflow.kinds import load_case

@@ -15,9 +15,9 @@ from tests.workflow.test_friction_rig import NODES, RIG, SPECIMENS
 from tests.workflow.test_time_cases import refused
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase
-from workflow.analyses.vibration_wear.friction_rig_run import run_friction_rig_wear
 from workflow.analyses.vibration_wear.pad_wear_steps import PadState, heun, taken, worn_until
 from workflow.analyses.vibration_wear.pads import WearingPads
+from workflow.analyses.vibration_wear.run import run_vibration_wear
 from workflow.case.writing import dump_case
 from workflow.kinds import parse_case
 from workflow.shell.folder import OutputFolder
@@ -185,7 +185,7 @@ def ended(tmp_path_factory):
     case, out = case_in(folder), OutputFolder(folder / "out")
     out.claim(case, force=False, resumable=False)
     reporter = Reporter(out.log)
-    run_friction_rig_wear(case, out, reporter)
+    run_vibration_wear(case, out, reporter)
     reporter.close()
     return out
 

@@ -15,8 +15,10 @@ import h5py
 import numpy as np
 import pytest
 
+import wear.coupled
 import workflow.analyses.wear.run
 from workflow.analyses.wear import checkpoint, contact_workers
+from workflow.analyses.wear.recording import Recorder
 from workflow.shell import processes as workers
 
 # Many quick jumps, so that a random moment mostly falls among them.
@@ -55,15 +57,15 @@ def jumps_kept(folder: Path) -> int:
 @pytest.fixture(scope="module")
 def stopped(start, tmp_path_factory):
     """A run that got Ctrl-C once two jumps were kept; not to be changed."""
-    keep = workflow.analyses.wear.run.WearLoop.keep
+    keep = Recorder.keep
 
-    def interrupting(loop, state):
-        keep(loop, state)
+    def interrupting(recorder, state):
+        keep(recorder, state)
         if state.jump == 2:
             raise KeyboardInterrupt
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(workflow.analyses.wear.run.WearLoop, "keep", interrupting)
+        patch.setattr(Recorder, "keep", interrupting)
         run = start(tmp_path_factory.mktemp("stopped") / "out")
     assert run.ending.exit_code == 130
     assert run.ending.stderr.splitlines()[-1].startswith("fretscale: interrupted")
@@ -140,7 +142,7 @@ def test_interruption_after_the_last_jump_writes_the_output(start, resume, monke
 def test_method_that_fails_later_says_how_to_go_on(start, resume, whole, monkeypatch, tmp_path):
     from wear.stepping import ContactFailure
 
-    jump = workflow.analyses.wear.run.WearLoop._jump
+    jump = wear.coupled.CoupledWear._jump
 
     def failing(loop, state):
         if state.jump == 1:
@@ -148,7 +150,7 @@ def test_method_that_fails_later_says_how_to_go_on(start, resume, whole, monkeyp
         return jump(loop, state)
 
     with monkeypatch.context() as patch:
-        patch.setattr(workflow.analyses.wear.run.WearLoop, "_jump", failing)
+        patch.setattr(wear.coupled.CoupledWear, "_jump", failing)
         run = start(tmp_path / "out")
     assert run.ending.exit_code == 3
     last = run.ending.stderr.splitlines()[-1]

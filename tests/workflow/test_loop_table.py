@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from workflow.analyses.wear.loop_table import COLUMNS, read_loop_table, write_table
+from workflow.analyses.wear.loop_table import COLUMNS, read_loop_table, write_loop_table
 from workflow.errors import UserError
 
 
@@ -17,7 +17,7 @@ def rows(count):
 def test_table_reads_back_equal(tmp_path, per_length):
     path = tmp_path / "loops_face.csv"
     given = rows(5)
-    write_table(path, given, per_length)
+    write_loop_table(path, given, per_length)
     table = read_loop_table(path)
     assert table.per_length is per_length
     for column in COLUMNS:
@@ -27,7 +27,7 @@ def test_table_reads_back_equal(tmp_path, per_length):
 
 def test_table_names_everyday_units(tmp_path):
     path = tmp_path / "loops_face.csv"
-    write_table(path, [dict.fromkeys((c.name for c in COLUMNS), 1000.0)])
+    write_loop_table(path, [dict.fromkeys((c.name for c in COLUMNS), 1000.0)])
     headings, first = path.read_text().splitlines()
     assert headings.startswith("cycles [1],energy [J],P [N],kt [N/mm],mu [1],energy_per_loop [mJ],")
     assert first.split(",")[:2] == ["1000", "1"]
@@ -35,7 +35,7 @@ def test_table_names_everyday_units(tmp_path):
 
 def test_only_columns_of_the_rows_are_written(tmp_path):
     path = tmp_path / "loops.csv"
-    write_table(path, [{"kt": 2e4, "energy": 500.0}, {"kt": 3e4, "energy": 700.0}])
+    write_loop_table(path, [{"kt": 2e4, "energy": 500.0}, {"kt": 3e4, "energy": 700.0}])
     assert path.read_text().splitlines() == ["energy [J],kt [N/mm]", "0.5,20000", "0.7,30000"]
 
 
@@ -54,7 +54,7 @@ def test_measured_tables_may_have_units_of_their_own(tmp_path):
     [
         ("", ":1: no rows; allowed: a header"),
         ("energy,P,kt,mu\n", ":1: no rows"),
-        ("energy,P,kt,mu,colour\n0,1,1,1,1\n", "'colour': no column; allowed: cycles, energy"),
+        ("energy,P,kt,mu,colour\n0,1,1,1,1\n", "'colour': unknown column; allowed: cycles, energy"),
         (
             "energy,P,kt\n0,1,1\n",
             "no column mu; this file has 'energy', 'P', 'kt'; allowed: at least energy, P",

@@ -12,7 +12,7 @@ import pyvista as pv
 from sa_solver.types import Array, Frame, Grid
 from workflow.analyses.wear.paraview.wear import write_wear
 from workflow.pictures.drawing import write_paraview
-from workflow.shell.store import frame_of, grid_of
+from workflow.shell.results import frame_of, grid_of
 
 SIZE = (10.0, 60.0)  # of the synthetic flanks [mm]
 INTERFACES = ("intrados", "extrados")

@@ -13,6 +13,7 @@ from fe_models.mesh import Face, Interface
 from fe_models.structure import InterfaceHistory
 from fe_models.transfer import FaceTransfer
 from sa_solver.types import Frame, Grid, LoadHistory, resultants
+from workflow.analyses.wear.datasets import put_face
 from workflow.analyses.wear.structures.resultants.faces import FaceError, facets_over
 from workflow.analyses.wear.structures.resultants.reading import read_resultants
 from workflow.analyses.wear.structures.resultants.writing import (
@@ -26,7 +27,7 @@ from workflow.analyses.wear.worn_nodes import (
     write_worn_nodes,
 )
 from workflow.case.input_files import InputFileError
-from workflow.shell.store import ResultsWriter
+from workflow.shell.results import writing
 
 FRICTION, SIZE = 0.4, (10.0, 60.0)
 RECIPE = Path(workflow.analyses.wear.structures.resultants.__file__).with_name("RECIPE.md")
@@ -137,16 +138,8 @@ def test_slip_on_the_grid_is_the_same_bit_for_bit(tmp_path):
 def test_results_of_a_run_are_read_from_their_group(tmp_path):
     """``results.h5:structure`` holds what a run wrote of its structure."""
     history, path = face_history(), tmp_path / "results.h5"
-    with h5py.File(path, "w") as file:
-        writer = ResultsWriter(file)
-        writer.put("structure/intrados/load_history", **vars(history.loads))
-        writer.put(
-            "structure/intrados",
-            coordinates=history.interface.coordinates,
-            facets=history.interface.facets,
-            pressure=history.pressure,
-            slip=history.slip,
-        )
+    with writing(path) as writer:
+        put_face(writer, "structure/intrados", history.interface, history)
     found = read_resultants(f"{path}:structure")["intrados"]
     assert_same(found.loads, history.loads)
     assert found.frame is None
@@ -317,7 +310,7 @@ def test_what_is_within_rounding_is_taken(tmp_path):
 
 
 HEADERS = {
-    "missing": ("P, Qx, Qy, Mx, My, Edx", "1: Mz, Edy: missing; allowed: P, Qx, Qy, Mx, My, Mz, "),
+    "missing": ("P, Qx, Qy, Mx, My, Edx", "1: no column Mz, Edy; this file has 'P', 'Qx', "),
     "unknown": ("P, Qx, Qy, Mx, My, Mz, Edx, Ed", "1: 'Ed': unknown column; did you mean 'Edy'?"),
     "stranger": ("P, weight", "1: 'weight': unknown column; allowed: interface, increment, P"),
     "twice": ("P, Qx, P", "1: P: column given twice; allowed: once"),
@@ -339,7 +332,10 @@ def test_a_wrong_header_is_refused(tmp_path, header, error):
 
 def test_missing_columns_name_those_present(tmp_path):
     path = write(tmp_path, "# loads\nP, Qx, Edx [J]\n1, 2, 3\n")
-    with pytest.raises(InputFileError, match=r"csv:2: Qy, .*; this one has P, Qx, Edx$"):
+    with pytest.raises(
+        InputFileError,
+        match=r"csv:2: no column Qy, .*; this file has 'P', 'Qx', 'Edx \[J\]'; allowed: P, Qx",
+    ):
         read_resultants(path)
 
 
@@ -654,7 +650,10 @@ def test_node_tables_and_displacements_keep_the_users_numbers(tmp_path):
 
 
 NODES = {
-    "missing": ("node, X\n1, 2\n", "1: Y: missing; allowed: node, X, Y in every file"),
+    "missing": (
+        "node, X\n1, 2\n",
+        "1: no column Y; this file has 'node', 'X'; allowed: node, X, Y",
+    ),
     "text": ("node, X, Y\n1, 2, a\n", "2: Y: 'a': not a number; allowed: numbers"),
     "fraction": ("node, X, Y\n1.5, 2, 3\n", "2: node: 1.5: not a whole number; allowed: whole"),
     "twice": ("node, X, Y\n1, 2, 3\n# \n1, 4, 5\n", "4: node: 1: node given twice; allowed: once"),

@@ -9,10 +9,11 @@ import pytest
 
 from sa_solver.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Grid, Material
+from wear.interface import CycleTractions
 from workflow.analyses.wear.case.sections import ContactStress, Life
-from workflow.analyses.wear.contact_stage import CycleTractions
 from workflow.analyses.wear.contact_stress import Planes, _tell_of_stick, life_maps
-from workflow.shell.store import grid_of, jump_names
+from workflow.analyses.wear.layout import jump_names
+from workflow.shell.results import grid_of
 
 FLANKS = ("intrados", "extrados")
 BODIES = {1: "disk", 2: "blade"}
@@ -175,16 +176,16 @@ def test_reversed_sliding_is_alike_in_both_bodies_and_at_both_ends(parameter: st
     grid = Grid.covering((2.0, 2.0), (20, 16))
     cycle, life = reversed_cycle(grid), Life.model_validate({"parameter": parameter})
     known = np.ones(2, dtype=bool)
-    # First the value of the parameter, then what it is made of.
-    maps_1, maps_2 = (
-        life_maps(life, SubsurfaceStress(grid, METAL, n), METAL, cycle, known) for n in (1, 2)
-    )
     name = "cracking_parameter" if parameter == "ruiz" else parameter
-    value, scale = maps_1[name], maps_1[name].max()
+    value, of_body_2 = (
+        life_maps(life, SubsurfaceStress(grid, METAL, n), METAL, cycle, known)[name].values
+        for n in (1, 2)
+    )
+    scale = value.max()
     assert scale > 0.0
     # The search for the worst plane is not symmetric: see wear.life.PlaneSearch.
     left = 1e-10 if parameter == "ruiz" else 0.02
-    np.testing.assert_allclose(maps_2[name], value, atol=left * scale)
+    np.testing.assert_allclose(of_body_2, value, atol=left * scale)
     np.testing.assert_allclose(value[::-1], value, atol=left * scale)
     np.testing.assert_allclose(value[:, ::-1], value, atol=left * scale)
 
@@ -196,7 +197,11 @@ def test_increments_with_unknown_shear_add_work_but_no_stress() -> None:
     grid = Grid.covering((2.0, 2.0), (20, 16))
     cycle, solver = reversed_cycle(grid), SubsurfaceStress(grid, METAL, 2)
     every, first = (
-        life_maps(Life(), solver, METAL, cycle, np.array([True, known])) for known in (True, False)
+        {name: own.values for name, own in maps.items()}
+        for maps in (
+            life_maps(Life(), solver, METAL, cycle, np.array([True, known]))
+            for known in (True, False)
+        )
     )
     np.testing.assert_array_equal(every["friction_parameter"], first["friction_parameter"])
     # Sliding along x, body 2 is pulled at +x; the tension at -x belongs to the way back.

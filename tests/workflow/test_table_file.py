@@ -42,7 +42,7 @@ def test_other_columns_of_a_record_are_left_alone(tmp_path):
 
 def forces(path):
     table = read_table_file(path)
-    table.require("force", "both")
+    table.require(["force"], "both")
     return table.column("force", RECORDED["force"])
 
 
@@ -53,7 +53,10 @@ def forces(path):
         ("# nothing\n\ntime,force\n", ":3: no rows"),
         ("# a\ntime\n1\n", ":2: no column force; this file has 'time'; allowed: both"),
         ("time,force,force\n1,2,3\n", ":1: force: column given twice; allowed: once"),
-        ("time,force [s]\n1,2\n", ":1: force: unit 's' cannot be converted to N; allowed: units"),
+        (
+            "time,force [s]\n1,2\n",
+            ":1: force: unit 's' cannot be converted to N; allowed: N, or",
+        ),
         ("time,force\n1,2\n#\n\n1,2,3\n", ":5: 3 values; allowed: 2, as the header"),
         ("time,force\n1,two\n", ":2: force: 'two': not a number; allowed: numbers"),
         ("time,force\n1,1_0\n", ":2: force: '1_0': not a number"),

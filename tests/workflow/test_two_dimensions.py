@@ -194,7 +194,10 @@ def slot(small_path):
     return (
         source,
         stages,
-        [stage.begin(own)[0] for stage, own in zip(stages, source.unworn(), strict=True)],
+        [
+            stage.begin(own, case.wear.cycles)[0]
+            for stage, own in zip(stages, source.unworn(), strict=True)
+        ],
     )
 
 

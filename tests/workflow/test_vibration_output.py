@@ -19,7 +19,6 @@ from workflow.analyses.vibration.figures import loops as vibration_loops
 from workflow.analyses.vibration.figures import response as vibration
 from workflow.analyses.vibration.figures import states as vibration_states
 from workflow.analyses.vibration.figures.response import figures_of
-from workflow.analyses.vibration.outcome import DATASETS
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
 from workflow.analyses.vibration.paraview import write_vibration
 from workflow.pictures.drawing import write_figures
@@ -27,6 +26,19 @@ from workflow.pictures.style import STYLE
 
 FRICTION = 0.5
 SINGLE = 2e-7  # rounding of single precision
+# Curves of a response, and of a backbone with their units.
+CURVES = {
+    *("frequency", "amplitude", "phase", "energy_per_cycle"),
+    *("damping", "slip", "separated", "left_out"),
+}
+BACKBONE = {
+    "force": "N",
+    "frequency": "Hz",
+    "amplitude": "mm",
+    "damping": "1",
+    "energy_per_cycle": "N mm",
+    "slip": "1",
+}
 NAMES = {"frequency_response", "resonance", "loops", "node_states", "pad_states"}
 
 
@@ -81,11 +93,16 @@ def test_every_dataset_has_its_unit_and_description(results: h5py.File) -> None:
 
     results.visititems(check)
     response = set(results["responses/00001"])
-    assert response == {*DATASETS["responses"], "nodes", "resonance", "loops"}
-    for group in ("nodes", "resonance"):
-        assert set(results[f"responses/00001/{group}"]) == set(DATASETS[group])
-    for group in ("contact", "backbone", "linear"):
-        assert set(results[group]) == set(DATASETS[group])
+    assert response == {*CURVES, "nodes", "resonance", "loops"}
+    groups = {name: set(results[name]) for name in ("contact", "backbone", "linear")}
+    groups |= {name: set(results[f"responses/00001/{name}"]) for name in ("nodes", "resonance")}
+    assert groups == {
+        "contact": {"x", "y", "gap", "area", "normal_force", "normal_displacement"},
+        "backbone": set(BACKBONE),
+        "linear": {"frequency", "free", "stuck"},
+        "nodes": {"slip", "separated", "energy"},
+        "resonance": {"displacement", "force", "state"},
+    }
     assert list(results["responses/00001/loops"]) == ["00000", "00001"]
     assert len(described) > 40
     assert list(results.attrs["seen"]) == ["block y", "block x"]
@@ -108,9 +125,7 @@ def test_tables_are_those_of_the_results(folder: Path, results: h5py.File) -> No
         response["damping [1]"], results["responses/00001/damping"], rtol=1e-8
     )
     backbone = table(folder / "backbone.csv")
-    assert list(backbone) == [
-        f"{name} [{unit}]" for name, (unit, _) in DATASETS["backbone"].items()
-    ]
+    assert list(backbone) == [f"{name} [{unit}]" for name, unit in BACKBONE.items()]
     np.testing.assert_allclose(backbone["frequency [Hz]"], results["backbone/frequency"], rtol=1e-8)
 
 

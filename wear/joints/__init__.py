@@ -10,7 +10,7 @@ The laws, all of :mod:`wear.joints.law`'s one interface
 
 Their marches
     - ``march_joints``: through any displacements.
-    - ``PeriodicMarch``: round a period until the forces repeat, with their derivative.
+    - ``PeriodicMarch``: over a period until the forces repeat, with their derivative.
     - ``ParallelSliders``: sliders side by side as one joint of such a march.
 
 How they wear

@@ -1,4 +1,4 @@
-"""Long tests by jumps in energy: how many cycles a joint takes to dissipate so much.
+"""Long tests by jumps in energy: how many cycles a joint takes to dissipate a given energy.
 
 The parameters of a joint change at the end of a cycle only, so its cumulative energy obeys
 
@@ -60,13 +60,13 @@ SMALLEST_TOLERANCE = 1e-12
 """Rounding of a panel's polynomials is a hundredth of it."""
 
 ROUNDING = 1e-12
-"""Of an energy: the end of a test and the energy there belong together to so much."""
+"""Relative, of an energy: to this accuracy the end of a test has the energy computed there."""
 
 SMALLEST = 1e-300
-"""Energies are found to their last digit: a joint may dissipate ever so little."""
+"""Absolute tolerance of an energy: it is solved for to its last digit, however small it is."""
 
 EnergyPerCycle = Callable[[float], float]
-"""Energy that a cycle dissipates [N mm] where the joint has dissipated so much before [N mm]."""
+"""Energy of a cycle [N mm] as a function of the energy dissipated before it [N mm]."""
 
 
 class AgeingError(ConvergenceError):
@@ -162,8 +162,8 @@ class LongTest:
         starts = [jump.cycles for jump in self.jumps]
         places = np.searchsorted(starts, cycles, side="right") - 1
         pairs = zip(places.ravel(), cycles.ravel(), strict=True)
-        found = [self._energy(int(place), float(own)) for place, own in pairs]
-        return np.array(found).reshape(cycles.shape)
+        energies = [self._energy(int(place), float(number)) for place, number in pairs]
+        return np.array(energies).reshape(cycles.shape)
 
     def cycles_at(self, energy: Array | float) -> Array:
         """Cycles after which the joint has dissipated ``energy`` [N mm], of its shape.
@@ -178,8 +178,8 @@ class LongTest:
         starts = [jump.start for jump in self.jumps]
         places = np.searchsorted(starts, energy, side="right") - 1
         pairs = zip(places.ravel(), energy.ravel(), strict=True)
-        found = [self._cycles(int(place), float(own)) for place, own in pairs]
-        return np.array(found).reshape(energy.shape)
+        numbers = [self._cycles(int(place), float(value)) for place, value in pairs]
+        return np.array(numbers).reshape(energy.shape)
 
     def _energy(self, place: int, cycles: float) -> float:
         return self.jumps[place].energy_at(cycles) if self.jumps else self.energy_before
@@ -207,7 +207,7 @@ def long_test(
 ) -> LongTest:
     """Run ``cycles`` of a joint that has dissipated ``start`` [N mm] before.
 
-    With ``until`` it ends where the joint has dissipated so much [N mm], if that comes earlier.
+    With ``until`` it ends where the joint has dissipated that energy [N mm], if that comes earlier.
     ``tolerance`` is the error allowed in the number of cycles after which any energy is reached,
     relative to it. ``breaks`` [N mm] are energies at which ``energy_per_cycle`` has a kink
     (:attr:`~wear.joints.evolution.JointEvolution.breaks`): cycles across it are counted. Where a
@@ -238,7 +238,7 @@ class _Jumper:
         tolerance: float,
         breaks: list[float],
     ) -> None:
-        self._own_rate = rate
+        self._energy_per_cycle = rate
         self._total, self._until = ends
         self._tolerance = tolerance
         self._breaks = breaks
@@ -342,7 +342,7 @@ class _Jumper:
                 "of a cycle: they are not smooth to the tolerance; allow a larger one, or name "
                 "the energies at which they have kinks"
             )
-        rate = float(self._own_rate(energy))
+        rate = float(self._energy_per_cycle(energy))
         if not 0.0 <= rate < np.inf:
             raise AgeingError(
                 f"a cycle dissipates {rate:g} N mm where {energy:g} were before; allowed: 0 or more"
@@ -428,7 +428,7 @@ class MarchedStroke:
 
 
 @dataclass(frozen=True)
-class Stretch:
+class IntegratedCycles:
     """Cycles of a long test integrated one after the other.
 
     ``energy`` ``(k + 1,)`` [N mm] is that of ``k`` cycles from ``first`` on and ``jumped`` that of
@@ -443,16 +443,16 @@ class Stretch:
     stated: float
 
 
-def integrated_stretch(
+def integrate_cycles(
     test: LongTest, energy_per_cycle: EnergyPerCycle, first: float, cycles: int
-) -> Stretch:
+) -> IntegratedCycles:
     """Integrate ``cycles`` of a long test directly, from cycle ``first`` on, and compare.
 
     ``energy_per_cycle`` is called once for every cycle, in order: it may be that of the test or an
     independent one with a memory of its own. Raises InputError for cycles the test does not have.
     """
     if cycles < 1:
-        raise InputError(f"{cycles} cycles; allowed: a stretch of one or more")
+        raise InputError(f"{cycles} cycles; allowed: one or more")
     numbers = np.arange(cycles + 1, dtype=np.float64) + first
     jumped = test.energy_at(numbers)
     energy = np.empty(cycles + 1)
@@ -466,6 +466,6 @@ def integrated_stretch(
         for jump in test.jumps
         if jump.cycles <= numbers[-1] and jump.cycles + jump.length >= numbers[0]
     ]
-    # A jump errs by this at either end of the stretch.
+    # A jump errs by this at either end of these cycles.
     stated = 2.0 * sum(jump.error for jump in touched)
-    return Stretch(float(first), energy, jumped, difference, stated)
+    return IntegratedCycles(float(first), energy, jumped, difference, stated)

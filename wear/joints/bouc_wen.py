@@ -27,7 +27,13 @@ from numba import njit, vectorize
 
 from sa_solver.types import Array
 from wear.joints.law import JointResponse, JointState
-from wear.joints.parameters import JointError, Parameter, UniaxialLaw, answer, parameter_columns
+from wear.joints.parameters import (
+    JointError,
+    Parameter,
+    UniaxialLaw,
+    kernel_response,
+    parameter_columns,
+)
 
 # Largest step n s of the fourth-order rule, and the largest as a share of |ξ| or, by ξ = 0, at all:
 # there |ξ|^n has few derivatives. ξ and the loss of a branch are then within 2e-9 of the solution.
@@ -74,15 +80,15 @@ def _unload(u: float, s: float, exponent: float, gain: float) -> tuple[float, fl
     if gain == 0.0:
         return max(u - s, 0.0), max(s - u, 0.0), 0.0
     if exponent == 1.0:
-        way = log1p(gain * u) / gain
-        end = 0.0 if s >= way else u * exp(-gain * s) + expm1(-gain * s) / gain
+        to_zero = log1p(gain * u) / gain
+        end = 0.0 if s >= to_zero else u * exp(-gain * s) + expm1(-gain * s) / gain
         lost = (_excess(gain * u) - _excess(gain * end)) / gain**2
     else:
         root = sqrt(gain)
-        way = atan(root * u) / root
-        end = 0.0 if s >= way else tan(root * (way - s)) / root
+        to_zero = atan(root * u) / root
+        end = 0.0 if s >= to_zero else tan(root * (to_zero - s)) / root
         lost = 0.5 * (u * u - end * end - (log1p(gain * u * u) - log1p(gain * end * end)) / gain)
-    return end, max(s - way, 0.0), lost
+    return end, max(s - to_zero, 0.0), lost
 
 
 @njit(cache=True)
@@ -168,9 +174,11 @@ def _respond(
     force, tangent = np.empty((joints, 1)), np.empty((joints, 1, 1))
     new, lost = np.empty((joints, 2)), np.empty(joints)
     for j in range(joints):
-        own = parameters[j % len(parameters)]
+        joint = parameters[j % len(parameters)]
+        stiffness, residual, limit = joint[0], joint[1], joint[2]
+        exponent, gain = joint[3], joint[4]
         force[j, 0], tangent[j, 0, 0], new[j, 0], new[j, 1], lost[j] = advance_bouc_wen(
-            own[0], own[1], own[2], own[3], own[4], state[j, 0], state[j, 1], increment[j, 0]
+            stiffness, residual, limit, exponent, gain, state[j, 0], state[j, 1], increment[j, 0]
         )
     return force, tangent, new, lost
 
@@ -188,13 +196,13 @@ def _loop_energy(
     if limit <= NO_FRICTION * spring * amplitude:
         return 0.0
     # The settled loop goes from -ξ to ξ; what half of it makes of -ξ less ξ falls as ξ grows.
-    way = 2.0 * spring * amplitude / limit
+    distance = 2.0 * spring * amplitude / limit
     least, most = 0.0, 1.0
     while True:
         xi = 0.5 * (least + most)
         if xi in (least, most):
-            return 2.0 * limit * (limit / spring) * travel(-xi, way, exponent, gain)[1]
-        if travel(-xi, way, exponent, gain)[0] > xi:
+            return 2.0 * limit * (limit / spring) * travel(-xi, distance, exponent, gain)[1]
+        if travel(-xi, distance, exponent, gain)[0] > xi:
             least = xi
         else:
             most = xi
@@ -248,7 +256,7 @@ class BoucWen(UniaxialLaw):
         return np.zeros((joints, 2))
 
     def respond(self, state: JointState, increment: Array) -> JointResponse:
-        return answer(_respond, self._parameters, state, increment)
+        return kernel_response(_respond, self._parameters, state, increment)
 
     def loop_energy(self, amplitude: Parameter) -> Array:
         """Energy lost in a settled cycle between ± ``amplitude`` [mm], in [N mm].

@@ -164,7 +164,7 @@ class JointEvolution:
 
     def values(self, law: object, energy: Array | float) -> dict[str, Array]:
         """Evolving parameters by name, of ``energy`` broadcast with the initial ones."""
-        found = {}
+        values = {}
         for name, function in self._functions():
             initial = getattr(law, name, None)
             if initial is None:
@@ -175,14 +175,17 @@ class JointEvolution:
                 if isinstance(function, TabulatedEvolution)
                 else np.asarray(initial)
             )
-            found[name] = np.maximum(value * scale, 0.0)
-        return {name: np.asarray(value) for name, value in found.items()}
+            values[name] = np.maximum(value * scale, 0.0)
+        return {name: np.asarray(value) for name, value in values.items()}
 
     @property
     def breaks(self) -> tuple[float, ...]:
         """Energies at which a parameter has a kink: those of the tables, ascending [N mm]."""
-        tables = [own for _, own in self._functions() if isinstance(own, TabulatedEvolution)]
-        return tuple(sorted({energy for table in tables for energy in table.energies}))
+        energies: set[float] = set()
+        for _, function in self._functions():
+            if isinstance(function, TabulatedEvolution):
+                energies.update(function.energies)
+        return tuple(sorted(energies))
 
     def _functions(self) -> Iterator[tuple[str, WearFunction]]:
         for field in fields(self):

@@ -64,7 +64,7 @@ NODES = NODES + 0.5
 
 
 class ForcePath(NamedTuple):
-    """A straight path in contact, told in forces [N].
+    """A straight path in contact, in terms of forces [N].
 
     Force of the tangential spring at its start (within the circle there), ``pull`` that the path
     would add if the slider held, and the limit µ f at its two ends.
@@ -351,7 +351,7 @@ def _tangential(path: ForcePath, jacobian: Array) -> tuple[float, float, float]:
 def advance_contact(
     parameters: Array, start: Array, increment: Array, force: Array, end: Array, jacobian: Array
 ) -> float:
-    """Lead one joint along an increment of displacement ``(3,)``; return the energy it loses.
+    """Advance one joint by an increment of displacement ``(3,)``; return the energy it loses.
 
     For compiled loops: allocates nothing. ``parameters`` ``(5,)`` is a row of
     :attr:`FrictionContact.parameters`, ``start`` ``(3,)`` a state. Written are the
@@ -392,8 +392,10 @@ def _advance_all(
     force, end, jacobian = np.empty((joints, 3)), np.empty((joints, 3)), np.empty((joints, 3, 6))
     dissipated = np.empty(joints)
     for j in range(joints):
-        own = parameters[j % len(parameters)]
-        dissipated[j] = advance_contact(own, start[j], increment[j], force[j], end[j], jacobian[j])
+        joint = parameters[j % len(parameters)]
+        dissipated[j] = advance_contact(
+            joint, start[j], increment[j], force[j], end[j], jacobian[j]
+        )
     return force, end, jacobian, dissipated
 
 

@@ -11,7 +11,7 @@ from numba import njit
 
 from sa_solver.types import Array
 from wear.joints.law import JointResponse, JointState
-from wear.joints.parameters import Parameter, UniaxialLaw, answer, parameter_columns
+from wear.joints.parameters import Parameter, UniaxialLaw, kernel_response, parameter_columns
 
 
 @njit(cache=True)
@@ -49,9 +49,9 @@ def _respond(
     force, tangent = np.empty((joints, 1)), np.empty((joints, 1, 1))
     new, lost = np.empty((joints, 2)), np.empty(joints)
     for j in range(joints):
-        own = parameters[j % len(parameters)]
+        joint = parameters[j % len(parameters)]
         force[j, 0], tangent[j, 0, 0], new[j, 0], new[j, 1], lost[j] = advance_jenkins(
-            own[0], own[1], own[2], state[j, 0], state[j, 1], increment[j, 0]
+            joint[0], joint[1], joint[2], state[j, 0], state[j, 1], increment[j, 0]
         )
     return force, tangent, new, lost
 
@@ -78,7 +78,7 @@ class Jenkins(UniaxialLaw):
         return np.zeros((joints, 2))
 
     def respond(self, state: JointState, increment: Array) -> JointResponse:
-        return answer(_respond, self._parameters, state, increment)
+        return kernel_response(_respond, self._parameters, state, increment)
 
     def loop_energy(self, amplitude: Parameter) -> Array:
         """Energy lost in a cycle between ± ``amplitude`` [mm]: 4 µN (A - µN/kt) [N mm] or 0."""

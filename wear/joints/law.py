@@ -5,8 +5,8 @@ relative to the first, and its force is the one that resists: the joint pushes t
 ``-force``. Work of the force on the displacement is what the joint stores and dissipates.
 
 A law holds the parameters of ``n`` joints, as numbers or ``(n,)`` arrays, and no state. What it
-remembers is a :data:`JointState`, an array ``(n, k)`` with one row per joint, whose columns are the
-law's own affair; a state is never changed, a new one is returned.
+remembers is a :data:`JointState`, an array ``(n, k)`` with one row per joint, whose columns the
+law defines; a state is never changed, a new one is returned.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ JointState = Array
 
 @dataclass(frozen=True)
 class JointResponse:
-    """What ``n`` joints of ``d`` directions answer to an increment of displacement.
+    """Response of ``n`` joints of ``d`` directions to an increment of displacement.
 
     ``force`` ``(n, d)`` [N] at its end, ``tangent`` ``(n, d, d)`` [N/mm] its derivative with
     respect to the displacement there, ``state`` ``(n, k)`` at its end, and ``dissipated`` ``(n,)``
@@ -49,7 +49,7 @@ class JointLaw(Protocol):
         ...
 
     def respond(self, state: JointState, increment: Array) -> JointResponse:
-        """Answer to an increment of displacement ``(n, d)`` [mm] along a straight path."""
+        """Response to an increment of displacement ``(n, d)`` [mm] along a straight path."""
         ...
 
 
@@ -69,7 +69,7 @@ class JointHistory:
 def march_joints(
     law: JointLaw, state: JointState, start: Array, displacement: Array
 ) -> JointHistory:
-    """Lead joints through ``displacement`` ``(t, n, d)`` [mm], from ``start`` ``(n, d)``."""
+    """March joints through ``displacement`` ``(t, n, d)`` [mm], from ``start`` ``(n, d)``."""
     forces, dissipated = np.empty(displacement.shape), np.empty(displacement.shape[:2])
     for step, increment in enumerate(np.diff(displacement, axis=0, prepend=start[None])):
         response = law.respond(state, increment)

@@ -193,24 +193,24 @@ def _amid(motion: Array, places: tuple[int, int, int], band: float) -> int:
 # --- branches -----------------------------------------------------------------------------------
 
 
-def branches(record: LoopRecord) -> tuple[LoopRecord, tuple[LoopBranch, ...]]:
+def complete_branches(record: LoopRecord) -> tuple[LoopRecord, tuple[LoopBranch, ...]]:
     """The two branches of every complete cycle, one after the other, and the record they are of.
 
     In that record the displacement is smoothed; one closed period that begins anywhere is turned
     to begin at a reversal. Raises MeasuredLoopError for a record without a complete cycle.
     """
     turns = reversals(record.displacement)
-    found = _complete(record, turns)
-    if len(found) < 2 <= len(turns) and _closed(record):
+    branches = _complete(record, turns)
+    if len(branches) < 2 <= len(turns) and _closed(record):
         record = _begun_at(record, int(turns[1]))
-        found = _complete(record, reversals(record.displacement))
-    if len(found) < 2:
+        branches = _complete(record, reversals(record.displacement))
+    if len(branches) < 2:
         raise MeasuredLoopError(
             "no complete cycle; allowed: a record that has one from reversal to reversal, or one "
             "closed period"
         )
-    found = found[: len(found) // 2 * 2]
-    return replace(record, displacement=_smoothed(record.displacement, found)), tuple(found)
+    branches = branches[: len(branches) // 2 * 2]
+    return replace(record, displacement=_smoothed(record.displacement, branches)), tuple(branches)
 
 
 def _complete(record: LoopRecord, places: Indices) -> list[LoopBranch]:
@@ -229,7 +229,7 @@ def _complete(record: LoopRecord, places: Indices) -> list[LoopBranch]:
 def _closed(record: LoopRecord) -> bool:
     """Whether the record ends where it began."""
     columns = (record.displacement, record.force)
-    return all(abs(own[-1] - own[0]) <= CLOSED * np.ptp(own) for own in columns)
+    return all(abs(column[-1] - column[0]) <= CLOSED * np.ptp(column) for column in columns)
 
 
 def _begun_at(record: LoopRecord, start: int) -> LoopRecord:
@@ -244,9 +244,9 @@ def _begun_at(record: LoopRecord, start: int) -> LoopRecord:
     return LoopRecord(*(column[order] for column in columns))
 
 
-def _smoothed(motion: Array, found: Sequence[LoopBranch]) -> Array:
+def _smoothed(motion: Array, branches: Sequence[LoopBranch]) -> Array:
     """The displacement without some of its noise, or as it is if that would bend the motion."""
-    period = 2.0 * float(np.median([branch.end - branch.begin for branch in found]))
+    period = 2.0 * float(np.median([branch.end - branch.begin for branch in branches]))
     half = int(0.5 * SMOOTHING * period)
     if 2 * half + 1 < FEWEST_SMOOTHED:
         return motion
@@ -254,7 +254,7 @@ def _smoothed(motion: Array, found: Sequence[LoopBranch]) -> Array:
     taken = motion - smooth
     if taken[1:] @ taken[:-1] > SIGNAL * (taken @ taken):
         return motion
-    turns = np.array([[branch.end, branch.sense] for branch in found[:-1]])
+    turns = np.array([[branch.end, branch.sense] for branch in branches[:-1]])
     near = turns[:, :1] + np.arange(-half // 4, half // 4 + 1)
     rounding = turns[:, 1] * taken[near].mean(axis=1)
     error = float(np.std(taken)) / np.sqrt(near.size)

@@ -33,7 +33,7 @@ from numba import njit, vectorize
 
 from sa_solver.types import Array
 from wear.joints.law import JointResponse, JointState
-from wear.joints.parameters import Parameter, UniaxialLaw, answer, parameter_columns
+from wear.joints.parameters import Parameter, UniaxialLaw, kernel_response, parameter_columns
 
 SliderCurve = tuple[float, float, float, float]
 """K, limit, c, m."""
@@ -161,12 +161,12 @@ def _respond(
     force, tangent = np.empty((joints, 1)), np.empty((joints, 1, 1))
     new, lost = np.zeros((joints, _columns_for(state))), np.empty(joints)
     for j in range(joints):
-        own = parameters[j % len(parameters)]
+        joint = parameters[j % len(parameters)]
         used = POINTS + 2 * int(state[j, DEPTH])
         new[j, :used] = state[j, :used]
-        curve = (own[0], own[2], own[3], own[4])
+        curve = (joint[0], joint[2], joint[3], joint[4])
         force[j, 0], tangent[j, 0, 0], lost[j] = advance_masing(
-            curve, own[1], new[j], increment[j, 0]
+            curve, joint[1], new[j], increment[j, 0]
         )
     return force, tangent, new, lost
 
@@ -204,7 +204,7 @@ class MasingLaw(UniaxialLaw, ABC):
         return np.zeros((joints, POINTS + 2 * FEWEST_POINTS))
 
     def respond(self, state: JointState, increment: Array) -> JointResponse:
-        return answer(_respond, self._parameters, state, increment)
+        return kernel_response(_respond, self._parameters, state, increment)
 
     def loop_energy(self, amplitude: Parameter) -> Array:
         """Energy lost in a cycle between ± ``amplitude`` [mm]: 4 L(A) [N mm]."""

@@ -35,7 +35,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from sa_solver.types import Array, Indices
-from wear.joints.loop_record import LoopBranch, LoopRecord, MeasuredLoopError, branches, loop_record
+from wear.joints.loop_record import (
+    LoopBranch,
+    LoopRecord,
+    MeasuredLoopError,
+    complete_branches,
+    loop_record,
+)
 
 __all__ = [
     "MeanEstimate",
@@ -180,15 +186,16 @@ def measure_loops(
     MeasuredLoopError for a record without a complete cycle, with too few samples after a reversal,
     or whose loops give energy instead of taking it.
     """
-    record, own = branches(loop_record(displacement, force, normal_load, time))
-    slopes, spread = _stick_slopes(record, own, [WINDOW * record.rise(branch) for branch in own])
-    sliding = _sliding_share(record, own, float(np.mean(slopes)))
-    pairs = list(zip(own[0::2], own[1::2], strict=True))
+    record, branches = complete_branches(loop_record(displacement, force, normal_load, time))
+    rises = [WINDOW * record.rise(branch) for branch in branches]
+    slopes, spread = _stick_slopes(record, branches, rises)
+    sliding = _sliding_share(record, branches, float(np.mean(slopes)))
+    pairs = list(zip(branches[0::2], branches[1::2], strict=True))
     lines = np.full((len(pairs), 2), np.nan)
     if sliding > 0.0:
         lines = np.array([_sliding_lines(record, pair, sliding) for pair in pairs])
         heights = np.repeat(2.0 * lines[:, 1], 2)
-        slopes, spread = _stick_slopes(record, own, (WINDOW * heights).tolist())
+        slopes, spread = _stick_slopes(record, branches, (WINDOW * heights).tolist())
     energy = np.array([_energy(record, pair) for pair in pairs])
     if not energy.mean() > 0.0:
         raise MeasuredLoopError(
@@ -197,13 +204,13 @@ def measure_loops(
         )
     cycles = np.array([(go.begin, go.end, back.end) for go, back in pairs])
     return MeasuredLoops(
-        stroke=_of_cycles([record.travel(branch) for branch in own]),
+        stroke=_of_cycles([record.travel(branch) for branch in branches]),
         energy=energy,
         stick_stiffness=1.0 / _of_cycles(1.0 / slopes),
         bend_spread=spread,
         residual_stiffness=lines[:, 0],
         friction_force=lines[:, 1],
-        force=0.5 * _of_cycles([record.rise(branch) for branch in own]),
+        force=0.5 * _of_cycles([record.rise(branch) for branch in branches]),
         normal_load=np.array([record.normal_load[i : k + 1].mean() for i, _, k in cycles]),
         sliding=sliding,
         reversals=cycles,
@@ -244,13 +251,13 @@ class _Stick:
 
 
 def _stick_slopes(
-    record: LoopRecord, own: Sequence[LoopBranch], rises: Sequence[float]
+    record: LoopRecord, branches: Sequence[LoopBranch], rises: Sequence[float]
 ) -> tuple[Array, float]:
     """Slopes of the force at the reversals that begin the branches, ``(b,)`` [N/mm].
 
     And the relative standard error that they share, of the bend.
     """
-    sticks = [_stick(record, *one) for one in zip(own, rises, strict=True)]
+    sticks = [_stick(record, *one) for one in zip(branches, rises, strict=True)]
     bend, error = _common_bend(sticks)
     compliances, leverages = [], []
     for stick in sticks:
@@ -317,16 +324,16 @@ def _tail(record: LoopRecord, branch: LoopBranch, share: float) -> slice:
     return slice(branch.begin + _passage(motion, level), branch.end + 1)
 
 
-def _sliding_share(record: LoopRecord, own: Sequence[LoopBranch], stick_slope: float) -> float:
+def _sliding_share(record: LoopRecord, branches: Sequence[LoopBranch], stick_slope: float) -> float:
     """The largest of ``SHARES`` over which the branches end straight and flat, less a margin."""
-    span = float(np.mean([record.rise(branch) for branch in own]))
+    span = float(np.mean([record.rise(branch) for branch in branches]))
     for share in SHARES:
-        tails = [_tail(record, branch, share) for branch in own]
+        tails = [_tail(record, branch, share) for branch in branches]
         if min(tail.stop - tail.start for tail in tails) < FEWEST_SLIDING:
             break
-        lines = np.array([_shape(record, *one) for one in zip(tails, own, strict=True)])
+        lines = np.array([_shape(record, *one) for one in zip(tails, branches, strict=True)])
         slope, turn, bend = lines[:, :3].mean(axis=0)
-        turn_error, bend_error = np.sqrt((lines[:, 3:] ** 2).sum(axis=0)) / len(own)
+        turn_error, bend_error = np.sqrt((lines[:, 3:] ** 2).sum(axis=0)) / len(branches)
         flat = abs(slope) <= SLIDING_SLOPE * stick_slope
         steady = abs(turn) + turn_error <= SLIDING_TURN * stick_slope
         straight = abs(bend) <= SLIDING_BEND * span + bend_error
@@ -357,8 +364,8 @@ def _sliding_lines(
     tails = [_tail(record, branch, share) for branch in pair]
     motion = [record.displacement[tail] for tail in tails]
     force = [record.force[tail] for tail in tails]
-    about = [own - own.mean() for own in motion]
-    product = sum(float(own @ other) for own, other in zip(about, force, strict=True))
-    slope = product / sum(float(own @ own) for own in about)
+    about = [moved - moved.mean() for moved in motion]
+    product = sum(float(moved @ other) for moved, other in zip(about, force, strict=True))
+    slope = product / sum(float(moved @ moved) for moved in about)
     rests = [f.mean() - slope * d.mean() for d, f in zip(motion, force, strict=True)]
     return slope, float(0.5 * pair[0].sense * (rests[0] - rests[1]))

@@ -1,4 +1,4 @@
-"""Sliders side by side on one displacement, as one joint that is led round a period.
+"""Sliders side by side on one displacement, as one joint, marched over a period.
 
 Sliders in parallel make up the joints of Masing and Iwan: together they follow any curve that bends
 one way. To a structure they are a single joint, whose force is their sum; each keeps its own
@@ -63,14 +63,14 @@ class ParallelSliders:
             raise JointError(f"coefficients of {len(coefficients)} joints for the sliders of one")
         stiffness = np.atleast_1d(self.law.stiffness)
         shared = np.repeat(coefficients, len(stiffness), axis=0)
-        own = self._march.settle(shared, basis, weights, lead)
-        held = np.where(own.states == STICK, stiffness, 0.0).sum(axis=1)
+        cycle = self._march.settle(shared, basis, weights, lead)
+        held = np.where(cycle.states == STICK, stiffness, 0.0).sum(axis=1)
         return SlidersCycle(
-            force=own.force.sum(axis=0, keepdims=True),
-            jacobian=own.jacobian.sum(axis=0, keepdims=True),
-            samples=own.samples.sum(axis=1, keepdims=True),
+            force=cycle.force.sum(axis=0, keepdims=True),
+            jacobian=cycle.jacobian.sum(axis=0, keepdims=True),
+            samples=cycle.samples.sum(axis=1, keepdims=True),
             states=np.where(held < 0.5 * stiffness.sum(), SLIP, STICK)[:, None],
-            dissipated=own.dissipated.sum(keepdims=True),
-            change=own.change.max(keepdims=True),
-            by_slider=own.dissipated,
+            dissipated=cycle.dissipated.sum(keepdims=True),
+            change=cycle.change.max(keepdims=True),
+            by_slider=cycle.dissipated,
         )

@@ -1,4 +1,4 @@
-"""What the laws along one direction share: checked parameters, and a compiled kernel's answer.
+"""What the laws along one direction share: checked parameters, and a compiled kernel's response.
 
 A kernel takes the parameters of ``n`` joints as one array ``(m, p)``, a row per joint or a single
 row for all of them, and loops over the joints: a call for a few of them then costs microseconds,
@@ -58,10 +58,10 @@ def parameter_columns(*values: Parameter) -> Array:
     return columns
 
 
-def answer(
+def kernel_response(
     kernel: ResponseKernel, parameters: Array, state: JointState, increment: Array
 ) -> JointResponse:
-    """Lead the joints of ``state`` by ``increment`` ``(n, 1)`` [mm].
+    """Advance the joints of ``state`` by ``increment`` ``(n, 1)`` [mm].
 
     Raises :class:`JointError` where shapes differ: the kernel itself checks no bounds.
     """
@@ -88,7 +88,7 @@ class UniaxialLaw:
     residual_stiffness: Parameter = 0.0
 
     def __post_init__(self) -> None:
-        require_one_each(*(getattr(self, own.name) for own in fields(self)))
+        require_one_each(*(getattr(self, parameter.name) for parameter in fields(self)))
         require_positive(stiffness=self.stiffness)
         require_not_negative(
             friction=self.friction,

@@ -1,15 +1,15 @@
-"""Joints led round a given period until their forces repeat, and the derivative of these forces.
+"""Joints driven through a given period until their forces repeat, and these forces' derivative.
 
 The displacement of a joint is a combination of functions of time, sampled over one period: u = Φ c
-with the basis Φ ``(t, m)`` and coefficients c ``(m, d)``. The joint is led along straight paths
-from sample to sample, round and round, until what it remembers is the same after a period as
-before. Its forces are then projected, F = W f with the weights W ``(m, t)``, and so is their exact
-derivative with respect to c, which passes through everything the joint remembers: where its slider
-is, where it turned round, when it touched. What the functions are is the caller's affair.
+with the basis Φ ``(t, m)`` and coefficients c ``(m, d)``. The joint is driven along straight paths
+from sample to sample, period after period, until its state is the same after one as before. Its
+forces are then projected, F = W f with the weights W ``(m, t)``, and so is their exact derivative
+with respect to c, which passes through everything the joint remembers: where its slider is, where
+it turned round, when it touched. The caller chooses the functions.
 
-A joint is led into the period from rest, through the points Φ_lead c: the rows ``lead`` ``(p, m)``,
-of which the last is the first sample. This decides between the many periodic forces of a joint that
-does not slip fully; where it does, it makes no difference.
+A joint is driven into the period from rest, through the points Φ_lead c: the rows ``lead``
+``(p, m)``, of which the last is the first sample. This decides between the many periodic forces of
+a joint that does not slip fully; where it does, it makes no difference.
 
 Derivatives are those of the forces on these paths, so that a Newton iteration on the coefficients
 converges as fast as it can. On a switch between two states they are those of one side.
@@ -63,7 +63,7 @@ class SettledCycle:
 class PeriodicMarch:
     """A joint law over whole periods.
 
-    ``threads`` march so many shares of the joints at once.
+    ``threads`` march that many shares of the joints at once.
     """
 
     law: Jenkins | BoucWen | MasingLaw | FrictionContact
@@ -79,7 +79,7 @@ class PeriodicMarch:
         """The settled period of joints with the ``coefficients`` ``(j, m, d)`` [mm].
 
         ``basis`` ``(t, m)``, ``weights`` ``(m, t)`` and ``lead`` ``(p, m)`` as in the module;
-        without ``lead`` joints are led from rest straight to the first sample. Raises
+        without ``lead`` joints are driven from rest straight to the first sample. Raises
         :class:`JointError` for shapes that do not fit.
         """
         lead = basis[:1] if lead is None else lead

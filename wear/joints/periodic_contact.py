@@ -1,8 +1,8 @@
-"""Compiled march of contacts in three dimensions round a period; see :mod:`wear.joints.periodic`.
+"""Compiled march of contacts in three dimensions over a period; see :mod:`wear.joints.periodic`.
 
 What a contact remembers is the stretch s of its tangential spring, two numbers. Its derivative S
-with respect to the coefficients is led along, and with it A, the derivative of the stretch after a
-period with respect to that before. Where periods go on to change the stretch, they will by
+with respect to the coefficients is carried along, and with it A, the derivative of the stretch
+after a period with respect to that before. Where periods go on to change the stretch, they will by
 (1 - A)⁻¹ times the change of one: Newton's step, of which few are needed where slip is so little
 that the contact would take thousands of periods.
 """
@@ -41,7 +41,7 @@ def _to_the_limit(a: Array) -> tuple[float, float, float, float]:
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _carry(slopes: Array, stiffness: float, start: Array, step: Array, derivative: Array) -> bool:
-    """Lead the derivative ``(2, 3, m)`` of the stretch along one increment: whether it sticks.
+    """Carry the derivative ``(2, 3, m)`` of the stretch along one increment: whether it sticks.
 
     ``slopes`` ``(3, 6)`` are those of the forces by stretch, approach and increment; ``start`` and
     ``step`` ``(m,)`` the derivatives of a displacement before the increment and of its change.
@@ -78,16 +78,16 @@ def _chain(slopes: Array, stiffness: float, total: Array) -> None:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _state_of(own: Array, force: Array) -> int:
+def _state_of(joint: Array, force: Array) -> int:
     """0 stick, 1 slip, 2 separated."""
     if force[2] <= 0.0:
         return 2
-    limit = own[2] * force[2] * (1.0 - ON_CIRCLE)
+    limit = joint[2] * force[2] * (1.0 - ON_CIRCLE)
     return 1 if force[0] ** 2 + force[1] ** 2 >= limit * limit else 0
 
 
 class Memory(NamedTuple):
-    """A contact on its way, changed in place.
+    """A contact on its path, changed in place.
 
     ``state`` ``(3,)`` is that of the law, ``derivative`` ``(2, 3, m)`` that of its stretch; the
     others are room for an increment ``(3,)``, a force ``(3,)`` and slopes ``(3, 6)``.
@@ -109,22 +109,22 @@ class PeriodRecord(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _move(own: Array, memory: Memory, end: Array) -> float:
+def _move(joint: Array, memory: Memory, end: Array) -> float:
     """One increment to the displacement ``end`` ``(3,)``; return the energy lost.
 
     ``memory.increment`` has the tangential part of it already.
     """
     memory.increment[2] = end[2] - memory.state[2]
     lost: float = advance_contact(
-        own, memory.state, memory.increment, memory.force, memory.state, memory.slopes
+        joint, memory.state, memory.increment, memory.force, memory.state, memory.slopes
     )
     memory.state[2] = end[2]
     return lost
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _lead_in(own: Array, memory: Memory, before: Array, lead: Array) -> None:
-    """Lead a contact from rest to the first sample."""
+def _lead_in(joint: Array, memory: Memory, before: Array, lead: Array) -> None:
+    """Drive a contact from rest to the first sample."""
     memory.state[:], memory.derivative[:] = 0.0, 0.0
     start, step = np.zeros(lead.shape[1]), np.empty(lead.shape[1])
     for i in range(len(lead)):
@@ -132,17 +132,17 @@ def _lead_in(own: Array, memory: Memory, before: Array, lead: Array) -> None:
         for direction in range(2):
             here = before[i - 1, direction] if i > 0 else 0.0
             memory.increment[direction] = there[direction] - here
-        _move(own, memory, there)
+        _move(joint, memory, there)
         step[:] = lead[i] - start
-        _carry(memory.slopes, own[0], start, step, memory.derivative)
+        _carry(memory.slopes, joint[0], start, step, memory.derivative)
         start[:] = lead[i]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _round(
-    own: Array,
+    joint: Array,
     memory: Memory,
-    way: Array,
+    path: Array,
     basis: Array,
     steps: Array,
     record: PeriodRecord,
@@ -159,28 +159,28 @@ def _round(
     for step in range(1, samples + 1):
         at = step if step < samples else 0
         for direction in range(2):
-            memory.increment[direction] = way[at, direction] - way[step - 1, direction]
-        lost += _move(own, memory, way[at])
-        if not _carry(memory.slopes, own[0], basis[step - 1], steps[at], memory.derivative):
+            memory.increment[direction] = path[at, direction] - path[step - 1, direction]
+        lost += _move(joint, memory, path[at])
+        if not _carry(memory.slopes, joint[0], basis[step - 1], steps[at], memory.derivative):
             sticks = False
-            _chain(memory.slopes, own[0], total)
+            _chain(memory.slopes, joint[0], total)
         record.gradient[at] = memory.derivative
         record.force[at] = memory.force
-        record.states[at] = _state_of(own, memory.force)
+        record.states[at] = _state_of(joint, memory.force)
     return lost, sticks
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _settle_contact(
-    own: Array, memory: Memory, way: Array, basis: Array, steps: Array, record: PeriodRecord
+    joint: Array, memory: Memory, path: Array, basis: Array, steps: Array, record: PeriodRecord
 ) -> tuple[float, float, bool]:
     """March until stretch and derivative repeat: energy lost, change of force, all stuck."""
     total, stretch, derivative = np.empty((2, 2)), np.empty(2), np.empty_like(memory.derivative)
-    span = max(np.max(np.abs(way[:, 0])), np.max(np.abs(way[:, 1])))
+    span = max(np.max(np.abs(path[:, 0])), np.max(np.abs(path[:, 1])))
     lost, change, sticks = 0.0, 0.0, True
     for period in range(MAX_PERIODS):
         stretch[:], derivative[:] = memory.state[:2], memory.derivative
-        lost, sticks = _round(own, memory, way, basis, steps, record, total)
+        lost, sticks = _round(joint, memory, path, basis, steps, record, total)
         x, y = memory.state[0] - stretch[0], memory.state[1] - stretch[1]
         change = max(abs(x), abs(y))
         turned = np.max(np.abs(memory.derivative - derivative))
@@ -197,7 +197,7 @@ def _settle_contact(
                 memory.derivative[0, direction, c] = g * x + h * y
                 memory.derivative[1, direction, c] = k * x + m * y
         memory.derivative[:] += derivative
-    return lost, own[0] * change, sticks
+    return lost, joint[0] * change, sticks
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -266,7 +266,7 @@ def settle_contacts(
     weights: Array,
     lead: Array,
     parameters: Array,
-    way: Array,
+    path: Array,
     before: Array,
     force: Array,
     states: Array,
@@ -277,22 +277,24 @@ def settle_contacts(
 ) -> None:
     """Settle contacts: ``parameters`` ``(j, 5)`` are those of the law.
 
-    ``way`` ``(j, t, 3)`` and ``before`` ``(j, p, 3)`` [mm] are led, the last of
-    ``before`` being the first of ``way``. The others are written.
+    ``path`` ``(j, t, 3)`` and ``before`` ``(j, p, 3)`` [mm] are the displacements, the last of
+    ``before`` being the first of ``path``. The others are written.
     """
     samples, size = basis.shape
     gradient = np.empty((samples, 2, 3, size))
     steps, shares = differences(basis), np.dot(weights, basis)
     memory = Memory(np.empty(3), np.empty((2, 3, size)), np.empty(3), np.empty(3), np.empty((3, 6)))
     for j in range(len(parameters)):
-        own, record = parameters[j], PeriodRecord(force[j], states[j], gradient)
-        _lead_in(own, memory, before[j], lead)
-        dissipated[j], missing, sticks = _settle_contact(own, memory, way[j], basis, steps, record)
+        joint, record = parameters[j], PeriodRecord(force[j], states[j], gradient)
+        _lead_in(joint, memory, before[j], lead)
+        dissipated[j], missing, sticks = _settle_contact(
+            joint, memory, path[j], basis, steps, record
+        )
         largest = np.max(np.abs(force[j]))
         change[j] = missing / largest if largest > 0.0 else 0.0
         projected[j] = np.dot(weights, force[j])
         if sticks:
-            _project_stuck(own[0], basis, weights, shares, record, jacobian[j])
+            _project_stuck(joint[0], basis, weights, shares, record, jacobian[j])
         else:
-            _project(own[0], weights, record, jacobian[j])
-        _project_normal(own[1], basis, weights, shares, states[j], jacobian[j])
+            _project(joint[0], weights, record, jacobian[j])
+        _project_normal(joint[1], basis, weights, shares, states[j], jacobian[j])

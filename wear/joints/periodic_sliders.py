@@ -1,4 +1,4 @@
-"""Compiled marches of joints along one direction round a period; see :mod:`wear.joints.periodic`.
+"""Compiled marches of joints along one direction over a period; see :mod:`wear.joints.periodic`.
 
 Jenkins's and Bouc-Wen's joints remember one number, here the stretch z of a spring that gives the
 force K z + kr u, and carry its derivative with it. A joint of spread sliders remembers turning
@@ -42,15 +42,15 @@ CURVE_PERIODS = 2
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _move(own: Array, stretch: float, increment: float) -> tuple[float, float, float, float]:
+def _move(joint: Array, stretch: float, increment: float) -> tuple[float, float, float, float]:
     """One increment: stretch at its end, derivatives by stretch and increment, energy lost."""
-    kind, spring, limit = own[0], own[1], own[3]
+    kind, spring, limit = joint[0], joint[1], joint[3]
     if kind == JENKINS:
         _, slope, _, end, lost = advance_jenkins(spring, 0.0, limit, 0.0, stretch, increment)
         held = 1.0 if slope > 0.0 else 0.0
         return end, held, held, lost
-    exponent, gain, way = own[4], own[5], spring * abs(increment)
-    if limit <= NO_FRICTION * way:
+    exponent, gain, pull = joint[4], joint[5], spring * abs(increment)
+    if limit <= NO_FRICTION * pull:
         return 0.0, 0.0, 0.0, 0.0
     xi = spring * stretch / limit
     _, slope, _, end, lost = advance_bouc_wen(
@@ -60,18 +60,18 @@ def _move(own: Array, stretch: float, increment: float) -> tuple[float, float, f
     if increment != 0.0:
         # dη/ds does not contain s: two paths keep their distance in s.
         rate = xi_rate(copysign(xi, xi * increment), exponent, gain)
-        kept = slope / (spring * rate) if rate > COMPLETE else exp(-exponent * way / limit)
+        kept = slope / (spring * rate) if rate > COMPLETE else exp(-exponent * pull / limit)
     return end * limit / spring, kept, slope / spring, lost
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _lead_in(own: Array, before: Array, lead: Array, derivative: Array) -> float:
-    """Stretch at the first sample, to which it is led from rest; ``derivative`` is written."""
+def _lead_in(joint: Array, before: Array, lead: Array, derivative: Array) -> float:
+    """Stretch at the first sample, to which it is driven from rest; ``derivative`` is written."""
     stretch, here = 0.0, 0.0
     derivative[:] = 0.0
     for i in range(len(lead)):
         there = before[i]
-        stretch, kept, follows, _ = _move(own, stretch, there - here)
+        stretch, kept, follows, _ = _move(joint, stretch, there - here)
         for c in range(derivative.size):
             change = lead[i, c] - (lead[i - 1, c] if i > 0 else 0.0)
             derivative[c] = kept * derivative[c] + follows * change
@@ -81,9 +81,9 @@ def _lead_in(own: Array, before: Array, lead: Array, derivative: Array) -> float
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _round(
-    own: Array,
+    joint: Array,
     stretch: float,
-    way: Array,
+    path: Array,
     steps: Array,
     derivative: Array,
     force: Array,
@@ -99,22 +99,22 @@ def _round(
     total, lost = 1.0, 0.0
     for step in range(1, samples + 1):
         at = step if step < samples else 0
-        stretch, kept, follows, loss = _move(own, stretch, way[at] - way[step - 1])
+        stretch, kept, follows, loss = _move(joint, stretch, path[at] - path[step - 1])
         total *= kept
         lost += loss
         for c in range(size):
             derivative[c] = kept * derivative[c] + follows * steps[at, c]
             gradient[at, c] = derivative[c]
-        force[at] = own[1] * stretch
+        force[at] = joint[1] * stretch
         states[at] = 1 if follows < LEFT_IN_SLIP else 0
     return stretch, total, lost
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _settle_slider(
-    own: Array,
+    joint: Array,
     stretch: float,
-    way: Array,
+    path: Array,
     steps: Array,
     derivative: Array,
     force: Array,
@@ -124,11 +124,11 @@ def _settle_slider(
     """March until stretch and derivative repeat: energy lost, last change of the stretch."""
     size = steps.shape[1]
     before = np.empty(size)
-    repeated = REPEATED * min(own[3] / own[1], np.max(np.abs(way)))
+    repeated = REPEATED * min(joint[3] / joint[1], np.max(np.abs(path)))
     lost, change = 0.0, 0.0
     for period in range(MAX_PERIODS):
         before[:] = derivative
-        end, total, lost = _round(own, stretch, way, steps, derivative, force, states, gradient)
+        end, total, lost = _round(joint, stretch, path, steps, derivative, force, states, gradient)
         change = end - stretch
         if abs(change) <= repeated and _furthest(derivative, before) <= DERIVATIVE_REPEATED:
             break
@@ -173,7 +173,7 @@ def settle_sliders(
     weights: Array,
     lead: Array,
     parameters: Array,
-    way: Array,
+    path: Array,
     before: Array,
     force: Array,
     states: Array,
@@ -184,37 +184,37 @@ def settle_sliders(
 ) -> None:
     """Settle Jenkins's and Bouc-Wen's joints.
 
-    ``parameters`` ``(j, 6)``: kind, K, kr, µN, n, 2 σ - 1. ``way`` ``(j, t, 1)`` and ``before``
-    ``(j, p, 1)`` [mm] are led, the last of ``before`` being the first of ``way``. The others are
-    written.
+    ``parameters`` ``(j, 6)``: kind, K, kr, µN, n, 2 σ - 1. ``path`` ``(j, t, 1)`` and ``before``
+    ``(j, p, 1)`` [mm] are the displacements, the last of ``before`` being the first of ``path``.
+    The others are written.
     """
     samples, size = basis.shape
     gradient, derivative, steps = np.empty((samples, size)), np.empty(size), differences(basis)
     # Needed for residual stiffness only: for one joint as much work as all the rest.
     beside = np.any(parameters[:, 2] != 0.0)
     shares = np.dot(weights, basis) if beside else np.zeros((size, size))
-    own_force, own_way = np.empty(samples), np.empty(samples)
+    joint_force, joint_path = np.empty(samples), np.empty(samples)
     for j in range(len(parameters)):
-        own = parameters[j]
-        own_way[:] = way[j, :, 0]
-        start = _lead_in(own, before[j, :, 0], lead, derivative)
+        joint = parameters[j]
+        joint_path[:] = path[j, :, 0]
+        start = _lead_in(joint, before[j, :, 0], lead, derivative)
         dissipated[j], missing = _settle_slider(
-            own, start, own_way, steps, derivative, own_force, states[j], gradient
+            joint, start, joint_path, steps, derivative, joint_force, states[j], gradient
         )
-        change[j] = _relative_change(own[1] * missing, own_force)
+        change[j] = _relative_change(joint[1] * missing, joint_force)
         slopes = np.dot(weights, gradient)
         for at in range(samples):
-            own_force[at] += own[2] * own_way[at]
-            force[j, at, 0] = own_force[at]
-        projected[j, :, 0] = np.dot(weights, own_force)
+            joint_force[at] += joint[2] * joint_path[at]
+            force[j, at, 0] = joint_force[at]
+        projected[j, :, 0] = np.dot(weights, joint_force)
         for row in range(size):
             for c in range(size):
-                jacobian[j, row, 0, c, 0] = own[1] * slopes[row, c] + own[2] * shares[row, c]
+                jacobian[j, row, 0, c, 0] = joint[1] * slopes[row, c] + joint[2] * shares[row, c]
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _follow_curve(
-    own: Array,
+    joint: Array,
     memory: Array,
     places: Array,
     forces: Array,
@@ -223,7 +223,7 @@ def _follow_curve(
     end: float,
     gradient: Array,
 ) -> tuple[float, float, float]:
-    """Lead a joint of spread sliders to ``end``: force, share of stiffness left, energy lost.
+    """Drive a joint of spread sliders to ``end``: force, share of stiffness left, energy lost.
 
     ``here`` and ``there`` ``(m,)`` are the derivatives of displacement at both ends; ``gradient``
     that of the force, read and written. ``places`` and ``forces`` ``(depth, m)`` are those of
@@ -233,7 +233,9 @@ def _follow_curve(
     depth = int(memory[DEPTH])
     if increment != 0.0 and turns(memory, depth, memory[DISPLACEMENT] + increment):
         places[depth], forces[depth] = here, gradient
-    force, slope, lost = advance_masing((own[0], own[2], own[3], own[4]), 0.0, memory, increment)
+    force, slope, lost = advance_masing(
+        (joint[0], joint[2], joint[3], joint[4]), 0.0, memory, increment
+    )
     # Set anew: sums of increments round, and a period must return to the same numbers.
     memory[DISPLACEMENT] = end
     depth = int(memory[DEPTH])
@@ -241,7 +243,7 @@ def _follow_curve(
         gradient[c] = slope * there[c]
         if depth > 0:
             gradient[c] += forces[depth - 1, c] - slope * places[depth - 1, c]
-    return force, slope / own[0], lost
+    return force, slope / joint[0], lost
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -250,7 +252,7 @@ def settle_curves(
     weights: Array,
     lead: Array,
     parameters: Array,
-    way: Array,
+    path: Array,
     before: Array,
     force: Array,
     states: Array,
@@ -271,32 +273,39 @@ def settle_curves(
     places, forces = np.empty((depth, size)), np.empty((depth, size))
     gradients, gradient, nowhere = np.empty((samples, size)), np.empty(size), np.zeros(size)
     shares = np.dot(weights, basis)
-    own_force = np.empty(samples)
+    joint_force = np.empty(samples)
     for j in range(len(parameters)):
-        own = parameters[j]
+        joint = parameters[j]
         memory[:], gradient[:], here = 0.0, 0.0, nowhere
         for i in range(len(lead)):
             end = before[j, i, 0]
-            own_force[0], _, _ = _follow_curve(
-                own, memory, places, forces, here, lead[i], end, gradient
+            joint_force[0], _, _ = _follow_curve(
+                joint, memory, places, forces, here, lead[i], end, gradient
             )
             here = lead[i]
         for _ in range(CURVE_PERIODS):
-            start, dissipated[j] = own_force[0], 0.0
+            start, dissipated[j] = joint_force[0], 0.0
             for step in range(1, samples + 1):
                 at = step if step < samples else 0
-                own_force[at], left, lost = _follow_curve(
-                    own, memory, places, forces, basis[step - 1], basis[at], way[j, at, 0], gradient
+                joint_force[at], left, lost = _follow_curve(
+                    joint,
+                    memory,
+                    places,
+                    forces,
+                    basis[step - 1],
+                    basis[at],
+                    path[j, at, 0],
+                    gradient,
                 )
                 gradients[at] = gradient
                 dissipated[j] += lost
                 states[j, at] = 1 if left < LEFT_IN_SLIP else 0
-            change[j] = _relative_change(own_force[0] - start, own_force)
+            change[j] = _relative_change(joint_force[0] - start, joint_force)
         slopes = np.dot(weights, gradients)
         for at in range(samples):
-            own_force[at] += own[1] * way[j, at, 0]
-            force[j, at, 0] = own_force[at]
-        projected[j, :, 0] = np.dot(weights, own_force)
+            joint_force[at] += joint[1] * path[j, at, 0]
+            force[j, at, 0] = joint_force[at]
+        projected[j, :, 0] = np.dot(weights, joint_force)
         for row in range(size):
             for c in range(size):
-                jacobian[j, row, 0, c, 0] = slopes[row, c] + own[1] * shares[row, c]
+                jacobian[j, row, 0, c, 0] = slopes[row, c] + joint[1] * shares[row, c]

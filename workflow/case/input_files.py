@@ -1,66 +1,58 @@
-"""Files that a case names: columns of numbers with their units known, and fields of heights."""
+"""Files that a case or a command names: rows of CSV, and fields of heights."""
 
 from __future__ import annotations
 
 import csv
-import difflib
-from collections.abc import Mapping
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.case.fields import Quantity, shown, split_dataset
+from workflow.case.fields import shown, split_dataset
+from workflow.errors import one_line
+
+COMMENT = "#"
 
 
 class InputFileError(ValueError):
     """A file that cannot be taken; ``file:line: what is wrong; what is allowed``."""
 
 
-def read_columns(file: str, allowed: Mapping[str, Quantity]) -> dict[str, Array]:
-    """Columns ``(n,)`` of a CSV file with a header of ``allowed`` names, in base units.
+def csv_rows(file: str | Path) -> list[tuple[int, tuple[str, ...]]]:
+    """Line number and cells of every row of a CSV file that is neither empty nor a comment.
 
-    Raises InputFileError.
+    Comments begin with ``#``; a byte-order mark is passed over. Raises InputFileError.
     """
-    rows = _rows(file)
-    if len(rows) < 2:
-        raise InputFileError(f"{file}:1: no rows; allowed: a header and a row per increment")
-    (line, header), *rest = rows
-    _check_header(f"{file}:{line}", header, list(allowed))
-    values = [_numbers(f"{file}:{line}", header, row, allowed) for line, row in rest]
-    return dict(zip(header, np.array(values).T.copy(), strict=True))
-
-
-def _check_header(place: str, header: list[str], allowed: list[str]) -> None:
-    for name in header:
-        if name not in allowed:
-            near = difflib.get_close_matches(name, allowed, n=1)
-            hint = f"did you mean '{near[0]}'?" if near else f"allowed: {', '.join(allowed)}"
-            raise InputFileError(f"{place}: {shown(name)}: unknown column; {hint}")
-        if header.count(name) > 1:
-            raise InputFileError(f"{place}: {name}: column given twice; allowed: once")
-
-
-def _numbers(
-    place: str, header: list[str], row: list[str], allowed: Mapping[str, Quantity]
-) -> list[float]:
-    """One row of the table, every number within its limits."""
-    if len(row) != len(header):
-        raise InputFileError(f"{place}: {len(row)} values; allowed: {len(header)}, as the header")
-    values = []
-    for name, cell in zip(header, row, strict=True):
-        number = _number(f"{place}: {name}", cell)
-        if not allowed[name].contains(number):
-            raise InputFileError(
-                f"{place}: {name}: {cell}: out of range; allowed: {allowed[name].allowed}"
-            )
-        values.append(number)
-    return values
-
-
-def _number(place: str, cell: str) -> float:
     try:
-        number = float(cell)
+        with Path(file).open(newline="", encoding="utf-8-sig") as stream:
+            # Empty in place of comments, so that they still count.
+            lines = ("\n" if line.lstrip().startswith(COMMENT) else line for line in stream)
+            reader = csv.reader(lines)
+            return [
+                (reader.line_num, tuple(cell.strip() for cell in cells))
+                for cells in reader
+                if any(cell.strip() for cell in cells)
+            ]
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise _unreadable(str(file), error, "; allowed: a CSV file") from error
+
+
+def check_widths(file: str | Path, rows: Sequence[tuple[int, tuple[str, ...]]], first: str) -> None:
+    """Raise InputFileError unless all rows have as many cells as the first, called so."""
+    count = len(rows[0][1])
+    for line, cells in rows:
+        if len(cells) != count:
+            raise InputFileError(
+                f"{file}:{line}: {len(cells)} values; allowed: {count}, as the {first}"
+            )
+
+
+def number_in(place: str, cell: str) -> float:
+    """The number that a cell says. Raises InputFileError where it is none, or not finite."""
+    try:
+        # Python would take 1_000 for a number.
+        number = float("" if "_" in cell else cell)
     except ValueError:
         raise InputFileError(f"{place}: {shown(cell)}: not a number; allowed: numbers") from None
     if not np.isfinite(number):
@@ -105,7 +97,7 @@ def _read_npy(file: str) -> np.ndarray:
     try:
         return np.asarray(np.load(file, allow_pickle=False))
     except (OSError, ValueError, EOFError) as error:
-        raise InputFileError(f"{file}: cannot be read ({_first_line(error)})") from error
+        raise _unreadable(file, error) from error
 
 
 def _read_dataset(file: str, dataset: str) -> np.ndarray:
@@ -121,36 +113,16 @@ def _read_dataset(file: str, dataset: str) -> np.ndarray:
                 raise InputFileError(f"{file}: {dataset}: no such dataset; at the top: {known}")
             return np.asarray(found[()])
     except OSError as error:
-        raise InputFileError(f"{file}: cannot be read ({_first_line(error)})") from error
+        raise _unreadable(file, error) from error
 
 
 def _read_csv(file: str) -> np.ndarray:
-    rows = _rows(file)
+    rows = csv_rows(file)
     if not rows:
         raise InputFileError(f"{file}:1: empty; allowed: rows of heights")
-    values = []
-    for line, row in rows:
-        if len(row) != len(rows[0][1]):
-            raise InputFileError(
-                f"{file}:{line}: {len(row)} values; allowed: {len(rows[0][1])}, as the first row"
-            )
-        values.append([_number(f"{file}:{line}", cell) for cell in row])
-    return np.array(values)
+    check_widths(file, rows, "first row")
+    return np.array([[number_in(f"{file}:{line}", cell) for cell in row] for line, row in rows])
 
 
-def _rows(file: str) -> list[tuple[int, list[str]]]:
-    """Line number and cells of every row that is not empty."""
-    try:
-        with Path(file).open(newline="", encoding="utf-8-sig") as stream:
-            reader = csv.reader(stream)
-            return [
-                (reader.line_num, [cell.strip() for cell in row])
-                for row in reader
-                if any(cell.strip() for cell in row)
-            ]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputFileError(f"{file}: cannot be read ({_first_line(error)})") from error
-
-
-def _first_line(error: Exception) -> str:
-    return (str(error).splitlines() or [type(error).__name__])[0]
+def _unreadable(file: str, error: Exception, allowed: str = "") -> InputFileError:
+    return InputFileError(f"{file}: cannot be read ({one_line(error)}){allowed}")

@@ -46,7 +46,7 @@ def disagreement(message: str, *keys: str) -> PydanticCustomError:
 class Section(BaseModel):
     """A section of a case: frozen, every key known, every number finite."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, defer_build=True)
 
     # Whether a template fills in optional entries that most cases give.
     filled_in: ClassVar[bool] = True

@@ -6,8 +6,9 @@ unit. Lines that begin with ``#`` are comments, empty ones and a byte-order mark
 
 from __future__ import annotations
 
-import csv
+import difflib
 import re
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -15,11 +16,9 @@ import numpy as np
 
 from sa_solver.types import Array
 from workflow.case.fields import Quantity, shown
-from workflow.case.input_files import InputFileError
+from workflow.case.input_files import InputFileError, check_widths, csv_rows, number_in
 from workflow.case.units import UnitError, to_base
-from workflow.errors import one_line
 
-COMMENT = "#"
 HEADING = re.compile(r"(?P<name>[^\[\]]*?)\s*(?:\[\s*(?P<unit>[^\[\]]*?)\s*\])?")
 
 
@@ -31,6 +30,9 @@ class TableFile:
     line: int
     headings: tuple[str, ...]
     rows: tuple[tuple[int, tuple[str, ...]], ...]
+
+    def __len__(self) -> int:
+        return len(self.rows)
 
     @property
     def place(self) -> str:
@@ -46,91 +48,104 @@ class TableFile:
         """Unit of a column, empty without one."""
         return _name_and_unit(self.headings[self.names.index(name)])[1]
 
-    def require(self, name: str, allowed: str) -> None:
-        """Raise InputFileError, which says what is ``allowed``, unless there is such a column."""
-        if name not in self.names:
+    def check(self, units: Mapping[str, str | None]) -> None:
+        """Raise InputFileError unless all columns are among those of ``units``.
+
+        Each given once, in a unit that can be converted to the base unit; None is text.
+        """
+        for name, heading in zip(self.names, self.headings, strict=True):
+            if name not in units:
+                near = difflib.get_close_matches(name, list(units), n=1)
+                hint = f"did you mean '{near[0]}'?" if near else f"allowed: {', '.join(units)}"
+                raise InputFileError(f"{self.place}: {shown(heading)}: unknown column; {hint}")
+            self._check_column(name, units[name])
+
+    def require(self, names: Iterable[str], allowed: str) -> None:
+        """Raise InputFileError, which says what is ``allowed``, unless there are such columns."""
+        missing = [name for name in names if name not in self.names]
+        if missing:
             there = ", ".join(shown(heading) for heading in self.headings)
             raise InputFileError(
-                f"{self.place}: no column {name}; this file has {there}; allowed: {allowed}"
+                f"{self.place}: no column {', '.join(missing)}; this file has {there}; "
+                f"allowed: {allowed}"
             )
+
+    def cells(self, name: str) -> list[str]:
+        """Texts of a column that there is, as they are written."""
+        place = self.names.index(name)
+        return [cells[place] for _, cells in self.rows]
 
     def column(self, name: str, quantity: Quantity) -> Array:
         """Numbers ``(n,)`` of a column that there is, in the base unit of ``quantity``.
 
-        Raises InputFileError for a column that is given twice, a unit of another kind, and what
-        is no number or outside the limits of ``quantity``.
+        Conversion is exact, as in a case. Raises InputFileError for a column that is given twice, a
+        unit of another kind, and what is no number or outside the limits of ``quantity``.
         """
+        base = quantity.unit or "1"
+        self._check_column(name, base)
+        unit = self.unit(name)
+        numbers = []
+        for (line, _), cell in zip(self.rows, self.cells(name), strict=True):
+            place = f"{self.file}:{line}: {name}"
+            number = number_in(place, cell)
+            if unit not in ("", base):
+                number = to_base(f"{cell} {unit}", base)
+            if not quantity.contains(number):
+                raise InputFileError(f"{place}: {cell}: out of range; allowed: {quantity.allowed}")
+            numbers.append(number)
+        return np.array(numbers)
+
+    def whole(self, name: str) -> list[int]:
+        """A column of whole numbers. Raises InputFileError."""
+        numbers = self.column(name, Quantity("1"))
+        for row in np.flatnonzero(numbers != np.rint(numbers)).tolist():
+            raise self.refusal(row, name, "not a whole number", "whole numbers")
+        return [int(number) for number in numbers]
+
+    def refusal(self, row: int, name: str, wrong: str, allowed: str) -> InputFileError:
+        """The error about one cell; a column that the file does not give is named alone."""
+        line, cells = self.rows[row]
+        value = f"{cells[self.names.index(name)]}: " if name in self.names else ""
+        return InputFileError(f"{self.file}:{line}: {name}: {value}{wrong}; allowed: {allowed}")
+
+    def _check_column(self, name: str, base: str | None) -> None:
         if self.names.count(name) > 1:
             raise InputFileError(f"{self.place}: {name}: column given twice; allowed: once")
-        place, factor = self.names.index(name), self._factor(name, quantity.unit or "1")
-        return np.array(
-            [
-                _number(f"{self.file}:{line}: {name}", cells[place], factor, quantity)
-                for line, cells in self.rows
-            ]
-        )
-
-    def _factor(self, name: str, base: str) -> float:
-        """Base units in the unit of a column."""
-        unit = self.unit(name)
-        if unit in ("", base):
-            return 1.0
-        try:
-            return to_base(f"1 {unit}", base)
-        except UnitError as error:
-            raise InputFileError(
-                f"{self.place}: {name}: {error}; allowed: units of {base}"
-            ) from error
+        if unit := self.unit(name):
+            check_unit(f"{self.place}: {name}", unit, base or "1")
 
 
 def read_table_file(file: str | Path) -> TableFile:
     """Headings and rows of a CSV file. Raises InputFileError where it is none."""
-    lines = _lines(file)
-    if len(lines) < 2:
-        line = lines[0][0] if lines else 1
+    rows = csv_rows(file)
+    if len(rows) < 2:
+        line = rows[0][0] if rows else 1
         raise InputFileError(f"{file}:{line}: no rows; allowed: a header and at least one row")
-    (line, headings), *rows = lines
-    for number, cells in rows:
-        if len(cells) != len(headings):
-            raise InputFileError(
-                f"{file}:{number}: {len(cells)} values; allowed: {len(headings)}, as the header"
-            )
-    return TableFile(str(file), line, headings, tuple(rows))
+    check_widths(file, rows, "header")
+    (line, headings), *rest = rows
+    return TableFile(str(file), line, headings, tuple(rest))
 
 
-def _lines(file: str | Path) -> list[tuple[int, tuple[str, ...]]]:
-    """Line number and cells of every row that is neither empty nor a comment."""
+def read_columns(file: str, allowed: Mapping[str, Quantity]) -> dict[str, Array]:
+    """All columns ``(n,)`` of a file by name, each one of the ``allowed``, in base units.
+
+    Raises InputFileError.
+    """
+    table = read_table_file(file)
+    table.check({name: quantity.unit for name, quantity in allowed.items()})
+    return {name: table.column(name, allowed[name]) for name in table.names}
+
+
+def check_unit(place: str, unit: str, base: str) -> None:
+    """Raise InputFileError unless ``unit`` can be converted to ``base``."""
     try:
-        with Path(file).open(newline="", encoding="utf-8-sig") as stream:
-            # Empty in place of comments, so that they still count.
-            lines = ("\n" if line.lstrip().startswith(COMMENT) else line for line in stream)
-            reader = csv.reader(lines)
-            return [
-                (reader.line_num, tuple(cell.strip() for cell in cells))
-                for cells in reader
-                if any(cell.strip() for cell in cells)
-            ]
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
-        raise InputFileError(
-            f"{file}: cannot be read ({one_line(error)}); allowed: a CSV file"
-        ) from error
+        to_base(f"1 {unit}", base)
+    except UnitError as error:
+        allowed = "a bare number" if base == "1" else f"{base}, or a unit of the same dimension"
+        raise InputFileError(f"{place}: {error}; allowed: {allowed}") from error
 
 
 def _name_and_unit(heading: str) -> tuple[str, str]:
     """Name and unit of a heading; one in other brackets is a name as a whole."""
     match = HEADING.fullmatch(heading)
     return (match["name"], match["unit"] or "") if match else (heading, "")
-
-
-def _number(place: str, cell: str, factor: float, quantity: Quantity) -> float:
-    """A cell in the base unit, within the limits of its quantity."""
-    try:
-        # Python would take 1_000 for a number.
-        number = factor * float("" if "_" in cell else cell)
-    except ValueError:
-        raise InputFileError(f"{place}: {shown(cell)}: not a number; allowed: numbers") from None
-    if not np.isfinite(number):
-        raise InputFileError(f"{place}: {cell}: not a finite number; allowed: finite numbers")
-    if not quantity.contains(number):
-        raise InputFileError(f"{place}: {cell}: out of range; allowed: {quantity.allowed}")
-    return number

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Iterator
 from math import isfinite
@@ -17,6 +16,7 @@ from workflow.chart.frontier import Combination, cheapest
 from workflow.chart.ladder import Judged, Ladder
 from workflow.chart.run import Chart
 from workflow.shell.store import replacing
+from workflow.shell.tables import write_table
 from workflow.shell.versions import versions
 
 # Columns of text where the tables go to a file.
@@ -155,11 +155,9 @@ def _write_table(chart: Chart, path: Path) -> None:
     """One row for each rung; a quantity that its axis does not have is empty."""
     points = [rung.point for ladder in chart.ladders for rung in ladder.rungs]
     quantities = list(dict.fromkeys(q for p in points for q in (*p.values, *p.extras)))
-    with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as file:
-        writer = csv.DictWriter(file, [*HEAD, *quantities, *TAIL, *FRONTIER], restval="")
-        writer.writeheader()
-        for ladder in chart.ladders:
-            writer.writerows(_rows(ladder))
+    rows = [row for ladder in chart.ladders for row in _rows(ladder)]
+    names = [*HEAD, *quantities, *TAIL, *FRONTIER]
+    write_table(path, {name: [row.get(name) for row in rows] for name in names})
 
 
 def _rows(ladder: Ladder) -> Iterator[dict[str, object]]:

@@ -35,7 +35,7 @@ def read_loop_file(path: Path, names: Mapping[str, str]) -> LoopFile:
     try:
         table = read_table_file(path)
         for key in (*NEEDED, *names):
-            table.require(called[key], f"a column of that name, or --column {key}=NAME")
+            table.require([called[key]], f"a column of that name, or --column {key}=NAME")
         columns = {
             key: table.column(called[key], Quantity(unit)) if called[key] in table.names else None
             for key, unit in BASE_UNITS.items()

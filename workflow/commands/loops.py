@@ -10,7 +10,7 @@ import numpy as np
 from sa_solver.types import Array
 from wear.joints.loop_record import MeasuredLoopError
 from wear.joints.measured_loops import MeanEstimate, MeasuredLoops, mean_estimate, measure_loops
-from workflow.analyses.wear.loop_table import write_table
+from workflow.analyses.wear.loop_table import write_loop_table
 from workflow.case.units import UnitError, to_base
 from workflow.commands.loop_file import BASE_UNITS, LoopFile, read_loop_file
 from workflow.errors import UserError
@@ -158,7 +158,7 @@ def write_loops(found: MeasuredLoops, out: Path, title: str, force: bool) -> lis
     if there and not force:
         raise UserError(f"{there[0]}: exists; give another folder, or --force")
     out.mkdir(parents=True, exist_ok=True)
-    write_table(paths[0], _rows(found))
+    write_loop_table(paths[0], list(_rows(found)))
     from workflow.commands.loops_figure import write_figure
 
     write_figure(found, title, paths[1])

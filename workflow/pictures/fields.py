@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array, Grid
-from workflow.shell.store import grid_of
+from workflow.shell.results import grid_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

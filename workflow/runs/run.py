@@ -12,7 +12,7 @@ from workflow.case.changing import changed
 from workflow.case.sections import Case
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError, UserError
-from workflow.kinds import analysis_of, load_case
+from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
@@ -98,7 +98,7 @@ def _run(case: Case, folder: OutputFolder, resume: bool) -> None:
 
     reporter = Reporter(folder.log, append=resume)
     try:
-        run = Run(case, folder, reporter, resume, folder.choice, compute)
+        run = Run(kind_of(case), case, folder, reporter, resume, folder.choice, compute)
         analysis_of(case).run(run)
     finally:
         reporter.close()

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Generic, TypeVar
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from workflow.case.sections import Case
-from workflow.shell.folder import OutputFolder
 from workflow.shell.memory import Memory
-from workflow.shell.reporter import Reporter
+
+if TYPE_CHECKING:
+    from workflow.shell.folder import OutputFolder
+    from workflow.shell.reporter import Reporter
 
 AnyCase = TypeVar("AnyCase", bound=Case)
 Summary = Mapping[str, Any]
@@ -20,12 +22,13 @@ Summary = Mapping[str, Any]
 class Run(Generic[AnyCase]):
     """A run that an analysis is to bring to its end.
 
-    It goes on from where ``folder`` has got to if it is to ``resume``. ``choice`` is the record of
-    the settings that were chosen for the case, None where they stand as written. ``compute`` runs
-    another case file into a folder, from where an earlier run there has got to; False if that was
-    finished already.
+    ``kind`` is the name of its kind of case. It goes on from where ``folder`` has got to if it is
+    to ``resume``. ``choice`` is the record of the settings that were chosen for the case, None
+    where they stand as written. ``compute`` runs another case file into a folder, from where an
+    earlier run there has got to; False if that was finished already.
     """
 
+    kind: str
     case: AnyCase
     folder: OutputFolder
     reporter: Reporter

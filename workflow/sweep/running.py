@@ -22,7 +22,7 @@ from workflow.shell.store import replacing
 from workflow.shell.versions import versions
 from workflow.sweep.design import Run, runs_of
 from workflow.sweep.schema import Sweep, load_sweep
-from workflow.sweep.table import Row, columns_of, spread, unit_of, varied_in, write_table
+from workflow.sweep.table import Row, columns_of, spread, unit_of, varied_in, write_sweep_table
 
 # A copy of the file marks the folder as that of a sweep.
 FILE, RUNS, TABLE, SUMMARY, LOG = "sweep.yaml", "runs", "sweep.csv", "summary.json", "sweep.log"
@@ -134,7 +134,7 @@ def _run(
     finally:
         rows = [Row(run, ended[run.name]) for run in runs if run.name in ended]
         if rows:
-            write_table(rows, out / TABLE)
+            write_sweep_table(rows, out / TABLE)
     return rows
 
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import io
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,7 +11,8 @@ import numpy as np
 
 from sa_solver.types import Array
 from workflow.runs.job import Finished
-from workflow.shell.store import PER_LENGTH, replacing
+from workflow.shell.dataset import unit_in
+from workflow.shell.tables import heading, write_table
 from workflow.sweep.design import Run
 from workflow.sweep.schema import Amount, amount_of
 
@@ -111,7 +110,7 @@ class Varied:
     @property
     def heading(self) -> str:
         """Path and unit."""
-        return f"{self.path} [{self.unit}]" if self.unit else self.path
+        return heading(self.path, self.unit)
 
 
 def varied_in(rows: Sequence[Row]) -> list[Varied]:
@@ -153,39 +152,27 @@ def unit_of(name: str, rows: Sequence[Row]) -> str:
     """Unit of a column of a wear run; "" where it goes without saying."""
     unit = WEAR_UNITS.get(name.partition(".")[2], "")
     per_length = {bool(s["per_length"]) for row in rows if (s := row.finished.summary) and unit}
-    both = {False: unit, True: PER_LENGTH.get(unit, unit)}
-    return " or ".join(dict.fromkeys(both[line] for line in sorted(per_length)))
+    return " or ".join(dict.fromkeys(unit_in(line, unit) for line in sorted(per_length)))
 
 
 # --- the file -----------------------------------------------------------------------------------
 
 
-def write_table(rows: Sequence[Row], path: Path) -> None:
+def write_sweep_table(rows: Sequence[Row], path: Path) -> None:
     """Write the table as CSV: name, what varies, how the run ended, and what it found.
 
     Numbers are in base units, with all their digits; cells of a run that failed are empty.
     """
-    varied, found = varied_in(rows), columns_of(rows)
-    units = {name: unit_of(name, rows) for name in found}
-    text = io.StringIO(newline="")
-    writer = csv.writer(text, lineterminator="\n")
-    headings = [f"{name} [{unit}]" if unit else name for name, unit in units.items()]
-    ends = "status", "message", "seconds"
-    writer.writerow(["name", *map(_heading, varied), *ends, *headings])
-    for number, row in enumerate(rows):
-        cells = [column[number] for column in found.values()]
-        writer.writerow(
-            [
-                row.run.name,
-                *(own.texts[number] for own in varied),
-                DONE if row.done else FAILED,
-                row.finished.error,
-                "" if row.seconds is None else row.seconds,
-                *("" if np.isnan(cell) else _cell(cell) for cell in cells),
-            ]
-        )
-    with replacing(path) as partial:
-        partial.write_text(text.getvalue(), encoding="utf-8")
+    columns: dict[str, Sequence[Any]] = {"name": [row.run.name for row in rows]}
+    columns |= {_heading(varied): varied.texts for varied in varied_in(rows)}
+    columns |= {
+        "status": [DONE if row.done else FAILED for row in rows],
+        "message": [row.finished.error for row in rows],
+        "seconds": [row.seconds for row in rows],
+    }
+    for name, column in columns_of(rows).items():
+        columns[heading(name, unit_of(name, rows))] = [_cell(own) for own in column.tolist()]
+    write_table(path, columns)
 
 
 def _heading(varied: Varied) -> str:
@@ -194,9 +181,11 @@ def _heading(varied: Varied) -> str:
     return varied.path if cells_have_it else varied.heading
 
 
-def _cell(number: float) -> str:
-    """The shortest text that reads back as the number."""
-    return str(int(number)) if number.is_integer() and abs(number) < 1e15 else repr(float(number))
+def _cell(number: float) -> float | None:
+    """The number, whole if it can be; None for one that a run has not found."""
+    if np.isnan(number):
+        return None
+    return int(number) if number.is_integer() and abs(number) < 1e15 else number
 
 
 def spread(values: Array) -> dict[str, float] | None:

@@ -11,6 +11,7 @@ from fe_models.dynamics import harmonic_balance
 from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonic_jacobian import HarmonicJacobian
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.receptance import Receptance, ReceptanceError
@@ -204,11 +205,11 @@ def test_stuck_joints_are_preconditioned_by_their_stiffness(free):
         model = replace(model, stiffness=np.diag([500.0, 700.0, 900.0]))
     load = pressed(model, 8.0, 1.0)
     problem = balance(model, PeriodicMarch(FrictionContact(300.0, 400.0, 0.5)), (0, 1, 2), 64, load)
-    assert (problem.held > 0.0) == free
+    assert (problem.transfer.held > 0.0) == free
     motion = problem.solve(30.0, 0.1)
     assert np.all(motion.cycle.states == STICK)
     at = problem.evaluate(motion.coefficients.ravel(), 30.0, 0.1, "frequency")
-    products = harmonic_balance._Jacobian(problem, at.steady, at.cycle.jacobian)
+    products = HarmonicJacobian(problem.transfer, problem.rest, at.steady, at.cycle.jacobian)
     vector = np.random.default_rng(8).standard_normal(problem.size)
     np.testing.assert_allclose(products.precondition(products @ vector), vector, atol=1e-9)
 

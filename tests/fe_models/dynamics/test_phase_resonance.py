@@ -392,7 +392,7 @@ def test_motion_in_time_has_the_phase(place):
     assert largest_kinetic_energy(problem, solution) == pytest.approx(kinetic, rel=1e-2)
 
 
-def test_what_is_seen_decides_on_the_phase():
+def test_the_output_decides_on_the_phase():
     """The force's own point is the default; another displacement lags by a quarter elsewhere."""
     problem, model = on_rig((1, 3), ratio=0.05), rig(0.05)
     start = peak(problem, 40.0, (20.0, 400.0))

@@ -14,7 +14,7 @@ from wear.joints.ageing import (
     AgeingError,
     MarchedStroke,
     NeverReachedError,
-    integrated_stretch,
+    integrate_cycles,
     long_test,
     steady_stroke,
 )
@@ -111,7 +111,7 @@ def test_a_joint_that_sticks_does_not_age() -> None:
     np.testing.assert_array_equal(test.energy, [0.0, 0.0])
     np.testing.assert_array_equal(test.cycles_at(np.array([0.0, 1.0])), [0.0, np.nan])
     assert test.error == 0.0
-    assert integrated_stretch(test, lambda _: 0.0, 10.0, 5).difference == 0.0
+    assert integrate_cycles(test, lambda _: 0.0, 10.0, 5).difference == 0.0
 
 
 @pytest.mark.parametrize("power", [0.5, 1.0, 2.0])
@@ -202,7 +202,7 @@ def test_questions_beyond_the_test_are_refused() -> None:
     with pytest.raises(ValueError, match="below 3 N mm"):
         test.cycles_at(2.0)
     with pytest.raises(ValueError, match="0 cycles"):
-        integrated_stretch(test, lambda _: 1.0, 1.0, 0)
+        integrate_cycles(test, lambda _: 1.0, 1.0, 0)
     assert np.isnan(test.cycles_at(14.0))
 
 
@@ -291,7 +291,7 @@ def test_rig_takes_seconds() -> None:
 def test_rig_on_a_stretch(rig, first) -> None:
     """Cycle after cycle with the closed form, from the first and steepest on."""
     rate = steady_stroke(RIG, RIG_EVOLUTION, RIG_AMPLITUDE)
-    stretch = integrated_stretch(rig, rate, first, 1000)
+    stretch = integrate_cycles(rig, rate, first, 1000)
     assert abs(stretch.difference) <= stretch.stated + 1e-8
     np.testing.assert_allclose(stretch.energy, stretch.jumped, rtol=1e-6)
 
@@ -301,7 +301,7 @@ def test_rig_on_a_marched_stretch(rig, first) -> None:
     """The law's own memory from cycle to cycle makes no difference: the joint slides fully."""
     start = float(rig.energy_at(first))
     marched = MarchedStroke(RIG, RIG_EVOLUTION, RIG_AMPLITUDE, start=start)
-    stretch = integrated_stretch(rig, marched, first, 1000)
+    stretch = integrate_cycles(rig, marched, first, 1000)
     assert abs(stretch.difference) < 1e-4
 
 
@@ -349,7 +349,7 @@ def test_bolted_joint_counted_to_its_end(bolted) -> None:
 def test_bolted_joint_on_a_marched_stretch(bolted, first) -> None:
     law, evolution, amplitude = TEST_4
     marched = MarchedStroke(law, evolution, amplitude, start=float(bolted.energy_at(first)))
-    stretch = integrated_stretch(bolted, marched, first, 500)
+    stretch = integrate_cycles(bolted, marched, first, 500)
     assert abs(stretch.difference) <= stretch.stated + 1e-7
 
 

@@ -11,7 +11,7 @@ def _run(run: Run[ContactCase | LineContactCase]) -> None:
     # Solvers take a second to load: where they are used.
     from workflow.analyses.contact.run import run_contact
 
-    run_contact(run.case, run.folder, run.reporter)
+    run_contact(run)
 
 
 # What contact cases are compared by where they expect nothing.

@@ -12,7 +12,7 @@ from pydantic import Discriminator, Field, StrictBool, Tag, model_validator
 
 from workflow.analyses.contact.load_table import LoadTable, conflict, ramps
 from workflow.case.fields import File, Quantity, Whole
-from workflow.case.input_files import InputFileError, height_shape, read_columns
+from workflow.case.input_files import InputFileError, height_shape
 from workflow.case.loading import word_at
 from workflow.case.sections import (
     Case,
@@ -30,6 +30,7 @@ from workflow.case.sections import (
     quantities_of,
 )
 from workflow.case.source import Source
+from workflow.case.table_file import read_columns
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual contact.
 Poisson = Annotated[float, Quantity("1", at_least=0.0, at_most=0.5)]

@@ -10,10 +10,11 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array, Grid
+from workflow.analyses.contact.datasets import BODIES
 from workflow.analyses.contact.load_table import FORCES, MOTIONS
 from workflow.pictures.fields import MAX_PROFILES, centres, draw_map, middle, spread
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, new_figure
-from workflow.shell.store import BODIES, grid_of
+from workflow.shell.results import grid_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

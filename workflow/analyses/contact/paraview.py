@@ -8,8 +8,9 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Frame
+from workflow.analyses.contact.datasets import BODIES
 from workflow.pictures.vtk import Fields, Step, attach, cells, grid_image, write_series, write_xml
-from workflow.shell.store import BODIES, frame_of, grid_of
+from workflow.shell.results import frame_of, grid_of
 
 
 def write_contact(file: h5py.File, folder: Path) -> list[Path]:

@@ -5,25 +5,35 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 
 from sa_solver.types import Array, Frame, Grid
 from workflow.analyses.contact.bodies import bodies_of, bulk_strain
 from workflow.analyses.contact.case import ContactCase, LineContactCase
+from workflow.analyses.contact.datasets import (
+    BODIES,
+    energy_columns,
+    motion_columns,
+    resultant_columns,
+    sliding_column,
+    traction_fields,
+)
 from workflow.analyses.contact.figures import figures_of
 from workflow.analyses.contact.load_table import FORCES, MOTIONS, LoadTable
 from workflow.analyses.contact.paraview import write_contact
 from workflow.analyses.contact.summary import loop_summary, slides, state_summaries, stick_zone
-from workflow.case.writing import dump_case
 from workflow.pictures.drawing import write_pictures
-from workflow.shell.folder import OutputFolder
+from workflow.shell.analysis import Run
+from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
-from workflow.shell.store import BODIES, ResultsWriter, replacing
+from workflow.shell.results import run_results
 from workflow.shell.versions import versions
 
 if TYPE_CHECKING:
+    from sa_solver.contact import ContactState
     from sa_solver.history import History
+
+ContactRun = Run[ContactCase | LineContactCase]
 
 
 @dataclass(frozen=True)
@@ -37,55 +47,72 @@ class ContactOutcome:
     history: History
 
 
-def write_contact_output(outcome: ContactOutcome, folder: OutputFolder, reporter: Reporter) -> None:
+def write_contact_output(outcome: ContactOutcome, run: ContactRun) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
+    reporter = run.reporter
     with reporter.stage("results"):
-        write_contact_results(outcome, folder)
+        write_contact_results(outcome, run)
     with reporter.stage("paraview and figures"):
-        write_pictures(outcome.case.output, folder, figures_of, write_contact)
+        write_pictures(outcome.case.output, run.folder, figures_of, write_contact)
     summary = _summary(outcome, reporter)
-    folder.write_summary(summary)
+    run.folder.write_summary(summary)
     _say(summary, outcome.grid, reporter)
 
 
-def write_contact_results(outcome: ContactOutcome, folder: OutputFolder) -> None:
+def write_contact_results(outcome: ContactOutcome, run: ContactRun) -> None:
     """Write ``results.h5`` with the states there are."""
-    case, history = outcome.case, outcome.history
+    case, grid, history = outcome.case, outcome.grid, outcome.history
     friction = case.friction.coefficient
-    with replacing(folder.results) as partial, h5py.File(partial, "w") as file:
-        writer = ResultsWriter(file, per_length=outcome.grid.line)
-        file.attrs.update({"title": case.title, "friction": friction})
-        file.create_group("case").attrs.update({"text": dump_case(case)} | versions())
-        writer.put_grid(BODIES, outcome.grid, Frame(np.zeros(3), np.eye(3)))
-        writer.put(f"surfaces/{BODIES}", height=outcome.height)
-        writer.put("path", **outcome.table.columns)
-        writer.put(
-            "history", increment=np.array(history.indices) + 1, **_columns(history, friction)
-        )
-        file["history"].attrs.update({"method": history.method, "reason": history.reason})
+    height = Dataset(outcome.height, "mm", "gap before loading")
+    with run_results(run, case, {"friction": friction}, grid.line) as writer:
+        writer.put_grid(f"grid/{BODIES}", grid, Frame(np.zeros(3), np.eye(3)))
+        writer.put(f"surfaces/{BODIES}", {"height": height})
+        writer.put("path", _path(outcome.table))
+        method = {"method": history.method, "reason": history.reason}
+        writer.put("history", _columns(history, friction), **method)
         for index, state in zip(history.indices, history.states, strict=True):
-            group = f"contact/{BODIES}/{index + 1:05d}"
-            writer.put(
-                group,
-                pressure=state.traction[2],
-                shear=state.traction[:2],
-                slip=state.slip,
-                gap=state.gap,
-                sticking=stick_zone(state, friction),
-            )
-            file[group].attrs["increment"] = index + 1
+            place = f"contact/{BODIES}/{index + 1:05d}"
+            writer.put(place, _fields(state, friction), increment=index + 1)
 
 
-def _columns(history: History, friction: float) -> dict[str, Array]:
+def _path(table: LoadTable) -> dict[str, Dataset]:
+    """What the path imposes, ``(n,)`` each."""
+    columns = {
+        **resultant_columns(*(table[name] for name in FORCES)),
+        **motion_columns(*(table[name] for name in MOTIONS)),
+        "bulk_stress_1": Dataset(
+            table["bulk_stress_1"], "MPa", "stress along x in body 1 far below the contact"
+        ),
+        "bulk_stress_2": Dataset(
+            table["bulk_stress_2"], "MPa", "stress along x in body 2 far above the contact"
+        ),
+    }
+    return {name: columns[name] for name in table.columns}
+
+
+def _columns(history: History, friction: float) -> dict[str, Dataset]:
     """Resultants, rigid motions and energies of the computed increments, ``(n,)`` each."""
     forces = np.array([state.resultants for state in history.states])
     motions = np.array([state.rigid for state in history.states])
     energies = np.array([state.energy for state in history.states])
+    sliding = np.array([slides(state, friction) for state in history.states])
+    increment = np.array(history.indices) + 1
     return {
-        **dict(zip(FORCES, forces.T, strict=True)),
-        **dict(zip(MOTIONS, motions.T, strict=True)),
-        **dict(zip(("Edx", "Edy"), energies.T, strict=True)),
-        "sliding": np.array([slides(state, friction) for state in history.states]),
+        "increment": Dataset(increment, "1", "row of the path, counted from 1"),
+        **resultant_columns(*forces.T),
+        **motion_columns(*motions.T),
+        **energy_columns(*energies.T),
+        "sliding": sliding_column(sliding),
+    }
+
+
+def _fields(state: ContactState, friction: float) -> dict[str, Dataset]:
+    """The contact in one increment."""
+    sticking = stick_zone(state, friction)
+    return {
+        **traction_fields(state.traction[2], state.traction[:2], state.slip),
+        "gap": Dataset(state.gap, "mm", "distance of the deformed faces"),
+        "sticking": Dataset(sticking, "1", "whether the cell is pressed and its shear below µp"),
     }
 
 

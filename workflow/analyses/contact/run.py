@@ -9,6 +9,7 @@ from workflow.analyses.contact.bodies import bodies_of, grid_of, half_space_of, 
 from workflow.analyses.contact.case import ContactCase, LineContactCase
 from workflow.analyses.contact.results import (
     ContactOutcome,
+    ContactRun,
     write_contact_output,
     write_contact_results,
 )
@@ -17,25 +18,23 @@ from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
 
 
-def run_contact(
-    case: ContactCase | LineContactCase, folder: OutputFolder, reporter: Reporter
-) -> None:
+def run_contact(run: ContactRun) -> None:
     """Run a contact case to its end.
 
     Raises MethodFailed at an increment that does not converge or that no contact can carry; those
     before it are written. Raises UserError where ``contact.history`` does not suit the path.
     """
-    reporter.say(f"run: {case.title}")
-    outcome, message = _march(case, folder, reporter)
+    run.reporter.say(f"run: {run.case.title}")
+    outcome, message = _march(run.case, run.folder, run.reporter)
     if outcome.history.states:
-        _warn(outcome, reporter)
+        _warn(outcome, run.reporter)
     if message:
         kept = ""
         if outcome.history.states:
-            write_contact_results(outcome, folder)
-            kept = f"; the increments so far are in {folder.results}"
+            write_contact_results(outcome, run)
+            kept = f"; the increments so far are in {run.folder.results}"
         raise MethodFailed(f"{message}{kept}")
-    write_contact_output(outcome, folder, reporter)
+    write_contact_output(outcome, run)
 
 
 def _march(

@@ -122,8 +122,7 @@ class Recorded(Section):
     def read(self) -> tuple[Array, Array]:
         """Times [s] and forces [N] ``(s,)`` of the file. Raises InputFileError."""
         table = read_table_file(self.file)
-        for name in RECORDED:
-            table.require(name, " and ".join(RECORDED))
+        table.require(RECORDED, " and ".join(RECORDED))
         times, forces = (table.column(name, quantity) for name, quantity in RECORDED.items())
         return times, forces
 

@@ -11,7 +11,7 @@ def _run(run: Run[SpecimensCase]) -> None:
     # Finite elements take a second to load: where they are used.
     from workflow.analyses.specimens.run import run_specimens
 
-    run_specimens(run.case, run.folder, run.reporter)
+    run_specimens(run)
 
 
 ANALYSIS = Analysis(

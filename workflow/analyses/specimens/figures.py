@@ -11,7 +11,7 @@ import numpy as np
 from sa_solver.types import Array
 from workflow.pictures.fields import PRESSURE_COLOURS, centres, middle, near_middle, spread
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, new_figure
-from workflow.shell.store import grid_of
+from workflow.shell.results import grid_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

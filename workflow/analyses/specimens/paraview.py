@@ -12,7 +12,7 @@ import h5py
 import numpy as np
 
 from workflow.pictures.vtk import Step, attach, write_series, write_xml
-from workflow.shell.store import frame_of
+from workflow.shell.results import frame_of
 
 FIELDS = ("pressure", "gap", "shear_x", "cycle_slip", "worn_1", "worn_2")
 

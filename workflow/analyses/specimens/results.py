@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
 
 from fe_models.reduced_contact import masing_loop
 from fe_models.reduction import save_reduced
 from sa_solver.types import Array
+from workflow.analyses.contact.datasets import pressure_field
+from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.figures import figures_of
 from workflow.analyses.specimens.paraview import write_specimens
 from workflow.analyses.specimens.summary import (
@@ -23,16 +25,17 @@ from workflow.analyses.specimens.summary import (
     reported_summary,
     tied_pad,
 )
-from workflow.case.writing import dump_case
+from workflow.analyses.wear.datasets import cycles_column, face_mesh, kinetics_columns
 from workflow.pictures.drawing import write_pictures
-from workflow.shell.folder import OutputFolder
+from workflow.shell.analysis import Run
+from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
-from workflow.shell.store import ResultsWriter, replacing
+from workflow.shell.results import ResultsWriter, run_results
+from workflow.shell.store import replacing
 from workflow.shell.versions import versions
 
 if TYPE_CHECKING:
     from fe_models.cycle_blocks import BlockState
-    from workflow.analyses.specimens.half_space import HalfSpaceState
     from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
 
 # Name of the pad's grid, and of the two shapes that a half-space is put beside.
@@ -40,16 +43,15 @@ PAD = "pad"
 SHAPES = "unworn", "worn"
 
 
-def write_specimens_output(
-    outcome: SpecimensOutcome, folder: OutputFolder, reporter: Reporter
-) -> None:
+def write_specimens_output(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
+    folder, reporter = run.folder, run.reporter
     with reporter.stage("results"):
         folder.reduced.mkdir(exist_ok=True)
         for number, model in enumerate(outcome.model.reduction.models, 1):
             with replacing(folder.reduced / f"body_{number}.h5") as partial:
                 save_reduced(partial, model)
-        _write_results(outcome, folder)
+        _write_results(outcome, run)
     with reporter.stage("paraview and figures"):
         write_pictures(outcome.case.output, folder, figures_of, write_specimens)
     summary = _summary(outcome, reporter)
@@ -60,94 +62,124 @@ def write_specimens_output(
 # --- results ------------------------------------------------------------------------------------
 
 
-def _write_results(outcome: SpecimensOutcome, folder: OutputFolder) -> None:
-    case, face = outcome.case, outcome.model.face
-    with replacing(folder.results) as partial, h5py.File(partial, "w") as file:
-        writer = ResultsWriter(file)
-        file.attrs.update({"title": case.title, "friction": case.friction.coefficient})
-        file.create_group("case").attrs.update({"text": dump_case(case)} | versions())
-        writer.put_grid(PAD, outcome.half_space.grid, face.frame)
-        writer.put("specimens/pad", coordinates=face.coordinates, facets=face.facets)
+def _write_results(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -> None:
+    case, face, areas = outcome.case, outcome.model.face, outcome.pair.areas
+    with run_results(run, case, {"friction": case.friction.coefficient}) as writer:
+        writer.put_grid(f"grid/{PAD}", outcome.half_space.grid, face.frame)
+        writer.put("specimens/pad", face_mesh(face))
         reduction = outcome.model.reduction
-        for number, (full, reduced) in enumerate(
-            zip(reduction.full, reduction.reduced, strict=True), 1
+        for number, frequencies in enumerate(
+            zip(reduction.full, reduction.reduced, strict=True), start=1
         ):
-            writer.put(f"specimens/body_{number}", full=full, reduced=reduced)
-        for place, load in enumerate(outcome.loads):
-            group = f"loads/{place}"
-            _write_load(writer, group, load, outcome.pair.areas)
-            file[group].attrs["normal_force"] = load.force
-            file[group].attrs["unit"] = "N"
+            writer.put(f"specimens/body_{number}", _natural_frequencies(*frequencies))
+        for number, load in enumerate(outcome.loads):
+            _put_load(writer, f"loads/{number}", load, areas)
 
 
-def _write_load(writer: ResultsWriter, group: str, load: LoadOutcome, areas: Array) -> None:
-    writer.put(f"{group}/kinetics", **_kinetics(load.blocks, areas))
+def _natural_frequencies(full: Array, reduced: Array) -> dict[str, Dataset]:
+    what = "natural frequencies of the free body"
+    return {
+        "full": Dataset(full, "Hz", f"{what}, finite elements"),
+        "reduced": Dataset(reduced, "Hz", f"{what}, reduced model"),
+    }
+
+
+def _put_load(writer: ResultsWriter, group: str, load: LoadOutcome, areas: Array) -> None:
+    writer.put(group, {}, normal_force=load.force, unit="N")
+    writer.put(f"{group}/kinetics", _kinetics(load.blocks, areas))
     for number, kept in enumerate(load.kept):
-        name = f"{group}/states/{number:05d}"
-        _write_state(writer, name, kept, areas)
-        writer.file[name].attrs["cycles"] = kept.block.cycles
-        writer.file[name].attrs["energy"] = kept.block.energy
+        name, loop = f"{group}/states/{number:05d}", masing_loop(kept.curve)
+        numbers = {"cycles": kept.block.cycles, "energy": kept.block.energy}
+        writer.put(name, _state(kept, areas), **numbers)
+        writer.put(f"{name}/loop", _ring_loop(loop.displacement, loop.force))
     for shape, beside in zip(SHAPES, load.half_space, strict=True):
-        _write_half_space(writer, f"{group}/half_space/{shape}", beside)
+        name = f"{group}/half_space/{shape}"
+        writer.put(name, _pad_fields(beside.pressure, beside.shear, 4.0 * beside.slip))
+        writer.put(f"{name}/first_loading", _ring_loop(beside.displacement, beside.force))
     marched = load.marched
-    writer.put(
-        f"{group}/coupled_cycle",
-        ring_displacement=marched.displacement,
-        ring_force=marched.force,
-    )
+    writer.put(f"{group}/coupled_cycle", _ring_loop(marched.displacement, marched.force))
 
 
-def _kinetics(blocks: tuple[BlockState, ...], areas: Array) -> dict[str, Array]:
+def _kinetics(blocks: tuple[BlockState, ...], areas: Array) -> dict[str, Dataset]:
     """Numbers at the start of every cycle block, ``(blocks + 1,)`` each."""
     contacts = [state.contact for state in blocks]
     pressures = [contact.normal.pressure for contact in contacts]
-    columns: dict[str, Any] = {
-        "cycles": [state.cycles for state in blocks],
-        "energy": [state.energy for state in blocks],
-        "energy_per_cycle": [contact.energy for contact in contacts],
-        "stick_stiffness": [contact.stick_stiffness for contact in contacts],
-        "area": [contact.normal.area for contact in contacts],
-        "approach": [contact.normal.approach for contact in contacts],
-        "peak_pressure": [pressure.max() for pressure in pressures],
-        "pressure_deviation": [pressure_deviation(areas, pressure) for pressure in pressures],
-        "friction": [contact.friction for contact in contacts],
+    worn = [
+        (*(d.max() for d in state.depths), *(d @ areas for d in state.depths), state.energy)
+        for state in blocks
+    ]
+    area = np.array([contact.normal.area for contact in contacts])
+
+    def column(values: Iterable[float], unit: str, description: str) -> Dataset:
+        return Dataset(np.array([*values], dtype=np.float64), unit, description)
+
+    return {
+        "cycles": cycles_column(np.array([state.cycles for state in blocks], dtype=np.float64)),
+        **kinetics_columns(np.array(worn), area),
+        "energy_per_cycle": column(
+            (contact.energy for contact in contacts), "N mm", "energy dissipated in a cycle"
+        ),
+        "stick_stiffness": column(
+            (contact.stick_stiffness for contact in contacts),
+            "N/mm",
+            "tangential stiffness with all that touches stuck",
+        ),
+        "approach": column(
+            (contact.normal.approach for contact in contacts),
+            "mm",
+            "motion of body 1 towards body 2",
+        ),
+        "peak_pressure": column(
+            (pressure.max() for pressure in pressures), "MPa", "largest pressure"
+        ),
+        "pressure_deviation": column(
+            (pressure_deviation(areas, pressure) for pressure in pressures),
+            "1",
+            "root mean square of pressure/mean - 1 over the pad",
+        ),
+        "friction": column(
+            (contact.friction for contact in contacts), "1", "largest tangential over normal force"
+        ),
         # Infinite where nothing slides.
-        "stable_cycles": [contact.stable_cycles for contact in contacts],
+        "stable_cycles": column(
+            (contact.stable_cycles for contact in contacts),
+            "1",
+            "cycles of constant shape beyond which errors of shape grow",
+        ),
     }
-    for body in (0, 1):
-        columns[f"depth_{body + 1}"] = [s.depths[body].max() for s in blocks]
-        columns[f"volume_{body + 1}"] = [s.depths[body] @ areas for s in blocks]
-    return {name: np.array(values, dtype=np.float64) for name, values in columns.items()}
 
 
-def _write_state(writer: ResultsWriter, group: str, kept: KeptState, areas: Array) -> None:
-    block, curve = kept.block, kept.curve
-    contact, loop = block.contact, masing_loop(curve)
-    writer.put(
-        group,
-        pressure=contact.normal.pressure,
-        gap=contact.normal.gap,
-        shear_x=contact.tangential.shear / areas,
-        cycle_slip=contact.cycle_slip,
-        worn_1=block.depths[0],
-        worn_2=block.depths[1],
-        secant_stiffness=curve.secant_stiffness(SLOPE_SHARE),
-    )
-    writer.put(f"{group}/loop", ring_displacement=loop.displacement, ring_force=loop.force)
+def _state(kept: KeptState, areas: Array) -> dict[str, Dataset]:
+    """The pad in a worn state, at its nodes."""
+    block, contact = kept.block, kept.block.contact
+    secant = np.array(kept.curve.secant_stiffness(SLOPE_SHARE))
+    slope = "slope of the loop up to half of its largest force"
+    return {
+        **_pad_fields(
+            contact.normal.pressure, contact.tangential.shear / areas, contact.cycle_slip
+        ),
+        "gap": Dataset(contact.normal.gap, "mm", "distance of the deformed faces"),
+        "worn_1": Dataset(block.depths[0], "mm", "worn depth of body 1"),
+        "worn_2": Dataset(block.depths[1], "mm", "worn depth of body 2"),
+        "secant_stiffness": Dataset(secant, "N/mm", slope),
+    }
 
 
-def _write_half_space(writer: ResultsWriter, group: str, beside: HalfSpaceState) -> None:
-    writer.put(
-        group,
-        pressure=beside.pressure,
-        shear_x=beside.shear,
-        cycle_slip=4.0 * beside.slip,
-    )
-    writer.put(
-        f"{group}/first_loading",
-        ring_displacement=beside.displacement,
-        ring_force=beside.force,
-    )
+def _pad_fields(pressure: Array, shear: Array, cycle_slip: Array) -> dict[str, Dataset]:
+    """Tractions of first loading, and slip, at the nodes of the pad or the cells of its grid."""
+    along = "shear on body 2 along x at the end of first loading"
+    return {
+        "pressure": pressure_field(pressure),
+        "shear_x": Dataset(shear, "MPa", along),
+        "cycle_slip": Dataset(cycle_slip, "mm", "path of slip along x in a cycle"),
+    }
+
+
+def _ring_loop(displacement: Array, force: Array) -> dict[str, Dataset]:
+    return {
+        "ring_displacement": Dataset(displacement, "mm", "motion of body 2's ring along x"),
+        "ring_force": Dataset(force, "N", "force along x that moves body 2's ring"),
+    }
 
 
 # --- summary ------------------------------------------------------------------------------------

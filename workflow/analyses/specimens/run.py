@@ -27,7 +27,7 @@ from workflow.analyses.specimens.outcome import (
 )
 from workflow.analyses.specimens.results import write_specimens_output
 from workflow.errors import MethodFailed, UserError
-from workflow.shell.folder import OutputFolder
+from workflow.shell.analysis import Run
 from workflow.shell.reporter import Reporter
 
 # States of each force that are kept with their fields: the unworn one, the last, others between
@@ -44,20 +44,20 @@ SMALL_MOTION = 1e-3
 MOST_BLOCKS = 20_000
 
 
-def run_specimens(case: SpecimensCase, folder: OutputFolder, reporter: Reporter) -> None:
+def run_specimens(run: Run[SpecimensCase]) -> None:
     """Run a case of specimens to its end.
 
     Raises UserError where the mesher refuses or a cycle block would be unstable, MethodFailed where
     a contact does not converge.
     """
-    reporter.say(f"run: {case.title}")
+    run.reporter.say(f"run: {run.case.title}")
     try:
-        outcome = _compute(case, reporter)
+        outcome = _compute(run.case, run.reporter)
     except MeshError as error:
-        raise UserError(f"{folder.case}: {error}") from error
+        raise UserError(f"{run.folder.case}: {error}") from error
     except CycleBlockError as error:
-        raise UserError(f"{folder.case}: wear.cycle_block.length: {error}") from error
-    write_specimens_output(outcome, folder, reporter)
+        raise UserError(f"{run.folder.case}: wear.cycle_block.length: {error}") from error
+    write_specimens_output(outcome, run)
 
 
 def _compute(case: SpecimensCase, reporter: Reporter) -> SpecimensOutcome:

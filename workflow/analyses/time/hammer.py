@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from fe_models.dynamics.excitation import HammerBlow
 from fe_models.dynamics.free_decay import ring_down
@@ -24,6 +25,7 @@ from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.time.motion import motion_curves, motion_numbers, motion_of, step_control
 from workflow.analyses.time.outcome import MOTION, RESPONSE, RING_DOWN, State, TimeOutcome
 from workflow.errors import MethodFailed
+from workflow.shell.dataset import Dataset, Datasets
 from workflow.shell.reporter import Reporter
 
 # The second mode is looked for between these shares of its frequencies without the joint and with
@@ -94,15 +96,21 @@ def _state(
     seen = response.frequency <= hammer.highest
     curves = {
         MOTION: motion_curves(rig, motion, blow),
-        RESPONSE: {
-            "frequency": response.frequency[seen],
-            "magnitude": np.abs(response.value[seen]),
-            "phase": np.angle(response.value[seen]),
-        },
+        RESPONSE: _response(response.frequency[seen], response.value[seen]),
     }
     if decay is not None:
         curves[RING_DOWN] = decay
     return State(energy, None, joint.parameters(energy), numbers, curves)
+
+
+def _response(frequency: Array, value: NDArray[np.complex128]) -> dict[str, Dataset]:
+    """A frequency response ``(n,)``."""
+    size = "acceleration of what is looked at, over the excitation"
+    return {
+        "frequency": Dataset(frequency, "Hz", "frequency"),
+        "magnitude": Dataset(np.abs(value), "mm/(s^2 N)", size),
+        "phase": Dataset(np.angle(value), "rad", "of the acceleration before the excitation"),
+    }
 
 
 def _peak(
@@ -132,7 +140,7 @@ def _decay_time(motion: Motion) -> float:
 
 def _ring_down(
     rig: RigModel, motion: Motion, hammer: given.Hammer, energy: float, reporter: Reporter
-) -> dict[str, Array] | None:
+) -> dict[str, Dataset] | None:
     """Frequency and damping of the first mode against its amplitude; None of a dead beat.
 
     By the acceleration, as it is measured: what the joint creeps does not disturb it.
@@ -149,19 +157,20 @@ def _ring_down(
         reporter.warn(f"no ring-down at {joules(energy)}: over before the filter has settled")
         return None
     kept = np.unique(np.linspace(0, len(amplitude) - 1, RING_DOWN_POINTS).astype(int))
+    size = "amplitude of what is looked at, in its first mode"
     return {
-        "amplitude": amplitude[kept],
-        "frequency": found.frequency[kept],
-        "damping_ratio": found.damping_ratio[kept],
+        "amplitude": Dataset(amplitude[kept], "mm", size),
+        "frequency": Dataset(found.frequency[kept], "Hz", "instantaneous frequency"),
+        "damping_ratio": Dataset(found.damping_ratio[kept], "1", "instantaneous damping ratio"),
     }
 
 
-def _ends(decay: dict[str, Array] | None) -> dict[str, dict[str, float]] | None:
+def _ends(decay: Datasets | None) -> dict[str, dict[str, float]] | None:
     """A ring-down where it is largest and where it is smallest."""
     if decay is None:
         return None
     return {
-        when: {name: float(values[place]) for name, values in decay.items()}
+        when: {name: float(curve.values[place]) for name, curve in decay.items()}
         for when, place in (("largest", 0), ("smallest", -1))
     }
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,7 +13,7 @@ from wear.joints.ageing import (
     LongTest,
     MarchedStroke,
     NeverReachedError,
-    integrated_stretch,
+    integrate_cycles,
     long_test,
     steady_stroke,
 )
@@ -22,8 +22,9 @@ from wear.joints.measured_loops import MeasuredLoopError, measure_loops
 from workflow.analyses.rig.laws import Law
 from workflow.analyses.time.case import Ageing, JointCase, joules
 from workflow.analyses.time.joint_model import JointModel
-from workflow.analyses.time.outcome import LOOP, PARAMETERS, State, TimeOutcome
+from workflow.analyses.time.outcome import LOOP, State, TimeOutcome, loop_curves
 from workflow.errors import MethodFailed, UserError
+from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
 # Points of a loop: those of a cosine over a cycle, dense where the motion turns.
@@ -70,7 +71,7 @@ def _state(model: JointModel, energy: float, cycles: float, amplitude: float) ->
         "force": 0.5 * float(np.ptp(force)),
         "extracted": extracted(displacement, force, parameters["normal_load"]),
     }
-    curves = {LOOP: {"displacement": displacement, "force": force}}
+    curves = {LOOP: loop_curves(displacement, force)}
     return State(energy, cycles, parameters, numbers, curves)
 
 
@@ -153,19 +154,35 @@ def evolution_curve(
     last: float,
     test: LongTest | None = None,
     rate: Callable[[float], float] | None = None,
-) -> dict[str, Array]:
+) -> dict[str, Dataset]:
     """Parameters over the energy up to the ``last``; cycles and energy per cycle where aged."""
     energy = np.array([0.0])
     if last > 0.0:
         even = np.linspace(0.0, last, CURVE_POINTS)
         energy = np.union1d(even, np.geomspace(CURVE_BEGIN * last, last, CURVE_POINTS)[:-1])
     parameters = [model.parameters(float(own)) for own in energy]
-    curve = {"energy": energy}
+    curve = {"energy": Dataset(energy, "N mm", "energy dissipated so far in the joint")}
     if test is not None and rate is not None:
-        curve["cycles"] = test.cycles_at(energy)
-        curve["energy_per_cycle"] = np.array([rate(float(own)) for own in energy])
-    names = [name for name in PARAMETERS if name in parameters[0]]
-    return curve | {name: np.array([own[name] for own in parameters]) for name in names}
+        per_cycle = np.array([rate(float(own)) for own in energy])
+        curve |= {
+            "cycles": Dataset(test.cycles_at(energy), "1", "cycles so far"),
+            "energy_per_cycle": Dataset(per_cycle, "N mm", "energy dissipated in a cycle"),
+        }
+    return curve | _parameter_columns(parameters)
+
+
+def _parameter_columns(parameters: Sequence[Mapping[str, float]]) -> dict[str, Dataset]:
+    """The parameters that the law has, ``(n,)`` each, by name."""
+    described = {
+        "friction": ("1", "coefficient of friction"),
+        "stiffness": ("N/mm", "slope of the stuck joint"),
+        "residual_stiffness": ("N/mm", "slope of the sliding joint"),
+        "normal_load": ("N", "normal load"),
+    }
+    return {
+        name: Dataset(np.array([own[name] for own in parameters]), *described[name])
+        for name in parameters[0]
+    }
 
 
 def _ageing_numbers(model: JointModel, test: LongTest, amplitude: float) -> dict[str, Any]:
@@ -177,7 +194,7 @@ def _ageing_numbers(model: JointModel, test: LongTest, amplitude: float) -> dict
         return numbers
     begin = float(test.energy_at(first))
     marched = MarchedStroke(model.line_law, model.evolution, amplitude, start=begin)
-    stretch = integrated_stretch(test, marched, first, cycles)
+    stretch = integrate_cycles(test, marched, first, cycles)
     return numbers | {
         "stretch": {
             "first": stretch.first,

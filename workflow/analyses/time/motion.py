@@ -9,11 +9,11 @@ import numpy as np
 from fe_models.dynamics.excitation import ExcitationForce
 from fe_models.dynamics.motion import Motion, Start
 from fe_models.dynamics.newmark import TimeStepControl, integrate
-from sa_solver.types import Array
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.time.case import RigCase, joules
 from workflow.analyses.time.joint_model import JointModel
 from workflow.errors import MethodFailed
+from workflow.shell.dataset import Dataset
 
 
 def step_control(case: RigCase) -> TimeStepControl:
@@ -53,13 +53,18 @@ def motion_numbers(rig: RigModel, motion: Motion) -> dict[str, Any]:
     }
 
 
-def motion_curves(rig: RigModel, motion: Motion, force: ExcitationForce) -> dict[str, Array]:
+def motion_curves(rig: RigModel, motion: Motion, force: ExcitationForce) -> dict[str, Dataset]:
     """What is kept of a motion."""
+    seen, pull = rig.seen.T, "force of the joint, or the sum of several, resisting"
+    dissipated = motion.energies.joints.sum(axis=1)
+    lost = "energy that the joint has dissipated since the beginning"
     return {
-        "time": motion.times,
-        "excitation": force.value(motion.times),
-        "displacement": motion.displacement @ rig.seen.T,
-        "acceleration": motion.acceleration @ rig.seen.T,
-        "joint_force": rig.loop(motion)[1],
-        "dissipated": motion.energies.joints.sum(axis=1),
+        "time": Dataset(motion.times, "s", "time"),
+        "excitation": Dataset(force.value(motion.times), "N", "force of the excitation"),
+        "displacement": Dataset(motion.displacement @ seen, "mm", "displacements of what is seen"),
+        "acceleration": Dataset(
+            motion.acceleration @ seen, "mm/s^2", "accelerations of what is seen"
+        ),
+        "joint_force": Dataset(rig.loop(motion)[1], "N", pull),
+        "dissipated": Dataset(dissipated, "N mm", lost),
     }

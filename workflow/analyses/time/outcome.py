@@ -8,6 +8,7 @@ from typing import Any
 
 from sa_solver.types import Array
 from workflow.analyses.time.case import JointCase, RigCase
+from workflow.shell.dataset import Dataset, Datasets
 
 # The parameters of a joint that evolve, in the order in which they are told.
 PARAMETERS = ("friction", "stiffness", "residual_stiffness", "normal_load")
@@ -20,14 +21,14 @@ class State:
     """The joint after it has dissipated ``energy`` [N mm] in so many ``cycles``, if they are known.
 
     ``parameters`` by the names of :data:`PARAMETERS`, ``numbers`` for the summary, and ``curves``
-    by group and dataset (:data:`DATASETS`), the first axis of each along the curve.
+    by group, the first axis of each along the curve.
     """
 
     energy: float
     cycles: float | None
     parameters: Mapping[str, float]
     numbers: Mapping[str, Any]
-    curves: Mapping[str, Mapping[str, Array]]
+    curves: Mapping[str, Datasets]
 
 
 @dataclass(frozen=True)
@@ -41,45 +42,15 @@ class TimeOutcome:
 
     case: JointCase | RigCase
     states: tuple[State, ...]
-    evolution: Mapping[str, Array]
+    evolution: Datasets
     numbers: Mapping[str, Any] = field(default_factory=dict)
     seen: tuple[str, ...] = ()
 
 
-# Unit and description of every dataset, by group and name.
-DATASETS: dict[str, dict[str, tuple[str, str]]] = {
-    "evolution": {
-        "energy": ("N mm", "energy dissipated so far in the joint"),
-        "cycles": ("1", "cycles so far"),
-        "energy_per_cycle": ("N mm", "energy dissipated in a cycle"),
-        "friction": ("1", "coefficient of friction"),
-        "stiffness": ("N/mm", "slope of the stuck joint"),
-        "residual_stiffness": ("N/mm", "slope of the sliding joint"),
-        "normal_load": ("N", "normal load"),
-    },
-    LOOP: {
-        "displacement": ("mm", "displacement of the joint, or the mean of several, in a cycle"),
-        "force": ("N", "force that resists it"),
-    },
-    MOTION: {
-        "time": ("s", "time"),
-        "excitation": ("N", "force of the excitation"),
-        "displacement": ("mm", "displacements of what is seen"),
-        "acceleration": ("mm/s^2", "accelerations of what is seen"),
-        "joint_force": ("N", "force of the joint, or the sum of several, resisting"),
-        "dissipated": ("N mm", "energy that the joint has dissipated since the beginning"),
-    },
-    RESPONSE: {
-        "frequency": ("Hz", "frequency"),
-        "magnitude": (
-            "mm/(s^2 N)",
-            "acceleration of what is looked at, over the excitation",
-        ),
-        "phase": ("rad", "of the acceleration before the excitation"),
-    },
-    RING_DOWN: {
-        "amplitude": ("mm", "amplitude of what is looked at, in its first mode"),
-        "frequency": ("Hz", "instantaneous frequency"),
-        "damping_ratio": ("1", "instantaneous damping ratio"),
-    },
-}
+def loop_curves(displacement: Array, force: Array) -> dict[str, Dataset]:
+    """A loop of the joint, or of several together."""
+    moved = "displacement of the joint, or the mean of several, in a cycle"
+    return {
+        "displacement": Dataset(displacement, "mm", moved),
+        "force": Dataset(force, "N", "force that resists it"),
+    }

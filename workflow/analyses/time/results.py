@@ -2,34 +2,31 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-import h5py
-import numpy as np
-
-from sa_solver.types import Array
+from workflow.analyses.time.case import JointCase, RigCase
 from workflow.analyses.time.figures import figures_of
-from workflow.analyses.time.outcome import DATASETS, MOTION, State, TimeOutcome
-from workflow.case.writing import dump_case
+from workflow.analyses.time.outcome import MOTION, State, TimeOutcome
 from workflow.pictures.drawing import write_pictures
-from workflow.shell.folder import OutputFolder
+from workflow.shell.analysis import Run
 from workflow.shell.reporter import Reporter
-from workflow.shell.store import replacing
+from workflow.shell.results import run_results
 from workflow.shell.summary import number_at
+from workflow.shell.tables import write_curves
 from workflow.shell.versions import versions
 
 EVOLUTION = "evolution"
-# Datasets larger than this are worth packing.
-LARGE = 4096
+
+TimeRun = Run[JointCase | RigCase]
 
 
-def write_time_output(outcome: TimeOutcome, folder: OutputFolder, reporter: Reporter) -> None:
+def write_time_output(outcome: TimeOutcome, run: TimeRun) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
+    folder, reporter = run.folder, run.reporter
     with reporter.stage("results"):
-        _write_results(outcome, folder.results)
+        _write_results(outcome, run)
         _write_tables(outcome, folder.root)
     with reporter.stage("paraview and figures"):
         write_pictures(outcome.case.output, folder, figures_of)
@@ -41,48 +38,27 @@ def write_time_output(outcome: TimeOutcome, folder: OutputFolder, reporter: Repo
 # --- results and tables -------------------------------------------------------------------------
 
 
-def _write_results(outcome: TimeOutcome, path: Path) -> None:
-    with replacing(path) as partial, h5py.File(partial, "w") as file:
-        case = outcome.case
-        file.attrs.update({"title": case.title, "analysis": case.analysis, "law": case.joint.law})
-        if outcome.seen:
-            file.attrs["seen"] = outcome.seen
-        file.create_group("case").attrs.update({"text": dump_case(case)} | versions())
-        _put(file, EVOLUTION, EVOLUTION, outcome.evolution)
+def _write_results(outcome: TimeOutcome, run: TimeRun) -> None:
+    case = outcome.case
+    attributes = {"analysis": case.analysis, "law": case.joint.law, "seen": outcome.seen or None}
+    with run_results(run, case, attributes) as writer:
+        writer.put(EVOLUTION, outcome.evolution)
         for number, state in enumerate(outcome.states):
-            group = file.create_group(f"states/{number:05d}")
+            place = f"states/{number:05d}"
             scalars = {k: v for k, v in state.numbers.items() if isinstance(v, int | float | list)}
-            group.attrs.update({"energy": state.energy, **state.parameters, **scalars})
-            if state.cycles is not None:
-                group.attrs["cycles"] = state.cycles
-            for kind, curves in state.curves.items():
-                _put(file, f"states/{number:05d}/{kind}", kind, curves)
-
-
-def _put(file: h5py.File, place: str, kind: str, curves: Mapping[str, Array]) -> None:
-    """Write the curves of one kind, each with its unit and description."""
-    for name, values in curves.items():
-        packed = {"compression": "gzip", "compression_opts": 1} if values.size > LARGE else {}
-        dataset = file.create_dataset(f"{place}/{name}", data=values, **packed)
-        dataset.attrs["unit"], dataset.attrs["description"] = DATASETS[kind][name]
+            parameters = {"energy": state.energy, "cycles": state.cycles, **state.parameters}
+            writer.put(place, {}, **(parameters | scalars))
+            for group, curves in state.curves.items():
+                writer.put(f"{place}/{group}", curves)
 
 
 def _write_tables(outcome: TimeOutcome, root: Path) -> None:
     """The evolution, and the curves of every state, as CSV in base units; motions are too long."""
-    _write_table(root / f"{EVOLUTION}.csv", EVOLUTION, outcome.evolution)
+    write_curves(root / f"{EVOLUTION}.csv", outcome.evolution)
     for number, state in enumerate(outcome.states):
-        for kind, curves in state.curves.items():
-            if kind != MOTION:
-                _write_table(root / f"{kind}_{number:05d}.csv", kind, curves)
-
-
-def _write_table(path: Path, kind: str, curves: Mapping[str, Array]) -> None:
-    units = {name: unit for name, (unit, _) in DATASETS[kind].items()}
-    with replacing(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow([f"{name} [{units[name]}]" for name in curves])
-        for row in np.column_stack(list(curves.values())):
-            writer.writerow([f"{value:.9g}" for value in row])
+        for group, curves in state.curves.items():
+            if group != MOTION:
+                write_curves(root / f"{group}_{number:05d}.csv", curves)
 
 
 # --- summary ------------------------------------------------------------------------------------

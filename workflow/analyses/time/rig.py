@@ -23,7 +23,7 @@ from workflow.analyses.time.joint import aged, energies_within, evolution_curve,
 from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.time.memory import memory
 from workflow.analyses.time.motion import motion_curves, motion_numbers, motion_of, step_control
-from workflow.analyses.time.outcome import LOOP, MOTION, State, TimeOutcome
+from workflow.analyses.time.outcome import LOOP, MOTION, State, TimeOutcome, loop_curves
 from workflow.errors import MethodFailed
 from workflow.shell.reporter import Reporter
 
@@ -147,7 +147,7 @@ def _steady_state(
         "change": cycle.change,
         "step_error": cycle.error,
     }
-    curves = {LOOP: {"displacement": cycle.stretch, "force": cycle.force}}
+    curves = {LOOP: loop_curves(cycle.stretch, cycle.force)}
     return State(energy, cycles, parameters, numbers, curves)
 
 

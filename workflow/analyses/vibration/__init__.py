@@ -17,7 +17,7 @@ def _run(run: Run[VibrationCase]) -> None:
     # Joint laws are compiled when they are first needed.
     from workflow.analyses.vibration.run import run_vibration
 
-    run_vibration(run.case, run.folder, run.reporter)
+    run_vibration(run)
 
 
 def _quantities(case: VibrationCase, summary: Summary) -> list[str]:

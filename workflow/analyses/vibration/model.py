@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, HarmonicSolution, PeriodicLoad
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.receptance import Receptance
 from sa_solver.types import Array
@@ -22,6 +23,7 @@ from workflow.analyses.rig.structure import FrictionRig
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.memory import memory
 from workflow.errors import MethodFailed
+from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
 # Frequencies of the linear limits, beside their own natural frequencies. Each takes the inverse of
@@ -100,23 +102,26 @@ class VibrationModel:
             numbers["joints"] = self.rig.joints
         return numbers
 
-    def contact(self) -> dict[str, Array] | None:
+    def contact(self) -> dict[str, Dataset] | None:
         """Where joints are and how they rest, if they have places."""
         rig = self.rig
         if rig.places is None:
             return None
         assert rig.gap is not None
         assert rig.area is not None
+        force, closing = self.rest.cycle.samples[0, :, 2], self.rest.coefficients[:, 0, 2]
         return {
-            "x": rig.places[:, 0],
-            "y": rig.places[:, 1],
-            "gap": rig.gap,
-            "area": rig.area,
-            "normal_force": self.rest.cycle.samples[0, :, 2],
-            "normal_displacement": self.rest.coefficients[:, 0, 2],
+            "x": Dataset(rig.places[:, 0], "mm", "of each joint on the contact plane"),
+            "y": Dataset(rig.places[:, 1], "mm", "of each joint on the contact plane"),
+            "gap": Dataset(rig.gap, "mm", "of the bodies without load"),
+            "area": Dataset(rig.area, "mm^2", "that belongs to each joint"),
+            "normal_force": Dataset(force, "N", "of each joint at rest"),
+            "normal_displacement": Dataset(
+                closing, "mm", "closing of each joint by the load at rest"
+            ),
         }
 
-    def linear(self, span: tuple[float, float]) -> dict[str, Array]:
+    def linear(self, span: tuple[float, float]) -> dict[str, Dataset]:
         """Amplitude over force of what is looked at, with the joints free, and stuck."""
         natural = np.array([*self._natural["free"], *self._natural["stuck"]])
         inside = natural[(natural > span[0]) & (natural < span[1])]
@@ -125,7 +130,12 @@ class VibrationModel:
         frequency = np.union1d(np.geomspace(*span, points), inside)
         parts = np.array_split(frequency, -(-len(frequency) // AT_ONCE))
         free, stuck = np.concatenate([self._limits(part) for part in parts], axis=1)
-        return {"frequency": frequency, "free": free, "stuck": stuck}
+        size = "amplitude of what is looked at over the force"
+        return {
+            "frequency": Dataset(frequency, "Hz", "frequency of the force"),
+            "free": Dataset(free, "mm/N", f"{size}, without the joints"),
+            "stuck": Dataset(stuck, "mm/N", f"{size}, all joints stuck"),
+        }
 
     def _limits(self, frequency: Array) -> Array:
         """Amplitudes over force ``(2, f)`` [mm/N], joints free and stuck.

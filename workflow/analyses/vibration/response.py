@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -19,7 +19,8 @@ from fe_models.dynamics.forced_response import (
     along_frequency,
     finer_resolution,
 )
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, HarmonicSolution
+from fe_models.dynamics.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import Resolution
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
@@ -31,6 +32,7 @@ from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Curves, Response
 from workflow.errors import MethodFailed
+from workflow.shell.dataset import Dataset, Datasets
 from workflow.shell.reporter import Reporter
 
 # Times of a period from which amplitudes are taken: between them harmonic 1 is 5e-6 larger.
@@ -89,7 +91,7 @@ def response_under(
     if branch.message:
         reporter.warn(f"{force:g} N: {branch.message}")
     curves = _curves(model, branch)
-    if int(np.argmax(curves["amplitude"][:, -1])) in (0, len(branch.solutions) - 1):
+    if int(np.argmax(curves["amplitude"].values[:, -1])) in (0, len(branch.solutions) - 1):
         reporter.warn(f"{force:g} N: no resonance, the largest motion is at an end of the curve")
     peak = _resonance(model, branch, curves)
     # The peak may have been found before the resolution grew.
@@ -130,18 +132,22 @@ def force_sweep(
         reporter.warn(f"{frequency:g} Hz, along the force: {branch.message}")
     curves = _curves(model, branch)
     shared = ("phase", "damping", "energy_per_cycle", "slip", "left_out")
-    values = {"force": branch.forces, "amplitude": curves["amplitude"][:, -1]}
-    values |= {name: curves[name] for name in shared}
+    along = "amplitude of the force, in the order of the curve"
+    datasets = {
+        "force": Dataset(branch.forces, "N", along),
+        "amplitude": amplitude_column(curves["amplitude"].values[:, -1]),
+        **{name: curves[name] for name in shared},
+    }
     folds = [float(branch.curve.parameters[place]) for place in branch.curve.folds]
     points = len(branch.solutions)
     numbers = {"frequency": frequency, "points": points, "folds": folds, "message": branch.message}
-    return Curves(values, numbers)
+    return Curves(datasets, numbers)
 
 
 def _numbers(
     model: VibrationModel,
     branch: ResponseBranch,
-    curves: Mapping[str, Array],
+    curves: Datasets,
     problem: HarmonicBalance,
     resonance: HarmonicSolution,
 ) -> dict[str, Any]:
@@ -152,7 +158,7 @@ def _numbers(
         "resonance": resonance.frequency,
         "amplitude": float(amplitudes[-1]),
         "receptance": float(amplitudes[-1]) / resonance.force,
-        "first_amplitude": float(max(amplitudes[0], curves["amplitude"][:, 0].max())),
+        "first_amplitude": float(max(amplitudes[0], curves["amplitude"].values[:, 0].max())),
         "energy_per_cycle": float(resonance.cycle.dissipated.sum()),
         "damping": damping_ratio(problem, resonance),
         "slip": share_of(model, resonance, SLIP),
@@ -167,18 +173,46 @@ def _numbers(
     }
 
 
-def _curves(model: VibrationModel, branch: ResponseBranch) -> dict[str, Array]:
-    solutions = branch.solutions
-    seen = model.rig.seen[-1]
+def _curves(model: VibrationModel, branch: ResponseBranch) -> dict[str, Dataset]:
+    motions, looked_at = branch.solutions, model.rig.seen[-1]
+    amplitudes = np.array([amplitudes_of(model, motion) for motion in motions])
+    phases = np.array([_phase(motion, looked_at) for motion in motions])
+    separated = np.array([share_of(model, motion, SEPARATED) for motion in motions])
+    left_out = np.array([motion.left_out for motion in motions])
+    along = "frequency of the force, in the order of the curve"
+    seen = "half of the way to and fro of what is seen, the last looked at"
+    lag = "of harmonic 1 of what is looked at before the force"
+    beyond = "estimated share of the joints' vibration in harmonics left out"
     return {
-        "frequency": branch.frequencies,
-        "amplitude": np.array([amplitudes_of(model, own) for own in solutions]),
-        "phase": np.array([_phase(own, seen) for own in solutions]),
-        "energy_per_cycle": np.array([own.cycle.dissipated.sum() for own in solutions]),
-        "damping": np.array([damping_ratio(branch.problem, own) for own in solutions]),
-        "slip": np.array([share_of(model, own, SLIP) for own in solutions]),
-        "separated": np.array([share_of(model, own, SEPARATED) for own in solutions]),
-        "left_out": np.array([own.left_out for own in solutions]),
+        "frequency": Dataset(branch.frequencies, "Hz", along),
+        "amplitude": Dataset(amplitudes, "mm", seen),
+        "phase": Dataset(phases, "rad", lag),
+        **joint_columns(model, branch.problem, motions),
+        "separated": Dataset(separated, "1", "share of the cycle in which they are apart"),
+        "left_out": Dataset(left_out, "1", beyond),
+    }
+
+
+def amplitude_column(amplitude: Array) -> Dataset:
+    """Amplitude ``(n,)`` of what is looked at, along a curve."""
+    return Dataset(amplitude, "mm", "half of the way to and fro of what is looked at")
+
+
+def joint_columns(
+    model: VibrationModel, problem: HarmonicBalance, motions: Sequence[HarmonicSolution]
+) -> dict[str, Dataset]:
+    """What the joints do in motions along a curve, ``(n,)`` each."""
+    dissipated = np.array([motion.cycle.dissipated.sum() for motion in motions])
+    damping = np.array([damping_ratio(problem, motion) for motion in motions])
+    slips = "share of the cycle in which a joint slips, mean of those that touch at rest"
+    lost = "energy lost in a cycle over 4π times the largest kinetic energy"
+    slip = np.array([share_of(model, motion, SLIP) for motion in motions])
+    return {
+        "energy_per_cycle": Dataset(
+            dissipated, "N mm", "energy that the joints dissipate in a cycle"
+        ),
+        "damping": Dataset(damping, "1", lost),
+        "slip": Dataset(slip, "1", slips),
     }
 
 
@@ -199,23 +233,30 @@ def share_of(model: VibrationModel, solution: HarmonicSolution, state: int) -> f
     return float((solution.cycle.states[:, model.touching] == state).mean())
 
 
-def _nodes(branch: ResponseBranch) -> dict[str, Array]:
+def _nodes(branch: ResponseBranch) -> dict[str, Dataset]:
     """What each joint does along the curve."""
-    cycles = [own.cycle for own in branch.solutions]
+    cycles = [motion.cycle for motion in branch.solutions]
+    slip = np.array([(cycle.states == SLIP).mean(axis=0) for cycle in cycles])
+    separated = np.array([(cycle.states == SEPARATED).mean(axis=0) for cycle in cycles])
+    energy = np.array([cycle.dissipated for cycle in cycles])
+    share = "share of the cycle in which each joint"
     return {
-        "slip": np.array([(cycle.states == SLIP).mean(axis=0) for cycle in cycles]),
-        "separated": np.array([(cycle.states == SEPARATED).mean(axis=0) for cycle in cycles]),
-        "energy": np.array([cycle.dissipated for cycle in cycles]),
+        "slip": Dataset(slip, "1", f"{share} slips, by point of the curve"),
+        "separated": Dataset(separated, "1", f"{share} is apart"),
+        "energy": Dataset(energy, "N mm", "energy that each joint dissipates in a cycle"),
     }
 
 
-def _cycle(solution: HarmonicSolution) -> dict[str, Array]:
+def _cycle(solution: HarmonicSolution) -> dict[str, Dataset]:
     """Displacements, forces and states of all joints in a cycle."""
-    displacement = solution.resolution.basis @ solution.coefficients
+    displacement = (solution.resolution.basis @ solution.coefficients).transpose(1, 0, 2)
+    states = solution.cycle.states.astype(np.int8)
+    moved = "of each joint along x, y and its closing, at times of a cycle"
+    pulled = "of each joint along x, y and its pressure"
     return {
-        "displacement": displacement.transpose(1, 0, 2),
-        "force": solution.cycle.samples,
-        "state": solution.cycle.states.astype(np.int8),
+        "displacement": Dataset(displacement, "mm", moved),
+        "force": Dataset(solution.cycle.samples, "N", pulled),
+        "state": Dataset(states, "1", "of each joint: 0 sticks, 1 slips, 2 is apart"),
     }
 
 
@@ -236,14 +277,12 @@ def _warn_of_stroke(model: VibrationModel, motion: HarmonicSolution, reporter: R
 # --- resonance ----------------------------------------------------------------------------------
 
 
-def _resonance(
-    model: VibrationModel, branch: ResponseBranch, curves: Mapping[str, Array]
-) -> HarmonicSolution:
+def _resonance(model: VibrationModel, branch: ResponseBranch, curves: Datasets) -> HarmonicSolution:
     """The motion in which what is looked at moves most: between the points beside the largest.
 
     Where the curve folds there, or ends, the largest point itself.
     """
-    sizes = curves["amplitude"][:, -1]
+    sizes = curves["amplitude"].values[:, -1]
     place = int(np.argmax(sizes))
     best = branch.solutions[place]
     if place in (0, len(sizes) - 1):
@@ -323,10 +362,13 @@ def loop_of(case: VibrationCase, model: VibrationModel, motion: HarmonicSolution
     force = motion.cycle.samples[:, :, rig.along].sum(axis=1)
     total = motion.cycle.force[:, :, rig.along].sum(axis=0)
     expansion = motion.resolution.basis @ total
-    values = {
-        "displacement": closed(displacement),
-        "force": closed(force),
-        "expansion": closed(expansion),
+    moved = "between the targets, or the mean of the joints, in a cycle"
+    datasets = {
+        "displacement": Dataset(closed(displacement), "mm", moved),
+        "force": Dataset(closed(force), "N", "of all joints together along it"),
+        "expansion": Dataset(
+            closed(expansion), "N", "the same in the harmonics of the motion alone"
+        ),
     }
     numbers = {
         "frequency": motion.frequency,
@@ -339,7 +381,7 @@ def loop_of(case: VibrationCase, model: VibrationModel, motion: HarmonicSolution
         "deformation": _deformation(force, expansion),
         **_slopes(model, motion, displacement, force, case.joint.normal_load),
     }
-    return Curves(values, numbers)
+    return Curves(datasets, numbers)
 
 
 def _deformation(force: Array, expansion: Array) -> float:

@@ -5,11 +5,9 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import h5py
-
+from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.figures.response import figures_of
 from workflow.analyses.vibration.outcome import (
-    DATASETS,
     FORCE_SWEEPS,
     LOOPS,
     NODES,
@@ -19,24 +17,22 @@ from workflow.analyses.vibration.outcome import (
     VibrationOutcome,
 )
 from workflow.analyses.vibration.paraview import write_vibration
-from workflow.analyses.vibration.store import put, write_table
-from workflow.case.writing import dump_case
 from workflow.pictures.drawing import write_pictures
-from workflow.shell.folder import OutputFolder
+from workflow.shell.analysis import Run
 from workflow.shell.reporter import Reporter
-from workflow.shell.store import replacing
+from workflow.shell.results import ResultsWriter, run_results
+from workflow.shell.tables import write_curves
 from workflow.shell.versions import versions
 
-RESPONSES, CONTACT, LINEAR, BACKBONE = "responses", "contact", "linear", "backbone"
+RESPONSES, BACKBONE = "responses", "backbone"
 TO_MICRONS, PER_MICRON = 1e3, 1e-3  # mm to µm, N/mm to N/µm
 
 
-def write_vibration_output(
-    outcome: VibrationOutcome, folder: OutputFolder, reporter: Reporter
-) -> None:
+def write_vibration_output(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
+    folder, reporter = run.folder, run.reporter
     with reporter.stage("results"):
-        _write_results(outcome, folder.results)
+        _write_results(outcome, run)
         _write_tables(outcome, folder.root)
     with reporter.stage("paraview and figures"):
         write_pictures(outcome.case.output, folder, figures_of, write_vibration)
@@ -54,38 +50,34 @@ def write_vibration_output(
 # --- results ------------------------------------------------------------------------------------
 
 
-def _write_results(outcome: VibrationOutcome, path: Path) -> None:
+def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
     case = outcome.case
-    with replacing(path) as partial, h5py.File(partial, "w") as file:
-        file.attrs.update({"title": case.title, "analysis": case.analysis, "law": case.joint.law})
-        file.attrs["seen"] = list(outcome.labels)
-        file.create_group("case").attrs.update({"text": dump_case(case)} | versions())
-        linear = put(file, LINEAR, outcome.linear, DATASETS[LINEAR])
-        linear.attrs.update({name: outcome.numbers[name] for name in ("free", "stuck", "sliding")})
+    attributes = {"analysis": case.analysis, "law": case.joint.law, "seen": list(outcome.labels)}
+    with run_results(run, case, attributes) as writer:
+        limits = {name: outcome.numbers[name] for name in ("free", "stuck", "sliding")}
+        writer.put("linear", outcome.linear, **limits)
         if outcome.contact is not None:
-            put(file, CONTACT, outcome.contact, DATASETS[CONTACT])
+            writer.put("contact", outcome.contact)
         for number, response in enumerate(outcome.responses):
-            _put_response(file, f"{RESPONSES}/{number:05d}", response)
+            _put_response(writer, f"{RESPONSES}/{number:05d}", response)
         if outcome.backbone is not None:
-            _put_curves(file, BACKBONE, BACKBONE, outcome.backbone)
+            writer.put(BACKBONE, outcome.backbone.datasets, **outcome.backbone.numbers)
         for number, sweep in enumerate(outcome.force_sweeps):
-            _put_curves(file, f"{FORCE_SWEEPS}/{number:05d}", FORCE_SWEEPS, sweep)
+            writer.put(f"{FORCE_SWEEPS}/{number:05d}", sweep.datasets, **sweep.numbers)
 
 
-def _put_response(file: h5py.File, place: str, response: Response) -> None:
-    group = put(file, place, response.curves, DATASETS[RESPONSES])
-    group.attrs.update({"force": response.force, **response.numbers})
-    for kind, values in ((NODES, response.nodes), (RESONANCE, response.resonance)):
-        if values is not None:
-            put(file, f"{place}/{kind}", values, DATASETS[kind])
+def _put_response(writer: ResultsWriter, place: str, response: Response) -> None:
+    put_response_curves(writer, place, response)
+    for kind, datasets in ((NODES, response.nodes), (RESONANCE, response.resonance)):
+        if datasets is not None:
+            writer.put(f"{place}/{kind}", datasets)
     for number, loop in enumerate(response.loops):
-        _put_curves(file, f"{place}/{LOOPS}/{number:05d}", LOOPS, loop)
+        writer.put(f"{place}/{LOOPS}/{number:05d}", loop.datasets, **loop.numbers)
 
 
-def _put_curves(file: h5py.File, place: str, kind: str, curves: Curves) -> None:
-    """Curves and their numbers; those that there are not are left out."""
-    numbers = {name: value for name, value in curves.numbers.items() if value is not None}
-    put(file, place, curves.values, DATASETS[kind]).attrs.update(numbers)
+def put_response_curves(writer: ResultsWriter, place: str, response: Response) -> None:
+    """The curves of a response and its numbers."""
+    writer.put(place, response.curves, **{"force": response.force, **response.numbers})
 
 
 # --- tables -------------------------------------------------------------------------------------
@@ -94,13 +86,13 @@ def _put_curves(file: h5py.File, place: str, kind: str, curves: Curves) -> None:
 def _write_tables(outcome: VibrationOutcome, root: Path) -> None:
     """Responses, loops (the finest of each force), backbone and force sweeps as CSV."""
     for number, response in enumerate(outcome.responses):
-        write_table(root / f"frf_{number:05d}.csv", response.curves, DATASETS[RESPONSES])
+        write_curves(root / f"frf_{number:05d}.csv", response.curves)
         if response.loops:
-            write_table(root / f"loop_{number:05d}.csv", response.loops[-1].values, DATASETS[LOOPS])
+            write_curves(root / f"loop_{number:05d}.csv", response.loops[-1].datasets)
     if outcome.backbone is not None:
-        write_table(root / f"{BACKBONE}.csv", outcome.backbone.values, DATASETS[BACKBONE])
+        write_curves(root / f"{BACKBONE}.csv", outcome.backbone.datasets)
     for number, sweep in enumerate(outcome.force_sweeps):
-        write_table(root / f"force_sweep_{number:05d}.csv", sweep.values, DATASETS[FORCE_SWEEPS])
+        write_curves(root / f"force_sweep_{number:05d}.csv", sweep.datasets)
 
 
 # --- summary ------------------------------------------------------------------------------------
@@ -116,7 +108,7 @@ def _summary(outcome: VibrationOutcome, reporter: Reporter) -> dict[str, Any]:
         "responses": [_response_summary(own) for own in outcome.responses],
     }
     if outcome.backbone is not None:
-        points = len(outcome.backbone.values["force"])
+        points = len(outcome.backbone.datasets["force"].values)
         found[BACKBONE] = {"points": points, **outcome.backbone.numbers}
     if outcome.force_sweeps:
         found[FORCE_SWEEPS] = [dict(sweep.numbers) for sweep in outcome.force_sweeps]
@@ -161,5 +153,7 @@ def _loop_line(loop: Curves) -> str:
 
 
 def _backbone_line(backbone: Curves) -> str:
-    (first, last), (low, high) = (backbone.values[name][[0, -1]] for name in ("frequency", "force"))
+    (first, last), (low, high) = (
+        backbone.datasets[name].values[[0, -1]] for name in ("frequency", "force")
+    )
     return f"phase resonance: {first:.5g} Hz under {low:g} N, {last:.5g} Hz under {high:g} N"

@@ -6,45 +6,45 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.dynamics.cycle_energy import damping_ratio
 from fe_models.dynamics.forced_response import ResponseBranch
 from fe_models.dynamics.harmonics import HarmonicBalanceError
 from fe_models.dynamics.phase_resonance import along_phase_resonance
 from fe_models.dynamics.receptance import ReceptanceError
 from wear.joints.parameters import JointError
-from wear.joints.periodic import SLIP
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Curves, Response, VibrationOutcome, trend
 from workflow.analyses.vibration.response import (
     accuracy_of,
+    amplitude_column,
     amplitudes_of,
     force_sweep,
+    joint_columns,
     response_under,
-    share_of,
     step_control,
 )
 from workflow.analyses.vibration.results import write_vibration_output
 from workflow.errors import UserError
-from workflow.shell.folder import OutputFolder
+from workflow.shell.analysis import Run
+from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
 
-def run_vibration(case: VibrationCase, folder: OutputFolder, reporter: Reporter) -> None:
+def run_vibration(run: Run[VibrationCase]) -> None:
     """Run a vibration case to its end.
 
     Raises UserError where joint or structure cannot be what the case says, MethodFailed where it
     does not rest, or a force has no motion at all. A curve that ends before its span does is told
     as a warning.
     """
-    reporter.say(f"run: {case.title}")
+    run.reporter.say(f"run: {run.case.title}")
     try:
-        outcome = _outcome(case, reporter)
+        outcome = _outcome(run.case, run.reporter)
     except JointError as error:
-        raise UserError(f"{folder.case}: joint: {error}") from error
+        raise UserError(f"{run.folder.case}: joint: {error}") from error
     except (HarmonicBalanceError, ReceptanceError) as error:
-        raise UserError(f"{folder.case}: structure: {error}") from error
-    write_vibration_output(outcome, folder, reporter)
+        raise UserError(f"{run.folder.case}: structure: {error}") from error
+    write_vibration_output(outcome, run)
 
 
 def _outcome(case: VibrationCase, reporter: Reporter) -> VibrationOutcome:
@@ -100,15 +100,13 @@ def _backbone(
         reporter.warn(f"backbone: {found.message}")
     if not found.solutions:
         return None
-    motions = found.solutions
-    return Curves(
-        {
-            "force": found.forces,
-            "frequency": found.frequencies,
-            "amplitude": np.array([amplitudes_of(model, own)[-1] for own in motions]),
-            "damping": np.array([damping_ratio(found.problem, own) for own in motions]),
-            "energy_per_cycle": np.array([own.cycle.dissipated.sum() for own in motions]),
-            "slip": np.array([share_of(model, own, SLIP) for own in motions]),
-        },
-        {"message": found.message},
-    )
+    amplitude = np.array([amplitudes_of(model, motion)[-1] for motion in found.solutions])
+    resonance = "of phase resonance: what is driven lags the force by 90 degrees"
+    joints = joint_columns(model, found.problem, found.solutions)
+    datasets = {
+        "force": Dataset(found.forces, "N", "amplitude of the force"),
+        "frequency": Dataset(found.frequencies, "Hz", resonance),
+        "amplitude": amplitude_column(amplitude),
+        **{name: joints[name] for name in ("damping", "energy_per_cycle", "slip")},
+    }
+    return Curves(datasets, {"message": found.message})

@@ -11,7 +11,7 @@ def _run(run: Run[VibrationWearCase | FrictionRigWearCase]) -> None:
     # Joint laws are compiled when they are first needed.
     from workflow.analyses.vibration_wear.run import run_vibration_wear
 
-    run_vibration_wear(run.case, run.folder, run.reporter)
+    run_vibration_wear(run)
 
 
 ANALYSIS = Analysis(

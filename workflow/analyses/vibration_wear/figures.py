@@ -22,7 +22,7 @@ from workflow.analyses.vibration_wear.outcome import (
 )
 from workflow.pictures.fields import spread
 from workflow.pictures.style import BLUE, GREEN, ORANGE, PURPLE, new_figure
-from workflow.shell.store import grid_of
+from workflow.shell.results import grid_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

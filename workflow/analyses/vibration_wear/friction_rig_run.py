@@ -13,10 +13,19 @@ from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Curves
 from workflow.analyses.vibration.response import loop_of, response_under
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase
-from workflow.analyses.vibration_wear.outcome import LOOP, NODES, VibrationWearOutcome, WornState
+from workflow.analyses.vibration_wear.outcome import (
+    LOOP,
+    NODES,
+    VibrationWearOutcome,
+    WornState,
+    depth_fields,
+    path_field,
+    wearing_loop,
+)
 from workflow.analyses.vibration_wear.pad_wear_steps import PadState, worn_until
 from workflow.analyses.vibration_wear.pads import RubbedPads, WearingPads
 from workflow.case.loading import load_case
+from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
 
@@ -38,7 +47,11 @@ def wear_specimens(case: FrictionRigWearCase, reporter: Reporter) -> VibrationWe
     rig = unworn.rig
     assert rig.places is not None
     assert rig.area is not None
-    places = {"x": rig.places[:, 0], "y": rig.places[:, 1], "area": rig.area}
+    places = {
+        "x": Dataset(rig.places[:, 0], "mm", "of each node on the contact plane"),
+        "y": Dataset(rig.places[:, 1], "mm", "of each node on the contact plane"),
+        "area": Dataset(rig.area, "mm^2", "that belongs to each node"),
+    }
     return VibrationWearOutcome(case, tuple(states), places=places)
 
 
@@ -90,17 +103,17 @@ def _numbers(rubbed: RubbedPads, depth: Array, loop: Curves) -> dict[str, Any]:
     }
 
 
-def _fields(pads: WearingPads, state: PadState, loop: Curves) -> dict[str, dict[str, Array]]:
+def _fields(pads: WearingPads, state: PadState, loop: Curves) -> dict[str, dict[str, Dataset]]:
     rubbed = state.rubbed
-    depth_1, depth_2 = pads.depths(state.depth)
+    gap, pressed = np.asarray(rubbed.law.gap), rubbed.model.rest.cycle.samples[0, :, 2]
+    moved, pulled = (loop.datasets[name].values for name in ("displacement", "force"))
     return {
         NODES: {
-            "gap": np.asarray(rubbed.law.gap),
-            "depth_1": depth_1,
-            "depth_2": depth_2,
-            "normal_force": rubbed.model.rest.cycle.samples[0, :, 2],
-            "path": rubbed.path,
-            "energy": rubbed.energy,
+            "gap": Dataset(gap, "mm", "of the worn bodies without load"),
+            **depth_fields(*pads.depths(state.depth)),
+            "normal_force": Dataset(pressed, "N", "of each node at rest"),
+            "path": path_field(rubbed.path),
+            "energy": Dataset(rubbed.energy, "N mm", "that each node dissipates in such a cycle"),
         },
-        LOOP: {name: loop.values[name] for name in ("displacement", "force")},
+        LOOP: wearing_loop(moved, pulled),
     }

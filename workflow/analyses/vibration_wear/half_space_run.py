@@ -14,7 +14,6 @@ import numpy as np
 
 from fe_models.dynamics.harmonics import Resolution
 from sa_solver.tangential_loop import TangentialLoop
-from sa_solver.types import Array
 from wear.joints.jenkins import Jenkins
 from wear.moving import LARGE_STROKE
 from wear.steppers import (
@@ -40,11 +39,15 @@ from workflow.analyses.vibration_wear.outcome import (
     SLIDERS,
     VibrationWearOutcome,
     WornState,
+    depth_fields,
+    path_field,
+    wearing_loop,
 )
 from workflow.analyses.vibration_wear.vibrating_contact import Rubbing, Shaking, VibratingContact
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase
 from workflow.case.loading import load_case
 from workflow.errors import CaseError, UserError
+from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
 # Of the motion at which all of the contact slides: where loops in partial slip are compared.
@@ -196,28 +199,45 @@ def _energy_error(rubbing: Rubbing, loop: TangentialLoop) -> float:
     return (own - loop.energy) / larger if larger > 0.0 else 0.0
 
 
-def _fields(rubbing: Rubbing, loop: TangentialLoop) -> dict[str, dict[str, Array]]:
-    slipping, surfaces = rubbing.slipping, rubbing.state.surfaces
+def _fields(rubbing: Rubbing, loop: TangentialLoop) -> dict[str, dict[str, Dataset]]:
     displacement, force = loop.cycle
+    pull = "between them, of the whole tangential problem"
     return {
-        CONTACT: {
-            "pressure": slipping.normal.pressure,
-            "gap": np.maximum(slipping.normal.gap, 0.0) * (slipping.normal.pressure == 0.0),
-            "depth_1": surfaces.depth_1,
-            "depth_2": surfaces.depth_2,
-            "onset": rubbing.friction * slipping.onset,
-            "path": rubbing.path,
-            "energy": rubbing.energy,
+        CONTACT: _contact_fields(rubbing),
+        SLIDERS: _slider_fields(rubbing),
+        LOOP: wearing_loop(
+            closed(rubbing.displacement), closed(rubbing.motion.cycle.samples[:, 0, 0])
+        ),
+        HALF_SPACE: {
+            "displacement": Dataset(displacement, "mm", "of the bodies, as far to and fro"),
+            "force": Dataset(force, "N", pull),
         },
-        SLIDERS: {
-            "reach": rubbing.friction * slipping.reach,
-            "stiffness": slipping.slider_stiffness,
-            "normal_load": slipping.slider_load,
-            "energy": rubbing.by_slider,
-        },
-        LOOP: {
-            "displacement": closed(rubbing.displacement),
-            "force": closed(rubbing.motion.cycle.samples[:, 0, 0]),
-        },
-        HALF_SPACE: {"displacement": displacement, "force": force},
+    }
+
+
+def _contact_fields(rubbing: Rubbing) -> dict[str, Dataset]:
+    """Fields of the grid."""
+    normal, surfaces = rubbing.slipping.normal, rubbing.state.surfaces
+    gap = np.maximum(normal.gap, 0.0) * (normal.pressure == 0.0)
+    sticks = "motion of the joint from rest up to which each cell sticks"
+    return {
+        "pressure": Dataset(normal.pressure, "MPa", "at rest"),
+        "gap": Dataset(gap, "mm", "at rest"),
+        **depth_fields(surfaces.depth_1, surfaces.depth_2),
+        "onset": Dataset(rubbing.friction * rubbing.slipping.onset, "mm", sticks),
+        "path": path_field(rubbing.path),
+        "energy": Dataset(rubbing.energy, "N/mm", "per area, in such a cycle"),
+    }
+
+
+def _slider_fields(rubbing: Rubbing) -> dict[str, Dataset]:
+    """The sliders that the contact is to the rig, ``(n,)`` each."""
+    slipping = rubbing.slipping
+    reach = rubbing.friction * slipping.reach
+    lost = "that it dissipates in a cycle under the force that wears"
+    return {
+        "reach": Dataset(reach, "mm", "motion at which each slider gives way"),
+        "stiffness": Dataset(slipping.slider_stiffness, "N/mm", "of its spring"),
+        "normal_load": Dataset(slipping.slider_load, "N", "that presses it"),
+        "energy": Dataset(rubbing.by_slider, "N mm", lost),
     }

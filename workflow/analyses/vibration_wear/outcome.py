@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array, Grid
-from workflow.analyses.vibration.outcome import DATASETS as VIBRATION
 from workflow.analyses.vibration.outcome import Response
 from workflow.analyses.vibration_wear.case import VibrationWearScene
+from workflow.shell.dataset import Dataset, Datasets
 
 # Groups of a state, and the one that holds the states.
 CONTACT, SLIDERS, RESPONSES = "contact", "sliders", "responses"
@@ -25,12 +25,12 @@ WORN, EVOLUTION = "worn", "evolution"
 class WornState:
     """The contact after so many ``cycles``, and what the rig does on it.
 
-    ``fields`` by group and name of :data:`DATASETS`; ``numbers`` for the summary.
+    ``fields`` by group; ``numbers`` for the summary.
     """
 
     cycles: float
     numbers: Mapping[str, Any]
-    fields: Mapping[str, Mapping[str, Array]]
+    fields: Mapping[str, Datasets]
     responses: tuple[Response, ...]
 
 
@@ -38,86 +38,72 @@ class WornState:
 class VibrationWearOutcome:
     """All states of a run, the unworn one first.
 
-    The contact is on a ``grid``, or at nodes with ``places``: of :data:`DATASETS`.
+    The contact is on a ``grid``, or at nodes with ``places``.
     """
 
     case: VibrationWearScene
     states: tuple[WornState, ...]
     grid: Grid | None = None
-    places: Mapping[str, Array] | None = None
+    places: Datasets | None = None
 
     @property
-    def evolution(self) -> dict[str, Array]:
-        """Numbers that every state of this kind has, against cycles: of :data:`DATASETS`."""
+    def evolution(self) -> dict[str, Dataset]:
+        """Numbers that every state of this kind has, against cycles ``(k,)``.
 
-        def column(name: str) -> Array:
-            return np.array([state.numbers[name] for state in self.states])
+        Those by force are ``(k, forces)``.
+        """
+        columns = {
+            "cycles": ("1", "under the force that wears"),
+            "energy": ("N mm", "dissipated so far"),
+            "volume": ("mm^3", "worn from both bodies"),
+            "depth": ("mm", "largest of both bodies together"),
+            "area": ("mm^2", "in contact at rest"),
+            "touching": ("1", "nodes in contact at rest"),
+            "peak_pressure": ("MPa", "at rest"),
+            "friction": ("1", "coefficient"),
+            "stiffness": ("N/mm", "of the stuck contact; between targets, that of the loop"),
+            "full_slip": ("mm", "motion of the joint from rest at which all of it slides"),
+            "stroke": ("mm", "of the joint from end to end, under the force that wears"),
+            "energy_per_cycle": ("N mm", "under the force that wears"),
+            "stuck": ("Hz", "natural frequencies with the contact stuck"),
+        }
+        by_force = {
+            "resonance": ("Hz", "under each force"),
+            "receptance": (
+                "mm/N",
+                "largest amplitude of the last mass over the force, under each",
+            ),
+        }
+        return {
+            name: Dataset(np.array([state.numbers[name] for state in self.states]), *described)
+            for name, described in columns.items()
+            if name in self.states[0].numbers
+        } | {
+            name: Dataset(self._by_force(name), *described) for name, described in by_force.items()
+        }
 
-        def by_force(name: str) -> Array:
-            return np.array([[own.numbers[name] for own in s.responses] for s in self.states])
-
-        names = [name for name in DATASETS[EVOLUTION] if name in self.states[0].numbers]
-        columns = {name: column(name) for name in names}
-        return columns | {name: by_force(name) for name in BY_FORCE}
+    def _by_force(self, name: str) -> Array:
+        """A number of every response, ``(k, forces)``."""
+        return np.array([[own.numbers[name] for own in state.responses] for state in self.states])
 
 
-# Columns of the evolution with a value for each force.
-BY_FORCE = ("resonance", "receptance")
+def depth_fields(depth_1: Array, depth_2: Array) -> dict[str, Dataset]:
+    """What each body has lost, at cells or nodes."""
+    return {
+        "depth_1": Dataset(depth_1, "mm", "worn from body 1"),
+        "depth_2": Dataset(depth_2, "mm", "worn from body 2"),
+    }
 
-# Unit and description of every dataset, by group and name.
-DATASETS: dict[str, dict[str, tuple[str, str]]] = {
-    CONTACT: {
-        "pressure": ("MPa", "at rest"),
-        "gap": ("mm", "at rest"),
-        "depth_1": ("mm", "worn from body 1"),
-        "depth_2": ("mm", "worn from body 2"),
-        "onset": ("mm", "motion of the joint from rest up to which each cell sticks"),
-        "path": ("mm", "of slip in a cycle under the force that wears"),
-        "energy": ("N/mm", "per area, in such a cycle"),
-    },
-    SLIDERS: {
-        "reach": ("mm", "motion at which each slider gives way"),
-        "stiffness": ("N/mm", "of its spring"),
-        "normal_load": ("N", "that presses it"),
-        "energy": ("N mm", "that it dissipates in a cycle under the force that wears"),
-    },
-    PLACES: {
-        "x": ("mm", "of each node on the contact plane"),
-        "y": ("mm", "of each node on the contact plane"),
-        "area": ("mm^2", "that belongs to each node"),
-    },
-    NODES: {
-        "gap": ("mm", "of the worn bodies without load"),
-        "depth_1": ("mm", "worn from body 1"),
-        "depth_2": ("mm", "worn from body 2"),
-        "normal_force": ("N", "of each node at rest"),
-        "path": ("mm", "of slip in a cycle under the force that wears"),
-        "energy": ("N mm", "that each node dissipates in such a cycle"),
-    },
-    LOOP: {
-        "displacement": ("mm", "of the joint, or between the targets, under the force that wears"),
-        "force": ("N", "of the joint along it"),
-    },
-    HALF_SPACE: {
-        "displacement": ("mm", "of the bodies, as far to and fro"),
-        "force": ("N", "between them, of the whole tangential problem"),
-    },
-    RESPONSES: VIBRATION[RESPONSES],
-    EVOLUTION: {
-        "cycles": ("1", "under the force that wears"),
-        "energy": ("N mm", "dissipated so far"),
-        "volume": ("mm^3", "worn from both bodies"),
-        "depth": ("mm", "largest of both bodies together"),
-        "area": ("mm^2", "in contact at rest"),
-        "touching": ("1", "nodes in contact at rest"),
-        "peak_pressure": ("MPa", "at rest"),
-        "friction": ("1", "coefficient"),
-        "stiffness": ("N/mm", "of the stuck contact; between targets, that of the loop"),
-        "full_slip": ("mm", "motion of the joint from rest at which all of it slides"),
-        "stroke": ("mm", "of the joint from end to end, under the force that wears"),
-        "energy_per_cycle": ("N mm", "under the force that wears"),
-        "stuck": ("Hz", "natural frequencies with the contact stuck"),
-        "resonance": ("Hz", "under each force"),
-        "receptance": ("mm/N", "largest amplitude of the last mass over the force, under each"),
-    },
-}
+
+def path_field(path: Array) -> Dataset:
+    """How far surfaces slip over each other, at cells or nodes."""
+    return Dataset(path, "mm", "of slip in a cycle under the force that wears")
+
+
+def wearing_loop(displacement: Array, force: Array) -> dict[str, Dataset]:
+    """The loop of the joint in the motion that wears it."""
+    moved = "of the joint, or between the targets, under the force that wears"
+    return {
+        "displacement": Dataset(displacement, "mm", moved),
+        "force": Dataset(force, "N", "of the joint along it"),
+    }

@@ -12,7 +12,8 @@ from functools import cached_property
 
 import numpy as np
 
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, HarmonicSolution
+from fe_models.dynamics.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.periodic import PeriodicMarch

@@ -5,14 +5,13 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from workflow.analyses.vibration.outcome import trend
-from workflow.analyses.vibration.store import put, write_table
+from workflow.analyses.vibration.results import put_response_curves
+from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
 from workflow.analyses.vibration_wear.figures import figures_of
 from workflow.analyses.vibration_wear.outcome import (
-    DATASETS,
     EVOLUTION,
     PLACES,
     RESPONSES,
@@ -20,12 +19,14 @@ from workflow.analyses.vibration_wear.outcome import (
     VibrationWearOutcome,
     WornState,
 )
-from workflow.case.writing import dump_case
 from workflow.pictures.drawing import write_pictures
-from workflow.shell.folder import OutputFolder
+from workflow.shell.analysis import Run
 from workflow.shell.reporter import Reporter
-from workflow.shell.store import replacing
+from workflow.shell.results import run_results
+from workflow.shell.tables import write_curves
 from workflow.shell.versions import versions
+
+VibrationWearRun = Run[VibrationWearCase | FrictionRigWearCase]
 
 # What rises, falls, or neither, beside the resonance under the least force.
 TRENDS = ("stiffness", "peak_pressure", "touching")
@@ -33,12 +34,11 @@ TRENDS = ("stiffness", "peak_pressure", "touching")
 TO_JOULES, PER_MICRON, TO_MICRONS = 1e-3, 1e-3, 1e3
 
 
-def write_vibration_wear_output(
-    outcome: VibrationWearOutcome, folder: OutputFolder, reporter: Reporter
-) -> None:
+def write_vibration_wear_output(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
+    folder, reporter = run.folder, run.reporter
     with reporter.stage("results"):
-        _write_results(outcome, folder.results)
+        _write_results(outcome, run)
         _write_tables(outcome, folder.root)
     with reporter.stage("paraview and figures"):
         write_pictures(outcome.case.output, folder, figures_of)
@@ -53,27 +53,22 @@ def write_vibration_wear_output(
 # --- results ------------------------------------------------------------------------------------
 
 
-def _write_results(outcome: VibrationWearOutcome, path: Path) -> None:
+def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None:
     case = outcome.case
-    with replacing(path) as partial, h5py.File(partial, "w") as file:
-        file.attrs.update({"title": case.title, "analysis": case.analysis})
-        file.attrs["forces"] = list(case.forces)
-        file.create_group("case").attrs.update({"text": dump_case(case)} | versions())
+    attributes = {"analysis": case.analysis, "forces": list(case.forces)}
+    with run_results(run, case, attributes) as writer:
         if outcome.grid is not None:
-            own = {"shape": outcome.grid.shape, "pitch": outcome.grid.pitch}
-            file.create_group("grid").attrs.update(own)
+            writer.put_grid("grid", outcome.grid)
         if outcome.places is not None:
-            put(file, PLACES, outcome.places, DATASETS[PLACES])
-        put(file, EVOLUTION, outcome.evolution, DATASETS[EVOLUTION])
+            writer.put(PLACES, outcome.places)
+        writer.put(EVOLUTION, outcome.evolution)
         for number, state in enumerate(outcome.states):
             place = f"{WORN}/{number:05d}"
-            file.create_group(place).attrs.update(state.numbers)
-            for kind, values in state.fields.items():
-                put(file, f"{place}/{kind}", values, DATASETS[kind])
-            for response_number, response in enumerate(state.responses):
-                within = f"{place}/{RESPONSES}/{response_number:05d}"
-                group = put(file, within, response.curves, DATASETS[RESPONSES])
-                group.attrs.update({"force": response.force, **response.numbers})
+            writer.put(place, {}, **state.numbers)
+            for group, datasets in state.fields.items():
+                writer.put(f"{place}/{group}", datasets)
+            for force, response in enumerate(state.responses):
+                put_response_curves(writer, f"{place}/{RESPONSES}/{force:05d}", response)
 
 
 # --- tables -------------------------------------------------------------------------------------
@@ -81,11 +76,11 @@ def _write_results(outcome: VibrationWearOutcome, path: Path) -> None:
 
 def _write_tables(outcome: VibrationWearOutcome, root: Path) -> None:
     """The evolution, and the responses of every state to every force, as CSV in base units."""
-    write_table(root / f"{EVOLUTION}.csv", outcome.evolution, DATASETS[EVOLUTION])
+    write_curves(root / f"{EVOLUTION}.csv", outcome.evolution)
     for number, state in enumerate(outcome.states):
         for force, response in enumerate(state.responses):
             path = root / f"frf_{number:05d}_{force:05d}.csv"
-            write_table(path, response.curves, DATASETS[RESPONSES])
+            write_curves(path, response.curves)
 
 
 # --- summary ------------------------------------------------------------------------------------

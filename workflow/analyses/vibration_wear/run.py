@@ -7,23 +7,23 @@ from fe_models.dynamics.receptance import ReceptanceError
 from sa_solver.normal import NormalContactError
 from wear.joints.parameters import JointError
 from wear.stepping import ContactFailure
-from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
+from workflow.analyses.vibration_wear.case import VibrationWearCase
 from workflow.analyses.vibration_wear.friction_rig_run import wear_specimens
 from workflow.analyses.vibration_wear.half_space_run import wear_half_space
-from workflow.analyses.vibration_wear.results import write_vibration_wear_output
+from workflow.analyses.vibration_wear.results import (
+    VibrationWearRun,
+    write_vibration_wear_output,
+)
 from workflow.errors import MethodFailed, UserError
-from workflow.shell.folder import OutputFolder
-from workflow.shell.reporter import Reporter
 
 
-def run_vibration_wear(
-    case: VibrationWearCase | FrictionRigWearCase, folder: OutputFolder, reporter: Reporter
-) -> None:
+def run_vibration_wear(run: VibrationWearRun) -> None:
     """Run such a case to its end.
 
     Raises UserError where contact, specimens or rig cannot be what the case says, MethodFailed
     where rest, a contact problem or a motion is not found.
     """
+    case, reporter = run.case, run.reporter
     reporter.say(f"run: {case.title}")
     try:
         if isinstance(case, VibrationWearCase):
@@ -33,7 +33,7 @@ def run_vibration_wear(
     except (ContactFailure, NormalContactError) as error:
         raise MethodFailed(str(error)) from error
     except JointError as error:
-        raise UserError(f"{folder.case}: joint: {error}") from error
+        raise UserError(f"{run.folder.case}: joint: {error}") from error
     except (HarmonicBalanceError, ReceptanceError) as error:
-        raise UserError(f"{folder.case}: structure: {error}") from error
-    write_vibration_wear_output(outcome, folder, reporter)
+        raise UserError(f"{run.folder.case}: structure: {error}") from error
+    write_vibration_wear_output(outcome, run)

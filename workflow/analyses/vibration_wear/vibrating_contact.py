@@ -13,7 +13,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, HarmonicSolution, PeriodicLoad
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.receptance import Receptance
 from sa_solver.contact import FrictionalContact
@@ -110,7 +111,7 @@ class VibratingContact:
         unworn = WearState.unworn(np.ascontiguousarray(np.broadcast_to(gap, self.grid.shape)))
         rubbing = self.at(unworn)
         starts = {0: rubbing.slipping.normal.start}
-        result = rubbing.wearing.cycle(replace(unworn, starts=starts), rubbing.wearing.working)
+        result = rubbing.wearing.cycle(replace(unworn, starts=starts), rubbing.wearing.dissipating)
         depth_rate, volume_rate = result.per_cycle(self.grid.cell_area)
         return replace(unworn, starts=starts, depth_rate=depth_rate, volume_rate=volume_rate)
 

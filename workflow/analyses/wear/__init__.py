@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.measures import COMPARISON
 from workflow.analyses.wear.structures import CasesOfStructures, structure_of
 from workflow.shell.analysis import Analysis, Run
-from workflow.shell.folder import OutputFolder
 from workflow.shell.memory import Memory
+
+if TYPE_CHECKING:
+    from workflow.shell.folder import OutputFolder
 
 __all__ = ["ANALYSIS"]
 

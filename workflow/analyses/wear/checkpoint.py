@@ -1,8 +1,8 @@
-"""The state of a wear run between two jumps, and its copy on disk."""
+"""The copy on disk of the state that a wear run has between two jumps."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
@@ -10,66 +10,18 @@ import numpy as np
 
 from sa_solver.normal import NormalStart
 from sa_solver.types import Array, LoadHistory
+from wear.coupled import CoupledState
+from wear.interface import InterfaceState
+from wear.stepping import Spent
 from wear.surfaces import Surfaces
-from workflow.analyses.wear.interface_state import InterfaceState, Spent
 from workflow.errors import UserError
 from workflow.shell.store import read_arrays, write_arrays
 
-# Columns of the kinetics of one interface.
-KINETICS = ("depth_1", "depth_2", "volume_1", "volume_2", "energy")
 # Numbers of the state of one interface.
 SCALARS = ("energy", "depth_rate", "volume_rate", "volume_error", "next_cycles")
 
 
-@dataclass(frozen=True)
-class RunState:
-    """Everything a wear run needs to go on.
-
-    ``cycles`` ``(j,)`` are those at the end of every jump so far, the unworn state included;
-    ``kinetics`` ``(j, interfaces, 5)`` has the columns ``KINETICS``; ``solved_resultants``
-    ``(interfaces, 6)`` is the probe at the last structural solution; ``drift`` ``(j,)`` the drift
-    found after each jump; ``solutions`` counts the structural solutions, ``spent`` what the
-    contacts have taken.
-    """
-
-    interfaces: tuple[InterfaceState, ...]
-    cycles: Array
-    kinetics: Array
-    drift: Array
-    solved_resultants: Array
-    solutions: int
-    spent: Spent
-
-    @property
-    def jump(self) -> int:
-        """Number of jumps done."""
-        return len(self.cycles) - 1
-
-    def record(self, cycles: float, cell_areas: list[float], drift: float) -> RunState:
-        """The state with a row of kinetics added."""
-        row = [
-            kinetics_row(state, area)
-            for state, area in zip(self.interfaces, cell_areas, strict=True)
-        ]
-        return replace(
-            self,
-            cycles=np.append(self.cycles, cycles),
-            kinetics=np.concatenate([self.kinetics, np.array([row])]),
-            drift=np.append(self.drift, drift),
-        )
-
-
-def kinetics_row(state: InterfaceState, cell_area: float) -> list[float]:
-    """Values of ``KINETICS`` for one interface."""
-    depths = state.surfaces.depth_1, state.surfaces.depth_2
-    return [
-        *(float(depth.max()) for depth in depths),
-        *(float(depth.sum()) * cell_area for depth in depths),
-        state.energy,
-    ]
-
-
-def save(path: Path, state: RunState) -> None:
+def save(path: Path, state: CoupledState) -> None:
     """Write the state; the old file stays until the new one is whole."""
     arrays: dict[str, object] = {
         name: getattr(state, name) for name in ("cycles", "kinetics", "drift", "solved_resultants")
@@ -92,7 +44,7 @@ def save(path: Path, state: RunState) -> None:
     write_arrays(path, arrays, attributes)
 
 
-def load(path: Path) -> RunState:
+def load(path: Path) -> CoupledState:
     """Read a state; raises :class:`UserError` if the file is damaged."""
     try:
         return _restored(*read_arrays(path))
@@ -110,8 +62,8 @@ def readable(path: Path) -> bool:
     return True
 
 
-def _restored(arrays: dict[str, Any], attributes: dict[str, Any]) -> RunState:
-    return RunState(
+def _restored(arrays: dict[str, Any], attributes: dict[str, Any]) -> CoupledState:
+    return CoupledState(
         interfaces=tuple(
             _load_interface(arrays, f"interface_{number}")
             for number in range(int(attributes["interfaces"]))

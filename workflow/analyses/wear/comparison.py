@@ -8,7 +8,8 @@ import numpy as np
 
 from sa_solver.contact import ContactState
 from sa_solver.types import LoadHistory
-from workflow.shell.store import ResultsWriter
+from workflow.analyses.contact.datasets import load_columns, traction_fields
+from workflow.shell.results import ResultsWriter
 
 # Increments shown, as shares of the way from the peak to the end of the cycle: 8, 12 and 15 of 22.
 SHOWN = 0.0, 2.0 / 7.0, 0.5
@@ -32,17 +33,13 @@ def write_comparison(
 ) -> None:
     """Loads of the cycle, and its fields at the increments shown; of a mix, of the peak's cycle."""
     group = f"comparison/{name}"
-    writer.put(f"{group}/load_history", **half_space_loads(cycle, structure).columns())
+    writer.put(f"{group}/load_history", load_columns(half_space_loads(cycle, structure)))
     left = next(own.stop for own in structure.blocks if peak < own.stop) - 1 - peak
     # A set: in a short cycle two of them may be the same.
     for increment in sorted({peak + round(share * left) for share in SHOWN}):
         state = cycle[increment]
-        writer.put(
-            f"{group}/{increment:05d}",
-            pressure=state.pressure,
-            shear=state.shear,
-            slip=state.slip,
-        )
+        fields = traction_fields(state.pressure, state.shear, state.slip)
+        writer.put(f"{group}/{increment:05d}", fields)
 
 
 def comparison_summary(cycle: tuple[ContactState, ...], structure: LoadHistory) -> dict[str, Any]:

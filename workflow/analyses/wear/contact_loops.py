@@ -26,22 +26,19 @@ from sa_solver.tangential_loop import (
 from sa_solver.types import Array
 from wear.stepping import ContactFailure
 from workflow.analyses.wear.case.loops import Loops
-from workflow.analyses.wear.loop_table import COLUMNS, write_table
+from workflow.analyses.wear.loop_table import COLUMNS, write_loop_table
 from workflow.errors import UserError
+from workflow.shell.dataset import Dataset
 
 if TYPE_CHECKING:
-    from workflow.analyses.wear.interface_state import InterfaceState
+    from wear.interface import InterfaceState
     from workflow.shell.folder import OutputFolder
     from workflow.shell.reporter import Reporter
-    from workflow.shell.store import ResultsWriter
+    from workflow.shell.results import ResultsWriter
 
 
 # Measured by every loop; cycles come from the jump.
 MEASURED = tuple(column.name for column in COLUMNS if column.name != "cycles")
-CURVES = {
-    "displacement": ("mm", "of body 1 relative to body 2 along the axis, from the pressed state"),
-    "force": ("N", "tangential force on body 2"),
-}
 # Interfaces and jumps are groups of a file.
 LOOPS = "loops"
 
@@ -130,7 +127,7 @@ def kept_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Arr
     for name, loop in zip(names, loops, strict=True):
         place = f"{LOOPS}/{name}"
         arrays[f"{place}/values"] = np.array([loop.values[own] for own in MEASURED])
-        arrays |= {f"{place}/{curve}": getattr(loop, curve) for curve in CURVES}
+        arrays |= {f"{place}/displacement": loop.displacement, f"{place}/force": loop.force}
     return arrays
 
 
@@ -147,11 +144,13 @@ def write_loops(writer: ResultsWriter, folder: OutputFolder, jumps: int) -> None
 
 
 def _write_loop(writer: ResultsWriter, place: str, kept: h5py.Group, cycles: float) -> None:
-    for curve, (unit, description) in CURVES.items():
-        dataset = writer.file.create_dataset(f"{place}/{curve}", data=kept[curve][()])
-        dataset.attrs.update({"unit": unit, "description": description})
+    along = "of body 1 relative to body 2 along the axis, from the pressed state"
+    curve = {
+        "displacement": Dataset(kept["displacement"][()], "mm", along),
+        "force": Dataset(kept["force"][()], "N", "tangential force on body 2"),
+    }
     values = dict(zip(MEASURED, kept["values"][()].tolist(), strict=True))
-    writer.file[place].attrs.update(values | {"cycles": cycles})
+    writer.put(place, curve, **values, cycles=cycles)
 
 
 def write_loop_tables(folder: OutputFolder, per_length: bool) -> dict[str, dict[str, Any]]:
@@ -161,7 +160,7 @@ def write_loop_tables(folder: OutputFolder, per_length: bool) -> dict[str, dict[
         for name, group in file.get(LOOPS, {}).items():
             rows = [{c.name: float(own.attrs[c.name]) for c in COLUMNS} for own in group.values()]
             table = f"loops_{name}.csv"
-            write_table(folder.root / table, rows, per_length)
+            write_loop_table(folder.root / table, rows, per_length)
             summary[name] = {"file": table, "unworn": rows[0], "worn": rows[-1]}
     return summary
 

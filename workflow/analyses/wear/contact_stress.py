@@ -17,13 +17,14 @@ import numpy as np
 from fe_models.elasticity import von_mises
 from sa_solver.subsurface import COMPONENTS, SubsurfaceStress
 from sa_solver.types import Array, Grid, Material
-from wear.life import findley, ruiz, smith_watson_topper
+from wear.interface import CycleTractions, FaceLoads, FirstContact
+from wear.life import Ruiz, findley, ruiz, smith_watson_topper
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Life
-from workflow.analyses.wear.contact_stage import ContactStage, CycleTractions, FirstContact
-from workflow.analyses.wear.load_source import FaceLoads
+from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
-from workflow.shell.store import ResultsWriter
+from workflow.shell.results import ResultsWriter
 
 MOMENTS = ("unworn", "worn")
 
@@ -31,6 +32,8 @@ MOMENTS = ("unworn", "worn")
 # at its rim, whatever its size; the cells at the edge of a sliding contact that find no slipping
 # node of the structure stay below this.
 STUCK_SHARE = 0.01
+
+LEFT_OUT = "increments without full knowledge of the shear, not in the life map"
 
 # What the summary tells of each parameter's maps, the parameter itself first.
 TOLD = {
@@ -50,7 +53,7 @@ class BodyStress:
     """
 
     section: Array | None
-    maps: dict[str, Array]
+    maps: dict[str, Dataset]
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,7 @@ class ContactMoment:
     """Both bodies under one contact, unworn or worn.
 
     ``left_out`` are the increments, counted from 0, whose shear is not known (see
-    :class:`workflow.analyses.wear.contact_stage.CycleTractions`) and that the maps do without.
+    :class:`wear.interface.CycleTractions`) and that the maps do without.
     """
 
     bodies: tuple[BodyStress, BodyStress]
@@ -112,24 +115,26 @@ class InterfaceStress:
 
     def _write_section(self, writer: ResultsWriter, group: str) -> None:
         planes = self.planes
-        writer.put(group, along=planes.along, depths=planes.depths)
+        axes = {
+            "along": Dataset(planes.along, "mm", "centres of the section's cells, along its axis"),
+            "depths": Dataset(planes.depths, "mm", "of the section's points below the surface"),
+        }
         attributes = {"axis": planes.settings.section, "at": planes.at, "components": COMPONENTS}
         limits = dict(enumerate(self.yield_stresses, start=1))
         attributes |= {f"yield_stress_{n}": y for n, y in limits.items() if np.isfinite(y)}
-        writer.file[group].attrs.update(attributes)
+        writer.put(group, axes, **attributes)
         for moment, own in self.moments.items():
             for number, body in enumerate(own.bodies, start=1):
-                stress, place = body.section, f"{group}/{moment}/body_{number}"
-                assert stress is not None
-                writer.put(place, stress=stress, von_mises=von_mises(stress))
+                assert body.section is not None
+                writer.put(f"{group}/{moment}/body_{number}", _section(body.section))
 
     def _write_life(self, writer: ResultsWriter, group: str) -> None:
         for moment, own in self.moments.items():
-            writer.put(f"{group}/{moment}", left_out=own.left_out)
+            writer.put(f"{group}/{moment}", {"left_out": Dataset(own.left_out, "1", LEFT_OUT)})
             for number, body in enumerate(own.bodies, start=1):
-                writer.put(f"{group}/{moment}/body_{number}", **body.maps)
+                writer.put(f"{group}/{moment}/body_{number}", body.maps)
         life = self.planes.settings.life
-        writer.file[group].attrs.update({"parameter": life.parameter, "depth": life.depth})
+        writer.put(group, {}, parameter=life.parameter, depth=life.depth)
 
     def summary(self) -> dict[str, Any]:
         """Largest values, where they are, and worn over unworn, by body."""
@@ -140,7 +145,9 @@ class InterfaceStress:
             return told
         told["left_out"] = {m: len(own.left_out) for m, own in self.moments.items()}
         for name in TOLD[self.planes.settings.life.parameter]:
-            told[name] = self._of_bodies(lambda body, name=name: self._largest(body.maps[name]))
+            told[name] = self._of_bodies(
+                lambda body, name=name: self._largest(body.maps[name].values)
+            )
         return told
 
     def _of_bodies(self, largest: Any) -> dict[str, Any]:
@@ -225,6 +232,15 @@ def _interface_stress(
     )
 
 
+def _section(stress: Array) -> dict[str, Dataset]:
+    """Stress ``(6, n, k)`` in a section, and its equivalent."""
+    what = "xx, yy, zz, xy, yz, zx in the section at peak load under the contact's tractions alone"
+    return {
+        "stress": Dataset(stress, "MPa", what),
+        "von_mises": Dataset(von_mises(stress), "MPa", "von Mises stress at peak load"),
+    }
+
+
 def _traction(cycle: CycleTractions, t: int) -> Array:
     """Tractions qx, qy, p of an increment ``(3, nx, ny)``."""
     return np.concatenate([cycle.shear[t], cycle.pressure[t, None]])
@@ -237,7 +253,7 @@ def life_maps(
     cycle: CycleTractions,
     known: np.ndarray,
     share: Array | None = None,
-) -> dict[str, Array]:
+) -> dict[str, Dataset]:
     """Maps of the parameter and of what it is made of, at the critical distance, by name.
 
     Stress is that of the ``known`` ``(t,)`` increments, of all cycles of a mix together; friction
@@ -251,18 +267,44 @@ def life_maps(
         history[t] = solver.at_depth(_traction(cycle, int(t)), life.depth)
     if life.parameter == "ruiz":
         # Without stress, an increment adds its work and leaves the largest tension as it is.
-        parameters = ruiz(history, cycle.shear, cycle.slip, share)
-        names = "friction_parameter", "tension", "cracking_parameter"
-        return {name: getattr(parameters, name) for name in names}
+        return _ruiz_maps(ruiz(history, cycle.shear, cycle.slip, share))
     if life.parameter == "findley":
-        plane, amplitude = findley(history[known], life.sensitivity), "shear_amplitude"
+        plane = findley(history[known], life.sensitivity)
+        what = "shear stress amplitude plus k largest normal stress, worst plane"
+        maps = {
+            "findley": Dataset(plane.value, "MPa", what),
+            "shear_amplitude": Dataset(
+                plane.amplitude, "MPa", "amplitude of the shear stress on the worst plane"
+            ),
+        }
     else:
-        plane, amplitude = smith_watson_topper(history[known], material), "strain_amplitude"
+        plane = smith_watson_topper(history[known], material)
+        what = "largest normal stress times strain amplitude, worst plane"
+        maps = {
+            "smith_watson_topper": Dataset(plane.value, "MPa", what),
+            "strain_amplitude": Dataset(
+                plane.amplitude, "1", "amplitude of the normal strain on the worst plane"
+            ),
+        }
+    return maps | {
+        "normal_stress": Dataset(
+            plane.normal_stress, "MPa", "largest normal stress over a cycle on the worst plane"
+        ),
+        "normal": Dataset(
+            plane.normal, "1", "unit normal of the worst plane, in the interface frame"
+        ),
+    }
+
+
+def _ruiz_maps(parameters: Ruiz) -> dict[str, Dataset]:
+    work = "Ruiz's F1: a quarter of the friction work of a cycle per area"
+    tension = "largest tension along the surface over a cycle, under the contact's tractions alone"
     return {
-        life.parameter: plane.value,
-        amplitude: plane.amplitude,
-        "normal_stress": plane.normal_stress,
-        "normal": plane.normal,
+        "friction_parameter": Dataset(parameters.friction_parameter, "N/mm", work),
+        "tension": Dataset(parameters.tension, "MPa", tension),
+        "cracking_parameter": Dataset(
+            parameters.cracking_parameter, "N^2/mm^3", "Ruiz's F2: F1 times tension"
+        ),
     }
 
 

@@ -7,7 +7,9 @@ from dataclasses import dataclass
 from typing import Literal, Protocol
 
 from fe_models.mesh import Face
-from sa_solver.types import Array, Frame, Grid, Indices, LoadHistory
+from sa_solver.types import Array, Frame, Grid, Indices
+from wear import coupled
+from wear.interface import FaceLoads
 
 BODIES: tuple[Literal[1, 2], ...] = (1, 2)
 
@@ -48,21 +50,8 @@ class UserFace:
     points: Array | None = None
 
 
-class FaceLoads(Protocol):
-    """What one face carries over a cycle: ``slip`` ``(t, 2, n)`` [mm] is that of its nodes."""
-
-    @property
-    def loads(self) -> LoadHistory: ...
-    @property
-    def slip(self) -> Array: ...
-
-
-class LoadSource(Protocol):
-    """Loads and slips of every contact face over one closed cycle.
-
-    Worn depths are nodal, ``(n,)`` per face, of both bodies together [mm]. Coefficients of friction
-    are one per face; those before any wear where they are not given.
-    """
+class LoadSource(coupled.LoadSource, Protocol):
+    """A source of loads for the coupled loop, with what a run asks of it beside that."""
 
     @property
     def faces(self) -> tuple[ContactFace, ...]: ...
@@ -85,16 +74,6 @@ class LoadSource(Protocol):
         """The closed cycle with unworn faces."""
         ...
 
-    def worn(
-        self, depths: list[Array], friction: Sequence[float] | None = None
-    ) -> Sequence[FaceLoads]:
-        """The closed cycle with worn faces."""
-        ...
-
     def user_faces(self, number: int) -> Sequence[UserFace]:
         """Where the worn surfaces of interface ``number`` go back to nodes of the user's own."""
-        ...
-
-    def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
-        """Resultants ``(faces, 6)`` that wear moves as it moves those of the cycle, but cheap."""
         ...

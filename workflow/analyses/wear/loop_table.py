@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-import csv
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.case.fields import Quantity, shown
+from workflow.case.fields import Quantity
 from workflow.case.input_files import InputFileError
 from workflow.case.table_file import TableFile, read_table_file
 from workflow.case.units import UnitError, to_base
 from workflow.errors import UserError
-from workflow.shell.store import replacing
+from workflow.shell.tables import heading, write_table
 
 
 @dataclass(frozen=True)
@@ -36,9 +35,13 @@ class Column:
         per = "/mm" if per_length and self.extensive else ""
         return self.unit + per, self.shown + per
 
-    def heading(self, per_length: bool) -> str:
-        """Name and unit, as they head the column."""
-        return f"{self.name} [{self.units(per_length)[1]}]"
+    def written(
+        self, rows: Sequence[Mapping[str, float]], per_length: bool
+    ) -> tuple[str, list[float]]:
+        """Heading and values of the column, in the unit in which it is written."""
+        base, unit = self.units(per_length)
+        factor = to_base(f"1 {unit}", base) if unit != base else 1.0
+        return heading(self.name, unit), [row[self.name] / factor for row in rows]
 
 
 COLUMNS = (
@@ -55,6 +58,8 @@ COLUMNS = (
     Column("residual_stiffness", "N/mm", "N/mm", "slope of the loop as branches end"),
     Column("border_load", "1", "1", "share of P on the grid's outermost cells", extensive=False),
 )
+# Of a table that joint laws read again.
+DIGITS = 12
 # Without these a table is none.
 NEEDED = ("energy", "P", "kt", "mu")
 
@@ -82,21 +87,12 @@ class LoopTable:
     per_length: bool
 
 
-def write_table(path: Path, rows: Iterable[Mapping[str, float]], per_length: bool = False) -> None:
+def write_loop_table(
+    path: Path, rows: Sequence[Mapping[str, float]], per_length: bool = False
+) -> None:
     """Write a table of loops, whose ``rows`` are in base units and have the same columns."""
-    rows = list(rows)
     columns = [column for column in COLUMNS if column.name in rows[0]]
-    factors = {column.name: _factor(*column.units(per_length)) for column in columns}
-    with replacing(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
-        writer = csv.writer(file)
-        writer.writerow([column.heading(per_length) for column in columns])
-        for row in rows:
-            writer.writerow([f"{row[name] / factor:.12g}" for name, factor in factors.items()])
-
-
-def _factor(base: str, written: str) -> float:
-    """Base units in the unit that is written."""
-    return to_base(f"1 {written}", base) if written != base else 1.0
+    write_table(path, dict(column.written(rows, per_length) for column in columns), DIGITS)
 
 
 def read_loop_table(path: Path) -> LoopTable:
@@ -107,15 +103,16 @@ def read_loop_table(path: Path) -> LoopTable:
     """
     try:
         table = read_table_file(path)
-        _refuse_unknown(table)
-        for name in NEEDED:
-            table.require(name, f"at least {', '.join(NEEDED)}")
+        table.require(NEEDED, f"at least {', '.join(NEEDED)}")
         per_length = _per_length(table)
+        units = {column.name: column.units(per_length)[0] for column in COLUMNS}
+        # Other columns may be slips of the pen for those that need not be given.
+        table.check(units)
         columns = {
-            column.name: table.column(column.name, Quantity(column.units(per_length)[0]))
-            if column.name in table.names
-            else np.full(len(table.rows), np.nan)
-            for column in COLUMNS
+            name: table.column(name, Quantity(unit))
+            if name in table.names
+            else np.full(len(table), np.nan)
+            for name, unit in units.items()
         }
     except InputFileError as error:
         raise UserError(str(error)) from error
@@ -124,16 +121,6 @@ def read_loop_table(path: Path) -> LoopTable:
         line = table.rows[falls[0] + 1][0]
         raise UserError(f"{path}:{line}: the energy falls; allowed: rows in order of their energy")
     return LoopTable(**columns, per_length=per_length)
-
-
-def _refuse_unknown(table: TableFile) -> None:
-    """Refuse other columns, which may be slips of the pen for those that need not be given."""
-    known = [column.name for column in COLUMNS]
-    for name, heading in zip(table.names, table.headings, strict=True):
-        if name not in known:
-            raise InputFileError(
-                f"{table.place}: {shown(heading)}: no column; allowed: {', '.join(known)}"
-            )
 
 
 def _per_length(table: TableFile) -> bool:

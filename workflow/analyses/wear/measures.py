@@ -7,14 +7,11 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-import h5py
 import numpy as np
 
 from sa_solver.types import Array, Grid
 from workflow.analyses.wear.case.base import WearCase
 from workflow.shell.analysis import Comparison, Summary
-from workflow.shell.folder import OutputFolder
-from workflow.shell.store import grid_of
 
 WORN = ("depth_1", "depth_2", "volume_1", "volume_2")
 MIDDLE = "middle"
@@ -46,6 +43,12 @@ def extra_quantities(summary: Mapping[str, Any]) -> list[str]:
 
 def worn_depths(folder: Path, names: Iterable[str]) -> dict[str, tuple[Grid, Array, Array]]:
     """Grid of each interface and worn depths ``(nx, ny)`` of body 1 and body 2 [mm]."""
+    # Files are read when runs are compared, not when a case is.
+    import h5py
+
+    from workflow.shell.folder import OutputFolder
+    from workflow.shell.results import grid_of
+
     found = {}
     with h5py.File(OutputFolder(folder).results) as file:
         for name in names:

@@ -12,11 +12,13 @@ import h5py
 import numpy as np
 
 from sa_solver.normal import NormalContactError
-from sa_solver.types import Array, LoadHistory
+from sa_solver.types import LoadHistory
+from wear.coupled import KINETICS, CoupledState
+from wear.interface import CycleTractions, FaceLoads, FirstContact
 from wear.kinetics import LinearRegime, linear_regime
 from wear.steppers import root_mean_square
+from workflow.analyses.contact.datasets import pressure_field, traction_fields
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.checkpoint import KINETICS, RunState
 from workflow.analyses.wear.comparison import comparison_summary, write_comparison
 from workflow.analyses.wear.contact_loops import (
     loops_sentence,
@@ -24,21 +26,32 @@ from workflow.analyses.wear.contact_loops import (
     write_loop_tables,
     write_loops,
 )
-from workflow.analyses.wear.contact_stage import ContactStage, CycleTractions, FirstContact
+from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.contact_stress import InterfaceStress, contact_stresses
+from workflow.analyses.wear.datasets import (
+    cycles_column,
+    kinetics_columns,
+    put_face,
+    surface_heights,
+)
 from workflow.analyses.wear.figures.wear import EXTRAPOLATION, figures_of
-from workflow.analyses.wear.load_source import FaceLoads, LoadSource
+from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.paraview.wear import write_wear
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.uniformity import uniformities
 from workflow.analyses.wear.worn_faces import worn_faces, write_worn_faces
 from workflow.analyses.wear.worn_structure import WornStructure, resultants_at, worn_structure
-from workflow.case.writing import dump_case
 from workflow.pictures.drawing import write_pictures
+from workflow.shell.analysis import Run
+from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
-from workflow.shell.store import ResultsWriter, read_arrays, replacing
+from workflow.shell.results import ResultsWriter, run_results
+from workflow.shell.store import read_arrays
 from workflow.shell.versions import versions
+
+# What the file of a jump has of each interface.
+JUMP_FIELDS = {"surfaces": ("body_1", "body_2"), "contact": ("pressure", "shear", "slip")}
 
 
 @dataclass(frozen=True)
@@ -52,7 +65,7 @@ class Outcome:
     case: WearCase
     source: LoadSource
     stages: list[ContactStage]
-    state: RunState
+    state: CoupledState
     unworn: Sequence[FaceLoads]
     first: list[FirstContact]
     worn: list[CycleTractions]
@@ -71,9 +84,9 @@ class Outcome:
         }
 
 
-def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> None:
+def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
-    structure = None
+    folder, reporter, structure = run.folder, run.reporter, None
     if isinstance(outcome.source, StructureStage):
         structure = worn_structure(
             outcome.source,
@@ -93,7 +106,7 @@ def write_output(outcome: Outcome, folder: OutputFolder, reporter: Reporter) -> 
             reporter,
         )
     with reporter.stage("results"):
-        _write_results(outcome, structure, stresses, folder)
+        _write_results(outcome, structure, stresses, run)
     with reporter.stage("paraview and figures"):
         # They take ten seconds and more on one core.
         write_pictures(outcome.case.output, folder, figures_of, write_wear, processes=2)
@@ -139,30 +152,26 @@ def _write_results(
     outcome: Outcome,
     structure: WornStructure | None,
     stresses: list[InterfaceStress],
-    folder: OutputFolder,
+    run: Run[WearCase],
 ) -> None:
-    source = outcome.source
-    with replacing(folder.results) as partial, h5py.File(partial, "w") as file:
-        writer = ResultsWriter(file, per_length=source.line)
-        file.attrs.update(
-            {
-                "title": outcome.case.title,
-                "friction": outcome.case.friction.at(0.0),
-                "peak_increment": source.peak,
-                "bodies": list(outcome.case.bodies),
-            }
-        )
-        file.create_group("case").attrs.update({"text": dump_case(outcome.case)} | versions())
+    case, source = outcome.case, outcome.source
+    attributes = {
+        "friction": case.friction.at(0.0),
+        "peak_increment": source.peak,
+        "bodies": list(case.bodies),
+    }
+    with run_results(run, case, attributes, source.line) as writer:
         for stage, result, loads in zip(outcome.stages, outcome.first, outcome.unworn, strict=True):
-            writer.put_grid(stage.name, stage.grid, stage.face.frame)
-            writer.put_face(f"structure/{stage.name}", stage.face, loads)
+            writer.put_grid(f"grid/{stage.name}", stage.grid, stage.face.frame)
+            put_face(writer, f"structure/{stage.name}", stage.face, loads)
             _write_coarse(writer, stage, loads.loads, source.peak)
-            writer.put(f"contact/{stage.name}", energy_half_space=result.energy)
+            dissipated = "energy dissipated in each increment, half-space pressure"
+            energy = {"energy_half_space": Dataset(result.energy, "N mm", dissipated)}
+            writer.put(f"contact/{stage.name}", energy)
             if result.cycle:
                 write_comparison(writer, stage.name, result.cycle, loads.loads, source.peak)
-        _write_jumps(writer, outcome, folder)
-        _write_kinetics(writer, outcome)
-        write_loops(writer, folder, outcome.state.jump)
+        _write_kinetics(writer, outcome, _write_jumps(writer, outcome, run.folder))
+        write_loops(writer, run.folder, outcome.state.jump)
         if structure is not None:
             structure.write(writer)
         for stress in stresses:
@@ -181,48 +190,54 @@ def _write_coarse(
         pressure = stage.coarse_pressure(loads, peak)
     except NormalContactError:
         return
-    place, grid = f"contact/{stage.name}/coarse", stage.coarse_grid
-    writer.put(place, pressure=pressure)
+    grid = stage.coarse_grid
     shape = {"shape": grid.shape, "pitch": grid.pitch, "line": grid.line}
-    writer.file[place].attrs.update(shape)
+    writer.put(f"contact/{stage.name}/coarse", {"pressure": pressure_field(pressure)}, **shape)
 
 
-def _write_jumps(writer: ResultsWriter, outcome: Outcome, folder: OutputFolder) -> None:
+def _write_jumps(
+    writer: ResultsWriter, outcome: Outcome, folder: OutputFolder
+) -> dict[str, list[float]]:
+    """Copy surfaces and contacts of all jumps; areas in contact at peak load, by interface."""
+    areas: dict[str, list[float]] = {stage.name: [] for stage in outcome.stages}
     for jump in range(outcome.state.jump + 1):
         arrays, attributes = read_arrays(folder.jump(jump))
         for stage in outcome.stages:
-            for kind in ("surfaces", "contact"):
-                prefix = f"{kind}/{stage.name}/"
-                fields = {
-                    n.removeprefix(prefix): a for n, a in arrays.items() if n.startswith(prefix)
-                }
-                writer.put(f"{prefix}{jump:05d}", **fields)
-                writer.file[f"{prefix}{jump:05d}"].attrs["cycles"] = attributes["cycles"]
-
-
-def _write_kinetics(writer: ResultsWriter, outcome: Outcome) -> None:
-    state = outcome.state
-    writer.put("kinetics", cycles=state.cycles)
-    for number, stage in enumerate(outcome.stages):
-        group = f"kinetics/{stage.name}"
-        columns = dict(zip(KINETICS, state.kinetics[:, number].T, strict=True))
-        writer.put(group, **columns, area=_contact_area(writer.file, stage, state.jump))
-        for name, regime in outcome.regimes[stage.name].items():
-            writer.file[group].attrs.update(
-                {
-                    f"{name}_linear_from": regime.start if regime else np.nan,
-                    f"{name}_rate": regime.rate if regime else np.nan,
-                    f"{name}_trend": regime.trend if regime else np.nan,
-                    f"{name}_scatter": regime.scatter if regime else np.nan,
-                }
+            surfaces, contact = (
+                {name: arrays[f"{kind}/{stage.name}/{name}"] for name in names}
+                for kind, names in JUMP_FIELDS.items()
             )
+            place, cycles = f"{stage.name}/{jump:05d}", attributes["cycles"]
+            writer.put(f"surfaces/{place}", surface_heights(**surfaces), cycles=cycles)
+            writer.put(f"contact/{place}", traction_fields(**contact), cycles=cycles)
+            cells = np.count_nonzero(contact["pressure"] > 0.0)
+            areas[stage.name].append(cells * stage.grid.cell_area)
+    return areas
 
 
-def _contact_area(file: h5py.File, stage: ContactStage, jumps: int) -> Array:
-    """Area in contact at peak load after every jump, unworn first, ``(jumps + 1,)`` [mm²]."""
-    pressures = (file[f"contact/{stage.name}/{jump:05d}/pressure"] for jump in range(jumps + 1))
-    cells = [np.count_nonzero(pressure[()] > 0.0) for pressure in pressures]
-    return np.array(cells, dtype=np.float64) * stage.grid.cell_area
+def _write_kinetics(writer: ResultsWriter, outcome: Outcome, areas: dict[str, list[float]]) -> None:
+    state = outcome.state
+    writer.put("kinetics", {"cycles": cycles_column(state.cycles)})
+    for number, stage in enumerate(outcome.stages):
+        columns = kinetics_columns(state.kinetics[:, number], np.array(areas[stage.name]))
+        regimes = {
+            f"{name}_{attribute}": value
+            for name, regime in outcome.regimes[stage.name].items()
+            for attribute, value in _regime_attributes(regime).items()
+        }
+        writer.put(f"kinetics/{stage.name}", columns, **regimes)
+
+
+def _regime_attributes(regime: LinearRegime | None) -> dict[str, float]:
+    """A linear regime as attributes, not numbers where there is none."""
+    if regime is None:
+        return dict.fromkeys(("linear_from", "rate", "trend", "scatter"), np.nan)
+    return {
+        "linear_from": regime.start,
+        "rate": regime.rate,
+        "trend": regime.trend,
+        "scatter": regime.scatter,
+    }
 
 
 def _add_areas(summary: dict[str, Any], outcome: Outcome, folder: OutputFolder) -> None:

@@ -16,8 +16,8 @@ import numpy as np
 from fe_models.structure import InterfaceHistory
 from fe_models.transfer import FaceTransfer
 from sa_solver.types import Array
+from wear.interface import InterfaceState
 from workflow.analyses.wear.contact_stage import ContactStage
-from workflow.analyses.wear.interface_state import InterfaceState
 from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.structure_stage import StructureStage
 

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from wear.coupled import CoupledState
+from wear.interface import FirstContact
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.checkpoint import RunState
-from workflow.analyses.wear.contact_stage import ContactStage, FirstContact
+from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.shell.reporter import Reporter
@@ -44,7 +45,7 @@ def warn_of_contact(
     case: WearCase,
     peak: int,
     stages: list[ContactStage],
-    state: RunState,
+    state: CoupledState,
     first: list[FirstContact],
     reporter: Reporter,
 ) -> None:
@@ -76,7 +77,20 @@ def warn_of_contact(
             reporter.warn(line)
 
 
-def warn_of_growth(stages: list[ContactStage], state: RunState, reporter: Reporter) -> None:
+def warn_of_instability(
+    stages: list[ContactStage], state: CoupledState, cycles: float, reporter: Reporter
+) -> None:
+    """Explicit steps of so many cycles that are too long."""
+    pairs = zip(stages, state.interfaces, strict=True)
+    stable = min(stage.stable_cycles(own) for stage, own in pairs)
+    if cycles > stable:
+        reporter.warn(
+            f"explicit wear steps above {stable:.3g} cycles amplify the grid's roughness "
+            "(wear.step): use implicit steps or smaller ones"
+        )
+
+
+def warn_of_growth(stages: list[ContactStage], state: CoupledState, reporter: Reporter) -> None:
     """Contacts that have grown to the border of their grid: they have worn there."""
     for stage, own in zip(stages, state.interfaces, strict=True):
         worn = own.surfaces.depth

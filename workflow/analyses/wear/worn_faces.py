@@ -11,8 +11,8 @@ import numpy as np
 
 from fe_models.mesh import Face
 from sa_solver.types import Array, Frame, Indices
+from wear.interface import InterfaceState
 from workflow.analyses.wear.contact_stage import ContactStage
-from workflow.analyses.wear.interface_state import InterfaceState
 from workflow.analyses.wear.load_source import UserFace
 from workflow.analyses.wear.worn_nodes import (
     NodalDepths,

@@ -7,7 +7,6 @@ How much of it they carry is measured: ``NodalDepths.volume_share``.
 
 from __future__ import annotations
 
-import csv
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -19,8 +18,9 @@ from fe_models.mesh import Face
 from fe_models.transfer import FaceTransfer
 from sa_solver.types import Array, Frame, Grid, Indices
 from workflow.analyses.wear.structures.resultants.faces import FaceError, facets_over
-from workflow.analyses.wear.structures.resultants.table import read_table
-from workflow.shell.store import replacing
+from workflow.case.fields import Quantity
+from workflow.case.table_file import read_table_file
+from workflow.shell.tables import write_table
 
 NODE = "node"
 AXES = ("X", "Y", "Z")
@@ -57,15 +57,20 @@ def read_nodes(file: str | Path) -> NodeTable:
 
     Raises InputFileError.
     """
-    table = read_table(str(file), {NODE: "1", **dict.fromkeys(AXES, "mm")}, [NODE, "X", "Y"])
+    table, needed = read_table_file(file), (NODE, "X", "Y")
+    table.check({NODE: "1", **dict.fromkeys(AXES, "mm")})
+    table.require(needed, ", ".join(needed))
     numbers = table.whole(NODE)
     seen: set[int] = set()
     for row, number in enumerate(numbers):
         if number in seen:
             raise table.refusal(row, NODE, "node given twice", "once")
         seen.add(number)
-    zeros = np.zeros(len(table))
-    points = np.stack([table.numbers.get(axis, zeros) for axis in AXES], axis=1)
+    columns = [
+        table.column(axis, Quantity("mm")) if axis in table.names else np.zeros(len(table))
+        for axis in AXES
+    ]
+    points = np.stack(columns, axis=1)
     return NodeTable(np.array(numbers, dtype=np.int64), points)
 
 
@@ -101,11 +106,8 @@ def worn_displacement(depth: Array, frame: Frame, body: Literal[1, 2]) -> Array:
 
 def write_worn_nodes(path: Path, nodes: Indices, displacement: Array) -> None:
     """Write displacements ``(n, 3)`` [mm] by node number, such that they read back the same."""
-    with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
-        writer = csv.writer(stream, lineterminator="\n")
-        writer.writerow([NODE, "ux [mm]", "uy [mm]", "uz [mm]"])
-        for node, row in zip(nodes.tolist(), displacement.tolist(), strict=True):
-            writer.writerow([node, *map(repr, row)])
+    along = {f"u{axis.lower()} [mm]": own for axis, own in zip(AXES, displacement.T, strict=True)}
+    write_table(path, {NODE: nodes} | along)
 
 
 def _in_plane(points: Array, frame: Frame, line: bool) -> Array:

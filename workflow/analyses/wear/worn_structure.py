@@ -7,19 +7,22 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.mesh import StructureMesh, write_msh
+from fe_models.mesh import Body, StructureMesh, write_msh
 from fe_models.nonlinear import NonlinearCheck
 from fe_models.remesh import worn_mesh, worn_volume
 from fe_models.stress import StressField
 from fe_models.structure import CycleSolution
 from sa_solver.types import LoadHistory
+from wear.coupled import CoupledState
 from workflow.analyses.wear.case.evolution import EvolvingFriction
-from workflow.analyses.wear.checkpoint import RunState
 from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.datasets import put_face
 from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
-from workflow.shell.store import ResultsWriter, replacing
+from workflow.shell.results import ResultsWriter
+from workflow.shell.store import replacing
 
 RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
 # What the summary tells of a total Lagrangian check, beside the resultants.
@@ -42,13 +45,13 @@ class WornStructure:
         """Load histories of the worn faces, and both bodies unworn and worn."""
         for history in self.cycle.histories:
             group = f"structure_worn/{history.interface.name}"
-            writer.put_face(group, history.interface, history)
+            put_face(writer, group, history.interface, history)
         for moment, mesh in (("unworn", self.stage.mesh), ("worn", self.mesh)):
             bodies = zip((mesh.body_1, mesh.body_2), self.stresses[moment], strict=True)
             for body, field in bodies:
-                writer.put_body(f"bodies/{body.name}/{moment}", body.points, body.mesh.t.T, field)
+                writer.put(f"bodies/{body.name}/{moment}", _body(body, field))
 
-    def summary(self, state: RunState) -> dict[str, Any]:
+    def summary(self, state: CoupledState) -> dict[str, Any]:
         """What the solver says of itself, and the largest stresses."""
         stage, unworn = self.stage, self.stage.unworn_cycle
         bodies = self.mesh.body_1, self.mesh.body_2
@@ -91,10 +94,23 @@ class WornStructure:
         }
 
 
+def _body(body: Body, field: StressField) -> dict[str, Dataset]:
+    """Mesh and stress of a body."""
+    corners = "corner vertices of the tetrahedra, or of the triangles in the plane"
+    principal = "largest principal stress at peak load"
+    return {
+        "points": Dataset(body.points, "mm", "vertices"),
+        "elements": Dataset(body.mesh.t.T, "1", corners),
+        "displacement": Dataset(field.displacement, "mm", "displacement at peak load"),
+        "von_mises": Dataset(field.von_mises, "MPa", "von Mises stress at peak load"),
+        "maximum_principal": Dataset(field.maximum_principal, "MPa", principal),
+    }
+
+
 def worn_structure(
     stage: StructureStage,
     contacts: list[ContactStage],
-    state: RunState,
+    state: CoupledState,
     friction: EvolvingFriction,
     folder: OutputFolder,
     reporter: Reporter,

@@ -9,18 +9,19 @@ from __future__ import annotations
 
 from functools import lru_cache, partial
 from math import ceil, gcd
+from typing import Literal
 
 import numpy as np
 
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, resultant_change
+from wear.coupled import ContactsInTurn, CoupledSettings, CoupledState, CoupledWear, JumpSize
 from wear.steppers import Implicit, advance_cycles
 from wear.stepping import SlidingCycle, WearingContact, WearState
 from workflow.analyses.wear.case.sections import Contact, ContactStress, Life, Step
 from workflow.analyses.wear.contact_stage import ContactStage, StageSettings
 from workflow.analyses.wear.fidelity.estimate import Numbers
-from workflow.analyses.wear.interface_state import InterfaceState
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.analyses.wear.structures.dovetail.model import SIDES, DovetailModel
@@ -83,15 +84,37 @@ def life(case: DovetailCase) -> Numbers:
     The loads are those of the unworn structure. Raises what structure and contact raise, and
     MethodFailed where nothing wears.
     """
+    stages, (*_, end) = _run(case, "constant")
+    return _wearing(_found(stages, end))
+
+
+def coupled_life(case: DovetailCase) -> tuple[Numbers, float]:
+    """A life whose structure is solved again after every step, and by how much loads drifted.
+
+    The drift is that of the resultants in the end, as a run measures it.
+    """
+    stages, (first, *_, end) = _run(case, "every")
+    sizes = np.array([stage.grid.size for stage in stages])
+    drift = resultant_change(end.solved_resultants, first.solved_resultants, sizes)
+    return _found(stages, end), float(np.abs(drift).max())
+
+
+def _run(
+    case: DovetailCase, resultants: Literal["constant", "every"]
+) -> tuple[list[ContactStage], list[CoupledState]]:
+    """The contacts of a life, and its states, the unworn one first."""
     structure = _structure(case)
-    found = {}
-    for contact, history in zip(structure.faces, structure.unworn(), strict=True):
-        stage = ContactStage(StageSettings(case, contact))
-        state, _ = stage.begin(history)
-        for _ in range(STEPS):
-            state, _ = stage.jump(state, case.wear.cycles / STEPS, case.wear.cycles)
-        found[stage.name] = _worn(state.surfaces.depth, stage.grid)
-    return _wearing(found)
+    stages = [ContactStage(StageSettings(case, contact)) for contact in structure.faces]
+    cycles = case.wear.cycles
+    settings = CoupledSettings(cycles, JumpSize(cycles / STEPS), resultants=resultants)
+    loop = CoupledWear(settings, structure, ContactsInTurn(stages))
+    state, _ = loop.begin(structure.unworn())
+    return stages, [state, *loop.march(state)]
+
+
+def _found(stages: list[ContactStage], state: CoupledState) -> Numbers:
+    pairs = zip(stages, state.interfaces, strict=True)
+    return {stage.name: _worn(own.surfaces.depth, stage.grid) for stage, own in pairs}
 
 
 def _wearing(found: Numbers) -> Numbers:
@@ -103,38 +126,6 @@ def _wearing(found: Numbers) -> Numbers:
 
 def _worn(depth: Array, grid: Grid) -> dict[str, float]:
     return {"depth": float(depth.max()), "volume": float(depth.sum()) * grid.cell_area}
-
-
-# --- the structure follows the worn surfaces ------------------------------------------------------
-
-
-def coupled_life(case: DovetailCase) -> tuple[Numbers, float]:
-    """A life whose structure is solved again after every step, and by how much loads drifted.
-
-    The drift is that of the resultants in the end, as a run measures it.
-    """
-    structure = _structure(case)
-    stages = [ContactStage(StageSettings(case, contact)) for contact in structure.faces]
-    pairs = zip(stages, structure.unworn(), strict=True)
-    states = [stage.begin(history)[0] for stage, history in pairs]
-    unworn = structure.probe(_depths(stages, states))
-    for _ in range(STEPS):
-        jumped = [
-            stage.jump(own, case.wear.cycles / STEPS, case.wear.cycles)[0]
-            for stage, own in zip(stages, states, strict=True)
-        ]
-        histories = structure.worn(_depths(stages, jumped))
-        triples = zip(stages, jumped, histories, strict=True)
-        states = [stage.follow(own, history) for stage, own, history in triples]
-    sizes = np.array([stage.grid.size for stage in stages])
-    drift = resultant_change(structure.probe(_depths(stages, states)), unworn, sizes)
-    pairs_of_states = zip(stages, states, strict=True)
-    worn = {stage.name: _worn(own.surfaces.depth, stage.grid) for stage, own in pairs_of_states}
-    return worn, float(np.abs(drift).max())
-
-
-def _depths(stages: list[ContactStage], states: list[InterfaceState]) -> list[Array]:
-    return [stage.nodal_depth(own) for stage, own in zip(stages, states, strict=True)]
 
 
 # --- the profile along the slot -------------------------------------------------------------------

@@ -10,7 +10,7 @@ import numpy as np
 from sa_solver.types import Array
 from workflow.pictures.fields import centres, line_contacts, middle, near_middle
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, new_figure
-from workflow.shell.store import grid_of
+from workflow.shell.results import grid_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

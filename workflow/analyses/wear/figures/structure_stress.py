@@ -11,7 +11,7 @@ from sa_solver.types import Array
 from workflow.analyses.wear.body_mesh import body_mesh
 from workflow.pictures.fields import line_contacts
 from workflow.pictures.style import BLACK, new_figure
-from workflow.shell.store import grid_of
+from workflow.shell.results import grid_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,9 +8,10 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array, Grid
+from workflow.analyses.wear.layout import body_names
 from workflow.pictures.fields import centres, draw_map, map_top
 from workflow.pictures.style import BLACK, BLUE, FONT_SIZE, ORANGE, new_figure
-from workflow.shell.store import body_names, grid_of
+from workflow.shell.results import grid_of
 
 if TYPE_CHECKING:
     from collections.abc import Callable

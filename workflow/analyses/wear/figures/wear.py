@@ -14,6 +14,7 @@ from workflow.analyses.wear.figures.comparison import half_space_and_structure
 from workflow.analyses.wear.figures.loops import LOOP_FIGURES
 from workflow.analyses.wear.figures.structure_stress import structure_stress
 from workflow.analyses.wear.figures.subsurface import STRESS_FIGURES
+from workflow.analyses.wear.layout import body_names, jump_names
 from workflow.pictures.fields import (
     MAP_PERCENTILE,
     MAX_PROFILES,
@@ -26,7 +27,7 @@ from workflow.pictures.fields import (
     spread,
 )
 from workflow.pictures.style import BLACK, BLUE, FONT_SIZE, GREEN, ORANGE, PURPLE, new_figure
-from workflow.shell.store import body_names, grid_of, jump_names
+from workflow.shell.results import grid_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -8,8 +8,8 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array, Frame
+from workflow.analyses.wear.layout import jump_names
 from workflow.pictures.vtk import Fields, Step, attach, cells, write_series, write_xml
-from workflow.shell.store import jump_names
 
 
 def life_fields(file: h5py.File, interface: str, jump: str) -> Fields:

@@ -22,6 +22,7 @@ import numpy as np
 
 from sa_solver.types import Frame, Grid
 from workflow.analyses.wear.body_mesh import body_mesh
+from workflow.analyses.wear.layout import body_names, jump_names
 from workflow.analyses.wear.paraview.subsurface import life_fields, write_sections
 from workflow.pictures.vtk import (
     Fields,
@@ -33,7 +34,7 @@ from workflow.pictures.vtk import (
     write_stl,
     write_xml,
 )
-from workflow.shell.store import body_names, frame_of, grid_of, jump_names
+from workflow.shell.results import frame_of, grid_of
 
 if TYPE_CHECKING:
     import pyvista

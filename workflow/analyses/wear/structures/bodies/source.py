@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property, partial
 
 import numpy as np
 
 from fe_models.mesh import Face
 from sa_solver.types import Array, Frame, Grid, LoadHistory
+from wear.interface import CycleLoads
 from workflow.analyses.contact.bodies import Shape, height_at
 from workflow.analyses.contact.case import Heights
 from workflow.analyses.wear.gaps import GapFunction, GridHeights
@@ -28,14 +28,6 @@ COARSER = 4
 # Cells below which a contact is hardly one.
 FEWEST = 8
 REMEDY = "enlarge contact.size, and contact.grid with it"
-
-
-@dataclass(frozen=True)
-class Sliding:
-    """What the contact carries over a cycle: ``slip`` ``(t, 2, n)`` [mm] of the rigid bodies."""
-
-    loads: LoadHistory
-    slip: Array
 
 
 class BodiesSource:
@@ -68,12 +60,12 @@ class BodiesSource:
     def prepare(self) -> None:
         """Nothing is costly."""
 
-    def unworn(self) -> tuple[Sliding, ...]:
+    def unworn(self) -> tuple[CycleLoads, ...]:
         return self._sliding(self._case.friction.coefficient)
 
     def worn(
         self, depths: Sequence[Array], friction: Sequence[float] | None = None
-    ) -> tuple[Sliding, ...]:
+    ) -> tuple[CycleLoads, ...]:
         """As unworn but for the friction: no structure answers to wear."""
         return self._sliding(*friction) if friction else self.unworn()
 
@@ -95,10 +87,12 @@ class BodiesSource:
         there = np.tile(step, (path.increments, 1))
         return np.concatenate([there, -there])
 
-    def _sliding(self, friction: float) -> tuple[Sliding]:
+    def _sliding(self, friction: float) -> tuple[CycleLoads]:
         """The cycle of the only contact."""
         nodes = len(self.faces[0].face)
-        return (Sliding(self._loads(friction), np.repeat(self.motion[:, :, None], nodes, axis=2)),)
+        return (
+            CycleLoads(self._loads(friction), np.repeat(self.motion[:, :, None], nodes, axis=2)),
+        )
 
     def _loads(self, friction: float) -> LoadHistory:
         """Friction against the motion, and what it dissipates."""

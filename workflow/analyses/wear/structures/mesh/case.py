@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 import numpy as np
-from pydantic import TypeAdapter, ValidationError, model_validator
+from pydantic import model_validator
 
 from workflow.analyses.wear.case.base import WearCase, check_interface_name
 from workflow.analyses.wear.case.gaps import Gap, check_gap
@@ -30,7 +30,6 @@ from workflow.analyses.wear.structures.mesh.loads import (
 )
 from workflow.case.fields import File, Whole
 from workflow.case.sections import Length, Section, Title, disagreement, entry
-from workflow.errors import UserError
 
 if TYPE_CHECKING:
     from fe_models import imported_structure as fe
@@ -170,27 +169,6 @@ def _stamp(file: str) -> Stamp:
     """Time and size by which a file that has changed is known."""
     state = Path(file).stat()
     return state.st_mtime_ns, state.st_size
-
-
-def described_file(file: Path, size: str | None) -> list[str]:
-    """Lines that list what a mesh or CAD file has; ``size`` with its unit. Raises UserError."""
-    from fe_models.geometry.imported import describe_bodies, read_bodies
-    from fe_models.mesh import MeshError
-
-    try:
-        return describe_bodies(read_bodies(file, None if size is None else _length(size)))
-    except MeshError as error:
-        raise UserError(str(error)) from error
-
-
-def _length(text: str) -> float:
-    """A length in mm. Raises UserError."""
-    value = float(text) if text.replace(".", "", 1).isdecimal() else text
-    try:
-        length: float = TypeAdapter(Length).validate_python(value)
-    except ValidationError as error:
-        raise UserError(f"--size: {error.errors()[0]['msg']}") from error
-    return length
 
 
 class CycleOfMix(Section):

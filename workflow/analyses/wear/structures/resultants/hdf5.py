@@ -23,10 +23,10 @@ from workflow.analyses.wear.structures.resultants.imported import (
     base_units,
     required_columns,
 )
-from workflow.analyses.wear.structures.resultants.table import check_unit
 from workflow.case import units
 from workflow.case.input_files import InputFileError
-from workflow.shell.store import frame_of
+from workflow.case.table_file import check_unit
+from workflow.shell.results import frame_of
 
 LOADS = "load_history"
 # In a group beside the loads: what is read, and what our results hold besides.

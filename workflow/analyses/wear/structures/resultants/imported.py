@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from sa_solver.types import Array, Frame, Indices, LoadHistory
-from workflow.shell.store import DATASETS, PER_LENGTH
+from workflow.analyses.contact.datasets import energy_columns, resultant_columns
+from workflow.shell.dataset import unit_in
 
 if TYPE_CHECKING:
     from fe_models.mesh import Face
@@ -57,8 +58,8 @@ class ImportedLoads:
 
 def base_units(line: bool) -> dict[str, str]:
     """Base unit of every column; per length in a line contact."""
-    own = {name: DATASETS[name][0] for name in COLUMNS}
-    return {name: PER_LENGTH[unit] if line else unit for name, unit in own.items()}
+    columns = resultant_columns(*np.empty((6, 0))) | energy_columns(*np.empty((2, 0)))
+    return {name: unit_in(line, column.unit) for name, column in columns.items()}
 
 
 def required_columns(line: bool) -> list[str]:

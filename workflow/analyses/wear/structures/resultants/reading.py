@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from sa_solver.types import LoadHistory
+from sa_solver.types import Array, LoadHistory
 from workflow.analyses.wear.structures.resultants.consistency import (
     MIX,
     Bounds,
@@ -26,9 +26,9 @@ from workflow.analyses.wear.structures.resultants.imported import (
     base_units,
     required_columns,
 )
-from workflow.analyses.wear.structures.resultants.table import Table, read_table
-from workflow.case.fields import shown, split_dataset
+from workflow.case.fields import Quantity, shown, split_dataset
 from workflow.case.input_files import InputFileError
+from workflow.case.table_file import TableFile, read_table_file
 
 INTERFACE, INCREMENT, SLIDING = "interface", "increment", "sliding"
 # Names become groups of results and columns of tables.
@@ -59,10 +59,19 @@ def read_resultants(
 
     if file.endswith(HDF5):
         return _alike(file, read_h5(file, group, bounds, line))
-    table = read_table(file, _columns(line), required_columns(line))
+    table, units, required = read_table_file(file), _columns(line), required_columns(line)
+    table.check(units)
+    table.require(required, f"{', '.join(required)} in every file")
+    numbers = {
+        name: table.column(name, Quantity(unit))
+        for name, unit in units.items()
+        if unit is not None and name in table.names
+    }
     rows = _rows_of(table)
     _check_counts(table, rows)
-    read = {name: ImportedLoads(_loads(table, own, bounds(name))) for name, own in rows.items()}
+    read = {
+        name: ImportedLoads(_loads(table, numbers, own, bounds(name))) for name, own in rows.items()
+    }
     return _alike(file, read)
 
 
@@ -84,22 +93,23 @@ def _columns(line: bool) -> dict[str, str | None]:
     return {INTERFACE: None, INCREMENT: "1", **base_units(line), **bare}
 
 
-def _rows_of(table: Table) -> dict[str, list[int]]:
+def _rows_of(table: TableFile) -> dict[str, list[int]]:
     """Rows of every interface, in the order of its increments."""
-    names = table.cells.get(INTERFACE, [UNNAMED] * len(table))
+    named = INTERFACE in table.names
+    names = table.cells(INTERFACE) if named else [UNNAMED] * len(table)
     rows: dict[str, list[int]] = {}
     for row, name in enumerate(names):
         if not NAME.fullmatch(name):
             allowed = "letters, digits, '_', '-', '.' and spaces between them"
             raise table.refusal(row, INTERFACE, "no name", allowed)
         rows.setdefault(name, []).append(row)
-    if INCREMENT in table.cells:
+    if INCREMENT in table.names:
         for own in rows.values():
             _check_increments(table, own)
     return rows
 
 
-def _check_increments(table: Table, rows: list[int]) -> None:
+def _check_increments(table: TableFile, rows: list[int]) -> None:
     increments = table.whole(INCREMENT)
     for count, row in enumerate(rows, start=1):
         if increments[row] != count:
@@ -108,36 +118,37 @@ def _check_increments(table: Table, rows: list[int]) -> None:
             raise table.refusal(row, INCREMENT, wrong, f"{count}: they count from 1")
 
 
-def _check_counts(table: Table, rows: dict[str, list[int]]) -> None:
+def _check_counts(table: TableFile, rows: dict[str, list[int]]) -> None:
     longest = max(rows, key=lambda name: len(rows[name]))
     for name, own in rows.items():
         if len(own) != len(rows[longest]):
             raise InputFileError(
-                f"{table.file}:{table.lines[own[-1]]}: {shown(name)} ends after {len(own)} "
+                f"{table.file}:{table.rows[own[-1]][0]}: {shown(name)} ends after {len(own)} "
                 f"increments; allowed: as many for every interface, {longest} has "
                 f"{len(rows[longest])}"
             )
 
 
-def _loads(table: Table, rows: list[int], bounds: Bounds) -> LoadHistory:
+def _loads(
+    table: TableFile, numbers: Mapping[str, Array], rows: list[int], bounds: Bounds
+) -> LoadHistory:
     zeros = np.zeros(len(rows))
     columns: dict[str, Any] = {
-        name: table.numbers[name][rows] if name in table.numbers else zeros
-        for name in base_units(bounds.line)
+        name: numbers[name][rows] if name in numbers else zeros for name in base_units(bounds.line)
     }
     refusal = partial(_refusal, table, rows)
     check_loads(columns, bounds, refusal)
-    given = {name: table.numbers[name][rows] for name in MIX if name in table.numbers}
+    given = {name: numbers[name][rows] for name in MIX if name in numbers}
     mix = mix_columns(given, refusal)
-    if SLIDING not in table.numbers:
+    if SLIDING not in numbers:
         return LoadHistory(**columns, sliding=slides_by_limit(columns, bounds.friction), **mix)
-    marks = table.numbers[SLIDING][rows]
+    marks = numbers[SLIDING][rows]
     for increment in np.flatnonzero((marks != 0.0) & (marks != 1.0)).tolist():
         raise refusal(increment, SLIDING, "neither yes nor no", "0 or 1")
     return LoadHistory(**columns, sliding=marks == 1.0, **mix)
 
 
 def _refusal(
-    table: Table, rows: list[int], increment: int, column: str, wrong: str, allowed: str
+    table: TableFile, rows: list[int], increment: int, column: str, wrong: str, allowed: str
 ) -> InputFileError:
     return table.refusal(rows[increment], column, wrong, allowed)

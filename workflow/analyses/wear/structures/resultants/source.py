@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from fe_models.mesh import Face
-from sa_solver.types import Array, Frame, Grid, LoadHistory
+from sa_solver.types import Array, Frame, Grid
+from wear.interface import CycleLoads
 from workflow.analyses.wear.gaps import gap_over
 from workflow.analyses.wear.load_source import BODIES, ContactFace, UserFace
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
@@ -22,14 +23,6 @@ COARSER = 4
 # Cells below which a contact is hardly one.
 FEWEST = 8
 REMEDY = "enlarge structure.size, and contact.grid with it"
-
-
-@dataclass(frozen=True)
-class FaceHistory:
-    """What the file says of one face over the cycle: ``slip`` ``(t, 2, n)`` [mm]."""
-
-    loads: LoadHistory
-    slip: Array
 
 
 class ResultantsSource:
@@ -61,15 +54,15 @@ class ResultantsSource:
     def prepare(self) -> None:
         """Nothing is costly."""
 
-    def unworn(self) -> tuple[FaceHistory, ...]:
+    def unworn(self) -> tuple[CycleLoads, ...]:
         return tuple(
-            FaceHistory(own.loads, _slip(own, len(contact.face)))
+            CycleLoads(own.loads, _slip(own, len(contact.face)))
             for own, contact in zip(self.imported.values(), self.faces, strict=True)
         )
 
     def worn(
         self, depths: Sequence[Array], friction: Sequence[float] | None = None
-    ) -> tuple[FaceHistory, ...]:
+    ) -> tuple[CycleLoads, ...]:
         """As unworn: no structure answers to wear."""
         return self.unworn()
 

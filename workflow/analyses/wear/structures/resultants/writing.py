@@ -2,30 +2,27 @@
 
 from __future__ import annotations
 
-import csv
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
+from numpy.typing import NDArray
 
 from sa_solver.types import Array, LoadHistory
+from workflow.analyses.contact.datasets import load_columns, slip_field
+from workflow.analyses.wear.datasets import face_mesh
 from workflow.analyses.wear.structures.resultants.consistency import MIX
 from workflow.analyses.wear.structures.resultants.imported import base_units
-from workflow.shell.store import ResultsWriter, replacing
+from workflow.shell.dataset import Dataset
+from workflow.shell.results import writing
+from workflow.shell.tables import heading, write_table
 
 if TYPE_CHECKING:
     from fe_models.mesh import Interface
     from fe_models.structure import InterfaceHistory
 
-NOTE = "# forces and moments of body 1 on body 2, in the frame of each interface; one closed cycle"
-# Unit and description of what only these files hold.
-NODAL = {
-    "nodes_1": ("1", "node numbers of body 1"),
-    "nodes_2": ("1", "node numbers of body 2"),
-    "nodal_height": ("mm", "gap before loading, at the nodes"),
-}
+NOTE = "forces and moments of body 1 on body 2, in the frame of each interface; one closed cycle"
 
 
 def write_resultants_csv(
@@ -35,19 +32,19 @@ def write_resultants_csv(
 
     Loads of a ``line`` contact are per mm.
     """
-    units = base_units(line)
-    with replacing(path) as partial, partial.open("w", newline="", encoding="utf-8") as stream:
-        stream.write(NOTE + "\n")
-        writer = csv.writer(stream, lineterminator="\n")
-        header = [f"{name} [{unit}]" for name, unit in units.items()]
-        mixed = [name for name in MIX if any(loads.mixed for loads in histories.values())]
-        writer.writerow(["interface", "increment", *header, "sliding", *mixed])
-        for interface, loads in histories.items():
-            columns = np.array([getattr(loads, name) for name in units]).T.tolist()
-            marks = zip(loads.sliding, *(getattr(loads, name) for name in mixed), strict=True)
-            for number, (row, (slides, *mix)) in enumerate(zip(columns, marks, strict=True), 1):
-                cells = map(repr, [*row, int(slides), *(own.item() for own in mix)])
-                writer.writerow([interface, number, *cells])
+    loads = list(histories.values())
+    units = base_units(line) | {"sliding": ""}
+    if any(own.mixed for own in loads):
+        units |= dict.fromkeys(MIX, "")
+    lengths = [len(own) for own in loads]
+    columns: dict[str, NDArray[Any]] = {
+        "interface": np.repeat(list(histories), lengths),
+        "increment": np.concatenate([np.arange(1, length + 1) for length in lengths]),
+    }
+    for name, unit in units.items():
+        values = np.concatenate([getattr(own, name) for own in loads])
+        columns[heading(name, unit)] = values.astype(int) if name == "sliding" else values
+    write_table(path, columns, note=NOTE)
 
 
 def write_resultants_h5(
@@ -62,23 +59,23 @@ def write_resultants_h5(
     from fe_models.mesh import Interface
 
     line = any(history.interface.line for history in histories.values())
-    with replacing(path) as partial, h5py.File(partial, "w") as file:
-        writer = ResultsWriter(file, per_length=line)
+    with writing(path, line) as writer:
         for name, history in histories.items():
             face = history.interface
-            writer.put(f"{name}/load_history", **history.loads.columns())
-            writer.put(name, coordinates=face.coordinates, facets=face.facets, slip=history.slip)
-            file[name].attrs.update({"origin": face.frame.origin, "axes": face.frame.axes})
+            writer.put(f"{name}/load_history", load_columns(history.loads))
+            datasets = face_mesh(face) | {"slip": slip_field(history.slip)}
             if heights is not None:
-                writer.put(name, height=heights[name])
+                datasets["height"] = Dataset(heights[name], "mm", "gap before loading")
             if isinstance(face, Interface):
-                _put_nodes(file[name], face)
+                datasets |= _at_nodes(face)
+            writer.put(name, datasets, origin=face.frame.origin, axes=face.frame.axes)
 
 
-def _put_nodes(group: h5py.Group, face: Interface) -> None:
+def _at_nodes(face: Interface) -> dict[str, Dataset]:
     """Gap and node numbers at the nodes of the face; body 1's where both meet node to node."""
-    for name, (unit, description) in NODAL.items():
-        values = {"nodes_1": face.nodes_1, "nodes_2": face.nodes_2, "nodal_height": face.gap}[name]
-        if len(values) == len(face):
-            dataset = group.create_dataset(name, data=values)
-            dataset.attrs.update({"unit": unit, "description": description})
+    datasets = {
+        "nodes_1": Dataset(face.nodes_1, "1", "node numbers of body 1"),
+        "nodes_2": Dataset(face.nodes_2, "1", "node numbers of body 2"),
+        "nodal_height": Dataset(face.gap, "mm", "gap before loading, at the nodes"),
+    }
+    return {name: own for name, own in datasets.items() if len(own.values) == len(face)}

@@ -1,0 +1,160 @@
+"""Between the joints of a structure and its modes, harmonic by harmonic, and the Jacobian of that.
+
+With the receptances R_k between joints, and the derivative J of the joints' forces by their
+displacements, the balance of harmonics u - ... + R F(u) has the Jacobian 1 + R J. Where only joints
+hold the structure, R is that of a structure held by springs κ in every direction of the joints, and
+κ u is taken off the joints' forces at harmonic 0: see :mod:`fe_models.dynamics.receptance`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numba import njit
+
+from fe_models.dynamics.harmonics import ComplexArray, Resolution, by_function, by_joint
+from fe_models.dynamics.joint_rest import Rest
+from fe_models.dynamics.receptance import Receptance, SteadyMotion
+from sa_solver.types import Array
+
+
+@dataclass(frozen=True)
+class HarmonicTransfer:
+    """Between coefficients of joints of so many ``directions`` and amplitudes of the modes."""
+
+    resolution: Resolution
+    receptance: Receptance
+    directions: int
+
+    @cached_property
+    def joints(self) -> int:
+        """How many there are."""
+        return len(self.receptance.at_joints) // self.directions
+
+    @cached_property
+    def size(self) -> int:
+        """Coefficients of all joints."""
+        return self.joints * self.resolution.size * self.directions
+
+    @cached_property
+    def held(self) -> float:
+        """κ [N/mm], 0 where it is not needed."""
+        return self.receptance.held if self.resolution.harmonics[0] == 0 else 0.0
+
+    def shaped(self, unknowns: Array) -> Array:
+        """Coefficients ``(j, m, d)`` from all in a row."""
+        return unknowns.reshape(self.joints, self.resolution.size, self.directions)
+
+    def on_modes(
+        self, force: Array, unknowns: Array, structure: Receptance | None = None
+    ) -> ComplexArray:
+        """Forces on the modes ``(k, n)``, of the opposite sign, by joints' ``force`` ``(j, m, d)``.
+
+        It is their ``unknowns`` by which they are held at harmonic 0. The modes are those of this
+        structure, or of another one.
+        """
+        structure, rows = structure or self.receptance, by_function(force)
+        if self.held:
+            # Of a single joint the rows are a view of the given force, which stays as it is.
+            rows = rows.copy()
+            rows[0] -= self.held * self.shaped(unknowns)[:, 0].ravel()
+        return self.resolution.combined(rows @ structure.at_joints)
+
+    def at_joints(self, motion: ComplexArray, structure: Receptance | None = None) -> Array:
+        """Coefficients ``(j m d,)`` of the joints' displacements, of a motion of the modes.
+
+        The modes are those of this structure, or of another one.
+        """
+        structure = structure or self.receptance
+        rows = self.resolution.separated(motion) @ structure.at_joints.T
+        return by_joint(rows, self.directions).ravel()
+
+
+@dataclass(frozen=True)
+class HarmonicJacobian:
+    """1 + R (J - κ): what it does to a vector, and its assembly.
+
+    ``steady`` is the structure at the harmonics of a frequency, ``slopes`` ``(j, m, d, m, d)`` J,
+    and ``rest`` knows the joints' stiffness at rest.
+    """
+
+    transfer: HarmonicTransfer
+    rest: Rest
+    steady: SteadyMotion
+    slopes: Array
+
+    def __matmul__(self, vector: Array) -> Array:
+        joints = len(self.slopes)
+        size = self.slopes.shape[1] * self.slopes.shape[2]
+        columns = vector.reshape(joints, size, 1)
+        force = (self.slopes.reshape(joints, size, size) @ columns).reshape(self.slopes.shape[:3])
+        return vector + self._answer(self.steady, force, vector)
+
+    def precondition(self, vector: Array) -> Array:
+        """The inverse with the joints' stiffness D at rest, for J, times a vector.
+
+        (1 + R (D - κ))⁻¹ = 1 - R' (D - κ), with receptances R' of the structure stiffened by D.
+        """
+        shaped = vector.reshape(self.slopes.shape[:3])
+        return vector - self._answer(self._stiffened, shaped @ self.rest.tangents, vector)
+
+    @cached_property
+    def _stiffened(self) -> SteadyMotion:
+        return self.rest.stiffened.at(self.steady.angular)
+
+    def _answer(self, steady: SteadyMotion, force: Array, vector: Array) -> Array:
+        transfer, structure = self.transfer, steady.structure
+        motion = steady.respond(transfer.on_modes(force, vector, structure))
+        return transfer.at_joints(motion, structure)
+
+    def assembled(self) -> Array:
+        """The matrix ``(n, n)``."""
+        transfer = self.transfer
+        slopes = self.slopes.reshape(*self.slopes.shape[:3], -1)
+        jacobian = np.zeros((transfer.size, transfer.size))
+        places = transfer.resolution.places
+        _assemble(self.steady.between_joints(), slopes, transfer.held, *places, jacobian)
+        return jacobian
+
+
+@njit(cache=True, nogil=True)
+def _assemble(
+    between: ComplexArray,
+    slopes: Array,
+    held: float,
+    cosines: np.ndarray,
+    sines: np.ndarray,
+    jacobian: Array,
+) -> None:
+    """1 + R (J - κ), added to ``jacobian`` of zeros.
+
+    ``between`` ``(k, j d, j d)`` R; ``slopes`` ``(j, m, d, m d)`` J of the joints' forces, from
+    which ``held`` κ is taken off at harmonic 0.
+    """
+    joints, size, directions, columns = slopes.shape
+    for k in range(len(cosines)):
+        cosine, sine = cosines[k], sines[k]
+        for to in range(joints * directions):
+            to_joint, to_direction = to // directions, to % directions
+            row = (to_joint * size + cosine) * directions + to_direction
+            other = (to_joint * size + sine) * directions + to_direction
+            for joint in range(joints):
+                first = joint * columns
+                for direction in range(directions):
+                    by = between[k, to, joint * directions + direction]
+                    in_phase = slopes[joint, cosine, direction]
+                    for c in range(columns):
+                        jacobian[row, first + c] += by.real * in_phase[c]
+                    if sine < 0:
+                        jacobian[row, first + direction] -= by.real * held
+                        continue
+                    quadrature = slopes[joint, sine, direction]
+                    for c in range(columns):
+                        jacobian[row, first + c] += by.imag * quadrature[c]
+                        jacobian[other, first + c] += (
+                            by.real * quadrature[c] - by.imag * in_phase[c]
+                        )
+    for row in range(len(jacobian)):
+        jacobian[row, row] += 1.0

@@ -1,0 +1,61 @@
+"""A periodic motion of a structure with joints, by its harmonics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.dynamics.harmonics import ComplexArray, Resolution
+from fe_models.dynamics.periodic_joints import CycleRecord
+from sa_solver.types import Array
+
+
+@dataclass(frozen=True)
+class HarmonicSolution:
+    """A periodic motion.
+
+    ``frequency`` [Hz], ``force`` (the factor a of the load), ``coefficients`` ``(j, m, d)`` [mm] of
+    the joints' displacements, ``motion`` ``(k, n)`` the complex amplitudes of the structure's [mm],
+    ``cycle`` what the joints do, ``iterations`` and ``residual`` of Newton's method. ``message`` is
+    empty, or says why this is not a solution.
+
+    ``left_out`` estimates the share of the joints' vibration that is in other harmonics than those
+    of the ``resolution``: what the joints' forces there would cause. ``sampling`` is by how much
+    the vibration would change with twice the samples, relative to it; None if not asked for.
+    """
+
+    frequency: float
+    force: float
+    resolution: Resolution
+    coefficients: Array
+    motion: ComplexArray
+    cycle: CycleRecord
+    iterations: int
+    residual: float
+    left_out: float
+    sampling: float | None
+    message: str
+
+    @property
+    def converged(self) -> bool:
+        return not self.message
+
+    def amplitude(self, place: int, harmonic: int = 1) -> complex:
+        """Complex amplitude of a degree of freedom [mm]."""
+        return complex(self.motion[self.resolution.harmonics.index(harmonic), place])
+
+    def displacement(self, samples: int) -> Array:
+        """Displacement of the structure ``(t, n)`` [mm] at equal times of a period."""
+        return _in_time(self.motion, self.resolution, samples)
+
+    def velocity(self, samples: int) -> Array:
+        """Velocity of the structure ``(t, n)`` [mm/s]."""
+        rates = 2j * np.pi * self.frequency * np.array(self.resolution.harmonics)
+        return _in_time(rates[:, None] * self.motion, self.resolution, samples)
+
+
+def _in_time(amplitudes: ComplexArray, resolution: Resolution, samples: int) -> Array:
+    """Re Σ a_k exp(ikωt) ``(t, n)`` at equal times of a period."""
+    turns = np.outer(np.arange(samples), resolution.harmonics) % samples / samples
+    return np.asarray((np.exp(2j * np.pi * turns) @ amplitudes).real)

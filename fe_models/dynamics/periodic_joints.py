@@ -1,0 +1,62 @@
+"""What joints do in a period of a given motion: the protocol of the laws that are handed over."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from sa_solver.types import Array
+
+
+class Cycle(Protocol):
+    """What joints do in a period; see :class:`PeriodicJoints`."""
+
+    @property
+    def force(self) -> Array: ...
+    @property
+    def jacobian(self) -> Array: ...
+    @property
+    def samples(self) -> Array: ...
+    @property
+    def states(self) -> np.ndarray: ...
+    @property
+    def dissipated(self) -> Array: ...
+    @property
+    def change(self) -> Array: ...
+
+
+class PeriodicJoints(Protocol):
+    """Joints that are marched through a period: :class:`wear.joints.periodic.PeriodicMarch` is one.
+
+    The displacement of joint j at sample t is ``basis[t] @ coefficients[j]``, from ``basis``
+    ``(t, m)`` and ``coefficients`` ``(j, m, d)`` [mm]; ``lead`` ``(p, m)`` gives the points through
+    which they are marched from rest to the first sample, the last. Answers ``force`` ``(j, m, d)``
+    [N], the samples times ``weights`` ``(m, t)``, its derivative ``jacobian``
+    ``(j, m, d, m, d)``, the ``samples`` ``(t, j, d)`` and ``states`` ``(t, j)`` (0 stick, 1 slip,
+    2 separated), the energy ``dissipated`` ``(j,)`` [N mm] per period, and the relative ``change``
+    ``(j,)`` of the force from one period to the next.
+    """
+
+    @property
+    def directions(self) -> int: ...
+    def settle(
+        self, coefficients: Array, basis: Array, weights: Array, lead: Array | None
+    ) -> Cycle: ...
+
+
+@dataclass(frozen=True)
+class CycleRecord:
+    """What is kept of a :class:`Cycle`: all but its derivative."""
+
+    force: Array
+    samples: Array
+    states: np.ndarray
+    dissipated: Array
+    change: Array
+
+    @classmethod
+    def of(cls, cycle: Cycle) -> CycleRecord:
+        """Of a cycle whose derivative is no longer needed."""
+        return cls(cycle.force, cycle.samples, cycle.states, cycle.dissipated, cycle.change)

@@ -1,0 +1,437 @@
+"""The coupled loop, driven by sources of loads that are formulas.
+
+**A cylinder** that slides as a whole under a constant load: its worn shape is known
+(``tests/wear/test_closed_forms.py``).
+
+**A flat patch** of area A, pressed by a load that falls linearly with the mean depth worn off it,
+P = P0 (1 - h/h0) with h = V/A. It slides as a whole, so that the volume per cycle is c P, whatever
+the pressure is like: V' = c P0 (1 - V/(A h0)), V = A h0 (1 - exp(-N/N0)), N0 = A h0/(c P0). Loads
+that stay the same during a jump are Euler's method on that.
+"""
+
+import subprocess
+import sys
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+from sa_solver.errors import InputError
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from tests.oracles.worn_shapes import worn_cylinder
+from wear.coupled import (
+    AT_STOP,
+    ConstantLoads,
+    ContactsInTurn,
+    CoupledSettings,
+    CoupledState,
+    CoupledWear,
+    JumpSize,
+    Observer,
+    Stop,
+)
+from wear.evolution import EnergyTable
+from wear.interface import (
+    CellNodes,
+    CycleLoads,
+    InterfaceContact,
+    InterfaceSettings,
+    InterfaceState,
+    MotionError,
+)
+from wear.laws import EnergyLaw, EvolvingLaw
+from wear.steppers import ErrorControl, Implicit
+from wear.stepping import ContactFailure
+
+BODY = Material(115e3, 0.29)
+PAIR = ElasticPair(BODY, BODY)
+FRICTION, SLIP = 0.5, 0.04
+COEFFICIENTS = 5e-8, 1e-8
+# Volume of both bodies per cycle and load [mm³/N].
+PER_LOAD = sum(COEFFICIENTS) * FRICTION * SLIP
+RADIUS = 10.0
+
+
+def cylinder(**settings) -> InterfaceSettings:
+    """A line contact on 70 strips."""
+    grid = Grid.strips(1.4, 70)
+    return interface(grid, grid.x**2 / (2.0 * RADIUS), **settings)
+
+
+def patch(**settings) -> InterfaceSettings:
+    """A flat of 1 mm on a step that never touches."""
+    grid = Grid.strips(1.2, 24)
+    return interface(grid, np.where(np.abs(grid.x) < 0.5, 0.0, 1.0), **settings)
+
+
+def interface(grid: Grid, gap: Array, **settings) -> InterfaceSettings:
+    return InterfaceSettings(
+        **{
+            "name": "contact",
+            "grid": grid,
+            "gap": np.ascontiguousarray(gap),
+            "transfer": CellNodes(grid),
+            "pair": PAIR,
+            "laws": tuple(EnergyLaw(own) for own in COEFFICIENTS),
+            "friction": lambda energy: FRICTION,
+            "stepper": Implicit(),
+            "follow": False,
+            "tolerance": 1e-10,
+        }
+        | settings
+    )
+
+
+AREA = 1.0  # of the patch, per length
+
+
+class Falling:
+    """Loads of some patches that fall as they wear, each P0 (1 - h/h0), h its mean depth."""
+
+    def __init__(self, loads: tuple[float, ...], depth: float, grid: Grid) -> None:
+        self._loads, self._depth, self._grid = loads, depth, grid
+        self.solved: list[list[float]] = []
+        self.probed = 0
+
+    def forces(self, depths: list[Array]) -> list[float]:
+        means = [depth.sum() * self._grid.cell_area / AREA for depth in depths]
+        pairs = zip(self._loads, means, strict=True)
+        return [load * (1.0 - mean / self._depth) for load, mean in pairs]
+
+    def worn(self, depths: list[Array], friction=None) -> list[CycleLoads]:
+        self.solved.append(self.forces(depths))
+        return [cycle(load, self._grid) for load in self.solved[-1]]
+
+    def unworn(self) -> list[CycleLoads]:
+        return [cycle(load, self._grid) for load in self._loads]
+
+    def probe(self, depths: list[Array], friction=None) -> Array:
+        self.probed += 1
+        return np.array([[load, *[0.0] * 5] for load in self.forces(depths)])
+
+
+def cycle(load: float, grid: Grid) -> CycleLoads:
+    """There and back as a whole, under a load."""
+    zero = np.zeros(2)
+    slip = 0.5 * SLIP * np.array([1.0, -1.0])[:, None, None] * [[[1.0], [0.0]]]
+    loads = LoadHistory(zero + load, *(zero,) * 7, sliding=np.ones(2, dtype=bool))
+    cells = grid.shape[0] * grid.shape[1]
+    return CycleLoads(loads, np.broadcast_to(slip, (2, 2, cells)).copy())
+
+
+def run(settings: CoupledSettings, source: Falling, contacts, *observers) -> list[CoupledState]:
+    """All states of a run, the unworn one first."""
+    loop = CoupledWear(settings, source, in_turn(contacts), observers)
+    state, _ = loop.begin(source.unworn())
+    return [state, *loop.march(state)]
+
+
+def run_constant(
+    settings: CoupledSettings, load: float, contact: InterfaceSettings
+) -> CoupledState:
+    """The end of a run of one contact under a constant load."""
+    histories = [cycle(load, contact.grid)]
+    loop = CoupledWear(settings, ConstantLoads(histories), in_turn([contact]))
+    state, _ = loop.begin(histories)
+    *_, end = loop.march(state)
+    return end
+
+
+def in_turn(contacts: list[InterfaceSettings]) -> ContactsInTurn:
+    return ContactsInTurn([InterfaceContact(own) for own in contacts])
+
+
+# --- against closed forms -------------------------------------------------------------------------
+
+
+def test_a_cylinder_wears_to_its_closed_form() -> None:
+    """Under a constant load, in automatic steps of 1 %; α times energy is exact."""
+    load, volume = 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS
+    contact = cylinder(stepper=Implicit(ErrorControl(0.01)))
+    settings = CoupledSettings(volume / (PER_LOAD * load))
+    end = run_constant(settings, load, contact)
+    assert end.cycles[-1] == pytest.approx(settings.cycles, rel=1e-12)
+    assert end.volume == pytest.approx(volume, rel=1e-9)
+    b, depth, _ = worn_cylinder(load, volume, RADIUS, PAIR.contact_modulus)
+    worn = end.interfaces[0].surfaces.depth
+    assert worn.max() == pytest.approx(depth, rel=1e-2)
+    half = 0.5 * np.count_nonzero(worn) * contact.grid.pitch[0]
+    assert half == pytest.approx(b, abs=contact.grid.pitch[0])
+    assert end.solutions == 1
+    assert end.drift.max() == 0.0
+
+
+def test_volume_is_coefficient_times_energy() -> None:
+    """Of both bodies, after every jump; energy is µ P s of all cycles so far."""
+    load = 50.0
+    end = run_constant(CoupledSettings(1e6, JumpSize(2.5e5)), load, cylinder())
+    _, _, volume_1, volume_2, energy = end.kinetics[:, 0].T
+    assert len(energy) == 5
+    np.testing.assert_allclose(volume_1, COEFFICIENTS[0] * energy, rtol=1e-10)
+    np.testing.assert_allclose(volume_2, COEFFICIENTS[1] * energy, rtol=1e-10)
+    np.testing.assert_allclose(energy, FRICTION * load * SLIP * end.cycles, rtol=1e-9)
+
+
+FALL = 1e-3  # h0 [mm]
+LOAD = 80.0
+# Cycles in which the volume comes to within 1/e of its end.
+SCALE = AREA * FALL / (PER_LOAD * LOAD)
+
+
+def falling(*loads: float) -> Falling:
+    return Falling(loads or (LOAD,), FALL, patch().grid)
+
+
+def exact_volume(cycles: float) -> float:
+    """Of the patch, by an integrator of its own."""
+
+    def rate(_: float, volume: Array) -> Array:
+        return PER_LOAD * LOAD * (1.0 - volume / (AREA * FALL))
+
+    found = solve_ivp(rate, (0.0, cycles), [0.0], rtol=1e-10, atol=1e-14)
+    return float(found.y[0, -1])
+
+
+def test_loads_that_fall_with_wear_follow_their_differential_equation() -> None:
+    """Solved again after every jump: Euler's method, exactly, and of first order."""
+    errors = []
+    for jumps in (5, 10, 20):
+        jump = SCALE / jumps
+        states = run(
+            CoupledSettings(SCALE, JumpSize(jump), resultants="every"), falling(), [patch()]
+        )
+        assert states[-1].jump == jumps
+        euler = AREA * FALL * (1.0 - (1.0 - jump / SCALE) ** np.arange(jumps + 1))
+        volumes = states[-1].kinetics[:, 0, 2:4].sum(axis=1)
+        np.testing.assert_allclose(volumes, euler, rtol=1e-8, atol=1e-15)
+        errors.append(volumes[-1] / exact_volume(SCALE) - 1.0)
+    assert errors[-1] < 0.02
+    np.testing.assert_allclose(np.divide(errors[:-1], errors[1:]), 2.0, rtol=0.1)
+
+
+@pytest.mark.parametrize("drift", [0.02, 0.1, 0.3])
+def test_drift_asks_for_as_many_solutions_as_it_should(drift: float) -> None:
+    """The loads that a run should have had, by the rule alone."""
+    jumps, source = 25, falling()
+    jump = 2.0 * SCALE / jumps
+    settings = CoupledSettings(2.0 * SCALE, JumpSize(jump), drift=drift)
+    states = run(settings, source, [patch()])
+    volume, load, solved, drifts = 0.0, LOAD, [], [0.0]
+    for _ in range(jumps):
+        volume += PER_LOAD * load * jump
+        now = LOAD * (1.0 - volume / (AREA * FALL))
+        drifts.append(abs(now - load) / load)
+        if drifts[-1] > drift:
+            load = now
+            solved.append(now)
+    assert 1 < len(solved) < jumps or drift == 0.02
+    assert states[-1].solutions == 1 + len(solved)
+    np.testing.assert_allclose([own for (own,) in source.solved], solved, rtol=1e-7)
+    np.testing.assert_allclose(states[-1].drift, drifts, rtol=1e-6, atol=1e-9)
+    assert source.probed == 1 + jumps
+    assert states[-1].volume == pytest.approx(volume, rel=1e-8)
+
+
+def test_constant_resultants_are_never_asked_for_again() -> None:
+    source = falling()
+    settings = CoupledSettings(SCALE, JumpSize(0.2 * SCALE), resultants="constant")
+    end = run(settings, source, [patch()])[-1]
+    assert (end.solutions, source.solved, source.probed) == (1, [], 1)
+    assert end.volume == pytest.approx(PER_LOAD * LOAD * SCALE, rel=1e-8)
+
+
+def test_a_source_is_told_of_friction_that_changes() -> None:
+    """One coefficient per contact, after what each has dissipated."""
+    told = []
+
+    class Listening(Falling):
+        def worn(self, depths, friction=None):
+            told.append(friction)
+            return super().worn(depths, friction)
+
+    def friction(energy: float) -> float:
+        return FRICTION * (1.0 + energy)
+
+    contacts = [patch(friction=friction)] * 2
+    source = Listening((LOAD, 0.5 * LOAD), FALL, contacts[0].grid)
+    settings = CoupledSettings(
+        0.2 * SCALE, JumpSize(0.1 * SCALE), resultants="every", friction=friction
+    )
+    states = run(settings, source, contacts)
+    energies = states[-1].kinetics[1:, :, 4]
+    np.testing.assert_allclose(told, FRICTION * (1.0 + energies))
+
+
+# --- stops and sizes of jumps ---------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("jump", [None, 0.37 * SCALE])
+@pytest.mark.parametrize("stop", [Stop(volume=4e-4), Stop(depth=3.1e-4)])
+def test_a_stop_is_met_to_a_thousandth(stop: Stop, jump: float | None) -> None:
+    """Whatever the jumps, and although the loads fall on the way."""
+    contact = patch(stepper=Implicit(ErrorControl(0.01)))
+    settings = CoupledSettings(10.0 * SCALE, JumpSize(jump), stop, "every")
+    states = run(settings, falling(), [contact])
+    reached = states[-1].volume if stop.volume else states[-1].depth
+    assert reached == pytest.approx(stop.volume or stop.depth, rel=1.001 * AT_STOP)
+    assert settings.ended(states[-1])
+    assert not any(map(settings.ended, states[:-1]))
+    assert states[-1].cycles[-1] < settings.cycles
+
+
+@pytest.mark.parametrize(
+    ("size", "column"), [(JumpSize(volume=1e-4), slice(2, 4)), (JumpSize(depth=6e-5), slice(0, 1))]
+)
+def test_jumps_may_be_as_long_as_they_wear(size: JumpSize, column: slice) -> None:
+    """Volumes of a jump are known from its rates, depths nearly: pressures even out."""
+    settings = CoupledSettings(SCALE, size, resultants="constant")
+    end = run_constant(settings, LOAD, patch())
+    worn = np.diff(end.kinetics[:, 0, column].sum(axis=1))
+    asked = size.volume or size.depth
+    np.testing.assert_allclose(worn[1:-1], asked, rtol=1e-6 if size.volume else 0.15)
+
+
+def test_a_jump_has_one_size() -> None:
+    with pytest.raises(InputError, match="more than one size"):
+        JumpSize(cycles=1.0, depth=1e-3)
+
+
+# --- observers ------------------------------------------------------------------------------------
+
+
+class Diary(Observer):
+    """Writes down all that happens."""
+
+    def __init__(self) -> None:
+        self.events: list[tuple] = []
+
+    @contextmanager
+    def stage(self, name):
+        self.events.append(("stage", name))
+        yield
+        self.events.append(("over", name))
+
+    def begin(self, state):
+        self.events.append(("begin", state))
+
+    def jumping(self, state, cycles):
+        self.events.append(("jumping", state, cycles))
+
+    def jumped(self, before, after):
+        self.events.append(("jumped", before, after))
+
+
+def test_observers_see_every_state_once_and_in_order() -> None:
+    diaries = Diary(), Diary()
+    settings = CoupledSettings(SCALE, JumpSize(0.3 * SCALE), drift=0.4)
+    states = run(settings, falling(), [patch()], *diaries)
+    assert diaries[0].events == diaries[1].events
+    seen = [event for event in diaries[0].events if event[0] not in ("stage", "over")]
+    assert seen[0] == ("begin", states[0])
+    for number, (jumping, jumped) in enumerate(zip(seen[1::2], seen[2::2], strict=True)):
+        assert jumping[0] == "jumping"
+        assert jumping[1] is states[number]
+        assert jumped[1] is states[number]
+        assert jumped[2] is states[number + 1]
+        cycles = states[number + 1].cycles[-1] - states[number].cycles[-1]
+        assert jumping[2] == pytest.approx(cycles)
+    assert len(seen) == 1 + 2 * (len(states) - 1)
+    stages = [event[1] for event in diaries[0].events if event[0] == "stage"]
+    assert stages.count("wear") == stages.count("probe") == len(states) - 1
+    assert stages.count("loads") == states[-1].solutions - 1
+    assert stages[0] == "first cycle"
+
+
+def test_an_observer_may_be_anything() -> None:
+    """It has methods for all that happens, which do nothing."""
+    run(CoupledSettings(SCALE), falling(), [patch()], Observer())
+
+
+# --- a run goes on --------------------------------------------------------------------------------
+
+
+def numbers(state: InterfaceState) -> dict[str, object]:
+    """All that a state is, by name."""
+    found: dict[str, object] = {}
+    for name, value in vars(state).items():
+        if name in ("surfaces", "loads"):
+            found |= {f"{name}.{part}": own for part, own in vars(value).items()}
+        elif name == "starts":
+            for t, start in value.items():
+                found |= {f"{name}.{t}.{part}": own for part, own in vars(start).items()}
+        else:
+            found[name] = value
+    return found
+
+
+def same(one: InterfaceState, other: InterfaceState) -> None:
+    """Bit for bit."""
+    mine, its = numbers(one), numbers(other)
+    assert mine.keys() == its.keys()
+    for name, value in mine.items():
+        np.testing.assert_array_equal(value, its[name], err_msg=name)
+
+
+@pytest.mark.parametrize("method", ["normal", "full"])
+def test_going_on_from_any_state_ends_bit_for_bit_alike(method: str) -> None:
+    """Two contacts under loads that drift, with contacts and source made anew."""
+    loads, control = (LOAD, 0.6 * LOAD), ErrorControl(0.02)
+    contacts = [
+        patch(name=name, method=method, stepper=Implicit(control), driven=True, tolerance=1e-8)
+        for name in ("left", "right")
+    ]
+    settings = CoupledSettings(0.3 * SCALE, drift=0.05)
+    states = run(settings, falling(*loads), contacts)
+    assert len(states) > 3
+    assert states[-1].solutions > 1
+    for begun in states[:-1]:
+        loop = CoupledWear(settings, falling(*loads), in_turn(contacts))
+        *_, end = loop.march(begun)
+        for name in ("cycles", "kinetics", "drift", "solved_resultants"):
+            np.testing.assert_array_equal(getattr(end, name), getattr(states[-1], name))
+        assert end.solutions == states[-1].solutions
+        for one, other in zip(end.interfaces, states[-1].interfaces, strict=True):
+            same(one, other)
+
+
+def test_a_state_that_has_ended_stays() -> None:
+    settings = CoupledSettings(SCALE, JumpSize(0.5 * SCALE))
+    states = run(settings, falling(), [patch()])
+    assert list(CoupledWear(settings, falling(), in_turn([patch()])).march(states[-1])) == []
+
+
+# --- failures -------------------------------------------------------------------------------------
+
+
+def test_a_failure_names_its_contact() -> None:
+    contacts = [patch(name="left"), patch(name="right", tolerance=1e-30)]
+    source = falling(LOAD, LOAD)
+    with pytest.raises(ContactFailure, match="right: increment 1: "):
+        run(CoupledSettings(SCALE), source, contacts)
+
+
+def test_a_law_that_changes_from_place_to_place_does_not_move() -> None:
+    law = EvolvingLaw(EnergyLaw(1e-6), EnergyTable(), "local")
+    contact = patch(laws=(law, law), follow=True)
+    with pytest.raises(MotionError, match="neglect the motion"):
+        run(CoupledSettings(SCALE), falling(), [contact])
+
+
+# --- what it needs --------------------------------------------------------------------------------
+
+
+def test_it_needs_neither_cases_nor_finite_elements() -> None:
+    """All of this file, imported and a run of it made, in a process of its own."""
+    code = f"""
+import runpy, sys
+scene = runpy.run_path({str(Path(__file__))!r})
+settings = scene["CoupledSettings"](scene["SCALE"])
+states = scene["run"](settings, scene["falling"](), [scene["patch"]()])
+assert states[-1].volume > 0.0
+found = {{name.partition(".")[0] for name in sys.modules}}
+assert not found & {{"workflow", "fe_models", "pydantic", "h5py", "rich", "click"}}, found
+"""
+    root = Path(__file__).parents[2]
+    subprocess.run([sys.executable, "-c", code], cwd=root, check=True)

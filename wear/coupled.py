@@ -1,0 +1,445 @@
+"""The coupled loop: loads, contacts, wear, and worn gaps that change the loads.
+
+Contacts wear in jumps of many cycles. After each one the source of their loads is asked, by a cheap
+probe, how far wear has moved the resultants since it was last solved; if that is too far, it is
+solved again with the worn gaps. :meth:`CoupledWear.march` yields the state after every jump; a run
+goes on from any of them as if it had never stopped. Whatever else is to happen on the way, such as
+records and progress, is up to :class:`Observer` s.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
+from dataclasses import dataclass, replace
+from typing import Literal, NamedTuple, Protocol
+
+import numpy as np
+
+from sa_solver.errors import InputError
+from sa_solver.types import Array, Grid, resultant_change
+from wear.interface import (
+    FaceLoads,
+    FirstContact,
+    InterfaceContact,
+    InterfaceState,
+    failures_of,
+)
+from wear.steppers import ROUNDING
+from wear.stepping import Spent
+
+KINETICS = ("depth_1", "depth_2", "volume_1", "volume_2", "energy")
+"""Columns of the kinetics of one interface, in mm, mm³ and N mm."""
+
+AT_STOP = 1e-3
+"""How near to a stop a run must come: a jump that is to reach it is cut short to do so."""
+
+Stage = Literal["first cycle", "wear", "probe", "loads"]
+
+
+# --- what is given --------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class JumpSize:
+    """How far one jump goes: so many ``cycles``, or until so much ``depth`` [mm] or ``volume`` of
+    all bodies [mm³] is worn at the present rates.
+
+    One of them at most. Without any, as far as the automatic steps of all contacts would go.
+    """
+
+    cycles: float | None = None
+    depth: float | None = None
+    volume: float | None = None
+
+    def __post_init__(self) -> None:
+        if sum(size is not None for size in vars(self).values()) > 1:
+            raise InputError("a jump of more than one size: give cycles, depth or volume")
+
+
+@dataclass(frozen=True)
+class Stop:
+    """Where a run ends before its cycles are over: at the first of these that is reached to 0.1 %.
+
+    ``depth`` [mm] is the largest of any body, ``volume`` [mm³] that of all bodies together.
+    """
+
+    depth: float | None = None
+    volume: float | None = None
+
+
+@dataclass(frozen=True)
+class CoupledSettings:
+    """How far a run of so many ``cycles`` goes, in which jumps, and when loads are solved again.
+
+    ``resultants`` constant: never; every: after each jump; drift: where the probe has changed by
+    more than the share ``drift`` (:func:`sa_solver.types.resultant_change`). ``friction`` gives the
+    coefficient of a contact after so much dissipated energy [N mm], where the source is to know of
+    it; None: it keeps its own.
+    """
+
+    cycles: float
+    jump: JumpSize = JumpSize()
+    stop: Stop = Stop()
+    resultants: Literal["constant", "drift", "every"] = "drift"
+    drift: float = 0.02
+    friction: Callable[[float], float] | None = None
+
+    def ended(self, state: CoupledState) -> bool:
+        """Whether a run that has got to ``state`` is over."""
+        stop, reached = self.stop, 1.0 - AT_STOP
+        return bool(
+            state.cycles[-1] >= self.cycles * (1.0 - ROUNDING)
+            or (stop.depth is not None and state.depth >= stop.depth * reached)
+            or (stop.volume is not None and state.volume >= stop.volume * reached)
+        )
+
+
+class LoadSource(Protocol):
+    """Loads and slips of every contact over one closed cycle.
+
+    Worn depths are nodal, ``(n,)`` per contact, of both bodies together [mm]. Coefficients of
+    friction are one per contact; those before any wear where they are not given.
+    """
+
+    def worn(
+        self, depths: list[Array], friction: Sequence[float] | None = None
+    ) -> Sequence[FaceLoads]:
+        """The closed cycle with worn faces."""
+        ...
+
+    def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
+        """Resultants ``(contacts, 6)`` that wear moves as it moves those of the cycle, but cheap.
+
+        Those at peak load if nothing else is at hand.
+        """
+        ...
+
+
+@dataclass(frozen=True)
+class ConstantLoads:
+    """A source of loads that wear does not change: one ``histories`` per contact."""
+
+    histories: Sequence[FaceLoads]
+
+    def worn(
+        self, depths: list[Array], friction: Sequence[float] | None = None
+    ) -> Sequence[FaceLoads]:
+        return self.histories
+
+    def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
+        """Resultants where each contact is loaded most."""
+        rows = []
+        for own in self.histories:
+            loads, t = own.loads, int(np.argmax(own.loads.P))
+            columns = loads.P, loads.Qx, loads.Qy, loads.Mx, loads.My, loads.Mz
+            rows.append([column[t] for column in columns])
+        return np.array(rows)
+
+
+class Contacts(Protocol):
+    """The contacts of all interfaces, which may wear side by side.
+
+    See :class:`wear.interface.InterfaceContact` for what each method does to one of them.
+    """
+
+    @property
+    def grids(self) -> Sequence[Grid]: ...
+
+    def begin(
+        self, histories: Sequence[FaceLoads], cycles: float
+    ) -> Sequence[tuple[InterfaceState, FirstContact]]: ...
+
+    def jump(
+        self, states: Sequence[InterfaceState], cycles: float, left: float
+    ) -> Sequence[tuple[InterfaceState, Spent]]: ...
+
+    def follow(
+        self, states: Sequence[InterfaceState], histories: Sequence[FaceLoads]
+    ) -> Sequence[InterfaceState]: ...
+
+    def nodal_depths(self, states: Sequence[InterfaceState]) -> list[Array]: ...
+
+
+class ContactsInTurn:
+    """Contacts that wear one after the other, in this process."""
+
+    def __init__(self, contacts: Sequence[InterfaceContact]) -> None:
+        self.contacts = contacts
+
+    @property
+    def grids(self) -> Sequence[Grid]:
+        return [own.grid for own in self.contacts]
+
+    def begin(
+        self, histories: Sequence[FaceLoads], cycles: float
+    ) -> list[tuple[InterfaceState, FirstContact]]:
+        begun = []
+        for own, history in zip(self.contacts, histories, strict=True):
+            with failures_of(own.name):
+                begun.append(own.begin(history, cycles))
+        return begun
+
+    def jump(
+        self, states: Sequence[InterfaceState], cycles: float, left: float
+    ) -> list[tuple[InterfaceState, Spent]]:
+        jumped = []
+        for own, state in zip(self.contacts, states, strict=True):
+            with failures_of(own.name):
+                jumped.append(own.jump(state, cycles, left))
+        return jumped
+
+    def follow(
+        self, states: Sequence[InterfaceState], histories: Sequence[FaceLoads]
+    ) -> list[InterfaceState]:
+        triples = zip(self.contacts, states, histories, strict=True)
+        return [own.follow(state, history) for own, state, history in triples]
+
+    def nodal_depths(self, states: Sequence[InterfaceState]) -> list[Array]:
+        return [own.nodal_depth(s) for own, s in zip(self.contacts, states, strict=True)]
+
+
+# --- what comes out -------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class CoupledState:
+    """Everything that a run needs to go on.
+
+    ``cycles`` ``(j,)`` are those at the end of every jump so far, the unworn state included;
+    ``kinetics`` ``(j, interfaces, 5)`` has the columns :data:`KINETICS`; ``solved_resultants``
+    ``(interfaces, 6)`` is the probe at the last solution of the source; ``drift`` ``(j,)`` the
+    drift found after each jump; ``solutions`` counts the solutions, ``spent`` what the contacts
+    have taken.
+    """
+
+    interfaces: tuple[InterfaceState, ...]
+    cycles: Array
+    kinetics: Array
+    drift: Array
+    solved_resultants: Array
+    solutions: int
+    spent: Spent
+
+    @property
+    def jump(self) -> int:
+        """Number of jumps done."""
+        return len(self.cycles) - 1
+
+    @property
+    def depth(self) -> float:
+        """Largest depth that any body has lost [mm]."""
+        return _worn(self.kinetics[-1]).depth
+
+    @property
+    def volume(self) -> float:
+        """Volume that all bodies have lost [mm³]."""
+        return _worn(self.kinetics[-1]).volume
+
+    def record(self, cycles: float, cell_areas: list[float], drift: float) -> CoupledState:
+        """The state with a row of kinetics added."""
+        row = _kinetics(self.interfaces, cell_areas)
+        return replace(
+            self,
+            cycles=np.append(self.cycles, cycles),
+            kinetics=np.concatenate([self.kinetics, row[None]]),
+            drift=np.append(self.drift, drift),
+        )
+
+
+class Observer:
+    """Looks on while a run goes; a subclass has those methods that it needs."""
+
+    def stage(self, name: Stage) -> AbstractContextManager[object]:
+        """Entered while the part ``name`` of a run is computed."""
+        return nullcontext()
+
+    def begin(self, state: CoupledState) -> None:
+        """The march begins from a state: unworn, or one that an earlier run has got to."""
+
+    def jumping(self, state: CoupledState, cycles: float) -> None:
+        """A jump of so many cycles is to begin; near a stop it may be cut short."""
+
+    def jumped(self, before: CoupledState, after: CoupledState) -> None:
+        """A jump is done, and the loads follow it."""
+
+
+# --- the loop -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class CoupledWear:
+    """A run of the coupled loop. Its methods raise what ``source`` and ``contacts`` raise."""
+
+    settings: CoupledSettings
+    source: LoadSource
+    contacts: Contacts
+    observers: Sequence[Observer] = ()
+
+    def begin(self, unworn: Sequence[FaceLoads]) -> tuple[CoupledState, list[FirstContact]]:
+        """The state before the first jump, and the contact of the first cycle.
+
+        ``unworn`` are the loads of all contacts before any wear.
+        """
+        with self._stage("first cycle"):
+            begun = self.contacts.begin(unworn, self.settings.cycles)
+        interfaces = tuple(own for own, _ in begun)
+        state = CoupledState(
+            interfaces=interfaces,
+            cycles=np.empty(0),
+            kinetics=np.empty((0, len(interfaces), len(KINETICS))),
+            drift=np.empty(0),
+            solved_resultants=self._probe(interfaces),
+            solutions=1,
+            spent=sum((first.spent for _, first in begun), Spent()),
+        )
+        return state.record(0.0, self._areas, 0.0), [first for _, first in begun]
+
+    def march(self, state: CoupledState) -> Iterator[CoupledState]:
+        """The states after every jump from ``state``, until cycles are over or a stop is met."""
+        for own in self.observers:
+            own.begin(state)
+        while not self.settings.ended(state):
+            before, state = state, self._jump(state)
+            for own in self.observers:
+                own.jumped(before, state)
+            yield state
+
+    @contextmanager
+    def _stage(self, name: Stage) -> Iterator[None]:
+        with ExitStack() as stack:
+            for own in self.observers:
+                stack.enter_context(own.stage(name))
+            yield
+
+    # -- one jump ----------------------------------------------------------------------------------
+    def _jump(self, state: CoupledState) -> CoupledState:
+        cycles, spent = self._jump_cycles(state), Spent()
+        for own in self.observers:
+            own.jumping(state, cycles)
+        # The run ends at a stop if it comes to that.
+        left = max(cycles, min(self._left(state), self._to_stop(state)))
+        while True:
+            with self._stage("wear"):
+                jumped = self.contacts.jump(state.interfaces, cycles, left)
+            spent = sum((found for _, found in jumped), spent)
+            interfaces = tuple(found for found, _ in jumped)
+            shorter = cycles * self._share_to_stop(state, interfaces)
+            if shorter == cycles or cycles <= 1.0:
+                break
+            cycles = max(1.0, shorter)
+        state = replace(state, interfaces=interfaces, spent=state.spent + spent)
+        state, drift = self._follow_drift(state)
+        return state.record(float(state.cycles[-1]) + cycles, self._areas, drift)
+
+    def _jump_cycles(self, state: CoupledState) -> float:
+        """Cycles of the next jump, by the size that is asked for at the present rates."""
+        size, left = self.settings.jump, self._left(state)
+        if size.cycles is not None:
+            cycles = size.cycles
+        elif size.depth is not None:
+            cycles = _quotient(size.depth, _depth_rate(state))
+        elif size.volume is not None:
+            cycles = _quotient(size.volume, _volume_rate(state))
+        else:
+            # The steps that are left, all of one length: none of them is a mere remainder.
+            proposed = min(own.next_cycles for own in state.interfaces)
+            cycles = left / max(1.0, np.ceil(left / proposed * (1.0 - ROUNDING)))
+        cycles = min(cycles, self._to_stop(state))
+        return left if cycles > left * (1.0 - ROUNDING) else float(cycles)
+
+    def _left(self, state: CoupledState) -> float:
+        """Cycles to the end of the run."""
+        return self.settings.cycles - float(state.cycles[-1])
+
+    def _to_stop(self, state: CoupledState) -> float:
+        """Cycles to the nearest stop at the present rates, one at least."""
+        stop = self.settings.stop
+        to_depth = to_volume = np.inf
+        if stop.depth is not None:
+            to_depth = _quotient(stop.depth - state.depth, _depth_rate(state))
+        if stop.volume is not None:
+            to_volume = _quotient(stop.volume - state.volume, _volume_rate(state))
+        return max(1.0, min(to_depth, to_volume))
+
+    def _share_to_stop(self, before: CoupledState, interfaces: Sequence[InterfaceState]) -> float:
+        """Share of a jump at which it came to a stop that it went past; else 1."""
+        after, stop, share = _worn(_kinetics(interfaces, self._areas)), self.settings.stop, 1.0
+        for limit, then, now in (
+            (stop.depth, before.depth, after.depth),
+            (stop.volume, before.volume, after.volume),
+        ):
+            if limit is not None and now > limit * (1.0 + AT_STOP):
+                share = min(share, (limit - then) / (now - then))
+        return share
+
+    # -- loads -------------------------------------------------------------------------------------
+    def _follow_drift(self, state: CoupledState) -> tuple[CoupledState, float]:
+        """Solve the source again where its resultants have drifted too far."""
+        settings = self.settings
+        if settings.resultants == "constant":
+            return state, 0.0
+        with self._stage("probe"):
+            probe = self._probe(state.interfaces)
+        sizes = np.array([grid.size for grid in self.contacts.grids])
+        drift = float(np.abs(resultant_change(probe, state.solved_resultants, sizes)).max())
+        if settings.resultants == "drift" and drift <= settings.drift:
+            return state, drift
+        with self._stage("loads"):
+            depths = self.contacts.nodal_depths(state.interfaces)
+            histories = self.source.worn(depths, self._friction(state.interfaces))
+        return replace(
+            state,
+            interfaces=tuple(self.contacts.follow(state.interfaces, histories)),
+            solved_resultants=probe,
+            solutions=state.solutions + 1,
+        ), drift
+
+    def _probe(self, interfaces: Sequence[InterfaceState]) -> Array:
+        return self.source.probe(self.contacts.nodal_depths(interfaces), self._friction(interfaces))
+
+    def _friction(self, interfaces: Sequence[InterfaceState]) -> list[float] | None:
+        """Coefficients of friction of the interfaces, where they change."""
+        friction = self.settings.friction
+        return None if friction is None else [friction(own.energy) for own in interfaces]
+
+    @property
+    def _areas(self) -> list[float]:
+        return [grid.cell_area for grid in self.contacts.grids]
+
+
+class _Worn(NamedTuple):
+    """Largest depth of either body [mm] and volume of all [mm³]."""
+
+    depth: float
+    volume: float
+
+
+def _worn(kinetics: Array) -> _Worn:
+    """Of a row of kinetics ``(interfaces, 5)``."""
+    last = dict(zip(KINETICS, kinetics.T, strict=True))
+    depth = max(last["depth_1"].max(), last["depth_2"].max())
+    return _Worn(float(depth), float((last["volume_1"] + last["volume_2"]).sum()))
+
+
+def _kinetics(interfaces: Sequence[InterfaceState], cell_areas: Sequence[float]) -> Array:
+    """Depths, volumes and energy of all interfaces ``(interfaces, 5)``."""
+    rows = []
+    for own, area in zip(interfaces, cell_areas, strict=True):
+        depths = own.surfaces.depths
+        volumes = (float(depth.sum()) * area for depth in depths)
+        rows.append([*(float(depth.max()) for depth in depths), *volumes, own.energy])
+    return np.array(rows)
+
+
+def _depth_rate(state: CoupledState) -> float:
+    return max(own.depth_rate for own in state.interfaces)
+
+
+def _volume_rate(state: CoupledState) -> float:
+    return sum(own.volume_rate for own in state.interfaces)
+
+
+def _quotient(limit: float, rate: float) -> float:
+    """Cycles to a limit; all that remain where nothing wears."""
+    return limit / rate if rate > 0.0 else np.inf

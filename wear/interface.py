@@ -1,0 +1,432 @@
+"""The contact of one interface: its grid, its loads and slips, and how it wears.
+
+Loads and slips come from outside, over one closed cycle (:class:`FaceLoads`). Slips are those of
+the structure's nodes, or the half-space's own under the same loads (wear methods 1 and 2 of Gallego
+2007); these are found anew on every worn surface. What an interface is lies in
+:class:`InterfaceSettings`, all that it remembers in :class:`InterfaceState`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Literal, Protocol
+
+import numpy as np
+
+from sa_solver.contact import ContactState, FrictionalContact
+from sa_solver.errors import InputError
+from sa_solver.half_space import HalfSpace
+from sa_solver.normal import NormalContact
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
+from wear.full_cycle import march_cycle
+from wear.laws import EvolvingLaw, WearLaw
+from wear.moving import followed, passages
+from wear.steppers import Stepper, advance_cycles, first_cycles
+from wear.stepping import (
+    ContactFailure,
+    CycleResult,
+    SlidingCycle,
+    Spent,
+    Starts,
+    WearingContact,
+    WearState,
+)
+
+
+class MotionError(InputError):
+    """Surfaces that move over each other, under a law that no wear step follows then."""
+
+
+# --- what an interface is -------------------------------------------------------------------------
+
+
+class Transfer(Protocol):
+    """Fields between the ``n`` nodes of a face and the ``(nx, ny)`` cells of the grid over it."""
+
+    def to_cells(self, nodal: Array) -> Array:
+        """Cell values ``(..., nx, ny)`` of nodal values ``(..., n)``."""
+        ...
+
+    def to_nodes(self, cells: Array) -> Array:
+        """Nodal values ``(n,)`` of cell values ``(nx, ny)``, volumes kept."""
+        ...
+
+
+@dataclass(frozen=True)
+class CellNodes:
+    """The transfer of a face whose nodes are the cells of its ``grid``, in the order of C."""
+
+    grid: Grid
+
+    def to_cells(self, nodal: Array) -> Array:
+        return nodal.reshape(*nodal.shape[:-1], *self.grid.shape)
+
+    def to_nodes(self, cells: Array) -> Array:
+        return cells.ravel()
+
+
+class FaceLoads(Protocol):
+    """What one face carries over a cycle: ``slip`` ``(t, 2, n)`` [mm] is that of its nodes."""
+
+    @property
+    def loads(self) -> LoadHistory: ...
+    @property
+    def slip(self) -> Array: ...
+
+
+@dataclass(frozen=True)
+class CycleLoads:
+    """The same as plain data."""
+
+    loads: LoadHistory
+    slip: Array
+
+
+@dataclass(frozen=True)
+class InterfaceSettings:
+    """One interface and how it wears.
+
+    ``gap`` ``(nx, ny)`` [mm] is that of the unloaded, unworn bodies, ``laws`` those of body 1 and
+    body 2, and ``friction`` gives Coulomb's coefficient after so much dissipated energy [N mm].
+    Slips are those of the loads, or with ``method`` full the half-space's own; there ``gross_slip``
+    says in which direction it slides as a whole, and a ``driven`` contact has the slip of its loads
+    imposed as the motion of its bodies, in the place of the tangential force. ``follow`` says
+    whether surfaces that move over each other are followed; None: where that counts
+    (:func:`wear.moving.moves`). ``tolerance`` is the contact solver's.
+    """
+
+    name: str
+    grid: Grid
+    gap: Array
+    transfer: Transfer
+    pair: ElasticPair
+    laws: tuple[WearLaw, WearLaw]
+    friction: Callable[[float], float]
+    stepper: Stepper
+    method: Literal["normal", "full"] = "normal"
+    gross_slip: Literal["force", "energies"] = "force"
+    driven: bool = False
+    follow: bool | None = None
+    tolerance: float = 1e-8
+
+
+@dataclass(frozen=True)
+class InterfaceState(WearState):
+    """What an interface must remember between two jumps.
+
+    ``loads`` and nodal ``slip`` ``(t, 2, n)`` are those of the last solution of the source;
+    ``ends`` ``(t, 2, 2)`` [mm] are where body 2 is before and after each increment, none where its
+    motion is too little to follow (:func:`wear.moving.followed`).
+    """
+
+    loads: LoadHistory
+    slip: Array
+    ends: Array
+
+
+# --- what it says of itself -----------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class ContactFields:
+    """One increment: ``pressure`` ``(nx, ny)``, ``shear`` on body 2 and ``slip`` ``(2, nx, ny)``.
+
+    In MPa and mm.
+    """
+
+    pressure: Array
+    shear: Array
+    slip: Array
+
+
+@dataclass(frozen=True)
+class CycleTractions:
+    """Tractions and slip of one contact over the increments of a closed cycle.
+
+    ``pressure`` ``(t, nx, ny)`` and ``shear`` ``(t, 2, nx, ny)`` on body 2 [MPa] are those at the
+    end of an increment, ``slip`` ``(t, 2, nx, ny)`` [mm] that during it. Where slip is that of the
+    loads (method normal), shear is µp against it and, unknown where nothing slips, 0 there:
+    ``unknown`` ``(t,)`` is the share of the normal force on such cells.
+    """
+
+    pressure: Array
+    shear: Array
+    slip: Array
+    unknown: Array
+
+
+@dataclass(frozen=True)
+class FirstContact:
+    """What the contact of the unworn cycle says: see :class:`wear.stepping.CycleResult`.
+
+    ``energy`` ``(t,)`` [N mm]; ``pressure`` ``(t, nx, ny)`` [MPa]; ``stable_cycles`` the longest
+    stable explicit step; ``cycle`` the states at its increments where the half-space has its own
+    friction (method full), else empty.
+    """
+
+    energy: Array
+    pressure: Array
+    touches_border: bool
+    largest_residual: float
+    spent: Spent
+    stable_cycles: float
+    cycle: tuple[ContactState, ...]
+
+    @property
+    def highest_pressure(self) -> float:
+        """Largest pressure of all increments [MPa]."""
+        return float(self.pressure.max())
+
+
+@contextmanager
+def failures_of(name: str) -> Iterator[None]:
+    """Let a :class:`~wear.stepping.ContactFailure` say of which interface it is."""
+    try:
+        yield
+    except ContactFailure as error:
+        raise ContactFailure(f"{name}: {error}") from error
+
+
+# --- the contact ----------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Loaded:
+    """A contact under its loads, ``slip`` ``(t, 2, nx, ny)`` [mm], and the cycle of the half-space
+    that it comes from (empty: from the loads).
+    """
+
+    contact: WearingContact
+    slip: Array
+    cycle: tuple[ContactState, ...]
+
+
+class InterfaceContact:
+    """One interface on its grid.
+
+    All of its methods raise :class:`~wear.stepping.ContactFailure` where a contact problem does not
+    converge.
+    """
+
+    def __init__(self, settings: InterfaceSettings) -> None:
+        self.settings = settings
+        self._contact = NormalContact(HalfSpace(settings.grid, settings.pair))
+        self._frictional: FrictionalContact | None = None
+        self._spent = Spent()
+        self._current: tuple[tuple[Array, ...], _Loaded] | None = None
+
+    @property
+    def name(self) -> str:
+        return self.settings.name
+
+    @property
+    def grid(self) -> Grid:
+        return self.settings.grid
+
+    @property
+    def transfer(self) -> Transfer:
+        return self.settings.transfer
+
+    @property
+    def pair(self) -> ElasticPair:
+        return self.settings.pair
+
+    # -- wear ------------------------------------------------------------------------------------
+    def begin(self, history: FaceLoads, cycles: float) -> tuple[InterfaceState, FirstContact]:
+        """The unworn state of a run of so many ``cycles``, and the contact of its first cycle.
+
+        At every loaded increment. Raises :class:`MotionError`.
+        """
+        unworn = WearState.unworn(self.settings.gap)
+        state = InterfaceState(
+            **vars(unworn), loads=history.loads, slip=history.slip, ends=np.empty((0, 2, 2))
+        )
+        loaded = np.flatnonzero(history.loads.P > 0.0).tolist()
+        before, own = self._spent, self._loaded(state)
+        result = own.contact.cycle(state, loaded)
+        depth_rate, volume_rate = result.per_cycle(self.grid.cell_area)
+        starts = {t: found.start for t, found in result.states.items()}
+        state = replace(
+            state,
+            depth_rate=depth_rate,
+            volume_rate=volume_rate,
+            starts=starts,
+            ends=self._ends(own.slip, starts, history.loads),
+        )
+        first_step = first_cycles(own.contact, state, cycles)
+        states = result.states.values()
+        return replace(state, next_cycles=first_step), FirstContact(
+            energy=result.energy,
+            pressure=self._pressure(result),
+            touches_border=any(s.touches_border for s in states),
+            largest_residual=max((s.residuals.largest for s in states), default=0.0),
+            spent=self._spent - before + Spent(len(states), result.convolutions),
+            stable_cycles=own.contact.stable_cycles(state),
+            cycle=own.cycle,
+        )
+
+    def follow(self, state: InterfaceState, history: FaceLoads) -> InterfaceState:
+        """The state under the loads of a new solution. Raises :class:`MotionError`."""
+        starts = {t: start for t, start in state.starts.items() if history.loads.P[t] > 0.0}
+        state = replace(state, loads=history.loads, slip=history.slip, starts=starts)
+        if self.settings.method == "full":
+            return state  # body 2 goes on as the half-space's own slip has it
+        ends = self._ends(self.transfer.to_cells(history.slip), starts, history.loads)
+        return replace(state, ends=ends)
+
+    def jump(
+        self, state: InterfaceState, cycles: float, left: float
+    ) -> tuple[InterfaceState, Spent]:
+        """Wear ``cycles`` of the ``left`` cycles of the run; also what it took."""
+        before = self._spent
+        result = advance_cycles(self.settings.stepper, state, cycles, left, self._contact_at)
+        after = result.state
+        assert isinstance(after, InterfaceState)
+        # Friction of the half-space on the new surfaces: for the record now, to wear by next.
+        self._loaded(after)
+        own = Spent(result.contact_solves, result.convolutions, result.steps)
+        return after, own + self._spent - before
+
+    def stable_cycles(self, state: InterfaceState) -> float:
+        """Longest explicit step that is stable."""
+        return self._loaded(state).contact.stable_cycles(state)
+
+    def nodal_depth(self, state: InterfaceState) -> Array:
+        """Worn depth of both bodies together at the nodes of the face ``(n,)`` [mm]."""
+        return self.transfer.to_nodes(state.surfaces.depth)
+
+    # -- tractions ---------------------------------------------------------------------------------
+    def fields(self, state: InterfaceState, increment: int) -> ContactFields:
+        """Tractions and slip of an increment on the present surfaces."""
+        own = self._loaded(state)
+        if own.cycle:
+            found = own.cycle[increment]
+            return ContactFields(found.pressure, found.shear, found.slip)
+        slip, start = self.transfer.to_cells(state.slip[increment]), state.starts.get(increment)
+        pressure = own.contact.solve(state.surfaces, increment, start).pressure
+        return ContactFields(pressure, self._sliding_shear(pressure, slip, state.energy), slip)
+
+    def tractions(self, state: InterfaceState) -> CycleTractions:
+        """Tractions of a cycle on the present surfaces."""
+        own = self._loaded(state)
+        if own.cycle:
+            return _own_tractions(own.cycle)
+        loaded = np.flatnonzero(state.loads.P > 0.0).tolist()
+        result = own.contact.cycle(state, loaded)
+        return self._given_tractions(state.slip, self._pressure(result), state.energy)
+
+    def unworn_tractions(self, history: FaceLoads, first: FirstContact) -> CycleTractions:
+        """Tractions of the first cycle, solved already."""
+        if first.cycle:
+            return _own_tractions(first.cycle)
+        return self._given_tractions(history.slip, first.pressure, 0.0)
+
+    def frictional(self, energy: float) -> FrictionalContact:
+        """The contact with the half-space's own friction, after so much ``energy`` [N mm]."""
+        friction = self.settings.friction(energy)
+        if self._frictional is None or self._frictional.friction != friction:
+            self._frictional = FrictionalContact(
+                self._contact.half_space,
+                friction,
+                self.settings.tolerance,
+                self.settings.gross_slip,
+            )
+        return self._frictional
+
+    # -- loads -------------------------------------------------------------------------------------
+    def _contact_at(self, state: WearState) -> WearingContact:
+        assert isinstance(state, InterfaceState)
+        return self._loaded(state).contact
+
+    def _loaded(self, state: InterfaceState) -> _Loaded:
+        """The contact under the state's loads and slips, kept until these change.
+
+        Slips of the loads change with these, those of the half-space with wear.
+        """
+        settings, friction = self.settings, self.settings.friction(state.energy)
+        columns = np.array([*vars(state.loads).values()], dtype=float)
+        key: tuple[Array, ...] = columns, state.slip, state.ends, np.array([friction])
+        if settings.method == "full":
+            key = *key, state.surfaces.gap, state.surfaces.depth_1
+        if self._current is not None and all(map(np.array_equal, self._current[0], key)):
+            return self._current[1]
+        ways = passages(self.grid, state.ends)
+        slip = self.transfer.to_cells(state.slip)
+        sliding = SlidingCycle(state.loads, np.hypot(slip[:, 0], slip[:, 1]), None, ways)
+        cycle: tuple[ContactState, ...] = ()
+        if settings.method == "full":
+            cycle = self._own_cycle(state, sliding)
+            slip = np.stack([own.slip for own in cycle])
+            sizes = np.hypot(slip[:, 0], slip[:, 1])
+            sliding = replace(sliding, slip=sizes, uplift=self._uplift(cycle))
+        contact = WearingContact(
+            self._contact, settings.laws, friction, sliding, settings.tolerance
+        )
+        self._current = key, _Loaded(contact, slip, cycle)
+        return self._current[1]
+
+    def _own_cycle(self, state: InterfaceState, sliding: SlidingCycle) -> tuple[ContactState, ...]:
+        """The closed cycle with the half-space's own friction, on the present surfaces."""
+        gaps = np.stack([sliding.gap(state.surfaces, t) for t in range(len(state.loads))])
+        motion = state.slip.mean(axis=2) if self.settings.driven else None
+        cycle = tuple(march_cycle(self.frictional(state.energy), gaps, state.loads, motion))
+        self._spent += Spent(len(cycle), sum(own.convolutions for own in cycle))
+        return cycle
+
+    def _uplift(self, cycle: tuple[ContactState, ...]) -> Array | None:
+        """Normal displacement under the shear of each increment; None for similar bodies."""
+        if self.pair.similar:
+            return None
+        half_space = self._contact.half_space
+        return np.stack([half_space.normal_under_shear(own.shear) for own in cycle])
+
+    def _ends(self, slip: Array, starts: Starts, loads: LoadHistory) -> Array:
+        """Where body 2 is before and after each increment, if its motion is to be followed."""
+        pressure = np.zeros(self.grid.shape)
+        for start in starts.values():
+            pressure += start.pressure
+        law = self.settings.laws[0]
+        ends = followed(self.grid, slip, pressure, loads.blocks, self.settings.follow)
+        if len(ends) and isinstance(law, EvolvingLaw) and law.scope == "local":
+            raise MotionError(
+                "the surfaces move over each other, and that of body 1 changes from place to "
+                "place, which no wear step follows: neglect the motion, or let the law change with "
+                "the energy of the whole contact"
+            )
+        return ends
+
+    # -- tractions of given slips ------------------------------------------------------------------
+    def _pressure(self, result: CycleResult) -> Array:
+        """Pressure of every increment of a cycle ``(t, nx, ny)``."""
+        pressure = np.zeros((len(result.energy), *self.grid.shape))
+        for t, state in result.states.items():
+            pressure[t] = state.pressure
+        return pressure
+
+    def _given_tractions(self, nodal_slip: Array, pressure: Array, energy: float) -> CycleTractions:
+        """Those where slip is the loads', once so much ``energy`` [N mm] is dissipated."""
+        slip = self.transfer.to_cells(nodal_slip)
+        stuck = ~slip.any(axis=1)
+        force = pressure.sum(axis=(1, 2))
+        held = np.where(stuck, pressure, 0.0).sum(axis=(1, 2))
+        unknown = np.divide(held, force, out=np.zeros_like(force), where=force > 0.0)
+        pairs = zip(pressure, slip, strict=True)
+        shear = np.stack([self._sliding_shear(p, s, energy) for p, s in pairs])
+        return CycleTractions(pressure, shear, slip, unknown)
+
+    def _sliding_shear(self, pressure: Array, slip: Array, energy: float) -> Array:
+        """µp against ``slip`` ``(2, nx, ny)``; 0 where nothing slips."""
+        size = np.hypot(*slip)
+        opposing = np.divide(-slip, size, out=np.zeros_like(slip), where=size > 0.0)
+        shear: Array = self.settings.friction(energy) * pressure * opposing
+        return shear
+
+
+def _own_tractions(cycle: tuple[ContactState, ...]) -> CycleTractions:
+    """Tractions where the half-space has its own friction: known everywhere."""
+    pressure, shear, slip = (
+        np.stack([getattr(own, name) for own in cycle]) for name in ("pressure", "shear", "slip")
+    )
+    return CycleTractions(pressure, shear, slip, np.zeros(len(cycle)))

@@ -1,0 +1,70 @@
+"""Faces, surfaces and kinetics of worn contacts as datasets, whichever analysis has them.
+
+Extensive quantities are in the units of a contact over an area.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from sa_solver.types import Array
+from workflow.analyses.contact.datasets import (
+    load_columns,
+    pressure_field,
+    shear_field,
+    slip_field,
+)
+from workflow.shell.dataset import Dataset
+from workflow.shell.results import ResultsWriter
+
+if TYPE_CHECKING:
+    from fe_models.mesh import Face
+    from wear.interface import FaceLoads
+
+
+def face_mesh(face: Face) -> dict[str, Dataset]:
+    """Nodes ``(n, 2)`` and facets ``(m, 3)``, in a line contact ``(m, 2)``, of a face."""
+    facets = "corner nodes of the triangles, or of the segments of a line contact"
+    return {
+        "coordinates": Dataset(face.coordinates, "mm", "nodes in the interface frame"),
+        "facets": Dataset(face.facets, "1", facets),
+    }
+
+
+def put_face(writer: ResultsWriter, group: str, face: Face, carried: FaceLoads) -> None:
+    """A contact face over a cycle; nodal pressure and shear where a structure gives them."""
+    writer.put(f"{group}/load_history", load_columns(carried.loads))
+    writer.put(group, face_mesh(face) | {"slip": slip_field(carried.slip)})
+    force = getattr(carried, "force", None)
+    if force is not None:
+        pressure, shear = force[:, 2] / face.nodal_areas, force[:, :2] / face.nodal_areas
+        writer.put(group, {"pressure": pressure_field(pressure), "shear": shear_field(shear)})
+
+
+def surface_heights(body_1: Array, body_2: Array) -> dict[str, Dataset]:
+    """Heights ``(nx, ny)`` of both bodies."""
+    return {
+        "body_1": Dataset(body_1, "mm", "height of body 1 in the interface frame"),
+        "body_2": Dataset(body_2, "mm", "height of body 2 in the interface frame"),
+    }
+
+
+def cycles_column(cycles: Array) -> Dataset:
+    """The cycles ``(n,)`` at which kinetics are known."""
+    return Dataset(cycles, "1", "cycles")
+
+
+def kinetics_columns(kinetics: Array, area: Array) -> dict[str, Dataset]:
+    """What a contact has lost and dissipated over the cycles, and its area, ``(n,)`` each.
+
+    ``kinetics`` ``(n, 5)`` has depths and volumes of both bodies, and the energy.
+    """
+    depth_1, depth_2, volume_1, volume_2, energy = kinetics.T
+    return {
+        "depth_1": Dataset(depth_1, "mm", "largest worn depth of body 1"),
+        "depth_2": Dataset(depth_2, "mm", "largest worn depth of body 2"),
+        "volume_1": Dataset(volume_1, "mm^3", "worn volume of body 1"),
+        "volume_2": Dataset(volume_2, "mm^3", "worn volume of body 2"),
+        "energy": Dataset(energy, "N mm", "energy dissipated so far"),
+        "area": Dataset(area, "mm^2", "area in contact"),
+    }

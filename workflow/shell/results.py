@@ -1,0 +1,76 @@
+"""The layout of ``results.h5``: groups of datasets, each with its unit and description."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from sa_solver.types import Frame, Grid
+from workflow.case.sections import Case
+from workflow.case.writing import dump_case
+from workflow.shell.analysis import Run
+from workflow.shell.dataset import Datasets, unit_in
+from workflow.shell.store import replacing
+from workflow.shell.versions import versions
+
+# Datasets of more values are worth packing.
+LARGE = 4096
+
+
+class ResultsWriter:
+    """Fills an open HDF5 file with datasets; ``line`` contacts have forces and energies per mm."""
+
+    def __init__(self, file: h5py.File, line: bool = False) -> None:
+        self._file, self._line = file, line
+
+    def put(self, group: str, datasets: Datasets, /, **attributes: Any) -> None:
+        """Write a group, new or there already; attributes that are None are left out."""
+        place = self._file.require_group(group)
+        for name, dataset in datasets.items():
+            packed = {"compression": "gzip", "compression_opts": 1}
+            written = place.create_dataset(
+                name, data=dataset.values, **(packed if np.size(dataset.values) > LARGE else {})
+            )
+            written.attrs["unit"] = unit_in(self._line, dataset.unit)
+            written.attrs["description"] = dataset.description
+        place.attrs.update({name: own for name, own in attributes.items() if own is not None})
+
+    def put_grid(self, group: str, grid: Grid, frame: Frame | None = None) -> None:
+        """A grid and, where it is known, its place in space."""
+        line = {"line": True} if grid.line else {}
+        placed = {} if frame is None else {"origin": frame.origin, "axes": frame.axes}
+        self.put(group, {}, shape=grid.shape, pitch=grid.pitch, **line, **placed)
+
+
+@contextmanager
+def writing(path: Path, line: bool = False) -> Iterator[ResultsWriter]:
+    """Write an HDF5 file, which appears once it is whole."""
+    with replacing(path) as partial, h5py.File(partial, "w") as file:
+        yield ResultsWriter(file, line)
+
+
+@contextmanager
+def run_results(
+    run: Run[Any], case: Case, attributes: Mapping[str, Any], line: bool = False
+) -> Iterator[ResultsWriter]:
+    """Write ``results.h5`` of a run: what it is of, the ``case`` as run, and what is put there."""
+    with writing(run.folder.results, line) as writer:
+        writer.put("/", {}, kind=run.kind, title=case.title, **attributes)
+        writer.put("case", {}, text=dump_case(case), **versions())
+        yield writer
+
+
+def grid_of(group: h5py.Group) -> Grid:
+    """The grid that a group's attributes describe."""
+    (nx, ny), (dx, dy) = group.attrs["shape"], group.attrs["pitch"]
+    return Grid((int(nx), int(ny)), (float(dx), float(dy)), bool(group.attrs.get("line", False)))
+
+
+def frame_of(group: h5py.Group) -> Frame:
+    """The frame that a group's attributes describe."""
+    return Frame(np.array(group.attrs["origin"]), np.array(group.attrs["axes"]))

@@ -1,0 +1,62 @@
+"""Tables as CSV files: a row of headings, each ``name [unit]``, and a row for every point.
+
+They are read by :mod:`workflow.case.table_file`.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from workflow.shell.dataset import Datasets
+from workflow.shell.store import replacing
+
+# Digits of curves: more than they are known to, fewer than it takes to read back the same.
+DIGITS = 9
+
+
+def write_curves(path: Path, curves: Datasets) -> None:
+    """Write datasets as columns; of what has several values at a point, one column for each."""
+    columns: dict[str, NDArray[Any]] = {}
+    for name, dataset in curves.items():
+        if dataset.values.ndim == 1:
+            columns[heading(name, dataset.unit)] = dataset.values
+        else:
+            for number, values in enumerate(dataset.values.T, start=1):
+                columns[heading(f"{name}_{number}", dataset.unit)] = values
+    write_table(path, columns, DIGITS)
+
+
+def write_table(
+    path: Path,
+    columns: Mapping[str, Sequence[Any] | NDArray[Any]],
+    digits: int | None = None,
+    note: str = "",
+) -> None:
+    """Write ``columns`` of equal length by their headings, below a comment if there is a ``note``.
+
+    Numbers have so many digits, or as many as it takes to read back the same. None is an empty
+    cell.
+    """
+    values = [own.tolist() if isinstance(own, np.ndarray) else own for own in columns.values()]
+    with replacing(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
+        if note:
+            file.write(f"# {note}\n")
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(columns)
+        for row in zip(*values, strict=True):
+            writer.writerow(row if digits is None else [_rounded(cell, digits) for cell in row])
+
+
+def heading(name: str, unit: str) -> str:
+    """What stands above a column; nothing is said of a unit that goes without saying."""
+    return f"{name} [{unit}]" if unit else name
+
+
+def _rounded(cell: object, digits: int) -> object:
+    return f"{cell:.{digits}g}" if isinstance(cell, float) else cell
