@@ -1,7 +1,9 @@
 """Shared by the tests of ``workflow``: synthetic results, and runs of the small case."""
 
 import json
-from collections.abc import Callable, Iterator
+import pickle
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -13,7 +15,9 @@ from click.testing import CliRunner, Result
 
 from fe_models.gmsh_session import gmsh_model
 from sa_solver.types import Array, Frame, Grid
+from workflow.analyses.wear import contact_workers
 from workflow.cli import cli
+from workflow.shell import processes
 
 SIZE, EDGE, END = (10.0, 60.0), 1.0, 3.0
 EDGE_RADIUS, END_RADIUS = 30.0, 150.0
@@ -251,6 +255,48 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("FRETSCALE_CACHE", str(tmp_path_factory.mktemp("cache")))
         yield
+
+
+def sent(message: Any) -> Any:
+    """What arrives at the other end of a pipe: a copy, its arrays in C order."""
+    return pickle.loads(pickle.dumps(message))
+
+
+class InThisProcess:
+    """Stands for the workers of a run: they answer one after the other, here."""
+
+    def __init__(self, answering: list[Callable[..., Any]]) -> None:
+        self._answering = answering
+
+    def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
+        shares = sent(list(zip(*arguments, strict=True)))
+        return [
+            sent(own(method, *share)) for own, share in zip(self._answering, shares, strict=True)
+        ]
+
+
+@contextmanager
+def workers_here(
+    make: Callable[[Any], Callable[..., Any]], settings: Sequence[Any]
+) -> Iterator[InThisProcess]:
+    yield InThisProcess([make(sent(own)) for own in settings])
+
+
+@pytest.fixture(scope="session", autouse=True)
+def _contacts_here() -> Iterator[None]:
+    """Contacts are computed in the process of the test: to start others takes longer than they do.
+
+    In processes of their own they find the same but for rounding (test_run.py).
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(contact_workers, "workers", workers_here)
+        yield
+
+
+@pytest.fixture
+def own_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Contacts have processes of their own, as where there is no test."""
+    monkeypatch.setattr(contact_workers, "workers", processes.workers)
 
 
 def invoke(*arguments: object) -> Result:

@@ -1,13 +1,11 @@
 """Tangential loops of a wear run: what is imposed, kept, written, and drawn."""
 
-from contextlib import nullcontext
 from types import SimpleNamespace
 
 import h5py
 import numpy as np
 import pytest
 
-import workflow.analyses.wear.run
 from sa_solver.contact import FrictionalContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.reference.mindlin import ShearedSphere
@@ -24,7 +22,6 @@ from workflow.analyses.wear.contact_loops import (
     worn_loop,
     write_loops,
 )
-from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.figures import loops as loops_figure
 from workflow.analyses.wear.figures import wear as figures
 from workflow.analyses.wear.loop_table import read_loop_table
@@ -257,29 +254,10 @@ def start_balls(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def rubbed(start_balls, tmp_path_factory):
-    """The balls with a loop after every jump, run by workers; not to be changed."""
+    """The balls with a loop after every jump, not to be changed."""
     run = start_balls(tmp_path_factory.mktemp("rubbed") / "out", *ASKED)
     assert run.ending.exit_code == 0, run.ending.stderr
     return run
-
-
-class Here:
-    """Contact stages in this process instead of workers, whose start takes longer than the run."""
-
-    def __init__(self, settings):
-        self._stages = [ContactStage(own) for own in settings]
-
-    def call(self, method, *arguments):
-        shares = zip(self._stages, zip(*arguments, strict=True), strict=True)
-        return [getattr(stage, method)(*own) for stage, own in shares]
-
-
-@pytest.fixture
-def here(monkeypatch):
-    """Runs without workers."""
-    monkeypatch.setattr(
-        workflow.analyses.wear.run, "contact_workers", lambda settings: nullcontext(Here(settings))
-    )
 
 
 def test_run_writes_a_table_for_every_interface(rubbed):
@@ -306,7 +284,6 @@ def test_run_writes_a_table_for_every_interface(rubbed):
         assert summary[name]["worn_area"] > 0.0
 
 
-@pytest.mark.usefixtures("here")
 def test_loops_change_nothing_else(start_balls, rubbed, tmp_path):
     plain = start_balls(tmp_path / "out")
     for name, height in plain.heights().items():
@@ -315,7 +292,6 @@ def test_loops_change_nothing_else(start_balls, rubbed, tmp_path):
     assert not list(plain.folder.glob("loops_*"))
 
 
-@pytest.mark.usefixtures("here")
 @pytest.mark.parametrize("every", ["end", "jump"])
 def test_resumed_run_keeps_its_earlier_loops(
     start_balls, resume, rubbed, tmp_path, monkeypatch, every

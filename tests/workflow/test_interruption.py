@@ -17,8 +17,7 @@ import pytest
 
 import wear.coupled
 import workflow.analyses.wear.run
-from workflow.analyses.wear import checkpoint
-from workflow.analyses.wear.contact_workers import contact_workers
+from workflow.analyses.wear import checkpoint, contact_workers
 from workflow.analyses.wear.recording import Recorder
 from workflow.shell import processes as workers
 
@@ -176,10 +175,10 @@ def test_worker_that_dies_is_one_line():
         workers._answers(connections)
 
 
-def test_worker_that_cannot_be_set_up_says_why(small_path):
+def test_worker_that_cannot_be_set_up_says_why(own_processes):
     """What goes wrong in a worker is raised here, not printed there."""
     with (
-        contact_workers([None]) as team,
+        contact_workers.contact_workers([None]) as team,
         pytest.raises(AttributeError, match="'NoneType'"),
     ):
         team.call("begin", [None])
@@ -276,8 +275,10 @@ def command(small_path: Path, folder: Path) -> list[object]:
 
 @pytest.fixture(scope="module")
 def reference(start, tmp_path_factory):
-    """The run of many jumps, undisturbed."""
-    run = start(tmp_path_factory.mktemp("reference") / "out", *MANY)
+    """The run of many jumps, undisturbed, its contacts in processes of their own."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(contact_workers, "workers", workers.workers)
+        run = start(tmp_path_factory.mktemp("reference") / "out", *MANY)
     assert run.summary["jumps"] == JUMPS
     assert run.summary["structure"]["solutions"] > 1
     return run
@@ -312,7 +313,8 @@ def kill_and_resume(small_path, folder, moments):
 
 
 @posix_only
-def test_three_kills_lose_nothing(small_path, resume, reference, tmp_path):
+@pytest.mark.slow
+def test_three_kills_lose_nothing(small_path, resume, reference, own_processes, tmp_path):
     moments = [(0, 0.0), (3, 0.02), (8, 0.05)]
     assert kill_and_resume(small_path, tmp_path / "out", moments) == 3
     assert_equal_after(resume, tmp_path / "out", reference)
@@ -320,7 +322,7 @@ def test_three_kills_lose_nothing(small_path, resume, reference, tmp_path):
 
 @posix_only
 @pytest.mark.slow
-def test_twenty_kills_lose_nothing(small_path, resume, reference, tmp_path):
+def test_twenty_kills_lose_nothing(small_path, resume, reference, own_processes, tmp_path):
     """At random moments of the run, of its output and of its start."""
     dice, kills, number = random.Random(20), 0, 0
     while kills < 20:
@@ -339,12 +341,14 @@ def assert_equal_after(resume, folder, reference):
 
 
 @posix_only
-def test_kill_while_the_checkpoint_is_written(small_path, resume, reference, tmp_path):
+@pytest.mark.slow
+def test_kill_while_the_checkpoint_is_written(
+    small_path, resume, reference, own_processes, tmp_path
+):
     """The half of it that is on disk is not the checkpoint."""
     code = """
 import os, signal, sys
-from workflow.analyses.wear import checkpoint
-from workflow.analyses.wear.contact_workers import contact_workers
+from workflow.analyses.wear import checkpoint, contact_workers
 from workflow.shell import store
 whole, written = store.write_arrays, []
 def torn(path, arrays, attributes):
@@ -368,16 +372,10 @@ main()
     assert_equal_after(resume, folder, reference)
 
 
-@posix_only
-@pytest.mark.parametrize("moment", ["starting workers", "jumping"])
-def test_ctrl_c_ends_in_one_line_and_resumes(small_path, resume, reference, tmp_path, moment):
-    folder = tmp_path / "out"
+def interrupt(small_path, folder, began):
+    """Ctrl-C as soon as the run has begun what ``began`` looks for: one line, and all gone."""
     process = Process(*command(small_path, folder))
-    began = {
-        "starting workers": lambda: len(process.descendants()) >= 2,
-        "jumping": lambda: (folder / "checkpoint.h5").exists(),
-    }[moment]
-    assert wait_until(began, PATIENCE)
+    assert wait_until(lambda: began(process), PATIENCE)
     below = process.descendants()
     process.interrupt()
     code, text = process.finish()
@@ -387,5 +385,18 @@ def test_ctrl_c_ends_in_one_line_and_resumes(small_path, resume, reference, tmp_
     # Before it only what the run itself had said: no traceback, nothing of the workers.
     assert [line for line in lines[:-1] if not line.startswith("run: ")] == []
     assert wait_until(lambda: not any(map(alive, below)), 10.0)
-    if moment == "jumping":
-        assert_equal_after(resume, folder, reference)
+
+
+@posix_only
+def test_ctrl_c_while_workers_start_ends_in_one_line(small_path, tmp_path):
+    interrupt(small_path, tmp_path / "out", lambda process: len(process.descendants()) >= 2)
+
+
+@posix_only
+@pytest.mark.slow
+def test_ctrl_c_among_jumps_ends_in_one_line_and_resumes(
+    small_path, resume, reference, own_processes, tmp_path
+):
+    folder = tmp_path / "out"
+    interrupt(small_path, folder, lambda process: (folder / "checkpoint.h5").exists())
+    assert_equal_after(resume, folder, reference)

@@ -95,6 +95,18 @@ def test_explicit_run_with_a_law_for_each_body_and_its_overrides_on_record(start
     assert (recorded.wear.step.kind, recorded.wear.cycles) == ("explicit", 6000.0)
 
 
+def test_contacts_in_processes_of_their_own_find_the_same(start, whole, own_processes, tmp_path):
+    """But for rounding: an interpreter with fewer libraries may take another way to add up."""
+    run = start(tmp_path / "out")
+    for name, height in whole.heights().items():
+        deepest = np.abs(whole.heights()[f"{name.rpartition('/')[0]}/body_1"]).max()
+        other = run.heights()[name]
+        np.testing.assert_allclose(other, height, rtol=1e-12, atol=1e-9 * deepest, err_msg=name)
+    assert run.summary["structure"] == pytest.approx(
+        whole.summary["structure"] | {"from_cache": True}, rel=1e-9
+    )
+
+
 def test_two_runs_are_bitwise_equal(start, whole, tmp_path):
     again = start(tmp_path / "out")
     first, second = whole.heights(), again.heights()
