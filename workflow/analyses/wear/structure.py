@@ -45,8 +45,9 @@ class WearStructure(Generic[AnyWearCase]):
     """What a wear run needs to know of a kind of structure.
 
     ``case`` is the kind of case that has it, ``source`` gives the loads of its contacts and
-    ``memory`` what a run needs, given the nodes of both bodies and of all interfaces (0: unknown). ``choose`` gives the case with the settings that it leaves open, and
-    a record of why; ``warnings`` are about the unworn contact of a stage under a peak load [N].
+    ``memory`` what a run needs, given the nodes of both bodies and of all interfaces (0: unknown).
+    ``choose`` gives the case with the settings that it leaves open, and a record of why;
+    ``warnings`` are about the unworn contact of a stage under a peak load [N].
     """
 
     name: str
