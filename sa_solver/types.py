@@ -27,7 +27,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -289,8 +288,3 @@ class LoadHistory:
     def mean_energy(self) -> float:
         """Energy dissipated per mean cycle [N mm]."""
         return float(self.share @ (self.Edx + self.Edy))
-
-    def columns(self) -> dict[str, NDArray[Any]]:
-        """Columns by name; those of a mix only where there is one."""
-        names = [column.name for column in fields(self)]
-        return {name: getattr(self, name) for name in (names if self.mixed else names[:-2])}

@@ -187,12 +187,10 @@ def test_a_history_is_one_cycle_unless_mixed() -> None:
     plain, other = HEAVY[0], LIGHT[0]
     assert plain.blocks == [slice(0, 3)]
     assert not plain.mixed
-    assert "share" not in plain.columns()
     mixed = LoadHistory.mix([plain, other], (0.25, 0.75))
     assert mixed.mixed
     assert mixed.blocks == [slice(0, 3), slice(3, 5)]
     assert mixed.share.tolist() == [0.25] * 3 + [0.75] * 2
-    assert list(mixed.columns())[-2:] == ["share", "block"]
 
 
 def test_mean_energy_is_by_shares() -> None:

@@ -243,6 +243,13 @@ class Run:
 Runner = Callable[..., Run]
 
 
+def manifest_has_all(folder: Path) -> bool:
+    """Whether the manifest of a run lists what there is, and nothing else."""
+    listed: dict[str, str] = json.loads((folder / "manifest.json").read_text("utf-8"))
+    there = {path.name for path in folder.iterdir() if not path.name.startswith(".")}
+    return there == listed.keys() | {"manifest.json"} and all(listed.values())
+
+
 @pytest.fixture(scope="session")
 def small_path(dovetail_path: Path) -> Path:
     """The case of a few seconds."""

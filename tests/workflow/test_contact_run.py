@@ -12,6 +12,7 @@ import pytest
 from click.testing import CliRunner
 
 from sa_solver.history import History
+from tests.workflow.conftest import manifest_has_all
 from workflow.analyses.contact import run as contact_run
 from workflow.cli import cli
 from workflow.kinds import template
@@ -154,7 +155,9 @@ def test_folder_holds_what_it_promises(whole):
     names = {path.name for path in whole.iterdir()}
     assert names == {
         *("case.yaml", "summary.json", "results.h5", "run.log", "paraview", "figures"),
+        "manifest.json",
     }
+    assert manifest_has_all(whole)
     assert {path.stem for path in (whole / "figures").iterdir()} == {"profiles", "maps", "forces"}
     assert len(list((whole / "paraview" / "contact").iterdir())) == 12
 

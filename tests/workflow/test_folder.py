@@ -156,11 +156,6 @@ def test_a_run_of_its_own_stays_until_the_case_is_finished(case, folder, finishe
     assert ("wear" in folder.manifest) is not finished
 
 
-def test_the_manifest_of_a_run_has_all_it_wrote(whole):
-    folder = OutputFolder(whole.folder)
-    assert folder.manifest.keys() | {"manifest.json"} == {own.name for own in folder.root.iterdir()}
-
-
 def test_a_run_beside_what_is_not_its_own_says_so(start, tmp_path):
     (tmp_path / "worn.msh").write_text("mine")
     run = start(tmp_path, "wear.cycles=1e4", "contact.grid=[16, 24]", force=True)

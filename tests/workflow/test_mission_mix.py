@@ -7,6 +7,7 @@ import pytest
 
 from sa_solver.types import LoadHistory
 from tests.workflow.conftest import Run, invoke
+from workflow.analyses.contact.datasets import load_columns
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.mesh.model import MeshModel
@@ -214,6 +215,13 @@ def mixed_loads() -> LoadHistory:
     P = np.array([100.0, 200.0, 0.0])
     own = LoadHistory(P, -0.1 * P, zero, zero, zero, zero, 0.01 * P, zero, P > 1e3)
     return LoadHistory.mix([own, own], (0.7, 0.3))
+
+
+def test_only_a_mix_has_shares_and_blocks():
+    loads = mixed_loads()
+    assert list(load_columns(loads))[-2:] == ["share", "block"]
+    one = LoadHistory(**{name: column[:3] for name, column in list(vars(loads).items())[:9]})
+    assert list(load_columns(one))[-1] == "sliding"
 
 
 def test_csv_of_a_mix_reads_back_bit_for_bit(tmp_path):

@@ -29,6 +29,7 @@ from workflow.case.sections import Case, Length, Section, Stress, entry
 from workflow.cli import cli
 from workflow.shell.analysis import Analysis, Run
 from workflow.shell.memory import Memory
+from workflow.shell.summary import finish
 
 Force = Annotated[float, Quantity("N", above=0.0, at_most=1e6)]
 
@@ -74,7 +75,7 @@ def run_hertz(run: Run[HertzCase]) -> None:
     run.reporter.say(f"run: {case.title}")
     combined = case.structure.modulus / 2.0
     radius = (0.75 * case.force * case.structure.radius / combined) ** (1.0 / 3.0)
-    run.folder.write_summary({"title": case.title, "contact": {"radius": radius}})
+    finish(run, {"contact": {"radius": radius}}, [f"radius {radius:.4g} mm"])
 
 
 def no_memory(case: HertzCase) -> Memory:

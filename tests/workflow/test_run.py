@@ -4,6 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.workflow.conftest import manifest_has_all
 from workflow.kinds import load_case
 from workflow.shell import memory
 
@@ -42,7 +43,9 @@ def test_folder_holds_what_it_promises(whole):
     names = {path.name for path in whole.folder.iterdir()}
     assert names == {
         *("case.yaml", "summary.json", "results.h5", "checkpoint.h5", "run.log", "worn.msh"),
+        "manifest.json",
     }
+    assert manifest_has_all(whole.folder)
     assert whole.summary["jumps"] == 3
     assert whole.summary["kinetics"]["cycles"] == [0.0, 1e4, 2e4, 3e4]
     assert whole.summary["warnings"] == []

@@ -12,6 +12,7 @@ from fe_models.mesh import Face
 from fe_models.reduction import free_frequencies, load_reduced
 from sa_solver.reference.hertz import HertzSphere
 from sa_solver.types import ElasticPair, Frame, Material
+from tests.workflow.conftest import manifest_has_all
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import NodeGrid, PadHalfSpace
 from workflow.case.writing import dump_case
@@ -245,6 +246,7 @@ class TestResults:
         from workflow.analyses.specimens import figures as specimens
         from workflow.pictures.style import STYLE
 
+        assert manifest_has_all(curved)
         names = {"pad", "loops", "kinetics", "half_space"}
         assert {path.stem for path in (curved / "figures").iterdir()} == names
         for path in (curved / "figures").iterdir():

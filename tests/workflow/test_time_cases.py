@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.workflow.conftest import invoke
+from tests.workflow.conftest import invoke, manifest_has_all
 from workflow.analyses.time.joint import steady_loop
 from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.time.memory import memory
@@ -285,6 +285,7 @@ def test_files_of_a_joint(tmp_path):
             "cycles [1]",
             "energy_per_cycle [N mm]",
         ]
+    assert manifest_has_all(folder)
     assert sorted(path.name for path in (folder / "figures").iterdir()) == [
         "evolution.png",
         "loops.png",

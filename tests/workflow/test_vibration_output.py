@@ -12,7 +12,7 @@ import pytest
 import pyvista as pv
 
 from sa_solver.types import Array
-from tests.workflow.conftest import invoke
+from tests.workflow.conftest import invoke, manifest_has_all
 from tests.workflow.vibration_pad import LOAD, ROWS, block, places, run_block
 from wear.joints.periodic import SEPARATED, SLIP
 from workflow.analyses.vibration.figures import loops as vibration_loops
@@ -168,6 +168,7 @@ def title(figure: Any) -> str:
 def test_every_figure_is_written_and_not_blank(folder: Path) -> None:
     from matplotlib.image import imread
 
+    assert manifest_has_all(folder)
     written = list((folder / "figures").iterdir())
     assert {path.stem for path in written} == NAMES
     for path in written:

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-import h5py
 import numpy as np
 
 from sa_solver.normal import NormalContactError
@@ -83,6 +82,22 @@ class Outcome:
         }
 
 
+@dataclass(frozen=True)
+class PeakHistory:
+    """The contact at peak load after every jump, unworn first.
+
+    ``area`` in contact [mm²] and largest ``pressure`` [MPa].
+    """
+
+    area: list[float]
+    pressure: list[float]
+
+    def summary(self) -> dict[str, Any]:
+        """The first pressure, the last pressure and the last area."""
+        pressures = {"unworn": self.pressure[0], "worn": self.pressure[-1]}
+        return {"peak_pressure": pressures, "area": self.area[-1]}
+
+
 def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
     folder, reporter, structure = run.folder, run.reporter, None
@@ -105,17 +120,15 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
             reporter,
         )
     with reporter.stage("results"):
-        _write_results(outcome, structure, stresses, run)
+        recorded = _write_results(outcome, structure, stresses, run)
     with reporter.stage("paraview and figures"):
         # They take ten seconds and more on one core.
         write_pictures(outcome.case.output, folder, figures_of, write_wear, processes=2)
     worn_nodes = _write_worn_nodes(outcome, folder, reporter)
-    pressures = _peak_pressures(outcome, folder)
     loops = write_loop_tables(folder, outcome.source.line)
     warn_of_border(loops, outcome.case.loops, reporter)
     _warn_of_steps(outcome, reporter)
-    summary = _summary(outcome, structure, stresses, pressures)
-    _add_areas(summary, outcome, folder)
+    summary = _summary(outcome, structure, stresses, recorded)
     for name, written in worn_nodes.items():
         summary[name]["worn_nodes"] = written
     for name, found in loops.items():
@@ -150,7 +163,8 @@ def _write_results(
     structure: WornStructure | None,
     stresses: list[InterfaceStress],
     run: Run[WearCase],
-) -> None:
+) -> dict[str, PeakHistory]:
+    """Write ``results.h5``; what the jumps recorded, by interface."""
     case, source = outcome.case, outcome.source
     attributes = {
         "friction": case.friction.at(0.0),
@@ -167,12 +181,14 @@ def _write_results(
             writer.put(f"contact/{stage.name}", energy)
             if result.cycle:
                 write_comparison(writer, stage.name, result.cycle, loads.loads, source.peak)
-        _write_kinetics(writer, outcome, _write_jumps(writer, outcome, run.folder))
+        recorded = _write_jumps(writer, outcome, run.folder)
+        _write_kinetics(writer, outcome, recorded)
         write_loops(writer, run.folder, outcome.state.jump)
         if structure is not None:
             structure.write(writer)
         for stress in stresses:
             stress.write(writer)
+    return recorded
 
 
 def _write_coarse(
@@ -194,9 +210,9 @@ def _write_coarse(
 
 def _write_jumps(
     writer: ResultsWriter, outcome: Outcome, folder: OutputFolder
-) -> dict[str, list[float]]:
-    """Copy surfaces and contacts of all jumps; areas in contact at peak load, by interface."""
-    areas: dict[str, list[float]] = {stage.name: [] for stage in outcome.stages}
+) -> dict[str, PeakHistory]:
+    """Copy surfaces and contacts of all jumps; what they come to, by interface."""
+    recorded = {stage.name: PeakHistory([], []) for stage in outcome.stages}
     for jump in range(outcome.state.jump + 1):
         arrays, attributes = read_arrays(folder.jump(jump))
         for stage in outcome.stages:
@@ -207,16 +223,20 @@ def _write_jumps(
             place, cycles = f"{stage.name}/{jump:05d}", attributes["cycles"]
             writer.put(f"surfaces/{place}", surface_heights(**surfaces), cycles=cycles)
             writer.put(f"contact/{place}", traction_fields(**contact), cycles=cycles)
-            cells = np.count_nonzero(contact["pressure"] > 0.0)
-            areas[stage.name].append(cells * stage.grid.cell_area)
-    return areas
+            pressure = contact["pressure"]
+            area = np.count_nonzero(pressure > 0.0) * stage.grid.cell_area
+            recorded[stage.name].area.append(area)
+            recorded[stage.name].pressure.append(float(pressure.max()))
+    return recorded
 
 
-def _write_kinetics(writer: ResultsWriter, outcome: Outcome, areas: dict[str, list[float]]) -> None:
+def _write_kinetics(
+    writer: ResultsWriter, outcome: Outcome, recorded: dict[str, PeakHistory]
+) -> None:
     state = outcome.state
     writer.put("kinetics", {"cycles": cycles_column(state.cycles)})
     for number, stage in enumerate(outcome.stages):
-        columns = kinetics_columns(state.kinetics[:, number], np.array(areas[stage.name]))
+        columns = kinetics_columns(state.kinetics[:, number], np.array(recorded[stage.name].area))
         regimes = {
             f"{name}_{attribute}": value
             for name, regime in outcome.regimes[stage.name].items()
@@ -237,35 +257,11 @@ def _regime_attributes(regime: LinearRegime | None) -> dict[str, float]:
     }
 
 
-def _add_areas(summary: dict[str, Any], outcome: Outcome, folder: OutputFolder) -> None:
-    """Area in contact at peak load over the cycles, and that which has worn by the end."""
-    with h5py.File(folder.results, "r") as file:
-        for stage, state in zip(outcome.stages, outcome.state.interfaces, strict=True):
-            area = file[f"kinetics/{stage.name}/area"][()].tolist()
-            summary["kinetics"][stage.name]["area"] = area
-            worn = np.count_nonzero(state.surfaces.depth > 0.0)
-            areas = {"area": area[-1], "worn_area": worn * stage.grid.cell_area}
-            summary[stage.name].update(areas)
-
-
-def _peak_pressures(outcome: Outcome, folder: OutputFolder) -> dict[str, dict[str, float]]:
-    """Largest pressure at peak load before the first and after the last jump, by interface."""
-    jumps = {"unworn": 0, "worn": outcome.state.jump}
-    with h5py.File(folder.results, "r") as file:
-        return {
-            stage.name: {
-                moment: float(file[f"contact/{stage.name}/{jump:05d}/pressure"][()].max())
-                for moment, jump in jumps.items()
-            }
-            for stage in outcome.stages
-        }
-
-
 def _summary(
     outcome: Outcome,
     structure: WornStructure | None,
     stresses: list[InterfaceStress],
-    pressures: dict[str, dict[str, float]],
+    recorded: dict[str, PeakHistory],
 ) -> dict[str, Any]:
     state = outcome.state
     stress = {own.name: {"stress": own.summary()} for own in stresses}
@@ -278,18 +274,26 @@ def _summary(
         **{
             stage.name: _interface_summary(outcome, number)
             | (structure.interface_summary(number) if structure else {})
-            | {"peak_pressure": pressures[stage.name]}
+            | recorded[stage.name].summary()
             | stress.get(stage.name, {})
+            | {"worn_area": _worn_area(outcome, number)}
             for number, stage in enumerate(outcome.stages)
         },
         "kinetics": {
             "cycles": state.cycles.tolist(),
             **{
                 stage.name: dict(zip(KINETICS, state.kinetics[:, number].T.tolist(), strict=True))
+                | {"area": recorded[stage.name].area}
                 for number, stage in enumerate(outcome.stages)
             },
         },
     }
+
+
+def _worn_area(outcome: Outcome, number: int) -> float:
+    """Area that has worn by the end [mm²]."""
+    worn = np.count_nonzero(outcome.state.interfaces[number].surfaces.depth > 0.0)
+    return worn * outcome.stages[number].grid.cell_area
 
 
 def _interface_summary(outcome: Outcome, number: int) -> dict[str, Any]:
