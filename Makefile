@@ -1,29 +1,60 @@
-# The one environment for everything: made from constraints.txt, made again when that changes.
+# One environment: `make run` installs what running needs, `make test` adds what testing needs.
+# Both are brought up to date when pyproject.toml or constraints.txt changes.
 PYTHON ?= python3
 BIN := .venv/bin
-STAMP := .venv/.installed
+PIP := $(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt
+INSTALLED := .venv/.installed
+TESTABLE := .venv/.testable
+SYSTEM_CHECK := workflow/shell/system_check.py
 PYHARM := .venv/pyharm/.installed
 # Tests run side by side in processes; threads inside each would only fight over the cores.
 ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
 
-.PHONY: run test test-full bench lint check install clean
+.PHONY: run test test-full bench lint install clean
 .DEFAULT_GOAL := run
 
-run: check
+run: $(INSTALLED)
+	@echo 'fretscale: the case takes one to two minutes on two cores, 110 MB in out/dovetail.'
 	$(BIN)/fretscale run cases/dovetail.yaml --out out/dovetail --force
 
-test: check lint
+test: $(TESTABLE)
+	@echo 'fretscale: style, types and layers, then the tests: about 20 minutes on two cores.'
+	@$(MAKE) --no-print-directory lint
 	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2
 
-test-full: check lint
+test-full: lint
 	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 -m "slow or not slow"
 
-bench: check
-	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[test,bench]'
+lint: $(TESTABLE)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/mypy
+	$(BIN)/lint-imports --no-logo
+
+bench: $(TESTABLE)
+	$(PIP) -e '.[test,bench]'
 	-$(MAKE) $(PYHARM)
 	$(ONE_THREAD) $(BIN)/python -m pytest -q -s tests/benchmarks/test_tamaas.py
 	$(ONE_THREAD) $(BIN)/python -m pytest -q -s -m "slow or not slow" tests/benchmarks \
 	    --ignore tests/benchmarks/test_tamaas.py
+
+install: $(INSTALLED)
+
+# What the system lacks is found, and installed or named, before anything is downloaded.
+$(INSTALLED): pyproject.toml constraints.txt
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
+	    { echo 'fretscale: needs Python 3.11 or newer; choose one with: make PYTHON=python3.12'; exit 1; }
+	@$(PYTHON) -I $(SYSTEM_CHECK)
+	@echo 'fretscale: installing in .venv: 630 MB to download, 2.3 GB on disk, 2 to 4 minutes.'
+	$(PYTHON) -m venv .venv
+	$(PIP) -e .
+	@$(BIN)/python -I $(SYSTEM_CHECK) --imports
+	@touch $@
+
+$(TESTABLE): $(INSTALLED)
+	@echo 'fretscale: installing what tests add: 40 MB to download, 150 MB on disk, a minute.'
+	$(PIP) -e '.[test]'
+	@touch $@
 
 # A peer that is measured beside ours. It brings a hundred packages: an environment of its own.
 $(PYHARM):
@@ -31,27 +62,6 @@ $(PYHARM):
 	$(@D)/bin/python -m pip install -q --disable-pip-version-check -c constraints.txt \
 	    pyharm-os==1.2.2
 	@touch $@
-
-lint: install
-	$(BIN)/ruff check .
-	$(BIN)/ruff format --check .
-	$(BIN)/mypy
-	$(BIN)/lint-imports --no-logo
-
-# Ends in one line naming the Debian packages to install when a system library is missing.
-check: install
-	@$(BIN)/python -m workflow.shell.system_check
-
-install: $(STAMP)
-
-$(STAMP): pyproject.toml constraints.txt
-	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
-	    { echo 'fretscale: needs Python 3.11 or newer; choose one with: make PYTHON=python3.12'; exit 1; }
-	@$(PYTHON) -c 'import ensurepip, venv' 2>/dev/null || \
-	    { echo 'fretscale: needs the venv module; install with: apt-get install python3-venv'; exit 1; }
-	$(PYTHON) -m venv .venv
-	$(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt -e '.[test]'
-	@touch $(STAMP)
 
 clean:
 	rm -rf .venv out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache \

@@ -43,6 +43,8 @@ CROWN = 2e-5
 CLOSING, SHAKEN = {"tilt": -10.0, "twist": 0.0}, 10
 # Both solvers run to rounding; what is compared is asked to agree to this.
 AGREEMENT = 1e-6
+# What processors and libraries make of the same data, and some more.
+ROUNDING = 1e-13
 
 
 @pytest.fixture(autouse=True)
@@ -175,6 +177,26 @@ def statuses(force):
     closed = force[2] > 0.0
     slides = closed & (np.hypot(*force[:2]) >= FRICTION * force[2] * (1.0 - 1e-9))
     return int(np.sum(~closed)), int(np.sum(slides)), int(np.sum(closed & ~slides))
+
+
+def perturbed(values, rng):
+    """Every number changed in its last digits, as the rounding of another machine might."""
+    return values * (1.0 + ROUNDING * rng.uniform(-1.0, 1.0, values.shape))
+
+
+def test_whole_bodies_are_solved_whatever_the_rounding():
+    """An oracle that converges by luck is none: the same forces from perturbed data, thrice."""
+    joint = BlockOnPlate(1)
+    found = []
+    for seed in range(3):
+        rng, monolith = np.random.default_rng(seed), joint.monolith()
+        monolith.stiffness.data = perturbed(monolith.stiffness.data, rng)
+        monolith.stiffness = (monolith.stiffness + monolith.stiffness.T) / 2.0
+        monolith.loads = perturbed(monolith.loads, rng)
+        states = monolith.march(PATH[: TURN + 1], perturbed(joint.gap, rng))
+        found.append([state.force for state in states])
+    apart = np.ptp(found, axis=0).max()
+    assert 0.0 < apart < 1e4 * ROUNDING * np.abs(found).max()
 
 
 def test_path_sees_every_status(pair):

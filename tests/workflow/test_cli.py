@@ -180,13 +180,6 @@ def test_endings_have_their_exit_code(monkeypatch, dovetail_path, tmp_path, endi
     assert "Traceback" not in result.stderr
 
 
-def test_missing_library_names_its_packages(monkeypatch):
-    monkeypatch.setattr(system_check, "DEBIAN_PACKAGES", {"libno.so.7": "libno7", "libc.so.6": "c"})
-    line = system_check.remedy(OSError(LIBRARY_MISSING))
-    assert line.endswith("apt-get install libno7")
-    assert system_check.remedy(OSError("disk full")) is None
-
-
 def test_verify_reports_by_exit_code(monkeypatch, dovetail_path, tmp_path):
     for passed in (True, False):
 

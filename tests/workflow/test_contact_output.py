@@ -321,8 +321,8 @@ def test_line_has_no_maps_and_no_images(tmp_path):
     folder = OutputFolder(tmp_path / "out")
     folder.claim(case, force=False, resumable=False)
     write_contact_results(outcome, SimpleNamespace(kind="line", folder=folder))
-    assert write_paraview(write_contact, folder.results, folder.paraview) == []
-    written = write_figures(figures_of, folder.results, folder.figures)
+    assert write_paraview(write_contact, folder.results, folder.root / "paraview") == []
+    written = write_figures(figures_of, folder.results, folder.root / "figures")
     assert {path.stem for path in written} == {"profiles", "forces"}
     with h5py.File(folder.results) as file:
         assert file.attrs["kind"] == "line"

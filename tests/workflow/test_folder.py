@@ -1,5 +1,7 @@
 """The output folder: whose it is, and what is refused."""
 
+import json
+
 import pytest
 
 from workflow.case.writing import dump_case
@@ -22,56 +24,149 @@ def files(folder):
     return sorted(str(path.relative_to(folder.root)) for path in folder.root.rglob("*"))
 
 
+def make(folder, *names):
+    """Entries as a run makes them."""
+    for name in names:
+        folder.reserve(name, "a test").write_text("old")
+
+
 def test_claim_makes_the_folder_and_records_the_case(case, folder):
     folder.claim(case, force=False, resumable=True)
-    assert files(folder) == ["case.yaml", "jumps"]
+    assert files(folder) == ["case.yaml", "jumps", "manifest.json"]
+    assert set(folder.manifest) == {"case.yaml", "checkpoint.h5", "jumps"}
     assert load_case(folder.case) == case
 
 
-def test_claim_removes_only_what_a_run_writes(case, folder):
+def test_claim_removes_only_what_the_earlier_run_wrote(case, folder):
     folder.claim(case, force=False, resumable=True)
-    for name in ("summary.json", "results.h5", "worn.msh", "jumps/00001.h5", "notes.txt"):
-        (folder.root / name).write_text("old")
+    make(folder, "summary.json", "results.h5", "worn.msh", "loops_left.csv")
+    folder.jump(1).write_text("old")
+    (folder.reserve("figures", "a test") / "below").mkdir(parents=True)
+    for name in ("notes.txt", "loops_mine.csv"):
+        (folder.root / name).write_text("mine")
     (folder.root / ".results.h5.123.part").write_text("old")
     (folder.jumps / ".00002.h5.123.part").write_text("old")
+    assert folder.claim(case, force=False, resumable=True) == []
+    assert files(folder) == ["case.yaml", "jumps", "loops_mine.csv", "manifest.json", "notes.txt"]
+
+
+def test_entries_are_listed_before_they_are_made(case, folder):
+    folder.claim(case, force=False, resumable=False)
+    path = folder.reserve("loops_left.csv", "loops of left")
+    assert not path.exists()
+    assert folder.manifest["loops_left.csv"] == "loops of left"
+    make(folder, "jumps.txt")
+    folder.discard("jumps.txt")
+    assert "jumps.txt" not in folder.manifest
+    assert files(folder) == ["case.yaml", "manifest.json"]
+
+
+def test_what_is_not_of_the_run_is_set_aside(case, folder):
+    folder.claim(case, force=False, resumable=False)
+    for text in ("first", "second"):
+        (folder.root / "worn.msh").write_text(text)
+        make(folder, "worn.msh")
+        folder.discard("worn.msh")
+    (folder.root / "figures").mkdir()
+    assert not folder.reserve("figures", "a test").exists()
+    assert files(folder) == [
+        *("case.yaml", "figures.aside", "manifest.json", "worn.msh.aside", "worn.msh.aside2")
+    ]
+    assert (folder.root / "worn.msh.aside").read_text() == "first"
+
+
+def test_a_manifest_leads_nowhere_else(case, folder):
+    folder.claim(case, force=False, resumable=False)
+    outside = folder.root.parent / "outside"
+    outside.mkdir()
+    (folder.root / ".hidden").touch()
+    names = ["case.yaml", "../outside", str(outside), "", ".", "..", ".hidden"]
+    (folder.root / "manifest.json").write_text(json.dumps(dict.fromkeys(names, "")))
+    folder.claim(case, force=False, resumable=False)
+    assert outside.exists()
+    assert files(folder) == [".hidden", "case.yaml", "manifest.json"]
+
+
+def older(folder, case):
+    folder.root.mkdir()
+    for name in ("summary.json", "results.h5", "worn.msh"):
+        (folder.root / name).write_text("old")
+    folder.case.write_text(dump_case(case))
+
+
+def foreign(folder, case):
+    folder.root.mkdir()
+    (folder.root / "thesis.tex").write_text("mine")
+
+
+def other(folder, case):
+    folder.claim(case, force=False, resumable=False)
+    folder.case.write_text(dump_case(case) + "# other\n")
+
+
+def unfinished(folder, case):
     folder.claim(case, force=False, resumable=True)
-    assert files(folder) == ["case.yaml", "jumps", "notes.txt"]
+    folder.checkpoint.touch()
 
 
 @pytest.mark.parametrize(
-    ("prepare", "words"),
+    ("prepare", "words", "stays"),
     [
-        (lambda root, text: (root / "thesis.tex").write_text("x"), "no run of fretscale"),
-        (lambda root, text: (root / "case.yaml").write_text(text + "# other\n"), "another case"),
-        (
-            lambda root, text: [
-                (root / "case.yaml").write_text(text),
-                (root / "checkpoint.h5").touch(),
-            ],
-            "fretscale resume",
-        ),
+        (foreign, "no run of fretscale", ["thesis.tex"]),
+        (older, "older version, which left no manifest.json", ["worn.msh"]),
+        (other, "another case", []),
+        (unfinished, "fretscale resume", []),
     ],
-    ids=["foreign", "another case", "unfinished"],
 )
-def test_what_is_refused_and_what_force_takes(case, folder, prepare, words):
-    folder.root.mkdir()
-    prepare(folder.root, dump_case(case))
+def test_what_is_refused_and_what_force_takes(case, folder, prepare, words, stays):
+    prepare(folder, case)
     before = files(folder)
     with pytest.raises(UserError, match=words) as refusal:
         folder.claim(case, force=False, resumable=True)
     assert "\n" not in str(refusal.value)
     assert files(folder) == before
-    folder.claim(case, force=True, resumable=True)
-    assert {"case.yaml", "jumps"} <= set(files(folder))
-    assert not folder.checkpoint.exists()
+    assert folder.claim(case, force=True, resumable=True) == stays
+    assert files(folder) == sorted(["case.yaml", "jumps", "manifest.json", *stays])
+
+
+def test_a_case_alone_is_no_run_yet(case, folder):
+    folder.root.mkdir()
+    folder.case.write_text(dump_case(case))
+    assert folder.claim(case, force=False, resumable=False) == []
 
 
 def test_finished_run_of_the_same_case_may_be_repeated(case, folder):
     folder.claim(case, force=False, resumable=True)
     folder.checkpoint.touch()
-    folder.summary.touch()
+    make(folder, "summary.json")
     folder.claim(case, force=False, resumable=True)
     assert not folder.summary.exists()
+
+
+@pytest.mark.parametrize("finished", [False, True])
+def test_a_run_of_its_own_stays_until_the_case_is_finished(case, folder, finished):
+    """Such as the wear of a joint, which takes longest."""
+    folder.claim(case, force=False, resumable=False)
+    nested = OutputFolder(folder.reserve("wear", "a test"))
+    nested.claim(case, force=False, resumable=True)
+    if finished:
+        make(folder, "summary.json")
+    folder.claim(case, force=False, resumable=False)
+    assert nested.case.exists() is not finished
+    assert ("wear" in folder.manifest) is not finished
+
+
+def test_the_manifest_of_a_run_has_all_it_wrote(whole):
+    folder = OutputFolder(whole.folder)
+    assert folder.manifest.keys() | {"manifest.json"} == {own.name for own in folder.root.iterdir()}
+
+
+def test_a_run_beside_what_is_not_its_own_says_so(start, tmp_path):
+    (tmp_path / "worn.msh").write_text("mine")
+    run = start(tmp_path, "wear.cycles=1e4", "contact.grid=[16, 24]", force=True)
+    assert run.ending.exit_code == 0
+    assert "worn.msh: in the folder before this run" in run.summary["warnings"][0]
+    assert (tmp_path / "worn.msh.aside").read_text() == "mine"
 
 
 @pytest.mark.parametrize("place", ["file", "file/below"])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator
 from math import isfinite
 from pathlib import Path
@@ -15,7 +14,7 @@ from rich.table import Column, Table
 from workflow.chart.frontier import Combination, cheapest
 from workflow.chart.ladder import Judged, Ladder
 from workflow.chart.run import Chart
-from workflow.shell.store import replacing
+from workflow.shell.store import write_json
 from workflow.shell.tables import write_table
 from workflow.shell.versions import versions
 
@@ -32,8 +31,7 @@ def write_chart(chart: Chart, out: Path) -> None:
 
     _write_table(chart, out / "chart.csv")
     write_chart_figures(chart, out / "figures")
-    with replacing(out / "summary.json") as partial:
-        partial.write_text(json.dumps(_summary(chart), indent=2) + "\n", encoding="utf-8")
+    write_json(out / "summary.json", _summary(chart))
 
 
 # --- what to choose -----------------------------------------------------------------------------

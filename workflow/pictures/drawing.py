@@ -46,10 +46,12 @@ def write_pictures(
     results = folder.results
     jobs: list[tuple[Callable[..., Any], tuple[Any, ...]]] = []
     if output.paraview and paraview_of is not None:
-        jobs.append((write_paraview, (paraview_of, results, folder.paraview)))
+        files = folder.reserve("paraview", "files for ParaView")
+        jobs.append((write_paraview, (paraview_of, results, files)))
     if output.figures:
         parts = max(processes, 1)
-        shares = [(figures_of, results, folder.figures, part, parts) for part in range(parts)]
+        figures = folder.reserve("figures", "figures of the results")
+        shares = [(figures_of, results, figures, part, parts) for part in range(parts)]
         jobs += [(write_figures, share) for share in shares]
     if processes:
         side_by_side(jobs)

@@ -73,14 +73,14 @@ def main() -> None:
         error = str(ending)
     except Exception as ending:
         error = f"{type(ending).__name__}: {ending}"
-        _log(OutputFolder(Path(given["out"]) / job.name).log, traceback.format_exc())
+        _log(OutputFolder(Path(given["out"]) / job.name), traceback.format_exc())
     answer.write(json.dumps({"error": error}))
     answer.close()
 
 
-def _log(path: Path, text: str) -> None:
+def _log(folder: OutputFolder, text: str) -> None:
     """Keep what one line cannot say where the run has told of itself."""
-    with suppress(OSError), path.open("a", encoding="utf-8") as log:
+    with suppress(OSError), folder.reserve_log().open("a", encoding="utf-8") as log:
         log.write(text)
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, Literal
@@ -14,7 +14,7 @@ from workflow.case.writing import dump_case
 from workflow.errors import CaseError, UserError
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.shell.analysis import Run
-from workflow.shell.folder import OutputFolder
+from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
 from workflow.shell.reporter import Reporter
 
 if sys.platform != "win32":
@@ -32,9 +32,9 @@ def run_case(case: Case, out: Path, force: bool) -> None:
     case, choice = analysis.choose(case)
     analysis.memory(case).check()
     folder = OutputFolder(out)
-    folder.claim(case, force, resumable=analysis.resumable is not None)
+    stays = folder.claim(case, force, resumable=analysis.resumable is not None)
     folder.keep_choice(choice)
-    _run(case, folder, resume=False)
+    _run(case, folder, resume=False, stays=stays)
 
 
 def resume_run(out: Path) -> bool:
@@ -51,9 +51,14 @@ def resume_run(out: Path) -> bool:
             f"{out}: a case of this kind takes up no run half done; start it again with "
             f"`fretscale run {folder.case} --out {out}`"
         )
+    if folder.manifest is None:
+        raise UserError(
+            f"{out}: a run of an older version, which left no {MANIFEST} of its files; start it "
+            f"again with `fretscale run {folder.case} --out DIR`"
+        )
     analysis.memory(case).check()
     folder.clear_partial()
-    folder.jumps.mkdir(exist_ok=True)
+    folder.reserve_state()
     _run(case, folder, resume=True)
     return True
 
@@ -88,16 +93,21 @@ def kept_in(root: Path, case: Case) -> Kept:
         return "other"
     if finished:
         return "finished"
-    resumable = analysis_of(case).resumable is not None and folder.checkpoint.exists()
-    return "unfinished" if resumable else "nothing"
+    listed = folder.manifest is not None and folder.checkpoint.exists()
+    return "unfinished" if listed and analysis_of(case).resumable is not None else "nothing"
 
 
-def _run(case: Case, folder: OutputFolder, resume: bool) -> None:
+def _run(case: Case, folder: OutputFolder, resume: bool, stays: Sequence[str] = ()) -> None:
     def compute(file: Path, root: Path) -> bool:
         return bring_to_end(load_case(file), root)
 
-    reporter = Reporter(folder.log, append=resume)
+    reporter = Reporter(folder.reserve_log(), append=resume)
     try:
+        if stays:
+            reporter.warn(
+                f"{', '.join(stays)}: in the folder before this run, and not of it; what has a "
+                f"name that the run needs gets {ASIDE} at its end"
+            )
         run = Run(kind_of(case), case, folder, reporter, resume, folder.choice, compute)
         analysis_of(case).run(run)
     finally:
@@ -123,7 +133,7 @@ def _refuse_foreign(root: Path) -> None:
     """Leave alone what no run of ours has made."""
     if not root.exists():
         return
-    ours = any((root / name).exists() for name in (LOCK, OutputFolder(root).case.name))
+    ours = any((root / name).exists() for name in (LOCK, MANIFEST, OutputFolder(root).case.name))
     if not root.is_dir() or (any(root.iterdir()) and not ours):
         raise UserError(f"{root}: not empty and no run of fretscale; give another folder")
 

@@ -1,4 +1,8 @@
-"""A run's output folder: whose it is, and what may be overwritten."""
+"""A run's output folder: whose it is, what the run wrote there, and what may be overwritten.
+
+A run asks the folder by name for every entry that it makes, and says what it is. Its manifest has
+them all before they are made: a later run removes what that names, and nothing else.
+"""
 
 from __future__ import annotations
 
@@ -11,19 +15,15 @@ from typing import Any
 from workflow.case.sections import Case
 from workflow.case.writing import dump_case
 from workflow.errors import UserError
-from workflow.shell.store import PARTIAL, replacing
+from workflow.shell.store import PARTIAL, write_json, write_text
 
-FILES = ("case.yaml", "summary.json", "results.h5", "worn.msh", "checkpoint.h5", "run.log")
-# Worn surfaces at the nodes of another code, and tangential loops, by interface; curves of cases in
-# time, by state, and of vibration cases, by force.
-TABLES = (
-    *("worn_nodes_*.csv", "loops_*.csv", "evolution.csv", "loop_*.csv"),
-    *("frequency_response_*.csv", "ring_down_*.csv", "frf_*.csv", "backbone.csv"),
-    "force_sweep_*.csv",
-)
+MANIFEST = "manifest.json"
+# What every run makes. Without a manifest no more than these can be told to be of a run.
+CERTAIN = ("case.yaml", "summary.json", "results.h5", "checkpoint.h5", "run.log")
+# Ending of what was there before under a name that a run asks for.
+ASIDE = ".aside"
 # Record of the settings that were chosen for a case, so that a resumed run knows it.
 CHOICE = "fidelity.json"
-FOLDERS = ("jumps", "reduced", "paraview", "figures", "wear")
 
 
 class OutputFolder:
@@ -37,71 +37,59 @@ class OutputFolder:
         self.checkpoint = root / "checkpoint.h5"
         self.log = root / "run.log"
         self.jumps = root / "jumps"
-        self.reduced = root / "reduced"
-        self.paraview = root / "paraview"
-        self.figures = root / "figures"
-        self.wear = root / "wear"  # a run of its own
 
     def jump(self, number: int) -> Path:
         """File of one jump's fields."""
         return self.jumps / f"{number:05d}.h5"
 
-    def claim(self, case: Case, force: bool, resumable: bool) -> None:
-        """Make the folder this run's own, removing what an earlier run left.
+    # --- what the run writes --------------------------------------------------------------------
 
-        Of an unfinished run of this case the wear that it had computed first stays. A run that is
-        ``resumable`` keeps in ``jumps`` what it needs until it is finished.
-        Raises :class:`UserError` if it holds anything of another case, or an unfinished run, and
-        ``force`` is not given.
+    @property
+    def manifest(self) -> dict[str, str] | None:
+        """What the run wrote, or was about to write, by name; None where nothing tells."""
+        try:
+            listed = json.loads((self.root / MANIFEST).read_text(encoding="utf-8"))
+        except (OSError, ValueError):
+            return None
+        if not isinstance(listed, dict):
+            return None
+        return {name: str(what) for name, what in listed.items() if _is_entry(name)}
+
+    def reserve(self, name: str, what: str) -> Path:
+        """The path of a file or folder that the run is to make here; ``what`` says what it is.
+
+        Something there that is not of the run is set aside under a name of its own.
         """
-        if self.root.exists() and not self.root.is_dir():
-            raise UserError(f"{self.root}: is a file; give a folder to --out")
-        if self.root.is_dir() and any(self.root.iterdir()) and not force:
-            self._refuse_foreign(case)
-        self.root.mkdir(parents=True, exist_ok=True)
-        broken_off = self._holds(case) and not self.summary.exists()
-        for name in FILES:
-            (self.root / name).unlink(missing_ok=True)
-        for pattern in TABLES:
-            for path in self.root.glob(pattern):
-                path.unlink()
-        for name in FOLDERS:
-            if not (broken_off and name == self.wear.name):
-                shutil.rmtree(self.root / name, ignore_errors=True)
-        self.clear_partial()
-        if resumable:
-            self.jumps.mkdir()
-        with replacing(self.case) as partial:
-            partial.write_text(dump_case(case), encoding="utf-8")
+        path, listed = self.root / name, self.manifest or {}
+        if name not in listed:
+            if path.exists():
+                path.rename(_free(path.with_name(name + ASIDE)))
+            write_json(self.root / MANIFEST, listed | {name: what})
+        return path
 
-    def clear_partial(self) -> None:
-        """Remove what a run that was killed had begun to write."""
-        for path in [*self.root.glob(f".*{PARTIAL}*"), *self.root.glob(f"*/.*{PARTIAL}*")]:
-            path.unlink()
+    def discard(self, name: str) -> None:
+        """Remove what the run has no more use for."""
+        _remove(self.root / name)
+        listed = self.manifest or {}
+        write_json(self.root / MANIFEST, {own: listed[own] for own in listed if own != name})
+
+    def reserve_state(self) -> None:
+        """Make room for what a run needs to go on where it was cut off."""
+        self.reserve("checkpoint.h5", "state after the last jump, for the run to go on from")
+        self.reserve("jumps", "fields after each jump, until the run ends").mkdir(exist_ok=True)
+
+    def reserve_log(self) -> Path:
+        """The path of what the run says."""
+        return self.reserve("run.log", "what the run said, and when")
 
     def write_summary(self, summary: Mapping[str, Any]) -> None:
         """Write the summary, which marks the run as finished."""
-        with replacing(self.summary) as partial:
-            partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+        write_json(self.reserve("summary.json", "numbers of the run"), summary)
 
-    def _refuse_foreign(self, case: Case) -> None:
-        if not self.case.exists():
-            raise UserError(
-                f"{self.root}: not empty and no run of fretscale; give another folder, or --force"
-            )
-        if not self._holds(case):
-            raise UserError(
-                f"{self.root}: holds the results of another case; give another folder, or --force"
-            )
-        if not self.summary.exists() and self.checkpoint.exists():
-            raise UserError(
-                f"{self.root}: holds an unfinished run of this case; continue it with "
-                f"`fretscale resume {self.root}`, or start again with --force"
-            )
-
-    def _holds(self, case: Case) -> bool:
-        """Whether the folder was claimed for this case."""
-        return self.case.exists() and self.case.read_text(encoding="utf-8") == dump_case(case)
+    def read_summary(self) -> dict[str, Any]:
+        """The summary of a finished run."""
+        summary: dict[str, Any] = json.loads(self.summary.read_text(encoding="utf-8"))
+        return summary
 
     def keep_choice(self, record: Mapping[str, Any] | None) -> None:
         """Keep what was chosen for the case with the run until it is finished."""
@@ -117,7 +105,92 @@ class OutputFolder:
             record = json.loads(path.read_text(encoding="utf-8"))
         return record
 
-    def read_summary(self) -> dict[str, Any]:
-        """The summary of a finished run."""
-        summary: dict[str, Any] = json.loads(self.summary.read_text(encoding="utf-8"))
-        return summary
+    # --- whose it is ----------------------------------------------------------------------------
+
+    def claim(self, case: Case, force: bool, resumable: bool) -> list[str]:
+        """Make the folder this run's own, removing what an earlier run left.
+
+        Of an unfinished run of this case the runs of their own that it had made first stay. A run
+        that is ``resumable`` keeps in ``jumps`` what it needs until it is finished. Returns the
+        names of what stays where nothing tells whose it is.
+        Raises :class:`UserError` if it holds anything of another case, an unfinished run, or what
+        nothing tells whose it is, and ``force`` is not given.
+        """
+        if self.root.exists() and not self.root.is_dir():
+            raise UserError(f"{self.root}: is a file; give a folder to --out")
+        if not force:
+            self._refuse_foreign(case)
+        self.root.mkdir(parents=True, exist_ok=True)
+        listed = self.manifest
+        self._clear(dict.fromkeys(CERTAIN, "") if listed is None else listed, case)
+        stays = [name for name in self._entries() if not name.startswith(".")]
+        path = self.reserve("case.yaml", "the case as run, every default written out")
+        write_text(path, dump_case(case))
+        if resumable:
+            self.reserve_state()
+        return stays if listed is None else []
+
+    def clear_partial(self) -> None:
+        """Remove what a run that was killed had begun to write."""
+        for path in [*self.root.glob(f".*{PARTIAL}*"), *self.root.glob(f"*/.*{PARTIAL}*")]:
+            path.unlink()
+
+    def _clear(self, listed: Mapping[str, str], case: Case) -> None:
+        """Remove what an earlier run wrote, and list what of it stays."""
+        broken_off = self._holds(case) and not self.summary.exists()
+        kept = {
+            name: what
+            for name, what in listed.items()
+            if broken_off and (self.root / name / MANIFEST).exists()
+        }
+        for name in listed.keys() - kept.keys():
+            _remove(self.root / name)
+        self.clear_partial()
+        write_json(self.root / MANIFEST, kept)
+
+    def _refuse_foreign(self, case: Case) -> None:
+        if self.manifest is None and set(self._entries()) - {self.case.name}:
+            what = "not empty and no run of fretscale"
+            if self.case.exists():
+                what = f"holds a run of an older version, which left no {MANIFEST} of its files"
+            raise UserError(f"{self.root}: {what}; give another folder, or --force")
+        if self.case.exists() and not self._holds(case):
+            raise UserError(
+                f"{self.root}: holds the results of another case; give another folder, or --force"
+            )
+        if not self.summary.exists() and self.checkpoint.exists():
+            raise UserError(
+                f"{self.root}: holds an unfinished run of this case; continue it with "
+                f"`fretscale resume {self.root}`, or start again with --force"
+            )
+
+    def _entries(self) -> list[str]:
+        """Names of what is there, but for the manifest."""
+        if not self.root.exists():
+            return []
+        return sorted(path.name for path in self.root.iterdir() if path.name != MANIFEST)
+
+    def _holds(self, case: Case) -> bool:
+        """Whether the folder was claimed for this case."""
+        return self.case.exists() and self.case.read_text(encoding="utf-8") == dump_case(case)
+
+
+def _is_entry(name: str) -> bool:
+    """Whether it names something in a folder, and no more than a run makes there."""
+    return bool(name) and not name.startswith(".") and Path(name).name == name
+
+
+def _free(path: Path) -> Path:
+    """The path, or the first with a number at its end that nothing has."""
+    number, free = 1, path
+    while free.exists():
+        number += 1
+        free = path.with_name(f"{path.name}{number}")
+    return free
+
+
+def _remove(path: Path) -> None:
+    if path.is_dir() and not path.is_symlink():
+        shutil.rmtree(path, ignore_errors=True)
+    else:
+        path.unlink(missing_ok=True)

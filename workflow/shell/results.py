@@ -59,7 +59,8 @@ def run_results(
     run: Run[Any], case: Case, attributes: Mapping[str, Any], line: bool = False
 ) -> Iterator[ResultsWriter]:
     """Write ``results.h5`` of a run: what it is of, the ``case`` as run, and what is put there."""
-    with writing(run.folder.results, line) as writer:
+    path = run.folder.reserve("results.h5", "fields and curves, with units and descriptions")
+    with writing(path, line) as writer:
         writer.put("/", {}, kind=run.kind, title=case.title, **attributes)
         writer.put("case", {}, text=dump_case(case), **versions())
         yield writer

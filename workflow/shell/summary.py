@@ -1,9 +1,37 @@
-"""Numbers of ``summary.json``."""
+"""``summary.json``: what every run says of itself around what its analysis has found."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
+
+from workflow.shell.analysis import Run
+from workflow.shell.versions import versions
+
+
+def finish(run: Run[Any], found: Mapping[str, Any], lines: Iterable[str]) -> None:
+    """Write the summary of a run, which marks it as finished, and say how it ended.
+
+    ``found`` is what the analysis tells, ``lines`` the same in short.
+    """
+    reporter = run.reporter
+    seconds = {name: round(value, 2) for name, value in reporter.seconds.items()}
+    run.folder.write_summary(
+        {
+            "title": run.case.title,
+            "assumed": list(run.case.assumed),
+            **found,
+            **({"fidelity": run.choice} if run.choice else {}),
+            "warnings": reporter.warnings,
+            "seconds": seconds,
+            "versions": versions(),
+        }
+    )
+    for line in lines:
+        reporter.say(line)
+    reporter.say(
+        f"  seconds: {', '.join(f'{name} {value:.1f}' for name, value in seconds.items())}"
+    )
 
 
 def number_at(summary: Mapping[str, Any], path: str) -> float | None:

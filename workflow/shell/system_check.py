@@ -1,14 +1,21 @@
-"""Are the system libraries there that the mesher needs? ``python -m workflow.shell.system_check``
+"""What must be there before anything is installed: Python's venv and the mesher's libraries.
 
-The gmsh wheel brings its library but not the X11 and OpenGL libraries that it is linked with.
-Without them ``import gmsh`` fails with the name of the first one missing; here all of them are
-found at once, with the Debian packages that have them. Uses the standard library only.
+The gmsh wheel brings its library but not the X11 and OpenGL libraries that it is linked with, and
+a bare Debian has no ``ensurepip``. All that is missing is found at once here, with the Debian
+packages that have it. Standard library only; run by path, for this package may need more:
+
+    python3 -I workflow/shell/system_check.py            # installs what is missing, or says how
+    python -I workflow/shell/system_check.py --imports   # later: can what was installed be used?
 """
 
 from __future__ import annotations
 
 import ctypes
 import importlib
+import importlib.util
+import os
+import shutil
+import subprocess
 import sys
 
 DEBIAN_PACKAGES = {
@@ -24,6 +31,11 @@ DEBIAN_PACKAGES = {
     "libX11.so.6": "libx11-6",
     "libgomp.so.1": "libgomp1",
 }
+# If nothing is there yet; measured on Debian 12.
+MOST = "at most 70 MB to download, 230 MB on disk, a minute"
+UPDATE = "apt-get update"
+INSTALL = "apt-get install -y --no-install-recommends"
+FAILED = 3
 
 
 def missing_packages() -> list[str]:
@@ -38,9 +50,19 @@ def remedy(error: Exception) -> str | None:
     if "cannot open shared object file" not in str(error):
         return None
     packages = missing_packages()
-    if packages:
-        return f"system libraries are missing; install with: apt-get install {' '.join(packages)}"
-    return f"a system library is missing: {' '.join(str(error).split())}"
+    return _advice(packages) if packages else f"a system library is missing: {_line(error)}"
+
+
+def _advice(packages: list[str]) -> str:
+    if shutil.which("apt-get") is None:
+        return f"system packages are missing, by Debian's names: {' '.join(packages)}"
+    sudo = "" if os.geteuid() == 0 else "sudo "
+    commands = f"{sudo}{UPDATE} && {sudo}{INSTALL} {' '.join(packages)}"
+    return f"system packages are missing; install with: {commands}"
+
+
+def _line(error: Exception) -> str:
+    return " ".join(str(error).split())
 
 
 def _loads(name: str) -> bool:
@@ -51,18 +73,59 @@ def _loads(name: str) -> bool:
     return True
 
 
-def main(arguments: list[str]) -> int:
-    """With ``--packages`` print the missing packages only, else check that gmsh can be used."""
-    if "--packages" in arguments:
-        print(" ".join(missing_packages()))
-        return 0
+def _prepared() -> str | None:
+    """Install what is missing if that needs no password; what is still in the way, or None."""
+    packages = _wanted()
+    if packages and _may_install():
+        print(f"fretscale: installing {' '.join(packages)}: {MOST}", flush=True)
+        _install(packages)
+        importlib.invalidate_caches()
+        packages = _wanted()
+    return _advice(packages) if packages else None
+
+
+def _wanted() -> list[str]:
+    """Debian packages of all that is missing, the virtual environment's among them."""
+    version = "{}.{}".format(*sys.version_info)
+    there = all(map(importlib.util.find_spec, ("ensurepip", "venv")))
+    return missing_packages() + ([] if there else [f"python{version}-venv"])
+
+
+def _may_install() -> bool:
+    if shutil.which("apt-get") is None:
+        return False
+    if os.geteuid() == 0:
+        return True
+    if shutil.which("sudo") is None:
+        return False
+    asked = subprocess.run(["sudo", "-n", "true"], stderr=subprocess.DEVNULL, check=False)
+    return asked.returncode == 0
+
+
+def _install(packages: list[str]) -> None:
+    root = ["env", "DEBIAN_FRONTEND=noninteractive"]
+    if os.geteuid() != 0:
+        root = ["sudo", "-n", *root]
+    for command in (UPDATE.split(), [*INSTALL.split(), *packages]):
+        subprocess.run([*root, *command, "-qq"], stdout=subprocess.DEVNULL, check=False)
+
+
+def _imported() -> str | None:
+    """Why the mesher cannot be used, or None."""
     try:
         # By name: a static import would break the rule that only fe_models knows gmsh.
         importlib.import_module("gmsh")
     except (ImportError, OSError) as error:
-        print(f"fretscale: {remedy(error) or error}", file=sys.stderr)
-        return 3
-    return 0
+        return remedy(error) or _line(error)
+    return None
+
+
+def main(arguments: list[str]) -> int:
+    """With ``--imports`` check what was installed, else what must be there before."""
+    wrong = _imported() if "--imports" in arguments else _prepared()
+    if wrong:
+        print(f"fretscale: {wrong}", file=sys.stderr)
+    return FAILED if wrong else 0
 
 
 if __name__ == "__main__":

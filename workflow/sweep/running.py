@@ -5,7 +5,6 @@ All is taken up where an earlier call was interrupted: the runs are found again 
 
 from __future__ import annotations
 
-import json
 import os
 import re
 import time
@@ -18,7 +17,7 @@ from workflow.runs.job import Finished, Job
 from workflow.runs.jobs import run_jobs
 from workflow.runs.run import kept_in
 from workflow.shell.reporter import Reporter
-from workflow.shell.store import replacing
+from workflow.shell.store import write_json, write_text
 from workflow.shell.versions import versions
 from workflow.sweep.design import Run, runs_of
 from workflow.sweep.schema import Sweep, load_sweep
@@ -44,8 +43,7 @@ def run_sweep(
     _check_folder(out)
     finished = _check_runs(sweep, runs, out / RUNS, force)
     (out / RUNS).mkdir(parents=True, exist_ok=True)
-    with replacing(out / FILE) as partial:
-        partial.write_text(path.read_text(encoding="utf-8"), encoding="utf-8")
+    write_text(out / FILE, path.read_text(encoding="utf-8"))
     reporter = Reporter(out / LOG, append=True)
     try:
         reporter.say(f"sweep: {len(runs)} runs of {sweep.file.case}, {finished} finished before")
@@ -155,8 +153,7 @@ def _write_summary(sweep: Sweep, rows: list[Row], out: Path) -> None:
         "seconds": round(sum(row.seconds or 0.0 for row in rows), 2),
         "versions": versions(),
     }
-    with replacing(out / SUMMARY) as partial:
-        partial.write_text(json.dumps(summary, indent=2) + "\n", encoding="utf-8")
+    write_json(out / SUMMARY, summary)
 
 
 def _title(sweep: Sweep, rows: Sequence[Row]) -> str:

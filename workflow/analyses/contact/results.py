@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -25,9 +26,8 @@ from workflow.analyses.contact.summary import loop_summary, slides, state_summar
 from workflow.pictures.drawing import write_pictures
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset
-from workflow.shell.reporter import Reporter
 from workflow.shell.results import run_results
-from workflow.shell.versions import versions
+from workflow.shell.summary import finish
 
 if TYPE_CHECKING:
     from sa_solver.contact import ContactState
@@ -54,9 +54,8 @@ def write_contact_output(outcome: ContactOutcome, run: ContactRun) -> None:
         write_contact_results(outcome, run)
     with reporter.stage("paraview and figures"):
         write_pictures(outcome.case.output, run.folder, figures_of, write_contact)
-    summary = _summary(outcome, reporter)
-    run.folder.write_summary(summary)
-    _say(summary, outcome.grid, reporter)
+    summary = _summary(outcome)
+    finish(run, summary, _lines(summary, outcome.grid))
 
 
 def write_contact_results(outcome: ContactOutcome, run: ContactRun) -> None:
@@ -116,13 +115,11 @@ def _fields(state: ContactState, friction: float) -> dict[str, Dataset]:
     }
 
 
-def _summary(outcome: ContactOutcome, reporter: Reporter) -> dict[str, Any]:
+def _summary(outcome: ContactOutcome) -> dict[str, Any]:
     case, grid, history = outcome.case, outcome.grid, outcome.history
     friction = case.friction.coefficient
     strain = bulk_strain(outcome.table, bodies_of(case))
     return {
-        "title": case.title,
-        "assumed": list(case.assumed),
         "increments": len(outcome.table),
         "history": {
             "method": history.method,
@@ -133,25 +130,21 @@ def _summary(outcome: ContactOutcome, reporter: Reporter) -> dict[str, Any]:
         "states": state_summaries(grid, friction, history),
         "loop": loop_summary(grid, friction, outcome.table, history, strain),
         "convolutions": sum(state.convolutions for state in history.states),
-        "warnings": reporter.warnings,
-        "seconds": {name: round(value, 2) for name, value in reporter.seconds.items()},
-        "versions": versions(),
     }
 
 
-def _say(summary: dict[str, Any], grid: Grid, reporter: Reporter) -> None:
+def _lines(summary: dict[str, Any], grid: Grid) -> Iterator[str]:
     """The end of the run in a few lines."""
     last, method = summary["states"][-1], summary["history"]["method"]
-    reporter.say(
+    yield (
         f"{summary['increments']} increments, {len(summary['states'])} computed ({method}), "
         f"{summary['convolutions']} convolutions"
     )
     size = "half_width" if grid.line else "radius"
-    reporter.say(
+    yield (
         f"  last: peak pressure {last['peak_pressure']:.4g} MPa, contact {size.replace('_', ' ')} "
         f"{last[f'contact_{size}']:.4g} mm, stick {last[f'stick_{size}']:.4g} mm"
     )
     if loop := summary["loop"]:
         energy = "N mm per mm" if grid.line else "N mm"
-        reporter.say(f"  cycle: {loop['energy']:.5g} {energy} dissipated")
-    reporter.say(f"  seconds: {', '.join(f'{k} {v:.1f}' for k, v in summary['seconds'].items())}")
+        yield f"  cycle: {loop['energy']:.5g} {energy} dissipated"

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -32,7 +32,7 @@ from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 from workflow.shell.results import ResultsWriter, run_results
 from workflow.shell.store import replacing
-from workflow.shell.versions import versions
+from workflow.shell.summary import finish
 
 if TYPE_CHECKING:
     from fe_models.cycle_blocks import BlockState
@@ -47,16 +47,16 @@ def write_specimens_output(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -
     """Write all files of a finished run; the summary comes last and marks it as finished."""
     folder, reporter = run.folder, run.reporter
     with reporter.stage("results"):
-        folder.reduced.mkdir(exist_ok=True)
+        reduced = folder.reserve("reduced", "reduced models of the specimens, to build rigs of")
+        reduced.mkdir(exist_ok=True)
         for number, model in enumerate(outcome.model.reduction.models, 1):
-            with replacing(folder.reduced / f"body_{number}.h5") as partial:
+            with replacing(reduced / f"body_{number}.h5") as partial:
                 save_reduced(partial, model)
         _write_results(outcome, run)
     with reporter.stage("paraview and figures"):
         write_pictures(outcome.case.output, folder, figures_of, write_specimens)
     summary = _summary(outcome, reporter)
-    folder.write_summary(summary)
-    _say(summary, reporter)
+    finish(run, summary, _lines(summary))
 
 
 # --- results ------------------------------------------------------------------------------------
@@ -196,8 +196,6 @@ def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
             )
     coefficients = case.wear.body_1.coefficient, case.wear.body_2.coefficient
     return {
-        "title": case.title,
-        "assumed": list(case.assumed),
         "structure": {"nodes": model.node_count(), "pad_nodes": len(model.face)},
         "frequencies": frequencies(outcome),
         "tied_pad": tied_pad(outcome.bulk),
@@ -205,33 +203,30 @@ def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
         "loads": loads,
         "collapse": collapse(loads),
         "reported": [reported_summary(own, loads, coefficients) for own in case.wear.reported],
-        "warnings": reporter.warnings,
-        "seconds": {name: round(value, 2) for name, value in reporter.seconds.items()},
-        "versions": versions(),
     }
 
 
-def _say(summary: dict[str, Any], reporter: Reporter) -> None:
+def _lines(summary: dict[str, Any]) -> Iterator[str]:
     """The end of the run in a few lines."""
     own = summary["frequencies"]["body_1"]
     for name in ("full", "reduced"):
         values = ", ".join(f"{value:.0f}" for value in own[name])
-        reporter.say(f"  free frequencies, {name}: {values} Hz")
+        yield f"  free frequencies, {name}: {values} Hz"
     for load in summary["loads"]:
         first, last, steady = load["unworn"], load["worn"], load["steady"]["stiffness"]
         stuck, slope = (
             f"{1e-3 * first[name]:.4g} to {1e-3 * last[name]:.4g}"
             for name in ("stick_stiffness", "secant_stiffness")
         )
-        reporter.say(
+        yield (
             f"  {load['normal_force']:g} N: stiffness {stuck} N/um, slope of the loop {slope} N/um"
         )
-        reporter.say(
+        yield (
             f"    area {first['area']:.3g} to {last['area']:.3g} mm^2, stiffness steady after "
             f"{steady['cycles']:.4g} cycles, {1e-3 * steady['energy']:.4g} J"
         )
     tied = summary["tied_pad"]["tangential"]
-    reporter.say(
+    yield (
         f"  tied pad along x: {1e-3 * tied['specimens']:.4g} N/um, half-space "
         f"{1e-3 * tied['half_space']:.4g}: a difference of "
         f"{1e6 * tied['bulk_compliance']:.3g} nm/N"
@@ -240,8 +235,7 @@ def _say(summary: dict[str, Any], reporter: Reporter) -> None:
         if reported["coefficients"] is None:
             continue
         values = " and ".join(f"{1e12 * value:.4g}" for value in reported["coefficients"])
-        reporter.say(
+        yield (
             f"  {reported['normal_force']:g} N, {reported['steady']} steady after "
             f"{reported['cycles_reported']:.4g} cycles: with {values} um^3/J"
         )
-    reporter.say(f"  seconds: {', '.join(f'{k} {v:.1f}' for k, v in summary['seconds'].items())}")

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from pathlib import Path
+from collections.abc import Iterator, Mapping
 from typing import Any
 
-from workflow.analyses.time.case import JointCase, RigCase
+from workflow.analyses.time.case import JointCase, RigCase, joules
 from workflow.analyses.time.figures import figures_of
 from workflow.analyses.time.outcome import MOTION, State, TimeOutcome
 from workflow.pictures.drawing import write_pictures
 from workflow.shell.analysis import Run
+from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
 from workflow.shell.results import run_results
-from workflow.shell.summary import number_at
+from workflow.shell.summary import finish, number_at
 from workflow.shell.tables import write_curves
-from workflow.shell.versions import versions
 
 EVOLUTION = "evolution"
 
@@ -27,12 +26,11 @@ def write_time_output(outcome: TimeOutcome, run: TimeRun) -> None:
     folder, reporter = run.folder, run.reporter
     with reporter.stage("results"):
         _write_results(outcome, run)
-        _write_tables(outcome, folder.root)
+        _write_tables(outcome, folder)
     with reporter.stage("paraview and figures"):
         write_pictures(outcome.case.output, folder, figures_of)
     summary = _summary(outcome, reporter)
-    folder.write_summary(summary)
-    _say(summary, reporter)
+    finish(run, summary, _lines(summary))
 
 
 # --- results and tables -------------------------------------------------------------------------
@@ -52,13 +50,15 @@ def _write_results(outcome: TimeOutcome, run: TimeRun) -> None:
                 writer.put(f"{place}/{group}", curves)
 
 
-def _write_tables(outcome: TimeOutcome, root: Path) -> None:
+def _write_tables(outcome: TimeOutcome, folder: OutputFolder) -> None:
     """The evolution, and the curves of every state, as CSV in base units; motions are too long."""
-    write_curves(root / f"{EVOLUTION}.csv", outcome.evolution)
+    what = "parameters of the joint over the energy it has dissipated"
+    write_curves(folder.reserve(f"{EVOLUTION}.csv", what), outcome.evolution)
     for number, state in enumerate(outcome.states):
         for group, curves in state.curves.items():
             if group != MOTION:
-                write_curves(root / f"{group}_{number:05d}.csv", curves)
+                what = f"{group.replace('_', ' ')} at {joules(state.energy)}"
+                write_curves(folder.reserve(f"{group}_{number:05d}.csv", what), curves)
 
 
 # --- summary ------------------------------------------------------------------------------------
@@ -67,8 +67,6 @@ def _write_tables(outcome: TimeOutcome, root: Path) -> None:
 def _summary(outcome: TimeOutcome, reporter: Reporter) -> dict[str, Any]:
     case = outcome.case
     found: dict[str, Any] = {
-        "title": case.title,
-        "assumed": list(case.assumed),
         "law": case.joint.law,
         **outcome.numbers,
         "states": [_state_summary(state) for state in outcome.states],
@@ -80,12 +78,7 @@ def _summary(outcome: TimeOutcome, reporter: Reporter) -> dict[str, Any]:
             reporter.warn(f"reported: no quantity {entry.quantity} in summary.json")
         told = {"quantity": entry.quantity, "reported": entry.value, "computed": computed}
         reported.append(told | {"source": entry.source})
-    return found | {
-        "reported": reported,
-        "warnings": reporter.warnings,
-        "seconds": {name: round(value, 2) for name, value in reporter.seconds.items()},
-        "versions": versions(),
-    }
+    return found | {"reported": reported}
 
 
 def _state_summary(state: State) -> dict[str, Any]:
@@ -93,16 +86,15 @@ def _state_summary(state: State) -> dict[str, Any]:
     return {"energy": state.energy, **cycles, **state.parameters, **state.numbers}
 
 
-def _say(summary: dict[str, Any], reporter: Reporter) -> None:
+def _lines(summary: dict[str, Any]) -> Iterator[str]:
     """The end of the run in a few lines."""
     for state in summary["states"]:
-        reporter.say(f"  {_state_line(state)}")
+        yield f"  {_state_line(state)}"
     for entry in summary["reported"]:
-        reporter.say(
+        yield (
             f"  {entry['quantity']}: {_shown(entry['computed'])} computed, "
             f"{_shown(entry['reported'])} reported ({entry['source']})"
         )
-    reporter.say(f"  seconds: {', '.join(f'{k} {v:.1f}' for k, v in summary['seconds'].items())}")
 
 
 def _shown(value: float | None) -> str:

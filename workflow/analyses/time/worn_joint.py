@@ -13,6 +13,7 @@ from workflow.analyses.wear.loop_table import read_loop_table
 from workflow.case.loading import load_case
 from workflow.errors import CaseError, UserError
 from workflow.shell.analysis import Run
+from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
 
 # A joint is under the load of its table when they differ by less than this share.
@@ -31,19 +32,23 @@ def with_computed_wear(run: Run[JointCase | RigCase]) -> JointCase | RigCase:
     if file is None or not file.endswith(".yaml"):
         return case
     _check(file)
-    folder = run.folder.root / WEAR
+    folder = run.folder.reserve(WEAR, "the wear of the contact, a run of its own")
     with run.reporter.stage("wear of the contact"):
         computed = run.compute(Path(file), folder)
     if not computed:
         run.reporter.say(f"wear of the contact: as an earlier run has left it in {folder}")
-    tables = sorted(folder.glob("loops_*.csv"))
+    summary = OutputFolder(folder).read_summary()
+    tables = {
+        name: folder / told["loops"]["file"]
+        for name, told in summary.items()
+        if isinstance(told, dict) and "loops" in told
+    }
     if len(tables) != 1:
-        names = ", ".join(path.stem.removeprefix("loops_") for path in tables)
         raise UserError(
-            f"evolution.file: {file} wears the contacts {names}; allowed: a case of one contact, "
-            f"or one of the tables in {folder}"
+            f"evolution.file: {file} wears the contacts {', '.join(sorted(tables))}; allowed: a "
+            f"case of one contact, or one of the tables in {folder}"
         )
-    evolution = case.evolution.model_copy(update={"file": str(tables[0])})
+    evolution = case.evolution.model_copy(update={"file": str(*tables.values())})
     return case.model_copy(update={"evolution": evolution})
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Iterator
 from typing import Any
 
 from workflow.analyses.vibration.case import VibrationCase
@@ -19,10 +19,10 @@ from workflow.analyses.vibration.outcome import (
 from workflow.analyses.vibration.paraview import write_vibration
 from workflow.pictures.drawing import write_pictures
 from workflow.shell.analysis import Run
-from workflow.shell.reporter import Reporter
+from workflow.shell.folder import OutputFolder
 from workflow.shell.results import ResultsWriter, run_results
+from workflow.shell.summary import finish
 from workflow.shell.tables import write_curves
-from workflow.shell.versions import versions
 
 RESPONSES, BACKBONE = "responses", "backbone"
 TO_MICRONS, PER_MICRON = 1e3, 1e-3  # mm to µm, N/mm to N/µm
@@ -33,18 +33,10 @@ def write_vibration_output(outcome: VibrationOutcome, run: Run[VibrationCase]) -
     folder, reporter = run.folder, run.reporter
     with reporter.stage("results"):
         _write_results(outcome, run)
-        _write_tables(outcome, folder.root)
+        _write_tables(outcome, folder)
     with reporter.stage("paraview and figures"):
         write_pictures(outcome.case.output, folder, figures_of, write_vibration)
-    summary = _summary(outcome, reporter)
-    folder.write_summary(summary)
-    for response in outcome.responses:
-        for line in _lines(response, outcome.labels[-1]):
-            reporter.say(f"  {line}")
-    if outcome.backbone is not None:
-        reporter.say(f"  {_backbone_line(outcome.backbone)}")
-    seconds = ", ".join(f"{name} {value:.1f}" for name, value in summary["seconds"].items())
-    reporter.say(f"  seconds: {seconds}")
+    finish(run, _summary(outcome), _lines(outcome))
 
 
 # --- results ------------------------------------------------------------------------------------
@@ -83,27 +75,29 @@ def put_response_curves(writer: ResultsWriter, place: str, response: Response) -
 # --- tables -------------------------------------------------------------------------------------
 
 
-def _write_tables(outcome: VibrationOutcome, root: Path) -> None:
+def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
     """Responses, loops (the finest of each force), backbone and force sweeps as CSV."""
     for number, response in enumerate(outcome.responses):
-        write_curves(root / f"frf_{number:05d}.csv", response.curves)
+        under = f"under {response.force:g} N"
+        path = folder.reserve(f"frf_{number:05d}.csv", f"response {under}, over frequency")
+        write_curves(path, response.curves)
         if response.loops:
-            write_curves(root / f"loop_{number:05d}.csv", response.loops[-1].datasets)
+            path = folder.reserve(f"loop_{number:05d}.csv", f"loop of the joints {under}")
+            write_curves(path, response.loops[-1].datasets)
     if outcome.backbone is not None:
-        write_curves(root / f"{BACKBONE}.csv", outcome.backbone.datasets)
+        path = folder.reserve(f"{BACKBONE}.csv", "phase resonance, over the force")
+        write_curves(path, outcome.backbone.datasets)
     for number, sweep in enumerate(outcome.force_sweeps):
-        write_curves(root / f"force_sweep_{number:05d}.csv", sweep.datasets)
+        what = f"response at {sweep.numbers['frequency']:g} Hz, over the force"
+        write_curves(folder.reserve(f"force_sweep_{number:05d}.csv", what), sweep.datasets)
 
 
 # --- summary ------------------------------------------------------------------------------------
 
 
-def _summary(outcome: VibrationOutcome, reporter: Reporter) -> dict[str, Any]:
-    case = outcome.case
+def _summary(outcome: VibrationOutcome) -> dict[str, Any]:
     found: dict[str, Any] = {
-        "title": case.title,
-        "assumed": list(case.assumed),
-        "law": case.joint.law,
+        "law": outcome.case.joint.law,
         **outcome.numbers,
         "responses": [_response_summary(own) for own in outcome.responses],
     }
@@ -112,11 +106,7 @@ def _summary(outcome: VibrationOutcome, reporter: Reporter) -> dict[str, Any]:
         found[BACKBONE] = {"points": points, **outcome.backbone.numbers}
     if outcome.force_sweeps:
         found[FORCE_SWEEPS] = [dict(sweep.numbers) for sweep in outcome.force_sweeps]
-    return found | {
-        "warnings": reporter.warnings,
-        "seconds": {name: round(value, 2) for name, value in reporter.seconds.items()},
-        "versions": versions(),
-    }
+    return found
 
 
 def _response_summary(response: Response) -> dict[str, Any]:
@@ -126,8 +116,18 @@ def _response_summary(response: Response) -> dict[str, Any]:
     return found
 
 
-def _lines(response: Response, label: str) -> list[str]:
-    """What a force does, in a line; and its loop, in another."""
+def _lines(outcome: VibrationOutcome) -> Iterator[str]:
+    """The end of the run in a few lines."""
+    for response in outcome.responses:
+        yield f"  {_response_line(response, outcome.labels[-1])}"
+        for loop in response.loops[-1:]:
+            yield f"    {_loop_line(loop)}"
+    if outcome.backbone is not None:
+        yield f"  {_backbone_line(outcome.backbone)}"
+
+
+def _response_line(response: Response, label: str) -> str:
+    """What a force does."""
     own = response.numbers
     parts = [
         f"{response.force:g} N: resonance {own['resonance']:.5g} Hz",
@@ -137,14 +137,13 @@ def _lines(response: Response, label: str) -> list[str]:
         f"{own['points']} points",
         f"harmonics left out {own['left_out']:.1e}",
     ]
-    text = ", ".join(parts) + (f"; {len(own['folds'])} folds" if own["folds"] else "")
-    return [text, *(_loop_line(loop) for loop in response.loops[-1:])]
+    return ", ".join(parts) + (f"; {len(own['folds'])} folds" if own["folds"] else "")
 
 
 def _loop_line(loop: Curves) -> str:
     own = loop.numbers
     lost = f"{own['energy']:.4g} mJ" if own["slip"] > 0.0 else "no slip"
-    text = f"  loop at {own['frequency']:g} Hz: {lost}"
+    text = f"loop at {own['frequency']:g} Hz: {lost}"
     if own["stiffness"] is not None:
         text += f", sticks with {PER_MICRON * own['stiffness']:.4g} N/um"
     if own["friction"] is not None:

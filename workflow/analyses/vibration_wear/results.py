@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -21,10 +20,10 @@ from workflow.analyses.vibration_wear.outcome import (
 )
 from workflow.pictures.drawing import write_pictures
 from workflow.shell.analysis import Run
-from workflow.shell.reporter import Reporter
+from workflow.shell.folder import OutputFolder
 from workflow.shell.results import run_results
+from workflow.shell.summary import finish
 from workflow.shell.tables import write_curves
-from workflow.shell.versions import versions
 
 VibrationWearRun = Run[VibrationWearCase | FrictionRigWearCase]
 
@@ -39,15 +38,10 @@ def write_vibration_wear_output(outcome: VibrationWearOutcome, run: VibrationWea
     folder, reporter = run.folder, run.reporter
     with reporter.stage("results"):
         _write_results(outcome, run)
-        _write_tables(outcome, folder.root)
+        _write_tables(outcome, folder)
     with reporter.stage("paraview and figures"):
         write_pictures(outcome.case.output, folder, figures_of)
-    summary = _summary(outcome, reporter)
-    folder.write_summary(summary)
-    for state in outcome.states:
-        reporter.say(f"  {_line(state)}")
-    seconds = ", ".join(f"{name} {value:.1f}" for name, value in summary["seconds"].items())
-    reporter.say(f"  seconds: {seconds}")
+    finish(run, _summary(outcome), (f"  {_line(state)}" for state in outcome.states))
 
 
 # --- results ------------------------------------------------------------------------------------
@@ -74,24 +68,24 @@ def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None
 # --- tables -------------------------------------------------------------------------------------
 
 
-def _write_tables(outcome: VibrationWearOutcome, root: Path) -> None:
+def _write_tables(outcome: VibrationWearOutcome, folder: OutputFolder) -> None:
     """The evolution, and the responses of every state to every force, as CSV in base units."""
-    write_curves(root / f"{EVOLUTION}.csv", outcome.evolution)
+    what = "contact and resonances, over the cycles"
+    write_curves(folder.reserve(f"{EVOLUTION}.csv", what), outcome.evolution)
     for number, state in enumerate(outcome.states):
         for force, response in enumerate(state.responses):
-            path = root / f"frf_{number:05d}_{force:05d}.csv"
+            what = f"response under {response.force:g} N after {state.cycles:g} cycles"
+            path = folder.reserve(f"frf_{number:05d}_{force:05d}.csv", f"{what}, over frequency")
             write_curves(path, response.curves)
 
 
 # --- summary ------------------------------------------------------------------------------------
 
 
-def _summary(outcome: VibrationWearOutcome, reporter: Reporter) -> dict[str, Any]:
+def _summary(outcome: VibrationWearOutcome) -> dict[str, Any]:
     states, last = outcome.states, outcome.states[-1].numbers
     energy = last["energy"]
     return {
-        "title": outcome.case.title,
-        "assumed": list(outcome.case.assumed),
         "volume_per_energy": last["volume"] / energy if energy > 0.0 else 0.0,
         "states": [_of_state(state) for state in states],
         "trend": {
@@ -100,9 +94,6 @@ def _summary(outcome: VibrationWearOutcome, reporter: Reporter) -> dict[str, Any
             if name in states[0].numbers
         }
         | {"resonance": trend([state.responses[0].numbers["resonance"] for state in states])},
-        "warnings": reporter.warnings,
-        "seconds": {name: round(value, 2) for name, value in reporter.seconds.items()},
-        "versions": versions(),
     }
 
 

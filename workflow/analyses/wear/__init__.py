@@ -26,7 +26,7 @@ def _run(run: Run[WearCase]) -> None:
 
 
 def _memory(case: WearCase) -> Memory:
-    return structure_of(case).memory(case)
+    return structure_of(case).memory(case, 0, 0)
 
 
 def _choose(case: WearCase) -> tuple[WearCase, dict[str, Any] | None]:

@@ -160,7 +160,8 @@ def write_loop_tables(folder: OutputFolder, per_length: bool) -> dict[str, dict[
         for name, group in file.get(LOOPS, {}).items():
             rows = [{c.name: float(own.attrs[c.name]) for c in COLUMNS} for own in group.values()]
             table = f"loops_{name}.csv"
-            write_loop_table(folder.root / table, rows, per_length)
+            path = folder.reserve(table, f"tangential loops of {name} as it wears")
+            write_loop_table(path, rows, per_length)
             summary[name] = {"file": table, "unworn": rows[0], "worn": rows[-1]}
     return summary
 

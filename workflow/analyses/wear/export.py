@@ -13,7 +13,6 @@ from fe_models.structure import InterfaceHistory
 from sa_solver.types import Array
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.load_source import ContactFace
-from workflow.analyses.wear.structure import condensation_memory
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import resultants, structure_of
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
@@ -25,7 +24,7 @@ from workflow.analyses.wear.warnings import warn_of_structure
 from workflow.case.writing import dump_case
 from workflow.errors import UserError
 from workflow.shell.reporter import Reporter
-from workflow.shell.store import replacing
+from workflow.shell.store import write_text
 
 # How other codes write such files.
 RECIPE = Path(resultants.__file__).with_name("RECIPE.md")
@@ -44,7 +43,7 @@ def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list
             f"{name}: structure.kind: {structure.name} has no finite elements "
             "to take loads from; allowed: a case with a structure of ours, such as dovetail"
         )
-    structure.memory(case).check()
+    structure.memory(case, 0, 0).check()
     _claim(out, force)
     reporter = Reporter(out / LOG)
     try:
@@ -75,7 +74,8 @@ def _claim(out: Path, force: bool) -> None:
 def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter) -> None:
     with reporter.stage("mesh"):
         faces = source.faces
-    condensation_memory(source.node_count(), source.interface_count()).check()
+    nodes, interface_nodes = source.node_count(), source.interface_count()
+    structure_of(case).memory(case, nodes, interface_nodes).check()
     with reporter.stage("condensation"):
         source.prepare()
     with reporter.stage("structural friction"):
@@ -85,9 +85,7 @@ def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter
     loads = {name: history.loads for name, history in histories.items()}
     write_resultants_csv(out / TABLE, loads, source.line)
     write_resultants_h5(out / FIELDS, histories, heights)
-    text = dump_case(_imported(case, faces, out))
-    with replacing(out / CASE) as partial:
-        partial.write_text(text, encoding="utf-8")
+    write_text(out / CASE, dump_case(_imported(case, faces, out)))
 
 
 def _numbered(source: StructureStage, history: InterfaceHistory) -> InterfaceHistory:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import shutil
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -48,7 +47,7 @@ from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
 from workflow.shell.results import ResultsWriter, run_results
 from workflow.shell.store import read_arrays
-from workflow.shell.versions import versions
+from workflow.shell.summary import finish
 
 # What the file of a jump has of each interface.
 JUMP_FIELDS = {"surfaces": ("body_1", "body_2"), "contact": ("pressure", "shear", "slip")}
@@ -115,24 +114,22 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
     loops = write_loop_tables(folder, outcome.source.line)
     warn_of_border(loops, outcome.case.loops, reporter)
     _warn_of_steps(outcome, reporter)
-    summary = _summary(outcome, structure, stresses, pressures, reporter)
+    summary = _summary(outcome, structure, stresses, pressures)
     _add_areas(summary, outcome, folder)
     for name, written in worn_nodes.items():
         summary[name]["worn_nodes"] = written
     for name, found in loops.items():
         summary[name]["loops"] = found
-    if chosen := folder.choice:
-        summary["fidelity"] = chosen
     uniform = uniformities(outcome.source, outcome.stages, outcome.state.interfaces)
     for name, own in uniform.items():
         summary[name]["uniformity"] = vars(own)
-    folder.write_summary(summary)
-    shutil.rmtree(folder.jumps)
-    _say(outcome, summary, reporter)
-    for name, own in uniform.items():
-        reporter.say(f"  {own.sentence(name)}")
-    for name, found in loops.items():
-        reporter.say(f"  {loops_sentence(name, found, outcome.source.line)}")
+    lines = [
+        *_lines(outcome, summary),
+        *(f"  {own.sentence(name)}" for name, own in uniform.items()),
+        *(f"  {loops_sentence(name, own, outcome.source.line)}" for name, own in loops.items()),
+    ]
+    finish(run, summary, lines)
+    folder.discard(folder.jumps.name)
 
 
 def _write_worn_nodes(
@@ -145,7 +142,7 @@ def _write_worn_nodes(
         for number, (stage, state) in enumerate(pairs)
         for face in worn_faces(outcome.source.user_faces(number), stage, state)
     ]
-    return write_worn_faces(faces, folder.root, reporter)
+    return write_worn_faces(faces, folder, reporter)
 
 
 def _write_results(
@@ -269,13 +266,10 @@ def _summary(
     structure: WornStructure | None,
     stresses: list[InterfaceStress],
     pressures: dict[str, dict[str, float]],
-    reporter: Reporter,
 ) -> dict[str, Any]:
     state = outcome.state
     stress = {own.name: {"stress": own.summary()} for own in stresses}
     return {
-        "title": outcome.case.title,
-        "assumed": list(outcome.case.assumed),
         "per_length": outcome.source.line,
         "cycles": float(state.cycles[-1]),
         "jumps": state.jump,
@@ -295,9 +289,6 @@ def _summary(
                 for number, stage in enumerate(outcome.stages)
             },
         },
-        "warnings": reporter.warnings,
-        "seconds": {name: round(value, 2) for name, value in reporter.seconds.items()},
-        "versions": versions(),
     }
 
 
@@ -383,18 +374,17 @@ def _slip_per_cycle(unworn: FaceLoads, first: FirstContact) -> float:
     return float(np.tensordot(unworn.loads.share, np.hypot(slip[:, 0], slip[:, 1]), 1).max())
 
 
-def _say(outcome: Outcome, summary: dict[str, Any], reporter: Reporter) -> None:
+def _lines(outcome: Outcome, summary: dict[str, Any]) -> Iterator[str]:
     """The end of the run in a few lines."""
-    reporter.say(f"{summary['cycles']:.6g} cycles in {summary['jumps']} jumps")
+    yield f"{summary['cycles']:.6g} cycles in {summary['jumps']} jumps"
     name_1, name_2 = outcome.case.bodies
     unit = "mm^3/mm" if outcome.source.line else "mm^3"
     for stage in outcome.stages:
         own = summary[stage.name]
         peaks = own["peak_pressure"]
-        reporter.say(
+        yield (
             f"  {stage.name}: worn {own['depth_1'] * 1e3:.3g} um ({name_1}), "
             f"{own['depth_2'] * 1e3:.3g} um ({name_2}); {own['volume_1']:.3g}, "
             f"{own['volume_2']:.3g} {unit}; peak pressure {peaks['unworn']:.0f} -> "
             f"{peaks['worn']:.0f} MPa"
         )
-    reporter.say(f"  seconds: {', '.join(f'{k} {v:.1f}' for k, v in summary['seconds'].items())}")

@@ -16,7 +16,6 @@ from workflow.analyses.wear.contact_workers import ContactProcesses, contact_wor
 from workflow.analyses.wear.fidelity.choosing import say
 from workflow.analyses.wear.recording import Recorder, RunLog
 from workflow.analyses.wear.results import Outcome, write_output
-from workflow.analyses.wear.structure import condensation_memory
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.warnings import warn_of_contact, warn_of_structure
@@ -69,7 +68,8 @@ class WearRun:
         with self._reporter.stage("mesh"):
             faces = source.faces
         if isinstance(source, StructureStage):
-            condensation_memory(source.node_count(), source.interface_count()).check()
+            nodes, interface_nodes = source.node_count(), source.interface_count()
+            structure_of(self._case).memory(self._case, nodes, interface_nodes).check()
         settings = [StageSettings(self._case, face) for face in faces]
         with contact_workers(settings) as workers:
             with self._reporter.stage("condensation"):

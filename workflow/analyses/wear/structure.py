@@ -22,16 +22,14 @@ SPECTRA = 300
 DENSE_MATRICES = 6
 
 
-def contact_memory(case: WearCase) -> Memory:
-    """Of one contact at a time, under loads that are given."""
-    return Memory(prod(case.contact.grid) * SPECTRA, "lower contact.grid")
+def memory(case: WearCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:
+    """Of one contact at a time, and of a structure condensed onto its interfaces.
 
-
-def condensation_memory(nodes: int, interface_nodes: int) -> Memory:
-    """Of a structure of so many nodes that is condensed onto those of its interfaces."""
-    remedy = "lower contact.grid, or make the mesh coarser (mesh or structure.size)"
+    The structure has so many nodes, and its interfaces so many, once they are known.
+    """
     dense = DENSE_MATRICES * (3 * interface_nodes) ** 2
-    return Memory(dense, remedy, factor_bytes(nodes))
+    contact = prod(case.contact.grid) * SPECTRA
+    return Memory(dense + contact, "lower contact.grid", factor_bytes(nodes))
 
 
 def _as_written(case: Any) -> tuple[Any, None]:
@@ -47,13 +45,14 @@ class WearStructure(Generic[AnyWearCase]):
     """What a wear run needs to know of a kind of structure.
 
     ``case`` is the kind of case that has it, ``source`` gives the loads of its contacts and
-    ``memory`` what they need. ``choose`` gives the case with the settings that it leaves open, and
-    a record of why; ``warnings`` are about the unworn contact of a stage under a peak load [N].
+    ``memory`` what a run needs, given the nodes of both bodies and of all interfaces (0: unknown).
+    ``choose`` gives the case with the settings that it leaves open, and a record of why;
+    ``warnings`` are about the unworn contact of a stage under a peak load [N].
     """
 
     name: str
     case: type[AnyWearCase]
     source: Callable[[AnyWearCase], LoadSource]
-    memory: Callable[[AnyWearCase], Memory] = contact_memory
+    memory: Callable[[AnyWearCase, int, int], Memory] = memory
     choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = _as_written
     warnings: Callable[[AnyWearCase, ContactStage, float], Iterator[str]] = _nothing_to_warn_of

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -20,6 +19,7 @@ from workflow.analyses.wear.worn_nodes import (
     worn_displacement,
     write_worn_nodes,
 )
+from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
 
 # Nodes that carry less than this share of the worn volume leave some of the wear out.
@@ -38,19 +38,21 @@ class WornFace:
 
 
 def write_worn_faces(
-    faces: Iterable[WornFace], folder: Path, reporter: Reporter
+    faces: Iterable[WornFace], folder: OutputFolder, reporter: Reporter
 ) -> dict[str, dict[str, Any]]:
     """Write the worn surfaces; what the summary says of them, by interface."""
     summary: dict[str, dict[str, Any]] = {}
     for face in faces:
-        path = folder / f"worn_nodes_{face.interface}_body_{face.body}.csv"
+        name = f"worn_nodes_{face.interface}_body_{face.body}.csv"
+        what = f"what the nodes of body {face.body} lose at {face.interface}, as displacements"
+        path = folder.reserve(name, what)
         displacement = worn_displacement(face.worn.depth, face.frame, face.body)
         write_worn_nodes(path, face.numbers, displacement)
         _warn_of_share(face.worn, f"{face.interface}, body_{face.body}", reporter)
         # JSON has no NaN: no share where nothing is worn.
         share = None if np.isnan(face.worn.volume_share) else face.worn.volume_share
         summary.setdefault(face.interface, {})[f"body_{face.body}"] = {
-            "file": path.name,
+            "file": name,
             "nodes": len(face.numbers),
             "volume_share": share,
         }

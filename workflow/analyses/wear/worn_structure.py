@@ -124,7 +124,7 @@ def worn_structure(
         )
     with reporter.stage("re-meshing"):
         mesh = worn_mesh(stage.mesh, [contact.depths_of_bodies(own) for contact, own in pairs])
-        with replacing(folder.root / "worn.msh") as partial:
+        with replacing(folder.reserve("worn.msh", "the mesh with the worn faces")) as partial:
             # gmsh goes by the ending; the name stays one that a resumed run clears away.
             path = partial.with_name(f"{partial.name}.msh")
             write_msh(path, mesh)

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from math import prod
 from typing import TYPE_CHECKING, Any
 
-from workflow.analyses.wear.structure import DENSE_MATRICES, WearStructure
+from workflow.analyses.wear.structure import DENSE_MATRICES, SPECTRA, WearStructure
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
-from workflow.shell.memory import Memory
+from workflow.shell.memory import Memory, factor_bytes
 
 if TYPE_CHECKING:
     from workflow.analyses.wear.contact_stage import ContactStage
@@ -16,8 +16,6 @@ if TYPE_CHECKING:
 
 # Fields per cell and increment: slips, depths per pressure, pressures, starts.
 FIELDS = 12
-# Spectra and iterates alive during a contact solve, per cell.
-SPECTRA = 300
 
 
 def _source(case: DovetailCase) -> LoadSource:
@@ -28,15 +26,18 @@ def _source(case: DovetailCase) -> LoadSource:
     return StructureStage(DovetailModel(case))
 
 
-def _memory(case: DovetailCase) -> Memory:
-    """Of two flanks whose nodes and increments are known beforehand, unlike those of a section."""
-    remedy = "lower mesh.flank_nodes, mesh.order or contact.grid, or raise mesh.size"
-    if case.structure.dimension == 2:
-        return Memory(prod(case.contact.grid) * SPECTRA, remedy)
-    interface_nodes = 2 * prod(case.mesh.flank_nodes)
-    increments = len(case.load_path.shares) * case.load_path.increments
-    fields = 2 * prod(case.contact.grid) * increments * FIELDS
-    return Memory(DENSE_MATRICES * (3 * interface_nodes) ** 2 + fields, remedy)
+def _memory(case: DovetailCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:
+    """In space the nodes of both flanks are known beforehand, and all increments are kept."""
+    contact = prod(case.contact.grid) * SPECTRA
+    if case.structure.dimension == 3:
+        interface_nodes = 2 * prod(case.mesh.flank_nodes)
+        increments = len(case.load_path.shares) * case.load_path.increments
+        contact = 2 * prod(case.contact.grid) * increments * FIELDS
+    return Memory(
+        DENSE_MATRICES * (3 * interface_nodes) ** 2 + contact,
+        "lower mesh.flank_nodes, mesh.order or contact.grid, or raise mesh.size",
+        factor_bytes(nodes),
+    )
 
 
 def _choose(case: DovetailCase) -> tuple[DovetailCase, dict[str, Any] | None]:

@@ -1,0 +1,80 @@
+"""What is missing of the system: named in one line, or installed where no password is needed."""
+
+import os
+import shutil
+import subprocess
+import sys
+from types import SimpleNamespace
+
+import pytest
+
+from workflow.shell import system_check
+
+APT = ["env", "DEBIAN_FRONTEND=noninteractive", "apt-get"]
+
+
+@pytest.fixture
+def bare(monkeypatch):
+    """A machine that lacks one library, until apt-get installs it; the commands it was given."""
+    commands = []
+
+    def run(command, **options):
+        commands.append(command)
+        if "install" in command:
+            monkeypatch.setattr(system_check, "DEBIAN_PACKAGES", {"libc.so.6": "libc6"})
+        return SimpleNamespace(returncode=1 if machine.password and "true" in command else 0)
+
+    machine = SimpleNamespace(user=1000, programs=["apt-get"], password=True, commands=commands)
+    lacking = {"libno.so.7": "libno7", "libc.so.6": "libc6"}
+    monkeypatch.setattr(system_check, "DEBIAN_PACKAGES", lacking)
+    monkeypatch.setattr(os, "geteuid", lambda: machine.user)
+    monkeypatch.setattr(shutil, "which", lambda name: name if name in machine.programs else None)
+    monkeypatch.setattr(subprocess, "run", run)
+    return machine
+
+
+def test_a_user_is_told_the_one_line_to_run(bare, capsys):
+    for programs in (["apt-get"], ["apt-get", "sudo"]):
+        bare.programs = programs
+        assert system_check.main([]) == system_check.FAILED
+        (line,) = capsys.readouterr().err.splitlines()
+        assert "sudo apt-get update && sudo apt-get install -y" in line
+        assert line.endswith(" libno7")
+    assert bare.commands == [["sudo", "-n", "true"]]
+
+
+def test_root_gets_what_is_missing(bare, capsys):
+    bare.user = 0
+    assert system_check.main([]) == 0
+    assert [command[:4] for command in bare.commands] == [[*APT, "update"], [*APT, "install"]]
+    assert "libno7" in bare.commands[-1]
+    assert "installing libno7" in capsys.readouterr().out
+    assert system_check.main([]) == 0
+    assert len(bare.commands) == 2
+
+
+def test_sudo_without_a_password_gets_it_too(bare):
+    bare.programs, bare.password = ["apt-get", "sudo"], False
+    assert system_check.main([]) == 0
+    assert [command[:2] for command in bare.commands] == [["sudo", "-n"]] * 3
+
+
+def test_other_systems_are_told_the_packages(bare, capsys):
+    bare.user, bare.programs = 0, []
+    assert system_check.main([]) == system_check.FAILED
+    assert capsys.readouterr().err.strip().endswith("libno7")
+    assert bare.commands == []
+
+
+def test_missing_library_of_an_import_names_its_packages(bare):
+    missing = "libGLU.so.1: cannot open shared object file: No such file or directory"
+    assert system_check.remedy(OSError(missing)).endswith(" libno7")
+    assert system_check.remedy(OSError("disk full")) is None
+
+
+def test_needs_the_standard_library_only():
+    """Run by its path, with nothing else to import."""
+    command = [sys.executable, "-I", "-S", system_check.__file__, "--imports"]
+    ended = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert ended.returncode == system_check.FAILED
+    assert ended.stderr == "fretscale: No module named 'gmsh'\n"
