@@ -134,8 +134,8 @@ def _frequent(unit: str) -> _Unit | None:
         size, dimension = FREQUENT[match["unit"]]
         power = sign * int(match["power"] or 1)
         factor *= Decimal(size) ** power
-        for root, own in dimension.items():
-            powers[root] = powers.get(root, Decimal(0)) + power * own
+        for root, exponent in dimension.items():
+            powers[root] = powers.get(root, Decimal(0)) + power * exponent
     return _Unit(factor, {root: power for root, power in powers.items() if power})
 
 
