@@ -1,4 +1,4 @@
-"""Figures of a case in time: loops, what wear makes of the joint, and how the rig answers."""
+"""Figures of a case in time: loops, what wear makes of the joint, and how the rig responds."""
 
 from __future__ import annotations
 
