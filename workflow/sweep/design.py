@@ -145,7 +145,7 @@ def _shortest(path: str, others: list[str]) -> str:
 
 
 def _names(short: list[str], rows: list[tuple[Any, ...]]) -> list[str]:
-    """The folder of each run: what varies and its values, so that it is found again by them."""
+    """The folder of each run: what varies and its values, by which it is recognised later."""
     whole = ["_".join(f"{n}={scalar(v)}" for n, v in zip(short, row, strict=True)) for row in rows]
     plain = [re.sub(r"[^\w.+=-]", "", text.replace(", ", "x")) for text in whole]
     texts = {name: {w for w, p in zip(whole, plain, strict=True) if p == name} for name in plain}

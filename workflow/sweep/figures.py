@@ -1,4 +1,4 @@
-"""Figures of a sweep: what its runs found, as bands over the cycles and against what varies."""
+"""Figures of a sweep: results of its runs, as bands over the cycles and against what varies."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def _curve(summary: dict[str, Any], name: str, quantity: str, scale: float) -> t
 
 @dataclass(frozen=True)
 class Panel:
-    """What the runs found ``(runs,)``, NaN for one that failed, with its label and title."""
+    """Results of the runs ``(runs,)``, NaN for one that failed, with its label and title."""
 
     label: str
     title: str
@@ -157,7 +157,7 @@ def _worded(quantity: str) -> str:
 
 
 def against(title: str, varied: Varied, panels: list[list[Panel]]) -> Figure:
-    """What the runs found against one entry that varies."""
+    """Results of the runs against one entry that varies."""
     figure = new_figure(f"{title}: against {varied.path}", 4.5 * len(panels))
     axes = figure.subplots(len(panels), len(panels[0]), sharex=True, sharey="row", squeeze=False)
     places, ticks = _places(varied)

@@ -36,7 +36,7 @@ PATH = "states"
 
 @dataclass(frozen=True)
 class Row:
-    """One run: what it was given, how it ended, and what it found."""
+    """One run: its values of what varies, how it ended, and its results."""
 
     run: Run
     finished: Finished
@@ -48,12 +48,12 @@ class Row:
 
     @property
     def seconds(self) -> float | None:
-        """Its own, of all its stages."""
+        """Of all stages of the run."""
         summary = self.finished.summary
         return None if summary is None else round(sum(summary["seconds"].values()), 2)
 
     def numbers(self) -> dict[str, float]:
-        """What it found, by path in its summary."""
+        """Results by path in the summary."""
         summary = self.finished.summary
         if summary is None:
             return {}
@@ -141,7 +141,7 @@ def _text(value: object) -> str:
 
 
 def columns_of(rows: Sequence[Row]) -> dict[str, Array]:
-    """All that the runs found ``(runs,)``, by path; NaN where a run has not found it."""
+    """All results of the runs ``(runs,)``, by path; NaN where a run has none."""
     by_run = [row.numbers() for row in rows]
     names = dict.fromkeys(name for numbers in by_run for name in numbers)
     return {
@@ -161,7 +161,7 @@ def unit_of(name: str, rows: Sequence[Row]) -> str:
 
 
 def write_sweep_table(rows: Sequence[Row], path: Path) -> None:
-    """Write the table as CSV: name, what varies, how the run ended, and what it found.
+    """Write the table as CSV: name, what varies, how the run ended, and its results.
 
     Numbers are in base units, with all their digits; cells of a run that failed are empty.
     """
@@ -184,14 +184,14 @@ def _heading(varied: Varied) -> str:
 
 
 def _cell(number: float) -> float | None:
-    """The number, whole if it can be; None for one that a run has not found."""
+    """The number, whole if it can be; None for one that a run does not have."""
     if np.isnan(number):
         return None
     return int(number) if number.is_integer() and abs(number) < 1e15 else number
 
 
 def spread(values: Array) -> dict[str, float] | None:
-    """How values spread over the runs; None where no run has found one."""
+    """How values spread over the runs; None where no run has one."""
     known = values[np.isfinite(values)]
     if not known.size:
         return None
