@@ -26,8 +26,8 @@ class _OneLineGroup(click.Group):
         except (FretscaleError, OSError, ImportError, MemoryError) as error:
             code = _report(error)
         except click.Abort:
-            told = "a run continues with `resume DIR`, many with the same command"
-            click.echo(f"fretscale: interrupted; {told}", err=True)
+            advice = "a run continues with `resume DIR`, many with the same command"
+            click.echo(f"fretscale: interrupted; {advice}", err=True)
             code = errors.INTERRUPTED
         except click.exceptions.NoArgsIsHelpError as error:
             error.show()
@@ -143,7 +143,7 @@ def chart(
     from workflow.chart import accuracy_of, chart_case
     from workflow.chart.report import show, write_chart
 
-    found = chart_case(
+    charted = chart_case(
         case,
         out,
         axes=axes,
@@ -152,9 +152,9 @@ def chart(
         accuracy=accuracy_of(accuracy),
         report=lambda line: click.echo(line, err=True),
     )
-    write_chart(found, out)
-    show(found)
-    return errors.DONE if found.complete else errors.MethodFailed.exit_code
+    write_chart(charted, out)
+    show(charted)
+    return errors.DONE if charted.complete else errors.MethodFailed.exit_code
 
 
 @cli.command()
@@ -229,11 +229,11 @@ def loops(
     """
     from workflow.commands.loops import loops_of_file, report, write_loops
 
-    found = loops_of_file(file, columns, normal_load)
-    for line in report(found):
+    measured = loops_of_file(file, columns, normal_load)
+    for line in report(measured):
         click.echo(line)
     if out is not None:
-        for path in write_loops(found, out, file.name, force):
+        for path in write_loops(measured, out, file.name, force):
             click.echo(path)
 
 

@@ -30,13 +30,13 @@ def kinds() -> dict[str, type[Case]]:
 
 
 def analysis_of(case: Case) -> Analysis[Any]:
-    """The analysis that a case is a case of."""
-    return next(own for own in ANALYSES if type(case) in own.cases.values())
+    """The analysis of a case."""
+    return next(analysis for analysis in ANALYSES if type(case) in analysis.cases.values())
 
 
 def kind_of(case: Case) -> str:
     """The name of a case's kind."""
-    return next(name for name, own in kinds().items() if type(case) is own)
+    return next(name for name, model in kinds().items() if type(case) is model)
 
 
 def load_case(path: str | Path, overrides: Sequence[str] = ()) -> Case:

@@ -18,6 +18,9 @@ DEGREES = np.pi / 180.0
 COMPLIANT = {"disk_height": 200.0, "blades": 16, "airfoil_mass": 0.4e-3}
 PEAK = 7
 
+# Between the steepest and the flattest flanks the rest is for `make test-full`.
+ANGLES = [35, *(pytest.param(angle, marks=pytest.mark.slow) for angle in (45, 55)), 65]
+
 
 def pull(structure, amplitudes):
     """Total force on the blade along the load axis at every increment [N]."""
@@ -53,7 +56,7 @@ def test_moment_presses_on_the_intrados(solved, mission):
 
 
 @pytest.mark.parametrize("mu", [0.0, 0.2, 0.4, 0.8])
-@pytest.mark.parametrize("angle", [35, 45, 55, 65])
+@pytest.mark.parametrize("angle", ANGLES)
 def test_flanks_carry_the_pull(structure_of, solved, symmetric, angle, mu):
     """F = 2 (P sin θ - Qx cos θ) at every increment, on both flanks alike."""
     theta = angle * DEGREES
@@ -88,7 +91,9 @@ def test_flanks_are_alike_to_the_last_digits(structure, joint, symmetric, monkey
 
 
 @pytest.mark.parametrize("mu", [0.2, 0.4, 0.6])
-@pytest.mark.parametrize("angle", [40, 50, 60])
+@pytest.mark.parametrize(
+    "angle", [*(pytest.param(angle, marks=pytest.mark.slow) for angle in (40, 60)), 50]
+)
 def test_gross_slip_up_and_reversed(structure_of, solved, symmetric, angle, mu):
     """P = F / 2 (sin θ + µ cos θ) as the load rises, with - once the flanks slide back.
 

@@ -427,6 +427,7 @@ def rubbed(cells, own):
     return solved(joined, path, preload)
 
 
+@pytest.mark.slow
 def test_meshes_that_do_not_match_agree_with_those_that_do():
     """Q and energy of a partial slip, to discretisation; P is equilibrium."""
     differences = []

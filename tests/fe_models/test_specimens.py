@@ -155,7 +155,7 @@ class TestModels:
         size = np.abs(turned).max()
         np.testing.assert_allclose(second.stiffness, turned, atol=1e-9 * size)
 
-    @pytest.mark.parametrize("order", [1, 2])
+    @pytest.mark.parametrize("order", [1, pytest.param(2, marks=pytest.mark.slow)])
     def test_reduced_frequencies(self, pair, order):
         (face,) = pair.interfaces
         full = specimen_matrices(COARSE, pair.body_1, face.nodes_1, STEEL, order)

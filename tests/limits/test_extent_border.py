@@ -197,7 +197,7 @@ def test_loads_of_any_size(kind, P):
     assert (state.border_load > 0.0) == (limit < P)
 
 
-@pytest.mark.parametrize("P", [1e-7, 1e-5])
+@pytest.mark.parametrize("P", [pytest.param(1e-7, marks=pytest.mark.slow), 1e-5])
 def test_rounding_hides_tiny_loads_on_unlike_bodies_and_it_is_said(P):
     """The splitting's state holds gaps over a cell's compliance: 2e4 MPa here, known to 4e-12.
 

@@ -76,9 +76,16 @@ LIMIT = CONSTANT.stable_cycles(waved())
 # --- order --------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("contact_at", [unchanging, evolving])
 @pytest.mark.parametrize(
-    ("stepper", "order"), [(Explicit(), 1), (Implicit(), 1), (SecondOrder(), 2)]
+    ("stepper", "order", "contact_at"),
+    [
+        (Explicit(), 1, unchanging),
+        (Explicit(), 1, evolving),
+        (Implicit(), 1, unchanging),
+        (Implicit(), 1, evolving),
+        (SecondOrder(), 2, unchanging),
+        pytest.param(SecondOrder(), 2, evolving, marks=pytest.mark.slow),
+    ],
 )
 def test_order_of_convergence(stepper, order, contact_at) -> None:
     """Depth anywhere converges at the order of the method, with slips that wear changes too."""
@@ -95,6 +102,7 @@ def test_order_of_convergence(stepper, order, contact_at) -> None:
     assert rate == pytest.approx(order, abs=0.25)
 
 
+@pytest.mark.slow
 def test_methods_agree_in_the_limit() -> None:
     cycles = 6.0 * LIMIT
     ends = []
@@ -206,6 +214,7 @@ def test_steps_add_up_to_the_cycles_asked_for(stepper) -> None:
     )
 
 
+@pytest.mark.slow
 def test_the_volume_has_an_error_of_its_own() -> None:
     """Slip that grows with wear: no pressure corrects the volume, and the estimate says so."""
     cycles, control = 6.0 * LIMIT, ErrorControl(0.01)

@@ -223,8 +223,8 @@ def test_every_different_case_runs_once_and_the_own_one_first(
     assert len({str(job.load()) for job in runs.ran}) == len(runs.ran)
     assert list(ladders) == ["grid", "method", "stepper", "dimension"]
     for ladder in ladders.values():
-        assert ladder.own is not None
-        assert ladder.own.point.folder == "own"
+        assert ladder.baseline is not None
+        assert ladder.baseline.point.folder == "own"
     for job in runs.ran:
         case = job.load()
         assert isinstance(case, DovetailCase)
@@ -306,7 +306,7 @@ def test_steppers_of_a_line_contact(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     for coarse, fine in pairwise(first):
         assert np.log2(coarse / fine) == pytest.approx(1.0, abs=0.2)
     assert errors["second order, 20 jumps"] < 0.1 * errors["implicit, 20 jumps"]
-    assert [rung.name for rung in ladder.rungs if rung.point.own] == ["implicit, 10 jumps"]
+    assert [rung.name for rung in ladder.rungs if rung.point.baseline] == ["implicit, 10 jumps"]
     assert all(rung.point.cost.solves > 0 for rung in ladder.rungs)
 
 

@@ -115,7 +115,8 @@ def two_masses(tmp_path) -> Path:
 def rig_of(folder: Path, *overrides: str, text: str = SPECIMEN):
     """The rig of a case and its joints."""
     case = parse_case(text, str(folder / "case.yaml"), overrides)
-    rig = rig_model(case, Reporter(folder / "run.log"))
+    mass = getattr(case, "mass", None)
+    rig = rig_model(case.structure, case.joint, mass, Reporter(folder / "run.log"))
     return rig, JointModel.of(case, rig.joints)
 
 
@@ -354,7 +355,7 @@ def test_files_without_a_body_are_refused(two_masses):
         rig_of(two_masses, text=AS_A_BODY)
     (two_masses / "rig.yaml").write_text(RIG, encoding="utf-8")
     of_a_case = "structure.file=rig.yaml", "structure.body=1"
-    with pytest.raises(UserError, match="reduces no body; allowed: a case of specimens"):
+    with pytest.raises(UserError, match="is no case of specimens; allowed: such a case"):
         rig_of(two_masses, *of_a_case, text=AS_A_BODY)
 
 

@@ -391,5 +391,5 @@ def test_only_a_structure_gives_loads(written, small_path, tmp_path):
     for path in (written, small_path.with_name("sphere_normal.yaml")):
         refused = command("resultants", path, "--out", tmp_path / "out")
         assert (refused.exit_code, refused.stderr.count("\n")) == (2, 1)
-        assert "has no finite elements to take loads from" in refused.stderr
+        assert "to take loads from" in refused.stderr
     assert not (tmp_path / "out").exists()

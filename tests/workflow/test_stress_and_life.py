@@ -11,7 +11,7 @@ from sa_solver.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Grid, Material
 from wear.interface import CycleTractions
 from workflow.analyses.wear.case.sections import ContactStress, Life
-from workflow.analyses.wear.contact_stress import Planes, _tell_of_stick, life_maps
+from workflow.analyses.wear.contact_stress import Planes, _report_stick, life_maps
 from workflow.analyses.wear.layout import jump_names
 from workflow.shell.results import grid_of
 
@@ -241,7 +241,7 @@ class Warnings:
 def test_stick_at_peak_load_is_warned_of() -> None:
     for share in (0.0, 0.3):
         heard: Any = Warnings()
-        _tell_of_stick(np.array([[0.5, 0.0, 0.0], [0.5, share, 0.0]]), 1, heard)
+        _report_stick(np.array([[0.5, 0.0, 0.0], [0.5, share, 0.0]]), 1, heard)
         assert [line[:33] for line in heard.said] == ["up to 30% of the peak load sticks"] * (
             share > 0.0
         )

@@ -12,10 +12,9 @@ from tests.workflow.conftest import invoke, manifest_has_all
 from workflow.analyses.time.joint import steady_loop
 from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.time.memory import memory
-from workflow.case.loading import load_case
 from workflow.chart.axes import axes_of
 from workflow.errors import CaseError, UserError
-from workflow.kinds import parse_case, template
+from workflow.kinds import load_case, parse_case, template
 from workflow.runs.verify import verify_cases
 
 CASES = Path(__file__).parents[2] / "cases"

@@ -4,14 +4,13 @@ import json
 
 import numpy as np
 import pytest
-from workflow.case.schema import json_schema
 
 from sa_solver.types import Array
 from wear.evolution import EnergyTable
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError
-from workflow.kinds import load_case, parse_case, template
+from workflow.kinds import json_schema, load_case, parse_case, template
 
 ARCHARD = "{law: archard, coefficient: 1e-4, hardness: 3.5 GPa}"
 ENERGY = "{law: energy, coefficient: 2e4 um^3/J}"

@@ -45,8 +45,8 @@ class _Explanation:
         ]
         meant = {(*path[:-1], near) for path in unknown if (near := self._nearest(path))}
         # A misspelt key is unknown and its right spelling missing; one line is enough.
-        told = [d for d in errors if d["type"] != "missing" or self._path(d) not in meant]
-        return [line for _, line in sorted({self._line_about(details) for details in told})]
+        reported = [d for d in errors if d["type"] != "missing" or self._path(d) not in meant]
+        return [line for _, line in sorted({self._line_about(details) for details in reported})]
 
     def _line_about(self, details: ErrorDetails) -> tuple[int, str]:
         """Line number, for sorting, and the line of text about one error."""

@@ -107,11 +107,11 @@ def _read_dataset(file: str, dataset: str) -> np.ndarray:
         raise InputFileError(f"{file}: which dataset? allowed: such as {Path(file).name}:gap")
     try:
         with h5py.File(file) as opened:
-            found = opened.get(dataset)
-            if not isinstance(found, h5py.Dataset):
+            item = opened.get(dataset)
+            if not isinstance(item, h5py.Dataset):
                 known = ", ".join(opened) or "none"
                 raise InputFileError(f"{file}: {dataset}: no such dataset; at the top: {known}")
-            return np.asarray(found[()])
+            return np.asarray(item[()])
     except OSError as error:
         raise _unreadable(file, error) from error
 

@@ -12,7 +12,7 @@ from workflow.case.explain import lines_about
 from workflow.case.fields import shown
 from workflow.case.sections import Case, words_of
 from workflow.case.source import KeyPath, Source, dotted, read_text
-from workflow.errors import CaseError
+from workflow.errors import CaseError, UserError
 
 AnyCase = TypeVar("AnyCase", bound=Case)
 
@@ -43,6 +43,24 @@ def parse_case(
         raise CaseError("\n".join(lines_about(source, kind, error.errors()))) from None
 
 
+class OtherKind(CaseError):
+    """A case whose analysis or structure is none of those asked for."""
+
+
+def load_named(key: str, file: str, kinds: Sequence[type[AnyCase]], what: str) -> AnyCase:
+    """The case in a ``file`` that another case names at ``key``: ``what``, one of ``kinds``.
+
+    Raises UserError.
+    """
+    try:
+        return load_case(file, kinds)
+    except OtherKind as error:
+        message = f"{key}: {file} is no case of {what}; allowed: such a case ({error})"
+        raise UserError(message) from error
+    except CaseError as error:
+        raise UserError(f"{key}: {error}") from error
+
+
 def _kind_of_case(source: Source, kinds: Sequence[type[AnyCase]]) -> type[AnyCase]:
     """The kind that the source means by its analysis and structure, whatever else is wrong."""
     for path in (("analysis",), ("structure", "kind")):
@@ -60,7 +78,7 @@ def _suiting(source: Source, kinds: Sequence[type[AnyCase]]) -> list[type[AnyCas
 
 
 def word_at(source: Source, path: KeyPath, allowed: tuple[str, ...]) -> str:
-    """The word at ``path``, one of those ``allowed``; else raises ``CaseError``."""
+    """The word at ``path``, one of those ``allowed``; else raises :class:`OtherKind`."""
     value = source.at(path)
     if isinstance(value, str) and value in allowed:
         return value
@@ -68,4 +86,4 @@ def word_at(source: Source, path: KeyPath, allowed: tuple[str, ...]) -> str:
     place = source.where(path)[1]
     key = dotted(path)
     named = "" if place.startswith(f"--set {key}=") else f"{key}: "
-    raise CaseError(f"{place}: {named}{wrong}; allowed: {', '.join(allowed)}")
+    raise OtherKind(f"{place}: {named}{wrong}; allowed: {', '.join(allowed)}")

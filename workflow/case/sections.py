@@ -57,8 +57,8 @@ class ElasticBody(Section):
 
     def elastic(self) -> ElasticMaterial:
         """The same material as the solvers take it; no yield stress is an infinite one."""
-        given = {k: v for k, v in self.model_dump().items() if v is not None}
-        return ElasticMaterial(**given)
+        properties = {k: v for k, v in self.model_dump().items() if v is not None}
+        return ElasticMaterial(**properties)
 
 
 class Friction(Section):
@@ -137,7 +137,7 @@ class Case(Section, ABC):
     def suits(cls, source: Source) -> bool:
         """Whether the source means this kind and none of the others of its analysis.
 
-        Asked where their kinds of structure do not tell them apart. May raise CaseError.
+        Decides where their kinds of structure do not distinguish them. May raise CaseError.
         """
         return True
 
@@ -196,8 +196,10 @@ def words_of(model: type[Section], *path: str) -> tuple[str, ...]:
     *sections, name = path
     models: list[type[Section]] = [model]
     for section in sections:
-        models = [m for own in models for m in sections_of(own.model_fields[section].annotation)]
-    words = [w for own in models for w in get_args(own.model_fields[name].annotation)]
+        models = [
+            m for parent in models for m in sections_of(parent.model_fields[section].annotation)
+        ]
+    words = [w for parent in models for w in get_args(parent.model_fields[name].annotation)]
     return tuple(dict.fromkeys(words))
 
 
@@ -215,4 +217,4 @@ def entry_of(field: FieldInfo) -> Entry | None:
 def quantities_of(model: type[Section]) -> dict[str, Quantity]:
     """The quantities among the fields of ``model``, by name."""
     entries = {name: entry_of(field) for name, field in model.model_fields.items()}
-    return {name: found for name, found in entries.items() if isinstance(found, Quantity)}
+    return {name: quantity for name, quantity in entries.items() if isinstance(quantity, Quantity)}

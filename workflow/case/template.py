@@ -15,7 +15,7 @@ HEADER = """\
 # wrong with a case, `fretscale run` runs it. Entries behind a # are optional.
 """
 # Optional entries the template fills in: a material that can yield, the length of a run, legs that
-# press, a face that is rounded all round, and a joint whose friction rises.
+# press, a face with all edges rounded, and a joint whose friction rises.
 FILLED_IN = ("yield_stress", "cycles", "legs", "P", "gap", "end_width", "end_radius", "friction")
 
 

@@ -1,7 +1,7 @@
 """Texts such as ``115 GPa`` to numbers in the base units mm, N, s, MPa, tonne, rad.
 
 The only place that knows other units. Conversion is in decimal arithmetic, so that ``115 GPa`` is
-exactly 115000.0. Angles count as a dimension of their own: ``45 %`` is no angle, ``100 Hz`` is no
+exactly 115000.0. Angles count as a separate dimension: ``45 %`` is no angle, ``100 Hz`` is no
 rotation speed.
 """
 
@@ -134,8 +134,8 @@ def _frequent(unit: str) -> _Unit | None:
         size, dimension = FREQUENT[match["unit"]]
         power = sign * int(match["power"] or 1)
         factor *= Decimal(size) ** power
-        for root, own in dimension.items():
-            powers[root] = powers.get(root, Decimal(0)) + power * own
+        for root, exponent in dimension.items():
+            powers[root] = powers.get(root, Decimal(0)) + power * exponent
     return _Unit(factor, {root: power for root, power in powers.items() if power})
 
 

@@ -24,7 +24,7 @@ CONTACT_GRIDS = 1 / 8, 1 / 4, 1 / 2, 1.0, 2.0, 4.0
 WEAR_GRIDS = 1 / 4, 1 / 2, 1.0, 2.0
 FEWEST_CELLS = 16  # with fewer, the contact is hardly there
 TOLERANCES = 1e-3, 1e-4, 1e-5, 1e-6
-# How far the finest rung of a tolerance is beyond the case's own.
+# How far the finest rung of a tolerance is beyond that of the case.
 FINER_TOLERANCE = 1e-2
 INCREMENTS = 1 / 4, 1 / 2, 1.0, 2.0
 INCREMENTS_2D = 1 / 2, 1.0, 2.0, 4.0, 8.0
@@ -46,7 +46,7 @@ SAMPLES = (32, 64, 128, 256, 512, 1024, 2048)
 
 @dataclass(frozen=True)
 class Rung:
-    """One setting: ``name`` is its own on its axis, ``branch`` the line that it belongs to.
+    """One setting: ``name`` identifies it on its axis, ``branch`` the line that it belongs to.
 
     ``step`` goes to zero with the error, in any unit; None where nothing converges. ``of_limit`` is
     the jump of explicit steps over their stability limit.
@@ -102,14 +102,14 @@ def axes_of(case: Path, base: Sequence[str], names: Sequence[str]) -> dict[Axis,
 
     Raises :class:`UserError` for an axis that there is not or that does not apply.
     """
-    own = Setting.of(case, base)
+    baseline = Setting.of(case, base)
     wanted = [axis for axis in AXES if not names or axis.name in names]
-    applying = _applying(wanted, own, case, base)
+    applying = _applying(wanted, baseline, case, base)
     for name in names:
         if all(axis.name != name for axis in applying):
             known = any(axis.name == name for axis in AXES)
             wrong = "does not apply to this case" if known else "no such axis"
-            offered = ", ".join(axis.name for axis in _applying(AXES, own, case, base))
+            offered = ", ".join(axis.name for axis in _applying(AXES, baseline, case, base))
             raise UserError(f"--axis {name}: {wrong}; allowed: {offered or 'none'}")
     if not applying:
         raise UserError(f"{case}: nothing of a case of this kind can be charted")
@@ -117,24 +117,24 @@ def axes_of(case: Path, base: Sequence[str], names: Sequence[str]) -> dict[Axis,
 
 
 def _applying(
-    axes: Sequence[Axis], own: Setting, case: Path, base: Sequence[str]
+    axes: Sequence[Axis], baseline: Setting, case: Path, base: Sequence[str]
 ) -> dict[Axis, list[Setting]]:
-    found = {axis: _settings(axis, own, case, base) for axis in axes}
-    return {axis: settings for axis, settings in found.items() if len(settings) > 1}
+    ladders = {axis: _settings(axis, baseline, case, base) for axis in axes}
+    return {axis: settings for axis, settings in ladders.items() if len(settings) > 1}
 
 
-def _settings(axis: Axis, own: Setting, case: Path, base: Sequence[str]) -> list[Setting]:
+def _settings(axis: Axis, baseline: Setting, case: Path, base: Sequence[str]) -> list[Setting]:
     """Rungs of the axis that the case admits, its own settings among them and each once."""
-    found: dict[str, Setting] = {}
-    for rung in axis.ladder(own.case):
+    settings: dict[str, Setting] = {}
+    for rung in axis.ladder(baseline.case):
         try:
             setting = Setting.of(case, base, rung)
         except CaseError:
             continue
-        found.setdefault(setting.text, setting)
-    if found and own.text not in found:
-        return [own, *found.values()]
-    return list(found.values())
+        settings.setdefault(setting.text, setting)
+    if settings and baseline.text not in settings:
+        return [baseline, *settings.values()]
+    return list(settings.values())
 
 
 def entry_at(case: Case, path: str) -> Any:
@@ -172,11 +172,11 @@ def _grids(case: Case) -> Iterator[Rung]:
 
 
 def _tolerances(case: Case) -> Iterator[Rung]:
-    own = entry_at(case, "contact.tolerance")
-    if own is None:
+    baseline = entry_at(case, "contact.tolerance")
+    if baseline is None:
         return
-    coarser = [tolerance for tolerance in TOLERANCES if tolerance > own]
-    for tolerance in (*coarser, own, max(FINER_TOLERANCE * own, 1e-12)):
+    coarser = [tolerance for tolerance in TOLERANCES if tolerance > baseline]
+    for tolerance in (*coarser, baseline, max(FINER_TOLERANCE * baseline, 1e-12)):
         yield Rung(f"{tolerance:.0e}", (f"contact.tolerance={tolerance!r}",), tolerance)
 
 
@@ -197,13 +197,13 @@ def _histories(case: Case) -> Iterator[Rung]:
 
 def _cycle(path: Any, factors: Sequence[float]) -> Iterator[Rung]:
     """The loads of a wear cycle in fewer and in more increments."""
-    own, peak = getattr(path, "increments", None), getattr(path, "peak_at", None)
-    if own is None:
+    increments, peak = getattr(path, "increments", None), getattr(path, "peak_at", None)
+    if increments is None:
         return
     for factor in factors:
-        legs = (own,) if isinstance(own, int) else own
+        legs = (increments,) if isinstance(increments, int) else increments
         counts = [max(1, round(factor * count)) for count in legs]
-        overrides = [f"load_path.increments={counts[0] if isinstance(own, int) else counts}"]
+        overrides = [f"load_path.increments={counts[0] if isinstance(increments, int) else counts}"]
         if peak is not None:
             overrides.append(f"load_path.peak_at={round(factor * peak)}")
         yield Rung(f"{sum(counts)} increments", tuple(overrides), 1.0 / factor)
@@ -252,14 +252,14 @@ def _steppers(case: Case) -> Iterator[Rung]:
 
 
 def _couplings(case: Case) -> Iterator[Rung]:
-    own = entry_at(case, "coupling")
-    if own is None:
+    coupling = entry_at(case, "coupling")
+    if coupling is None:
         return
-    yield Rung("constant", (f"coupling={{resultants: constant, drift: {own.drift!r}}}",))
+    yield Rung("constant", (f"coupling={{resultants: constant, drift: {coupling.drift!r}}}",))
     for drift in DRIFTS:
         text = f"coupling={{resultants: drift, drift: {drift!r}}}"
         yield Rung(f"drift of {100 * drift:g} %", (text,))
-    yield Rung("every jump", (f"coupling={{resultants: every, drift: {own.drift!r}}}",))
+    yield Rung("every jump", (f"coupling={{resultants: every, drift: {coupling.drift!r}}}",))
 
 
 # --- time ---------------------------------------------------------------------------------------
@@ -267,11 +267,11 @@ def _couplings(case: Case) -> Iterator[Rung]:
 
 def _time_steps(case: Case) -> Iterator[Rung]:
     """Longer and shorter steps; those in which the excitation is not seen are refused."""
-    own = entry_at(case, "integration.step")
-    if own is None:
+    base_step = entry_at(case, "integration.step")
+    if base_step is None:
         return
     for factor in TIME_STEPS:
-        step = factor * own
+        step = factor * base_step
         yield Rung(f"{1e6 * step:.3g} us", (f"integration.step={step!r}",), factor)
 
 
@@ -315,8 +315,8 @@ def _meshes(case: Case) -> Iterator[Rung]:
             size = entry_at(case, "mesh.size") / factor
             overrides = f"mesh.flank_nodes={counts}", f"mesh.size={size!r}"
             yield Rung(f"{counts[0]} x {counts[1]} nodes", overrides, 1.0 / factor)
-        elif (own := entry_at(case, "mesh.pad_elements")) is not None:
-            elements = 2 * max(1, round(0.5 * factor * own))
+        elif (across := entry_at(case, "mesh.pad_elements")) is not None:
+            elements = 2 * max(1, round(0.5 * factor * across))
             size = entry_at(case, "mesh.size") / factor
             overrides = f"mesh.pad_elements={elements}", f"mesh.size={size!r}"
             yield Rung(f"{elements} elements on the pad", overrides, 1.0 / factor)

@@ -38,49 +38,51 @@ def stage_seconds(log: str) -> dict[str, list[float]]:
 
     The log goes on where a run was resumed; the summary counts from there.
     """
-    found: dict[str, list[float]] = {}
+    seconds: dict[str, list[float]] = {}
     for line in log.splitlines():
         if match := STAGE.fullmatch(line):
-            found.setdefault(match["name"], []).append(float(match["seconds"]))
-    return found
+            seconds.setdefault(match["name"], []).append(float(match["seconds"]))
+    return seconds
 
 
 def costs(
     cases: Sequence[Case], folders: Sequence[Path], summaries: Sequence[Mapping[str, Any]]
 ) -> list[Cost]:
-    """Cost of each run, with what it found in the cache at the price of the run that computed it.
+    """Cost of each run, with what it took from the cache at the price of the run that computed it.
 
     That is the longest of all runs of the same structure.
     """
-    stages = [stage_seconds(OutputFolder(own).log.read_text(encoding="utf-8")) for own in folders]
+    stages = [
+        stage_seconds(OutputFolder(folder).log.read_text(encoding="utf-8")) for folder in folders
+    ]
     cold: dict[tuple[str, str], float] = {}
-    for case, own in zip(cases, stages, strict=True):
-        for stage, (key, seconds) in _found_by_others(case, own).items():
+    for case, logged in zip(cases, stages, strict=True):
+        for stage, (key, seconds) in _cacheable_stages(case, logged).items():
             cold[stage, key] = max(cold.get((stage, key), 0.0), seconds)
     return [
-        Cost(_seconds(case, own, cold), *_work(summary))
-        for case, own, summary in zip(cases, stages, summaries, strict=True)
+        Cost(_seconds(case, logged, cold), *_work(summary))
+        for case, logged, summary in zip(cases, stages, summaries, strict=True)
     ]
 
 
-def _found_by_others(
+def _cacheable_stages(
     case: Case, stages: Mapping[str, Sequence[float]]
 ) -> dict[str, tuple[str, float]]:
-    """Stages of a run that may be found in the cache: by what, and their seconds here."""
+    """Stages of a run that may be in the cache: by what, and their seconds here."""
     condensed = case.model_dump_json(exclude=NOT_STRUCTURAL | LOADED)
-    found = {name: (condensed, max(stages[name])) for name in CONDENSED if name in stages}
+    cacheable = {name: (condensed, max(stages[name])) for name in CONDENSED if name in stages}
     if FRICTION in stages:
         # The first is the unworn cycle; those after it are of worn faces and never kept.
-        found[FRICTION] = case.model_dump_json(exclude=NOT_STRUCTURAL), stages[FRICTION][0]
-    return found
+        cacheable[FRICTION] = case.model_dump_json(exclude=NOT_STRUCTURAL), stages[FRICTION][0]
+    return cacheable
 
 
 def _seconds(
     case: Case, stages: Mapping[str, Sequence[float]], cold: Mapping[tuple[str, str], float]
 ) -> float:
-    seconds = {name: sum(own) for name, own in stages.items() if name != PICTURES}
-    for stage, (key, own) in _found_by_others(case, stages).items():
-        seconds[stage] += cold[stage, key] - own
+    seconds = {name: sum(durations) for name, durations in stages.items() if name != PICTURES}
+    for stage, (key, warm) in _cacheable_stages(case, stages).items():
+        seconds[stage] += cold[stage, key] - warm
     return sum(seconds.values())
 
 

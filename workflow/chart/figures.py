@@ -44,7 +44,7 @@ def write_chart_figures(chart: Chart, folder: Path) -> list[Path]:
     written = []
     with matplotlib.rc_context(STYLE):
         ladders = [ladder for ladder in chart.ladders if ladder.rungs]
-        drawn = {own.axis.name: axis_figure(own, chart.accuracy) for own in ladders}
+        drawn = {ladder.axis.name: axis_figure(ladder, chart.accuracy) for ladder in ladders}
         if len(drawn) > 1:
             drawn["all"] = all_figure(chart)
         for name, figure in drawn.items():
@@ -64,11 +64,11 @@ def axis_figure(ladder: Ladder, accuracy: float) -> Figure:
     for axis, cost in _panels(figure, [ladder]):
         branches = list(dict.fromkeys(rung.point.rung.branch for rung in ladder.rungs))
         for number, branch in enumerate(branches):
-            own = [rung for rung in ladder.rungs if rung.point.rung.branch == branch]
+            rungs = [rung for rung in ladder.rungs if rung.point.rung.branch == branch]
             label = branch if len(branches) > 1 else ""
-            _draw_line(axis, own, cost, bottom, number, label or None)
+            _draw_line(axis, rungs, cost, bottom, number, label or None)
         _name_rungs(axis, _named(ladder.rungs, cost), cost, bottom)
-        _draw_own(axis, [rung for rung in ladder.rungs if rung.point.own], cost, bottom)
+        _draw_baseline(axis, [rung for rung in ladder.rungs if rung.point.baseline], cost, bottom)
         _draw_frontier(axis, ladder.rungs, cost, bottom)
         _draw_floor(axis, ladder)
         if len(branches) == 1 and 1 < len(ladder.references) <= MOST_QUANTITIES:
@@ -87,10 +87,10 @@ def all_figure(chart: Chart) -> Figure:
     figure = new_figure(title, HEIGHT)
     for axis, cost in _panels(figure, ladders):
         for number, ladder in enumerate(ladders):
-            own = [rung for rung in ladder.rungs if rung.point.own]
-            _draw_line(axis, own, cost, lowest, number, None)
+            baseline = [rung for rung in ladder.rungs if rung.point.baseline]
+            _draw_line(axis, baseline, cost, lowest, number, None)
             _draw_line(axis, _frontier(ladder.rungs, cost), cost, lowest, number, ladder.axis.name)
-            _draw_own(axis, own, cost, lowest)
+            _draw_baseline(axis, baseline, cost, lowest)
         axis.axhline(lowest, color=BLACK, lw=0.6, ls=":")
         _finish(axis, cost, chart.accuracy, (lowest, _top(ladders, chart.accuracy)))
     figure.axes[0].set_ylabel("largest relative error of the quantities")
@@ -113,7 +113,7 @@ def _bottom(ladders: Sequence[Ladder]) -> float:
     """Where what has no error is drawn: below every error and floor."""
     errors = [rung.error for ladder in ladders for rung in ladder.rungs]
     seen = [*errors, *(ladder.floor for ladder in ladders)]
-    return min((own for own in seen if 0.0 < own < inf), default=SMALLEST * MARGIN) / MARGIN
+    return min((error for error in seen if 0.0 < error < inf), default=SMALLEST * MARGIN) / MARGIN
 
 
 def _top(ladders: Sequence[Ladder], accuracy: float) -> float:
@@ -154,7 +154,7 @@ def _named(rungs: Sequence[Judged], cost: str) -> list[Judged]:
         return list(rungs)
     first = {rung.point.rung.branch: rung.name for rung in reversed(rungs)}
     kept = {*first.values(), *(rung.name for rung in _frontier(rungs, cost))}
-    return [rung for rung in rungs if rung.name in kept or rung.point.own]
+    return [rung for rung in rungs if rung.name in kept or rung.point.baseline]
 
 
 def _name_rungs(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> None:
@@ -162,17 +162,18 @@ def _name_rungs(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -
     together: dict[tuple[float, ...], list[Judged]] = {}
     for rung in rungs:
         place = _place(rung, cost, bottom)
-        together.setdefault(tuple(round(log10(own), PLACE) for own in place), []).append(rung)
-    for number, own in enumerate(together.values()):
-        names = [rung.name.removeprefix(f"{rung.point.rung.branch}, ") for rung in own]
+        rounded = tuple(round(log10(coordinate), PLACE) for coordinate in place)
+        together.setdefault(rounded, []).append(rung)
+    for number, group in enumerate(together.values()):
+        names = [rung.name.removeprefix(f"{rung.point.rung.branch}, ") for rung in group]
         text = names[0] if len(names) == 1 else f"{names[0]} to {names[-1]}"
         # Neighbours may be alike in cost and error: names go above and below in turn.
         shift = (8, 6) if number % 2 == 0 else (8, -14)
-        place = _place(own[0], cost, bottom)
+        place = _place(group[0], cost, bottom)
         axis.annotate(text, place, shift, textcoords="offset points", fontsize=9)
 
 
-def _draw_own(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> None:
+def _draw_baseline(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> None:
     for rung in rungs:
         place = _place(rung, cost, bottom)
         axis.plot(*place, "o", mfc="none", mec=BLACK, mew=1.6, ms=17, zorder=4)
@@ -181,8 +182,8 @@ def _draw_own(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> 
 
 def _frontier(rungs: Sequence[Judged], cost: str) -> list[Judged]:
     """The efficient rungs, the cheapest first."""
-    found = [rung for rung in rungs if getattr(rung, f"by_{cost}")]
-    return sorted(found, key=lambda rung: getattr(rung.point.cost, cost))
+    efficient = [rung for rung in rungs if getattr(rung, f"by_{cost}")]
+    return sorted(efficient, key=lambda rung: getattr(rung.point.cost, cost))
 
 
 def _draw_frontier(axis: Axes, rungs: Sequence[Judged], cost: str, bottom: float) -> None:
@@ -218,7 +219,7 @@ def _finish(axis: Axes, cost: str, accuracy: float, ends: tuple[float, float]) -
     """Scales and labels; ``ends`` are the lowest and the highest error shown."""
     from matplotlib.ticker import LogLocator
 
-    axis.axhline(accuracy, color=BLACK, lw=1.0, ls="--", label=f"asked for: {100 * accuracy:g} %")
+    axis.axhline(accuracy, color=BLACK, lw=1.0, ls="--", label=f"required: {100 * accuracy:g} %")
     axis.set_xscale("log")
     axis.set_yscale("log")
     axis.set_xlabel(COSTS[cost])

@@ -13,11 +13,11 @@ def efficient(costs: Sequence[float], errors: Sequence[float]) -> list[bool]:
     Of points alike in both the first counts.
     """
     order = sorted(range(len(costs)), key=lambda k: (costs[k], errors[k], k))
-    found, best = [False] * len(costs), inf
+    on_frontier, best = [False] * len(costs), inf
     for k in order:
         if errors[k] < best:
-            found[k], best = True, errors[k]
-    return found
+            on_frontier[k], best = True, errors[k]
+    return on_frontier
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,9 @@ def cheapest(axes: Sequence[Sequence[Option]], accuracy: float) -> Combination |
     """
     kept = [Combination()]
     for options in axes:
-        grown = [own.with_one(option) for own in kept for option in options]
+        grown = [choice.with_one(option) for choice in kept for option in options]
         # What is no frontier point so far is none of any longer combination either.
-        flags = efficient([own.ratio for own in grown], [own.error for own in grown])
-        kept = [own for own, flag in zip(grown, flags, strict=True) if flag]
-    met = [own for own in kept if isfinite(own.error) and own.error <= accuracy]
-    return min(met, key=lambda own: own.ratio, default=None)
+        flags = efficient([choice.ratio for choice in grown], [choice.error for choice in grown])
+        kept = [choice for choice, flag in zip(grown, flags, strict=True) if flag]
+    met = [choice for choice in kept if isfinite(choice.error) and choice.error <= accuracy]
+    return min(met, key=lambda choice: choice.ratio, default=None)

@@ -21,11 +21,12 @@ TIMING = 0.1
 class Point:
     """A rung that has run.
 
-    ``values`` by quantity; ``extras`` are told beside them. ``own`` marks the case's own settings.
+    ``values`` by quantity; ``extras`` are reported beside them. ``baseline`` marks the settings of
+    the case itself.
     """
 
     rung: Rung
-    own: bool
+    baseline: bool
     folder: str
     values: Mapping[str, float]
     cost: Cost
@@ -79,12 +80,12 @@ class Ladder:
     @property
     def floor(self) -> float:
         """How well the references are known, at worst."""
-        return max((own.floor for own in self.references.values()), default=nan)
+        return max((reference.floor for reference in self.references.values()), default=nan)
 
     @property
-    def own(self) -> Judged | None:
-        """The case's own settings, where they ran."""
-        return next((rung for rung in self.rungs if rung.point.own), None)
+    def baseline(self) -> Judged | None:
+        """The settings of the case itself, where they ran."""
+        return next((rung for rung in self.rungs if rung.point.baseline), None)
 
     def cheapest(self, accuracy: float) -> Judged | None:
         """The rung of fewest seconds whose error is at most ``accuracy`` for sure.
@@ -98,10 +99,10 @@ class Ladder:
 
     def options(self) -> list[Option]:
         """The rungs as choices, their costs over that of the case's own settings."""
-        own = self.own
-        if own is None:
+        baseline = self.baseline
+        if baseline is None:
             return []
-        unit = max(own.point.cost.seconds, 1e-2)  # seconds are logged to a hundredth
+        unit = max(baseline.point.cost.seconds, 1e-2)  # seconds are logged to a hundredth
         return [Option(r.name, r.point.cost.seconds / unit, r.bound) for r in self.rungs]
 
 
@@ -122,18 +123,21 @@ def judge(
     shared = [q for q in points[-1].values if all(q in point.values for point in points)]
     references = {q: _reference(axis, points, q, exact) for q in shared}
     if axis.order is None and finest not in ("", points[-1].rung.name):
-        references = {q: replace(own, floor=inf) for q, own in references.items()}
-    references = {q: own for q, own in references.items() if own.value}
+        references = {q: replace(reference, floor=inf) for q, reference in references.items()}
+    references = {q: reference for q, reference in references.items() if reference.value}
     errors = [_errors(point, references) for point in points]
     seconds = [point.cost.seconds for point in points]
     convolutions = [float(point.cost.convolutions) for point in points]
-    bounds = [max((e + references[q].floor for q, e in own.items()), default=inf) for own in errors]
+    bounds = [
+        max((e + references[q].floor for q, e in relative.items()), default=inf)
+        for relative in errors
+    ]
     flags = zip(efficient(seconds, bounds), efficient(convolutions, bounds), strict=True)
-    floor = max((own.floor for own in references.values()), default=0.0)
+    floor = max((reference.floor for reference in references.values()), default=0.0)
     judged = []
-    for point, own, bound, (quick, few) in zip(points, errors, bounds, flags, strict=True):
-        worst = max(own, key=lambda q: own[q], default="")
-        error = own.get(worst, inf)
+    for point, relative, bound, (quick, few) in zip(points, errors, bounds, flags, strict=True):
+        worst = max(relative, key=lambda q: relative[q], default="")
+        error = relative.get(worst, inf)
         worst = worst if error > 0.0 else ""
         judged.append(Judged(point, error, worst, bound, error < floor, quick, few))
     return Ladder(axis, tuple(judged), references, failed)
@@ -144,10 +148,12 @@ def _reference(
 ) -> Reference:
     last = points[-1]
     value = last.values[quantity]
-    found = _convergence(axis, points, quantity)
+    convergence = _convergence(axis, points, quantity)
     if axis.closed_form and quantity in exact:
-        return Reference(exact[quantity], True, found.order, 0.0)
-    return Reference(value, False, found.order, found.error / abs(value) if value else 0.0)
+        return Reference(exact[quantity], True, convergence.order, 0.0)
+    return Reference(
+        value, False, convergence.order, convergence.error / abs(value) if value else 0.0
+    )
 
 
 def _convergence(axis: Axis, points: Sequence[Point], quantity: str) -> Convergence:
@@ -166,6 +172,6 @@ def _convergence(axis: Axis, points: Sequence[Point], quantity: str) -> Converge
 def _errors(point: Point, references: Mapping[str, Reference]) -> dict[str, float]:
     """Relative difference of each quantity to its reference."""
     return {
-        quantity: abs(point.values[quantity] - own.value) / abs(own.value)
-        for quantity, own in references.items()
+        quantity: abs(point.values[quantity] - reference.value) / abs(reference.value)
+        for quantity, reference in references.items()
     }

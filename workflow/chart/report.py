@@ -38,7 +38,7 @@ def write_chart(chart: Chart, out: Path) -> None:
 
 
 def sentences(chart: Chart) -> list[str]:
-    """What to take for the accuracy asked for: on each axis, and on all together."""
+    """What to take for the required accuracy: on each axis, and on all together."""
     lines = [_choice(ladder, chart.accuracy) for ladder in chart.ladders]
     return [*lines, _together(chart)] if len(chart.ladders) > 1 else lines
 
@@ -81,17 +81,17 @@ def combination(chart: Chart) -> Combination | None:
 
 
 def _together(chart: Chart) -> str:
-    found = combination(chart)
-    if found is None:
+    best = combination(chart)
+    if best is None:
         return (
             f"all axes: for {percent(chart.accuracy)} no choice of rungs is known to be enough: "
             "their errors, each axis varied alone, add up to more"
         )
-    names = zip(chart.ladders, found.names, strict=True)
+    names = zip(chart.ladders, best.names, strict=True)
     choice = ", ".join(f"{ladder.axis.name} {name}" for ladder, name in names)
     return (
         f"all axes: for {percent(chart.accuracy)} take {choice}: errors, each axis varied alone, "
-        f"add up to {percent(found.error)} at most, and about {found.ratio:.2g} times the seconds "
+        f"add up to {percent(best.error)} at most, and about {best.ratio:.2g} times the seconds "
         "of the case as written"
     )
 
@@ -135,14 +135,15 @@ def _reference(ladder: Ladder) -> str:
         return " (nothing to hold the rungs against)"
     if ladder.axis.order is None or not ladder.references:
         return ""
-    orders = [own.order for own in ladder.references.values() if own.order is not None]
+    known = ladder.references.values()
+    orders = [reference.order for reference in known if reference.order is not None]
     observed = f", orders {min(orders):.1f} to {max(orders):.1f}" if orders else ""
     return f" (references known to {percent(ladder.floor)}{observed})"
 
 
 def _marks(rung: Judged) -> list[str]:
     marks = {
-        "as written": rung.point.own,
+        "as written": rung.point.baseline,
         "efficient": rung.by_seconds,
         "unresolved": rung.unresolved and rung.error > 0.0,
     }
@@ -163,7 +164,7 @@ def _rows(ladder: Ladder) -> Iterator[dict[str, object]]:
         point, cost = rung.point, rung.point.cost
         head = (
             *(ladder.axis.name, point.rung.branch, rung.name, " ".join(point.rung.overrides)),
-            *(point.own, point.folder),
+            *(point.baseline, point.folder),
         )
         tail = (
             *(rung.error, rung.worst, rung.bound, ladder.floor, rung.unresolved),
@@ -182,20 +183,20 @@ def _rows(ladder: Ladder) -> Iterator[dict[str, object]]:
 
 
 def _summary(chart: Chart) -> dict[str, Any]:
-    found = combination(chart)
+    best = combination(chart)
     return {
         "title": chart.title,
         "accuracy": chart.accuracy,
         "axes": {ladder.axis.name: _axis_summary(ladder, chart) for ladder in chart.ladders},
         "together": None
-        if found is None
+        if best is None
         else {
             "rungs": {
                 ladder.axis.name: name
-                for ladder, name in zip(chart.ladders, found.names, strict=True)
+                for ladder, name in zip(chart.ladders, best.names, strict=True)
             },
-            "error": found.error,
-            "seconds_ratio": found.ratio,
+            "error": best.error,
+            "seconds_ratio": best.ratio,
         },
         "sentences": sentences(chart),
         "versions": versions(),
@@ -208,8 +209,8 @@ def _axis_summary(ladder: Ladder, chart: Chart) -> dict[str, Any]:
         "converges": ladder.axis.order is not None,
         "floor": _finite(ladder.floor),
         "references": {
-            quantity: {**vars(own), "floor": _finite(own.floor)}
-            for quantity, own in ladder.references.items()
+            quantity: {**vars(reference), "floor": _finite(reference.floor)}
+            for quantity, reference in ladder.references.items()
         },
         "rungs": [_rung_summary(rung) for rung in ladder.rungs],
         "failed": dict(ladder.failed),
@@ -223,7 +224,7 @@ def _rung_summary(rung: Judged) -> dict[str, Any]:
         "name": rung.name,
         "branch": point.rung.branch,
         "settings": list(point.rung.overrides),
-        "own": point.own,
+        "own": point.baseline,
         "folder": f"runs/{point.folder}",
         "values": dict(point.values),
         "extras": dict(point.extras),

@@ -12,6 +12,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -32,7 +33,7 @@ from workflow.shell.summary import number_at
 CACHE = "FRETSCALE_CACHE"
 ACCURACY = Quantity("1", above=0.0, at_most=1.0)
 # Folders of a chart, and the run of the case as it is written.
-RUNS, STRUCTURES, OWN = "runs", "structures", "own"
+RUNS, STRUCTURES, BASELINE = "runs", "structures", "own"
 # Entry of an interface in the summary: the longest stable explicit step of the unworn contact.
 LIMIT = "explicit_limit"
 # Quantities of a computed increment counted from the first, which is another one with other steps.
@@ -43,7 +44,7 @@ MOST_STEPS = 5000
 
 @dataclass(frozen=True)
 class Chart:
-    """The ladders of a case, the accuracy that is asked for, and whether no run failed."""
+    """The ladders of a case, the required accuracy, and whether no run failed."""
 
     title: str
     ladders: tuple[Ladder, ...]
@@ -82,7 +83,7 @@ def chart_case(
 ) -> Chart:
     """Run the ladders of ``axes``, by default of all that apply, in folders below ``out/runs``.
 
-    The structural cache lies in ``out`` too: what a run found there is charged to it at the price
+    The structural cache lies in ``out`` too: what a run takes from it is charged to it at the price
     of the run that computed it. ``quantities`` are dotted paths into ``summary.json``. Raises
     :class:`UserError` where an axis does not apply or a quantity is nowhere to be found.
     """
@@ -95,13 +96,21 @@ def chart_case(
     runs = _runs(ended)
     if not runs:
         raise MethodFailed(f"{out}: not a single rung ran: {ended[0].job.name}: {ended[0].error}")
-    first = runs.get(OWN) or next(iter(runs.values()))
-    errors = left_out | {own.job.name: own.error for own in ended if own.summary is None}
+    first = runs.get(BASELINE) or next(iter(runs.values()))
+    errors = left_out | {
+        finished.job.name: finished.error for finished in ended if finished.summary is None
+    }
     ladders = [
-        _ladder(axis, [(own, jobs[own.text].name) for own in rungs], runs, errors, quantities)
+        _ladder(
+            axis,
+            [(setting, jobs[setting.text].name) for setting in rungs],
+            runs,
+            errors,
+            quantities,
+        )
         for axis, rungs in settings.items()
     ]
-    complete = all(own.summary is not None for own in ended)
+    complete = all(finished.summary is not None for finished in ended)
     return Chart(first.case.title, tuple(ladders), accuracy, complete)
 
 
@@ -115,11 +124,11 @@ def _plain(case: Case, quantities: Sequence[str]) -> Iterator[str]:
         yield "fidelity=fixed"
 
 
-def _claim(out: Path, own: Case) -> None:
+def _claim(out: Path, case: Case) -> None:
     """Make sure of the folder. Raises UserError where it holds anything but a chart."""
     if out.exists() and not (out / RUNS).is_dir() and (not out.is_dir() or any(out.iterdir())):
         raise UserError(f"{out}: not empty and no chart of fretscale; give another folder")
-    if kept_in(out / RUNS / OWN, own) != "finished":
+    if kept_in(out / RUNS / BASELINE, case) != "finished":
         # It is the first to run, and is to pay for its structure itself.
         for path in (out / STRUCTURES).glob("*.h5"):
             path.unlink()
@@ -129,8 +138,8 @@ def _jobs(
     case: Path, base: Sequence[str], settings: Mapping[Axis, list[Setting]]
 ) -> dict[str, Job]:
     """A job for each different case, by its text; the case's own settings come first."""
-    own = Setting.of(case, base)
-    jobs = {own.text: Job(OWN, case, tuple(base))}
+    baseline = Setting.of(case, base)
+    jobs = {baseline.text: Job(BASELINE, case, tuple(base))}
     for axis, rungs in settings.items():
         for setting in rungs:
             words = "".join(c if c.isalnum() or c in "-." else " " for c in setting.rung.name)
@@ -149,25 +158,25 @@ def _run(
 ) -> tuple[list[Finished], dict[str, str]]:
     """How the jobs ended, and why some were left out, by their name.
 
-    The first one tells whether there are such ``quantities``, before all others are run.
+    The first one shows whether there are such ``quantities``, before all others are run.
     """
-    told = _Progress(len(jobs), report)
-    own, *others = jobs.values()
-    ended = run_jobs([own], out, alone=True, report=told)
+    progress = _Progress(len(jobs), report)
+    baseline, *others = jobs.values()
+    ended = run_jobs([baseline], out, alone=True, report=progress)
     if (summary := ended[0].summary) is not None:
-        _check(quantities, _measured(own.load(), ended[0].folder, summary))
+        _check(quantities, _measured(baseline.load(), ended[0].folder, summary))
     left_out = {}
-    for setting in (one for rungs in settings.values() for one in rungs):
+    for setting in chain.from_iterable(settings.values()):
         if why := _too_long(setting, ended[0].summary or {}):
             left_out[jobs[setting.text].name] = why
     others = [job for job in others if job.name not in left_out]
-    return ended + run_jobs(others, out, alone=True, report=told), left_out
+    return ended + run_jobs(others, out, alone=True, report=progress), left_out
 
 
-def _too_long(setting: Setting, own: Mapping[str, Any]) -> str:
+def _too_long(setting: Setting, summary: Mapping[str, Any]) -> str:
     """Why nobody would wait for explicit steps, as far as the run of the case itself knows it."""
     share, case = setting.rung.of_limit, setting.case
-    limits = [limit for name in own if (limit := number_at(own, f"{name}.{LIMIT}"))]
+    limits = [limit for name in summary if (limit := number_at(summary, f"{name}.{LIMIT}"))]
     if share is None or not limits:
         return ""
     length = share * min(limits)
@@ -176,17 +185,17 @@ def _too_long(setting: Setting, own: Mapping[str, Any]) -> str:
 
 
 class _Progress:
-    """Tells each run as it ends."""
+    """Reports each run as it ends."""
 
     def __init__(self, total: int, report: Callable[[str], None]) -> None:
         self._total, self._report, self._done = total, report, 0
 
-    def __call__(self, own: Finished) -> None:
+    def __call__(self, finished: Finished) -> None:
         self._done += 1
-        ending = f"failed: {own.error}"
-        if own.summary is not None:
-            ending = f"{sum(own.summary.get('seconds', {}).values()):.1f} s"
-        self._report(f"{self._done}/{self._total} {own.job.name}: {ending}")
+        ending = f"failed: {finished.error}"
+        if finished.summary is not None:
+            ending = f"{sum(finished.summary.get('seconds', {}).values()):.1f} s"
+        self._report(f"{self._done}/{self._total} {finished.job.name}: {ending}")
 
 
 @contextmanager
@@ -205,12 +214,13 @@ def _environment(name: str, value: str) -> Iterator[None]:
 
 def _runs(ended: Sequence[Finished]) -> dict[str, _Run]:
     """What has run, by the name of the job."""
-    found = [(own, own.summary) for own in ended if own.summary is not None]
-    cases = [own.job.load() for own, _ in found]
-    paid = costs(cases, [own.folder for own, _ in found], [summary for _, summary in found])
+    completed = [(finished, finished.summary) for finished in ended if finished.summary is not None]
+    cases = [finished.job.load() for finished, _ in completed]
+    folders = [finished.folder for finished, _ in completed]
+    paid = costs(cases, folders, [summary for _, summary in completed])
     return {
-        own.job.name: _Run(case, own, _measured(case, own.folder, summary), cost)
-        for (own, summary), case, cost in zip(found, cases, paid, strict=True)
+        finished.job.name: _Run(case, finished, _measured(case, finished.folder, summary), cost)
+        for (finished, summary), case, cost in zip(completed, cases, paid, strict=True)
     }
 
 
@@ -237,49 +247,53 @@ def _ladder(
     picked: Sequence[str],
 ) -> Ladder:
     """The rungs of an axis, each with the name of its job, that ran or did not."""
-    found = [(setting.rung, runs[name]) for setting, name in rungs if name in runs]
+    completed = [(setting.rung, runs[name]) for setting, name in rungs if name in runs]
     failed = {setting.rung.name: errors[name] for setting, name in rungs if name in errors}
-    if not found:
+    if not completed:
         return Ladder(axis, (), {}, failed)
-    last = found[-1][1]
-    wanted = _quantities(axis, runs.get(OWN, last), picked)
-    exact = {own.quantity: own.value for own in last.case.expect if own.exact}
+    last = completed[-1][1]
+    wanted = _quantities(axis, runs.get(BASELINE, last), picked)
+    exact = {
+        expectation.quantity: expectation.value
+        for expectation in last.case.expect
+        if expectation.exact
+    }
     points = [
         Point(
             rung=rung,
-            own=run.finished.job.name == OWN,
+            baseline=run.finished.job.name == BASELINE,
             folder=run.finished.job.name,
             values=_numbers(run.summary, wanted),
             cost=run.cost,
             extras=_extras(run, last),
         )
-        for rung, run in found
+        for rung, run in completed
     ]
     return judge(axis, points, exact, failed, finest=rungs[-1][0].rung.name)
 
 
-def _quantities(axis: Axis, own: _Run, picked: Sequence[str]) -> list[str]:
+def _quantities(axis: Axis, run: _Run, picked: Sequence[str]) -> list[str]:
     """What the rungs of an axis are compared by."""
-    comparison = analysis_of(own.case).comparison
+    comparison = analysis_of(run.case).comparison
     if axis.sections:
-        return comparison.sections(own.summary)
+        return comparison.sections(run.summary)
     paths = list(picked)
     if not paths:
         # Nothing is relative to 0.
-        by_default = comparison.quantities(own.case, own.summary)
-        paths = [path for path in by_default if number_at(own.summary, path)]
+        by_default = comparison.quantities(run.case, run.summary)
+        paths = [path for path in by_default if number_at(run.summary, path)]
     if axis.moves_states:
         paths = [p for p in paths if not FROM_THE_FIRST.match(p)] or list(comparison.at_the_end)
     return paths
 
 
 def _numbers(summary: Mapping[str, Any], paths: Sequence[str]) -> dict[str, float]:
-    found = {path: number_at(summary, path) for path in paths}
-    return {path: value for path, value in found.items() if value is not None}
+    numbers = {path: number_at(summary, path) for path in paths}
+    return {path: value for path, value in numbers.items() if value is not None}
 
 
 def _extras(run: _Run, last: _Run) -> dict[str, float]:
-    """What is told of a run beside the quantities, and how far its fields are from the last."""
+    """What is reported of a run beside the quantities, and how far its fields are from the last."""
     comparison, folder = analysis_of(run.case).comparison, run.finished.folder
     beside = _numbers(run.summary, comparison.extras(run.summary))
     return beside | comparison.apart(folder, last.finished.folder, run.summary)

@@ -76,41 +76,41 @@ def _number(text: str) -> float | None:
 # --- what is printed ----------------------------------------------------------------------------
 
 
-def report(found: MeasuredLoops) -> list[str]:
+def report(loops: MeasuredLoops) -> list[str]:
     """The table of cycles, their means with standard errors, and what to know of them."""
-    columns = _shown(found)
+    columns = _shown(loops)
     rows = [["cycle", *columns]]
-    count = len(found.energy)
+    count = len(loops.energy)
     for cycle in _few(count):
         values = [values[cycle] for values, _ in columns.values()]
         rows.append([str(cycle + 1), *(f"{value:.4g}" for value in values)])
-    rows.append(["mean", *(f"{own.value:.4g}" for _, own in columns.values())])
+    rows.append(["mean", *(f"{estimate.value:.4g}" for _, estimate in columns.values())])
     if count > 1:
-        rows.append(["+-", *(f"{own.error:.1g}" for _, own in columns.values())])
+        rows.append(["+-", *(f"{estimate.error:.1g}" for _, estimate in columns.values())])
     lines = ["".join(f"{cell:>{WIDTH}}" for cell in row) for row in rows]
-    return [*lines, *_notes(found)]
+    return [*lines, *_notes(loops)]
 
 
-def _shown(found: MeasuredLoops) -> dict[str, tuple[Array, MeanEstimate]]:
+def _shown(loops: MeasuredLoops) -> dict[str, tuple[Array, MeanEstimate]]:
     """Values ``(c,)`` and their mean, by heading."""
     per_micron = 1e-3
-    stick = found.stick_estimate
+    stick = loops.stick_estimate
     columns = {
-        "stroke [um]": _with_mean(found.stroke / per_micron),
-        "energy [mJ]": _with_mean(found.energy),
+        "stroke [um]": _with_mean(loops.stroke / per_micron),
+        "energy [mJ]": _with_mean(loops.energy),
         "kt [N/um]": (
-            found.stick_stiffness * per_micron,
+            loops.stick_stiffness * per_micron,
             MeanEstimate(stick.value * per_micron, stick.error * per_micron),
         ),
     }
-    if found.slides:
-        columns["kr [N/um]"] = _with_mean(found.residual_stiffness * per_micron)
-    if not np.isnan(found.normal_load).any():
-        mu = found.friction if found.slides else found.mobilised
-        columns["mu" if found.slides else "mu at least"] = _with_mean(mu)
+    if loops.slides:
+        columns["kr [N/um]"] = _with_mean(loops.residual_stiffness * per_micron)
+    if not np.isnan(loops.normal_load).any():
+        mu = loops.friction if loops.slides else loops.mobilised
+        columns["mu" if loops.slides else "mu at least"] = _with_mean(mu)
     else:
-        force = found.friction_force if found.slides else found.force
-        columns["mu N [N]" if found.slides else "force [N]"] = _with_mean(force)
+        force = loops.friction_force if loops.slides else loops.force
+        columns["mu N [N]" if loops.slides else "force [N]"] = _with_mean(force)
     return columns
 
 
@@ -125,12 +125,12 @@ def _few(count: int) -> list[int]:
     return np.unique(np.linspace(0, count - 1, MOST_ROWS).round().astype(int)).tolist()
 
 
-def _notes(found: MeasuredLoops) -> list[str]:
+def _notes(loops: MeasuredLoops) -> list[str]:
     """What the numbers mean."""
     notes = ["kt is the slope right after a reversal, residual stiffness included"]
-    if found.slides:
+    if loops.slides:
         notes.append(
-            f"the last {found.sliding:.0%} of the branches slide: kr is their slope, mu half "
+            f"the last {loops.sliding:.0%} of the branches slide: kr is their slope, mu half "
             "their distance over the normal load"
         )
     else:
@@ -138,7 +138,7 @@ def _notes(found: MeasuredLoops) -> list[str]:
             "no sliding branch: half the force range over the normal load is a lower bound of mu, "
             "and kr is not known; a larger stroke would show both"
         )
-    if np.isnan(found.normal_load).any():
+    if np.isnan(loops.normal_load).any():
         notes.append("no normal load, so no mu: give --normal-load or a column normal_load")
     return notes
 
@@ -146,7 +146,7 @@ def _notes(found: MeasuredLoops) -> list[str]:
 # --- what is written ----------------------------------------------------------------------------
 
 
-def write_loops(found: MeasuredLoops, out: Path, title: str, force: bool) -> list[Path]:
+def write_loops(loops: MeasuredLoops, out: Path, title: str, force: bool) -> list[Path]:
     """Write a row per cycle, as a table of loops for joint laws, and the figure.
 
     Raises UserError for a folder that has them already, unless ``force``.
@@ -158,29 +158,29 @@ def write_loops(found: MeasuredLoops, out: Path, title: str, force: bool) -> lis
     if there and not force:
         raise UserError(f"{there[0]}: exists; give another folder, or --force")
     out.mkdir(parents=True, exist_ok=True)
-    write_loop_table(paths[0], list(_rows(found)))
+    write_loop_table(paths[0], list(_rows(loops)))
     from workflow.commands.loops_figure import write_figure
 
-    write_figure(found, title, paths[1])
+    write_figure(loops, title, paths[1])
     return paths
 
 
-def _rows(found: MeasuredLoops) -> Iterator[dict[str, float]]:
-    """A row per cycle, in base units; columns that the record does not tell are left out."""
+def _rows(loops: MeasuredLoops) -> Iterator[dict[str, float]]:
+    """A row per cycle, in base units; columns that the record does not have are left out."""
     values: dict[str, Array] = {
-        "cycles": np.arange(1.0, len(found.energy) + 1.0),
+        "cycles": np.arange(1.0, len(loops.energy) + 1.0),
         # Since the first cycle of the record began.
-        "energy": np.cumsum(found.energy),
-        "kt": found.stick_stiffness,
-        "energy_per_loop": found.energy,
-        "amplitude": 0.5 * found.stroke,
-        "force": found.force,
+        "energy": np.cumsum(loops.energy),
+        "kt": loops.stick_stiffness,
+        "energy_per_loop": loops.energy,
+        "amplitude": 0.5 * loops.stroke,
+        "force": loops.force,
     }
-    if found.slides:
-        values["residual_stiffness"] = found.residual_stiffness
-    if not np.isnan(found.normal_load).any():
-        values["P"] = found.normal_load
-        if found.slides:
-            values["mu"] = found.friction
+    if loops.slides:
+        values["residual_stiffness"] = loops.residual_stiffness
+    if not np.isnan(loops.normal_load).any():
+        values["P"] = loops.normal_load
+        if loops.slides:
+            values["mu"] = loops.friction
     for cycle in zip(*values.values(), strict=True):
         yield dict(zip(values, map(float, cycle), strict=True))

@@ -21,34 +21,34 @@ MOST_LOOPS = 40
 HEADROOM = 1.15
 
 
-def write_figure(found: MeasuredLoops, name: str, path: Path) -> None:
+def write_figure(loops: MeasuredLoops, name: str, path: Path) -> None:
     """Draw the loops of the record ``name``."""
     import matplotlib
 
     with matplotlib.rc_context(STYLE):
-        save(figure(found, name), path)
+        save(figure(loops, name), path)
 
 
-def figure(found: MeasuredLoops, name: str) -> Figure:
+def figure(loops: MeasuredLoops, name: str) -> Figure:
     """Loops with the lines that were laid through the middle one; stiffness, friction, energy."""
-    drawn = new_figure(_title(found, name), 7.0)
+    drawn = new_figure(_title(loops, name), 7.0)
     left, right = drawn.subfigures(1, 2, squeeze=False, width_ratios=(1.4, 1.0))[0]
-    _draw_loops(left.subplots(), found)
+    _draw_loops(left.subplots(), loops)
     panels = right.subplots(3, 1, sharex=True)
-    _draw_values(panels[0], PER_MICRON * found.stick_stiffness, "kt [N/µm]", BLUE)
-    _draw_values(panels[1], *_friction(found), ORANGE)
-    _draw_values(panels[2], found.energy, "energy [mJ]", GREEN)
+    _draw_values(panels[0], PER_MICRON * loops.stick_stiffness, "kt [N/µm]", BLUE)
+    _draw_values(panels[1], *_friction(loops), ORANGE)
+    _draw_values(panels[2], loops.energy, "energy [mJ]", GREEN)
     panels[2].set_xlabel("cycle of the record")
     return drawn
 
 
-def _draw_loops(axis: Axes, found: MeasuredLoops) -> None:
-    record, count = found.record, len(found.energy)
-    for begin, _, end in found.reversals[:: -(-count // MOST_LOOPS)]:
+def _draw_loops(axis: Axes, loops: MeasuredLoops) -> None:
+    record, count = loops.record, len(loops.energy)
+    for begin, _, end in loops.reversals[:: -(-count // MOST_LOOPS)]:
         here = slice(begin, end + 1)
         axis.plot(TO_MICRONS * record.displacement[here], record.force[here], color="0.7", lw=0.8)
     middle = count // 2
-    begin, turn, end = found.reversals[middle]
+    begin, turn, end = loops.reversals[middle]
     here = slice(begin, end + 1)
     axis.plot(
         TO_MICRONS * record.displacement[here],
@@ -58,9 +58,9 @@ def _draw_loops(axis: Axes, found: MeasuredLoops) -> None:
         label=f"cycle {middle + 1}",
     )
     for number, place in enumerate((begin, turn)):
-        _draw_stick(axis, found, middle, place, None if number else "stick slope kt")
-    if found.slides:
-        _draw_sliding(axis, found, middle)
+        _draw_stick(axis, loops, middle, place, None if number else "stick slope kt")
+    if loops.slides:
+        _draw_sliding(axis, loops, middle)
     axis.set_xlabel("displacement [µm]")
     axis.set_ylabel("force [N]")
     # The loop fills its panel: room for the legend above it.
@@ -70,24 +70,24 @@ def _draw_loops(axis: Axes, found: MeasuredLoops) -> None:
 
 
 def _draw_stick(
-    axis: Axes, found: MeasuredLoops, cycle: int, place: int, label: str | None
+    axis: Axes, loops: MeasuredLoops, cycle: int, place: int, label: str | None
 ) -> None:
     """The slope at the reversal ``place``, over half of the height of the loop."""
-    record = found.record
-    forces = record.force[found.reversals[cycle, :2]]
-    start, other = record.force[place], forces.sum() - record.force[place]
-    height = np.sign(other - start) * np.array([0.0, found.force[cycle]])
-    motion = record.displacement[place] + height / found.stick_stiffness[cycle]
+    record = loops.record
+    forces = record.force[loops.reversals[cycle, :2]]
+    start, opposite = record.force[place], forces.sum() - record.force[place]
+    height = np.sign(opposite - start) * np.array([0.0, loops.force[cycle]])
+    motion = record.displacement[place] + height / loops.stick_stiffness[cycle]
     axis.plot(TO_MICRONS * motion, start + height, color=BLUE, lw=2.5, label=label)
 
 
-def _draw_sliding(axis: Axes, found: MeasuredLoops, cycle: int) -> None:
+def _draw_sliding(axis: Axes, loops: MeasuredLoops, cycle: int) -> None:
     """The sliding lines over the part of the branches that they are laid through."""
-    record, (begin, turn, end) = found.record, found.reversals[cycle]
-    stroke, slope = found.stroke[cycle], found.residual_stiffness[cycle]
+    record, (begin, turn, end) = loops.record, loops.reversals[cycle]
+    stroke, slope = loops.stroke[cycle], loops.residual_stiffness[cycle]
     for number, (start, stop) in enumerate(((begin, turn), (turn, end))):
         sense = np.sign(record.displacement[stop] - record.displacement[start])
-        reach = record.displacement[stop] - sense * found.sliding * stroke
+        reach = record.displacement[stop] - sense * loops.sliding * stroke
         branch = slice(start, stop + 1)
         motion, force = record.displacement[branch], record.force[branch]
         there = sense * (motion - reach) >= 0.0
@@ -97,11 +97,11 @@ def _draw_sliding(axis: Axes, found: MeasuredLoops, cycle: int) -> None:
         axis.plot(TO_MICRONS * ends, line, color=ORANGE, lw=2.5, label=label)
 
 
-def _friction(found: MeasuredLoops) -> tuple[Array, str]:
+def _friction(loops: MeasuredLoops) -> tuple[Array, str]:
     """What the record says of friction, and what to call it."""
-    if np.isnan(found.normal_load).any():
-        return (found.friction_force, "µN [N]") if found.slides else (found.force, "force [N]")
-    return (found.friction, "µ") if found.slides else (found.mobilised, "µ at least")
+    if np.isnan(loops.normal_load).any():
+        return (loops.friction_force, "µN [N]") if loops.slides else (loops.force, "force [N]")
+    return (loops.friction, "µ") if loops.slides else (loops.mobilised, "µ at least")
 
 
 def _draw_values(axis: Axes, values: Array, label: str, colour: str) -> None:
@@ -110,9 +110,9 @@ def _draw_values(axis: Axes, values: Array, label: str, colour: str) -> None:
     axis.set_ylabel(label)
 
 
-def _title(found: MeasuredLoops, name: str) -> str:
-    values, label = _friction(found)
-    stick = PER_MICRON * found.stick_estimate.value
+def _title(loops: MeasuredLoops, name: str) -> str:
+    values, label = _friction(loops)
+    stick = PER_MICRON * loops.stick_estimate.value
     called, _, unit = label.partition(" [")
     unit = f" {unit.rstrip(']')}" if unit else ""
     equals = " " if called.endswith("least") else " = "

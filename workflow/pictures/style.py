@@ -23,7 +23,7 @@ STYLE: dict[Any, Any] = {
     "figure.titlesize": 15,
     "lines.linewidth": 1.8,
 }
-# Okabe and Ito's colours: told apart by everyone.
+# Okabe and Ito's colours, which colour-blind readers distinguish too.
 BLUE, ORANGE, GREEN, PURPLE, BLACK = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222"
 
 

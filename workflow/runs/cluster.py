@@ -45,14 +45,14 @@ def run_on_cluster(
         futures = {}
         for job, case in jobs:
             settings = {"key": _key(job, case, out), "pure": False, "retries": RETRIES}
-            own = Job(job.name, job.case.absolute(), job.overrides)
-            futures[client.submit(_on_worker, own, out.absolute(), **settings)] = job
+            absolute = Job(job.name, job.case.absolute(), job.overrides)
+            futures[client.submit(_on_worker, absolute, out.absolute(), **settings)] = job
         for future in as_completed(futures):
             end(futures[future], _error_of(future))
 
 
 def _key(job: Job, case: Case, out: Path) -> str:
-    """What the scheduler knows a run by: the same one asked for twice is run once."""
+    """What the scheduler knows a run by: the same one submitted twice is run once."""
     parts = f"{out.absolute()}\n{dump_case(case)}"
     return f"{job.name}-{hashlib.sha256(parts.encode()).hexdigest()[:16]}"
 

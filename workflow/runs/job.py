@@ -1,4 +1,4 @@
-"""One run of many: its folder, and the process of its own that computes it.
+"""One run of many: its folder, and the separate process that computes it.
 
 The process ends when whoever started it ends, however that ends, and its contact workers with it.
 Interrupted or killed it leaves a folder that :func:`workflow.runs.run.bring_to_end` takes up.
@@ -64,22 +64,22 @@ def main() -> None:
     answer = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)
     threading.Thread(target=_end_with_parent, daemon=True).start()
-    given = json.loads(sys.argv[1])
-    job = Job(given["name"], Path(given["case"]), tuple(given["overrides"]))
+    arguments = json.loads(sys.argv[1])
+    job = Job(arguments["name"], Path(arguments["case"]), tuple(arguments["overrides"]))
     error = ""
     try:
-        bring_to_end(job.load(), Path(given["out"]) / job.name)
+        bring_to_end(job.load(), Path(arguments["out"]) / job.name)
     except FretscaleError as ending:
         error = str(ending)
     except Exception as ending:
         error = f"{type(ending).__name__}: {ending}"
-        _log(OutputFolder(Path(given["out"]) / job.name), traceback.format_exc())
+        _log(OutputFolder(Path(arguments["out"]) / job.name), traceback.format_exc())
     answer.write(json.dumps({"error": error}))
     answer.close()
 
 
 def _log(folder: OutputFolder, text: str) -> None:
-    """Keep what one line cannot say where the run has told of itself."""
+    """Keep what one line cannot say in the log of the run."""
     with suppress(OSError), folder.reserve_log().open("a", encoding="utf-8") as log:
         log.write(text)
 
@@ -96,15 +96,15 @@ def _end_with_parent() -> None:
 def run_job(job: Job, out: Path, unwanted: Callable[[], bool], one_thread: bool = True) -> str:
     """Compute a job in a fresh process; the error in one line, "" if none.
 
-    It is ended when it is ``unwanted``. It has a process group of its own, so that Ctrl-C comes to
+    It is ended when it is ``unwanted``. It has a separate process group, so that Ctrl-C comes to
     whoever waits, and only there.
     """
-    given = asdict(job) | {"case": str(job.case.absolute()), "out": str(out.absolute())}
+    arguments = asdict(job) | {"case": str(job.case.absolute()), "out": str(out.absolute())}
     # Held open as long as this process lives: its end is the end of the other.
     theirs, lifeline = os.pipe()
     try:
         process = subprocess.Popen(
-            [sys.executable, "-c", COMMAND, json.dumps(given)],
+            [sys.executable, "-c", COMMAND, json.dumps(arguments)],
             stdin=theirs,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,
@@ -133,14 +133,14 @@ def _wait(process: subprocess.Popen[str], unwanted: Callable[[], bool]) -> tuple
                 process.kill()
 
 
-def _ending(process: subprocess.Popen[str], answer: str, said: str) -> str:
+def _ending(process: subprocess.Popen[str], answer: str, stderr: str) -> str:
     """Why the job failed, in one line; "" if it did not."""
     if process.returncode == 0:
         return one_line(json.loads(answer)["error"])
     if process.returncode < 0:
         number = -process.returncode
         return str(MethodFailed(f"the process of this run got signal {number}: for its memory?"))
-    last = (said.strip().splitlines() or ["it said nothing"])[-1]
+    last = (stderr.strip().splitlines() or ["it said nothing"])[-1]
     return f"the process of this run ended with exit code {process.returncode}: {last}"
 
 

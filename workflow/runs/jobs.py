@@ -37,7 +37,7 @@ def run_jobs(
     its ``error``. Local runs share ``processes`` cores (default: all there are), of which each
     takes as many as it has contacts; run ``alone``, one after the other, they have all cores and
     threads as by themselves. ``dask`` is the address of a scheduler to send them to instead.
-    ``report`` is told each job as it ends. Ctrl-C ends all of them; another call goes on.
+    ``report`` is called with each job as it ends. Ctrl-C ends all of them; another call goes on.
 
     Raises ValueError where two jobs would share a folder.
     """
@@ -61,7 +61,7 @@ def run_jobs(
         else:
             left.append(_Waiting(job, case))
     if dask is not None:
-        run_on_cluster([(own.job, own.case) for own in left], out, dask, end)
+        run_on_cluster([(waiting.job, waiting.case) for waiting in left], out, dask, end)
     else:
         cores = 1 if alone else processes or os.cpu_count() or 1
         _run_here(left, out, cores, end, one_thread=not alone)
@@ -92,7 +92,7 @@ def _run_here(
 ) -> None:
     """Run jobs side by side, first come, first served; one that wants more cores runs alone."""
     stop = threading.Event()
-    queue = [(own.job, min(own.case.cores, cores)) for own in jobs]
+    queue = [(waiting.job, min(waiting.case.cores, cores)) for waiting in jobs]
     running: dict[Future[str], tuple[Job, int]] = {}
     with ThreadPoolExecutor(max_workers=cores) as pool:
         try:

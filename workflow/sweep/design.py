@@ -44,7 +44,7 @@ def runs_of(sweep: Sweep) -> list[Run]:
     if sweep.file.design == "sample":
         rows = _sampled(list(varied.values()), sweep.file.samples or 0, sweep.file.seed)
     else:
-        rows = _combined(sweep, [_listed(own) for own in varied.values()])
+        rows = _combined(sweep, [_listed(variation) for variation in varied.values()])
     names = _names(_short_names(list(varied)), rows)
     return [
         Run(name, dict(zip(varied, row, strict=True)))
@@ -57,8 +57,8 @@ def _combined(sweep: Sweep, columns: list[list[Any]]) -> list[tuple[Any, ...]]:
     if sweep.file.design == "zip":
         counts = [len(column) for column in columns]
         if len(set(counts)) > 1:
-            told = ", ".join(map(str, counts))
-            raise CaseError(f"{place}: design: zip of {told} values; allowed: as many of each")
+            lengths = ", ".join(map(str, counts))
+            raise CaseError(f"{place}: design: zip of {lengths} values; allowed: as many of each")
         return list(zip(*columns, strict=True))
     count = prod(len(column) for column in columns)
     if count > MOST_RUNS:
@@ -66,15 +66,17 @@ def _combined(sweep: Sweep, columns: list[list[Any]]) -> list[tuple[Any, ...]]:
     return list(product(*columns))
 
 
-def _listed(own: Variation) -> list[Any]:
+def _listed(variation: Variation) -> list[Any]:
     """All values of a list or range."""
-    if own.values is not None:
-        return list(own.values)
-    assert own.range is not None
-    assert own.range.count is not None
-    first, last = own.range.ends
-    share = np.linspace(0.0, 1.0, own.range.count)
-    return [_written(first, number) for number in _between(first, last, share, own.range.scale)]
+    if variation.values is not None:
+        return list(variation.values)
+    assert variation.range is not None
+    assert variation.range.count is not None
+    first, last = variation.range.ends
+    share = np.linspace(0.0, 1.0, variation.range.count)
+    return [
+        _written(first, number) for number in _between(first, last, share, variation.range.scale)
+    ]
 
 
 def _between(first: Amount, last: Amount, share: Array, scale: str) -> Array:
@@ -98,19 +100,19 @@ def _sampled(varied: list[Variation], samples: int, seed: int) -> list[tuple[Any
     from scipy.stats import qmc  # half a second
 
     points = qmc.LatinHypercube(d=len(varied), seed=np.random.default_rng(seed)).random(samples)
-    columns = [_drawn(own, share) for own, share in zip(varied, points.T, strict=True)]
+    columns = [_drawn(variation, share) for variation, share in zip(varied, points.T, strict=True)]
     return list(zip(*columns, strict=True))
 
 
-def _drawn(own: Variation, share: Array) -> list[Any]:
+def _drawn(variation: Variation, share: Array) -> list[Any]:
     """Values below which ``share`` of the distribution lies; those of a list are as likely."""
-    if own.values is not None:
-        return [own.values[int(u * len(own.values))] for u in share]
-    if own.range is not None:
-        first, last = own.range.ends
-        numbers = _between(first, last, share, own.range.scale)
+    if variation.values is not None:
+        return [variation.values[int(u * len(variation.values))] for u in share]
+    if variation.range is not None:
+        first, last = variation.range.ends
+        numbers = _between(first, last, share, variation.range.scale)
     else:
-        first, numbers = _quantiles(own.distribution, share)
+        first, numbers = _quantiles(variation.distribution, share)
     return [_written(first, number) for number in numbers]
 
 
@@ -143,12 +145,12 @@ def _shortest(path: str, others: list[str]) -> str:
 
 
 def _names(short: list[str], rows: list[tuple[Any, ...]]) -> list[str]:
-    """The folder of each run: what varies and its values, so that it is found again by them."""
+    """The folder of each run: what varies and its values, by which it is recognised later."""
     whole = ["_".join(f"{n}={scalar(v)}" for n, v in zip(short, row, strict=True)) for row in rows]
     plain = [re.sub(r"[^\w.+=-]", "", text.replace(", ", "x")) for text in whole]
-    told = {name: {w for w, p in zip(whole, plain, strict=True) if p == name} for name in plain}
+    texts = {name: {w for w, p in zip(whole, plain, strict=True) if p == name} for name in plain}
     return [
-        name if len(name) <= LONGEST_NAME and len(told[name]) == 1 else _hashed(name, text)
+        name if len(name) <= LONGEST_NAME and len(texts[name]) == 1 else _hashed(name, text)
         for name, text in zip(plain, whole, strict=True)
     ]
 

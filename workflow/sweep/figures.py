@@ -1,4 +1,4 @@
-"""Figures of a sweep: what its runs found, as bands over the cycles and against what varies."""
+"""Figures of a sweep: results of its runs, as bands over the cycles and against what varies."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# So many runs can be told apart as lines of their own.
+# So many runs can be distinguished as separate lines.
 LINES = 30
 # From a ratio of largest to smallest on, an axis is logarithmic.
 LOGARITHMIC = 30.0
@@ -62,17 +62,17 @@ def kinetics_bands(title: str, rows: Sequence[Row]) -> Figure | None:
     names = list(dict.fromkeys(name for summary in done for name in interfaces_of(summary)))
     if not names:
         return None
-    told = "median (least to largest) at their end"
-    figure = new_figure(f"{title}: {len(done)} runs, {told}", 9.0)
+    statistics = "median (least to largest) at their end"
+    figure = new_figure(f"{title}: {len(done)} runs, {statistics}", 9.0)
     axes = figure.subplots(2, len(names), sharex=True, sharey="row", squeeze=False)
     for column, name in zip(axes.T, names, strict=True):
-        own = [summary for summary in done if name in interfaces_of(summary)]
+        summaries = [summary for summary in done if name in interfaces_of(summary)]
         for axis, (quantity, scale, unit) in zip(column, WEAR, strict=True):
             unit = unit or _unit(f"{name}.{quantity}", rows)
-            last = _draw_bands(axis, own, name, quantity, scale)
+            last = _draw_bands(axis, summaries, name, quantity, scale)
             low, middle, high = (float(np.quantile(last, q)) for q in (0.0, 0.5, 1.0))
-            found = f"{quantity} {middle:.3g} ({low:.3g} to {high:.3g})"
-            axis.set_title(f"{name}: {found} {unit}")
+            values = f"{quantity} {middle:.3g} ({low:.3g} to {high:.3g})"
+            axis.set_title(f"{name}: {values} {unit}")
             axis.set_ylabel(f"{_worded(quantity)} [{unit}]")
             axis.label_outer()
         column[-1].set_xlabel("cycles")
@@ -88,9 +88,9 @@ def _draw_bands(
 ) -> Array:
     """Bands of the runs; returns their last values ``(runs,)``."""
     curves = [_curve(summary, name, quantity, scale) for summary in summaries]
-    cycles = np.unique(np.concatenate([own for own, _ in curves]))
-    # A run says nothing beyond its own end.
-    values = np.array([np.interp(cycles, *own, right=np.nan) for own in curves])
+    cycles = np.unique(np.concatenate([counts for counts, _ in curves]))
+    # A run says nothing beyond its end.
+    values = np.array([np.interp(cycles, *curve, right=np.nan) for curve in curves])
     low, quarter, middle, three, high = np.nanquantile(values, [0, 0.25, 0.5, 0.75, 1], axis=0)
     axis.fill_between(cycles, low, high, color=BLUE, alpha=0.15, lw=0, label="all runs")
     axis.fill_between(cycles, quarter, three, color=BLUE, alpha=0.35, lw=0, label="middle half")
@@ -104,8 +104,8 @@ def _draw_bands(
 
 def _curve(summary: dict[str, Any], name: str, quantity: str, scale: float) -> tuple[Array, Array]:
     """Cycles ``(j,)`` and what both bodies have worn together ``(j,)``."""
-    own = summary["kinetics"][name]
-    worn = np.array(own[f"{quantity}_1"]) + np.array(own[f"{quantity}_2"])
+    kinetics = summary["kinetics"][name]
+    worn = np.array(kinetics[f"{quantity}_1"]) + np.array(kinetics[f"{quantity}_2"])
     return np.array(summary["kinetics"]["cycles"]), scale * worn
 
 
@@ -114,7 +114,7 @@ def _curve(summary: dict[str, Any], name: str, quantity: str, scale: float) -> t
 
 @dataclass(frozen=True)
 class Panel:
-    """What the runs found ``(runs,)``, NaN for one that failed, with its label and title."""
+    """Results of the runs ``(runs,)``, NaN for one that failed, with its label and title."""
 
     label: str
     title: str
@@ -123,7 +123,7 @@ class Panel:
 
 def _panels(rows: Sequence[Row]) -> list[list[Panel]]:
     """Panels by row and column of a figure."""
-    found = columns_of(rows)
+    columns = columns_of(rows)
     summaries = [row.finished.summary for row in rows if row.finished.summary]
     names = list(dict.fromkeys(name for summary in summaries for name in interfaces_of(summary)))
     if names:
@@ -132,16 +132,16 @@ def _panels(rows: Sequence[Row]) -> list[list[Panel]]:
                 Panel(
                     f"{_worded(quantity)} [{unit or _unit(f'{name}.{quantity}', rows)}]",
                     f"{name}: {quantity} at the end",
-                    scale * found[f"{name}.{quantity}"],
+                    scale * columns[f"{name}.{quantity}"],
                 )
                 for name in names
             ]
             for quantity, scale, unit in WEAR
         ]
-    shown = [own for own in OTHERS if own[0] in found][:MOST_ROWS]
-    per = "/mm" if LINE_CONTACT in found else ""
+    shown = [quantity for quantity in OTHERS if quantity[0] in columns][:MOST_ROWS]
+    per = "/mm" if LINE_CONTACT in columns else ""
     return [
-        [Panel(f"{text} [{unit}{per if unit == 'N mm' else ''}]", text, found[name])]
+        [Panel(f"{text} [{unit}{per if unit == 'N mm' else ''}]", text, columns[name])]
         for name, text, unit in shown
     ]
 
@@ -157,7 +157,7 @@ def _worded(quantity: str) -> str:
 
 
 def against(title: str, varied: Varied, panels: list[list[Panel]]) -> Figure:
-    """What the runs found against one entry that varies."""
+    """Results of the runs against one entry that varies."""
     figure = new_figure(f"{title}: against {varied.path}", 4.5 * len(panels))
     axes = figure.subplots(len(panels), len(panels[0]), sharex=True, sharey="row", squeeze=False)
     places, ticks = _places(varied)

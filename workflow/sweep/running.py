@@ -87,14 +87,14 @@ def _check_runs(sweep: Sweep, runs: Sequence[Run], out: Path, force: bool) -> in
 
 
 def _explained(sweep: Sweep, job: Job, text: str) -> Iterator[str]:
-    """Lines about a case; what the sweep gives it is told with its place in the sweep's file."""
-    given = {f"--set {override}: ": override.partition("=")[0] for override in job.overrides}
+    """Lines about a case; of what the sweep sets, with its place in the sweep's file."""
+    paths = {f"--set {override}: ": override.partition("=")[0] for override in job.overrides}
     for line in text.splitlines():
-        start = next((start for start in given if line.startswith(start)), "")
+        start = next((start for start in paths if line.startswith(start)), "")
         unknown = re.search(r":\d+: (\S+): unknown key", line)
         if start:
-            yield f"{sweep.place(given[start])}: {line.removeprefix(start)}"
-        elif unknown and (path := _below(unknown[1], given.values())):
+            yield f"{sweep.place(paths[start])}: {line.removeprefix(start)}"
+        elif unknown and (path := _below(unknown[1], paths.values())):
             yield f"{sweep.place(path)}: {line[unknown.start(1) :]}"
         else:
             yield line
@@ -137,18 +137,18 @@ def _run(
 
 
 def _write_summary(sweep: Sweep, rows: list[Row], out: Path) -> None:
-    found = columns_of(rows)
+    columns = columns_of(rows)
     summary = {
         "title": _title(sweep, rows),
         "case": os.path.relpath(sweep.file.case, out),
         "design": sweep.file.design,
-        "varied": [own.path for own in varied_in(rows)],
+        "varied": [varied.path for varied in varied_in(rows)],
         "runs": len(rows),
         "failed": {row.run.name: row.finished.error for row in rows if not row.done},
         "found": {
-            name: {"unit": unit_of(name, rows), **told}
-            for name, values in found.items()
-            if (told := spread(values)) is not None
+            name: {"unit": unit_of(name, rows), **statistics}
+            for name, values in columns.items()
+            if (statistics := spread(values)) is not None
         },
         "seconds": round(sum(row.seconds or 0.0 for row in rows), 2),
         "versions": versions(),

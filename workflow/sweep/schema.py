@@ -181,12 +181,12 @@ class LogNormal(Section):
     )
 
 
-def _require_one_unit(section: Section, one: str, other: str) -> None:
-    first, second = getattr(section, one), getattr(section, other)
+def _require_one_unit(section: Section, first_key: str, second_key: str) -> None:
+    first, second = getattr(section, first_key), getattr(section, second_key)
     if first.unit != second.unit:
         raise disagreement(
             f"{shown(second.written)} beside {shown(first.written)}; allowed: the same unit",
-            other,
+            second_key,
         )
 
 
@@ -205,9 +205,9 @@ class Variation(Section):
     @model_validator(mode="after")
     def _one_of_them(self) -> Variation:
         keys = "values", "range", "distribution"
-        given = [key for key in keys if getattr(self, key) is not None]
-        if len(given) != 1:
-            wrong = " and ".join(given) or "nothing"
+        chosen = [key for key in keys if getattr(self, key) is not None]
+        if len(chosen) != 1:
+            wrong = " and ".join(chosen) or "nothing"
             raise disagreement(f"{wrong} given; allowed: exactly one of {', '.join(keys)}")
         texts = [scalar(value) for value in self.values or ()]
         twice = [text for text in texts if texts.count(text) > 1]
@@ -271,10 +271,10 @@ def load_sweep(path: Path) -> Sweep:
 
 def _kind_of(source: Source) -> type[SweepFile]:
     """The kind of file whose section ``vary`` has the entries that this one gives it."""
-    given = source.at(("vary",))
-    names = list(given) if isinstance(given, dict) else []
-    one: Any = {name: (Variation, entry("values, range or distribution")) for name in names}
-    vary: Any = create_model("Vary", __base__=Section, **one)
+    entries = source.at(("vary",))
+    names = list(entries) if isinstance(entries, dict) else []
+    fields: Any = {name: (Variation, entry("values, range or distribution")) for name in names}
+    vary: Any = create_model("Vary", __base__=Section, **fields)
     return create_model(
         "SweepFile",
         __base__=SweepFile,
@@ -294,14 +294,14 @@ def _disagreements(sweep: Sweep) -> Iterator[str]:
         needed = "missing" if file.samples is None else f"not for design: {file.design}"
         yield f"{place(('samples',))[1]}: samples: {needed}; allowed: with design: sample"
     if file.design != "sample":
-        for name, own in varied.items():
-            yield from _without_sample(sweep, name, own)
+        for name, variation in varied.items():
+            yield from _without_sample(sweep, name, variation)
 
 
-def _without_sample(sweep: Sweep, name: str, own: Variation) -> Iterator[str]:
+def _without_sample(sweep: Sweep, name: str, variation: Variation) -> Iterator[str]:
     """What a variation lacks where values are combined, not drawn."""
     where = f"{sweep.place(name)}"
-    if own.distribution is not None:
+    if variation.distribution is not None:
         yield f"{where}: a distribution in design: {sweep.file.design}; allowed: design: sample"
-    elif own.range is not None and own.range.count is None:
+    elif variation.range is not None and variation.range.count is None:
         yield f"{where}.range.count: missing; allowed: number of values, such as 5"

@@ -17,7 +17,7 @@ from workflow.sweep.design import Run
 from workflow.sweep.schema import Amount, amount_of
 
 DONE, FAILED = "done", "failed"
-# What wear runs tell of an interface, and the units of it.
+# What wear runs report of an interface, with units.
 WEAR_UNITS = {
     "depth": "mm",
     "depth_1": "mm",
@@ -29,14 +29,14 @@ WEAR_UNITS = {
     "peak_pressure.unworn": "MPa",
     "peak_pressure.worn": "MPa",
 }
-# Of other kinds of run every number is told but these; of the states of a path the last alone.
-UNTOLD = ("seconds", "versions")
+# Of other kinds of run every number is a column but these; of the states of a path the last.
+LEFT_OUT = ("seconds", "versions")
 PATH = "states"
 
 
 @dataclass(frozen=True)
 class Row:
-    """One run: what it was given, how it ended, and what it found."""
+    """One run: its values of what varies, how it ended, and its results."""
 
     run: Run
     finished: Finished
@@ -48,12 +48,12 @@ class Row:
 
     @property
     def seconds(self) -> float | None:
-        """Its own, of all its stages."""
+        """Of all stages of the run."""
         summary = self.finished.summary
         return None if summary is None else round(sum(summary["seconds"].values()), 2)
 
     def numbers(self) -> dict[str, float]:
-        """What it found, by path in its summary."""
+        """Results by path in the summary."""
         summary = self.finished.summary
         if summary is None:
             return {}
@@ -67,14 +67,16 @@ def interfaces_of(summary: Mapping[str, Any]) -> list[str]:
 
 def _wear_numbers(summary: dict[str, Any]) -> dict[str, float]:
     """The end of a wear run; depth and volume are those of both bodies together."""
-    found: dict[str, float] = {"cycles": summary["cycles"], "jumps": summary["jumps"]}
+    results: dict[str, float] = {"cycles": summary["cycles"], "jumps": summary["jumps"]}
     for name in interfaces_of(summary):
-        own = summary[name]
-        numbers = {key: own[key] for key in WEAR_UNITS if key in own}
-        numbers |= {key: own[f"{key}_1"] + own[f"{key}_2"] for key in ("depth", "volume")}
-        numbers |= {f"peak_pressure.{when}": p for when, p in own["peak_pressure"].items()}
-        found |= {f"{name}.{key}": numbers[key] for key in WEAR_UNITS}
-    return found | dict(_numbers(summary.get("work", {}), "work."))
+        interface = summary[name]
+        numbers = {key: interface[key] for key in WEAR_UNITS if key in interface}
+        numbers |= {
+            key: interface[f"{key}_1"] + interface[f"{key}_2"] for key in ("depth", "volume")
+        }
+        numbers |= {f"peak_pressure.{when}": p for when, p in interface["peak_pressure"].items()}
+        results |= {f"{name}.{key}": numbers[key] for key in WEAR_UNITS}
+    return results | dict(_numbers(summary.get("work", {}), "work."))
 
 
 def _numbers(node: Any, path: str = "") -> Iterator[tuple[str, float]]:
@@ -83,7 +85,7 @@ def _numbers(node: Any, path: str = "") -> Iterator[tuple[str, float]]:
         for key, value in node.items():
             if not path and key == PATH and value:
                 yield from _numbers(value[-1], f"{PATH}.-1.")
-            elif path or key not in UNTOLD:
+            elif path or key not in LEFT_OUT:
                 yield from _numbers(value, f"{path}{key}.")
     elif isinstance(node, list):
         for index, value in enumerate(node):
@@ -119,7 +121,7 @@ def varied_in(rows: Sequence[Row]) -> list[Varied]:
 
 
 def _varied(path: str, values: list[Any]) -> Varied:
-    amounts = [found for value in values if (found := amount_of(value)) is not None]
+    amounts = [amount for value in values if (amount := amount_of(value)) is not None]
     if len(amounts) < len(values):
         return Varied(path, "", [_text(value) for value in values], None)
     unit = amounts[0].unit
@@ -139,11 +141,11 @@ def _text(value: object) -> str:
 
 
 def columns_of(rows: Sequence[Row]) -> dict[str, Array]:
-    """All that the runs found ``(runs,)``, by path; NaN where a run has not found it."""
-    found = [row.numbers() for row in rows]
-    names = dict.fromkeys(name for numbers in found for name in numbers)
+    """All results of the runs ``(runs,)``, by path; NaN where a run has none."""
+    by_run = [row.numbers() for row in rows]
+    names = dict.fromkeys(name for numbers in by_run for name in numbers)
     return {
-        name: np.array([numbers.get(name, np.nan) for numbers in found], dtype=np.float64)
+        name: np.array([numbers.get(name, np.nan) for numbers in by_run], dtype=np.float64)
         for name in names
     }
 
@@ -159,7 +161,7 @@ def unit_of(name: str, rows: Sequence[Row]) -> str:
 
 
 def write_sweep_table(rows: Sequence[Row], path: Path) -> None:
-    """Write the table as CSV: name, what varies, how the run ended, and what it found.
+    """Write the table as CSV: name, what varies, how the run ended, and its results.
 
     Numbers are in base units, with all their digits; cells of a run that failed are empty.
     """
@@ -171,7 +173,7 @@ def write_sweep_table(rows: Sequence[Row], path: Path) -> None:
         "seconds": [row.seconds for row in rows],
     }
     for name, column in columns_of(rows).items():
-        columns[heading(name, unit_of(name, rows))] = [_cell(own) for own in column.tolist()]
+        columns[heading(name, unit_of(name, rows))] = [_cell(number) for number in column.tolist()]
     write_table(path, columns)
 
 
@@ -182,14 +184,14 @@ def _heading(varied: Varied) -> str:
 
 
 def _cell(number: float) -> float | None:
-    """The number, whole if it can be; None for one that a run has not found."""
+    """The number, whole if it can be; None for one that a run does not have."""
     if np.isnan(number):
         return None
     return int(number) if number.is_integer() and abs(number) < 1e15 else number
 
 
 def spread(values: Array) -> dict[str, float] | None:
-    """How values spread over the runs; None where no run has found one."""
+    """How values spread over the runs; None where no run has one."""
     known = values[np.isfinite(values)]
     if not known.size:
         return None

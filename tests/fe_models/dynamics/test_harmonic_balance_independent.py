@@ -195,7 +195,7 @@ def test_jenkins_rig_is_the_fixed_point_of_event_driven_integration(
     assert solution.cycle.dissipated[0] == pytest.approx(lost, rel=WANTED)
 
 
-@pytest.mark.parametrize("ratio", [0.001, 0.02])
+@pytest.mark.parametrize("ratio", [pytest.param(0.001, marks=pytest.mark.slow), 0.02])
 def test_error_falls_with_the_third_power_of_the_harmonics(ratio):
     """The slope of the joint's force jumps where it begins to slip, and its harmonics fall as k⁻².
 
@@ -216,7 +216,7 @@ def test_error_falls_with_the_third_power_of_the_harmonics(ratio):
     assert np.all(np.divide(errors, estimates) < 10.0)
 
 
-@pytest.mark.parametrize("ratio", [0.001, 0.02])
+@pytest.mark.parametrize("ratio", [pytest.param(0.001, marks=pytest.mark.slow), 0.02])
 def test_jenkins_rig_is_the_fixed_point_of_newmark(ratio):
     """Second order in the step: what is left after extrapolation is below 1e-4."""
     model = rig(ratio)

@@ -1,7 +1,7 @@
 """A contact case: two bodies without a structure, pressed and sheared along a path of loads.
 
-A line contact, in plane strain, differs in the dimensions of its loads and its grid: a case of its
-own, though both are written ``analysis: contact``.
+A line contact, in plane strain, differs in the dimensions of its loads and its grid: a separate
+kind of case, though both are written ``analysis: contact``.
 """
 
 from __future__ import annotations
@@ -236,10 +236,10 @@ class LineContactPath(Section):
 
 
 def _check_path(legs: tuple[LegT, ...], file: str | None, model: type[LegT]) -> None:
-    """Raise unless the path is given once, presses, and no two entries fight."""
+    """Raise unless the path is given once, presses, and no two entries conflict."""
     if (file is None) == (not legs):
-        given = "both given" if legs else "neither given"
-        raise disagreement(f"{given}; allowed: either legs or file", "file" if legs else "legs")
+        problem = "both given" if legs else "neither given"
+        raise disagreement(f"{problem}; allowed: either legs or file", "file" if legs else "legs")
     if file is not None:
         try:
             named = list(_table(legs, file, model).columns)
@@ -396,17 +396,17 @@ def _outline(case: ContactCase | LineContactCase, kind: str, cells: str) -> list
     ]
 
 
-def touches_along_a_line(source: Source, either: tuple[str, ...]) -> bool:
-    """Whether two bodies touch along a line: by their shape, or one that may be ``either``.
+def touches_along_a_line(source: Source, ambiguous: tuple[str, ...]) -> bool:
+    """Whether two bodies touch along a line: by shape; ``ambiguous`` shapes may be both.
 
     Heights and flats know no dimension: a grid of one size is that of a line contact. Raises
     CaseError where the shape is none of them.
     """
     if source.at(("structure", "kind")) != "bodies":
         return False
-    shape = word_at(source, ("structure", "shape"), (*AREA_SHAPES, *LINE_SHAPES, *either))
+    shape = word_at(source, ("structure", "shape"), (*AREA_SHAPES, *LINE_SHAPES, *ambiguous))
     one_size = isinstance(source.at(("contact", "size")), str | int | float)
-    return one_size if shape in either else shape in LINE_SHAPES
+    return one_size if shape in ambiguous else shape in LINE_SHAPES
 
 
 def _require_elastic(materials: BodyMaterials, loads: LoadTable) -> None:

@@ -159,8 +159,8 @@ def _last_cycle(friction: float, table: LoadTable, history: History) -> tuple[in
     return None
 
 
-def _shear_change(friction: float, one: ContactState, other: ContactState) -> float:
+def _shear_change(friction: float, before: ContactState, after: ContactState) -> float:
     """Largest change of shear over µ times the peak pressure."""
-    limit = friction * float(one.traction[2].max())
-    change = np.hypot(*(other.traction[:2] - one.traction[:2])).max()
+    limit = friction * float(before.traction[2].max())
+    change = np.hypot(*(after.traction[:2] - before.traction[:2])).max()
     return float(change / limit) if limit > 0.0 else 0.0

@@ -33,14 +33,14 @@ RECORDED = {
 
 
 class Drive(Section):
-    """A displacement to and fro that is imposed on the joint."""
+    """An alternating displacement imposed on the joint."""
 
     stroke: Length = entry("of the joint, peak to peak [mm]", "14 um")
     frequency: Frequency = entry("of the cycles [Hz]", "100 Hz")
 
 
 class Harmonic(Section):
-    """A force f sin(2π frequency t), until the answer repeats itself."""
+    """A force f sin(2π frequency t), until the response is periodic."""
 
     kind: Literal["harmonic"] = entry("harmonic, hammer or recorded", "harmonic")
     mass: MassNumber | None = entry(
@@ -59,7 +59,7 @@ class Harmonic(Section):
 
 
 class Hammer(Section):
-    """A blow: half a sine of force, and the answer to it."""
+    """A hammer blow: half a sine of force, and the response to it."""
 
     kind: Literal["hammer"] = entry("half a sine of force", "hammer")
     mass: MassNumber | None = entry(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 import numpy as np
 
 from fe_models.dynamics.friction_rig import friction_rig
@@ -14,8 +12,8 @@ from workflow.analyses.rig.structure import FrictionRig
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
 from workflow.analyses.specimens.model import SpecimensModel
-from workflow.case.loading import load_case
-from workflow.errors import CaseError, UserError
+from workflow.case.loading import load_named
+from workflow.errors import UserError
 from workflow.shell.reporter import Reporter
 
 # What is looked at: displacements of the model, the last first of all.
@@ -27,7 +25,7 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
 
     Raises UserError for a file that is no case of specimens, or one that cannot be meshed.
     """
-    specimens = _specimens(rig.specimens)
+    specimens = load_named("structure.specimens", rig.specimens, [SpecimensCase], "specimens")
     bodies = SpecimensModel(specimens, rig.target_distance)
     try:
         with reporter.stage("reduction"):
@@ -55,10 +53,3 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
         gap=face.gap,
         area=face.nodal_areas,
     )
-
-
-def _specimens(file: str) -> SpecimensCase:
-    try:
-        return load_case(Path(file), [SpecimensCase])
-    except CaseError as error:
-        raise UserError(f"structure.specimens: {error}") from error

@@ -16,8 +16,8 @@ from workflow.analyses.rig.structure import Against, JointPlaces, Moved, Reduced
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
 from workflow.analyses.specimens.model import SpecimensModel
-from workflow.case.loading import load_case
-from workflow.errors import CaseError, UserError
+from workflow.case.loading import load_named
+from workflow.errors import UserError
 from workflow.shell.reporter import Reporter
 
 AXES = "xyz"
@@ -33,8 +33,8 @@ def reduced_rig_model(body: ReducedBody, directions: int, reporter: Reporter) ->
     points = _Points(reduced)
     joints = [
         joint
-        for number, own in enumerate(body.joints)
-        for joint in points.joints(own, directions, f"joints.{number}")
+        for number, places in enumerate(body.joints)
+        for joint in points.joints(places, directions, f"joints.{number}")
     ]
     try:
         model = reduced_rig(
@@ -46,8 +46,10 @@ def reduced_rig_model(body: ReducedBody, directions: int, reporter: Reporter) ->
             body.damping_ratio,
         )
         driven, seen = (
-            np.sum([share * unit_force(model, name) for name, share in points.shared(own, key)], 0)
-            for own, key in ((body.driven, "driven"), (body.seen, "seen"))
+            np.sum(
+                [share * unit_force(model, name) for name, share in points.shared(moved, key)], 0
+            )
+            for moved, key in ((body.driven, "driven"), (body.seen, "seen"))
         )
     except RigError as error:
         raise UserError(f"structure: {error}") from error
@@ -79,19 +81,16 @@ def _reduced_body(body: ReducedBody, reporter: Reporter) -> ReducedModel:
             return load_reduced(Path(body.file))
         except (OSError, ValueError) as error:
             raise UserError(f"structure.file: {error}") from error
-    try:
-        case = load_case(Path(body.file), [SpecimensCase])
-    except CaseError as error:
-        raise UserError(f"structure.file: {error}") from error
+    case = load_named("structure.file", body.file, [SpecimensCase], "specimens")
     model = SpecimensModel(case)
     try:
         memory(case, model.node_count()).check()
-        found = model.reduction.models[body.body - 1]
+        reduced = model.reduction.models[body.body - 1]
     except MeshError as error:
         raise UserError(f"structure.file: {body.file}: {error}") from error
     if model.from_cache:
         reporter.log("reduction: from the cache")
-    return found
+    return reduced
 
 
 # --- its points ---------------------------------------------------------------------------------
@@ -114,65 +113,65 @@ class _Points:
         """The point of that name, or all of that kind."""
         if wanted in self._points:
             return [wanted]
-        found = [point for point in self._points if _kind(point) == wanted]
-        if not found:
+        matching = [point for point in self._points if _kind(point) == wanted]
+        if not matching:
             kinds = Counter(map(_kind, self._points))
             known = [f"{kind}, {kind} 1 to {kind} {count}" for kind, count in kinds.items() if kind]
             known += [point for point in self._points if not _kind(point)]
             raise UserError(
                 f"structure.{key}: '{wanted}': no such point; allowed: {', '.join(known)}"
             )
-        return found
+        return matching
 
-    def pairs(self, own: Against, key: str) -> list[tuple[str, str | None]]:
+    def pairs(self, connection: Against, key: str) -> list[tuple[str, str | None]]:
         """Each point and that against which it moves, None for the ground."""
-        points = self.of(own.points, f"{key}.points")
-        if own.against is None:
+        points = self.of(connection.points, f"{key}.points")
+        if connection.against is None:
             return [(point, None) for point in points]
-        others = self.of(own.against, f"{key}.against")
-        if len(others) == 1:
-            others *= len(points)
-        if len(others) != len(points):
+        opposites = self.of(connection.against, f"{key}.against")
+        if len(opposites) == 1:
+            opposites *= len(points)
+        if len(opposites) != len(points):
             raise UserError(
-                f"structure.{key}.against: {len(others)} points for {len(points)}; allowed: as "
+                f"structure.{key}.against: {len(opposites)} points for {len(points)}; allowed: as "
                 "many, or one"
             )
-        pairs = list(zip(points, others, strict=True))
-        for point, other in pairs:
-            if point == other:
+        pairs = list(zip(points, opposites, strict=True))
+        for point, opposite in pairs:
+            if point == opposite:
                 raise UserError(f"structure.{key}.against: {point} against itself; allowed: others")
-        return [(point, other) for point, other in pairs]
+        return [(point, opposite) for point, opposite in pairs]
 
-    def joints(self, own: JointPlaces, directions: int, key: str) -> Iterator[list[Link]]:
+    def joints(self, places: JointPlaces, directions: int, key: str) -> Iterator[list[Link]]:
         """The links of every joint: that along its direction; three with it as the last."""
-        across = _across(own.direction) if directions > 1 else []
-        for point, other in self.pairs(own, key):
-            yield [_link(point, other, axis) for axis in (*across, own.direction)]
+        across = _across(places.direction) if directions > 1 else []
+        for point, opposite in self.pairs(places, key):
+            yield [_link(point, opposite, axis) for axis in (*across, places.direction)]
 
     def masses(self, body: ReducedBody) -> dict[str, float]:
         """Masses added to displacements [t]."""
         added: defaultdict[str, float] = defaultdict(float)
-        for number, own in enumerate(body.masses):
-            points = self.of(own.points, f"masses.{number}.points")
+        for number, point_mass in enumerate(body.masses):
+            points = self.of(point_mass.points, f"masses.{number}.points")
             for name in self.names:
                 if name.rpartition(" ")[0] in points:
-                    added[name] += own.mass / len(points)
+                    added[name] += point_mass.mass / len(points)
         return added
 
     def springs(self, body: ReducedBody) -> dict[Link, float]:
         """Springs added between displacements [N/mm]."""
         added: defaultdict[Link, float] = defaultdict(float)
-        for number, own in enumerate(body.springs):
-            pairs = self.pairs(own, f"springs.{number}")
-            for point, other in pairs:
-                added[_link(point, other, own.direction)] += own.stiffness / len(pairs)
+        for number, spring in enumerate(body.springs):
+            pairs = self.pairs(spring, f"springs.{number}")
+            for point, opposite in pairs:
+                added[_link(point, opposite, spring.direction)] += spring.stiffness / len(pairs)
         return added
 
-    def shared(self, own: Moved, key: str) -> list[tuple[str, float]]:
+    def shared(self, moved: Moved, key: str) -> list[tuple[str, float]]:
         """Displacements along a direction, and the even share of each with its sign."""
-        points = self.of(own.points, f"{key}.points")
-        sign = -1.0 if own.direction.startswith("-") else 1.0
-        return [(f"{point} {own.direction[-1]}", sign / len(points)) for point in points]
+        points = self.of(moved.points, f"{key}.points")
+        sign = -1.0 if moved.direction.startswith("-") else 1.0
+        return [(f"{point} {moved.direction[-1]}", sign / len(points)) for point in points]
 
 
 def _kind(point: str) -> str:
@@ -181,8 +180,8 @@ def _kind(point: str) -> str:
     return kind if number.isdecimal() else ""
 
 
-def _link(point: str, other: str | None, direction: str) -> Link:
+def _link(point: str, opposite: str | None, direction: str) -> Link:
     """What stretches when a point moves in a direction, from another or the ground."""
     axis = direction[-1]
-    ends = f"{point} {axis}", None if other is None else f"{other} {axis}"
+    ends = f"{point} {axis}", None if opposite is None else f"{opposite} {axis}"
     return Link(*reversed(ends)) if direction.startswith("-") else Link(*ends)

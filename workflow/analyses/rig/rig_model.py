@@ -17,7 +17,7 @@ from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from workflow.analyses.rig.laws import Law
 
-# Natural frequencies that are told, from the lowest on: those of a row of masses, all.
+# Natural frequencies that are reported, from the lowest on: those of a row of masses, all.
 MOST_FREQUENCIES = 20
 
 
@@ -69,7 +69,7 @@ class RigModel:
         force = law.respond(law.rest(self.joints), self.still).force
         return np.asarray(force.ravel() @ self.model.connection)
 
-    def shaken(self, law: Law, force: ExcitationForce) -> CombinedForces:
+    def with_preload(self, law: Law, force: ExcitationForce) -> CombinedForces:
         """An excitation, with the static load that balances the joints at rest."""
         preload = self.preload(law)
         if not preload.any():
@@ -142,5 +142,5 @@ class RigModel:
 
 
 def _lowest(frequencies: Array) -> list[float]:
-    found: list[float] = frequencies[:MOST_FREQUENCIES].tolist()
-    return found
+    lowest: list[float] = frequencies[:MOST_FREQUENCIES].tolist()
+    return lowest

@@ -122,12 +122,12 @@ class ReducedBody(Section):
     @property
     def text(self) -> str:
         """The structure in a few words."""
-        places = ", ".join(own.points for own in self.joints)
+        places = ", ".join(joint.points for joint in self.joints)
         return f"reduced body of {Path(self.file).name}, joints at {places}"
 
 
 class FrictionRig(Section):
-    """Two masses in a row, and the specimens that rub between the second mass and the ground."""
+    """Two masses in a row, and the specimens in contact between the second mass and the ground."""
 
     kind: Literal["friction_rig"] = entry("two reduced specimens in a rig", "friction_rig")
     specimens: Annotated[str, File((".yaml",))] = entry(

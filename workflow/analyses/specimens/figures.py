@@ -17,10 +17,10 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-# As many normal forces as have a panel or a colour of their own.
+# As many normal forces as have a separate panel or colour.
 MOST_LOADS = 4
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
-MICRO = 1e3  # mm to µm, N/mm to N/µm the other way round
+MICRO = 1e3  # mm to µm; its inverse N/mm to N/µm
 SHAPES = "unworn", "worn"
 
 
@@ -141,13 +141,13 @@ def _loops_title(loads: list[h5py.Group]) -> str:
         [float(_states(load)[place]["secant_stiffness"][()]) / MICRO for load in loads]
         for place in (0, -1)
     ]
-    unworn, worn = (_range(own) for own in slopes)
+    unworn, worn = (_range(values) for values in slopes)
     return f"Slope to half the largest force: unworn {unworn}, worn {worn} N/µm"
 
 
 def _range(values: list[float]) -> str:
     """Smallest and largest in three digits, once where they are the same."""
-    low, high = (f"{own:.3g}" for own in (min(values), max(values)))
+    low, high = (f"{value:.3g}" for value in (min(values), max(values)))
     return low if low == high else f"{low} to {high}"
 
 
@@ -189,7 +189,7 @@ def kinetics(file: h5py.File) -> Figure:
 
 def _kinetics_title(loads: list[h5py.Group]) -> str:
     values = [load["kinetics/stick_stiffness"][()] / MICRO for load in loads]
-    stuck = [[float(own[place]) for own in values] for place in (0, -1)]
+    stuck = [[float(stiffness[place]) for stiffness in values] for place in (0, -1)]
     unworn, worn = map(_range, stuck)
     return f"Stiffness of the stuck pair: unworn {unworn}, worn {worn} N/µm"
 
@@ -239,7 +239,7 @@ def _draw_profile(
     axis: Axes, file: h5py.File, state: h5py.Group, beside: h5py.Group, name: str
 ) -> None:
     """Cells next to y = 0 of the half-space, nodes on it of the reduced model."""
-    (grid,) = (grid_of(own) for own in file["grid"].values())
+    (grid,) = (grid_of(group) for group in file["grid"].values())
     place = file["specimens/pad/coordinates"][()]
     row = near_middle(place, 0)
     order = np.argsort(place[row, 0])

@@ -1,4 +1,4 @@
-"""Figures of a case in time: loops, what wear makes of the joint, and how the rig answers."""
+"""Figures of a case in time: loops, what wear makes of the joint, and how the rig responds."""
 
 from __future__ import annotations
 
@@ -187,16 +187,19 @@ def frequency_response(file: h5py.File) -> Figure:
     shown = _states(file, RESPONSE)
     figure = new_figure(_response_title(shown), 8.5)
     top, bottom = figure.subplots(2, 1)
-    first = max(_first(own, "frequency") for _, _, own in shown)
-    for label, colour, own in shown:
-        frequency, magnitude = _column(own, "frequency"), TO_METRES * _column(own, "magnitude")
+    first = max(_first(response, "frequency") for _, _, response in shown)
+    for label, colour, response in shown:
+        frequency, magnitude = (
+            _column(response, "frequency"),
+            TO_METRES * _column(response, "magnitude"),
+        )
         for axis in (top, bottom):
             axis.semilogy(frequency, magnitude, color=colour, label=label)
     top.set_xlim(0.0, FIRST_MODE * first)
-    lowest = min(_first(own, "frequency") for _, _, own in shown) / FIRST_MODE
-    inside = [_within(own, lowest, FIRST_MODE * first) for _, _, own in shown]
+    lowest = min(_first(response, "frequency") for _, _, response in shown) / FIRST_MODE
+    inside = [_within(response, lowest, FIRST_MODE * first) for _, _, response in shown]
     top.set_ylim(0.5 * min(map(np.min, inside)), 2.0 * max(map(np.max, inside)))
-    bottom.set_xlim(0.0, max(float(_column(own, "frequency")[-1]) for _, _, own in shown))
+    bottom.set_xlim(0.0, max(float(_column(response, "frequency")[-1]) for _, _, response in shown))
     top.set_title("first mode")
     bottom.set_title("all that was recorded")
     bottom.set_xlabel("frequency [Hz]")
@@ -206,20 +209,20 @@ def frequency_response(file: h5py.File) -> Figure:
     return figure
 
 
-def _within(own: h5py.Group, lowest: float, highest: float) -> Array:
+def _within(response: h5py.Group, lowest: float, highest: float) -> Array:
     """Magnitudes between two frequencies."""
-    frequency = _column(own, "frequency")
-    return TO_METRES * _column(own, "magnitude")[(frequency > lowest) & (frequency < highest)]
+    frequency = _column(response, "frequency")
+    return TO_METRES * _column(response, "magnitude")[(frequency > lowest) & (frequency < highest)]
 
 
-def _first(own: h5py.Group, name: str) -> float:
+def _first(response: h5py.Group, name: str) -> float:
     """Frequency or peak of the first resonance."""
-    return float(own.parent.attrs[f"first_{name}"])
+    return float(response.parent.attrs[f"first_{name}"])
 
 
 def _response_title(shown: list[tuple[str, Any, h5py.Group]]) -> str:
-    peaks = [_first(own, "frequency") for _, _, own in shown]
-    heights = [TO_METRES * _first(own, "peak") for _, _, own in shown]
+    peaks = [_first(response, "frequency") for _, _, response in shown]
+    heights = [TO_METRES * _first(response, "peak") for _, _, response in shown]
     if len(shown) == 1:
         return f"First mode at {peaks[0]:.4g} Hz"
     return (
@@ -235,14 +238,14 @@ def ring_down(file: h5py.File) -> Figure:
     top, bottom = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.3))[:, 0]
     history = top.subplots()
     left, right = bottom.subplots(1, 2)
-    for label, colour, own in shown:
-        moved = own.parent[MOTION]
-        stuck = float(own.parent.attrs["stuck"][0])
+    for label, colour, envelope in shown:
+        moved = envelope.parent[MOTION]
+        stuck = float(envelope.parent.attrs["stuck"][0])
         _draw_history(history, moved, colour, f"{label}: stuck {stuck:.4g} Hz")
-        amplitude = TO_MICRONS * _column(own, "amplitude")
-        softened = 100.0 * (_column(own, "frequency") / stuck - 1.0)
+        amplitude = TO_MICRONS * _column(envelope, "amplitude")
+        softened = 100.0 * (_column(envelope, "frequency") / stuck - 1.0)
         left.semilogx(amplitude, softened, color=colour)
-        right.loglog(amplitude, 100.0 * np.abs(_column(own, "damping_ratio")), color=colour)
+        right.loglog(amplitude, 100.0 * np.abs(_column(envelope, "damping_ratio")), color=colour)
     history.set_xlabel("time [s]")
     history.set_ylabel(f"displacement of {_seen(file)} [µm]")
     history.legend(loc="upper right", title="dissipated so far")
@@ -276,15 +279,15 @@ def motion(file: h5py.File) -> Figure:
     shown = _states(file, MOTION)
     figure = new_figure("Motion of the rig under its excitation", 9.0)
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
-    longest = max(_faded(own) for _, _, own in shown)
-    for label, colour, own in shown:
+    longest = max(_faded(history) for _, _, history in shown)
+    for label, colour, history in shown:
         every = max(1, longest // MOST_POINTS)
-        time = _column(own, "time")[:longest:every]
+        time = _column(history, "time")[:longest:every]
         look = {"color": colour, "label": label, "linewidth": 1.0}
         if label == shown[0][0]:
-            top.plot(time, own["excitation"][:longest:every], color=BLACK, linewidth=1.0)
-        middle.plot(time, TO_MICRONS * own["displacement"][:longest:every, -1], **look)
-        bottom.plot(time, own["dissipated"][:longest:every], **look)
+            top.plot(time, history["excitation"][:longest:every], color=BLACK, linewidth=1.0)
+        middle.plot(time, TO_MICRONS * history["displacement"][:longest:every, -1], **look)
+        bottom.plot(time, history["dissipated"][:longest:every], **look)
     top.set_ylabel("excitation [N]")
     middle.set_ylabel(f"displacement of {_seen(file)} [µm]")
     bottom.set_ylabel("dissipated by the joint [mJ]")

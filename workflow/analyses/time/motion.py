@@ -35,7 +35,7 @@ def motion_of(
     Raises MethodFailed for one that was not found to its end.
     """
     law = joint.at(energy)
-    motion = integrate(rig.model, law, rig.shaken(law, force), duration, control, start)
+    motion = integrate(rig.model, law, rig.with_preload(law, force), duration, control, start)
     if not motion.converged:
         raise MethodFailed(f"motion at {joules(energy)}: {motion.message}")
     return motion

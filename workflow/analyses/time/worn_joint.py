@@ -10,8 +10,8 @@ from workflow.analyses import wear
 from workflow.analyses.time.case import JointCase, RigCase
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.loop_table import read_loop_table
-from workflow.case.loading import load_case
-from workflow.errors import CaseError, UserError
+from workflow.case.loading import load_named
+from workflow.errors import UserError
 from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
@@ -75,10 +75,8 @@ def warn_of_table(case: JointCase | RigCase, last: float, reporter: Reporter) ->
 
 def _check(file: str) -> None:
     """Refuse a file that is no wear case, or one without loops."""
-    try:
-        case: WearCase = load_case(Path(file), list(wear.ANALYSIS.cases.values()))
-    except CaseError as error:
-        raise UserError(f"evolution.file: {error}") from error
+    kinds = list(wear.ANALYSIS.cases.values())
+    case: WearCase = load_named("evolution.file", file, kinds, "wear with loops")
     if not case.loops.wanted:
         raise UserError(
             f"evolution.file: {file} leaves no table of loops; allowed: a wear case with "

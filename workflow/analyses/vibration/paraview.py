@@ -3,7 +3,7 @@
 ``cycle_<n>.pvd`` over the time of a cycle [s], every step a mesh of the pad
 (``cycle_<n>/<step>.vtu``) with its fields at the nodes. Vectors are those of the interface frame:
 body 2 relative to body 1, and the force of body 1 on body 2. Warp By Vector on ``vibration``,
-``displacement`` less its mean over the cycle, lets the pad shake. ``state`` is 0 where a node
+``displacement`` less its mean over the cycle, shows its vibration. ``state`` is 0 where a node
 sticks, 1 where it slips and 2 where it is apart: between the nodes it means nothing, so that it is
 best seen on points or glyphs.
 """
@@ -39,14 +39,16 @@ def write_vibration(file: h5py.File, folder: Path) -> list[Path]:
     if "contact" not in file:
         return written
     for number in sorted(file["responses"]):
-        own = file["responses"][number]
-        if "resonance" in own:
-            written += _write_cycle(file["contact"], own, number, folder)
+        response = file["responses"][number]
+        if "resonance" in response:
+            written += _write_cycle(file["contact"], response, number, folder)
     return written
 
 
-def _write_cycle(contact: h5py.Group, own: h5py.Group, number: str, folder: Path) -> list[Path]:
-    cycle, frequency = own["resonance"], float(own.attrs["resonance"])
+def _write_cycle(
+    contact: h5py.Group, response: h5py.Group, number: str, folder: Path
+) -> list[Path]:
+    cycle, frequency = response["resonance"], float(response.attrs["resonance"])
     count = len(cycle["state"])
     mean = TO_FRAME * cycle["displacement"][()].mean(axis=0)
     steps: list[Step] = []

@@ -63,10 +63,10 @@ def frequency_response(file: h5py.File) -> Figure:
     panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     for axis, place in zip(panels, shown, strict=True):
         for state, colour in _states(file):
-            own = state[f"{RESPONSES}/{place:05d}"]
-            receptance = TO_MICRONS * own["amplitude"][:, -1] / forces[place]
-            label = f"{_cycles(state)}: {own.attrs['resonance']:.4g} Hz"
-            axis.plot(own["frequency"][()], receptance, color=colour, label=label)
+            response = state[f"{RESPONSES}/{place:05d}"]
+            receptance = TO_MICRONS * response["amplitude"][:, -1] / forces[place]
+            label = f"{_cycles(state)}: {response.attrs['resonance']:.4g} Hz"
+            axis.plot(response["frequency"][()], receptance, color=colour, label=label)
         axis.set_yscale("log")
         axis.set_title(f"{forces[place]:g} N")
         axis.set_ylabel("amplitude / force [µm/N]")
@@ -80,33 +80,33 @@ def frequency_response(file: h5py.File) -> Figure:
 
 def evolution(file: h5py.File) -> Figure:
     """Stiffness, resonances, motion and scar against cycles; the unworn contact at the left."""
-    own, forces = file[EVOLUTION], list(file.attrs["forces"])
-    cycles = own["cycles"][()]
+    history, forces = file[EVOLUTION], list(file.attrs["forces"])
+    cycles = history["cycles"][()]
     place = np.append(BEFORE * cycles[1], cycles[1:])
     figure = new_figure(_title(file), 9.0)
     (stiffness, frequency), (motion, depth) = figure.subplots(2, 2, sharex=True)
-    stiffness.plot(place, PER_MICRON * own["stiffness"][()], "o-", color=BLUE)
+    stiffness.plot(place, PER_MICRON * history["stiffness"][()], "o-", color=BLUE)
     stiffness.set_ylabel("stiffness kt while the contact sticks [N/µm]")
-    frequency.plot(place, own["stuck"][:, 0], "k--", label="stuck")
+    frequency.plot(place, history["stuck"][:, 0], "k--", label="stuck")
     for column, colour in zip(_some(len(forces), len(FORCE_COLOURS)), FORCE_COLOURS, strict=False):
         label = f"{forces[column]:g} N"
-        frequency.plot(place, own["resonance"][:, column], "o-", color=colour, label=label)
+        frequency.plot(place, history["resonance"][:, column], "o-", color=colour, label=label)
     frequency.set_ylabel("resonance [Hz]")
     frequency.legend()
     _two(
         motion,
         place,
-        (TO_MICRONS * own["stroke"][()], "stroke under the force that wears [µm]"),
-        (own["energy_per_cycle"][()], "energy per cycle [mJ]"),
+        (TO_MICRONS * history["stroke"][()], "stroke under the force that wears [µm]"),
+        (history["energy_per_cycle"][()], "energy per cycle [mJ]"),
     )
     touching = ("area", "area in contact [mm²]")
-    if "touching" in own:
+    if "touching" in history:
         touching = ("touching", "nodes in contact")
     _two(
         depth,
         place,
-        (TO_MICRONS * own["depth"][()], "largest worn depth [µm]"),
-        (own[touching[0]][()], touching[1]),
+        (TO_MICRONS * history["depth"][()], "largest worn depth [µm]"),
+        (history[touching[0]][()], touching[1]),
     )
     for axis in (motion, depth):
         axis.set_xscale("log")
@@ -121,11 +121,11 @@ def scar(file: h5py.File) -> Figure:
     figure = new_figure(_title(file), 9.0)
     depth, pressure, energy = figure.subplots(3, 1, sharex=True)
     for state, colour in _states(file):
-        own, label = state[CONTACT], _cycles(state)
-        worn = TO_MICRONS * (own["depth_1"][:, middle] + own["depth_2"][:, middle])
+        contact, label = state[CONTACT], _cycles(state)
+        worn = TO_MICRONS * (contact["depth_1"][:, middle] + contact["depth_2"][:, middle])
         depth.plot(along, worn, color=colour, label=label)
-        pressure.plot(along, own["pressure"][:, middle], color=colour)
-        energy.plot(along, own["energy"][:, middle], color=colour)
+        pressure.plot(along, contact["pressure"][:, middle], color=colour)
+        energy.plot(along, contact["energy"][:, middle], color=colour)
     depth.invert_yaxis()
     depth.set_ylabel("worn depth [µm]")
     depth.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="cycles")
@@ -172,18 +172,20 @@ def _sections(x: Array, y: Array) -> list[tuple[Array, Indices, str]]:
 
 
 def loops(file: h5py.File) -> Figure:
-    """Loops under the force that wears; of a half-space also its own of the same stroke."""
+    """Loops under the force that wears; of a half-space also that of the tangential problem."""
     figure = new_figure(_title(file), 7.0)
     axis: Any = figure.subplots()
     for state, colour in _states(file):
-        own = state[LOOP]
+        loop = state[LOOP]
         label = f"{_cycles(state)}: {state.attrs['energy_per_cycle']:.4g} mJ"
-        axis.plot(TO_MICRONS * own["displacement"][()], own["force"][()], color=colour, label=label)
+        axis.plot(
+            TO_MICRONS * loop["displacement"][()], loop["force"][()], color=colour, label=label
+        )
         if HALF_SPACE not in state:
             continue
-        other = state[HALF_SPACE]
-        moved = TO_MICRONS * other["displacement"][()]
-        axis.plot(moved, other["force"][()], "o", color=colour, markersize=3)
+        half_space = state[HALF_SPACE]
+        moved = TO_MICRONS * half_space["displacement"][()]
+        axis.plot(moved, half_space["force"][()], "o", color=colour, markersize=3)
     between = "between the targets" if PLACES in file else "of the joint"
     axis.set_xlabel(f"displacement {between} [µm]")
     points = "" if PLACES in file else "; points: whole tangential problem"
@@ -194,11 +196,11 @@ def loops(file: h5py.File) -> Figure:
 
 def _two(axis: Axes, place: Array, first: tuple[Array, str], second: tuple[Array, str]) -> None:
     """Two curves on one panel, each on its own scale."""
-    other = axis.twinx()
-    for own, (values, label), colour in ((axis, first, BLUE), (other, second, ORANGE)):
-        own.plot(place, values, "o-", color=colour)
-        own.set_ylabel(label, color=colour)
-    other.grid(visible=False)
+    right = axis.twinx()
+    for side, (values, label), colour in ((axis, first, BLUE), (right, second, ORANGE)):
+        side.plot(place, values, "o-", color=colour)
+        side.set_ylabel(label, color=colour)
+    right.grid(visible=False)
 
 
 def _states(file: h5py.File) -> list[tuple[h5py.Group, Any]]:
@@ -208,7 +210,7 @@ def _states(file: h5py.File) -> list[tuple[h5py.Group, Any]]:
     names = spread(sorted(file[WORN]), MOST_STATES)
     shades = np.linspace(0.0, 0.9, len(names))
     colours = [colormaps[STATE_COLOURS](shade) for shade in shades]
-    return [(file[WORN][name], own) for name, own in zip(names, colours, strict=True)]
+    return [(file[WORN][name], colour) for name, colour in zip(names, colours, strict=True)]
 
 
 def _some(count: int, most: int) -> list[int]:
@@ -222,9 +224,9 @@ def _cycles(state: h5py.Group) -> str:
 
 
 def _title(file: h5py.File) -> str:
-    own = file[EVOLUTION]
-    stiffness, stuck = PER_MICRON * own["stiffness"][()], own["stuck"][:, 0]
+    history = file[EVOLUTION]
+    stiffness, stuck = PER_MICRON * history["stiffness"][()], history["stuck"][:, 0]
     return (
         f"kt {stiffness[0]:.4g} to {stiffness[-1]:.4g} N/µm and stuck {stuck[0]:.4g} to "
-        f"{stuck[-1]:.4g} Hz after {TO_JOULES * own['energy'][-1]:.4g} J"
+        f"{stuck[-1]:.4g} Hz after {TO_JOULES * history['energy'][-1]:.4g} J"
     )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -24,7 +23,7 @@ from workflow.analyses.vibration_wear.outcome import (
 )
 from workflow.analyses.vibration_wear.pad_wear_steps import PadState, worn_until
 from workflow.analyses.vibration_wear.pads import RubbedPads, WearingPads
-from workflow.case.loading import load_case
+from workflow.case.loading import load_named
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
@@ -57,7 +56,8 @@ def wear_specimens(case: FrictionRigWearCase, reporter: Reporter) -> VibrationWe
 
 def _coefficients(case: FrictionRigWearCase) -> tuple[float, float]:
     """Of body 1 and 2 [1/MPa], from the case whose specimens the rig has been made of."""
-    specimens = load_case(Path(case.structure.specimens), [SpecimensCase])
+    file = case.structure.specimens
+    specimens = load_named("structure.specimens", file, [SpecimensCase], "specimens")
     return specimens.wear.body_1.coefficient, specimens.wear.body_2.coefficient
 
 

@@ -7,7 +7,6 @@ on those after them: their error estimate covers what the motion changes, and se
 from __future__ import annotations
 
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -45,8 +44,8 @@ from workflow.analyses.vibration_wear.outcome import (
 )
 from workflow.analyses.vibration_wear.vibrating_contact import Rubbing, Shaking, VibratingContact
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase
-from workflow.case.loading import load_case
-from workflow.errors import CaseError, UserError
+from workflow.case.loading import load_named
+from workflow.errors import UserError
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
@@ -90,10 +89,8 @@ def wear_half_space(case: VibrationWearCase, reporter: Reporter) -> VibrationWea
 
 def contact_case(file: str) -> BodiesWearCase:
     """The wear case of the contact. Raises UserError where it cannot be that of a rig."""
-    try:
-        case = load_case(Path(file), [BodiesWearCase])
-    except CaseError as error:
-        raise UserError(f"contact.file: {error}") from error
+    what = "wear of two bodies over an area"
+    case = load_named("contact.file", file, [BodiesWearCase], what)
     for number in (1, 2):
         if case.material(number) != case.material(1):
             raise UserError(

@@ -1,4 +1,4 @@
-"""The half-space's own cycle beside the structure's, where the contact method is full."""
+"""The cycle of the half-space beside the structure's, where the contact method is full."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def write_comparison(
     """Loads of the cycle, and its fields at the increments shown; of a mix, of the peak's cycle."""
     group = f"comparison/{name}"
     writer.put(f"{group}/load_history", load_columns(half_space_loads(cycle, structure)))
-    left = next(own.stop for own in structure.blocks if peak < own.stop) - 1 - peak
+    left = next(block.stop for block in structure.blocks if peak < block.stop) - 1 - peak
     # A set: in a short cycle two of them may be the same.
     for increment in sorted({peak + round(share * left) for share in SHOWN}):
         state = cycle[increment]

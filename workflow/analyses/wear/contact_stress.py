@@ -1,9 +1,9 @@
 """Stress under the contacts, and where fretting cracks would start, on unworn and worn surfaces.
 
-Both follow from the tractions of the half-space, with each body a half-space of its own: the stress
-that the structure carries past the contact is not in them. The surface itself is left out, since
-stress there hangs on the grid where shear starts at a slipping edge: sections begin, and maps lie,
-at the case's critical distance.
+Both follow from the tractions of the half-space, with each body as a separate half-space: the
+stress that the structure carries past the contact is not in them. The surface itself is left out,
+since stress there hangs on the grid where shear starts at a slipping edge: sections begin, and maps
+lie, at the case's critical distance.
 """
 
 from __future__ import annotations
@@ -35,8 +35,8 @@ STUCK_SHARE = 0.01
 
 LEFT_OUT = "increments without full knowledge of the shear, not in the life map"
 
-# What the summary tells of each parameter's maps, the parameter itself first.
-TOLD = {
+# What the summary has of each parameter's maps, the parameter itself first.
+SUMMARISED = {
     "ruiz": ("cracking_parameter", "friction_parameter", "tension"),
     "smith_watson_topper": ("smith_watson_topper",),
     "findley": ("findley",),
@@ -48,7 +48,7 @@ TOLD = {
 class BodyStress:
     """Stress of one body under one contact.
 
-    ``section`` ``(6, n, k)`` [MPa] at peak load, None if not asked for; ``maps`` of the fretting
+    ``section`` ``(6, n, k)`` [MPa] at peak load, None without a section; ``maps`` of the fretting
     parameter over the face by their names in ``results.h5``, each ``(..., nx, ny)``.
     """
 
@@ -104,7 +104,7 @@ class InterfaceStress:
     @property
     def mapped(self) -> bool:
         """Whether there are maps of the fretting parameter."""
-        return all(body.maps for own in self.moments.values() for body in own.bodies)
+        return all(body.maps for moment in self.moments.values() for body in moment.bodies)
 
     def write(self, writer: ResultsWriter) -> None:
         """Sections into ``stress/section``, maps into ``stress/life``, by interface."""
@@ -123,47 +123,47 @@ class InterfaceStress:
         limits = dict(enumerate(self.yield_stresses, start=1))
         attributes |= {f"yield_stress_{n}": y for n, y in limits.items() if np.isfinite(y)}
         writer.put(group, axes, **attributes)
-        for moment, own in self.moments.items():
-            for number, body in enumerate(own.bodies, start=1):
+        for moment, contact in self.moments.items():
+            for number, body in enumerate(contact.bodies, start=1):
                 assert body.section is not None
                 writer.put(f"{group}/{moment}/body_{number}", _section(body.section))
 
     def _write_life(self, writer: ResultsWriter, group: str) -> None:
-        for moment, own in self.moments.items():
-            writer.put(f"{group}/{moment}", {"left_out": Dataset(own.left_out, "1", LEFT_OUT)})
-            for number, body in enumerate(own.bodies, start=1):
+        for moment, contact in self.moments.items():
+            writer.put(f"{group}/{moment}", {"left_out": Dataset(contact.left_out, "1", LEFT_OUT)})
+            for number, body in enumerate(contact.bodies, start=1):
                 writer.put(f"{group}/{moment}/body_{number}", body.maps)
         life = self.planes.settings.life
         writer.put(group, {}, parameter=life.parameter, depth=life.depth)
 
     def summary(self) -> dict[str, Any]:
         """Largest values, where they are, and worn over unworn, by body."""
-        told: dict[str, Any] = {"convolutions": self.convolutions}
+        numbers: dict[str, Any] = {"convolutions": self.convolutions}
         if self.planes.settings.section != "none":
-            told["von_mises"] = self._of_bodies(self._largest_von_mises)
+            numbers["von_mises"] = self._of_bodies(self._largest_von_mises)
         if not self.mapped:
-            return told
-        told["left_out"] = {m: len(own.left_out) for m, own in self.moments.items()}
-        for name in TOLD[self.planes.settings.life.parameter]:
-            told[name] = self._of_bodies(
+            return numbers
+        numbers["left_out"] = {m: len(contact.left_out) for m, contact in self.moments.items()}
+        for name in SUMMARISED[self.planes.settings.life.parameter]:
+            numbers[name] = self._of_bodies(
                 lambda body, name=name: self._largest(body.maps[name].values)
             )
-        return told
+        return numbers
 
     def _of_bodies(self, largest: Any) -> dict[str, Any]:
-        told = {}
+        numbers = {}
         for number, name in enumerate(self.body_names):
-            own = {m: largest(moment.bodies[number]) for m, moment in self.moments.items()}
-            before, after = (own[moment]["value"] for moment in MOMENTS)
-            told[name] = own | {"ratio": after / before if before else None}
-        return told
+            values = {m: largest(moment.bodies[number]) for m, moment in self.moments.items()}
+            before, after = (values[moment]["value"] for moment in MOMENTS)
+            numbers[name] = values | {"ratio": after / before if before else None}
+        return numbers
 
     def _largest_von_mises(self, body: BodyStress) -> dict[str, float]:
         assert body.section is not None
         values, planes = von_mises(body.section), self.planes
         i, k = np.unravel_index(np.argmax(values), values.shape)
-        axis, other = ("y", "x") if planes.settings.section == "y" else ("x", "y")
-        place = {axis: float(planes.along[i]), other: planes.at, "depth": float(planes.depths[k])}
+        along, across = ("y", "x") if planes.settings.section == "y" else ("x", "y")
+        place = {along: float(planes.along[i]), across: planes.at, "depth": float(planes.depths[k])}
         return {"value": float(values[i, k]), **place}
 
     def _largest(self, values: Array) -> dict[str, float]:
@@ -188,13 +188,13 @@ def contact_stresses(
     """
     if not case.stress.wanted:
         return []
-    found, unknown = [], []
+    stresses, unknown = [], []
     for stage, (loads, first), last in zip(stages, unworn, worn, strict=True):
         cycles = stage.unworn_tractions(loads, first), last
         unknown += [cycle.unknown for cycle in cycles]
-        found.append(_interface_stress(case, stage, peak, cycles, loads.loads.share))
-    _tell_of_stick(np.array(unknown), peak, reporter)
-    return found
+        stresses.append(_interface_stress(case, stage, peak, cycles, loads.loads.share))
+    _report_stick(np.array(unknown), peak, reporter)
+    return stresses
 
 
 def _interface_stress(
@@ -308,7 +308,7 @@ def _ruiz_maps(parameters: Ruiz) -> dict[str, Dataset]:
     }
 
 
-def _tell_of_stick(unknown: Array, peak: int, reporter: Reporter) -> None:
+def _report_stick(unknown: Array, peak: int, reporter: Reporter) -> None:
     """Say where the shear is not known, ``unknown`` ``(cycles, t)``; warn if so at peak load."""
     why = "contact.method: normal does not know the shear where a contact sticks; full does"
     worst = unknown.max(axis=0)

@@ -1,4 +1,4 @@
-"""``fretscale resultants``: what our own structure does to its contacts, as files."""
+"""``fretscale resultants``: what the structure does to its contacts, as files."""
 
 from __future__ import annotations
 
@@ -79,7 +79,9 @@ def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter
     with reporter.stage("condensation"):
         source.prepare()
     with reporter.stage("structural friction"):
-        histories = {own.interface.name: _numbered(source, own) for own in source.unworn()}
+        histories = {
+            history.interface.name: _numbered(source, history) for history in source.unworn()
+        }
     warn_of_structure(source, reporter)
     heights = {face.face.name: _height(face, case) for face in faces}
     loads = {name: history.loads for name, history in histories.items()}
@@ -94,8 +96,8 @@ def _numbered(source: StructureStage, history: InterfaceHistory) -> InterfaceHis
     numbers = source.model.node_numbers(1), source.model.node_numbers(2)
     if not isinstance(face, Interface) or numbers[0] is None or numbers[1] is None:
         return history
-    own = replace(face, nodes_1=numbers[0][face.nodes_1], nodes_2=numbers[1][face.nodes_2])
-    return replace(history, interface=own)
+    numbered = replace(face, nodes_1=numbers[0][face.nodes_1], nodes_2=numbers[1][face.nodes_2])
+    return replace(history, interface=numbered)
 
 
 def _height(face: ContactFace, case: WearCase) -> Array:

@@ -107,30 +107,30 @@ def uniformities(
     """Uniformity of every loaded contact of a structure in three dimensions, by interface."""
     if not isinstance(source, StructureStage) or source.line:
         return {}
-    found = {}
+    results = {}
     for stage, history, state in zip(stages, source.unworn(), states, strict=True):
-        own = uniformity(stage, history, state, source.peak)
-        if own is not None:
-            found[stage.name] = own
-    return found
+        result = uniformity(stage, history, state, source.peak)
+        if result is not None:
+            results[stage.name] = result
+    return results
 
 
 def uniformity(
     stage: ContactStage, history: InterfaceHistory, state: InterfaceState, peak: int
 ) -> Uniformity | None:
     """Uniformity of the unworn contact and of the wear so far; None without load in the middle."""
-    found = sections(stage.transfer, history, peak)
-    if _middle(found.P) <= 0.0:
+    carried = sections(stage.transfer, history, peak)
+    if _middle(carried.P) <= 0.0:
         return None
     surfaces = state.surfaces
     worn = np.sum(surfaces.depth, axis=0)
-    deviations = [_deviation(values) for values in (found.P, found.slip, worn)]
+    deviations = [_deviation(values) for values in (carried.P, carried.slip, worn)]
     y = np.abs(stage.grid.y.ravel())
     half = 0.5 * stage.grid.size[1]
     inner = y <= MIDDLE * half
     apart = y[np.max(deviations, axis=0) > ALIKE]
     reach = float(apart.min()) - 0.5 * stage.grid.pitch[1] if apart.size else half
-    mean_load = float(found.P.mean()) / _middle(found.P)
+    mean_load = float(carried.P.mean()) / _middle(carried.P)
     pressure, slip, wear = (float(deviation[inner].max()) for deviation in deviations)
     return Uniformity(
         pressure=pressure,

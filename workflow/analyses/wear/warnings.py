@@ -14,7 +14,7 @@ from workflow.shell.reporter import Reporter
 OPEN_CYCLE = 0.02
 # Forces and moments on body 2 left out of balance, relative: the friction solver leaves 1e-7.
 OUT_OF_BALANCE = 1e-3
-# Energies of structure and half-space over a cycle that differ by more tell of different slips.
+# Energies of structure and half-space over a cycle that differ by more indicate different slips.
 ENERGIES_APART = 0.25
 
 
@@ -57,23 +57,26 @@ def warn_of_contact(
             "surfaces normally, which contact.method: normal leaves out; use full"
         )
     yield_stress = min(case.material(number).yield_stress for number in (1, 2))
-    for stage, own, result in zip(stages, state.interfaces, first, strict=True):
+    for stage, interface, result in zip(stages, state.interfaces, first, strict=True):
         highest = result.highest_pressure
         if highest > yield_stress:
             reporter.warn(
                 f"{stage.name}: the pressure reaches {highest:.0f} MPa, above the yield stress of "
                 f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there"
             )
-        given, found = own.loads.mean_energy, float(result.energy.sum())
-        if abs(found - given) > ENERGIES_APART * max(found, given) and not result.cycle:
+        structural, on_grid = interface.loads.mean_energy, float(result.energy.sum())
+        if (
+            abs(on_grid - structural) > ENERGIES_APART * max(on_grid, structural)
+            and not result.cycle
+        ):
             reporter.warn(
                 f"{stage.name}: pressure on the grid and slip of the structure dissipate "
-                f"{found:.3g} N mm a cycle, the structure {given:.3g}: its mesh is too coarse for "
-                "the slip zone, or little slips; refine it or use contact.method: full"
+                f"{on_grid:.3g} N mm a cycle, the structure {structural:.3g}: its mesh is too "
+                "coarse for the slip zone, or little slips; refine it or use contact.method: full"
             )
         if result.touches_border:
             warn_of_border(stage, reporter)
-        for line in structure_of(case).warnings(case, stage, float(own.loads.P[peak])):
+        for line in structure_of(case).warnings(case, stage, float(interface.loads.P[peak])):
             reporter.warn(line)
 
 
@@ -82,7 +85,7 @@ def warn_of_instability(
 ) -> None:
     """Explicit steps of so many cycles that are too long."""
     pairs = zip(stages, state.interfaces, strict=True)
-    stable = min(stage.stable_cycles(own) for stage, own in pairs)
+    stable = min(stage.stable_cycles(interface) for stage, interface in pairs)
     if cycles > stable:
         reporter.warn(
             f"explicit wear steps above {stable:.3g} cycles amplify the grid's roughness "
@@ -92,8 +95,8 @@ def warn_of_instability(
 
 def warn_of_growth(stages: list[ContactStage], state: CoupledState, reporter: Reporter) -> None:
     """Contacts that have grown to the border of their grid: they have worn there."""
-    for stage, own in zip(stages, state.interfaces, strict=True):
-        worn = own.surfaces.depth
+    for stage, interface in zip(stages, state.interfaces, strict=True):
+        worn = interface.surfaces.depth
         if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):
             warn_of_border(stage, reporter)
 

@@ -64,13 +64,13 @@ def worn_faces(
 ) -> Iterator[WornFace]:
     """What the user's nodes of an interface lose."""
     depths, nodal = state.surfaces.depths, stage.depths_of_bodies(state)
-    for own in faces:
-        depth = depths[own.body - 1]
-        if own.points is not None:
-            worn = nodal_depths(own.points, own.frame, stage.grid, depth)
+    for face in faces:
+        depth = depths[face.body - 1]
+        if face.points is not None:
+            worn = nodal_depths(face.points, face.frame, stage.grid, depth)
         else:
-            worn = _on_nodes(stage, stage.face_of(own.body), nodal[own.body - 1], depth)
-        yield WornFace(stage.name, own.body, own.numbers, own.frame, worn)
+            worn = _on_nodes(stage, stage.face_of(face.body), nodal[face.body - 1], depth)
+        yield WornFace(stage.name, face.body, face.numbers, face.frame, worn)
 
 
 def _on_nodes(stage: ContactStage, face: Face, nodal: Array, depth: Array) -> NodalDepths:

@@ -106,7 +106,10 @@ def worn_displacement(depth: Array, frame: Frame, body: Literal[1, 2]) -> Array:
 
 def write_worn_nodes(path: Path, nodes: Indices, displacement: Array) -> None:
     """Write displacements ``(n, 3)`` [mm] by node number, such that they read back the same."""
-    along = {f"u{axis.lower()} [mm]": own for axis, own in zip(AXES, displacement.T, strict=True)}
+    along = {
+        f"u{axis.lower()} [mm]": component
+        for axis, component in zip(AXES, displacement.T, strict=True)
+    }
     write_table(path, {NODE: nodes} | along)
 
 

@@ -25,7 +25,7 @@ from workflow.shell.results import ResultsWriter
 from workflow.shell.store import replacing
 
 RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
-# What the summary tells of a total Lagrangian check, beside the resultants.
+# What the summary has of a total Lagrangian check, beside the resultants.
 MEASURES = ("slip_change", "slide", "largest_strain", "largest_rotation", "face_rotation")
 
 
@@ -119,11 +119,15 @@ def worn_structure(
     pairs = list(zip(contacts, state.interfaces, strict=True))
     with reporter.stage("structural friction"):
         cycle = stage.worn_cycle(
-            [contact.nodal_depth(own) for contact, own in pairs],
-            None if friction.evolution is None else [friction.at(own.energy) for _, own in pairs],
+            [contact.nodal_depth(interface) for contact, interface in pairs],
+            None
+            if friction.evolution is None
+            else [friction.at(interface.energy) for _, interface in pairs],
         )
     with reporter.stage("re-meshing"):
-        mesh = worn_mesh(stage.mesh, [contact.depths_of_bodies(own) for contact, own in pairs])
+        mesh = worn_mesh(
+            stage.mesh, [contact.depths_of_bodies(interface) for contact, interface in pairs]
+        )
         with replacing(folder.reserve("worn.msh", "the mesh with the worn faces")) as partial:
             # gmsh goes by the ending; the name stays one that a resumed run clears away.
             path = partial.with_name(f"{partial.name}.msh")
@@ -152,7 +156,7 @@ def nonlinearity_sentence(check: NonlinearCheck) -> str:
 
 
 def nonlinearity_summary(stage: StructureStage) -> dict[str, Any]:
-    """The stiffness used and, where it was asked for, what the total Lagrangian check found."""
+    """The stiffness used and, where the case wants one, the total Lagrangian check."""
     chosen = stage.model.nonlinearity
     if not chosen.check:
         return {"stiffness": chosen.stiffness}

@@ -27,7 +27,7 @@ HEADROOM = 1.08
 
 def has_loops(file: h5py.File) -> bool:
     """Whether there is a loop under some force."""
-    return any("loops" in own for own in file["responses"].values())
+    return any("loops" in response for response in file["responses"].values())
 
 
 def loops(file: h5py.File) -> Figure:
@@ -41,18 +41,18 @@ def loops(file: h5py.File) -> Figure:
     shown = [responses[name] for name in names]
     figure = new_figure(_title(shown), 7.5)
     left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
-    for own, colour in zip(shown, _colours(len(shown)), strict=True):
-        for coarse in _resolutions(own)[:-1]:
+    for response, colour in zip(shown, _colours(len(shown)), strict=True):
+        for coarse in _resolutions(response)[:-1]:
             left.plot(*_curve(coarse, "expansion"), color=colour, **COARSE)
-        left.plot(*_curve(_finest(own)), color=colour)
-        _draw_branch(right, _finest(own), colour, f"{own.attrs['force']:g} N")
-    _bound(right, [_finest(own) for own in shown])
+        left.plot(*_curve(_finest(response)), color=colour)
+        _draw_branch(right, _finest(response), colour, f"{response.attrs['force']:g} N")
+    _bound(right, [_finest(response) for response in shown])
     _label(left, right, shown[0])
     return figure
 
 
-def _label(left: Axes, right: Axes, own: h5py.Group) -> None:
-    finest, coarse = _finest(own), _resolutions(own)[:-1]
+def _label(left: Axes, right: Axes, response: h5py.Group) -> None:
+    finest, coarse = _finest(response), _resolutions(response)[:-1]
     text = f"{finest.attrs['frequency']:.4g} Hz, {_harmonics(finest)} harmonics"
     if coarse:
         text += f"; dashed: the force in {', '.join(map(_harmonics, coarse))} alone"
@@ -65,13 +65,13 @@ def _label(left: Axes, right: Axes, own: h5py.Group) -> None:
     right.legend(loc="lower right", title="excitation: stick slope (dashed)")
 
 
-def _resolutions(own: h5py.Group) -> list[h5py.Group]:
+def _resolutions(response: h5py.Group) -> list[h5py.Group]:
     """Loops of a force, the finest last."""
-    return [own["loops"][name] for name in sorted(own["loops"])]
+    return [response["loops"][name] for name in sorted(response["loops"])]
 
 
-def _finest(own: h5py.Group) -> h5py.Group:
-    return _resolutions(own)[-1]
+def _finest(response: h5py.Group) -> h5py.Group:
+    return _resolutions(response)[-1]
 
 
 def _harmonics(loop: h5py.Group) -> str:
@@ -129,16 +129,16 @@ def _bound(axis: Axes, shown: list[h5py.Group]) -> None:
 
 
 def _title(shown: list[h5py.Group]) -> str:
-    slopes = np.array([_slope(_finest(own)) for own in shown])
+    slopes = np.array([_slope(_finest(response)) for response in shown])
     text = f"A cycle loses {', '.join(map(_lost, (shown[0], shown[-1])[: len(shown)]))}"
     if np.isfinite(slopes).any():
-        low, high = (f"{own:.4g}" for own in (np.nanmin(slopes), np.nanmax(slopes)))
+        low, high = (f"{slope:.4g}" for slope in (np.nanmin(slopes), np.nanmax(slopes)))
         text += f"; it sticks with {low if low == high else f'{low} to {high}'} N/µm"
     return text
 
 
-def _lost(own: h5py.Group) -> str:
+def _lost(response: h5py.Group) -> str:
     """Energy of a loop, in words."""
-    loop = _finest(own).attrs
+    loop = _finest(response).attrs
     energy = f"{loop['energy']:.3g} mJ" if loop["slip"] > 0.0 else "nothing"
-    return f"{energy} under {own.attrs['force']:g} N"
+    return f"{energy} under {response.attrs['force']:g} N"

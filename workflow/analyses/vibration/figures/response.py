@@ -68,13 +68,13 @@ def frequency_response(file: h5py.File) -> Figure:
     for name, style in STYLES.items():
         if name in file.get("linear", ()):
             _draw_limit(axis, file["linear"], name, style)
-    for own, colour in _shown(file):
-        force, size = float(own.attrs["force"]), TO_MICRONS * own["amplitude"][:, -1]
-        label = f"{force:g} N: {own.attrs['resonance']:.4g} Hz"
-        axis.plot(own["frequency"][()], size / force, color=colour, label=label)
-        peaks.append(TO_MICRONS * float(own.attrs["amplitude"]) / force)
+    for response, colour in _shown(file):
+        force, size = float(response.attrs["force"]), TO_MICRONS * response["amplitude"][:, -1]
+        label = f"{force:g} N: {response.attrs['resonance']:.4g} Hz"
+        axis.plot(response["frequency"][()], size / force, color=colour, label=label)
+        peaks.append(TO_MICRONS * float(response.attrs["amplitude"]) / force)
         lows.append(size.min() / force)
-        axis.plot(own.attrs["resonance"], peaks[-1], "o", color=colour, markersize=5)
+        axis.plot(response.attrs["resonance"], peaks[-1], "o", color=colour, markersize=5)
     _over_frequency(axis, file)
     axis.set_ylim(BELOW * min(lows), ABOVE * max(peaks))
     axis.set_ylabel(f"amplitude of {_seen(file)} / force [µm/N]")
@@ -90,11 +90,12 @@ def _draw_limit(axis: Axes, linear: h5py.Group, name: str, style: str) -> None:
 
 def _over_frequency(axis: Axes, file: h5py.File) -> None:
     """Logarithmic axes over the frequencies of all curves."""
-    every = [own["frequency"][()] for own in file["responses"].values()]
+    responses = file["responses"].values()
+    frequencies = np.concatenate([response["frequency"][()] for response in responses])
     axis.set_xscale("log")
     axis.set_yscale("log")
     plain_ticks(axis)
-    axis.set_xlim(min(own.min() for own in every), max(own.max() for own in every))
+    axis.set_xlim(frequencies.min(), frequencies.max())
     axis.set_xlabel("frequency [Hz]")
 
 
@@ -132,9 +133,11 @@ def resonance(file: h5py.File) -> Figure:
 
 
 def _draw_amplitudes(axis: Axes, file: h5py.File) -> None:
-    for own, colour in _shown(file):
-        force, size = float(own.attrs["force"]), TO_MICRONS * own["amplitude"][:, -1]
-        axis.plot(own["frequency"][()], size, color=colour, label=f"{force:g} N", linewidth=1.4)
+    for response, colour in _shown(file):
+        force, size = float(response.attrs["force"]), TO_MICRONS * response["amplitude"][:, -1]
+        axis.plot(
+            response["frequency"][()], size, color=colour, label=f"{force:g} N", linewidth=1.4
+        )
     _over_frequency(axis, file)
     if "backbone" in file:
         backbone = file["backbone"]
@@ -151,10 +154,10 @@ def _draw_against_force(axis: Axes, file: h5py.File, name: str, factor: float, c
         force, values = backbone["force"][()], factor * backbone[name][()]
         axis.plot(force, values, "--", color=BLACK, label="phase resonance")
     responses = list(file["responses"].values())
-    forces = [float(own.attrs["force"]) for own in responses]
+    forces = [float(response.attrs["force"]) for response in responses]
     axis.plot(
         forces,
-        [factor * _at_peak(own, name) for own in responses],
+        [factor * _at_peak(response, name) for response in responses],
         "o",
         color=colour,
         label="largest amplitude",
@@ -162,16 +165,16 @@ def _draw_against_force(axis: Axes, file: h5py.File, name: str, factor: float, c
     axis.set_ylim(0.0, HEADROOM * max(axis.dataLim.y1, 1e-300))
 
 
-def _at_peak(own: h5py.Group, name: str) -> float:
+def _at_peak(response: h5py.Group, name: str) -> float:
     """A value where the amplitude is largest."""
-    return float(own.attrs["resonance" if name == "frequency" else name])
+    return float(response.attrs["resonance" if name == "frequency" else name])
 
 
 def _resonance_title(file: h5py.File) -> str:
     responses = list(file["responses"].values())
-    lowest, highest = (f(float(own.attrs["resonance"]) for own in responses) for f in (min, max))
-    most = max(responses, key=lambda own: _at_peak(own, "damping"))
+    resonances = [float(response.attrs["resonance"]) for response in responses]
+    most = max(responses, key=lambda response: _at_peak(response, "damping"))
     return (
-        f"Resonance between {lowest:.4g} and {highest:.4g} Hz; most damped "
+        f"Resonance between {min(resonances):.4g} and {max(resonances):.4g} Hz; most damped "
         f"under {most.attrs['force']:g} N: {TO_PERCENT * _at_peak(most, 'damping'):.3g} %"
     )

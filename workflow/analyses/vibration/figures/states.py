@@ -45,7 +45,8 @@ TO_MICRONS = 1e3
 
 def has_states(file: h5py.File) -> bool:
     """Whether there are nodes with places and states."""
-    return "contact/x" in file and any("nodes" in own for own in file["responses"].values())
+    responses = file["responses"].values()
+    return "contact/x" in file and any("nodes" in response for response in responses)
 
 
 def node_states(file: h5py.File) -> Figure:
@@ -57,12 +58,13 @@ def node_states(file: h5py.File) -> Figure:
     )
     distance = np.hypot(file["contact/x"][()], file["contact/y"][()])
     order = np.argsort(distance, kind="stable")
-    for (top, bottom), own in zip(panels.T, shown, strict=True):
-        top.plot(own["frequency"][()], TO_MICRONS * own["amplitude"][:, -1] / own.attrs["force"])
-        _draw_over_frequency(bottom, own, order)
+    for (top, bottom), response in zip(panels.T, shown, strict=True):
+        receptance = TO_MICRONS * response["amplitude"][:, -1] / response.attrs["force"]
+        top.plot(response["frequency"][()], receptance)
+        _draw_over_frequency(bottom, response, order)
         for axis in (top, bottom):
-            axis.axvline(own.attrs["resonance"], color=BLACK, linestyle=":", linewidth=1.2)
-        top.set_title(f"{own.attrs['force']:g} N: {own.attrs['resonance']:.4g} Hz")
+            axis.axvline(response.attrs["resonance"], color=BLACK, linestyle=":", linewidth=1.2)
+        top.set_title(f"{response.attrs['force']:g} N: {response.attrs['resonance']:.4g} Hz")
         bottom.set_xlabel("frequency [Hz]")
     panels[0, 0].set_xscale("log")
     panels[0, 0].set_yscale("log")
@@ -82,10 +84,10 @@ def pad_states(file: h5py.File) -> Figure:
     figure = new_figure(_title(shown), AROUND_PADS + height)
     panels = figure.subplots(len(OCTAVES), len(shown), sharex=True, sharey=True, squeeze=False)
     for row, (name, factor) in zip(panels, OCTAVES.items(), strict=True):
-        for axis, own in zip(row, shown, strict=True):
-            place = _point_near(own, factor * float(own.attrs["resonance"]))
-            frequency, force = own["frequency"][place], own.attrs["force"]
-            _draw_pad(axis, file["contact"], _kinds(own)[place])
+        for axis, response in zip(row, shown, strict=True):
+            place = _point_near(response, factor * float(response.attrs["resonance"]))
+            frequency, force = response["frequency"][place], response.attrs["force"]
+            _draw_pad(axis, file["contact"], _kinds(response)[place])
             axis.set_title(f"{force:g} N, {frequency:.4g} Hz", fontsize="small")
         row[0].set_ylabel(f"{name}\ny [mm]")
     for axis in panels[-1]:
@@ -101,9 +103,9 @@ def _with_states(file: h5py.File, most: int) -> list[h5py.Group]:
     return [responses[name] for name in spread(names, most)]
 
 
-def _kinds(own: h5py.Group) -> Indices:
+def _kinds(response: h5py.Group) -> Indices:
     """What every node does at every point of a curve ``(p, j)``, as places in ``KINDS``."""
-    slip, apart = own["nodes/slip"][()], own["nodes/separated"][()]
+    slip, apart = response["nodes/slip"][()], response["nodes/separated"][()]
     kinds = np.where(slip <= ROUNDING, STICKS, SLIPS_LONG)
     kinds[(slip > ROUNDING) & (slip <= HALF)] = SLIPS_BRIEFLY
     kinds[apart > ROUNDING] = LIFTS_OFF
@@ -113,24 +115,24 @@ def _kinds(own: h5py.Group) -> Indices:
 
 def _title(shown: list[h5py.Group]) -> str:
     texts = []
-    for own in (shown[0], shown[-1])[: len(shown)]:
-        kinds = _kinds(own)[_point_near(own, float(own.attrs["resonance"]))]
+    for response in (shown[0], shown[-1])[: len(shown)]:
+        kinds = _kinds(response)[_point_near(response, float(response.attrs["resonance"]))]
         touching = int((kinds != OPEN).sum())
         sticking = int((kinds == STICKS).sum())
-        texts.append(f"{sticking} of {touching} under {own.attrs['force']:g} N")
+        texts.append(f"{sticking} of {touching} under {response.attrs['force']:g} N")
     return f"Nodes that touch and only stick at the peak: {', '.join(texts)}"
 
 
 # --- over frequency -----------------------------------------------------------------------------
 
 
-def _draw_over_frequency(axis: Axes, own: h5py.Group, order: Indices) -> None:
-    frequency = own["frequency"][()]
+def _draw_over_frequency(axis: Axes, response: h5py.Group, order: Indices) -> None:
+    frequency = response["frequency"][()]
     edges = np.geomspace(frequency.min(), frequency.max(), COLUMNS + 1)
-    points = largest_at(frequency, own["amplitude"][:, -1], np.sqrt(edges[1:] * edges[:-1]))
+    points = largest_at(frequency, response["amplitude"][:, -1], np.sqrt(edges[1:] * edges[:-1]))
     nodes = np.arange(len(order) + 1)
     axis.grid(visible=False)
-    axis.pcolormesh(edges, nodes, _kinds(own)[points][:, order].T, **_look())
+    axis.pcolormesh(edges, nodes, _kinds(response)[points][:, order].T, **_look())
 
 
 def largest_at(frequency: Array, amplitude: Array, wanted: Array) -> Indices:
@@ -147,9 +149,9 @@ def largest_at(frequency: Array, amplitude: Array, wanted: Array) -> Indices:
     return np.asarray(segment + second)
 
 
-def _point_near(own: h5py.Group, frequency: float) -> int:
+def _point_near(response: h5py.Group, frequency: float) -> int:
     """Point of a curve nearest to a frequency, which is taken into its span."""
-    curve, amplitude = own["frequency"][()], own["amplitude"][:, -1]
+    curve, amplitude = response["frequency"][()], response["amplitude"][:, -1]
     inside = np.clip([frequency], curve.min(), curve.max())
     return int(largest_at(curve, amplitude, inside)[0])
 

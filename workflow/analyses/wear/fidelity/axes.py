@@ -37,7 +37,7 @@ DOUBLINGS, MOST_INCREMENTS = 2, 1500
 FEWEST_ELEMENTS, MOST_ELEMENTS = 7, 160
 # Cells of a contact grid along one direction: fewer hardly show a contact. In the plane so many may
 # be chosen; in space, where each doubling takes four times as long, twice those of the case. None
-# is coarser than the case's own by more than the last.
+# is coarser than that of the case by more than the last.
 FEWEST_CELLS, MOST_STRIPS, FINER_SPACE, COARSER = 16, 512, 2, 4
 # Rungs of a ladder that are probed before any is chosen: an order takes three.
 LEAST_RUNGS = 3
@@ -64,17 +64,19 @@ def choose_increments(case: DovetailCase, allowed: float) -> Decision:
     first = increments(case, INCREMENTS)["load_path.increments"]
     counts = [first * 2**k for k in range(DOUBLINGS + 1)]
     values = [life(changed(section, increments(case, count))) for count in counts]
-    found = estimate(values, [1.0 / count for count in counts], FRICTION_ORDER)
-    needed = max(first, ceil(counts[-1] * found.refinement(allowed) * (1.0 - ROUNDING)))
+    estimated = estimate(values, [1.0 / count for count in counts], FRICTION_ORDER)
+    needed = max(first, ceil(counts[-1] * estimated.refinement(allowed) * (1.0 - ROUNDING)))
     settings = increments(case, min(needed, MOST_INCREMENTS))
     count = settings["load_path.increments"]
-    error, own = (found.beyond(n / counts[-1]) for n in (count, case.load_path.increments))
+    error, as_written = (
+        estimated.beyond(n / counts[-1]) for n in (count, case.load_path.increments)
+    )
     more = "more than" if count > case.load_path.increments else "against"
     why = (
         f"{error:.2%} of {allowed:.2%} allowed; {more} the case's own "
-        f"{case.load_path.increments}, which leave {own:.2%}"
+        f"{case.load_path.increments}, which leave {as_written:.2%}"
     )
-    probe = {"increments": counts, "values": values, "errors": found.errors, "own": own}
+    probe = {"increments": counts, "values": values, "errors": estimated.errors, "own": as_written}
     return _decision(settings, why, probe, allowed, error)
 
 
@@ -118,16 +120,16 @@ def choose_mesh(case: DovetailCase, allowed: float) -> Decision:
 def _meshes(case: DovetailCase) -> Iterator[_Rung]:
     across, along = case.mesh.flank_nodes
     in_space = case.structure.dimension == 3
-    own = across - 1
+    written = across - 1
     # Rungs beyond those that are offered say how good the finest of these is.
-    most = 4 * own if in_space else max(own, MOST_ELEMENTS)
-    for elements in _doublings(own, FEWEST_ELEMENTS, most):
-        factor = elements / own
+    most = 4 * written if in_space else max(written, MOST_ELEMENTS)
+    for elements in _doublings(written, FEWEST_ELEMENTS, most):
+        factor = elements / written
         settings = {
             "mesh.flank_nodes": (1 + elements, max(3, 1 + round(factor * (along - 1)))),
             "mesh.size": case.mesh.size / factor,
         }
-        yield _Rung(elements, settings, offered=elements <= own or not in_space)
+        yield _Rung(elements, settings, offered=elements <= written or not in_space)
 
 
 def choose_grid(case: DovetailCase, allowed: float) -> Decision:
@@ -145,9 +147,11 @@ def choose_grid(case: DovetailCase, allowed: float) -> Decision:
         grid, climbs = (first.taken.size, second.taken.size), [first, second]
     names = "strips across the flank", "strips along the slot"
     part = allowed / len(climbs)
-    why = "; ".join(_sentence(own, part, name) for own, name in zip(climbs, names, strict=False))
-    probe = {name: own.probed for own, name in zip(climbs, names, strict=False)}
-    error = sum(own.error for own in climbs)
+    why = "; ".join(
+        _sentence(climb, part, name) for climb, name in zip(climbs, names, strict=False)
+    )
+    probe = {name: climb.probed for climb, name in zip(climbs, names, strict=False)}
+    error = sum(climb.error for climb in climbs)
     return _decision({"contact.grid": grid}, why, probe, allowed, error)
 
 
@@ -159,15 +163,15 @@ def _ends(section: DovetailCase, rung: _Rung) -> Numbers:
     return end_life(section, rung.size)
 
 
-def _climb_grid(own: int, most: int, allowed: float, worn: Callable[[_Rung], Numbers]) -> _Climb:
+def _climb_grid(cells: int, most: int, allowed: float, worn: Callable[[_Rung], Numbers]) -> _Climb:
     """Up the halves and doubles of so many cells."""
-    sizes = _doublings(own, max(FEWEST_CELLS, own // COARSER), most)
+    sizes = _doublings(cells, max(FEWEST_CELLS, cells // COARSER), most)
     return _climb([_Rung(size, {}) for size in sizes], worn, allowed)
 
 
-def _doublings(own: int, fewest: int, most: int) -> list[int]:
+def _doublings(count: int, fewest: int, most: int) -> list[int]:
     """Halves and doubles of a count, coarse to fine, itself among them."""
-    sizes = [own]
+    sizes = [count]
     while (half := round(0.5 * sizes[0])) >= fewest:
         sizes.insert(0, half)
     while 2 * sizes[-1] <= most:
@@ -182,17 +186,17 @@ def _climb(rungs: Sequence[_Rung], worn: Callable[[_Rung], Numbers], allowed: fl
         values.append(worn(rung))
         if len(values) < min(LEAST_RUNGS, len(rungs)):
             continue
-        steps = [1.0 / own.size for own in rungs[: len(values)]]
-        found = estimate(values, steps, GRID_ORDER)
-        errors = found.errors
+        steps = [1.0 / rung.size for rung in rungs[: len(values)]]
+        estimated = estimate(values, steps, GRID_ORDER)
+        errors = estimated.errors
         enough = [k for k, error in enumerate(errors) if rungs[k].offered and error <= allowed]
         if enough:
             break
     offered = [k for k in range(len(values)) if rungs[k].offered]
     taken = enough[0] if enough else offered[-1]
-    sizes = [own.size for own in rungs[: len(values)]]
+    sizes = [rung.size for rung in rungs[: len(values)]]
     probed = {"sizes": sizes, "values": values, "errors": errors}
-    return _Climb(rungs[taken], errors[taken], found.worst(taken), probed)
+    return _Climb(rungs[taken], errors[taken], estimated.worst(taken), probed)
 
 
 def _sentence(climb: _Climb, allowed: float, unit: str) -> str:
@@ -227,10 +231,10 @@ def choose_steps(case: DovetailCase, allowed: float) -> Decision:
 
 def choose_drift(case: DovetailCase, allowed: float) -> Decision:
     """The drift at which two lives, coupled and not, would differ by the share."""
-    own = case.coupling
-    if own.resultants == "constant":
+    coupling = case.coupling
+    if coupling.resultants == "constant":
         why = "resultants stay those of the unworn structure, as the case has it"
-        return Decision("coupling.drift", own.drift, why)
+        return Decision("coupling.drift", coupling.drift, why)
     section = plane_section(case)
     apart = life(section)
     coupled, drift = coupled_life(section)

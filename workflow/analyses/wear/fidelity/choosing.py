@@ -17,7 +17,7 @@ from fe_models.mesh import MeshError
 from sa_solver.normal import NormalContactError
 from wear.stepping import ContactFailure
 from workflow.analyses.wear.fidelity.axes import AXES
-from workflow.analyses.wear.fidelity.decision import Axis, Decision, own_value
+from workflow.analyses.wear.fidelity.decision import Axis, Decision, value_at
 from workflow.analyses.wear.fidelity.dimension import choose_dimension
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.case.changing import changed
@@ -37,24 +37,26 @@ def choose(case: DovetailCase) -> tuple[DovetailCase, dict[str, Any]]:
         case = changed(case, decisions[-1].chosen)
     return case, {
         "accuracy": case.accuracy,
-        "budget": {own.entry: own.allowed for own in decisions},
-        "estimated_error": sum(own.error or 0.0 for own in decisions),
-        "met": all(own.met for own in decisions),
-        "chosen": {name: value for own in decisions for name, value in own.chosen.items()},
-        "decisions": [asdict(own) for own in decisions],
+        "budget": {decision.entry: decision.allowed for decision in decisions},
+        "estimated_error": sum(decision.error or 0.0 for decision in decisions),
+        "met": all(decision.met for decision in decisions),
+        "chosen": {
+            name: value for decision in decisions for name, value in decision.chosen.items()
+        },
+        "decisions": [asdict(decision) for decision in decisions],
         "seconds": _since(begin),
     }
 
 
 def _decide(axis: Axis, case: DovetailCase, allowed: float) -> Decision:
-    """What an axis decides; the case's own setting where its probe fails."""
+    """What an axis decides; the setting of the case where its probe fails."""
     begin = time.perf_counter()
     try:
         decision = axis.decide(case, allowed)
     except (MeshError, MethodFailed, ContactFailure, NormalContactError) as error:
         why = f"as the case has it: the probe failed: {error}"
-        own = own_value(case, axis.entry)
-        decision = Decision(axis.entry, own, why, allowed=allowed, met=False)
+        value = value_at(case, axis.entry)
+        decision = Decision(axis.entry, value, why, allowed=allowed, met=False)
     return replace(decision, seconds=_since(begin))
 
 
@@ -70,6 +72,6 @@ def say(record: Mapping[str, Any] | None, reporter: Reporter) -> None:
         reporter.say(f"fidelity: {decision['entry']}: {decision['value']}: {decision['why']}")
     estimated, seconds = record["estimated_error"], record["seconds"]
     reporter.say(
-        f"fidelity: estimated error {estimated:.2%} of {record['accuracy']:.2%} asked for, "
+        f"fidelity: estimated error {estimated:.2%} of {record['accuracy']:.2%} required, "
         f"{'within' if record['met'] else 'not within'} every share; probes took {seconds:.1f} s"
     )

@@ -47,8 +47,8 @@ class Axis:
     decide: Callable[[DovetailCase, float], Decision]
 
 
-def own_value(case: Section, entry: str) -> Any:
-    """What the case itself has at a dotted path."""
+def value_at(case: Section, entry: str) -> Any:
+    """The value of a case at a dotted path."""
     node: Any = case
     for key in entry.split("."):
         node = getattr(node, key)

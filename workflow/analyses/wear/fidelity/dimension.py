@@ -43,7 +43,11 @@ def choose_dimension(case: DovetailCase) -> Decision:
         return Decision(ENTRY, 3, f"the coarse probe failed: {error}")
     differences = _differences(values[2], values[3], case.friction.coefficient)
     flank, quantity, largest = max(
-        ((flank, name, value) for flank, own in differences.items() for name, value in own.items()),
+        (
+            (flank, name, value)
+            for flank, quantities in differences.items()
+            for name, value in quantities.items()
+        ),
         key=lambda item: item[2],
     )
     probe = {"two": values[2], "three": values[3], "differences": differences}
@@ -66,24 +70,27 @@ def _mid_slot(case: DovetailCase, dimension: int) -> Numbers:
     structure = case.structure.model_copy(update={"dimension": dimension})
     coarse = case.model_copy(update={"structure": structure, "mesh": mesh})
     stage = StructureStage(DovetailModel(coarse))
-    found = {}
+    middles = {}
     for contact, history in zip(stage.faces, stage.unworn(), strict=True):
         transfer = FaceTransfer.between(contact.face, contact.grid(contact.coarse))
-        found[contact.face.name] = sections(transfer, history, stage.peak).middle
-    return found
+        middles[contact.face.name] = sections(transfer, history, stage.peak).middle
+    return middles
 
 
 def _differences(two: Numbers, three: Numbers, friction: float) -> Numbers:
     """Relative differences of every quantity on every flank; those of Qx relative to µP."""
     largest = {
-        name: max(abs(own[name]) for own in three.values()) for name in next(iter(three.values()))
+        name: max(abs(quantities[name]) for quantities in three.values())
+        for name in next(iter(three.values()))
     }
     differences: Numbers = {}
-    for flank, own in three.items():
-        scales = {name: max(abs(own[name]), LESSER_FLANK * largest[name]) for name in own}
+    for flank, quantities in three.items():
+        scales = {
+            name: max(abs(quantities[name]), LESSER_FLANK * largest[name]) for name in quantities
+        }
         scales["Qx"] = friction * scales["P"]
         differences[flank] = {
-            name: abs(two[flank][name] - own[name]) / scale if scale > 0.0 else 0.0
+            name: abs(two[flank][name] - quantities[name]) / scale if scale > 0.0 else 0.0
             for name, scale in scales.items()
         }
     return differences

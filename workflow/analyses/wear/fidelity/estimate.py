@@ -43,19 +43,19 @@ class Estimate:
     @property
     def errors(self) -> list[float]:
         """The largest error of every rung."""
-        return [max(own) for own in zip(*(d.errors for d in self.deviations), strict=True)]
+        return [max(errors) for errors in zip(*(d.errors for d in self.deviations), strict=True)]
 
     def worst(self, rung: int) -> str:
         """The quantity that is worst on a rung."""
-        return max(self.deviations, key=lambda own: own.errors[rung]).name
+        return max(self.deviations, key=lambda deviation: deviation.errors[rung]).name
 
     def beyond(self, refinement: float) -> float:
         """The largest error at a step shorter than the last one by a factor."""
-        return max(own.beyond(refinement) for own in self.deviations)
+        return max(deviation.beyond(refinement) for deviation in self.deviations)
 
     def refinement(self, allowed: float) -> float:
         """How much shorter than the last one a step must be for this error."""
-        return max(own.refinement(allowed) for own in self.deviations)
+        return max(deviation.refinement(allowed) for deviation in self.deviations)
 
 
 def estimate(values: Sequence[Numbers], steps: Sequence[float], order: float) -> Estimate:
@@ -67,22 +67,22 @@ def estimate(values: Sequence[Numbers], steps: Sequence[float], order: float) ->
     """
     last = values[-1]
     names = next(iter(last.values()))
-    largest = {name: max(abs(own[name]) for own in last.values()) for name in names}
+    largest = {name: max(abs(quantities[name]) for quantities in last.values()) for name in names}
     deviations = []
-    for flank, own in last.items():
-        for name, value in own.items():
+    for flank, quantities in last.items():
+        for name, value in quantities.items():
             scale = max(abs(value), LESSER_FLANK * largest[name])
-            found = [each[flank][name] for each in values]
-            deviations.append(_deviation(f"{name} on the {flank}", found, scale, steps, order))
+            series = [rung[flank][name] for rung in values]
+            deviations.append(_deviation(f"{name} on the {flank}", series, scale, steps, order))
     return Estimate(tuple(deviations))
 
 
 def _deviation(
-    name: str, found: Sequence[float], scale: float, steps: Sequence[float], order: float
+    name: str, values: Sequence[float], scale: float, steps: Sequence[float], order: float
 ) -> Deviation:
     if scale <= 0.0:
-        return Deviation(name, (0.0,) * len(found), order)
-    convergence = richardson(found, steps, order)
-    errors = [(abs(value - found[-1]) + convergence.error) / scale for value in found]
+        return Deviation(name, (0.0,) * len(values), order)
+    convergence = richardson(values, steps, order)
+    errors = [(abs(value - values[-1]) + convergence.error) / scale for value in values]
     observed = LEAST_ORDER if convergence.order is None else convergence.order
     return Deviation(name, tuple(errors), min(max(observed, LEAST_ORDER), order))

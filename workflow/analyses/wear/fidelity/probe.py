@@ -34,7 +34,7 @@ STEPS = 3
 # Settings of a probe along the axes that it does not vary: strips across a flank, nodes across it,
 # and increments of the cycle at least. Differences along one axis hardly depend on the others.
 STRIPS, NODES, INCREMENTS = 64, 10, 10
-# Of the contact solver: a thousandth of what probes are to tell apart.
+# Of the contact solver: a thousandth of the differences that probes resolve.
 TOLERANCE = 1e-5
 
 
@@ -85,7 +85,7 @@ def life(case: DovetailCase) -> Numbers:
     MethodFailed where nothing wears.
     """
     stages, (*_, end) = _run(case, "constant")
-    return _wearing(_found(stages, end))
+    return _wearing(_worn_by_flank(stages, end))
 
 
 def coupled_life(case: DovetailCase) -> tuple[Numbers, float]:
@@ -96,7 +96,7 @@ def coupled_life(case: DovetailCase) -> tuple[Numbers, float]:
     stages, (first, *_, end) = _run(case, "every")
     sizes = np.array([stage.grid.size for stage in stages])
     drift = resultant_change(end.solved_resultants, first.solved_resultants, sizes)
-    return _found(stages, end), float(np.abs(drift).max())
+    return _worn_by_flank(stages, end), float(np.abs(drift).max())
 
 
 def _run(
@@ -112,16 +112,16 @@ def _run(
     return stages, [state, *loop.march(state)]
 
 
-def _found(stages: list[ContactStage], state: CoupledState) -> Numbers:
+def _worn_by_flank(stages: list[ContactStage], state: CoupledState) -> Numbers:
     pairs = zip(stages, state.interfaces, strict=True)
-    return {stage.name: _worn(own.surfaces.depth, stage.grid) for stage, own in pairs}
+    return {stage.name: _worn(interface.surfaces.depth, stage.grid) for stage, interface in pairs}
 
 
-def _wearing(found: Numbers) -> Numbers:
-    """What was found, if it says anything."""
-    if not any(own["volume"] > 0.0 for own in found.values()):
+def _wearing(numbers: Numbers) -> Numbers:
+    """The numbers, if anything wears. Raises MethodFailed."""
+    if not any(flank["volume"] > 0.0 for flank in numbers.values()):
         raise MethodFailed("nothing wears in a section of the case")
-    return found
+    return numbers
 
 
 def _worn(depth: Array, grid: Grid) -> dict[str, float]:
@@ -143,7 +143,7 @@ def end_life(case: DovetailCase, cells: int) -> Numbers:
     contact = NormalContact(HalfSpace(grid, ElasticPair(case.material(1), case.material(2))))
     laws = case.wear_of(1).described(), case.wear_of(2).described()
     geometry = case.structure.geometry()
-    found = {}
+    numbers = {}
     for face, history in zip(structure.faces, structure.unworn(), strict=True):
         loads = _along(history.loads, length / width)
         slip = np.hypot(history.slip[:, 0], history.slip[:, 1]).mean(axis=1)
@@ -151,8 +151,8 @@ def end_life(case: DovetailCase, cells: int) -> Numbers:
         gap = geometry.flank_gap(np.zeros_like(grid.x), grid.x, SIDES[face.face.name])
         wearing = WearingContact(contact, laws, case.friction.at(0.0), sliding, TOLERANCE)
         state = WearState.unworn(np.ascontiguousarray(gap))
-        found[face.face.name] = _worn(_worn_away(wearing, state, case.wear.cycles), grid)
-    return _wearing(found)
+        numbers[face.face.name] = _worn(_worn_away(wearing, state, case.wear.cycles), grid)
+    return _wearing(numbers)
 
 
 def _along(loads: LoadHistory, factor: float) -> LoadHistory:

@@ -1,4 +1,4 @@
-"""Figure of a wear run by method full: the half-space's own friction against the structure's."""
+"""Figure of a wear run by method full: friction by the half-space against the structure's."""
 
 from __future__ import annotations
 
@@ -69,13 +69,13 @@ def _draw_profiles(axis: Axes, file: h5py.File, interface: str, name: str, scale
         along = field if field.ndim == 2 else field[0]
         label = f"increment {int(key) + 1}"
         axis.plot(centres(grid, 0), scale * middle(along, 0), color=colour, label=label)
-        if _given(file, interface, name):
+        if _has_field(file, interface, name):
             place, values = _nodes_across(file, interface, name, int(key))
             axis.plot(place, scale * values, "x", color=colour, mew=2)
     axis.set_xlabel("x [mm]")
 
 
-def _given(file: h5py.File, interface: str, name: str) -> bool:
+def _has_field(file: h5py.File, interface: str, name: str) -> bool:
     """Whether the loads came with a field: those of another code may be resultants alone."""
     field = file["structure"][interface].get(name)
     return field is not None and bool(np.any(field[()]))

@@ -21,7 +21,7 @@ CYCLE_COLOURS = "viridis"
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, BLACK)
 # Of the panels that begin at 0, over the largest value.
 HEADROOM = 1.1
-MICRO = 1e3  # mm to µm, N/mm to N/µm the other way round
+MICRO = 1e3  # mm to µm; its inverse N/mm to N/µm
 
 
 def loops(file: h5py.File) -> Figure:
@@ -46,11 +46,11 @@ def _draw_loops(axis: Axes, group: h5py.Group) -> None:
 
     chosen = spread(sorted(group), MOST_LOOPS)
     for number, jump in enumerate(chosen):
-        own = group[jump]
+        loop = group[jump]
         colour = colormaps[CYCLE_COLOURS](0.9 * number / max(len(chosen) - 1, 1))
-        cycles = float(own.attrs["cycles"])
+        cycles = float(loop.attrs["cycles"])
         label = f"{cycles:,.0f} cycles" if cycles else "unworn"
-        displacement, force = MICRO * own["displacement"][()], own["force"][()]
+        displacement, force = MICRO * loop["displacement"][()], loop["force"][()]
         axis.plot(displacement, force, color=colour, label=label)
     axis.legend(loc="best")
 

@@ -69,9 +69,9 @@ def _place(file: h5py.File) -> str:
     (name, first), *others = ((name, group.attrs) for name, group in file["grid"].items())
     y, far = first["axes"][1], SAME_PLANE * grid_of(file["grid"][name]).size[1]
     shared = all(
-        abs(other["axes"][1] @ y) > 1.0 - SAME_PLANE
-        and abs((other["origin"] - first["origin"]) @ y) < far
-        for _, other in others
+        abs(attributes["axes"][1] @ y) > 1.0 - SAME_PLANE
+        and abs((attributes["origin"] - first["origin"]) @ y) < far
+        for _, attributes in others
     )
     return "at y = 0" if shared else f"at y = 0 of {name}"
 

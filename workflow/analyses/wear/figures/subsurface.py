@@ -36,8 +36,10 @@ PARAMETERS = {
 def subsurface_stress(file: h5py.File) -> Figure:
     """Von Mises stress in the section of every contact at peak load, unworn above worn."""
     sections = file["stress/section"]
-    fields = {name: [_both_bodies(own, m) for m in MOMENTS] for name, own in sections.items()}
-    top = max(float(field.max()) for own in fields.values() for field in own)
+    fields = {
+        name: [_both_bodies(section, m) for m in MOMENTS] for name, section in sections.items()
+    }
+    top = max(float(field.max()) for moments in fields.values() for field in moments)
     figure = new_figure(f"Von Mises stress under the contact at peak load: {_ends(fields)}", 9.0)
     axes = figure.subplots(2, len(sections), sharex="col", sharey=True, squeeze=False)
     for column, (name, group) in zip(axes.T, sections.items(), strict=True):
@@ -64,8 +66,8 @@ def _both_bodies(group: h5py.Group, moment: str) -> Array:
 def _ends(fields: dict[str, list[Array]]) -> str:
     """Largest stress of each contact, unworn and worn."""
     texts = (
-        f"{name} " + " → ".join(f"{field.max():.0f}" for field in own) + " MPa"
-        for name, own in fields.items()
+        f"{name} " + " → ".join(f"{field.max():.0f}" for field in moments) + " MPa"
+        for name, moments in fields.items()
     )
     return ", ".join(texts)
 
@@ -130,11 +132,11 @@ def _values(group: h5py.Group, body: int) -> list[Array]:
 def _maps(file: h5py.File, grids: dict[str, Grid]) -> Figure:
     rows = [(name, body) for name in grids for body in (1, 2)]
     fields = [_values(file["stress/life"][name], body) for name, body in rows]
-    top = map_top([field for own in fields for field in own])
+    top = map_top([field for moments in fields for field in moments])
     figure = new_figure(_title(file), 1.0 + 1.4 * len(rows))
     axes = figure.subplots(len(rows), 2, sharex=True, sharey=True, squeeze=False)
-    for line, (name, body), own in zip(axes, rows, fields, strict=True):
-        for axis, moment, field in zip(line, MOMENTS, own, strict=True):
+    for line, (name, body), moments in zip(axes, rows, fields, strict=True):
+        for axis, moment, field in zip(line, MOMENTS, moments, strict=True):
             image = draw_map(axis, field, grids[name], top)
             body_name = body_names(file)[body]
             axis.set_title(f"{name}, {body_name}, {moment}: at most {field.max():.3g}")
@@ -155,8 +157,8 @@ def _curves(file: h5py.File, grids: dict[str, Grid]) -> Figure:
     for column, (name, grid) in zip(axes.T, grids.items(), strict=True):
         group = file["stress/life"][name]
         for axis, body in zip(column, (1, 2), strict=True):
-            own = zip(MOMENTS, _values(group, body), (BLUE, ORANGE), strict=True)
-            for moment, field, colour in own:
+            curves = zip(MOMENTS, _values(group, body), (BLUE, ORANGE), strict=True)
+            for moment, field, colour in curves:
                 label = f"{moment}: at most {field.max():.3g}"
                 axis.plot(centres(grid, 0), field[:, 0], color=colour, label=label)
             axis.set_title(f"{name}, {body_names(file)[body]}")

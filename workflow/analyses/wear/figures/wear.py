@@ -187,7 +187,7 @@ def _peak_change(file: h5py.File) -> str:
 
 
 def pressure_profiles(file: h5py.File) -> Figure:
-    """Peak-load pressure along both middle lines of each face, with the coarse answers."""
+    """Peak-load pressure along both middle lines of each face, with the coarse solutions."""
     interfaces = list(file["contact"])
     along = ALONG_LINE if line_contacts(file) else ALONG
     directions = len(along)
@@ -322,7 +322,7 @@ def kinetics(file: h5py.File) -> Figure:
     axes[1, 0].set_ylabel(f"volume [mm³{_per_length(file)}]")
     if with_area:
         axes[2, 0].set_ylabel(f"area [mm²{_per_length(file)}]")
-    # Not every panel has a linear regime: the legend takes each name where it is found.
+    # Not every panel has a linear regime: the legend takes each name from the first that has it.
     named: dict[str, Any] = {}
     for axis in axes.flat:
         handles, names = axis.get_legend_handles_labels()

@@ -65,6 +65,6 @@ def _write_section(group: h5py.Group, state: str, body: int, frame: Frame, path:
 def _places(group: h5py.Group, body: int) -> Array:
     """The section's points in the interface frame ``(n, k, 3)`` [mm]."""
     along, depths = np.meshgrid(group["along"][()], group["depths"][()], indexing="ij")
-    other = np.full_like(along, float(group.attrs["at"]))
-    in_plane = (along, other) if group.attrs["axis"] == "x" else (other, along)
+    across = np.full_like(along, float(group.attrs["at"]))
+    in_plane = (along, across) if group.attrs["axis"] == "x" else (across, along)
     return np.stack([*in_plane, -depths if body == 1 else depths], axis=-1)

@@ -17,13 +17,13 @@ STRUCTURES: tuple[WearStructure[Any], ...] = (
 
 
 class CasesOfStructures(Mapping[str, type[WearCase]]):
-    """The kinds of case of the structures that there are when it is asked, by their names."""
+    """Kinds of case by the names of their structures, those registered later included."""
 
     def __getitem__(self, name: str) -> type[WearCase]:
-        return {own.name: own.case for own in STRUCTURES}[name]
+        return {structure.name: structure.case for structure in STRUCTURES}[name]
 
     def __iter__(self) -> Iterator[str]:
-        return iter(own.name for own in STRUCTURES)
+        return iter(structure.name for structure in STRUCTURES)
 
     def __len__(self) -> int:
         return len(STRUCTURES)
@@ -31,4 +31,4 @@ class CasesOfStructures(Mapping[str, type[WearCase]]):
 
 def structure_of(case: WearCase) -> WearStructure[Any]:
     """The structure of a case."""
-    return next(own for own in STRUCTURES if own.case is type(case))
+    return next(structure for structure in STRUCTURES if structure.case is type(case))

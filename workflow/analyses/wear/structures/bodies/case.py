@@ -1,7 +1,7 @@
 """A wear case of two bodies without a structure, one sliding to and fro on the other.
 
-A line contact, in plane strain, differs in the dimensions of its loads and its grid: a case of its
-own, though both are written ``analysis: wear`` and ``kind: bodies``.
+A line contact, in plane strain, differs in the dimensions of its loads and its grid: a separate
+kind of case, though both are written ``analysis: wear`` and ``kind: bodies``.
 """
 
 from __future__ import annotations

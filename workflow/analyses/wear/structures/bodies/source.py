@@ -66,7 +66,7 @@ class BodiesSource:
     def worn(
         self, depths: Sequence[Array], friction: Sequence[float] | None = None
     ) -> tuple[CycleLoads, ...]:
-        """As unworn but for the friction: no structure answers to wear."""
+        """As unworn but for the friction: no structure responds to wear."""
         return self._sliding(*friction) if friction else self.unworn()
 
     def user_faces(self, number: int) -> tuple[UserFace, ...]:

@@ -155,9 +155,9 @@ def _require_below(section: Section, key: str, limit: float, name: str) -> None:
     """Raise unless the length ``key`` is below ``limit`` [mm], called ``name`` in the message."""
     length = getattr(section, key)
     if length >= limit:
-        other = name.rsplit(" ", 1)[-1]
+        limiting_key = name.rsplit(" ", 1)[-1]
         raise disagreement(
-            f"{length:g} mm: too large; allowed: below {name}, {limit:g} mm", key, other
+            f"{length:g} mm: too large; allowed: below {name}, {limit:g} mm", key, limiting_key
         )
 
 
@@ -199,13 +199,15 @@ class LoadPath(Section):
     @property
     def shares(self) -> tuple[float, ...]:
         """Share of each mission in all cycles."""
-        return tuple(own.share for own in self.mix) or (1.0,)
+        return tuple(mission.share for mission in self.mix) or (1.0,)
 
     def missions(self) -> list[dict[str, Any]]:
         """The entries of every mission of the mix."""
         entries = self.model_dump(exclude={"mix"})
-        own = [mission.model_dump(exclude={"share"}, exclude_none=True) for mission in self.mix]
-        return [entries | given for given in own or [{}]]
+        missions = [
+            mission.model_dump(exclude={"share"}, exclude_none=True) for mission in self.mix
+        ]
+        return [entries | mission for mission in missions or [{}]]
 
     @property
     def heaviest(self) -> int:

@@ -1,4 +1,4 @@
-"""Two bodies of the user's own mesh or CAD file."""
+"""Two bodies of a mesh or CAD file of the user's."""
 
 from __future__ import annotations
 

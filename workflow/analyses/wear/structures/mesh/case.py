@@ -200,7 +200,7 @@ class Legs(Section):
         if not self.increments:
             raise disagreement("none; allowed: one or more", "increments")
         if self.mix:
-            check_shares([own.share for own in self.mix])
+            check_shares([cycle.share for cycle in self.mix])
         if not self.cycle_from <= self.peak_leg <= len(self.increments):
             raise disagreement(
                 f"{self.peak_leg}: no leg of the cycle; "
@@ -211,7 +211,7 @@ class Legs(Section):
 
     def mixed(self, loads: int) -> list[tuple[tuple[float, ...], float]]:
         """Factors of all ``loads``, so many, and share of every cycle."""
-        return [(own.factors, own.share) for own in self.mix] or [((1.0,) * loads, 1.0)]
+        return [(cycle.factors, cycle.share) for cycle in self.mix] or [((1.0,) * loads, 1.0)]
 
 
 class MeshCase(WearCase):
@@ -257,10 +257,10 @@ class MeshCase(WearCase):
                     f"structure.loads.{index}.path",
                 )
         loads = len(self.structure.loads)
-        for index, own in enumerate(self.load_path.mix):
-            if len(own.factors) != loads:
+        for index, cycle in enumerate(self.load_path.mix):
+            if len(cycle.factors) != loads:
                 raise disagreement(
-                    f"{len(own.factors)} factors for {loads} loads; allowed: one for each load",
+                    f"{len(cycle.factors)} factors for {loads} loads; allowed: one for each load",
                     f"load_path.mix.{index}.factors",
                 )
         return self
@@ -298,8 +298,8 @@ class MeshCase(WearCase):
             with _pointing_at(f"structure.supports.{index}.group"):
                 check_support(imported, (body_1, body_2), support.described())
         for index, load in enumerate(structure.loads):
-            own = ".group" if hasattr(load, "group") else ""
-            with _pointing_at(f"structure.loads.{index}{own}"):
+            suffix = ".group" if hasattr(load, "group") else ""
+            with _pointing_at(f"structure.loads.{index}{suffix}"):
                 check_load(imported, (body_1, body_2), load.described())
 
     def _check_contacts(self) -> None:
@@ -326,7 +326,9 @@ class MeshCase(WearCase):
 
         structure = self.structure
         supports = [support.described() for support in structure.supports]
-        imposed = [o.described() for o in structure.loads if isinstance(o, DisplacementLoad)]
+        imposed = [
+            load.described() for load in structure.loads if isinstance(load, DisplacementLoad)
+        ]
         materials = self.material(1), self.material(2)
         with _pointing_at("structure.supports"):
             made = imported_structure(structure.mesh(), imported, materials, supports, imposed, 1)

@@ -81,15 +81,15 @@ class MeshModel:
         return self._case.structure.mesh()
 
     def _with_gap(self, interface: Interface) -> Interface:
-        """The interface with the case's own gap on top of the meshes'."""
-        given = self._given(interface)
-        if given is None:
+        """The interface with the gap of the case on top of the meshes'."""
+        extra = self._case_gap(interface)
+        if extra is None:
             return interface
         points = interface.coordinates[:, :, None, None]
-        at_nodes = np.array([float(given(x, y)[0, 0]) for x, y in points])
+        at_nodes = np.array([float(extra(x, y)[0, 0]) for x, y in points])
         return replace(interface, gap=interface.gap + at_nodes)
 
-    def _given(self, interface: Interface) -> GapFunction | None:
+    def _case_gap(self, interface: Interface) -> GapFunction | None:
         """The gap that the case gives an interface, if it does."""
         (pair,) = (p for p in self._case.structure.contacts if p.name == interface.name)
         if pair.gap is None:
@@ -113,9 +113,9 @@ class MeshModel:
         return imported_softening(structure, loads, self.blocks[0].amplitudes[self.peak])
 
     def contact_face(self, interface: Interface) -> ContactFace:
-        size, given = face_size(interface), self._given(interface)
-        (own,) = (i for i in self._meshed.interfaces if i.name == interface.name)
-        gap = _MeshGap(own) if given is None else _Sum(_MeshGap(own), given)
+        size, extra = face_size(interface), self._case_gap(interface)
+        (meshed,) = (i for i in self._meshed.interfaces if i.name == interface.name)
+        gap = _MeshGap(meshed) if extra is None else _Sum(_MeshGap(meshed), extra)
         return ContactFace(interface, size, gap, _coarse(interface, size))
 
     def node_numbers(self, body: int) -> Indices:
@@ -137,12 +137,12 @@ class MeshModel:
 class _Sum:
     """Two gaps, one on the other."""
 
-    one: GapFunction
-    other: GapFunction
+    first: GapFunction
+    second: GapFunction
 
     def __call__(self, x: Array, y: Array) -> Array:
         """Gap ``(nx, ny)`` [mm] at ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``."""
-        return self.one(x, y) + self.other(x, y)
+        return self.first(x, y) + self.second(x, y)
 
 
 class _MeshGap:

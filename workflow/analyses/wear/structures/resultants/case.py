@@ -110,9 +110,9 @@ class Resultants(Section):
     @model_validator(mode="after")
     def _sizes_are_whole(self) -> Resultants:
         sizes = {"size": self.size} | {
-            f"interfaces.{number}.size": own.size
-            for number, own in enumerate(self.interfaces)
-            if own.size is not None
+            f"interfaces.{number}.size": interface.size
+            for number, interface in enumerate(self.interfaces)
+            if interface.size is not None
         }
         for key, size in sizes.items():
             if len(size) != 2 and not (len(size) == 1 and self.dimension == 2):
@@ -127,33 +127,33 @@ class Resultants(Section):
 
     def size_of(self, name: str) -> tuple[float, float]:
         """Extent of a face along x and y [mm]; of a line contact a slice of 1 mm."""
-        size = getattr(self._own(name), "size", None) or self.size
+        size = getattr(self._interface(name), "size", None) or self.size
         return size[0], 1.0 if self.line else size[1]
 
     def gap_of(self, name: str) -> GapShape | None:
         """Gap over a face, None where the file has it."""
-        return getattr(self._own(name), "gap", None) or self.gap
+        return getattr(self._interface(name), "gap", None) or self.gap
 
     def frame_of(self, name: str) -> Frame | None:
         """Frame of a face where the case gives one."""
-        own: FaceFrame | None = getattr(self._own(name), "frame", None)
-        return None if own is None else own.frame()
+        frame: FaceFrame | None = getattr(self._interface(name), "frame", None)
+        return None if frame is None else frame.frame()
 
     def nodes_of(self, name: str) -> dict[Literal[1, 2], str]:
         """Node tables of a face by body."""
-        own: NodeTables | None = getattr(self._own(name), "nodes", None)
+        nodes: NodeTables | None = getattr(self._interface(name), "nodes", None)
         files: dict[Literal[1, 2], str | None] = {}
-        if own is not None:
-            files = {1: own.body_1, 2: own.body_2}
+        if nodes is not None:
+            files = {1: nodes.body_1, 2: nodes.body_2}
         return {body: file for body, file in files.items() if file is not None}
 
-    def _own(self, name: str) -> ImportedInterface | None:
-        return next((own for own in self.interfaces if own.name == name), None)
+    def _interface(self, name: str) -> ImportedInterface | None:
+        return next((interface for interface in self.interfaces if interface.name == name), None)
 
     def key_of(self, name: str, key: str) -> str:
-        """The dotted path of an entry about a face: its own where it has one."""
-        for number, own in enumerate(self.interfaces):
-            if own.name == name and getattr(own, key.partition(".")[0]) is not None:
+        """The dotted path of an entry about a face: of the interface where that has it."""
+        for number, interface in enumerate(self.interfaces):
+            if interface.name == name and getattr(interface, key.partition(".")[0]) is not None:
                 return f"structure.interfaces.{number}.{key}"
         return f"structure.{key}"
 
@@ -166,10 +166,10 @@ class Resultants(Section):
         sizes = {name: self.size_of(name) for name in names}
         return read_resultants(self.file, self.line, friction, sizes)
 
-    def taken(self, found: dict[str, ImportedLoads]) -> dict[str, ImportedLoads]:
+    def taken(self, loads: dict[str, ImportedLoads]) -> dict[str, ImportedLoads]:
         """Of what the file has, the interfaces that the case takes."""
-        names = [own.name for own in self.interfaces] or list(found)
-        return {name: found[name] for name in names}
+        names = [interface.name for interface in self.interfaces] or list(loads)
+        return {name: loads[name] for name in names}
 
 
 class ImportedContact(Contact):
@@ -219,8 +219,8 @@ class ResultantsCase(WearCase):
         return [
             ("structure", f"loads in {self.structure.dimension}-D from {file}, {slip} slip"),
             ("load path", f"{len(first.loads)} increments"),
-            *(("face", f"{name}, P up to {own.loads.P.max():g} {unit}, {self._shape(name)}")
-              for name, own in loads.items()),
+            *(("face", f"{name}, P up to {imported.loads.P.max():g} {unit}, {self._shape(name)}")
+              for name, imported in loads.items()),
         ]  # fmt: skip
 
     def _shape(self, name: str) -> str:
@@ -231,32 +231,32 @@ class ResultantsCase(WearCase):
     @model_validator(mode="after")
     def _loads_can_be_used(self) -> ResultantsCase:
         try:
-            found = self.structure.read(self.friction.at(0.0))
+            in_file = self.structure.read(self.friction.at(0.0))
         except InputFileError as error:
             raise disagreement(str(error), "structure.file") from error
-        self._check_names(list(found))
-        loads = self.structure.taken(found)
-        if not any(own.loads.P.any() for own in loads.values()):
+        self._check_names(list(in_file))
+        loads = self.structure.taken(in_file)
+        if not any(imported.loads.P.any() for imported in loads.values()):
             raise disagreement(
                 "P is 0 in every increment; allowed: loads that press", "structure.file"
             )
-        for name, own in loads.items():
-            self._check_slip(own)
-            self._check_gap(name, own)
-            self._check_nodes(name, own)
+        for name, imported in loads.items():
+            self._check_slip(imported)
+            self._check_gap(name, imported)
+            self._check_nodes(name, imported)
         return self
 
-    def _check_names(self, found: list[str]) -> None:
+    def _check_names(self, in_file: list[str]) -> None:
         """Every interface of the case is in the file, once, and none is called as a result is."""
-        named = [own.name for own in self.structure.interfaces]
+        named = [interface.name for interface in self.structure.interfaces]
         for number, name in enumerate(named):
             key = f"structure.interfaces.{number}.name"
-            if name not in found:
-                allowed = ", ".join(found)
+            if name not in in_file:
+                allowed = ", ".join(in_file)
                 raise disagreement(f"{shown(name)}: not in the file; allowed: {allowed}", key)
             if name in named[:number]:
                 raise disagreement(f"{shown(name)}: given twice; allowed: once", key)
-        for name in named or found:
+        for name in named or in_file:
             check_interface_name(name, "structure.file")
 
     def _check_slip(self, loads: ImportedLoads) -> None:

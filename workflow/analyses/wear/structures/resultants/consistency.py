@@ -73,11 +73,11 @@ def mix_columns(columns: Mapping[str, Array], refusal: Refusal) -> dict[str, Any
     Empty where the file has neither. Raises what ``refusal`` makes of columns that are no mix: the
     rows of a block follow each other and have one share, and the shares add up to 1.
     """
-    given = [name for name in MIX if name in columns]
-    if not given:
+    present = [name for name in MIX if name in columns]
+    if not present:
         return {}
-    if len(given) == 1:
-        raise refusal(0, given[0], "given alone", f"{' and '.join(MIX)}, or neither")
+    if len(present) == 1:
+        raise refusal(0, present[0], "given alone", f"{' and '.join(MIX)}, or neither")
     names, share = (columns[name] for name in MIX)
     begins = np.flatnonzero(np.diff(names, prepend=np.nan) != 0.0)
     for number, row in enumerate(begins.tolist()):
@@ -96,8 +96,8 @@ def mix_columns(columns: Mapping[str, Array], refusal: Refusal) -> dict[str, Any
 def differently_mixed(loads: Mapping[str, LoadHistory]) -> str | None:
     """An interface whose cycles are mixed otherwise than those of the first one."""
     first = next(iter(loads.values()))
-    for name, own in loads.items():
-        pairs = ((own.block, first.block), (own.share, first.share))
+    for name, history in loads.items():
+        pairs = ((history.block, first.block), (history.share, first.share))
         if not all(np.array_equal(*pair) for pair in pairs):
             return name
     return None
@@ -122,7 +122,7 @@ def _check_apart(columns: dict[str, Array], remainder: dict[str, float], refusal
 
 
 def _check_line(columns: dict[str, Array], refusal: Refusal) -> None:
-    """Moments of a line contact about other axes than its length have no arm of their own."""
+    """Moments of a line contact about other axes than its length have no lever arm."""
     for name in ("Mx", "Mz"):
         wrong = np.abs(columns[name]) > REMAINDER * columns["P"].max()
         _refuse_where(wrong, name, "moment of a line contact", "0 but for My", refusal)
@@ -134,7 +134,7 @@ def _check_friction(columns: dict[str, Array], friction: float, refusal: Refusal
     limit = friction * P
     wrong = shear > limit * (1.0 + EXCESS) + REMAINDER * friction * P.max()
     for increment in np.flatnonzero(wrong).tolist():
-        name = max(("Qx", "Qy"), key=lambda own: abs(float(columns[own][increment])))
+        name = max(("Qx", "Qy"), key=lambda column: abs(float(columns[column][increment])))
         raise refusal(
             increment,
             name,

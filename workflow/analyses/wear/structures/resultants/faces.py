@@ -36,7 +36,7 @@ def check_facets(facets: Indices, count: int) -> None:
     if len(left):
         raise FaceError(
             f"node {left[0] + 1} of {count} belongs to no facet; allowed: nodes of one face, each "
-            "at a place of its own"
+            "at a different place"
         )
 
 

@@ -1,4 +1,4 @@
-"""Loads and slip fields of an HDF5 file, laid out as the structure's own in ``results.h5``."""
+"""Loads and slip fields of an HDF5 file, laid out as those of a structure in ``results.h5``."""
 
 from __future__ import annotations
 
@@ -93,13 +93,15 @@ def read_h5(
     try:
         with h5py.File(file, "r") as opened:
             top = opened.get(group or "/")
-            found = {} if not isinstance(top, h5py.Group) else _interfaces(file, top)
-            if not found:
+            interfaces = {} if not isinstance(top, h5py.Group) else _interfaces(file, top)
+            if not interfaces:
                 raise InputFileError(
                     f"{file}: /{group}: no interfaces; allowed: a group for each, with a group "
                     f"{LOADS} in it; at the top: {', '.join(opened) or 'nothing'}"
                 )
-            read = {name: _read(own, bounds(name), line) for name, own in found.items()}
+            read = {
+                name: _read(interface, bounds(name), line) for name, interface in interfaces.items()
+            }
     except OSError as error:
         reason = " ".join(str(error).split())
         raise InputFileError(f"{file}: cannot be read ({reason})") from error
@@ -117,11 +119,11 @@ def _interfaces(file: str, top: h5py.Group) -> dict[str, Group]:
 
 
 def _check_counts(file: str, read: dict[str, ImportedLoads]) -> None:
-    counts = {name: len(own.loads) for name, own in read.items()}
+    counts = {name: len(imported.loads) for name, imported in read.items()}
     if len(set(counts.values())) > 1:
-        told = ", ".join(f"{name} {count}" for name, count in counts.items())
+        listed = ", ".join(f"{name} {count}" for name, count in counts.items())
         raise InputFileError(
-            f"{file}: increments differ: {told}; allowed: as many for every interface"
+            f"{file}: increments differ: {listed}; allowed: as many for every interface"
         )
 
 
@@ -173,15 +175,15 @@ def _loads(group: Group, bounds: Bounds) -> LoadHistory:
         column = group.shaped(name, unit, shape)
         columns[name] = np.zeros(shape) if column is None else column
 
-    found = {name: group.shaped(name, "1", shape) for name in MIX}
-    given = {name: column for name, column in found.items() if column is not None}
+    optional = {name: group.shaped(name, "1", shape) for name in MIX}
+    mix_values = {name: column for name, column in optional.items() if column is not None}
 
     def refusal(increment: int, column: str, wrong: str, allowed: str) -> InputFileError:
-        value = (columns | given)[column][increment]
+        value = (columns | mix_values)[column][increment]
         return group.error(column, f"increment {increment + 1}: {value:g}: {wrong}", allowed)
 
     check_loads(columns, bounds, refusal)
-    mix = mix_columns(given, refusal)
+    mix = mix_columns(mix_values, refusal)
     marks = group.shaped("sliding", "1", shape)
     if marks is None:
         return LoadHistory(**columns, sliding=slides_by_limit(columns, bounds.friction), **mix)
@@ -191,11 +193,11 @@ def _loads(group: Group, bounds: Bounds) -> LoadHistory:
 
 
 def _frame(group: Group) -> Frame | None:
-    given = [name for name in ("origin", "axes") if name in group.group.attrs]
-    if not given:
+    attributes = [name for name in ("origin", "axes") if name in group.group.attrs]
+    if not attributes:
         return None
-    if len(given) == 1:
-        raise group.error("", f"attribute {given[0]} alone", "origin (3,) and axes (3, 3)")
+    if len(attributes) == 1:
+        raise group.error("", f"attribute {attributes[0]} alone", "origin (3,) and axes (3, 3)")
     frame = frame_of(group.group)
     if frame.origin.shape != (3,) or frame.axes.shape != (3, 3):
         raise group.error("", "frame of another shape", "origin (3,) and axes (3, 3)")

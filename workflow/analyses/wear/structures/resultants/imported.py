@@ -46,7 +46,7 @@ class ImportedLoads:
     def face(self, name: str) -> Face | None:
         """The face that slip is given on, None where there is none.
 
-        In a frame of its own where the file does not say where it lies.
+        In the global axes where the file does not say where it lies.
         """
         from fe_models.mesh import Face
 

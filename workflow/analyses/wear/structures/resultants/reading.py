@@ -70,19 +70,20 @@ def read_resultants(
     rows = _rows_of(table)
     _check_counts(table, rows)
     read = {
-        name: ImportedLoads(_loads(table, numbers, own, bounds(name))) for name, own in rows.items()
+        name: ImportedLoads(_loads(table, numbers, places, bounds(name)))
+        for name, places in rows.items()
     }
     return _alike(file, read)
 
 
 def _alike(file: str, read: dict[str, ImportedLoads]) -> dict[str, ImportedLoads]:
     """What was read, if all interfaces go through the same mix of cycles."""
-    other = differently_mixed({name: own.loads for name, own in read.items()})
-    if other is not None:
+    differing = differently_mixed({name: imported.loads for name, imported in read.items()})
+    if differing is not None:
         first = next(iter(read))
         raise InputFileError(
-            f"{file}: blocks or shares of {other} and {first} differ; allowed: the same for every "
-            "interface"
+            f"{file}: blocks or shares of {differing} and {first} differ; allowed: the same for "
+            "every interface"
         )
     return read
 
@@ -104,8 +105,8 @@ def _rows_of(table: TableFile) -> dict[str, list[int]]:
             raise table.refusal(row, INTERFACE, "no name", allowed)
         rows.setdefault(name, []).append(row)
     if INCREMENT in table.names:
-        for own in rows.values():
-            _check_increments(table, own)
+        for places in rows.values():
+            _check_increments(table, places)
     return rows
 
 
@@ -120,10 +121,10 @@ def _check_increments(table: TableFile, rows: list[int]) -> None:
 
 def _check_counts(table: TableFile, rows: dict[str, list[int]]) -> None:
     longest = max(rows, key=lambda name: len(rows[name]))
-    for name, own in rows.items():
-        if len(own) != len(rows[longest]):
+    for name, places in rows.items():
+        if len(places) != len(rows[longest]):
             raise InputFileError(
-                f"{table.file}:{table.rows[own[-1]][0]}: {shown(name)} ends after {len(own)} "
+                f"{table.file}:{table.rows[places[-1]][0]}: {shown(name)} ends after {len(places)} "
                 f"increments; allowed: as many for every interface, {longest} has "
                 f"{len(rows[longest])}"
             )
@@ -138,8 +139,8 @@ def _loads(
     }
     refusal = partial(_refusal, table, rows)
     check_loads(columns, bounds, refusal)
-    given = {name: numbers[name][rows] for name in MIX if name in numbers}
-    mix = mix_columns(given, refusal)
+    mix_values = {name: numbers[name][rows] for name in MIX if name in numbers}
+    mix = mix_columns(mix_values, refusal)
     if SLIDING not in numbers:
         return LoadHistory(**columns, sliding=slides_by_limit(columns, bounds.friction), **mix)
     marks = numbers[SLIDING][rows]

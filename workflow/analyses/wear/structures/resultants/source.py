@@ -39,12 +39,12 @@ class ResultantsSource:
 
     @cached_property
     def faces(self) -> tuple[ContactFace, ...]:
-        return tuple(self._contact_face(name, own) for name, own in self.imported.items())
+        return tuple(self._contact_face(name, imported) for name, imported in self.imported.items())
 
     @property
     def peak(self) -> int:
         """First increment in which a face carries the largest P of all."""
-        heaviest = np.max([own.loads.P for own in self.imported.values()], axis=0)
+        heaviest = np.max([imported.loads.P for imported in self.imported.values()], axis=0)
         return int(np.argmax(heaviest >= (1.0 - REMAINDER) * heaviest.max()))
 
     def frame(self, name: str) -> Frame | None:
@@ -56,24 +56,24 @@ class ResultantsSource:
 
     def unworn(self) -> tuple[CycleLoads, ...]:
         return tuple(
-            CycleLoads(own.loads, _slip(own, len(contact.face)))
-            for own, contact in zip(self.imported.values(), self.faces, strict=True)
+            CycleLoads(imported.loads, _slip(imported, len(contact.face)))
+            for imported, contact in zip(self.imported.values(), self.faces, strict=True)
         )
 
     def worn(
         self, depths: Sequence[Array], friction: Sequence[float] | None = None
     ) -> tuple[CycleLoads, ...]:
-        """As unworn: no structure answers to wear."""
+        """As unworn: no structure responds to wear."""
         return self.unworn()
 
     def user_faces(self, number: int) -> tuple[UserFace, ...]:
         """Over the nodes of the case's tables, else over those of the file of loads."""
-        name, own = list(self.imported.items())[number]
+        name, imported = list(self.imported.items())[number]
         frame, tables = self.frame(name), self._case.structure.nodes_of(name)
         if frame is None:
             return ()
         faces = []
-        for body, numbers in zip(BODIES, (own.nodes_1, own.nodes_2), strict=True):
+        for body, numbers in zip(BODIES, (imported.nodes_1, imported.nodes_2), strict=True):
             if body in tables:
                 table = read_nodes(tables[body])
                 faces.append(UserFace(body, table.numbers, frame, table.points))
@@ -86,44 +86,44 @@ class ResultantsSource:
         columns = ("P", "Qx", "Qy", "Mx", "My", "Mz")
         return np.array(
             [
-                [getattr(own.loads, name)[self.peak] for name in columns]
-                for own in self.imported.values()
+                [getattr(imported.loads, name)[self.peak] for name in columns]
+                for imported in self.imported.values()
             ]
         )
 
-    def _contact_face(self, name: str, own: ImportedLoads) -> ContactFace:
+    def _contact_face(self, name: str, imported: ImportedLoads) -> ContactFace:
         structure = self._case.structure
         grid = Grid.over(structure.size_of(name), self._case.contact.grid, self.line)
-        face = self._face(name, own, grid.size)
-        gap = gap_over(structure.gap_of(name), own.height, grid)
-        return ContactFace(face, grid.size, gap, self._coarse(own, grid), REMEDY)
+        face = self._face(name, imported, grid.size)
+        gap = gap_over(structure.gap_of(name), imported.height, grid)
+        return ContactFace(face, grid.size, gap, self._coarse(imported, grid), REMEDY)
 
-    def _face(self, name: str, own: ImportedLoads, size: tuple[float, float]) -> Face:
+    def _face(self, name: str, imported: ImportedLoads, size: tuple[float, float]) -> Face:
         """The face of the file, or the corners of the nominal one."""
         frame = self.frame(name) or Frame(np.zeros(3), np.eye(3))
-        found = own.face(name)
-        if found is not None:
-            return replace(found, frame=frame)
+        face = imported.face(name)
+        if face is not None:
+            return replace(face, frame=frame)
         half_x, half_y = 0.5 * size[0], 0.5 * size[1]
         if self.line:
             return Face(name, frame, np.array([[-half_x, 0.0], [half_x, 0.0]]), np.array([[0, 1]]))
         corners = [[-half_x, -half_y], [half_x, -half_y], [half_x, half_y], [-half_x, half_y]]
         return Face(name, frame, np.array(corners), np.array([[0, 1, 2], [0, 2, 3]]))
 
-    def _coarse(self, own: ImportedLoads, grid: Grid) -> tuple[int, int]:
+    def _coarse(self, imported: ImportedLoads, grid: Grid) -> tuple[int, int]:
         """About as many square-ish cells as the face has nodes; without nodes larger cells."""
         nx, ny = grid.shape
-        if own.coordinates is None:
+        if imported.coordinates is None:
             coarse = nx / COARSER, ny / COARSER
         elif self.line:
-            coarse = float(len(own.coordinates)), 1.0
+            coarse = float(len(imported.coordinates)), 1.0
         else:
-            pitch = np.sqrt(grid.size[0] * grid.size[1] / len(own.coordinates))
+            pitch = np.sqrt(grid.size[0] * grid.size[1] / len(imported.coordinates))
             coarse = grid.size[0] / pitch, grid.size[1] / pitch
         cells = max(FEWEST, round(coarse[0])), max(FEWEST, round(coarse[1]))
         return cells[0], 1 if self.line else cells[1]
 
 
-def _slip(own: ImportedLoads, nodes: int) -> Array:
+def _slip(imported: ImportedLoads, nodes: int) -> Array:
     """Slip of the file, or none."""
-    return np.zeros((len(own.loads), 2, nodes)) if own.slip is None else own.slip
+    return np.zeros((len(imported.loads), 2, nodes)) if imported.slip is None else imported.slip

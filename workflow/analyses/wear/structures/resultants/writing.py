@@ -1,4 +1,4 @@
-"""Loads of our own structures as files, in the form in which they are read."""
+"""Loads of our structures as files, in the form in which they are read."""
 
 from __future__ import annotations
 
@@ -34,15 +34,15 @@ def write_resultants_csv(
     """
     loads = list(histories.values())
     units = base_units(line) | {"sliding": ""}
-    if any(own.mixed for own in loads):
+    if any(history.mixed for history in loads):
         units |= dict.fromkeys(MIX, "")
-    lengths = [len(own) for own in loads]
+    lengths = [len(history) for history in loads]
     columns: dict[str, NDArray[Any]] = {
         "interface": np.repeat(list(histories), lengths),
         "increment": np.concatenate([np.arange(1, length + 1) for length in lengths]),
     }
     for name, unit in units.items():
-        values = np.concatenate([getattr(own, name) for own in loads])
+        values = np.concatenate([getattr(history, name) for history in loads])
         columns[heading(name, unit)] = values.astype(int) if name == "sliding" else values
     write_table(path, columns, note=NOTE)
 
@@ -78,4 +78,4 @@ def _at_nodes(face: Interface) -> dict[str, Dataset]:
         "nodes_2": Dataset(face.nodes_2, "1", "node numbers of body 2"),
         "nodal_height": Dataset(face.gap, "mm", "gap before loading, at the nodes"),
     }
-    return {name: own for name, own in datasets.items() if len(own.values) == len(face)}
+    return {name: dataset for name, dataset in datasets.items() if len(dataset.values) == len(face)}
