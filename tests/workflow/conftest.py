@@ -11,12 +11,12 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
 from fe_models.gmsh_session import gmsh_model
 from sa_solver.types import Array, Frame, Grid
+from tests.workflow.commands import invoke
 from workflow.analyses.wear import contact_workers
-from workflow.cli import cli
 from workflow.shell import processes
 
 SIZE, EDGE, END = (10.0, 60.0), 1.0, 3.0
@@ -297,13 +297,6 @@ def _contacts_here() -> Iterator[None]:
 def own_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Contacts have processes of their own, as where there is no test."""
     monkeypatch.setattr(contact_workers, "workers", processes.workers)
-
-
-def invoke(*arguments: object) -> Result:
-    """The command in this process; anything but an exit is raised."""
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
 
 
 @pytest.fixture(scope="session")
