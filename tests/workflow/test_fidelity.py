@@ -9,7 +9,7 @@ import pytest
 
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.case.sections import Coupling, Step
-from workflow.analyses.wear.fidelity import axes, dimension
+from workflow.analyses.wear.fidelity import axes, choosing
 from workflow.analyses.wear.fidelity.decision import Decision
 from workflow.analyses.wear.fidelity.estimate import estimate
 from workflow.analyses.wear.fidelity.probe import (
@@ -268,7 +268,7 @@ def cheap_probes(monkeypatch):
     def plane(case):
         return Decision("structure.dimension", 2, "as in a probe", error=0.043)
 
-    monkeypatch.setattr(dimension, "choose_dimension", plane)
+    monkeypatch.setattr(choosing, "choose_dimension", plane)
     monkeypatch.setattr(axes, "life", known)
     monkeypatch.setattr(axes, "end_life", lambda own, cells: both(1.0 + 5.0 / cells**2))
     monkeypatch.setattr(axes, "coupled_life", lambda own: (both(1.05), 0.02))

@@ -16,7 +16,7 @@ from sa_solver.types import Frame, Grid
 from tests.workflow.conftest import Run, invoke
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.contact_stage import ContactStage, StageSettings
-from workflow.analyses.wear.fidelity import axes
+from workflow.analyses.wear.fidelity import choosing
 from workflow.analyses.wear.fidelity.dimension import choose_dimension
 from workflow.analyses.wear.figures.wear import FIGURES, figures_of
 from workflow.analyses.wear.structure_stage import StructureStage
@@ -259,7 +259,7 @@ def test_sentence_of_a_uniform_slot():
 @pytest.fixture
 def dimension_only(monkeypatch):
     """The other axes leave the case as it is."""
-    monkeypatch.setattr(axes, "AXES", ())
+    monkeypatch.setattr(choosing, "AXES", ())
 
 
 def auto(path: Path, *overrides: str):
