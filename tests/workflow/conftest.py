@@ -17,6 +17,7 @@ from fe_models.gmsh_session import gmsh_model
 from sa_solver.types import Array, Frame, Grid
 from tests.workflow.commands import invoke
 from workflow.analyses.wear import contact_workers
+from workflow.pictures import drawing
 from workflow.shell import processes
 
 SIZE, EDGE, END = (10.0, 60.0), 1.0, 3.0
@@ -282,21 +283,29 @@ def workers_here(
     yield InThisProcess([make(sent(own)) for own in settings])
 
 
-@pytest.fixture(scope="session", autouse=True)
-def _contacts_here() -> Iterator[None]:
-    """Contacts are computed in the process of the test: to start others takes longer than they do.
+def one_by_one(jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]]) -> None:
+    """Stands for jobs side by side."""
+    for do, arguments in jobs:
+        do(*arguments)
 
-    In processes of their own they find the same but for rounding (test_run.py).
+
+@pytest.fixture(scope="session", autouse=True)
+def _all_here() -> Iterator[None]:
+    """Contacts and pictures of a run are made by the test: to start processes takes longer.
+
+    In processes of their own contacts find the same but for rounding (test_run.py).
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(contact_workers, "workers", workers_here)
+        patch.setattr(drawing, "side_by_side", one_by_one)
         yield
 
 
 @pytest.fixture
 def own_processes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Contacts have processes of their own, as where there is no test."""
+    """Contacts and pictures have processes of their own, as where there is no test."""
     monkeypatch.setattr(contact_workers, "workers", processes.workers)
+    monkeypatch.setattr(drawing, "side_by_side", processes.side_by_side)
 
 
 @pytest.fixture(scope="session")

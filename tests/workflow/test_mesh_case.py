@@ -144,7 +144,7 @@ def dovetail_as_mesh(folder, dovetail, ending):
     return write_case(folder / "joint.yaml", structure, legs, mu, materials=materials)
 
 
-@pytest.mark.parametrize("ending", [".msh", ".inp"])
+@pytest.mark.parametrize("ending", [".msh", pytest.param(".inp", marks=pytest.mark.slow)])
 def test_dovetail_as_a_mesh_is_the_dovetail(tmp_path, small_path, ending, monkeypatch):
     """Loads, slips and energies of every increment, to the solver's accuracy."""
     monkeypatch.setattr(friction, "TOLERANCE", 1e-11)
