@@ -11,12 +11,13 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
+from click.testing import Result
 
 from fe_models.gmsh_session import gmsh_model
 from sa_solver.types import Array, Frame, Grid
+from tests.workflow.commands import invoke
 from workflow.analyses.wear import contact_workers
-from workflow.cli import cli
+from workflow.pictures import drawing
 from workflow.shell import processes
 
 SIZE, EDGE, END = (10.0, 60.0), 1.0, 3.0
@@ -289,28 +290,29 @@ def workers_here(
     yield InThisProcess([make(sent(own)) for own in settings])
 
 
-@pytest.fixture(scope="session", autouse=True)
-def _contacts_here() -> Iterator[None]:
-    """Contacts are computed in the process of the test: to start others takes longer than they do.
+def one_by_one(jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]]) -> None:
+    """Stands for jobs side by side."""
+    for do, arguments in jobs:
+        do(*arguments)
 
-    In processes of their own they find the same but for rounding (test_run.py).
+
+@pytest.fixture(scope="session", autouse=True)
+def _all_here() -> Iterator[None]:
+    """Contacts and pictures of a run are made by the test: to start processes takes longer.
+
+    In processes of their own contacts find the same but for rounding (test_run.py).
     """
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(contact_workers, "workers", workers_here)
+        patch.setattr(drawing, "side_by_side", one_by_one)
         yield
 
 
 @pytest.fixture
 def own_processes(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Contacts have processes of their own, as where there is no test."""
+    """Contacts and pictures have processes of their own, as where there is no test."""
     monkeypatch.setattr(contact_workers, "workers", processes.workers)
-
-
-def invoke(*arguments: object) -> Result:
-    """The command in this process; anything but an exit is raised."""
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
+    monkeypatch.setattr(drawing, "side_by_side", processes.side_by_side)
 
 
 @pytest.fixture(scope="session")

@@ -7,14 +7,13 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
+from tests.workflow.commands import command
 from wear.interface import InterfaceState
 from workflow.analyses.wear.contact_stage import ContactStage, StageSettings
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
 from workflow.analyses.wear.structures.bodies.source import BodiesSource
 from workflow.case.writing import dump_case
-from workflow.cli import cli
 from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case, template
 
@@ -246,14 +245,6 @@ def test_partial_slip_over_a_given_stroke_is_that_of_mindlin() -> None:
 
 
 # --- the run ------------------------------------------------------------------------------------
-
-
-def command(name: str, *arguments: object, overrides: list[str] | None = None) -> Result:
-    """``fretscale name`` in this process."""
-    settings = [part for entry in overrides or [] for part in ("--set", entry)]
-    result = CliRunner().invoke(cli, [name, *map(str, arguments), *settings])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
 
 
 def run(case: Path, out: Path, *overrides: str) -> dict[str, Any]:

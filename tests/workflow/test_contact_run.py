@@ -9,12 +9,11 @@ from types import SimpleNamespace
 import h5py
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from sa_solver.history import History
+from tests.workflow.commands import invoke
 from tests.workflow.conftest import manifest_has_all
 from workflow.analyses.contact import run as contact_run
-from workflow.cli import cli
 from workflow.kinds import template
 
 CASES = Path(__file__).parents[2] / "cases"
@@ -36,12 +35,6 @@ load_path:
 contact: {grid: [32, 32], size: [1 mm, 1 mm], history: full}
 output: {paraview: false, figures: false}
 """
-
-
-def invoke(*arguments):
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
 
 
 @pytest.fixture

@@ -125,6 +125,7 @@ def test_damaged_checkpoint_is_one_line(interrupted, resume, damage):
     assert "Traceback" not in run.ending.stderr
 
 
+@pytest.mark.slow
 def test_interruption_after_the_last_jump_writes_the_output(start, resume, monkeypatch, tmp_path):
     def refuse(*_):
         raise KeyboardInterrupt

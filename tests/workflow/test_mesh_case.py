@@ -6,7 +6,6 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from click.testing import CliRunner
 from ruamel.yaml import YAML
 
 from fe_models import friction
@@ -14,10 +13,10 @@ from fe_models.geometry.imported import patch, read_bodies
 from fe_models.gmsh_session import gmsh_model
 from fe_models.mesh import write_msh
 from fe_models.structure import CLOSED
+from tests.workflow.commands import invoke
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.model import DovetailModel
 from workflow.analyses.wear.structures.mesh.model import MeshModel
-from workflow.cli import cli
 from workflow.errors import MethodFailed
 from workflow.kinds import load_case, template
 
@@ -51,13 +50,6 @@ def write_case(path, structure, legs, mu=0.5, grid=(16, 16), **changes):
     with path.open("w", encoding="utf-8") as stream:
         YAML().dump(json.loads(json.dumps(case)), stream)
     return path
-
-
-def invoke(*arguments):
-    """The command in this process; anything but an exit is raised."""
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
 
 
 def settings(overrides):
@@ -152,7 +144,7 @@ def dovetail_as_mesh(folder, dovetail, ending):
     return write_case(folder / "joint.yaml", structure, legs, mu, materials=materials)
 
 
-@pytest.mark.parametrize("ending", [".msh", ".inp"])
+@pytest.mark.parametrize("ending", [".msh", pytest.param(".inp", marks=pytest.mark.slow)])
 def test_dovetail_as_a_mesh_is_the_dovetail(tmp_path, small_path, ending, monkeypatch):
     """Loads, slips and energies of every increment, to the solver's accuracy."""
     monkeypatch.setattr(friction, "TOLERANCE", 1e-11)

@@ -14,10 +14,10 @@ from typing import Annotated, Literal
 import h5py
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
 from fe_models.mesh import Face
 from sa_solver.types import Array, Frame, LoadHistory
+from tests.workflow.commands import invoke
 from workflow import kinds
 from workflow.analyses.wear import structures
 from workflow.analyses.wear.case.base import WearCase
@@ -26,18 +26,11 @@ from workflow.analyses.wear.load_source import ContactFace, UserFace
 from workflow.analyses.wear.structure import WearStructure
 from workflow.case.fields import Quantity
 from workflow.case.sections import Case, Length, Section, Stress, entry
-from workflow.cli import cli
 from workflow.shell.analysis import Analysis, Run
 from workflow.shell.memory import Memory
 from workflow.shell.summary import finish
 
 Force = Annotated[float, Quantity("N", above=0.0, at_most=1e6)]
-
-
-def invoke(*arguments: object) -> Result:
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
 
 
 def done(*arguments: object) -> str:

@@ -9,10 +9,10 @@ from typing import Any
 import h5py
 import numpy as np
 import pytest
-from click.testing import CliRunner, Result
 
 from fe_models.geometry.dovetail import Dovetail
 from sa_solver.types import Array, Grid
+from tests.workflow.commands import command
 from workflow.analyses.wear.case.gaps import ParaboloidGap, RoundedGap
 from workflow.analyses.wear.figures.wear import figures_of
 from workflow.analyses.wear.gaps import GridHeights, gap_over
@@ -20,7 +20,6 @@ from workflow.analyses.wear.paraview.wear import write_wear
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
 from workflow.case.writing import dump_case
-from workflow.cli import cli
 from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case, template
 from workflow.pictures.drawing import write_figures, write_paraview
@@ -54,14 +53,6 @@ QUIET = [
     *("output.paraview=false", "output.figures=false"),
     *("stress.section=none", "stress.life.parameter=none"),
 ]
-
-
-def command(name: str, *arguments: object, overrides: list[str] | None = None) -> Result:
-    """``fretscale name`` in this process."""
-    settings = [part for entry in overrides or [] for part in ("--set", entry)]
-    result = CliRunner().invoke(cli, [name, *map(str, arguments), *settings])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
 
 
 def run(case: Path, out: Path, *overrides: str) -> dict[str, Any]:

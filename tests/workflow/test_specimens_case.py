@@ -6,17 +6,16 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
 from fe_models.mesh import Face
 from fe_models.reduction import free_frequencies, load_reduced
 from sa_solver.reference.hertz import HertzSphere
 from sa_solver.types import ElasticPair, Frame, Material
+from tests.workflow.commands import invoke
 from tests.workflow.conftest import manifest_has_all
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import NodeGrid, PadHalfSpace
 from workflow.case.writing import dump_case
-from workflow.cli import cli
 from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case, template
 
@@ -52,12 +51,6 @@ wear:
   reported:
     - {normal_force: 87 N, steady: stiffness, cycles: 1e5}
 """
-
-
-def invoke(*arguments):
-    result = CliRunner().invoke(cli, [str(argument) for argument in arguments])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
 
 
 @pytest.fixture(scope="module")

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -16,6 +16,7 @@ from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.receptance import Receptance, ReceptanceError
 from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
+from tests.oracles.cubic_springs import CubicSprings
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
 from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
@@ -40,38 +41,6 @@ def sine(model, name="m1"):
 
 def balance(model, joints=JENKINS, harmonics=ODD, samples=256, load=None):
     return HarmonicBalance(model, joints, load or sine(model), Resolution(harmonics, samples))
-
-
-@dataclass(frozen=True)
-class CubicCycle:
-    force: np.ndarray
-    jacobian: np.ndarray
-    samples: np.ndarray
-    states: np.ndarray
-    dissipated: np.ndarray
-    change: np.ndarray
-
-
-@dataclass(frozen=True)
-class CubicSprings:
-    """F = k u³ at every joint."""
-
-    stiffness: float
-    directions = 1
-
-    def settle(self, coefficients, basis, weights, lead):
-        way = (basis @ coefficients)[..., 0]
-        force = self.stiffness * way**3
-        slopes = 3.0 * self.stiffness * way**2
-        jacobian = np.einsum("mt,jt,tn->jmn", weights, slopes, basis)
-        return CubicCycle(
-            np.einsum("mt,jt->jm", weights, force)[..., None],
-            jacobian[:, :, None, :, None],
-            force.T[..., None],
-            np.zeros(force.T.shape, dtype=np.int8),
-            np.zeros(len(force)),
-            np.zeros(len(force)),
-        )
 
 
 def mixed_rig():

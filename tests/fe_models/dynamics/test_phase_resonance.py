@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -21,6 +21,7 @@ from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.phase_resonance import PhaseResonance, along_phase_resonance
 from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
+from tests.oracles.cubic_springs import CubicSprings
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
 from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
@@ -66,37 +67,6 @@ def cotangent(problem, solution):
     """Of the phase of the force's own points."""
     seen = np.vdot(problem.load.waves[1], solution.motion[solution.resolution.harmonics.index(1)])
     return seen.real / seen.imag
-
-
-@dataclass(frozen=True)
-class CubicCycle:
-    force: np.ndarray
-    jacobian: np.ndarray
-    samples: np.ndarray
-    states: np.ndarray
-    dissipated: np.ndarray
-    change: np.ndarray
-
-
-@dataclass(frozen=True)
-class CubicSpring:
-    """F = k u³ at one joint."""
-
-    stiffness: float
-    directions = 1
-
-    def settle(self, coefficients, basis, weights, lead):
-        way = basis @ coefficients[0, :, 0]
-        force = self.stiffness * way**3
-        jacobian = (weights * (3.0 * self.stiffness * way**2)) @ basis
-        return CubicCycle(
-            (weights @ force)[None, :, None],
-            jacobian[None, :, None, :, None],
-            force[:, None, None],
-            np.zeros((len(force), 1), dtype=np.int8),
-            np.zeros(1),
-            np.zeros(1),
-        )
 
 
 def pressed_block(joints=3):
@@ -218,7 +188,7 @@ def test_linear_oscillator(ratio, off):
 def test_duffing_oscillator():
     """m ω² = k + ¾ κ a² and c ω a = F: the folds of its responses are not on the backbone."""
     model = lumped_rig({"m": 1e-3}, {Link("m"): 40.0}, [[Link("m")]], 0.02)
-    problem = balance(model, CubicSpring(100.0), (1,), 16)
+    problem = balance(model, CubicSprings(100.0), (1,), 16)
     start = peak(problem, 1.5, (10.0, 60.0))
     backbone = along_phase_resonance(problem, start, (0.05, 6.0))
     assert backbone.message == ""
