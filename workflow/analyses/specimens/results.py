@@ -31,9 +31,9 @@ from workflow.shell.store import ResultsWriter, replacing
 from workflow.shell.versions import versions
 
 if TYPE_CHECKING:
-    from fe_models.cycle_blocks import BlockState
     from workflow.analyses.specimens.half_space import HalfSpaceState
     from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
+    from workflow.analyses.specimens.wear import BlockState
 
 # Name of the pad's grid, and of the two shapes that a half-space is put beside.
 PAD = "pad"
@@ -112,7 +112,7 @@ def _kinetics(blocks: tuple[BlockState, ...], areas: Array) -> dict[str, Array]:
         "pressure_deviation": [pressure_deviation(areas, pressure) for pressure in pressures],
         "friction": [contact.friction for contact in contacts],
         # Infinite where nothing slides.
-        "stable_cycles": [contact.stable_cycles for contact in contacts],
+        "stable_cycles": [state.stable_cycles for state in blocks],
     }
     for body in (0, 1):
         columns[f"depth_{body + 1}"] = [s.depths[body].max() for s in blocks]
