@@ -18,8 +18,8 @@ from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw
 from wear.steppers import Explicit, Heun, advance_cycles
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase
-from workflow.analyses.vibration_wear.friction_rig_run import run_friction_rig_wear
 from workflow.analyses.vibration_wear.pads import WearingPads
+from workflow.analyses.vibration_wear.run import run_vibration_wear
 from workflow.case.writing import dump_case
 from workflow.kinds import parse_case
 from workflow.shell.folder import OutputFolder
@@ -251,7 +251,7 @@ def ended(tmp_path_factory):
     case, out = case_in(folder), OutputFolder(folder / "out")
     out.claim(case, force=False, resumable=False)
     reporter = Reporter(out.log)
-    run_friction_rig_wear(case, out, reporter)
+    run_vibration_wear(case, out, reporter)
     reporter.close()
     return out
 
