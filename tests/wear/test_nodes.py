@@ -14,7 +14,7 @@ from sa_solver.types import Array
 from wear.evolution import EnergyTable
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw
 from wear.nodes import NodalContact, NodalState
-from wear.steppers import Explicit, Heun, StabilityError, advance_cycles, rest, steps
+from wear.steppers import Explicit, Heun, StabilityError, Stretches, advance_cycles, rest, steps
 
 FRICTION = 0.5
 AREAS = np.array([0.1, 0.2, 0.4])
@@ -188,6 +188,22 @@ def test_an_energy_threshold_is_passed_without_an_error(stepper) -> None:
     assert state.energy > 1.5 * threshold
     volume = float(state.surfaces.depth @ AREAS)
     assert volume == pytest.approx(5e-8 * (state.energy - threshold), rel=1e-10)
+
+
+def test_stretches_ask_before_each_of_them() -> None:
+    """Steps within a stretch go on as if it were the whole, and count."""
+    asked = []
+
+    def longest(state: NodalState, most: float) -> float:
+        asked.append(most)
+        return min(most, 2.5 * length)
+
+    length = 0.5 * springs(unworn()).stable_cycles(unworn())
+    done = advance_cycles(
+        Stretches(Explicit(0.5), longest), unworn(), 6.0 * length, 6.0 * length, springs
+    )
+    np.testing.assert_allclose(asked, [6.0 * length, 3.5 * length, length])
+    assert done.spent.steps == 3 + 3 + 1
 
 
 @pytest.mark.parametrize("stepper", [Explicit(0.5), Heun(0.1)])
