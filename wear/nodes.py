@@ -111,7 +111,8 @@ class NodalContact:
             volume_rate=float((depth_1 + depth_2) @ self.areas),
             start=self.cycles[-1].start,
         )
-        return WearStep(after, cycles, Spent(len(self.cycles), 0, 1))
+        # One cycle has been solved for it: of a mean, the other one was before.
+        return WearStep(after, cycles, Spent(1, 0, 1))
 
     def _per_pressure(
         self, cycle: NodalCycle, state: NodalState, cycles: float

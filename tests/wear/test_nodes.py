@@ -154,6 +154,7 @@ def test_heuns_steps_keep_to_tolerance_and_limit() -> None:
         depth = taken[-1].state.surfaces.depth
         np.testing.assert_allclose(depth, exact(cycles), rtol=0.2 * tolerance)
         assert all(step.spent.steps == 1 for step in taken)
+        assert all(step.spent.contact_solves % 2 == 0 for step in taken)
         counts.append(len(taken))
     assert counts == sorted(counts)
 
