@@ -12,7 +12,6 @@ joints is in :mod:`fe_models.dynamics`. What most uses begin with:
 - ``JointStiffness``, ``FrictionalJoint``: the joint of two condensed bodies, and friction in it
 - ``reduce_body``, ``ReducedModel``: Guyan and Craig-Bampton reduction
 - ``ReducedPair``, ``FrettingConditions``: two reduced specimens that fret
-- ``wear_in_cycle_blocks``: how these wear
 - ``MeshError``, ``SolverError``: a mesh that cannot be used, a system that cannot be solved
 
 One node pressed with 10 N on springs of 100 N/mm, µ = 0.4, under 3 N and then 6 N along the face:
@@ -35,7 +34,6 @@ from fe_models.lazy import lazy_names
 
 if TYPE_CHECKING:
     from fe_models.constraints import Constraints as Constraints
-    from fe_models.cycle_blocks import wear_in_cycle_blocks as wear_in_cycle_blocks
     from fe_models.elasticity import ElasticBody as ElasticBody
     from fe_models.friction import FrictionalJoint as FrictionalJoint
     from fe_models.joint import JointStiffness as JointStiffness
@@ -67,7 +65,6 @@ _MODULES = {
     "StructureMesh": "mesh",
     "SupportedBody": "supported_body",
     "reduce_body": "reduction",
-    "wear_in_cycle_blocks": "cycle_blocks",
 }
 __all__ = [*_MODULES]
 __getattr__ = lazy_names(__name__, _MODULES)

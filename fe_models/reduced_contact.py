@@ -1,4 +1,4 @@
-"""Quasi-static friction and wear of two reduced specimens that are pressed together and fret.
+"""Quasi-static friction of two reduced specimens that are pressed together and fret.
 
 The ring of body 1 is held. That of body 2 moves as a rigid translation: along x as prescribed, not
 along y, and along z so that the normal force is F. With A the sum of both compliances of the pad's
@@ -114,16 +114,14 @@ class Loop:
 
 @dataclass(frozen=True)
 class FrettingConditions:
-    """What is done to the pair in every cycle, and what it loses.
+    """What is done to the pair in every cycle.
 
-    ``force`` normal [N], ``stroke`` of body 2's ring along x, peak to peak [mm], ``friction`` µ and
-    ``wear_coefficients`` α of body 1 and 2 [1/MPa]: volume lost per energy dissipated.
+    ``force`` normal [N], ``stroke`` of body 2's ring along x, peak to peak [mm], ``friction`` µ.
     """
 
     force: float
     stroke: float
     friction: float
-    wear_coefficients: tuple[float, float]
 
 
 @dataclass(frozen=True)
@@ -132,8 +130,7 @@ class FrettingCycle:
 
     ``tangential`` is first loading to half the stroke; ``stick_stiffness`` [N/mm]; ``friction`` the
     largest tangential over the normal force; ``cycle_slip`` ``(n,)`` the length each node slides in
-    a cycle [mm]; ``energy`` of a cycle [N mm]; ``wear`` ``(2, n)`` what a cycle takes off each body
-    [mm]; ``stable_cycles`` the cycles of constant shape beyond which errors of shape grow.
+    a cycle [mm]; ``energy`` of a cycle [N mm].
     """
 
     normal: NormalSolution
@@ -142,8 +139,6 @@ class FrettingCycle:
     friction: float
     cycle_slip: Array
     energy: float
-    wear: Array
-    stable_cycles: float
 
     @property
     def converged(self) -> bool:
@@ -273,10 +268,6 @@ class ReducedPair:
         tangential = self.tangential(normal, 0.5 * conditions.stroke, conditions.friction)
         cycle_slip = 4.0 * tangential.slip
         energy = np.abs(tangential.shear) * cycle_slip
-        wear = np.outer(conditions.wear_coefficients, energy / self.areas)
-        per_force = (
-            sum(conditions.wear_coefficients) * conditions.friction * cycle_slip / self.areas
-        )
         return FrettingCycle(
             normal=normal,
             tangential=tangential,
@@ -284,11 +275,9 @@ class ReducedPair:
             friction=tangential.force / conditions.force,
             cycle_slip=cycle_slip,
             energy=float(energy.sum()),
-            wear=wear,
-            stable_cycles=self._stable_cycles(normal, per_force),
         )
 
-    def _stable_cycles(self, normal: NormalSolution, depth_per_force: Array) -> float:
+    def stable_cycles(self, normal: NormalSolution, depth_per_force: Array) -> float:
         """Cycles of constant shape beyond which errors of the worn shape grow.
 
         ``depth_per_force`` ``(n,)``, c, is what both bodies lose per cycle and nodal force [mm/N].

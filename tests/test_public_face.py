@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 FACES = ["sa_solver", "wear", "wear.joints"]
-LARGEST = 27
+LARGEST = 28
 INSTALLED = {"numpy", "scipy", "numba", "llvmlite", "pyfftw"}
 
 REFUSING = """

@@ -12,7 +12,8 @@ What is worn, in which steps
     - ``InterfaceSettings``: grid, gap, materials and laws of the contact of one interface.
     - ``CellNodes``: the transfer of a face whose nodes are the cells of its grid.
     - ``InterfaceContact``: such a contact, and how it wears under a cycle.
-    - ``Explicit``, ``Implicit``, ``SecondOrder``: steppers of first and second order.
+    - ``Explicit``, ``Implicit``: steppers of first order.
+    - ``Heun``, ``SecondOrder``: of second order, at known pressures and at those solved for.
     - ``ErrorControl``: the error of the depth that chooses their length.
     - ``ContactFailure``: a contact problem in between did not converge.
 
@@ -29,8 +30,8 @@ What follows
     - ``linear_regime``: the rate after running-in, and how far it can be extrapolated.
     - ``ruiz``, ``findley``, ``smith_watson_topper``: where cracks start.
 
-Joints of vibrating structures, and how they wear, are in :mod:`wear.joints`. A cylinder of 10 mm
-that is pressed by 50 N/mm and slides 40 µm a cycle:
+Contacts at nodes are in :mod:`wear.nodes`, joints of vibrating structures in :mod:`wear.joints`. A
+cylinder of 10 mm that is pressed by 50 N/mm and slides 40 µm a cycle:
 
 >>> import numpy as np
 >>> from sa_solver import ElasticPair, Grid, LoadHistory, Material
@@ -74,7 +75,7 @@ if TYPE_CHECKING:
     from wear.kinetics import linear_regime
     from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
     from wear.life import findley, ruiz, smith_watson_topper
-    from wear.steppers import ErrorControl, Explicit, Implicit, SecondOrder
+    from wear.steppers import ErrorControl, Explicit, Heun, Implicit, SecondOrder
     from wear.stepping import ContactFailure
 
 __all__ = [
@@ -93,6 +94,7 @@ __all__ = [
     "ErrorControl",
     "EvolvingLaw",
     "Explicit",
+    "Heun",
     "Implicit",
     "InterfaceContact",
     "InterfaceSettings",
@@ -119,7 +121,7 @@ __getattr__, __dir__ = lazy_names(
         "kinetics": ("linear_regime",),
         "laws": ("ArchardLaw", "EnergyAmplitudeLaw", "EnergyLaw", "EvolvingLaw", "WearLaw"),
         "life": ("findley", "ruiz", "smith_watson_topper"),
-        "steppers": ("ErrorControl", "Explicit", "Implicit", "SecondOrder"),
+        "steppers": ("ErrorControl", "Explicit", "Heun", "Implicit", "SecondOrder"),
         "stepping": ("ContactFailure",),
     },
 )

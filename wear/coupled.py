@@ -26,7 +26,7 @@ from wear.interface import (
     failures_of,
 )
 from wear.steppers import ROUNDING
-from wear.stepping import Spent
+from wear.worn import Spent
 
 KINETICS = ("depth_1", "depth_2", "volume_1", "volume_2", "energy")
 """Columns of the kinetics of one interface, in mm, mm³ and N mm."""

@@ -28,11 +28,11 @@ from wear.stepping import (
     ContactFailure,
     CycleResult,
     SlidingCycle,
-    Spent,
     Starts,
     WearingContact,
     WearState,
 )
+from wear.worn import Spent
 
 
 class MotionError(InputError):
@@ -104,7 +104,7 @@ class InterfaceSettings:
     pair: ElasticPair
     laws: tuple[WearLaw, WearLaw]
     friction: Callable[[float], float]
-    stepper: Stepper
+    stepper: Stepper[WearState, WearingContact]
     method: Literal["normal", "full"] = "normal"
     gross_slip: Literal["force", "energies"] = "force"
     driven: bool = False
@@ -286,8 +286,7 @@ class InterfaceContact:
         assert isinstance(after, InterfaceState)
         # Friction of the half-space on the new surfaces: for the record now, to wear by next.
         self._loaded(after)
-        own = Spent(result.contact_solves, result.convolutions, result.steps)
-        return after, own + self._spent - before
+        return after, result.spent + self._spent - before
 
     def stable_cycles(self, state: InterfaceState) -> float:
         """Longest explicit step that is stable."""

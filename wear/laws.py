@@ -18,14 +18,14 @@ from wear.evolution import EnergyTable
 class SlidingConditions:
     """What one body's wear during a step may depend on.
 
-    ``slip`` ``(t, nx, ny)`` is the size of the slip in each increment of the cycle [mm] and
-    ``friction`` Coulomb's coefficient. ``work`` is the energy dissipated per area of this body's
-    surface since it was new, ``(nx, ny)`` [N/mm], and ``energy`` that of the whole contact [N mm],
-    each before the step and, as predicted, after it.
+    ``slip`` ``(t, ...)`` is the size of the slip in each increment of the cycle [mm], by cell or
+    node, and ``friction`` Coulomb's coefficient. ``work`` is the energy dissipated per area of this
+    body's surface since it was new, ``(...)`` [N/mm], and ``energy`` that of the whole contact
+    [N mm], each before the step and, as predicted, after it.
     """
 
     slip: Array
-    friction: float
+    friction: float | Array
     work: tuple[Array, Array]
     energy: tuple[float, float]
 
@@ -34,7 +34,7 @@ class WearLaw(Protocol):
     """Wear of one body."""
 
     def depth_per_pressure(self, sliding: SlidingConditions) -> Array:
-        """Depth per pressure worn in each increment ``(t, nx, ny)`` [mm/MPa per cycle]."""
+        """Depth per pressure worn in each increment ``(t, ...)`` [mm/MPa per cycle]."""
         ...
 
 

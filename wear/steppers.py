@@ -1,8 +1,10 @@
 """How long a wear step may be, and what to do when it was too long.
 
-A stepper advances the surfaces of one interface by at most so many cycles, given a way to solve a
-cycle on any surfaces. Explicit steps keep below their stability limit; implicit ones, and those of
-second order, are as long as the caller says or as an error estimate allows.
+A stepper advances what wears by at most so many cycles, given the contact that belongs to any state
+of it. Explicit steps and Heun's keep below their stability limit, and need to know of a contact
+only what a cycle takes off: cells of a half-space or nodes of a structure (:mod:`wear.nodes`).
+Implicit steps and those of second order solve a half-space contact on the way, and are as long as
+the caller says or as an error estimate allows.
 
 An implicit step errs by what it wears more than ½ ΔN (r₀ + r₁), r being the depth per cycle at the
 pressures (and slips) of its two ends. What came before and what it adds are both pressed away in
@@ -23,14 +25,16 @@ itself, undamped: where slip follows from wear, as in partial slip, no pressure 
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Protocol
+from typing import Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
+from sa_solver.errors import InputError
 from sa_solver.types import Array
-from wear.stepping import WearingContact, WearState, WearStep
+from wear.stepping import WearingContact, WearState
+from wear.worn import Spent, State, WearStep
 
 FIRST_STEP, FIRST_SHARE = 8.0, 0.1
 """First automatic step over the explicit limit, and its largest share of the run: short enough to
@@ -50,32 +54,178 @@ or more slowly than steps without length would ever show."""
 ROUNDING = 1e-9
 """Steps that add up to the cycles asked for but for this share leave none over."""
 
-ContactAt = Callable[[WearState], WearingContact]
-"""The contact with the slips that belong to a state: solves its friction where there is one."""
+
+Contact = TypeVar("Contact", contravariant=True)
 
 
-class Stepper(Protocol):
+class StabilityError(InputError):
+    """Steps of a given length would be unstable; the message says which length is not."""
+
+
+class Stepper(Protocol[State, Contact]):
     """A way to advance the surfaces of one interface."""
 
-    def step(self, state: WearState, most: float, left: float, contact_at: ContactAt) -> WearStep:
-        """Wear at most ``most`` cycles of the ``left`` ones of the whole run."""
+    def step(
+        self, state: State, most: float, left: float, contact_at: Callable[[State], Contact]
+    ) -> WearStep[State]:
+        """Wear at most ``most`` cycles of the ``left`` ones of the whole run.
+
+        ``contact_at`` gives the contact with the pressures or slips that belong to a state.
+        """
+        ...
+
+
+# --- steps at what a contact is ------------------------------------------------------------------
+
+
+class ExplicitContact(Protocol[State]):
+    """A contact that can wear at the pressures and slips that it has."""
+
+    def explicit_step(self, state: State, cycles: float) -> WearStep[State]:
+        """Wear ``cycles`` cycles at what the contact is on the surfaces of ``state``."""
+        ...
+
+    def stable_cycles(self, state: State, cycles: float = 0.0) -> float:
+        """Longest explicit step in which no error grows, by the laws of a step of ``cycles``."""
+        ...
+
+
+class AveragedContact(ExplicitContact[State], Protocol[State]):
+    """Such a contact whose pressures are known, and can be averaged with those of another."""
+
+    def averaged(self, other: Self) -> Self:
+        """The contact that takes off the mean of what both do."""
         ...
 
 
 @dataclass(frozen=True)
 class Explicit:
-    """Explicit Euler: steps of ``fraction`` times the stability limit, or as long as may be."""
+    """Explicit Euler: steps of ``fraction`` times the stability limit, of so many ``cycles``, or as
+    long as may be.
+
+    Steps of given cycles raise :class:`StabilityError` beyond the limit.
+    """
 
     fraction: float | None = None
+    cycles: float | None = None
 
-    def step(self, state: WearState, most: float, left: float, contact_at: ContactAt) -> WearStep:
-        contact = contact_at(state)
-        cycles = most
+    def step(
+        self,
+        state: State,
+        most: float,
+        left: float,
+        contact_at: Callable[[State], ExplicitContact[State]],
+    ) -> WearStep[State]:
+        contact, cycles = contact_at(state), most
         if self.fraction is not None:
-            cycles = min(most, self.fraction * contact.stable_cycles(state))
-            while cycles > self.fraction * contact.stable_cycles(state, cycles):
-                cycles *= 0.5
+            cycles = _stable(contact, state, most, self.fraction)
+        elif self.cycles is not None:
+            limit = contact.stable_cycles(state, self.cycles)
+            if self.cycles > limit:
+                raise StabilityError(
+                    f"steps of {self.cycles:g} cycles: take at most {limit:.4g} cycles"
+                )
+            cycles = min(most, self.cycles)
         return contact.explicit_step(state, cycles)
+
+
+@dataclass(frozen=True)
+class Heun:
+    """Heun's method, of second order: at the mean of the contact before and after an explicit step.
+
+    Steps of at most a ``share`` of the stability limit, and such that the explicit step differs by
+    no more than ``tolerance`` of what is worn, in root mean square. Those much shorter than the
+    limit are not tried again: something other than their length is wrong, and their error says so.
+    """
+
+    tolerance: float
+    share: float = 0.5
+
+    def step(
+        self,
+        state: State,
+        most: float,
+        left: float,
+        contact_at: Callable[[State], AveragedContact[State]],
+    ) -> WearStep[State]:
+        contact = contact_at(state)
+        first = _stable(contact, state, min(most, state.next_cycles), self.share)
+
+        def trial(cycles: float) -> _Trial[State]:
+            predicted = contact.explicit_step(state, cycles)
+            following = contact_at(predicted.state)
+            step = contact.averaged(following).explicit_step(state, cycles)
+            worn = step.state.surfaces.depth - state.surfaces.depth
+            missed = step.state.surfaces.depth - predicted.state.surfaces.depth
+            size = root_mean_square(worn, worn)
+            error = root_mean_square(missed, worn) / size if size > 0.0 else 0.0
+            change = GROWTH
+            if error > 0.0:
+                change = float(np.clip(SAFETY * self.tolerance / error, SHRINKAGE, GROWTH))
+            further = cycles * change
+            if cycles == first < state.next_cycles:
+                # It was cut short, by the end or by stability, not by its error.
+                further = max(further, state.next_cycles)
+            ends = contact.stable_cycles(state), following.stable_cycles(predicted.state)
+            return _Trial(
+                replace(
+                    step,
+                    state=replace(step.state, next_cycles=further),
+                    spent=replace(predicted.spent + step.spent, steps=1),
+                    error=error,
+                ),
+                fits=error <= self.tolerance,
+                shorter=cycles * change,
+                shortest=_shortest(self.share * min(ends)),
+            )
+
+        return _tried(trial, first)
+
+
+def _stable(contact: ExplicitContact[State], state: State, most: float, fraction: float) -> float:
+    """Cycles of a step, at most ``most``, of this fraction of its stability limit or less."""
+    cycles = min(most, fraction * contact.stable_cycles(state))
+    while cycles > fraction * contact.stable_cycles(state, cycles):
+        cycles *= 0.5
+    return cycles
+
+
+# --- attempts -------------------------------------------------------------------------------------
+
+
+@dataclass(frozen=True)
+class _Trial(Generic[State]):
+    """A step that was tried, and whether its error ``fits``.
+
+    If not it is to be ``shorter``; steps of the ``shortest`` length are taken as they are [cycles].
+    """
+
+    step: WearStep[State]
+    fits: bool
+    shorter: float
+    shortest: float
+
+
+def _tried(trial: Callable[[float], _Trial[State]], cycles: float) -> WearStep[State]:
+    """A step whose error fits, begun with so many cycles; what all attempts have taken is its."""
+    spent = Spent()
+    while True:
+        found = trial(cycles)
+        spent += found.step.spent
+        if found.fits or cycles <= found.shortest:
+            return replace(found.step, spent=replace(spent, steps=found.step.spent.steps))
+        cycles = max(found.shorter, found.shortest)
+
+
+def _shortest(stable: float) -> float:
+    """Cycles of a step that is not tried again.
+
+    Nothing wears, and any length is stable, until an energy threshold is passed.
+    """
+    return SHORTEST * stable if np.isfinite(stable) else 0.0
+
+
+# --- steps that solve the contact on the way ------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -110,14 +260,20 @@ class Implicit:
 
     control: ErrorControl | None = None
 
-    def step(self, state: WearState, most: float, left: float, contact_at: ContactAt) -> WearStep:
+    def step(
+        self,
+        state: WearState,
+        most: float,
+        left: float,
+        contact_at: Callable[[WearState], WearingContact],
+    ) -> WearStep[WearState]:
         contact = contact_at(state)
         rate = contact.rate(state)
 
-        def attempt(cycles: float) -> WearStep:
+        def attempt(cycles: float) -> WearStep[WearState]:
             return contact.implicit_step(state, cycles)
 
-        def error(step: WearStep) -> Array:
+        def error(step: WearStep[WearState]) -> Array:
             ends = 0.5 * (rate + contact_at(step.state).rate(step.state))
             return step.state.surfaces.depth - state.surfaces.depth - step.cycles * ends
 
@@ -134,10 +290,16 @@ class SecondOrder:
 
     control: ErrorControl | None = None
 
-    def step(self, state: WearState, most: float, left: float, contact_at: ContactAt) -> WearStep:
+    def step(
+        self,
+        state: WearState,
+        most: float,
+        left: float,
+        contact_at: Callable[[WearState], WearingContact],
+    ) -> WearStep[WearState]:
         contact = contact_at(state)
 
-        def attempt(cycles: float) -> WearStep:
+        def attempt(cycles: float) -> WearStep[WearState]:
             predicted = contact.second_order_step(state, cycles)
             following = contact_at(predicted.state)
             if following is contact:
@@ -146,11 +308,10 @@ class SecondOrder:
             return replace(
                 step,
                 drift=step.state.surfaces.depth - predicted.state.surfaces.depth,
-                contact_solves=predicted.contact_solves + step.contact_solves,
-                convolutions=predicted.convolutions + step.convolutions,
+                spent=replace(predicted.spent + step.spent, steps=1),
             )
 
-        def error(step: WearStep) -> Array:
+        def error(step: WearStep[WearState]) -> Array:
             assert step.midway is not None
             ends = 0.5 * (state.surfaces.depth + step.state.surfaces.depth)
             return ends - step.midway + (0.0 if step.drift is None else step.drift)
@@ -163,45 +324,43 @@ class _Attempts:
     """A way to try a step of so many cycles, and the error that it adds, undamped ``(nx, ny)``."""
 
     contact: WearingContact
-    attempt: Callable[[float], WearStep]
-    error: Callable[[WearStep], Array]
+    attempt: Callable[[float], WearStep[WearState]]
+    error: Callable[[WearStep[WearState]], Array]
 
 
 def _estimated(
     attempts: _Attempts, control: ErrorControl | None, state: WearState, most: float, left: float
-) -> WearStep:
+) -> WearStep[WearState]:
     """A step with the error of the depth after it, tried again shorter until ``control`` agrees."""
-    cycles = most if control is None else min(most, state.next_cycles)
-    solves = convolutions = 0
-    while True:
+
+    def trial(cycles: float) -> _Trial[WearState]:
         step = attempts.attempt(cycles)
-        solves, convolutions = solves + step.contact_solves, convolutions + step.convolutions
-        # Nothing wears, and any length is stable, until an energy threshold is passed.
-        stable = min(attempts.contact.stable_cycles(ends) for ends in (state, step.state))
-        shortest = SHORTEST * stable if np.isfinite(stable) else 0.0
+        shortest = _shortest(
+            min(attempts.contact.stable_cycles(ends) for ends in (state, step.state))
+        )
         raw = attempts.error(step)
         carried, added = attempts.contact.damped_errors([state.error, raw], state, cycles)
         fits, proposed = True, cycles
         if control is not None:
             fits, change = _judged(control, state, step, left, carried, added, raw)
             proposed = max(cycles * float(np.clip(change, SHRINKAGE, GROWTH)), shortest)
-        if fits or cycles <= shortest:
-            area = attempts.contact.grid.cell_area
-            volume_error = state.volume_error + abs(float(raw.sum())) * area
-            after = replace(
-                step.state,
-                error=carried + added,
-                volume_error=volume_error,
-                next_cycles=proposed,
-            )
-            return replace(step, state=after, contact_solves=solves, convolutions=convolutions)
-        cycles = max(min(proposed, 0.5 * cycles), shortest)
+        area = attempts.contact.grid.cell_area
+        after = replace(
+            step.state,
+            error=carried + added,
+            volume_error=state.volume_error
+            + abs(float(raw.sum())) * attempts.contact.grid.cell_area,
+            next_cycles=proposed,
+        )
+        return _Trial(replace(step, state=after), fits, min(proposed, 0.5 * cycles), shortest)
+
+    return _tried(trial, most if control is None else min(most, state.next_cycles))
 
 
 def _judged(
     control: ErrorControl,
     state: WearState,
-    step: WearStep,
+    step: WearStep[WearState],
     left: float,
     carried: Array,
     added: Array,
@@ -236,23 +395,70 @@ def first_cycles(contact: WearingContact, state: WearState, total: float) -> flo
     return min(FIRST_STEP * contact.stable_cycles(state), FIRST_SHARE * total)
 
 
-@dataclass(frozen=True)
-class Advance:
-    """So many cycles in as many steps as they took: see :class:`WearStep`."""
+# --- many steps -----------------------------------------------------------------------------------
 
-    state: WearState
-    steps: int
-    contact_solves: int
-    convolutions: int
+
+@dataclass(frozen=True)
+class Stretches(Generic[State, Contact]):
+    """Steps of a ``stepper`` in stretches, each as long as ``longest`` says of a state.
+
+    It is told the cycles that are left for a stretch.
+    """
+
+    stepper: Stepper[State, Contact]
+    longest: Callable[[State, float], float]
+
+    def step(
+        self, state: State, most: float, left: float, contact_at: Callable[[State], Contact]
+    ) -> WearStep[State]:
+        cycles = self.longest(state, most)
+        done = advance_cycles(self.stepper, state, cycles, left, contact_at)
+        return WearStep(done.state, cycles, done.spent, error=done.error)
+
+
+@dataclass(frozen=True)
+class Advance(Generic[State]):
+    """So many cycles in as many steps as they took, and the largest error of any: see
+    :class:`wear.worn.WearStep`.
+    """
+
+    state: State
+    spent: Spent
+    error: float
+
+
+def steps(
+    stepper: Stepper[State, Contact],
+    state: State,
+    to_go: Callable[[State, float], float],
+    left: float,
+    contact_at: Callable[[State], Contact],
+) -> Iterator[WearStep[State]]:
+    """Steps of a run that has ``left`` cycles, until nothing is ``to_go``.
+
+    That is told a state and the cycles done so far, and gives the most that the next step may have.
+    """
+    done = 0.0
+    while (most := to_go(state, done)) > 0.0:
+        step = stepper.step(state, most, left - done, contact_at)
+        state, done = step.state, done + step.cycles
+        yield step
+
+
+def rest(cycles: float, done: float) -> float:
+    """What is to go of so many ``cycles``; nothing where it is but rounding."""
+    return cycles - done if cycles - done > ROUNDING * cycles else 0.0
 
 
 def advance_cycles(
-    stepper: Stepper, state: WearState, cycles: float, left: float, contact_at: ContactAt
-) -> Advance:
+    stepper: Stepper[State, Contact],
+    state: State,
+    cycles: float,
+    left: float,
+    contact_at: Callable[[State], Contact],
+) -> Advance[State]:
     """Wear ``cycles`` cycles of the ``left`` ones of the run, in as many steps as it takes."""
-    done, steps, solves, convolutions = 0.0, 0, 0, 0
-    while cycles - done > ROUNDING * cycles:
-        step = stepper.step(state, cycles - done, left - done, contact_at)
-        state, done, steps = step.state, done + step.cycles, steps + 1
-        solves, convolutions = solves + step.contact_solves, convolutions + step.convolutions
-    return Advance(state, steps, solves, convolutions)
+    spent, error = Spent(), 0.0
+    for step in steps(stepper, state, lambda _, done: rest(cycles, done), left, contact_at):
+        state, spent, error = step.state, spent + step.spent, max(error, step.error)
+    return Advance(state, spent, error)

@@ -36,6 +36,7 @@ from sa_solver.types import Array, LoadHistory
 from wear.laws import SlidingConditions, WearLaw
 from wear.moving import Passage, TravelError
 from wear.surfaces import Surfaces
+from wear.worn import Spent, WearStep, WornState
 
 GAMMA = 1.0 - np.sqrt(0.5)
 """Share of the second stage of Alexander's method, and the reach of either."""
@@ -46,29 +47,6 @@ Starts = dict[int, NormalStart]
 
 class ContactFailure(ConvergenceError):
     """The half-space solver did not converge; the message is its own."""
-
-
-@dataclass(frozen=True)
-class Spent:
-    """Contact problems of an increment solved, convolutions they took, and wear steps."""
-
-    contact_solves: int = 0
-    convolutions: int = 0
-    steps: int = 0
-
-    def __add__(self, other: Spent) -> Spent:
-        return Spent(
-            self.contact_solves + other.contact_solves,
-            self.convolutions + other.convolutions,
-            self.steps + other.steps,
-        )
-
-    def __sub__(self, other: Spent) -> Spent:
-        return Spent(
-            self.contact_solves - other.contact_solves,
-            self.convolutions - other.convolutions,
-            self.steps - other.steps,
-        )
 
 
 @dataclass(frozen=True)
@@ -125,45 +103,18 @@ class CycleResult:
 
 
 @dataclass(frozen=True)
-class WearState:
-    """What wear must remember between two steps.
+class WearState(WornState):
+    """What the wear of a half-space contact must remember between two steps.
 
-    ``energy`` is what the contact has dissipated so far [N mm]; ``depth_rate`` the largest depth
-    [mm] and ``volume_rate`` the volume of both bodies [mm³] worn per cycle of the last step;
-    ``starts`` the contact solver's, by increment; ``error`` ``(nx, ny)`` the estimated error of the
-    depth of both bodies [mm] and ``volume_error`` a bound of that of their volume [mm³];
-    ``next_cycles`` how far an automatic step would go next.
+    Fields are ``(nx, ny)``, one value per cell; ``starts`` are the contact solver's, by increment.
     """
 
-    surfaces: Surfaces
-    energy: float
-    depth_rate: float
-    volume_rate: float
     starts: Starts
-    error: Array
-    volume_error: float
-    next_cycles: float
 
     @classmethod
     def unworn(cls, gap: Array) -> WearState:
         """Before the first cycle, at the gap ``(nx, ny)`` [mm] of the unloaded bodies."""
-        return cls(Surfaces.unworn(gap), 0.0, 0.0, 0.0, {}, np.zeros_like(gap), 0.0, np.inf)
-
-
-@dataclass(frozen=True)
-class WearStep:
-    """A step: the ``state`` after it, its ``cycles``, and the contact problems it took.
-
-    ``midway`` ``(nx, ny)`` is the depth of both bodies in the middle of a step of second order, and
-    ``drift`` what its slips and friction, changing on the way, have added to it [mm].
-    """
-
-    state: WearState
-    cycles: float
-    contact_solves: int
-    convolutions: int
-    midway: Array | None = None
-    drift: Array | None = None
+        return cls(**vars(WornState.of(gap)), starts={})
 
 
 class WearingContact:
@@ -296,14 +247,14 @@ class WearingContact:
         return CycleResult(states, energy, worn.depth_1, worn.depth_2)
 
     # -- steps ----------------------------------------------------------------------------------
-    def explicit_step(self, state: WearState, cycles: float) -> WearStep:
+    def explicit_step(self, state: WearState, cycles: float) -> WearStep[WearState]:
         """Wear ``cycles`` cycles at the pressures of the present surfaces."""
         march = _March(self, state, cycles)
         for t, solved in self.cycle(state, self.dissipating).states.items():
             march.wear(t, solved, cycles)
         return march.step()
 
-    def implicit_step(self, state: WearState, cycles: float) -> WearStep:
+    def implicit_step(self, state: WearState, cycles: float) -> WearStep[WearState]:
         """Wear ``cycles`` cycles, first order in them, each increment at the pressure it ends with.
 
         Stable at any length, at given slips.
@@ -313,7 +264,7 @@ class WearingContact:
             march.wear(t, march.solve(t, cycles), cycles)
         return march.step()
 
-    def second_order_step(self, state: WearState, cycles: float) -> WearStep:
+    def second_order_step(self, state: WearState, cycles: float) -> WearStep[WearState]:
         """Wear ``cycles`` cycles, second order in them and stable at any length, at given slips."""
         march = _March(self, state, cycles)
         half = 0.5 * cycles
@@ -425,7 +376,7 @@ class _March:
         self.wear(increment, self.solve(increment, stage), cycles - stage)
         self.wear(increment, self.solve(increment, stage), stage)
 
-    def step(self) -> WearStep:
+    def step(self) -> WearStep[WearState]:
         """The step taken."""
         before, after = self._before.surfaces, self.surfaces
         lost = after.depth_1 - before.depth_1, after.depth_2 - before.depth_2
@@ -438,4 +389,4 @@ class _March:
             volume_rate=float(sum(depth.sum() for depth in lost)) * area / self._cycles,
             starts=self._starts,
         )
-        return WearStep(state, self._cycles, self._solves, self._convolutions)
+        return WearStep(state, self._cycles, Spent(self._solves, self._convolutions, 1))

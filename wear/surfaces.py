@@ -11,7 +11,7 @@ from sa_solver.types import Array
 
 @dataclass(frozen=True)
 class Surfaces:
-    """Unworn gap, and what both bodies have been through, all ``(nx, ny)``.
+    """Unworn gap, and what both bodies have been through, by cell ``(nx, ny)`` or node ``(n,)``.
 
     ``depth_1`` and ``depth_2`` are the depths lost [mm], ``work_1`` and ``work_2`` the energies
     dissipated per area [N/mm], each on the body's own surface.

@@ -20,6 +20,7 @@ from wear.steppers import (
     root_mean_square,
 )
 from wear.stepping import SlidingCycle, WearingContact, WearState
+from wear.worn import Spent
 
 BODY = Material(115e3, 0.29)
 GRID = Grid.strips(8.0, 40)
@@ -131,7 +132,7 @@ def automatic(stepper, cycles: float) -> Advance:
     limit = CONSTANT.stable_cycles(state)
     state = replace(state, starts=starts, next_cycles=4.0 * limit)
     end = advance_cycles(stepper, state, cycles, cycles, unchanging)
-    return replace(end, contact_solves=end.contact_solves + len(first.states))
+    return replace(end, spent=end.spent + Spent(len(first.states)))
 
 
 @cache
@@ -156,7 +157,7 @@ def test_automatic_steps_meet_their_tolerance_and_grow_fewer_with_it(kind) -> No
             assert error < tolerance
             assert kind is SecondOrder or error == pytest.approx(told, rel=0.5)
         assert depth.max() == pytest.approx(exact.max(), rel=tolerance)
-        steps.append(end.steps)
+        steps.append(end.spent.steps)
     assert steps == sorted(set(steps))
 
 
@@ -165,7 +166,7 @@ def test_automatic_steps_take_a_tenth_of_the_explicit_ones() -> None:
     cycles = 150.0 * CONSTANT.stable_cycles(rounded())
     explicit = automatic(Explicit(fraction=1.0), cycles)
     implicit = automatic(Implicit(ErrorControl(0.01)), cycles)
-    assert implicit.contact_solves <= 0.1 * explicit.contact_solves
+    assert implicit.spent.contact_solves <= 0.1 * explicit.spent.contact_solves
     depth, other = (own.state.surfaces.depth for own in (implicit, explicit))
     assert depth.max() == pytest.approx(other.max(), rel=0.01)
     assert depth.sum() == pytest.approx(other.sum(), rel=0.01)
@@ -181,7 +182,7 @@ def test_an_absolute_tolerance_is_a_depth() -> None:
         automatic(Implicit(control), cycles)
         for control in (ErrorControl(absolute=allowed), ErrorControl(relative=0.01))
     )
-    assert abs(absolute.steps - relative.steps) <= 2
+    assert abs(absolute.spent.steps - relative.spent.steps) <= 2
     assert root_mean_square(absolute.state.surfaces.depth - exact, exact) < allowed
 
 
@@ -190,14 +191,14 @@ def test_a_step_that_was_too_long_is_taken_again() -> None:
     cycles = 100.0 * CONSTANT.stable_cycles(rounded())
     exact = exact_depth(cycles)
     end = advance_cycles(Implicit(ErrorControl(0.01)), rounded(), cycles, cycles, unchanging)
-    assert end.contact_solves > 3 * end.steps
+    assert end.spent.contact_solves > 3 * end.spent.steps
     assert end.state.surfaces.depth.max() == pytest.approx(exact.max(), rel=0.01)
 
 
 def test_explicit_steps_keep_to_their_share_of_the_limit() -> None:
     limit = CONSTANT.stable_cycles(rounded())
     end = advance_cycles(Explicit(fraction=0.5), rounded(), 10.0 * limit, 10.0 * limit, unchanging)
-    assert end.steps >= 20
+    assert end.spent.steps >= 20
 
 
 @pytest.mark.parametrize(

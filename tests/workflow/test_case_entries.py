@@ -50,18 +50,23 @@ EVOLUTIONS = {
 }
 
 
-def wear(*bodies):
+def laws(lengths, *bodies):
     """The laws and evolutions that the templates do not have, for bodies of these names."""
-    laws = {
-        "archard": {"law": "archard", **LENGTHS, **dict.fromkeys(bodies, ARCHARD_BODY)},
+    own = {
+        "archard": {"law": "archard", **lengths, **dict.fromkeys(bodies, ARCHARD_BODY)},
         "energy_amplitude": {
             "law": "energy_amplitude",
             "reference_amplitude": "75 um",
-            **LENGTHS,
+            **lengths,
             **dict.fromkeys(bodies, ENERGY_BODY),
         },
     }
-    return FRICTION | {"wear": laws} | {f"wear.{body}.evolution": EVOLUTIONS for body in bodies}
+    return {"wear": own} | {f"wear.{body}.evolution": EVOLUTIONS for body in bodies}
+
+
+def wear(*bodies):
+    """The same of wear cases, whose friction may change too."""
+    return FRICTION | laws(LENGTHS, *bodies)
 
 
 def with_path(**loads):
@@ -94,6 +99,7 @@ GIVEN = {
     "specimens": {
         "structure.form": {ALWAYS: {"along": "1 m", "across": "50 mm"}},
         "wear.reported": {ALWAYS: REPORTED},
+        **laws({"cycles": 1e5}, "body_1", "body_2"),
     },
     "bodies": {
         "structure": {

@@ -355,7 +355,7 @@ class TestCase:
             ("structure.form.across=0.1 mm", "must exceed half of strip_width"),
             ("mesh.pad_elements=9", "odd; allowed: even numbers"),
             ("reduction.modes=0", "from 1 to 500"),
-            ("wear.law=archard", "allowed: 'energy'"),
+            ("wear.law=wishful", "allowed: energy, energy_amplitude, archard"),
             ("wear.cycles=1e5", "both given; allowed: either cycles or energy"),
             ("wear.energy=null", "neither given"),
             ("wear.energy=0", "--set wear.energy=0: 0: out of range"),
@@ -375,7 +375,7 @@ class TestCase:
         [
             (
                 ["wear.cycle_block.length=1e7"],
-                "wear.cycle_block.length: a cycle block of 1e+07 cycles",
+                "wear.cycle_block.length: steps of 1e+07 cycles",
             ),
             (["wear.cycle_block.length=1"], "more than 20000 cycle blocks"),
             (["load_path.stroke=1e-9 mm"], "nothing slides at 87 N"),

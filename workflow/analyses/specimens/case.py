@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, model_validator
 
 from sa_solver.types import Material as ElasticMaterial
-from workflow.analyses.wear.case.sections import Cycles, Ratio, TwoBodies, TwoMaterials
-from workflow.analyses.wear.case.worn_bodies import EnergyBody
+from workflow.analyses.wear.case.sections import Cycles, Laws, Ratio, TwoBodies, TwoMaterials
+from workflow.analyses.wear.case.worn_bodies import BodyWear, WornByArchard
 from workflow.case.fields import Quantity, Whole
 from workflow.case.sections import (
     Case,
@@ -25,6 +25,7 @@ from workflow.case.sections import (
 
 if TYPE_CHECKING:
     from fe_models.geometry.specimens import Specimen
+    from wear.laws import WearLaw
 
 Depth = Annotated[float, Quantity("mm", at_least=0.0, at_most=1e4)]
 Pressing = Annotated[
@@ -145,10 +146,9 @@ class Reported(Section):
     cycles: Cycles = entry("when it has become steady [1]", 2.5e6)
 
 
-class CycleBlockWear(TwoBodies[EnergyBody]):
-    """Depth = coefficient x dissipated energy per area; ends by exactly one of cycles, energy."""
+class CycleBlockWear(TwoBodies[BodyWear], Laws):
+    """Wear of both specimens, node by node; ends by exactly one of cycles, energy."""
 
-    law: Literal["energy"] = entry("energy", "energy")
     cycles: Cycles | None = entry("under each normal force [1]", 3e5, default=None)
     energy: Energy | None = entry("dissipated under each normal force [N*mm]", "1 kJ", default=None)
     cycle_block: CycleBlock = entry("cycles of constant geometry", default=CycleBlock())
@@ -165,6 +165,18 @@ class CycleBlockWear(TwoBodies[EnergyBody]):
     def _something_wears(self) -> CycleBlockWear:
         if self.body_1.coefficient == self.body_2.coefficient == 0.0:
             raise disagreement("0 for both bodies; allowed: one of them at most", "body_1")
+        return self
+
+    @model_validator(mode="after")
+    def _reported_are_of_energy(self) -> CycleBlockWear:
+        """Cycles that a source reports give coefficients if shapes scale with these."""
+        for body in (self.body_1, self.body_2):
+            if self.reported and (isinstance(body, WornByArchard) or body.evolution is not None):
+                raise disagreement(
+                    "given for a body that wears by archard, or whose coefficient changes; "
+                    "allowed: with laws of energy alone, without evolution",
+                    "reported",
+                )
         return self
 
 
@@ -185,6 +197,11 @@ class SpecimensCase(Case):
     def material(self, number: int) -> ElasticMaterial:
         """Material of body ``number``, 1 or 2."""
         return (self.materials.body_1, self.materials.body_2)[number - 1].elastic()
+
+    @property
+    def laws(self) -> tuple[WearLaw, WearLaw]:
+        """Those of body 1 and body 2."""
+        return self.wear.body_1.described(), self.wear.body_2.described()
 
     def geometry(self) -> Specimen:
         """The specimen as the mesher takes it."""

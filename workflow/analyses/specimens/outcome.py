@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fe_models.cycle_blocks import BlockState
 from fe_models.reduced_contact import ReducedPair, VirginCurve
 from sa_solver.types import Array
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import BulkCompliance, HalfSpaceState, PadHalfSpace
 from workflow.analyses.specimens.model import SpecimensModel
+from workflow.analyses.specimens.wear import BlockState
 
 
 @dataclass(frozen=True)

@@ -35,8 +35,8 @@ from workflow.shell.store import replacing
 from workflow.shell.summary import finish
 
 if TYPE_CHECKING:
-    from fe_models.cycle_blocks import BlockState
     from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
+    from workflow.analyses.specimens.wear import BlockState
 
 # Name of the pad's grid, and of the two shapes that a half-space is put beside.
 PAD = "pad"
@@ -142,7 +142,7 @@ def _kinetics(blocks: tuple[BlockState, ...], areas: Array) -> dict[str, Dataset
         ),
         # Infinite where nothing slides.
         "stable_cycles": column(
-            (contact.stable_cycles for contact in contacts),
+            (state.stable_cycles for state in blocks),
             "1",
             "cycles of constant shape beyond which errors of shape grow",
         ),

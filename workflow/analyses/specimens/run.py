@@ -8,13 +8,14 @@ shear together, which the uncoupled method and Masing's rule leave out.
 from __future__ import annotations
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 
-from fe_models.cycle_blocks import BlockState, CycleBlockError, wear_in_cycle_blocks
 from fe_models.mesh import MeshError
 from fe_models.reduced_contact import FrettingConditions, ReducedPair, VirginCurve
 from sa_solver.types import Array, ElasticPair
+from wear.steppers import Explicit, StabilityError, rest
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import PadHalfSpace, bulk_compliance
 from workflow.analyses.specimens.memory import memory
@@ -26,6 +27,7 @@ from workflow.analyses.specimens.outcome import (
     SpecimensOutcome,
 )
 from workflow.analyses.specimens.results import write_specimens_output
+from workflow.analyses.specimens.wear import BlockState, FrettedPair, wear_in_cycle_blocks
 from workflow.errors import MethodFailed, UserError
 from workflow.shell.analysis import Run
 from workflow.shell.reporter import Reporter
@@ -55,7 +57,7 @@ def run_specimens(run: Run[SpecimensCase]) -> None:
         outcome = _compute(run.case, run.reporter)
     except MeshError as error:
         raise UserError(f"{run.folder.case}: {error}") from error
-    except CycleBlockError as error:
+    except StabilityError as error:
         raise UserError(f"{run.folder.case}: wear.cycle_block.length: {error}") from error
     write_specimens_output(outcome, run)
 
@@ -93,9 +95,7 @@ def _rub(
     force: float,
     reporter: Reporter,
 ) -> LoadOutcome:
-    wear, friction = case.wear, case.friction.coefficient
-    coefficients = wear.body_1.coefficient, wear.body_2.coefficient
-    conditions = FrettingConditions(force, case.load_path.stroke, friction, coefficients)
+    conditions = FrettingConditions(force, case.load_path.stroke, case.friction.coefficient)
     with reporter.stage("wear"):
         blocks = tuple(_blocks(case, pair, model.face.gap, conditions))
         kept = tuple(
@@ -120,17 +120,34 @@ def _blocks(
     case: SpecimensCase, pair: ReducedPair, gap: Array, conditions: FrettingConditions
 ) -> Iterator[BlockState]:
     """The states of a worn pair, up to the end that the case asks for."""
-    wear = case.wear
-    cycles = np.inf if wear.cycles is None else wear.cycles
-    target = np.inf if wear.energy is None else wear.energy
-    states = wear_in_cycle_blocks(
-        pair, gap, conditions, cycles, wear.cycle_block.share, wear.cycle_block.length
-    )
+    own = case.wear.cycle_block
+    stepper = Explicit(own.share) if own.length is None else Explicit(cycles=own.length)
+    fretted = FrettedPair(pair, case.laws, conditions)
+    states = wear_in_cycle_blocks(fretted, gap, stepper, partial(_to_go, case))
     for number, state in enumerate(states):
         _check(state, number, conditions, case)
         yield state
-        if state.energy >= target:
-            return
+
+
+def _to_go(case: SpecimensCase, state: BlockState) -> float:
+    """The most cycles that the block after ``state`` may have; 0 at the end.
+
+    A run up to an energy ends with the first whole block that reaches it, and before anything wears
+    as soon as it does at the present rate.
+    """
+    wear = case.wear
+    if wear.cycles is not None:
+        return rest(wear.cycles, state.cycles)
+    assert wear.energy is not None
+    left = (wear.energy - state.energy) / state.contact.energy
+    block = _block(case, state)
+    return 0.0 if left <= 0.0 else max(left, block if np.isfinite(block) else 0.0)
+
+
+def _block(case: SpecimensCase, state: BlockState) -> float:
+    """Cycles of a whole block after ``state``."""
+    own = case.wear.cycle_block
+    return own.share * state.stable_cycles if own.length is None else own.length
 
 
 def _check(
@@ -148,7 +165,7 @@ def _check(
             f"wear.energy: nothing slides at {force}, so that it is never dissipated; raise "
             "load_path.stroke or friction.coefficient, or give wear.cycles"
         )
-    if contact.energy > 0.0 and np.isinf(contact.stable_cycles):
+    if state.wear.any() and np.isinf(state.stable_cycles):
         raise UserError(
             f"mesh.pad_elements: a single node of the pad touches at {force}, too few to wear; "
             "raise it, or load_path.normal_forces"
@@ -162,14 +179,11 @@ def _check(
 
 def _blocks_needed(state: BlockState, case: SpecimensCase) -> float:
     """About as many cycle blocks as the run takes, as long as the first one."""
-    wear, contact = case.wear, state.contact
-    block = wear.cycle_block.share * contact.stable_cycles
-    if wear.cycle_block.length is not None:
-        block = wear.cycle_block.length
+    wear, block = case.wear, _block(case, state)
     if wear.cycles is not None:
         return wear.cycles / block
     assert wear.energy is not None
-    return wear.energy / (contact.energy * block)
+    return wear.energy / (state.contact.energy * block)
 
 
 def _chosen(blocks: tuple[BlockState, ...]) -> list[BlockState]:

@@ -10,11 +10,11 @@ from sa_solver.types import Array
 from workflow.analyses.specimens.half_space import BulkCompliance
 
 if TYPE_CHECKING:
-    from fe_models.cycle_blocks import BlockState
     from fe_models.reduced_contact import ReducedPair
     from workflow.analyses.specimens.case import Reported
     from workflow.analyses.specimens.half_space import HalfSpaceState
     from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
+    from workflow.analyses.specimens.wear import BlockState
 
 # Steady is what stays within this of its last value: of the stiffness, and of the mean pressure.
 STEADY = 0.02

@@ -7,6 +7,8 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array
+from wear.nodes import NodalState
+from wear.steppers import Heun, advance_cycles
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Curves
@@ -21,7 +23,6 @@ from workflow.analyses.vibration_wear.outcome import (
     path_field,
     wearing_loop,
 )
-from workflow.analyses.vibration_wear.pad_wear_steps import PadState, worn_until
 from workflow.analyses.vibration_wear.pads import RubbedPads, WearingPads
 from workflow.case.loading import load_named
 from workflow.shell.dataset import Dataset
@@ -32,16 +33,21 @@ def wear_specimens(case: FrictionRigWearCase, reporter: Reporter) -> VibrationWe
     """All that is kept of a run."""
     own = case.wear
     unworn = VibrationModel.of(case.unworn, reporter)
-    pads = WearingPads(unworn, _coefficients(case), own.force, own.frequency)
+    file = case.structure.specimens
+    specimens = load_named("structure.specimens", file, [SpecimensCase], "specimens")
+    pads = WearingPads(unworn, specimens.laws, own.force, own.frequency)
+    stepper, total, done = Heun(own.tolerance), own.cycles[-1], 0.0
+    state = pads.begin()
     with reporter.stage("wear"):
-        state = PadState.new(pads)
-    states = [_kept(case, pads, state, state.steps, reporter)]
-    with reporter.jumps(own.cycles[-1], 0.0) as progress:
+        pads.at(state)
+    states, error = [_kept(case, pads, state, (0.0, 0), reporter)], 0.0
+    with reporter.jumps(total, 0.0) as progress:
         for cycles in own.cycles:
-            before = state.steps
             with reporter.stage("wear"):
-                state = worn_until(pads, state, cycles, own.tolerance)
-            states.append(_kept(case, pads, state, state.steps - before, reporter))
+                worn = advance_cycles(stepper, state, cycles - done, total - done, pads.contact_at)
+            state, done, error = worn.state, cycles, max(error, worn.error)
+            _warn_of_steps(case, cycles, error, reporter)
+            states.append(_kept(case, pads, state, (cycles, worn.spent.steps), reporter))
             progress.update(cycles, len(states) - 1)
     rig = unworn.rig
     assert rig.places is not None
@@ -54,29 +60,31 @@ def wear_specimens(case: FrictionRigWearCase, reporter: Reporter) -> VibrationWe
     return VibrationWearOutcome(case, tuple(states), places=places)
 
 
-def _coefficients(case: FrictionRigWearCase) -> tuple[float, float]:
-    """Of body 1 and 2 [1/MPa], from the case whose specimens the rig has been made of."""
-    file = case.structure.specimens
-    specimens = load_named("structure.specimens", file, [SpecimensCase], "specimens")
-    return specimens.wear.body_1.coefficient, specimens.wear.body_2.coefficient
+def _warn_of_steps(
+    case: FrictionRigWearCase, cycles: float, error: float, reporter: Reporter
+) -> None:
+    if error > case.wear.tolerance:
+        reporter.warn(
+            f"{cycles:g} cycles: steps of the shortest length left an error of "
+            f"{error:.2g}, above wear.tolerance {case.wear.tolerance:g}: raise "
+            "resolution.samples or resolution.harmonics"
+        )
 
 
 def _kept(
-    case: FrictionRigWearCase, pads: WearingPads, state: PadState, steps: int, reporter: Reporter
+    case: FrictionRigWearCase,
+    pads: WearingPads,
+    state: NodalState,
+    reached: tuple[float, int],
+    reporter: Reporter,
 ) -> WornState:
-    """The pads in a state, reached in ``steps`` since the last, and the rig on them."""
-    rubbed, of_state = state.rubbed, case.unworn
+    """The pads in a state, ``reached`` by so many cycles in all and steps since the last."""
+    (cycles, steps), rubbed, of_state = reached, pads.at(state), case.unworn
     loop = loop_of(of_state, rubbed.model, rubbed.motion)
     with reporter.stage("response"):
         found = [response_under(of_state, rubbed.model, own, reporter)[0] for own in case.forces]
-    numbers: dict[str, Any] = {"cycles": state.cycles, "steps": steps, "energy": state.energy}
-    numbers |= _numbers(rubbed, state.depth, loop) | rubbed.model.numbers()
-    if state.worst > case.wear.tolerance:
-        reporter.warn(
-            f"{state.cycles:g} cycles: steps of the shortest length left an error of "
-            f"{state.worst:.2g}, above wear.tolerance {case.wear.tolerance:g}: raise "
-            "resolution.samples or resolution.harmonics"
-        )
+    numbers: dict[str, Any] = {"cycles": cycles, "steps": steps, "energy": state.energy}
+    numbers |= _numbers(rubbed, state.surfaces.depth, loop) | rubbed.model.numbers()
     tolerance = case.resolution.tolerance
     if tolerance is not None and rubbed.motion.left_out > tolerance:
         reporter.warn(
@@ -84,15 +92,15 @@ def _kept(
             "resolution.tolerance: raise resolution.harmonics, those to begin with"
         )
     reporter.log(
-        f"{state.cycles:g} cycles: {steps} steps, {numbers['touching']} nodes touch, "
+        f"{cycles:g} cycles: {steps} steps, {numbers['touching']} nodes touch, "
         f"stroke {numbers['stroke']:.4g} mm"
     )
-    return WornState(state.cycles, numbers, _fields(pads, state, loop), tuple(found))
+    return WornState(cycles, numbers, _fields(rubbed, state, loop), tuple(found))
 
 
 def _numbers(rubbed: RubbedPads, depth: Array, loop: Curves) -> dict[str, Any]:
     return {
-        "volume": float(depth @ rubbed.area),
+        "volume": float(depth @ rubbed.areas),
         "depth": float(depth.max()),
         "friction": float(np.max(rubbed.law.friction)),
         # None where no increment of the loop sticks.
@@ -103,14 +111,13 @@ def _numbers(rubbed: RubbedPads, depth: Array, loop: Curves) -> dict[str, Any]:
     }
 
 
-def _fields(pads: WearingPads, state: PadState, loop: Curves) -> dict[str, dict[str, Dataset]]:
-    rubbed = state.rubbed
+def _fields(rubbed: RubbedPads, state: NodalState, loop: Curves) -> dict[str, dict[str, Dataset]]:
     gap, pressed = np.asarray(rubbed.law.gap), rubbed.model.rest.cycle.samples[0, :, 2]
     moved, pulled = (loop.datasets[name].values for name in ("displacement", "force"))
     return {
         NODES: {
             "gap": Dataset(gap, "mm", "of the worn bodies without load"),
-            **depth_fields(*pads.depths(state.depth)),
+            **depth_fields(*state.surfaces.depths),
             "normal_force": Dataset(pressed, "N", "of each node at rest"),
             "path": path_field(rubbed.path),
             "energy": Dataset(rubbed.energy, "N mm", "that each node dissipates in such a cycle"),

@@ -15,15 +15,7 @@ from fe_models.dynamics.harmonics import Resolution
 from sa_solver.tangential_loop import TangentialLoop
 from wear.joints.jenkins import Jenkins
 from wear.moving import LARGE_STROKE
-from wear.steppers import (
-    ROUNDING,
-    ErrorControl,
-    Implicit,
-    SecondOrder,
-    Stepper,
-    advance_cycles,
-    first_cycles,
-)
+from wear.steppers import Stretches, advance_cycles, first_cycles
 from wear.stepping import WearState
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.rig.rig_model import RigModel
@@ -43,6 +35,7 @@ from workflow.analyses.vibration_wear.outcome import (
     wearing_loop,
 )
 from workflow.analyses.vibration_wear.vibrating_contact import Rubbing, Shaking, VibratingContact
+from workflow.analyses.wear.contact_stage import stepper_of
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase
 from workflow.case.loading import load_named
 from workflow.errors import UserError
@@ -51,8 +44,6 @@ from workflow.shell.reporter import Reporter
 
 # Of the motion at which all of the contact slides: where loops in partial slip are compared.
 PARTIAL = 0.5
-# Share by which friction may change in a wear step.
-FRICTION_CHANGE = 0.03
 
 
 def wear_half_space(case: VibrationWearCase, reporter: Reporter) -> VibrationWearOutcome:
@@ -66,7 +57,8 @@ def wear_half_space(case: VibrationWearCase, reporter: Reporter) -> VibrationWea
     own, wear = case.resolution, case.wear
     resolution = Resolution(tuple(own.harmonics), own.samples)
     contact = VibratingContact(bodies, rig, Shaking(wear.force, wear.frequency, resolution))
-    stepper, total, done = _stepper(bodies), wear.cycles[-1], 0.0
+    stepper = Stretches(stepper_of(bodies.wear), contact.alike_cycles)
+    total, done = wear.cycles[-1], 0.0
     with reporter.stage("contact, first cycle"):
         state = contact.unworn()
         first = first_cycles(contact.wearing(state), state, total)
@@ -75,14 +67,11 @@ def wear_half_space(case: VibrationWearCase, reporter: Reporter) -> VibrationWea
     states = [keeper.keep(state, 0.0, 0)]
     with reporter.jumps(total, 0.0) as progress:
         for cycles in wear.cycles:
-            steps = 0
             with reporter.stage("wear"):
-                while cycles - done > ROUNDING * cycles:
-                    most = contact.alike_cycles(state, cycles - done, FRICTION_CHANGE)
-                    worn = advance_cycles(stepper, state, most, total - done, contact.wearing)
-                    state, done, steps = worn.state, done + most, steps + worn.steps
-            done = cycles
-            states.append(keeper.keep(state, cycles, steps))
+                left = total - done
+                worn = advance_cycles(stepper, state, cycles - done, left, contact.wearing)
+            state, done = worn.state, cycles
+            states.append(keeper.keep(state, cycles, worn.spent.steps))
             progress.update(cycles, len(states) - 1)
     return VibrationWearOutcome(case, tuple(states), grid=contact.grid)
 
@@ -106,13 +95,6 @@ def contact_case(file: str) -> BodiesWearCase:
             "steps, whose length follows from wear.tolerance"
         )
     return case
-
-
-def _stepper(case: BodiesWearCase) -> Stepper:
-    wear = case.wear
-    relative = wear.tolerance if wear.depth_tolerance is None else None
-    control = ErrorControl(relative, wear.depth_tolerance)
-    return Implicit(control) if wear.step.kind == "implicit" else SecondOrder(control)
 
 
 class _Keeper:

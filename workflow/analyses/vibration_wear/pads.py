@@ -1,8 +1,8 @@
 """Two specimens in a vibrating rig: how their contacts move, and what that takes off every node.
 
-Energy law: in a cycle a node loses the depth α e / A, with A its area, α the sum of both bodies'
-coefficients and e what its contact dissipates in the rig's steady motion by harmonic balance. The
-gap grows by the depth, and rest and motion are found anew.
+In a cycle of the rig's steady motion by harmonic balance the contact of a node slides along a path
+and dissipates an energy; what both bodies lose by it is up to their laws. The gap grows by the
+depth, and rest and motion are found anew.
 """
 
 from __future__ import annotations
@@ -17,20 +17,26 @@ from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.periodic import PeriodicMarch
+from wear.laws import WearLaw
+from wear.nodes import NodalContact, NodalState
 from wear.stepping import ContactFailure
+from wear.surfaces import Surfaces
 from workflow.analyses.vibration.model import VibrationModel
+
+# Pads of the last states: those before and after a step.
+KEPT = 2
 
 
 @dataclass(frozen=True)
 class RubbedPads:
-    """Pads of one shape, and the ``motion`` under the force that wears them.
+    """Pads of one shape, and their ``motion`` under the force that wears them.
 
-    ``model`` is the rig on them, ``coefficient`` α [1/MPa].
+    ``model`` is the rig on them. For wear each node slides its path at one pressure, with which it
+    dissipates what it does (:class:`wear.nodes.NodalCycle`).
     """
 
     model: VibrationModel
     motion: HarmonicSolution
-    coefficient: float
 
     @property
     def energy(self) -> Array:
@@ -38,12 +44,7 @@ class RubbedPads:
         return self.motion.cycle.dissipated
 
     @property
-    def rate(self) -> Array:
-        """Depth of both bodies that each node loses in a cycle ``(j,)`` [mm]."""
-        return self.coefficient * self.energy / self.area
-
-    @property
-    def area(self) -> Array:
+    def areas(self) -> Array:
         """Of each node ``(j,)`` [mm²]."""
         assert self.model.rig.area is not None
         return self.model.rig.area
@@ -53,6 +54,28 @@ class RubbedPads:
         """That of each contact."""
         assert isinstance(self.model.law, FrictionContact)
         return self.model.law
+
+    @property
+    def friction(self) -> float | Array:
+        return self.law.friction
+
+    @property
+    def slip(self) -> Array:
+        """Path of each slider ``(1, j)`` [mm]."""
+        return self.path[None]
+
+    @cached_property
+    def pressure(self) -> Array:
+        """Of each node while it slides ``(1, j)`` [MPa]."""
+        sliding = np.asarray(self.friction) * self.areas * self.path
+        pressure = np.divide(
+            self.energy, sliding, out=np.zeros_like(self.path), where=self.path > 0.0
+        )
+        return pressure[None]
+
+    @property
+    def start(self) -> HarmonicSolution:
+        return self.motion
 
     @cached_property
     def path(self) -> Array:
@@ -65,52 +88,67 @@ class RubbedPads:
         pressed = force[:, :, 2] > 0.0
         return np.asarray((steps * (pressed | np.roll(pressed, 1, axis=0))).sum(axis=0))
 
-    @property
-    def longest_step(self) -> float:
-        """Cycles of a step in which no error of the shape changes its sign, to first order.
+    def stable_cycles(self, depth_per_pressure: Array) -> float:
+        """Cycles beyond which an explicit step would let an error of the shape grow.
 
         A depth δ that is wrong changes the normal forces by -K δ, K = (1/kn + C)⁻¹: the contact
         springs in series with the elastic bodies, whose compliance C is not negative, be it under
-        constant load or not. Energies change by µ s K δ at the paths s, depths per cycle by -D K δ
-        with D = α µ s / A. The eigenvalues of D K lie between 0 and max kn D: in ΔN = 1/(max kn D)
-        an Euler step multiplies errors by 1 - x, x between 0 and 1, and a step of second order by
-        1 - x + x²/2. Both are stable up to twice that length. The path is the longest of all nodes,
-        as those that do not touch yet may touch before the step ends.
+        constant load or not. Depths per cycle change by -D K δ with D = w/A, w being the depth per
+        pressure. The eigenvalues of D K lie between 0 and max kn D: in ΔN = 1/(max kn D) an Euler
+        step multiplies errors by 1 - x, x between 0 and 1, and a step of second order by 1 - x +
+        x²/2. Both are stable up to twice that length. The largest w is that of all nodes, as those
+        that do not touch yet may touch before the step ends.
         """
-        rubbed = self.coefficient * float(np.max(self.law.friction)) * float(self.path.max())
-        fastest = float(np.max(self.law.normal_stiffness / self.area)) * rubbed
-        return 1.0 / fastest if fastest > 0.0 else np.inf
+        stiffest = float(np.max(self.law.normal_stiffness / self.areas))
+        fastest = stiffest * float(depth_per_pressure.max())
+        return 2.0 / fastest if fastest > 0.0 else np.inf
 
 
-@dataclass(frozen=True)
 class WearingPads:
     """Pads that wear under a ``force`` [N] at a ``frequency`` [Hz].
 
-    ``unworn`` is the rig before, ``coefficients`` are those of body 1 and 2 [1/MPa].
+    ``unworn`` is the rig before, ``laws`` are those of body 1 and body 2.
     """
 
-    unworn: VibrationModel
-    coefficients: tuple[float, float]
-    force: float
-    frequency: float
+    def __init__(
+        self,
+        unworn: VibrationModel,
+        laws: tuple[WearLaw, WearLaw],
+        force: float,
+        frequency: float,
+    ) -> None:
+        self.unworn, self.laws = unworn, laws
+        self._force, self._frequency = force, frequency
+        self._kept: list[tuple[Surfaces, RubbedPads]] = []
 
-    def at(self, depth: Array, start: HarmonicSolution | None = None) -> RubbedPads:
-        """The pads that have lost a ``depth`` ``(j,)`` [mm], and their motion, from a near one.
+    def begin(self) -> NodalState:
+        """The state before the first cycle."""
+        assert self.unworn.rig.gap is not None
+        return NodalState.unworn(self.unworn.rig.gap)
+
+    def at(self, state: NodalState) -> RubbedPads:
+        """The pads in a state, their motion found from that which wore to it.
 
         Raises :class:`wear.stepping.ContactFailure` where no motion is found.
         """
-        model = worn_model(self.unworn, depth)
-        motion = model.problem.solve(self.frequency, self.force, start)
+        for surfaces, rubbed in self._kept:
+            if surfaces is state.surfaces:
+                return rubbed
+        model = worn_model(self.unworn, state.surfaces.depth)
+        start = state.start
+        assert start is None or isinstance(start, HarmonicSolution)
+        motion = model.problem.solve(self._frequency, self._force, start)
         if not motion.converged:
             raise ContactFailure(
-                f"no motion under {self.force:g} N at {self.frequency:g} Hz: {motion.message}"
+                f"no motion under {self._force:g} N at {self._frequency:g} Hz: {motion.message}"
             )
-        return RubbedPads(model, motion, sum(self.coefficients))
+        found = RubbedPads(model, motion)
+        self._kept = [*self._kept[1 - KEPT :], (state.surfaces, found)]
+        return found
 
-    def depths(self, depth: Array) -> tuple[Array, Array]:
-        """What body 1 and body 2 have lost ``(j,)`` each [mm]."""
-        one, two = self.coefficients
-        return one / (one + two) * depth, two / (one + two) * depth
+    def contact_at(self, state: NodalState) -> NodalContact:
+        """The same as wear steps take it."""
+        return NodalContact(self.laws, (self.at(state),))
 
 
 def worn_model(unworn: VibrationModel, depth: Array) -> VibrationModel:

@@ -32,6 +32,8 @@ from workflow.analyses.wear.structures.bodies.source import gap_of
 
 # Contacts of the last states: those before and after a step.
 KEPT = 2
+# Share by which friction may change in a wear step.
+FRICTION_CHANGE = 0.03
 # Steps of each branch of the loop that the half-space is led through.
 LOOP_INCREMENTS = 12
 
@@ -129,8 +131,8 @@ class VibratingContact:
         """The same for wear steps."""
         return self.at(state).wearing
 
-    def alike_cycles(self, state: WearState, most: float, change: float) -> float:
-        """Cycles, ``most`` or fewer, in which friction changes by no more than this share; or one.
+    def alike_cycles(self, state: WearState, most: float) -> float:
+        """Cycles, ``most`` or fewer, in which friction hardly changes; or one.
 
         A wear step takes the friction of its beginning.
         """
@@ -138,7 +140,7 @@ class VibratingContact:
         per_cycle = float(rubbing.by_slider.sum())
         while cycles > 1.0:
             friction = self._case.friction.at(state.energy + cycles * per_cycle)
-            if abs(friction - rubbing.friction) <= change * rubbing.friction:
+            if abs(friction - rubbing.friction) <= FRICTION_CHANGE * rubbing.friction:
                 return cycles
             cycles *= 0.5
         return min(1.0, most)

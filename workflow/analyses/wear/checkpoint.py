@@ -12,8 +12,8 @@ from sa_solver.normal import NormalStart
 from sa_solver.types import Array, LoadHistory
 from wear.coupled import CoupledState
 from wear.interface import InterfaceState
-from wear.stepping import Spent
 from wear.surfaces import Surfaces
+from wear.worn import Spent
 from workflow.errors import UserError
 from workflow.shell.store import read_arrays, write_arrays
 

@@ -14,6 +14,7 @@ from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
 from wear.interface import InterfaceContact, InterfaceSettings, InterfaceState
 from wear.steppers import ErrorControl, Explicit, Implicit, SecondOrder, Stepper
+from wear.stepping import WearingContact, WearState
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Duration
 from workflow.analyses.wear.contact_loops import WornLoop, worn_loop
@@ -89,7 +90,7 @@ def _interface(case: WearCase, contact: ContactFace, transfer: FaceTransfer) -> 
         pair=ElasticPair(case.material(1), case.material(2)),
         laws=(case.wear_of(1).described(), case.wear_of(2).described()),
         friction=case.friction.at,
-        stepper=_stepper(case.wear),
+        stepper=stepper_of(case.wear),
         method=own.method,
         gross_slip=own.gross_slip,
         driven=contact.driven,
@@ -111,7 +112,7 @@ def _follow(case: WearCase) -> bool | None:
     return follow
 
 
-def _stepper(wear: Duration) -> Stepper:
+def stepper_of(wear: Duration) -> Stepper[WearState, WearingContact]:
     """What advances the surfaces of a contact, as the case asks for."""
     step = wear.step
     if step.kind == "explicit":

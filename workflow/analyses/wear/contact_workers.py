@@ -15,7 +15,7 @@ from wear.interface import (
     InterfaceState,
     failures_of,
 )
-from wear.stepping import Spent
+from wear.worn import Spent
 from workflow.analyses.wear.contact_loops import WornLoop
 from workflow.analyses.wear.contact_stage import ContactStage, StageSettings
 from workflow.shell.processes import Workers, workers

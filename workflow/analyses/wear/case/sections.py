@@ -200,7 +200,7 @@ class Duration(Section):
         return f"for an error of {self.tolerance:.2g} of the depth"
 
 
-class BodiesThatWear(Duration):
+class Laws(Section):
     """A law for both bodies, unless one has its own."""
 
     law: LawName = entry("energy, energy_amplitude or archard; a body may name its own", "energy")
@@ -223,7 +223,7 @@ class BodiesThatWear(Duration):
         return data | with_laws(bodies, law, data.get("reference_amplitude"))
 
     @model_validator(mode="after")
-    def _amplitude_is_needed(self) -> BodiesThatWear:
+    def _amplitude_is_needed(self) -> Laws:
         amplitudes = [
             body.reference_amplitude
             for body in (getattr(self, name) for name in self._names())
@@ -245,7 +245,12 @@ class BodiesThatWear(Duration):
     @classmethod
     def _names(cls) -> list[str]:
         """The keys of the two bodies."""
-        return [name for name in cls.model_fields if name not in BodiesThatWear.model_fields]
+        pairs = [own for own in (BladeAndDisk, TwoBodies) if issubclass(cls, own)]
+        return [name for own in pairs for name in own.model_fields]
+
+
+class BodiesThatWear(Laws, Duration):
+    """Laws of both bodies, and how far they wear."""
 
 
 class DovetailWear(BladeAndDisk[BodyWear], BodiesThatWear):

@@ -1,0 +1,215 @@
+"""Wear of nodes: laws by hand, and steppers on equations whose solution is known.
+
+Nodes of area A on springs k, pushed together by δ: p = (k/A) (δ - h) at the worn depth h, at a slip
+s a cycle. Depth decays to δ as exp(-N/N0), N0 = A/(k α µ s), each node for itself.
+"""
+
+import re
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from sa_solver.types import Array
+from wear.evolution import EnergyTable
+from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw
+from wear.nodes import NodalContact, NodalState
+from wear.steppers import Explicit, Heun, StabilityError, Stretches, advance_cycles, rest, steps
+
+FRICTION = 0.5
+AREAS = np.array([0.1, 0.2, 0.4])
+SLIP = np.array([0.02, 0.01, 0.03])
+STIFFNESS, PUSH = 1e3, np.array([1e-3, 2e-3, 3e-3])
+
+
+@dataclass(frozen=True)
+class Cycle:
+    """A cycle as it is given."""
+
+    slip: Array
+    pressure: Array
+    friction: float = FRICTION
+    start: object = "start"
+
+    @property
+    def areas(self) -> Array:
+        return AREAS
+
+    def stable_cycles(self, depth_per_pressure: Array) -> float:
+        """Of springs: an error of the depth is multiplied by 1 - (k/A) w ΔN."""
+        fastest = float((STIFFNESS / AREAS * depth_per_pressure).max())
+        return 2.0 / fastest if fastest > 0.0 else np.inf
+
+
+LAWS = EnergyLaw(4e-8), EnergyLaw(1e-8)
+# Cycles in which what is left of the depth falls to 1/e.
+SCALES = AREAS / (STIFFNESS * 5e-8 * FRICTION * SLIP)
+
+
+def springs(state: NodalState, laws=LAWS) -> NodalContact:
+    """The nodes as worn as they are."""
+    pressure = STIFFNESS / AREAS * (PUSH - state.surfaces.depth)
+    # Half of the way there, half of it back.
+    halves = np.array([0.5, 0.5])[:, None]
+    return NodalContact(laws, (Cycle(halves * SLIP, np.array([pressure, pressure])),))
+
+
+def unworn() -> NodalState:
+    return NodalState.unworn(np.zeros(3))
+
+
+def exact(cycles: float) -> Array:
+    return PUSH * (1.0 - np.exp(-cycles / SCALES))
+
+
+# --- laws -----------------------------------------------------------------------------------------
+
+
+PRESSURE = np.array([[100.0, 50.0, 0.0], [80.0, 60.0, 20.0]])
+PATHS = np.array([[0.01, 0.02, 0.03], [0.02, 0.0, 0.01]])
+SLID = (PATHS * PRESSURE).sum(axis=0)
+
+
+@pytest.mark.parametrize(
+    ("law", "expected"),
+    [
+        (EnergyLaw(2e-8), 2e-8 * FRICTION * SLID),
+        (ArchardLaw(1e-4, 3500.0), 1e-4 / 3500.0 * SLID),
+        (
+            EnergyAmplitudeLaw(2e-8, 0.075),
+            2e-8 * FRICTION * SLID * np.array([0.03, 0.02, 0.04]) / 4.0 / 0.075,
+        ),
+    ],
+)
+def test_a_law_takes_off_what_it_says(law, expected) -> None:
+    """Per cycle, of one body; the other, with none, keeps its depth."""
+    contact = NodalContact((law, EnergyLaw(0.0)), (Cycle(PATHS, PRESSURE),))
+    first, second = contact.wear(unworn())
+    np.testing.assert_allclose(first, expected, rtol=1e-14)
+    assert not second.any()
+    step = contact.explicit_step(unworn(), 10.0)
+    np.testing.assert_allclose(step.state.surfaces.depth_1, 10.0 * expected, rtol=1e-14)
+    assert step.state.depth_rate == pytest.approx(expected.max())
+    assert step.state.volume_rate == pytest.approx(expected @ AREAS)
+    assert step.state.start == "start"
+
+
+def test_energy_is_that_of_all_nodes() -> None:
+    step = NodalContact(LAWS, (Cycle(PATHS, PRESSURE),)).explicit_step(unworn(), 10.0)
+    np.testing.assert_allclose(step.state.surfaces.work_1, 10.0 * FRICTION * SLID)
+    assert step.state.energy == pytest.approx(10.0 * FRICTION * float(SLID @ AREAS))
+
+
+@pytest.mark.parametrize("scope", ["local", "global"])
+def test_a_coefficient_may_change_during_a_step(scope) -> None:
+    """By its exact mean over the energies between the ends."""
+    cycles, table = 10.0, EnergyTable((0.0, 20.0), (1.0, 5.0))
+    law = EvolvingLaw(EnergyLaw(2e-8), table, scope)
+    contact = NodalContact((law, law), (Cycle(PATHS, PRESSURE),))
+    once, _ = contact.wear(unworn(), cycles)
+    spent = FRICTION * SLID * cycles
+    ended = spent if scope == "local" else float(spent @ AREAS)
+    assert np.max(ended) < 20.0
+    np.testing.assert_allclose(once, (1.0 + 0.1 * ended) * 2e-8 * FRICTION * SLID, rtol=1e-13)
+
+
+def test_the_mean_of_two_cycles_is_that_of_what_they_take_off() -> None:
+    """Not that of one cycle twice as long, which an amplitude would count twice."""
+    laws = EnergyAmplitudeLaw(2e-8, 0.075), ArchardLaw(1e-4, 3500.0)
+    one, other = (NodalContact(laws, (Cycle(k * PATHS, PRESSURE),)) for k in (1.0, 3.0))
+    both = one.averaged(other)
+    parts = zip(both.wear(unworn()), one.wear(unworn()), other.wear(unworn()), strict=True)
+    for mean, first, second in parts:
+        np.testing.assert_allclose(mean, 0.5 * (first + second), rtol=1e-14)
+    assert both.energy == pytest.approx(0.5 * (one.energy + other.energy))
+
+
+# --- steps ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("stepper", "order"), [("explicit", 1), ("heun", 2)])
+def test_order_of_convergence(stepper, order) -> None:
+    cycles, errors = float(SCALES.min()), []
+    for count in (8, 16, 32):
+        length = cycles / count
+        own = Explicit(cycles=length) if stepper == "explicit" else Heun(np.inf, np.inf)
+        state = unworn()
+        for _ in range(count):
+            state = own.step(state, length, cycles, springs).state
+        errors.append(np.abs(state.surfaces.depth - exact(cycles)).max())
+    rates = np.log2(np.divide(errors[:-1], errors[1:]))
+    np.testing.assert_allclose(rates, order, atol=0.15)
+
+
+def test_heuns_steps_keep_to_tolerance_and_limit() -> None:
+    cycles, counts = 3.0 * float(SCALES.max()), []
+    limit = springs(unworn()).stable_cycles(unworn())
+    for tolerance in (0.3, 0.1, 0.03):
+        taken = list(
+            steps(Heun(tolerance), unworn(), lambda _, done: rest(cycles, done), cycles, springs)
+        )
+        assert max(step.error for step in taken) <= tolerance
+        assert max(step.cycles for step in taken) <= 0.5 * limit * (1.0 + 1e-12)
+        assert sum(step.cycles for step in taken) == pytest.approx(cycles)
+        depth = taken[-1].state.surfaces.depth
+        np.testing.assert_allclose(depth, exact(cycles), rtol=0.2 * tolerance)
+        assert all(step.spent.steps == 1 for step in taken)
+        assert all(step.spent.contact_solves % 2 == 0 for step in taken)
+        counts.append(len(taken))
+    assert counts == sorted(counts)
+
+
+def test_explicit_steps_of_a_share_of_the_limit() -> None:
+    limit = springs(unworn()).stable_cycles(unworn())
+    done = advance_cycles(Explicit(0.25), unworn(), 10.1 * limit, 10.1 * limit, springs)
+    assert done.spent.steps == 41
+    assert done.spent.contact_solves == 41
+
+
+def test_given_steps_beyond_the_limit_are_refused() -> None:
+    limit = springs(unworn()).stable_cycles(unworn())
+    with pytest.raises(StabilityError, match=re.escape(f"take at most {limit:.4g}")):
+        Explicit(cycles=1.01 * limit).step(unworn(), 1.0, 1.0, springs)
+    step = Explicit(cycles=limit).step(unworn(), 10.0 * limit, 10.0 * limit, springs)
+    assert step.cycles == limit
+
+
+@pytest.mark.parametrize("stepper", [Explicit(0.2), Heun(0.05)])
+def test_an_energy_threshold_is_passed_without_an_error(stepper) -> None:
+    """V = α (ΣEd - Ed_th), exactly; before, any step is stable."""
+    threshold = 0.02
+    laws = tuple(EvolvingLaw(own, EnergyTable(threshold=threshold), "global") for own in LAWS)
+
+    def contact_at(state: NodalState) -> NodalContact:
+        return springs(state, laws)
+
+    assert contact_at(unworn()).stable_cycles(unworn()) == np.inf
+    cycles = 2.0 * float(SCALES.max())
+    state = advance_cycles(stepper, unworn(), cycles, cycles, contact_at).state
+    assert state.energy > 1.5 * threshold
+    volume = float(state.surfaces.depth @ AREAS)
+    assert volume == pytest.approx(5e-8 * (state.energy - threshold), rel=1e-10)
+
+
+def test_stretches_ask_before_each_of_them() -> None:
+    """Steps within a stretch go on as if it were the whole, and count."""
+    asked = []
+
+    def longest(state: NodalState, most: float) -> float:
+        asked.append(most)
+        return min(most, 2.5 * length)
+
+    length = 0.5 * springs(unworn()).stable_cycles(unworn())
+    done = advance_cycles(
+        Stretches(Explicit(0.5), longest), unworn(), 6.0 * length, 6.0 * length, springs
+    )
+    np.testing.assert_allclose(asked, [6.0 * length, 3.5 * length, length])
+    assert done.spent.steps == 3 + 3 + 1
+
+
+@pytest.mark.parametrize("stepper", [Explicit(0.5), Heun(0.1)])
+def test_volume_is_coefficient_times_energy(stepper) -> None:
+    cycles = float(SCALES.max())
+    state = advance_cycles(stepper, unworn(), cycles, cycles, springs).state
+    volumes = [float(depth @ AREAS) for depth in state.surfaces.depths]
+    np.testing.assert_allclose(volumes, np.multiply((4e-8, 1e-8), state.energy), rtol=1e-12)

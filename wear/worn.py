@@ -1,0 +1,79 @@
+"""What wears, whatever it is: its surfaces between two steps, a step, and what that takes."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Generic, TypeVar
+
+import numpy as np
+
+from sa_solver.types import Array
+from wear.surfaces import Surfaces
+
+
+@dataclass(frozen=True)
+class Spent:
+    """Contact problems of an increment solved, convolutions they took, and wear steps."""
+
+    contact_solves: int = 0
+    convolutions: int = 0
+    steps: int = 0
+
+    def __add__(self, other: Spent) -> Spent:
+        return Spent(
+            self.contact_solves + other.contact_solves,
+            self.convolutions + other.convolutions,
+            self.steps + other.steps,
+        )
+
+    def __sub__(self, other: Spent) -> Spent:
+        return Spent(
+            self.contact_solves - other.contact_solves,
+            self.convolutions - other.convolutions,
+            self.steps - other.steps,
+        )
+
+
+@dataclass(frozen=True)
+class WornState:
+    """What wear must remember between two steps.
+
+    ``energy`` is what the contact has dissipated so far [N mm]; ``depth_rate`` the largest depth
+    [mm] and ``volume_rate`` the volume of both bodies [mm³] worn per cycle of the last step;
+    ``error`` the estimated error of the depth of both bodies [mm], by cell or node, and
+    ``volume_error`` a bound of that of their volume [mm³]; ``next_cycles`` how far a step that
+    chooses its own length would go next.
+    """
+
+    surfaces: Surfaces
+    energy: float
+    depth_rate: float
+    volume_rate: float
+    error: Array
+    volume_error: float
+    next_cycles: float
+
+    @staticmethod
+    def of(gap: Array) -> WornState:
+        """Before the first cycle, at the ``gap`` of the unloaded bodies, by cell or node [mm]."""
+        return WornState(Surfaces.unworn(gap), 0.0, 0.0, 0.0, np.zeros_like(gap), 0.0, np.inf)
+
+
+State = TypeVar("State", bound=WornState)
+
+
+@dataclass(frozen=True)
+class WearStep(Generic[State]):
+    """A step: the ``state`` after it, its ``cycles``, and what it took.
+
+    ``midway`` is the depth of both bodies in the middle of a step of second order, and ``drift``
+    what its slips and friction, changing on the way, have added to it [mm], by cell. ``error`` is
+    what a step whose length is judged by itself may have got wrong, over what it wears.
+    """
+
+    state: State
+    cycles: float
+    spent: Spent
+    midway: Array | None = None
+    drift: Array | None = None
+    error: float = 0.0

@@ -1,0 +1,119 @@
+"""Wear of two reduced specimens in cycle blocks, in which their shape stays the same."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from fe_models.reduced_contact import FrettingConditions, FrettingCycle, ReducedPair
+from sa_solver.types import Array
+from wear.laws import WearLaw
+from wear.nodes import NodalContact, NodalState
+from wear.steppers import Explicit, steps
+
+
+@dataclass(frozen=True)
+class BlockState:
+    """A worn pair after so many ``cycles``, at the start of a cycle block.
+
+    ``state`` are its surfaces and energy, ``contact`` the cycle on them, ``wear`` ``(2, n)`` what
+    that takes off each body [mm] and ``stable_cycles`` the longest stable block.
+    """
+
+    cycles: float
+    state: NodalState
+    contact: FrettingCycle
+    wear: Array
+    stable_cycles: float
+
+    @property
+    def gap(self) -> Array:
+        """Of the unloaded faces ``(n,)`` [mm]."""
+        return self.state.surfaces.gap
+
+    @property
+    def depths(self) -> Array:
+        """Worn off each body ``(2, n)`` [mm]."""
+        return np.stack(self.state.surfaces.depths)
+
+    @property
+    def energy(self) -> float:
+        """Dissipated since the start [N mm]."""
+        return self.state.energy
+
+
+class PairCycle:
+    """A fretting cycle of a pair, as the wear of nodes takes it: see :mod:`wear.nodes`.
+
+    By Masing's rule each node slides its whole way at one pressure.
+    """
+
+    def __init__(self, pair: ReducedPair, contact: FrettingCycle, friction: float) -> None:
+        self._pair, self.contact, self.friction = pair, contact, friction
+        self.slip, self.pressure = contact.cycle_slip[None], contact.normal.pressure[None]
+        self.areas, self.start = pair.areas, contact.normal.touching
+        self._last: tuple[Array, float] | None = None
+
+    def stable_cycles(self, depth_per_pressure: Array) -> float:
+        if self._last is None or not np.array_equal(self._last[0], depth_per_pressure):
+            limit = self._pair.stable_cycles(self.contact.normal, depth_per_pressure / self.areas)
+            self._last = depth_per_pressure, limit
+        return self._last[1]
+
+
+class FrettedPair:
+    """A pair under one cycle of loads, on whatever shape it has worn to."""
+
+    def __init__(
+        self, pair: ReducedPair, laws: tuple[WearLaw, WearLaw], conditions: FrettingConditions
+    ) -> None:
+        self._pair, self._laws, self._conditions = pair, laws, conditions
+        self._last: tuple[NodalState, PairCycle] | None = None
+
+    def cycle_at(self, state: NodalState) -> PairCycle:
+        """The cycle on the surfaces of ``state``, begun from the contact that wore to it."""
+        if self._last is None or self._last[0].surfaces is not state.surfaces:
+            own = self._conditions
+            guess = None if state.start is None else np.asarray(state.start)
+            contact = self._pair.fretting_cycle(state.surfaces.gap, own, guess)
+            self._last = state, PairCycle(self._pair, contact, own.friction)
+        return self._last[1]
+
+    def contact_at(self, state: NodalState) -> NodalContact:
+        """The same as steps take it."""
+        return NodalContact(self._laws, (self.cycle_at(state),))
+
+    def block(self, state: NodalState, cycles: float) -> BlockState:
+        """What is kept of a state after so many cycles."""
+        contact = self.contact_at(state)
+        return BlockState(
+            cycles,
+            state,
+            self.cycle_at(state).contact,
+            np.stack(contact.wear(state)),
+            contact.stable_cycles(state),
+        )
+
+
+def wear_in_cycle_blocks(
+    fretted: FrettedPair,
+    gap: Array,
+    stepper: Explicit,
+    to_go: Callable[[BlockState], float],
+) -> Iterator[BlockState]:
+    """States of a contact of unworn ``gap`` ``(n,)`` that frets until nothing is ``to_go``.
+
+    That gives the most cycles that the block after a state may have. Raises
+    :class:`~wear.steppers.StabilityError` where a block of a given length would be unstable.
+    """
+    block = fretted.block(NodalState.unworn(gap), 0.0)
+    yield block
+
+    def most(state: NodalState, done: float) -> float:
+        return to_go(block)
+
+    for step in steps(stepper, block.state, most, np.inf, fretted.contact_at):
+        block = fretted.block(step.state, block.cycles + step.cycles)
+        yield block
