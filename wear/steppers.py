@@ -348,8 +348,7 @@ def _estimated(
         after = replace(
             step.state,
             error=carried + added,
-            volume_error=state.volume_error
-            + abs(float(raw.sum())) * attempts.contact.grid.cell_area,
+            volume_error=state.volume_error + abs(float(raw.sum())) * area,
             next_cycles=proposed,
         )
         return _Trial(replace(step, state=after), fits, min(proposed, 0.5 * cycles), shortest)
