@@ -50,8 +50,10 @@ RENAMED: tuple[tuple[str, str], ...] = ()
 
 # Relative to the largest value of a field: sums in another order differ by some 1e-12.
 ROUNDING = 1e-9
-# Fields that differ from run to run, or with what the cache already holds.
-UNCOMPARED = re.compile(r"seconds|versions|from_cache|> case@")
+# Fields that differ from run to run, or with what the cache already holds; a chart chooses by time.
+UNCOMPARED = re.compile(
+    r"seconds|versions|from_cache|> case@|chart/summary.json > .*(chosen|together|sentences)"
+)
 # How well an equation holds, a share: compared with 1, not with its own noise.
 RESIDUALS = re.compile(r"residual|closure|equilibrium_error")
 # Files of which only the name is compared.
@@ -102,8 +104,7 @@ class Recorder:
         for kind in ("mesh", "resultants"):
             self.fretscale("new", kind, str(self.inputs / f"{kind}.yaml"))
         for name, text in LIST["inputs"].items():
-            placed = text.replace("{cases}", str(self.checkout / "cases"))
-            (self.inputs / name).write_text(placed, encoding="utf-8")
+            (self.inputs / name).write_text(text, encoding="utf-8")
         write_boxes(self.inputs)
         angle = np.linspace(0.0, 6.0 * np.pi, 601)
         loop = np.column_stack([7.0 * np.sin(angle), 30.0 * np.tanh(4.0 * np.cos(angle))])
