@@ -295,6 +295,8 @@ def compare_run(
     before = {renamed(key): value for key, value in before.items()}
     lines = [f"missing: {key}" for key in outermost(before.keys() - after.keys())]
     lines += [f"additional: {key}" for key in outermost(after.keys() - before.keys())]
+    if after[f"{name} > exit code"] != "0":
+        lines.append(f"failed on the later side, as its {name}/output.txt says")
     largest, told = (0.0, ""), []
     for key in before.keys() & after.keys():
         found = deviation(key, before[key], after[key])
