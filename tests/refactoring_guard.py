@@ -52,7 +52,7 @@ RENAMED: tuple[tuple[str, str], ...] = (
     (r"\bstint_limit\b", "stable_cycles"),
     (r"(loads\.\d+)\.stints\b", r"\1.cycle_blocks"),
 )
-# What the later side adds on purpose: since 838e474 the list of a run's files, and the kind of case.
+# What the later side adds on purpose: the list of the files of a run, and the kind of its case.
 ADDED = re.compile(r"manifest\.json|results\.h5 > @kind")
 
 # Relative to the largest value of a field: sums in another order differ by some 1e-12.
