@@ -19,9 +19,9 @@ from wear.steppers import Explicit, Heun, advance_cycles
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase
 from workflow.analyses.vibration_wear.pads import WearingPads
-from workflow.analyses.vibration_wear.run import run_vibration_wear
 from workflow.case.writing import dump_case
 from workflow.kinds import parse_case
+from workflow.runs.run import run_case
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
 
@@ -249,10 +249,7 @@ def test_half_the_limit_presses_roughness_away(pads, flat, seed):
 def ended(tmp_path_factory):
     folder = tmp_path_factory.mktemp("worn_rig")
     case, out = case_in(folder), OutputFolder(folder / "out")
-    out.claim(case, force=False, resumable=False)
-    reporter = Reporter(out.log)
-    run_vibration_wear(case, out, reporter)
-    reporter.close()
+    run_case(case, out.root, force=False)
     return out
 
 

@@ -1,4 +1,4 @@
-"""Joints in time: at a prescribed stroke, or in a rig that is shaken, hit or driven."""
+"""Joints in time: at a prescribed stroke, or in a rig that is excited, hit or driven."""
 
 from workflow.analyses.time.case import JointCase, RigCase
 from workflow.analyses.time.memory import memory

@@ -149,7 +149,7 @@ class JointCase(TimeCase):
 
 
 class RigCase(TimeCase):
-    """A rig with a joint that is shaken, hit, or driven by a recorded force."""
+    """A rig with a joint: excited by a harmonic force, hit, or driven by a recorded force."""
 
     title: Title = entry("one line", "Friction rig driven by a force")
     structure: Annotated[Rig | ReducedBody, Field(discriminator="kind")] = entry(

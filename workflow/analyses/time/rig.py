@@ -1,4 +1,4 @@
-"""A rig with a joint: shaken until it is steady, driven by a recorded force, or hit."""
+"""A rig with a joint: in steady vibration, driven by a recorded force, or hit."""
 
 from __future__ import annotations
 

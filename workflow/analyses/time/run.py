@@ -1,4 +1,4 @@
-"""A case in time: a joint at a prescribed stroke, or in a rig that is shaken, hit or driven."""
+"""A case in time: a joint at a prescribed stroke, or in a rig that is excited, hit or driven."""
 
 from __future__ import annotations
 

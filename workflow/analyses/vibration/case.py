@@ -144,7 +144,7 @@ class LoopsAt(Section):
         return self
 
 
-class VibrationScene(Case):
+class VibrationCaseBase(Case):
     """A structure under forces a sin(2π frequency t), for all frequencies of a span."""
 
     title: Title = entry("one line", "Forced response of a friction rig")
@@ -160,7 +160,7 @@ class VibrationScene(Case):
     continuation: Continuation = entry("of each curve", default=Continuation())
 
     @model_validator(mode="after")
-    def _ascending(self) -> VibrationScene:
+    def _ascending(self) -> VibrationCaseBase:
         if any(after <= before for before, after in pairwise(self.forces)):
             raise disagreement("not ascending; allowed: each force above the last", "forces")
         if self.frequencies[0] >= self.frequencies[1]:
@@ -208,7 +208,7 @@ def wears(source: Source) -> bool:
     return any(source.at((section,)) is not None for section in ("wear", "contact"))
 
 
-class DrivenMass(VibrationScene):
+class DrivenMass(VibrationCaseBase):
     """The same of a structure that may be a row of masses, of which any is driven."""
 
     mass: MassNumber | None = entry(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from workflow.analyses.vibration.case import VibrationScene
+from workflow.analyses.vibration.case import VibrationCaseBase
 from workflow.shell.memory import Memory
 
 # Points of a forced response, of each of which the samples of the joints' forces and the motion are
@@ -10,7 +10,7 @@ from workflow.shell.memory import Memory
 CURVE_POINTS, SLOPES = 2000, 20
 
 
-def memory(case: VibrationScene, displacements: int = 0, joints: int = 1) -> Memory:
+def memory(case: VibrationCaseBase, displacements: int = 0, joints: int = 1) -> Memory:
     """Of all motions under a force, and of what is held while one is found.
 
     The structure has so many ``displacements`` and ``joints``, once they are known.

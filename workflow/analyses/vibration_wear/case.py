@@ -17,7 +17,7 @@ from workflow.analyses.rig.joint_sections import (
 )
 from workflow.analyses.rig.structure import FrictionRig, Rig
 from workflow.analyses.specimens.case import Pressing
-from workflow.analyses.vibration.case import DrivenMass, VibrationCase, VibrationScene, wears
+from workflow.analyses.vibration.case import DrivenMass, VibrationCase, VibrationCaseBase, wears
 from workflow.analyses.wear.case.sections import Cycles
 from workflow.case.fields import File, Quantity
 from workflow.case.sections import OutputWithoutFields, Section, Title, disagreement, entry
@@ -78,7 +78,7 @@ class PadContacts(Joint):
     normal_stiffness: JointStiffness = entry("in contact [N/mm]", "58.5 N/um")
 
 
-class VibrationWearScene(VibrationScene):
+class VibrationWearCaseBase(VibrationCaseBase):
     """A rig on a contact that it wears, and its response to forces a sin(2π frequency t)."""
 
     title: Title = entry("one line", "Forced response of a friction rig as it wears")
@@ -103,12 +103,12 @@ class VibrationWearScene(VibrationScene):
 
     def _of_a_state(self, joint: Joint, mass: int | None = None) -> VibrationCase:
         """The vibration case with this joint, driven at the mass of this number."""
-        shared = [name for name in VibrationScene.model_fields if name not in NOT_OF_A_STATE]
+        shared = [name for name in VibrationCaseBase.model_fields if name not in NOT_OF_A_STATE]
         entries = {name: getattr(self, name) for name in shared}
         return VibrationCase(joint=joint, mass=mass, **entries)
 
 
-class VibrationWearCase(VibrationWearScene, DrivenMass):
+class VibrationWearCase(VibrationWearCaseBase, DrivenMass):
     """A row of masses on a half-space contact that it wears."""
 
     structure: Rig = entry("what holds the contact")
@@ -125,7 +125,7 @@ class VibrationWearCase(VibrationWearScene, DrivenMass):
         return [*super().outline(), ("contact", f"that of {Path(self.contact.file).name}")]
 
 
-class FrictionRigWearCase(VibrationWearScene):
+class FrictionRigWearCase(VibrationWearCaseBase):
     """Two specimens in a rig that wear each other, node by node."""
 
     structure: FrictionRig = entry("two specimens in a rig; their case says how they wear")

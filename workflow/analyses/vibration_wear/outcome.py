@@ -10,7 +10,7 @@ import numpy as np
 
 from sa_solver.types import Array, Grid
 from workflow.analyses.vibration.outcome import Response
-from workflow.analyses.vibration_wear.case import VibrationWearScene
+from workflow.analyses.vibration_wear.case import VibrationWearCaseBase
 from workflow.shell.dataset import Dataset, Datasets
 
 # Groups of a state, and the one that holds the states.
@@ -41,7 +41,7 @@ class VibrationWearOutcome:
     The contact is on a ``grid``, or at nodes with ``places``.
     """
 
-    case: VibrationWearScene
+    case: VibrationWearCaseBase
     states: tuple[WornState, ...]
     grid: Grid | None = None
     places: Datasets | None = None

@@ -30,7 +30,7 @@ def check_interface_name(name: str, key: str) -> None:
 
 
 class WearCase(Case):
-    """One scene: where its loads come from, its contacts and how they wear.
+    """One case: where its loads come from, its contacts and how they wear.
 
     Each kind of structure narrows ``structure``, ``materials`` and ``wear`` to its own.
     """
