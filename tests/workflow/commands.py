@@ -1,10 +1,22 @@
-"""The command line in the process of the test."""
+"""The command line in the process of the test, and the jobs and workers that it would start."""
 
-from collections.abc import Sequence
+import pickle
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
 
+import pytest
 from click.testing import CliRunner, Result
 
+from workflow.analyses.wear import contact_workers
 from workflow.cli import cli
+from workflow.errors import Ending, one_line
+from workflow.pictures import drawing
+from workflow.runs import jobs
+from workflow.runs.job import Job
+from workflow.runs.run import bring_to_end
 
 
 def invoke(*arguments: object) -> Result:
@@ -17,3 +29,65 @@ def invoke(*arguments: object) -> Result:
 def command(name: str, *arguments: object, overrides: Sequence[str] = ()) -> Result:
     """``fretscale name`` with overrides (``"wear.cycles=1e4"``)."""
     return invoke(name, *arguments, *(part for entry in overrides for part in ("--set", entry)))
+
+
+# --- in the place of other processes, whose start takes longer than what they do ------------------
+
+
+def sent(message: Any) -> Any:
+    """What arrives at the other end of a pipe: a copy, its arrays in C order."""
+    return pickle.loads(pickle.dumps(message))
+
+
+class InThisProcess:
+    """Stands for the workers of a run: they answer one after the other, here."""
+
+    def __init__(self, answering: list[Callable[..., Any]]) -> None:
+        self._answering = answering
+
+    def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
+        shares = sent(list(zip(*arguments, strict=True)))
+        return [
+            sent(own(method, *share)) for own, share in zip(self._answering, shares, strict=True)
+        ]
+
+
+@contextmanager
+def _workers(
+    make: Callable[[Any], Callable[..., Any]], settings: Sequence[Any]
+) -> Iterator[InThisProcess]:
+    yield InThisProcess([make(sent(own)) for own in settings])
+
+
+def _one_by_one(jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]]) -> None:
+    for do, arguments in jobs:
+        do(*arguments)
+
+
+@contextmanager
+def runs_here() -> Iterator[None]:
+    """Contacts and pictures of a run are made in this process."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(contact_workers, "workers", _workers)
+        patch.setattr(drawing, "side_by_side", _one_by_one)
+        yield
+
+
+_ALONE = threading.Lock()
+
+
+def _run_job(job: Job, out: Path, unwanted: Callable[[], bool], one_thread: bool = True) -> str:
+    try:
+        with _ALONE:
+            bring_to_end(job.load(), out / job.name)
+    except Ending as error:
+        return one_line(error)
+    return ""
+
+
+@contextmanager
+def jobs_here() -> Iterator[None]:
+    """The runs of sweeps and of other jobs are made in this process, one after the other."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(jobs, "run_job", _run_job)
+        yield

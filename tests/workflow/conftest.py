@@ -1,9 +1,7 @@
 """Shared by the tests of ``workflow``: synthetic results, and runs of the small case."""
 
 import json
-import pickle
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +13,7 @@ from click.testing import Result
 
 from fe_models.gmsh_session import gmsh_model
 from sa_solver.types import Array, Frame, Grid
-from tests.workflow.commands import invoke
+from tests.workflow.commands import invoke, runs_here
 from workflow.analyses.wear import contact_workers
 from workflow.pictures import drawing
 from workflow.shell import processes
@@ -265,46 +263,13 @@ def cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
         yield
 
 
-def sent(message: Any) -> Any:
-    """What arrives at the other end of a pipe: a copy, its arrays in C order."""
-    return pickle.loads(pickle.dumps(message))
-
-
-class InThisProcess:
-    """Stands for the workers of a run: they answer one after the other, here."""
-
-    def __init__(self, answering: list[Callable[..., Any]]) -> None:
-        self._answering = answering
-
-    def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
-        shares = sent(list(zip(*arguments, strict=True)))
-        return [
-            sent(own(method, *share)) for own, share in zip(self._answering, shares, strict=True)
-        ]
-
-
-@contextmanager
-def workers_here(
-    make: Callable[[Any], Callable[..., Any]], settings: Sequence[Any]
-) -> Iterator[InThisProcess]:
-    yield InThisProcess([make(sent(own)) for own in settings])
-
-
-def one_by_one(jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]]) -> None:
-    """Stands for jobs side by side."""
-    for do, arguments in jobs:
-        do(*arguments)
-
-
 @pytest.fixture(scope="session", autouse=True)
 def _all_here() -> Iterator[None]:
     """Contacts and pictures of a run are made by the test: to start processes takes longer.
 
     In processes of their own contacts find the same but for rounding (test_run.py).
     """
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(contact_workers, "workers", workers_here)
-        patch.setattr(drawing, "side_by_side", one_by_one)
+    with runs_here():
         yield
 
 

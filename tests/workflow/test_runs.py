@@ -13,6 +13,7 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.workflow.commands import jobs_here
 from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
 from workflow.analyses.contact.case import ContactCase
 from workflow.errors import UserError
@@ -45,6 +46,13 @@ def wear(tmp_path):
     path = tmp_path / "wear.yaml"
     path.write_text(ROLLER_WEAR, encoding="utf-8")
     return path
+
+
+@pytest.fixture
+def here():
+    """Jobs are run by the test."""
+    with jobs_here():
+        yield
 
 
 def without_times(summary):
@@ -80,7 +88,7 @@ def test_failures_are_values_and_stop_nobody(contact, tmp_path):
     assert good.summary["states"][-1]["peak_pressure"] == pytest.approx(1450.3, rel=0.03)
 
 
-def test_a_finished_run_stays_and_another_case_takes_its_place(contact, tmp_path):
+def test_a_finished_run_stays_and_another_case_takes_its_place(contact, here, tmp_path):
     out = tmp_path / "out"
     (first,) = run_jobs([Job("one", contact)], out)
     written = (out / "one/summary.json").stat().st_mtime_ns
@@ -93,14 +101,14 @@ def test_a_finished_run_stays_and_another_case_takes_its_place(contact, tmp_path
     assert changed.summary["states"][-1]["P"] == pytest.approx(500.0, rel=1e-6)
 
 
-def test_case_in_the_words_of_another_version_is_the_same(contact, tmp_path):
+def test_case_in_the_words_of_another_version_is_the_same(contact, here, tmp_path):
     (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
     case = done.folder / "case.yaml"
     case.write_text(case.read_text("utf-8").replace("#", "# formerly:"), encoding="utf-8")
     assert kept_in(done.folder, load_case(contact)) == "finished"
 
 
-def test_what_is_no_run_is_left_alone(contact, tmp_path):
+def test_what_is_no_run_is_left_alone(contact, here, tmp_path):
     figures = tmp_path / "out/mine/figures"
     figures.mkdir(parents=True)
     (done,) = run_jobs([Job("mine", contact)], tmp_path / "out")
@@ -259,7 +267,7 @@ def test_whoever_is_killed_leaves_a_run_to_take_up(wear, tmp_path):
     assert without_times(taken_up.summary)["kinetics"] == untouched.summary["kinetics"]
 
 
-def test_a_damaged_state_is_started_again(wear, tmp_path):
+def test_a_damaged_state_is_started_again(wear, here, tmp_path):
     job = Job("one", wear)
     (done,) = run_jobs([job], tmp_path / "out")
     folder = OutputFolder(done.folder)
@@ -270,7 +278,7 @@ def test_a_damaged_state_is_started_again(wear, tmp_path):
     assert without_times(again.summary) == without_times(done.summary)
 
 
-def test_a_chosen_case_is_known_by_the_case_that_was_asked_for(wear, tmp_path):
+def test_a_chosen_case_is_known_by_the_case_that_was_asked_for(wear, here, tmp_path):
     """What fidelity chose is in the folder's case; its record says so."""
     job = Job("one", wear)
     (done,) = run_jobs([job], tmp_path / "out")
@@ -294,6 +302,7 @@ def test_no_scheduler_is_one_line(contact, tmp_path, monkeypatch):
         run_jobs([Job("one", contact)], tmp_path / "out", dask="tcp://127.0.0.1:9")
 
 
+@pytest.mark.slow
 def test_a_cluster_finds_what_local_processes_find(contact, tmp_path):
     distributed = pytest.importorskip("distributed")
     jobs = [Job("good", contact), Job("slides", contact, ("load_path.legs.0.P=100 N",))]

@@ -12,10 +12,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
 
+from tests.workflow.commands import invoke, jobs_here
 from tests.workflow.scenes import BALL
-from workflow.cli import cli
 from workflow.errors import CaseError
 from workflow.runs.job import Finished
 from workflow.sweep.design import Run, runs_of
@@ -24,6 +23,13 @@ from workflow.sweep.table import Row, columns_of, unit_of, varied_in
 
 CASES = Path(__file__).parents[2] / "cases"
 PATIENCE = 120.0
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _jobs_here():
+    """A process for each run would take longer than the run (test_runs.py has them)."""
+    with jobs_here():
+        yield
 
 
 def write(folder, text):
@@ -38,9 +44,7 @@ def runs(folder, text):
 
 
 def sweep(path, out, *options):
-    result = CliRunner().invoke(cli, ["sweep", str(path), "--out", str(out), *options])
-    assert result.exception is None or isinstance(result.exception, SystemExit), result.exception
-    return result
+    return invoke("sweep", path, "--out", out, *options)
 
 
 def table(out):
@@ -285,6 +289,7 @@ def test_runs_of_another_case_need_force(tmp_path):
     assert float(table(tmp_path / "out")[0]["states.-1.peak_pressure"]) < pressure
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 def test_ctrl_c_keeps_what_is_done(tmp_path):
     """One line, exit code 130, a table of what has ended; the same command does the rest."""
