@@ -10,16 +10,16 @@ import pytest
 import yaml
 
 from fe_models.dynamics.rig import natural_frequencies
-from tests.workflow.conftest import invoke
+from tests.workflow.conftest import invoke, manifest_has_all
 from tests.workflow.test_friction_rig import NODES, RIG, SPECIMENS
 from tests.workflow.test_time_cases import refused
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase
 from workflow.analyses.vibration_wear.pad_wear_steps import PadState, heun, taken, worn_until
 from workflow.analyses.vibration_wear.pads import WearingPads
-from workflow.analyses.vibration_wear.run import run_vibration_wear
 from workflow.case.writing import dump_case
 from workflow.kinds import parse_case
+from workflow.runs.run import run_case
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
 
@@ -182,12 +182,9 @@ def test_the_longest_step_presses_roughness_away(pads, flat, seed):
 @pytest.fixture(scope="module")
 def ended(tmp_path_factory):
     folder = tmp_path_factory.mktemp("worn_rig")
-    case, out = case_in(folder), OutputFolder(folder / "out")
-    out.claim(case, force=False, resumable=False)
-    reporter = Reporter(out.log)
-    run_vibration_wear(case, out, reporter)
-    reporter.close()
-    return out
+    run_case(case_in(folder), folder / "out", force=False)
+    assert manifest_has_all(folder / "out")
+    return OutputFolder(folder / "out")
 
 
 @pytest.fixture(scope="module")
