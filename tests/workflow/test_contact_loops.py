@@ -156,18 +156,29 @@ def test_force_beyond_friction_ends_the_run_in_one_line():
 # --- kept and written ---------------------------------------------------------------------------
 
 
-@pytest.fixture
-def written(sphere, tmp_path):
+def with_loops(root, loop, line=False):
     """Results with loops of jumps 0 and 2, as after ``every: end``."""
-    folder = OutputFolder(tmp_path)
+    folder = OutputFolder(root)
     folder.jumps.mkdir()
     for jump in range(3):
-        arrays = kept_loops(["sphere"], [sphere]) if jump != 1 else {"other": np.zeros(1)}
+        arrays = kept_loops(["sphere"], [loop]) if jump != 1 else {"other": np.zeros(1)}
         write_arrays(folder.jump(jump), arrays, {"cycles": 100.0 * jump})
-    with writing(folder.results) as writer:
+    with writing(folder.results, line) as writer:
         write_loops(writer, folder, 2)
         writer.put_grid("grid/sphere", Grid((32, 32), (0.1, 0.1)))
     return folder
+
+
+@pytest.fixture
+def written(sphere, tmp_path):
+    return with_loops(tmp_path, sphere)
+
+
+@pytest.mark.parametrize(("line", "unit"), [(False, "N"), (True, "N/mm")])
+def test_forces_of_line_contacts_are_per_length(sphere, tmp_path, line, unit):
+    with h5py.File(with_loops(tmp_path, sphere, line).results) as file:
+        assert file["loops/sphere/00000/force"].attrs["unit"] == unit
+        assert file["loops/sphere/00000/displacement"].attrs["unit"] == "mm"
 
 
 def test_results_have_the_loops_of_their_jumps(written, sphere):

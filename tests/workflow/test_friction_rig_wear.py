@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from fe_models.dynamics.rig import natural_frequencies
-from tests.workflow.conftest import invoke
+from tests.workflow.conftest import invoke, manifest_has_all
 from tests.workflow.test_friction_rig import NODES, RIG, SPECIMENS
 from tests.workflow.test_time_cases import refused
 from wear.evolution import EnergyTable
@@ -248,9 +248,9 @@ def test_half_the_limit_presses_roughness_away(pads, flat, seed):
 @pytest.fixture(scope="module")
 def ended(tmp_path_factory):
     folder = tmp_path_factory.mktemp("worn_rig")
-    case, out = case_in(folder), OutputFolder(folder / "out")
-    run_case(case, out.root, force=False)
-    return out
+    run_case(case_in(folder), folder / "out", force=False)
+    assert manifest_has_all(folder / "out")
+    return OutputFolder(folder / "out")
 
 
 @pytest.fixture(scope="module")
