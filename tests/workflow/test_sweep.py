@@ -347,6 +347,9 @@ def test_columns_of_wear_runs_are_of_both_bodies_and_have_units():
     assert found["work.contact_solves"][0] == 7
     assert unit_of("flank.volume", rows) == "mm^3"
     assert unit_of("flank.volume", [worn(0.1, line=True)]) == "mm^3/mm"
+    run = Run("pressed", {})
+    pressed = Finished(run, Path("pressed"), {"loop": {"energy": 1.0}})
+    assert unit_of("loop.energy", [Row(run, pressed)]) == ""
     assert unit_of("flank.energy", [*rows, worn(0.1, line=True)]) == "N mm or N mm/mm"
 
 

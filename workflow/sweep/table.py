@@ -151,9 +151,12 @@ def columns_of(rows: Sequence[Row]) -> dict[str, Array]:
 
 
 def unit_of(name: str, rows: Sequence[Row]) -> str:
-    """Unit of a column of a wear run; "" where it goes without saying."""
+    """Unit of a column of a wear run; "" where it goes without saying, and of any other run."""
     unit = WEAR_UNITS.get(name.partition(".")[2], "")
-    per_length = {bool(s["per_length"]) for row in rows if (s := row.finished.summary) and unit}
+    if not unit:
+        return ""
+    summaries = [row.finished.summary for row in rows if row.finished.summary]
+    per_length = {bool(summary["per_length"]) for summary in summaries if "per_length" in summary}
     return " or ".join(dict.fromkeys(unit_in(line, unit) for line in sorted(per_length)))
 
 
