@@ -30,41 +30,61 @@ it sticks, then slips where friction carries no more than 4 N.
 
 from typing import TYPE_CHECKING
 
-from fe_models.lazy import lazy_names
+from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from fe_models.constraints import Constraints as Constraints
-    from fe_models.elasticity import ElasticBody as ElasticBody
-    from fe_models.friction import FrictionalJoint as FrictionalJoint
-    from fe_models.joint import JointStiffness as JointStiffness
-    from fe_models.linear_solver import SolverError as SolverError
-    from fe_models.mesh import Body as Body
-    from fe_models.mesh import Interface as Interface
-    from fe_models.mesh import MeshError as MeshError
-    from fe_models.mesh import StructureMesh as StructureMesh
-    from fe_models.reduced_contact import FrettingConditions as FrettingConditions
-    from fe_models.reduced_contact import ReducedPair as ReducedPair
-    from fe_models.reduction import ReducedModel as ReducedModel
-    from fe_models.reduction import reduce_body as reduce_body
-    from fe_models.structure import Structure as Structure
-    from fe_models.supported_body import SupportedBody as SupportedBody
+    from fe_models.constraints import Constraints
+    from fe_models.elasticity import ElasticBody
+    from fe_models.friction import FrictionalJoint
+    from fe_models.joint import JointStiffness
+    from fe_models.linear_solver import SolverError
+    from fe_models.mesh import Body, Interface, MeshError, StructureMesh
+    from fe_models.reduced_contact import FrettingConditions, ReducedPair
+    from fe_models.reduction import ReducedModel, reduce_body
+    from fe_models.structure import Structure
+    from fe_models.supported_body import SupportedBody
 
-_MODULES = {
-    "Body": "mesh",
-    "Constraints": "constraints",
-    "ElasticBody": "elasticity",
-    "FrettingConditions": "reduced_contact",
-    "FrictionalJoint": "friction",
-    "Interface": "mesh",
-    "JointStiffness": "joint",
-    "MeshError": "mesh",
-    "ReducedModel": "reduction",
-    "ReducedPair": "reduced_contact",
-    "SolverError": "linear_solver",
-    "Structure": "structure",
-    "StructureMesh": "mesh",
-    "SupportedBody": "supported_body",
-    "reduce_body": "reduction",
-}
-__all__ = [*_MODULES]
-__getattr__ = lazy_names(__name__, _MODULES)
+__all__ = [
+    "Body",
+    "Constraints",
+    "ElasticBody",
+    "FrettingConditions",
+    "FrictionalJoint",
+    "Interface",
+    "JointStiffness",
+    "MeshError",
+    "ReducedModel",
+    "ReducedPair",
+    "SolverError",
+    "Structure",
+    "StructureMesh",
+    "SupportedBody",
+    "reduce_body",
+]
+
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "constraints": ("Constraints",),
+        "elasticity": ("ElasticBody",),
+        "friction": ("FrictionalJoint",),
+        "joint": ("JointStiffness",),
+        "linear_solver": ("SolverError",),
+        "mesh": (
+            "Body",
+            "Interface",
+            "MeshError",
+            "StructureMesh",
+        ),
+        "reduced_contact": (
+            "FrettingConditions",
+            "ReducedPair",
+        ),
+        "reduction": (
+            "ReducedModel",
+            "reduce_body",
+        ),
+        "structure": ("Structure",),
+        "supported_body": ("SupportedBody",),
+    },
+)

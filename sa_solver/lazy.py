@@ -1,7 +1,7 @@
 """Names that a package offers, imported when they are first asked for (PEP 562).
 
-So that ``import sa_solver`` costs next to nothing, and the transforms and compilers behind its
-solvers are loaded by those who use them.
+So that importing a package of the library costs next to nothing, and the transforms, compilers,
+meshers and finite elements behind its names are loaded by those who use them.
 """
 
 from __future__ import annotations

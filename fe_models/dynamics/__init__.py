@@ -30,57 +30,94 @@ the energy of the blow goes into the damper.
 
 from typing import TYPE_CHECKING
 
-from fe_models.lazy import lazy_names
+from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from fe_models.dynamics.continuation import ContinuationControl as ContinuationControl
-    from fe_models.dynamics.excitation import CombinedForces as CombinedForces
-    from fe_models.dynamics.excitation import ConstantForce as ConstantForce
-    from fe_models.dynamics.excitation import HammerBlow as HammerBlow
-    from fe_models.dynamics.excitation import HarmonicForce as HarmonicForce
-    from fe_models.dynamics.excitation import RecordedForce as RecordedForce
-    from fe_models.dynamics.forced_response import Accuracy as Accuracy
-    from fe_models.dynamics.forced_response import along_force as along_force
-    from fe_models.dynamics.forced_response import along_frequency as along_frequency
-    from fe_models.dynamics.free_decay import ring_down as ring_down
-    from fe_models.dynamics.harmonic_balance import HarmonicBalance as HarmonicBalance
-    from fe_models.dynamics.harmonic_balance import PeriodicLoad as PeriodicLoad
-    from fe_models.dynamics.harmonics import Resolution as Resolution
-    from fe_models.dynamics.impact_hammer import frequency_response as frequency_response
-    from fe_models.dynamics.model import DynamicModel as DynamicModel
-    from fe_models.dynamics.newmark import TimeStepControl as TimeStepControl
-    from fe_models.dynamics.newmark import integrate as integrate
-    from fe_models.dynamics.phase_resonance import along_phase_resonance as along_phase_resonance
-    from fe_models.dynamics.rig import Link as Link
-    from fe_models.dynamics.rig import lumped_rig as lumped_rig
-    from fe_models.dynamics.rig import natural_frequencies as natural_frequencies
-    from fe_models.dynamics.rig import reduced_rig as reduced_rig
-    from fe_models.dynamics.rig import unit_force as unit_force
+    from fe_models.dynamics.continuation import ContinuationControl
+    from fe_models.dynamics.excitation import (
+        CombinedForces,
+        ConstantForce,
+        HammerBlow,
+        HarmonicForce,
+        RecordedForce,
+    )
+    from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
+    from fe_models.dynamics.free_decay import ring_down
+    from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+    from fe_models.dynamics.harmonics import Resolution
+    from fe_models.dynamics.impact_hammer import frequency_response
+    from fe_models.dynamics.model import DynamicModel
+    from fe_models.dynamics.newmark import TimeStepControl, integrate
+    from fe_models.dynamics.phase_resonance import along_phase_resonance
+    from fe_models.dynamics.rig import (
+        Link,
+        lumped_rig,
+        natural_frequencies,
+        reduced_rig,
+        unit_force,
+    )
 
-_MODULES = {
-    "Accuracy": "forced_response",
-    "CombinedForces": "excitation",
-    "ConstantForce": "excitation",
-    "ContinuationControl": "continuation",
-    "DynamicModel": "model",
-    "HammerBlow": "excitation",
-    "HarmonicBalance": "harmonic_balance",
-    "HarmonicForce": "excitation",
-    "Link": "rig",
-    "PeriodicLoad": "harmonic_balance",
-    "RecordedForce": "excitation",
-    "Resolution": "harmonics",
-    "TimeStepControl": "newmark",
-    "along_force": "forced_response",
-    "along_frequency": "forced_response",
-    "along_phase_resonance": "phase_resonance",
-    "frequency_response": "impact_hammer",
-    "integrate": "newmark",
-    "lumped_rig": "rig",
-    "natural_frequencies": "rig",
-    "reduced_rig": "rig",
-    "ring_down": "free_decay",
-    "unit_force": "rig",
-}
-__all__ = [*_MODULES]
-__getattr__ = lazy_names(__name__, _MODULES)
+__all__ = [
+    "Accuracy",
+    "CombinedForces",
+    "ConstantForce",
+    "ContinuationControl",
+    "DynamicModel",
+    "HammerBlow",
+    "HarmonicBalance",
+    "HarmonicForce",
+    "Link",
+    "PeriodicLoad",
+    "RecordedForce",
+    "Resolution",
+    "TimeStepControl",
+    "along_force",
+    "along_frequency",
+    "along_phase_resonance",
+    "frequency_response",
+    "integrate",
+    "lumped_rig",
+    "natural_frequencies",
+    "reduced_rig",
+    "ring_down",
+    "unit_force",
+]
+
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "continuation": ("ContinuationControl",),
+        "excitation": (
+            "CombinedForces",
+            "ConstantForce",
+            "HammerBlow",
+            "HarmonicForce",
+            "RecordedForce",
+        ),
+        "forced_response": (
+            "Accuracy",
+            "along_force",
+            "along_frequency",
+        ),
+        "free_decay": ("ring_down",),
+        "harmonic_balance": (
+            "HarmonicBalance",
+            "PeriodicLoad",
+        ),
+        "harmonics": ("Resolution",),
+        "impact_hammer": ("frequency_response",),
+        "model": ("DynamicModel",),
+        "newmark": (
+            "TimeStepControl",
+            "integrate",
+        ),
+        "phase_resonance": ("along_phase_resonance",),
+        "rig": (
+            "Link",
+            "lumped_rig",
+            "natural_frequencies",
+            "reduced_rig",
+            "unit_force",
+        ),
+    },
+)

@@ -17,21 +17,30 @@ Two crossed strips of radii 100 mm touch like spheres, half a millimetre from th
 
 from typing import TYPE_CHECKING
 
-from fe_models.lazy import lazy_names
+from sa_solver.lazy import lazy_names
 
 if TYPE_CHECKING:
-    from fe_models.geometry.dovetail import Dovetail as Dovetail
-    from fe_models.geometry.imported import ImportedMesh as ImportedMesh
-    from fe_models.geometry.imported import describe_bodies as describe_bodies
-    from fe_models.geometry.imported import read_bodies as read_bodies
-    from fe_models.geometry.specimens import Specimen as Specimen
+    from fe_models.geometry.dovetail import Dovetail
+    from fe_models.geometry.imported import ImportedMesh, describe_bodies, read_bodies
+    from fe_models.geometry.specimens import Specimen
 
-_MODULES = {
-    "Dovetail": "dovetail",
-    "ImportedMesh": "imported",
-    "Specimen": "specimens",
-    "describe_bodies": "imported",
-    "read_bodies": "imported",
-}
-__all__ = [*_MODULES]
-__getattr__ = lazy_names(__name__, _MODULES)
+__all__ = [
+    "Dovetail",
+    "ImportedMesh",
+    "Specimen",
+    "describe_bodies",
+    "read_bodies",
+]
+
+__getattr__, __dir__ = lazy_names(
+    __name__,
+    {
+        "dovetail": ("Dovetail",),
+        "imported": (
+            "ImportedMesh",
+            "describe_bodies",
+            "read_bodies",
+        ),
+        "specimens": ("Specimen",),
+    },
+)
