@@ -19,48 +19,36 @@ import h5py
 
 from workflow.case.sections import Output
 from workflow.pictures.style import STYLE, save
+from workflow.shell.analysis import Pictures
 from workflow.shell.folder import OutputFolder
 from workflow.shell.processes import side_by_side
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-FiguresOf = Callable[[h5py.File], Mapping[str, Callable[[h5py.File], "Figure"]]]
-"""The figures that there are data for in results, by name."""
 
-ParaviewOf = Callable[[h5py.File, Path], list[Path]]
-"""Writes what shows results in ParaView into a folder; the paths."""
-
-
-def write_pictures(
-    output: Output,
-    folder: OutputFolder,
-    figures_of: FiguresOf,
-    paraview_of: ParaviewOf | None = None,
-    processes: int = 0,
-) -> None:
-    """Write the pictures of a finished run that its case asks for.
-
-    In this process, or the figures in so many ``processes`` and the files for ParaView in one more.
-    """
-    results = folder.results
+def write_pictures(output: Output, folder: OutputFolder, pictures: Pictures) -> None:
+    """Write the pictures of the results in a folder that a case asks for in its ``output``."""
+    results, figures_of, paraview_of = folder.results, pictures.figures_of, pictures.paraview_of
     jobs: list[tuple[Callable[..., Any], tuple[Any, ...]]] = []
     if output.paraview and paraview_of is not None:
         files = folder.reserve("paraview", "files for ParaView")
         jobs.append((write_paraview, (paraview_of, results, files)))
     if output.figures:
-        parts = max(processes, 1)
+        parts = max(pictures.processes, 1)
         figures = folder.reserve("figures", "figures of the results")
         shares = [(figures_of, results, figures, part, parts) for part in range(parts)]
         jobs += [(write_figures, share) for share in shares]
-    if processes:
+    if pictures.processes:
         side_by_side(jobs)
         return
     for write, arguments in jobs:
         write(*arguments)
 
 
-def write_paraview(paraview_of: ParaviewOf, results: Path, folder: Path) -> list[Path]:
+def write_paraview(
+    paraview_of: Callable[[h5py.File, Path], list[Path]], results: Path, folder: Path
+) -> list[Path]:
     """Write the files that show ``results`` in ParaView; returns their paths.
 
     Every file appears under its name only when it is complete.
@@ -71,7 +59,11 @@ def write_paraview(paraview_of: ParaviewOf, results: Path, folder: Path) -> list
 
 
 def write_figures(
-    figures_of: FiguresOf, results: Path, folder: Path, first: int = 0, every: int = 1
+    figures_of: Callable[[h5py.File], Mapping[str, Callable[[h5py.File], Figure]]],
+    results: Path,
+    folder: Path,
+    first: int = 0,
+    every: int = 1,
 ) -> list[Path]:
     """Draw the figures of ``results`` (a ``results.h5``) as PNG files; returns their paths.
 

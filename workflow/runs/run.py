@@ -13,6 +13,7 @@ from workflow.case.sections import Case
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError, UserError
 from workflow.kinds import analysis_of, kind_of, load_case
+from workflow.pictures.drawing import write_pictures
 from workflow.shell.analysis import Run
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
 from workflow.shell.reporter import Reporter
@@ -101,6 +102,13 @@ def _run(case: Case, folder: OutputFolder, resume: bool, stays: Sequence[str] = 
     def compute(file: Path, root: Path) -> bool:
         return bring_to_end(load_case(file), root)
 
+    analysis = analysis_of(case)
+
+    def draw() -> None:
+        with reporter.stage("paraview and figures"):
+            if analysis.pictures is not None:
+                write_pictures(case.output, folder, analysis.pictures())
+
     reporter = Reporter(folder.reserve_log(), append=resume)
     try:
         if stays:
@@ -108,8 +116,8 @@ def _run(case: Case, folder: OutputFolder, resume: bool, stays: Sequence[str] = 
                 f"{', '.join(stays)}: in the folder before this run, and not of it; what has a "
                 f"name that the run needs gets {ASIDE} at its end"
             )
-        run = Run(kind_of(case), case, folder, reporter, resume, folder.choice, compute)
-        analysis_of(case).run(run)
+        run = Run(kind_of(case), case, folder, reporter, resume, folder.choice, compute, draw)
+        analysis.run(run)
     finally:
         reporter.close()
 

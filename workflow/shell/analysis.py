@@ -11,6 +11,9 @@ from workflow.case.sections import Case
 from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
+    import h5py
+    from matplotlib.figure import Figure
+
     from workflow.shell.folder import OutputFolder
     from workflow.shell.reporter import Reporter
 
@@ -25,7 +28,8 @@ class Run(Generic[AnyCase]):
     ``kind`` is the name of its kind of case. It goes on from where ``folder`` has got to if it is
     to ``resume``. ``choice`` is the record of the settings that were chosen for the case, None
     where they stand as written. ``compute`` runs another case file into a folder, from where an
-    earlier run there has got to; False if that was finished already.
+    earlier run there has got to; False if that was finished already. ``draw`` writes the pictures
+    of the results that the case asks for.
     """
 
     kind: str
@@ -35,6 +39,21 @@ class Run(Generic[AnyCase]):
     resume: bool
     choice: dict[str, Any] | None
     compute: Callable[[Path, Path], bool]
+    draw: Callable[[], None]
+
+
+@dataclass(frozen=True)
+class Pictures:
+    """How results are shown.
+
+    ``figures_of`` are the figures that there are data for, by name; ``paraview_of`` writes files
+    for ParaView into a folder and gives their paths, None where there are no fields. Figures are
+    drawn in so many ``processes``, and the files beside them; 0: all in the process of the run.
+    """
+
+    figures_of: Callable[[h5py.File], Mapping[str, Callable[[h5py.File], Figure]]]
+    paraview_of: Callable[[h5py.File, Path], list[Path]] | None = None
+    processes: int = 0
 
 
 def _as_written(case: Any) -> tuple[Any, None]:
@@ -85,9 +104,9 @@ class Analysis(Generic[AnyCase]):
 
     ``cases`` are its kinds of case by the names that ``fretscale new`` has for them; these say
     themselves how they are told apart, what they would run and on how many cores. ``memory`` is
-    what a run needs before anything is meshed; ``resumable``
-    tells of an unfinished run with a checkpoint whether it can go on from there; None where runs
-    leave none.
+    what a run needs before anything is meshed, ``pictures`` how its results are shown. Of an
+    unfinished run with a checkpoint ``resumable`` says whether it can go on from there; None where
+    runs leave none.
     ``choose`` gives the case with the settings that it leaves open, and a record of why.
     ``write_loads`` solves the structure of a case alone and writes the loads of its contacts into a
     folder, None where there is no structure.
@@ -97,6 +116,7 @@ class Analysis(Generic[AnyCase]):
     cases: Mapping[str, type[AnyCase]]
     run: Callable[[Run[AnyCase]], None]
     memory: Callable[[AnyCase], Memory]
+    pictures: Callable[[], Pictures] | None = None
     resumable: Callable[[OutputFolder], bool] | None = None
     choose: Callable[[AnyCase], tuple[AnyCase, dict[str, Any] | None]] = _as_written
     comparison: Comparison[AnyCase] = Comparison()

@@ -2,7 +2,7 @@
 
 from workflow.analyses.contact.case import ContactCase, LineContactCase
 from workflow.analyses.contact.memory import memory
-from workflow.shell.analysis import Analysis, Comparison, Run, Summary
+from workflow.shell.analysis import Analysis, Comparison, Pictures, Run, Summary
 
 __all__ = ["ANALYSIS"]
 
@@ -25,10 +25,19 @@ def _quantities(case: ContactCase | LineContactCase, summary: Summary) -> list[s
     return [own.quantity for own in case.expect if own.value] or list(AT_THE_END)
 
 
+def _pictures() -> Pictures:
+    # Plots take a second to load: where they are drawn.
+    from workflow.analyses.contact.figures import figures_of
+    from workflow.analyses.contact.paraview import write_contact
+
+    return Pictures(figures_of, write_contact)
+
+
 ANALYSIS: Analysis[ContactCase | LineContactCase] = Analysis(
     name="contact",
     cases={"bodies": ContactCase, "line": LineContactCase},
     run=_run,
+    pictures=_pictures,
     memory=memory,
     comparison=Comparison(quantities=_quantities, at_the_end=AT_THE_END),
 )

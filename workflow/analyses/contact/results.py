@@ -19,11 +19,8 @@ from workflow.analyses.contact.datasets import (
     sliding_column,
     traction_fields,
 )
-from workflow.analyses.contact.figures import figures_of
 from workflow.analyses.contact.load_table import FORCES, MOTIONS, LoadTable
-from workflow.analyses.contact.paraview import write_contact
 from workflow.analyses.contact.summary import loop_summary, slides, state_summaries, stick_zone
-from workflow.pictures.drawing import write_pictures
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset
 from workflow.shell.results import run_results
@@ -52,8 +49,7 @@ def write_contact_output(outcome: ContactOutcome, run: ContactRun) -> None:
     reporter = run.reporter
     with reporter.stage("results"):
         write_contact_results(outcome, run)
-    with reporter.stage("paraview and figures"):
-        write_pictures(outcome.case.output, run.folder, figures_of, write_contact)
+    run.draw()
     summary = _summary(outcome)
     finish(run, summary, _lines(summary, outcome.grid))
 

@@ -2,7 +2,7 @@
 
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
-from workflow.shell.analysis import Analysis, Run
+from workflow.shell.analysis import Analysis, Pictures, Run
 
 __all__ = ["ANALYSIS"]
 
@@ -14,9 +14,18 @@ def _run(run: Run[SpecimensCase]) -> None:
     run_specimens(run)
 
 
+def _pictures() -> Pictures:
+    # Plots take a second to load: where they are drawn.
+    from workflow.analyses.specimens.figures import figures_of
+    from workflow.analyses.specimens.paraview import write_specimens
+
+    return Pictures(figures_of, write_specimens)
+
+
 ANALYSIS = Analysis(
     name="specimens",
     cases={"specimens": SpecimensCase},
     run=_run,
+    pictures=_pictures,
     memory=memory,
 )

@@ -12,8 +12,6 @@ from fe_models.reduction import save_reduced
 from sa_solver.types import Array
 from workflow.analyses.contact.datasets import pressure_field
 from workflow.analyses.specimens.case import SpecimensCase
-from workflow.analyses.specimens.figures import figures_of
-from workflow.analyses.specimens.paraview import write_specimens
 from workflow.analyses.specimens.summary import (
     SLOPE_SHARE,
     collapse,
@@ -26,7 +24,6 @@ from workflow.analyses.specimens.summary import (
     tied_pad,
 )
 from workflow.analyses.wear.datasets import cycles_column, face_mesh, kinetics_columns
-from workflow.pictures.drawing import write_pictures
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
@@ -53,8 +50,7 @@ def write_specimens_output(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -
             with replacing(reduced / f"body_{number}.h5") as partial:
                 save_reduced(partial, model)
         _write_results(outcome, run)
-    with reporter.stage("paraview and figures"):
-        write_pictures(outcome.case.output, folder, figures_of, write_specimens)
+    run.draw()
     summary = _summary(outcome, reporter)
     finish(run, summary, _lines(summary))
 

@@ -2,7 +2,7 @@
 
 from workflow.analyses.time.case import JointCase, RigCase
 from workflow.analyses.time.memory import memory
-from workflow.shell.analysis import Analysis, Run
+from workflow.shell.analysis import Analysis, Pictures, Run
 
 __all__ = ["ANALYSIS"]
 
@@ -14,9 +14,17 @@ def _run(run: Run[JointCase | RigCase]) -> None:
     run_time(run)
 
 
+def _pictures() -> Pictures:
+    # Plots take a second to load: where they are drawn.
+    from workflow.analyses.time.figures import figures_of
+
+    return Pictures(figures_of)
+
+
 ANALYSIS = Analysis(
     name="time",
     cases={"joint": JointCase, "rig": RigCase},
     run=_run,
+    pictures=_pictures,
     memory=memory,
 )

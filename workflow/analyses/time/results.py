@@ -6,9 +6,7 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from workflow.analyses.time.case import JointCase, RigCase, joules
-from workflow.analyses.time.figures import figures_of
 from workflow.analyses.time.outcome import MOTION, State, TimeOutcome
-from workflow.pictures.drawing import write_pictures
 from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
@@ -27,8 +25,7 @@ def write_time_output(outcome: TimeOutcome, run: TimeRun) -> None:
     with reporter.stage("results"):
         _write_results(outcome, run)
         _write_tables(outcome, folder)
-    with reporter.stage("paraview and figures"):
-        write_pictures(outcome.case.output, folder, figures_of)
+    run.draw()
     summary = _summary(outcome, reporter)
     finish(run, summary, _lines(summary))
 

@@ -4,7 +4,7 @@ from itertools import product
 
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.memory import memory
-from workflow.shell.analysis import Analysis, Comparison, Run, Summary
+from workflow.shell.analysis import Analysis, Comparison, Pictures, Run, Summary
 
 __all__ = ["ANALYSIS"]
 
@@ -25,10 +25,19 @@ def _quantities(case: VibrationCase, summary: Summary) -> list[str]:
     return [f"responses.{n}.{moved}" for n, moved in product(range(count), MOTIONS)]
 
 
+def _pictures() -> Pictures:
+    # Plots take a second to load: where they are drawn.
+    from workflow.analyses.vibration.figures.response import figures_of
+    from workflow.analyses.vibration.paraview import write_vibration
+
+    return Pictures(figures_of, write_vibration)
+
+
 ANALYSIS = Analysis(
     name="vibration",
     cases={"vibration": VibrationCase},
     run=_run,
+    pictures=_pictures,
     memory=memory,
     comparison=Comparison(quantities=_quantities),
 )

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 from typing import Any
 
 from workflow.analyses.vibration.case import VibrationCase
-from workflow.analyses.vibration.figures.response import figures_of
 from workflow.analyses.vibration.outcome import (
     FORCE_SWEEPS,
     LOOPS,
@@ -16,8 +15,6 @@ from workflow.analyses.vibration.outcome import (
     Response,
     VibrationOutcome,
 )
-from workflow.analyses.vibration.paraview import write_vibration
-from workflow.pictures.drawing import write_pictures
 from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
 from workflow.shell.results import ResultsWriter, run_results
@@ -34,8 +31,7 @@ def write_vibration_output(outcome: VibrationOutcome, run: Run[VibrationCase]) -
     with reporter.stage("results"):
         _write_results(outcome, run)
         _write_tables(outcome, folder)
-    with reporter.stage("paraview and figures"):
-        write_pictures(outcome.case.output, folder, figures_of, write_vibration)
+    run.draw()
     finish(run, _summary(outcome), _lines(outcome))
 
 

@@ -2,7 +2,7 @@
 
 from workflow.analyses.vibration.memory import memory
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
-from workflow.shell.analysis import Analysis, Run
+from workflow.shell.analysis import Analysis, Pictures, Run
 
 __all__ = ["ANALYSIS"]
 
@@ -14,9 +14,17 @@ def _run(run: Run[VibrationWearCase | FrictionRigWearCase]) -> None:
     run_vibration_wear(run)
 
 
+def _pictures() -> Pictures:
+    # Plots take a second to load: where they are drawn.
+    from workflow.analyses.vibration_wear.figures import figures_of
+
+    return Pictures(figures_of)
+
+
 ANALYSIS = Analysis(
     name="vibration_wear",
     cases={"vibration_wear": VibrationWearCase, "friction_rig_wear": FrictionRigWearCase},
     run=_run,
+    pictures=_pictures,
     memory=memory,
 )

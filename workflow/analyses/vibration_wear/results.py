@@ -9,7 +9,6 @@ import numpy as np
 from workflow.analyses.vibration.outcome import trend
 from workflow.analyses.vibration.results import put_response_curves
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
-from workflow.analyses.vibration_wear.figures import figures_of
 from workflow.analyses.vibration_wear.outcome import (
     EVOLUTION,
     PLACES,
@@ -18,7 +17,6 @@ from workflow.analyses.vibration_wear.outcome import (
     VibrationWearOutcome,
     WornState,
 )
-from workflow.pictures.drawing import write_pictures
 from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
 from workflow.shell.results import run_results
@@ -39,8 +37,7 @@ def write_vibration_wear_output(outcome: VibrationWearOutcome, run: VibrationWea
     with reporter.stage("results"):
         _write_results(outcome, run)
         _write_tables(outcome, folder)
-    with reporter.stage("paraview and figures"):
-        write_pictures(outcome.case.output, folder, figures_of)
+    run.draw()
     finish(run, _summary(outcome), (f"  {_line(state)}" for state in outcome.states))
 
 

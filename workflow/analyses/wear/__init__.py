@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.measures import COMPARISON
 from workflow.analyses.wear.structures import CasesOfStructures, structure_of
-from workflow.shell.analysis import Analysis, Run
+from workflow.shell.analysis import Analysis, Pictures, Run
 from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
@@ -45,10 +45,19 @@ def _write_loads(case: WearCase, name: str, out: Path, force: bool) -> Sequence[
     return export_resultants(case, name, out, force)
 
 
+def _pictures() -> Pictures:
+    # Plots take a second to load: where they are drawn.
+    from workflow.analyses.wear.figures.wear import figures_of
+    from workflow.analyses.wear.paraview.wear import write_wear
+
+    return Pictures(figures_of, write_wear, processes=2)  # ten seconds and more on one core
+
+
 ANALYSIS = Analysis(
     name="wear",
     cases=CasesOfStructures(),
     run=_run,
+    pictures=_pictures,
     memory=_memory,
     resumable=_resumable,
     choose=_choose,

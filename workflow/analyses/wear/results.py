@@ -32,14 +32,12 @@ from workflow.analyses.wear.datasets import (
     put_face,
     surface_heights,
 )
-from workflow.analyses.wear.figures.wear import EXTRAPOLATION, figures_of
+from workflow.analyses.wear.figures.wear import EXTRAPOLATION
 from workflow.analyses.wear.load_source import LoadSource
-from workflow.analyses.wear.paraview.wear import write_wear
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.uniformity import uniformities
 from workflow.analyses.wear.worn_faces import worn_faces, write_worn_faces
 from workflow.analyses.wear.worn_structure import WornStructure, resultants_at, worn_structure
-from workflow.pictures.drawing import write_pictures
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
@@ -121,9 +119,7 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
         )
     with reporter.stage("results"):
         recorded = _write_results(outcome, structure, stresses, run)
-    with reporter.stage("paraview and figures"):
-        # They take ten seconds and more on one core.
-        write_pictures(outcome.case.output, folder, figures_of, write_wear, processes=2)
+    run.draw()
     worn_nodes = _write_worn_nodes(outcome, folder, reporter)
     loops = write_loop_tables(folder, outcome.source.line)
     warn_of_border(loops, outcome.case.loops, reporter)
