@@ -10,6 +10,7 @@ from fe_models.friction import FrictionalJoint
 from fe_models.remesh import element_volumes
 from fe_models.structure import load_history
 from sa_solver.types import LoadHistory
+from tests.marks import slow
 
 DEGREES = np.pi / 180.0
 # The disk of the default case is too stout: at 60° the slot opens so little under speed that
@@ -19,7 +20,7 @@ COMPLIANT = {"disk_height": 200.0, "blades": 16, "airfoil_mass": 0.4e-3}
 PEAK = 7
 
 # Between the steepest and the flattest flanks the rest is for `make test-full`.
-ANGLES = [35, *(pytest.param(angle, marks=pytest.mark.slow) for angle in (45, 55)), 65]
+ANGLES = [35, *(slow(angle) for angle in (45, 55)), 65]
 
 
 def pull(structure, amplitudes):
@@ -91,9 +92,7 @@ def test_flanks_are_alike_to_the_last_digits(structure, joint, symmetric, monkey
 
 
 @pytest.mark.parametrize("mu", [0.2, 0.4, 0.6])
-@pytest.mark.parametrize(
-    "angle", [*(pytest.param(angle, marks=pytest.mark.slow) for angle in (40, 60)), 50]
-)
+@pytest.mark.parametrize("angle", [*(slow(angle) for angle in (40, 60)), 50])
 def test_gross_slip_up_and_reversed(structure_of, solved, symmetric, angle, mu):
     """P = F / 2 (sin θ + µ cos θ) as the load rises, with - once the flanks slide back.
 

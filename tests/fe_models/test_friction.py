@@ -9,13 +9,14 @@ import pytest
 from fe_models import friction
 from fe_models.friction import FrictionalJoint
 from fe_models.joint import JointStiffness
+from tests.marks import slow
 
 NODES = 4
 # What the solver imposes: TOLERANCE of the load, which these problems carry over to the forces.
 FORCES = 1e-5
 
 # Between the steepest and the flattest flanks the rest is for `make test-full`.
-ANGLES = [35, *(pytest.param(angle, marks=pytest.mark.slow) for angle in (45, 55)), 65]
+ANGLES = [35, *(slow(angle) for angle in (45, 55)), 65]
 
 
 def small_joint(rng, nodes=NODES, plane=False):

@@ -30,6 +30,7 @@ from tests.fe_models.monolithic import (
     sliding,
     whole_stiffness,
 )
+from tests.marks import slow
 
 STEEL, TITANIUM = Material(200e3, 0.3, 7.8e-9), Material(115e3, 0.29, 4.43e-9)
 X, Y, Z = np.eye(3)
@@ -165,9 +166,7 @@ def both(order):
     return joint, supported, monolith, split, list(monolith.march(PATH, joint.gap))
 
 
-@pytest.fixture(
-    params=[1, pytest.param(2, marks=pytest.mark.slow)], ids=["linear", "quadratic"], name="pair"
-)
+@pytest.fixture(params=[1, slow(2)], ids=["linear", "quadratic"], name="pair")
 def solved_pair(request, to_rounding):
     return both(request.param)
 
@@ -327,6 +326,7 @@ def cycle_energies(steps):
     return work, lost, reported, closure
 
 
+@pytest.mark.slow
 def test_work_of_a_closed_cycle_is_the_energy_lost():
     """The loads' work is the friction's to rounding, and what is reported tends to it.
 

@@ -257,6 +257,7 @@ def test_factors_on_two_threads_are_the_same_bit_for_bit(box, titanium):
     assert len(solutions) == 1
 
 
+@pytest.mark.slow
 def test_memory_that_pardiso_announces(box, titanium):
     """Against what the process grows by; MKL keeps some of what earlier tests gave back."""
     need_pardiso()
@@ -294,6 +295,7 @@ def test_envelope_of_a_band_is_exact():
     assert entries == 2 * (2 * SIZE - 1)
 
 
+@pytest.mark.slow
 def test_iterations_hardly_grow_with_rigid_motions(box, titanium):
     """A slender box, three meshes: constant within three, four to eight times as many without."""
     with_motions, without = [], []

@@ -250,6 +250,7 @@ def test_path_goes_through_the_peak(peak, check, tangent):
     np.testing.assert_allclose(found.force, state.force, atol=1e-6 * scale)
 
 
+@pytest.mark.slow
 def test_half_the_load(peak, check, tangent, coarse, dovetail, mission):
     """Half the peak load changes P by half as much of it; the stiffness of the peak by as much.
 

@@ -155,6 +155,7 @@ def pull(structure, amplitudes):
     return np.array([structure.body_2.load_resultants(a, np.zeros(3))[0, 2] for a in amplitudes])
 
 
+@pytest.mark.slow
 def test_pull_is_that_of_the_whole_blade_per_length(dovetail, structure_of, plane_cycle, mission):
     """F = Ω² (ρ A Z + m R / L): a section carries its share of the airfoil and of the moment."""
     structure, _ = plane_cycle(mission)
@@ -249,6 +250,7 @@ def rows_in_middle(history):
     return force[2], force[0], slip[order]
 
 
+@pytest.mark.slow
 def test_space_tends_to_the_plane_without_poisson_and_roundings(dovetail, mission):
     """Nothing then tells one section from another: the middle of a slot is the plane's solution.
 

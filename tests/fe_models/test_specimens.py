@@ -9,6 +9,7 @@ from fe_models.mesh import MeshError
 from fe_models.reduction import free_frequencies, reduce_body
 from fe_models.specimens import reduced_specimens, specimen_matrices
 from sa_solver.types import Material
+from tests.marks import slow
 
 STEEL = Material(200e3, 0.3, 7.8e-9)
 # Free-free frequencies of the rig's specimen, full model [Hz] (thesis, table 1).
@@ -155,7 +156,7 @@ class TestModels:
         size = np.abs(turned).max()
         np.testing.assert_allclose(second.stiffness, turned, atol=1e-9 * size)
 
-    @pytest.mark.parametrize("order", [1, pytest.param(2, marks=pytest.mark.slow)])
+    @pytest.mark.parametrize("order", [1, slow(2)])
     def test_reduced_frequencies(self, pair, order):
         (face,) = pair.interfaces
         full = specimen_matrices(COARSE, pair.body_1, face.nodes_1, STEEL, order)

@@ -69,6 +69,7 @@ def test_it_converges_for_all_real_materials_up_to_a_friction_of_one(build):
     assert in_turns(build, 1.0, 0.5).converged
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("build", BODIES)
 def test_it_fails_beyond_and_says_so(build):
     state = in_turns(build, 2.8, 0.5, share=0.95, rounds=30)
@@ -88,6 +89,7 @@ def test_solving_both_together_has_no_such_border(build, friction, beta):
     assert together(build, friction, beta).converged
 
 
+@pytest.mark.slow
 def test_pressing_alone_is_easier_than_shearing():
     """Where cells stick, shear cannot follow pressure."""
     assert in_turns(sphere, 4.0, 0.3, share=0.0).converged

@@ -26,6 +26,7 @@ from sa_solver.normal import NormalContact
 from sa_solver.tangential import FrictionLimitError
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.limits.conditions import frictional_error, love_matrix, normal_error
+from tests.marks import slow
 
 TITANIUM = Material(115e3, 0.29)
 PAIRS = {
@@ -197,7 +198,7 @@ def test_loads_of_any_size(kind, P):
     assert (state.border_load > 0.0) == (limit < P)
 
 
-@pytest.mark.parametrize("P", [pytest.param(1e-7, marks=pytest.mark.slow), 1e-5])
+@pytest.mark.parametrize("P", [slow(1e-7), 1e-5])
 def test_rounding_hides_tiny_loads_on_unlike_bodies_and_it_is_said(P):
     """The splitting's state holds gaps over a cell's compliance: 2e4 MPa here, known to 4e-12.
 
@@ -244,7 +245,7 @@ def test_any_roughness_is_solved(rms, seed):
 
 
 @pytest.mark.parametrize("rms", [1e-3, 1e-1, 1.0])
-@pytest.mark.parametrize("seed", range(2))
+@pytest.mark.parametrize("seed", [0, slow(1)])
 def test_any_roughness_of_unlike_bodies_is_solved(rms, seed):
     """Three cells under a load within the triangle of their centres; then sheared, and back."""
     grid, height = rough(24, rms, seed)
@@ -257,6 +258,7 @@ def test_any_roughness_of_unlike_bodies_is_solved(rms, seed):
         assert error < 3.0 * SOLVED
 
 
+@pytest.mark.slow
 def test_heights_whose_digits_hide_the_displacement_are_refused():
     """Rounding of 1e3 mm is 1e-13 mm, 1e-8 of a displacement of 1e-5 mm: about 1e-2 N here."""
     grid, height = rough(24, 1e3)

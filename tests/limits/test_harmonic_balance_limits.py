@@ -15,6 +15,7 @@ from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.motion import Start
 from fe_models.dynamics.newmark import TimeStepControl, integrate
 from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
+from tests.marks import slow
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
 from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
@@ -303,6 +304,7 @@ def folded():
     return branch
 
 
+@pytest.mark.slow
 def test_folds_are_passed_and_told(folded):
     """Up and down find the same two folds, 103.0 and 108.2 Hz, three motions between them."""
     down = along_frequency(stopped(), 1.0, (60.0, 200.0), upward=False, control=SHORT)
@@ -317,6 +319,7 @@ def test_folds_are_passed_and_told(folded):
     assert highest[0] == pytest.approx(highest[1], rel=1e-3)
 
 
+@pytest.mark.slow
 def test_motions_that_coexist_are_those_that_time_integration_ends_in(folded):
     """At 106 Hz: the largest and the smallest of three; the middle one repels."""
     crossings = np.flatnonzero(np.diff(np.sign(folded.frequencies - 106.0)))
@@ -391,7 +394,7 @@ def test_a_start_beyond_a_fold_says_so_or_lands_on_the_other_side(folded):
     np.testing.assert_allclose(beyond.motion, alone.motion, atol=1e-9 * np.abs(alone.motion).max())
 
 
-@pytest.mark.parametrize("share", [0.25, 0.5, 0.75])
+@pytest.mark.parametrize("share", [slow(0.25), 0.5, slow(0.75)])
 def test_a_branch_taken_up_in_its_middle_is_the_rest_of_it(folded, share):
     """Point by point, also where it folds, since a point keeps its tangent and its step."""
     kept = round(share * len(folded.curve.points))
@@ -424,7 +427,7 @@ def pair(harmonics, samples):
     return HarmonicBalance(model, joints, load, Resolution(harmonics, samples))
 
 
-@pytest.mark.parametrize("held", [0.0, KT])
+@pytest.mark.parametrize("held", [slow(0.0), KT])
 def test_the_third_harmonic_in_resonance_with_the_second_mode(held):
     """Right with enough harmonics; one alone says what it leaves out, and more are found if asked.
 

@@ -82,6 +82,7 @@ def test_the_stick_zone_closes_as_in_mindlins_solution():
     np.testing.assert_allclose(state.shear[0], FRICTION * state.pressure, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_unlike_bodies_at_the_friction_of_the_load_solve_it_or_say_why():
     contact, height, pressed = pressed_on(sphere, "unlike", 16)
     given = load(Qx=(1.0 - 1e-9) * FRICTION * P)

@@ -11,6 +11,7 @@ import pytest
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from tests.marks import slow
 from wear.laws import EnergyLaw
 from wear.stepping import SlidingCycle, WearingContact, WearState
 
@@ -94,7 +95,7 @@ def test_no_checkerboard_and_no_growth_back(kind) -> None:
     assert abs(np.mean(second * signs[11:21, 11:21])) < 1e-4 * depth.max()
 
 
-@pytest.mark.parametrize("limits", [0.5, 5.0, 100.0])
+@pytest.mark.parametrize("limits", [slow(0.5), slow(5.0), 100.0])
 @pytest.mark.parametrize("kind", ["implicit", "second_order"])
 def test_a_symmetric_problem_stays_symmetric_over_100_jumps(kind, limits) -> None:
     """The sphere's four reflections, to 1e-8 of the depth."""

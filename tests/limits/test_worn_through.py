@@ -58,14 +58,15 @@ def run(folder, loads, *overrides):
     return json.loads(text)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     "step",
     [
         "{kind: implicit, cycles: 2e4}",
-        pytest.param("{kind: explicit, cycles: 2e4}", marks=pytest.mark.slow),
-        pytest.param("{kind: implicit, depth: 1 um}", marks=pytest.mark.slow),
-        pytest.param("{kind: second_order, cycles: 2e4}", marks=pytest.mark.slow),
-        pytest.param("{kind: implicit, volume: 0.001 mm^3}", marks=pytest.mark.slow),
+        "{kind: explicit, cycles: 2e4}",
+        "{kind: implicit, depth: 1 um}",
+        "{kind: second_order, cycles: 2e4}",
+        "{kind: implicit, volume: 0.001 mm^3}",
     ],
 )
 def test_a_run_ends_at_its_depth_and_not_a_step_beyond(tmp_path, step):

@@ -12,6 +12,7 @@ from sa_solver.normal import NormalContact
 from sa_solver.rigid_modes import RigidModes
 from sa_solver.tangential import FrictionLimitError, TangentialContact
 from sa_solver.types import ElasticPair, Grid, Material, resultants
+from tests.marks import slow
 from tests.oracles.alternating import AlternatingContact
 
 TOLERANCE = 1e-8
@@ -226,7 +227,7 @@ def test_stick_zone_of_a_flat_strip_for_weak_coupling():
         assert stick_share(state, friction) == pytest.approx(expected, abs=0.008)
 
 
-@pytest.mark.parametrize("beta", [0.3, 0.5])
+@pytest.mark.parametrize("beta", [0.3, slow(0.5)])
 def test_punch_and_growing_contacts_share_one_stick_zone(beta):
     """Spence 1968: c/a is the same for every power-law profile under a load that grows.
 
@@ -255,7 +256,7 @@ def test_one_step_and_many_differ():
     assert stick_share(many, 0.5) > stick_share(one, 0.5) + 0.1
 
 
-@pytest.mark.parametrize("friction", [0.2, 1.0])
+@pytest.mark.parametrize("friction", [0.2, slow(1.0)])
 def test_adjusting_in_turns_gives_the_same(friction):
     """The alternating iteration, where it converges, is an independent method."""
     contact, height = sphere(24, 0.5, friction)
@@ -376,6 +377,7 @@ def test_a_start_saves_iterations_and_changes_nothing():
     assert_same(warm.traction, cold.traction, 1e-6)
 
 
+@pytest.mark.slow
 def test_iterations_hardly_grow_with_the_grid():
     """As the fourth root of the number of cells across, about."""
     counts = []

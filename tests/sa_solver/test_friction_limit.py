@@ -41,6 +41,7 @@ def test_pure_torsion(limit, ratio):
     assert share(limit, (0.0, 0.0, 1.0)) == pytest.approx(ratio * carried, rel=2e-3)
 
 
+@pytest.mark.slow
 @settings(max_examples=20, deadline=None, derandomize=True)
 @given(st.integers(0, 2**32 - 1))
 def test_combined_loads_against_a_search(seed):

@@ -129,6 +129,7 @@ def test_auto_says_why_it_takes_every_increment(change, reason):
             march_history(half_space, height, loading, FRICTION, history="reversals")
 
 
+@pytest.mark.slow
 def test_the_error_of_a_full_path_falls_with_its_increments():
     """Load that turns in the plane: backward steps are of first order, and so is their estimate."""
     half_space, height = ball(0.3, 24)

@@ -100,6 +100,7 @@ def test_without_poissons_ratio_it_is_the_discrete_solution(height, share):
     assert cells == pytest.approx(loop.energy, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_with_poissons_ratio_loops_differ_little_from_the_whole_problem():
     curve, half_space, gap = moved(sphere(STEEL), 32)
     for share, allowed in ((0.5, 0.02), (2.0, 1e-3)):

@@ -95,6 +95,7 @@ def test_loop_area_needs_no_datum_and_is_the_energy():
         assert area == pytest.approx(contact.loop_energy(90.0), rel=1e-4)
 
 
+@pytest.mark.slow
 def test_energy_is_the_work_of_friction():
     """Masing: a half cycle slips twice as much as first loading, under µ p at both edges."""
     contact = bulk(90.0, 0.0)

@@ -99,6 +99,7 @@ def test_branches_are_first_loading_doubled(partial):
     np.testing.assert_allclose(displacement[-1] + forth[0], 2.0 * displacement, atol=scale)
 
 
+@pytest.mark.slow
 def test_energy_does_not_depend_on_the_increments_and_the_area_does_by_their_square():
     """ν = 0: cells slip only at |q| = µp, so slip's energy is exact; trapezoids cut the corners."""
     found = {

@@ -30,6 +30,7 @@ import scipy.linalg
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from tests.marks import slow
 from tests.oracles.worn_shapes import worn_cylinder, worn_sphere
 from wear.laws import EnergyLaw
 from wear.moving import LARGE_STROKE, passages
@@ -258,7 +259,7 @@ class MovingMarch:
         return self._state.surfaces.depth_2
 
 
-@pytest.mark.parametrize("stroke", [0.1, 2.0])
+@pytest.mark.parametrize("stroke", [0.1, slow(2.0)])
 def test_a_flat_that_does_not_wear_stays_out_of_it(stroke: float) -> None:
     """Only the cylinder wears: its shape is that of small strokes, however far it slides."""
     width = 1.4 + stroke
@@ -271,7 +272,7 @@ def test_a_flat_that_does_not_wear_stays_out_of_it(stroke: float) -> None:
     assert march.depth_2.max() == pytest.approx(depth, rel=3e-3)
 
 
-@pytest.mark.parametrize("stroke", [1.5, 3.0])
+@pytest.mark.parametrize("stroke", [1.5, slow(3.0)])
 def test_over_a_long_stroke_the_slider_wears_alone_and_the_flat_evenly(stroke: float) -> None:
     """The worn flat is flat but at its ends: the cylinder is worn as on a new one, by its own
     volume, to the half width b; the flat V1/s deep, and as far as the cylinder goes, b + s/2.
@@ -295,6 +296,7 @@ def test_over_a_long_stroke_the_slider_wears_alone_and_the_flat_evenly(stroke: f
     np.testing.assert_allclose(middle, volume / stroke, rtol=tolerance)
 
 
+@pytest.mark.slow
 def test_neglecting_the_motion_costs_the_square_of_the_stroke() -> None:
     """What :data:`wear.moving.LARGE_STROKE` rests on: less than 1 % at a tenth of the contact."""
     grid, load, volume = Grid.strips(1.6, 80), 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS

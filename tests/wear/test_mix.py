@@ -9,6 +9,7 @@ from sa_solver.contact import FrictionalContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from tests.marks import slow
 from wear.evolution import EnergyTable
 from wear.full_cycle import march_cycle
 from wear.laws import EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
@@ -77,7 +78,7 @@ def test_equal_cycles_wear_as_the_one(share: float) -> None:
     assert_same(march(mixed, "explicit", cycles, 4), march(own, "explicit", cycles, 4), 1e-12)
 
 
-@pytest.mark.parametrize(("kind", "order"), [("implicit", 1), ("second_order", 2)])
+@pytest.mark.parametrize(("kind", "order"), [("implicit", 1), slow("second_order", 2)])
 def test_equal_cycles_wear_as_the_one_to_the_order_of_the_step(kind: str, order: int) -> None:
     own, mixed = wearing(HEAVY), wearing(HEAVY, HEAVY, shares=(0.6, 0.4))
     cycles = 2.0 * limit(own)
@@ -125,6 +126,7 @@ def test_depth_is_the_mean_of_the_cycles_by_their_shares() -> None:
         np.testing.assert_allclose(found, 0.7 * alone[0] + 0.3 * alone[1], rtol=1e-12, atol=1e-18)
 
 
+@pytest.mark.slow
 def test_order_of_cycles_matters_to_first_order_in_the_step() -> None:
     """Swapping two of three cycles: halving the steps halves the difference."""
     shares = (0.3, 0.5, 0.2)

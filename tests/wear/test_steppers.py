@@ -9,6 +9,7 @@ import pytest
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from tests.marks import slow
 from wear.laws import EnergyLaw
 from wear.steppers import (
     Advance,
@@ -85,7 +86,7 @@ LIMIT = CONSTANT.stable_cycles(waved())
         (Implicit(), 1, unchanging),
         (Implicit(), 1, evolving),
         (SecondOrder(), 2, unchanging),
-        pytest.param(SecondOrder(), 2, evolving, marks=pytest.mark.slow),
+        slow(SecondOrder(), 2, evolving),
     ],
 )
 def test_order_of_convergence(stepper, order, contact_at) -> None:

@@ -11,6 +11,7 @@ import pytest
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from tests.marks import slow
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, WearLaw
 from wear.stepping import ContactFailure, SlidingCycle, WearingContact, WearState, WearStep
 from wear.surfaces import Surfaces
@@ -209,7 +210,7 @@ def test_nothing_wears_where_nothing_slips(kind: str) -> None:
 # --- convergence --------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("laws", [EQUAL, (EnergyAmplitudeLaw(4e-8, 0.02),) * 2])
+@pytest.mark.parametrize("laws", [EQUAL, slow((EnergyAmplitudeLaw(4e-8, 0.02),) * 2)])
 def test_explicit_and_implicit_meet_at_first_order(laws: tuple[WearLaw, WearLaw]) -> None:
     """Their difference halves as jumps double, and both extrapolate to one depth."""
     own = wearing(laws, loads(1000.0, LOAD))

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from sa_solver.types import Grid
+from tests.marks import slow
 from workflow.analyses.wear.measures import profile_difference
 from workflow.case.writing import dump_case
 from workflow.chart import Chart, accuracy_of
@@ -196,6 +197,7 @@ def test_sentences_say_when_nothing_is_enough():
     assert combination(charted(1e-3 / 2)) is None
 
 
+@pytest.mark.slow
 def test_files_of_a_chart(tmp_path: Path):
     write_chart(charted(0.1), tmp_path)
     lines = (tmp_path / "chart.csv").read_text("utf-8").splitlines()
@@ -295,7 +297,15 @@ CASES = sorted((Path(__file__).parents[2] / "cases").glob("*.yaml"))
 CHARTED = [path for path in CASES if load_case(path).structure.kind != "joint"]
 
 
-@pytest.mark.parametrize("path", CHARTED, ids=lambda path: path.stem)
+# One case of each analysis; all others are for `make test-full`.
+QUICK = "dovetail_2d", "sphere_fretting", "specimens_coarse", "rig_two_dof", "rig_wear_vibration"
+
+
+@pytest.mark.parametrize(
+    "path",
+    [path if path.stem in QUICK else slow(path) for path in CHARTED],
+    ids=[path.stem for path in CHARTED],
+)
 def test_every_rung_of_every_case_is_another_case_and_finer(path: Path):
     own = dump_case(load_case(path))
     for axis, settings in axes_of(path, (), ()).items():

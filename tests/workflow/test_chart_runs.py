@@ -231,6 +231,7 @@ def test_every_different_case_runs_once_and_the_own_one_first(
         assert (case.output.figures, case.stress.wanted, case.fidelity) == (False, False, "fixed")
 
 
+@pytest.mark.slow
 def test_quantities_of_wear_and_what_they_cost(
     small_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
@@ -264,6 +265,7 @@ def test_dimensions_are_compared_in_the_middle(
     assert "depth anywhere" not in two.point.extras
 
 
+@pytest.mark.slow
 def test_explicit_steps_that_take_too_long_are_left_out(
     small_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):

@@ -10,6 +10,7 @@ from sa_solver.contact import FrictionalContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Grid, Material
+from tests.marks import slow
 from tests.workflow.conftest import Run, invoke
 from wear.stepping import ContactFailure
 from workflow.analyses.wear.case.loops import Loops
@@ -303,7 +304,7 @@ def test_loops_change_nothing_else(start_balls, rubbed, tmp_path):
     assert not list(plain.folder.glob("loops_*"))
 
 
-@pytest.mark.parametrize("every", ["end", "jump"])
+@pytest.mark.parametrize("every", [slow("end"), "jump"])
 def test_resumed_run_keeps_its_earlier_loops(
     start_balls, resume, rubbed, tmp_path, monkeypatch, every
 ):

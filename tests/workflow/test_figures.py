@@ -60,6 +60,7 @@ def test_figures_are_wide_and_not_blank(written: list[Path]) -> None:
         assert all(part.any() for part in np.array_split(inked, 5, axis=1)), path
 
 
+@pytest.mark.slow
 def test_titles_fit_the_width(results: Path) -> None:
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -178,6 +179,7 @@ def test_ranges_of_increments() -> None:
     assert figures._ranges([]) == "none"
 
 
+@pytest.mark.slow
 def test_figures_without_data_are_left_out(changed: Path, tmp_path: Path) -> None:
     with h5py.File(changed, "a") as file:
         for group in ("structure", "structure_worn", "bodies"):
@@ -187,6 +189,7 @@ def test_figures_without_data_are_left_out(changed: Path, tmp_path: Path) -> Non
     assert names == NAMES - {"resultants", "structure_stress", "half_space_and_structure"}
 
 
+@pytest.mark.slow
 def test_run_without_wear_can_be_drawn(changed: Path, tmp_path: Path) -> None:
     with h5py.File(changed, "a") as file:
         for name in file["grid"]:

@@ -90,6 +90,7 @@ def test_the_rig_sticks_under_a_small_force_and_slides_under_a_large_one(files):
     np.testing.assert_allclose(nodes["energy"].sum(axis=1), energy, rtol=1e-12)
 
 
+@pytest.mark.slow
 def test_pads_pressed_evenly_are_closed_evenly_if_contacts_share_by_area(files):
     """Contacts so soft that bodies are rigid and flat beside them: each carries its share."""
     law = "law: friction_contact, normal_load: 60, friction: 1"

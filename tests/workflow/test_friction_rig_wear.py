@@ -207,6 +207,7 @@ def test_steps_converge_with_their_square(pads, unworn):
     assert np.all((orders > 1.7) & (orders < 2.4)), orders
 
 
+@pytest.mark.slow
 def test_the_tolerance_bounds_the_error(pads, unworn):
     best = worn(pads, unworn, 2e5, 0.005)
     exact = best.state.surfaces.depth

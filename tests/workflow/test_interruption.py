@@ -140,6 +140,7 @@ def test_interruption_after_the_last_jump_writes_the_output(start, resume, monke
     assert_equal(resume(run.folder), reference)
 
 
+@pytest.mark.slow
 def test_method_that_fails_later_says_how_to_go_on(start, resume, whole, monkeypatch, tmp_path):
     from wear.stepping import ContactFailure
 
@@ -169,6 +170,7 @@ def die(connection, code):
     os._exit(code)
 
 
+@pytest.mark.slow
 def test_worker_that_dies_is_one_line():
     from workflow.errors import MethodFailed
 
@@ -176,6 +178,7 @@ def test_worker_that_dies_is_one_line():
         workers._answers(connections)
 
 
+@pytest.mark.slow
 def test_worker_that_cannot_be_set_up_says_why(own_processes):
     """What goes wrong in a worker is raised here, not printed there."""
     with (

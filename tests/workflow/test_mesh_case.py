@@ -13,6 +13,7 @@ from fe_models.geometry.imported import patch, read_bodies
 from fe_models.gmsh_session import gmsh_model
 from fe_models.mesh import write_msh
 from fe_models.structure import CLOSED
+from tests.marks import slow
 from tests.workflow.commands import invoke
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.model import DovetailModel
@@ -144,7 +145,7 @@ def dovetail_as_mesh(folder, dovetail, ending):
     return write_case(folder / "joint.yaml", structure, legs, mu, materials=materials)
 
 
-@pytest.mark.parametrize("ending", [".msh", pytest.param(".inp", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("ending", [".msh", slow(".inp")])
 def test_dovetail_as_a_mesh_is_the_dovetail(tmp_path, small_path, ending, monkeypatch):
     """Loads, slips and energies of every increment, to the solver's accuracy."""
     monkeypatch.setattr(friction, "TOLERANCE", 1e-11)
@@ -290,6 +291,7 @@ def test_peak_that_does_not_converge_is_told(blocks, stiffness, monkeypatch):
         stage.probe([np.zeros(len(face.face)) for face in stage.faces])
 
 
+@pytest.mark.slow
 def test_load_beyond_the_middles_of_coarse_cells_costs_no_run(blocks, tmp_path):
     """A foot that nearly tips over: nine nodes make 3 x 3 cells, and the grid holds what they do
     not."""

@@ -12,6 +12,7 @@ import pytest
 
 from fe_models.geometry.dovetail import Dovetail
 from sa_solver.types import Array, Grid
+from tests.marks import slow
 from tests.workflow.commands import command
 from workflow.analyses.wear.case.gaps import ParaboloidGap, RoundedGap
 from workflow.analyses.wear.figures.wear import figures_of
@@ -333,7 +334,7 @@ def test_pictures_of_resultants_alone(typed, tmp_path):
     "settings",
     [
         ["structure.dimension=2", "contact.grid=[32, 8]", "contact.method=full"],
-        pytest.param(["contact.grid=[16, 24]"], marks=pytest.mark.slow),
+        slow(["contact.grid=[16, 24]"]),
     ],
     ids=["line, full", "area, given slips"],
 )
@@ -363,6 +364,7 @@ def test_our_loads_through_files_wear_the_same_bit_for_bit(small_path, tmp_path,
             assert told["volume_share"] == pytest.approx(1.0, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_our_table_is_read_by_a_case(small_path, written):
     """The CSV alone, over the flank as a nominal face."""
     folder = written.parent / "ours"

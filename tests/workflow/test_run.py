@@ -4,6 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.marks import slow
 from tests.workflow.conftest import manifest_has_all
 from workflow.analyses.wear.figures.wear import figures_of
 from workflow.kinds import load_case
@@ -12,7 +13,10 @@ from workflow.shell import memory
 
 UM3_PER_J = 1e-12
 # Few and quick increments for the odd cases, where a run is only to end well.
-QUICK = "load_path.increments=5", "load_path.peak_at=2", "contact.grid=[16, 24]"
+QUICK = (
+    *("load_path.increments=5", "load_path.peak_at=2", "contact.grid=[16, 24]"),
+    *("stress.section=none", "stress.life.parameter=none"),
+)
 
 
 def balances(run, laws):
@@ -113,6 +117,7 @@ def test_contacts_in_processes_of_their_own_find_the_same(start, whole, own_proc
             assert history[column] == pytest.approx(values, rel=1e-9), (name, column)
 
 
+@pytest.mark.slow
 def test_two_runs_are_bitwise_equal(start, whole, tmp_path):
     again = start(tmp_path / "out")
     first, second = whole.heights(), again.heights()
@@ -135,11 +140,13 @@ def test_pictures_are_written(start, own_processes, tmp_path):
 # --- steps and stops ----------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_last_jump_is_clipped_to_the_cycles_left(start, tmp_path):
     run = start(tmp_path / "out", "wear.cycles=25000", *QUICK)
     assert run.summary["kinetics"]["cycles"] == [0.0, 1e4, 2e4, 2.5e4]
 
 
+@pytest.mark.slow
 def test_jumps_that_add_up_leave_no_jump_of_rounding(start, tmp_path):
     """Nine times 3e4/9 is not quite 3e4."""
     assert sum([3e4 / 9] * 9) < 3e4
@@ -163,6 +170,7 @@ def test_step_and_stop_by_depth(start, tmp_path):
     assert depths[-1] == pytest.approx(stop, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_step_and_stop_by_volume(start, tmp_path):
     run = start(
         tmp_path / "out",
@@ -197,6 +205,7 @@ def test_small_drift_limit_solves_the_structure_again(start, whole, tmp_path):
     assert volumes[0] == pytest.approx(volumes[1], rel=0.02)
 
 
+@pytest.mark.slow
 def test_constant_resultants_never_drift(start, whole, tmp_path):
     run = start(tmp_path / "out", "coupling.resultants=constant")
     assert run.summary["structure"]["solutions"] == 1
@@ -216,7 +225,7 @@ def test_constant_resultants_never_drift(start, whole, tmp_path):
             ["wear.step.kind=explicit", "wear.step.cycles=5e5", "friction.coefficient=1.2"],
             ["amplify the grid's roughness", "locks itself"],
         ),
-        (
+        slow(
             [
                 *("structure.edge_radius=3 mm", "structure.edge_width=0.2 mm"),
                 *("materials.disk.yield_stress=100 MPa", "wear.cycles=1e4"),
@@ -241,7 +250,7 @@ def test_warnings(start, tmp_path, overrides, words):
 # --- odd cases ----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("figures", ["false", pytest.param("true", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("figures", ["false", slow("true")])
 def test_without_friction_nothing_wears(start, tmp_path, figures):
     run = start(tmp_path / "out", "friction.coefficient=0", *QUICK, f"output.figures={figures}")
     assert run.ending.exit_code == 0, run.ending.stderr
@@ -252,7 +261,7 @@ def test_without_friction_nothing_wears(start, tmp_path, figures):
     assert own["peak_load"]["unworn"]["P"] == pytest.approx(load, rel=1e-3)
 
 
-@pytest.mark.parametrize("step", ["wear.step.cycles=1e4", "wear.step.depth=1 um"])
+@pytest.mark.parametrize("step", ["wear.step.cycles=1e4", slow("wear.step.depth=1 um")])
 def test_without_wear_coefficient_nothing_wears(start, tmp_path, step):
     zero = "wear.disk.coefficient=0", "wear.blade.coefficient=0"
     run = start(tmp_path / "out", "wear.step.cycles=", *zero, *QUICK, step)
@@ -270,6 +279,7 @@ def test_blade_without_airfoil_pulls_by_its_own_mass(start, tmp_path):
     assert run.summary["intrados"]["peak_load"]["unworn"]["P"] == pytest.approx(load, rel=5e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("moment", ["1000 N*m", "3000 N*m"])
 def test_moment_that_opens_a_flank_ends_well(start, tmp_path, moment):
     """Either a result, or one line that says why there is none."""
@@ -346,6 +356,7 @@ def test_fields_are_kept_and_drawn(full, tmp_path):
             assert np.all(shear <= friction * fields["pressure"][()] * (1.0 + 1e-12))
 
 
+@pytest.mark.slow
 def test_both_directions_of_sliding_give_the_same_energy(start, full, tmp_path):
     other = start(tmp_path / "out", *QUICK, "contact.method=full", "contact.gross_slip=energies")
     for flank in ("intrados", "extrados"):
@@ -353,6 +364,7 @@ def test_both_directions_of_sliding_give_the_same_energy(start, full, tmp_path):
         assert two == pytest.approx(one, rel=0.01)
 
 
+@pytest.mark.slow
 def test_unlike_materials_run_coupled_and_are_warned_of_otherwise(start, tmp_path):
     steel = "materials.disk.young=200 GPa"
     coupled = start(tmp_path / "full", *QUICK, steel, "contact.method=full")

@@ -136,6 +136,7 @@ def test_a_process_that_breaks_tells_its_last_words(contact, tmp_path, monkeypat
     assert done.error.endswith("exit code 1: SystemError: broken")
 
 
+@pytest.mark.slow
 def test_a_mistake_of_the_program_leaves_its_traceback_in_the_log(contact, tmp_path, monkeypatch):
     code = "import workflow.analyses.contact.run as c; c.bodies_of = None;" + runs_job.COMMAND
     monkeypatch.setattr(runs_job, "COMMAND", code)

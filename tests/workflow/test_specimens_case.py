@@ -150,6 +150,7 @@ class TestSummary:
             assert abs(load["coupled_cycle"]["energy_difference"]) < 5e-3
             assert abs(load["coupled_cycle"]["secant_stiffness_difference"]) < 1e-2
 
+    @pytest.mark.slow
     def test_coefficient_that_a_source_would_have_had(self, folder, curved, summary):
         """Run with it, the pair is steady after the cycles that the source reports."""
         (reported,) = summary["reported"]
@@ -231,6 +232,7 @@ class TestResults:
         expected = summary["frequencies"]["body_2"]["reduced"]
         np.testing.assert_allclose(frequencies, expected, rtol=1e-9)
 
+    @pytest.mark.slow
     def test_figures(self, curved):
         from matplotlib import rc_context
         from matplotlib.backends.backend_agg import FigureCanvasAgg

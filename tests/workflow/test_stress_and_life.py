@@ -9,6 +9,7 @@ import pytest
 
 from sa_solver.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Grid, Material
+from tests.marks import slow
 from wear.interface import CycleTractions
 from workflow.analyses.wear.case.sections import ContactStress, Life
 from workflow.analyses.wear.contact_stress import Planes, _report_stick, life_maps
@@ -60,7 +61,7 @@ def peak_traction(file: h5py.File, flank: str, moment: str) -> Array:
 # --- against direct evaluation ------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("method", ["normal", "full", "line"])
+@pytest.mark.parametrize("method", ["normal", slow("full"), "line"])
 @pytest.mark.parametrize("moment", ["unworn", "worn"])
 def test_section_is_that_of_the_recorded_tractions(
     request: pytest.FixtureRequest, method: str, moment: str
@@ -126,7 +127,7 @@ def test_wear_takes_the_peaks_off(normal: Any) -> None:
 # --- balance ------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("method", ["normal", "full", "line"])
+@pytest.mark.parametrize("method", ["normal", slow("full"), "line"])
 def test_friction_parameter_integrates_to_the_energy_of_the_cycle(
     request: pytest.FixtureRequest, method: str
 ) -> None:
@@ -209,6 +210,7 @@ def test_increments_with_unknown_shear_add_work_but_no_stress() -> None:
     assert every["tension"][-6:].max() == pytest.approx(first["tension"][-6:].max())
 
 
+@pytest.mark.slow
 def test_left_out_increments_are_told(normal: Any, full: Any) -> None:
     with h5py.File(normal.folder / "results.h5") as file:
         out = file["stress/life/intrados/unworn/left_out"][()]

@@ -8,6 +8,7 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.marks import slow
 from tests.workflow.conftest import invoke, manifest_has_all
 from workflow.analyses.time.joint import steady_loop
 from workflow.analyses.time.joint_model import JointModel
@@ -405,6 +406,7 @@ def test_a_blow_shows_the_frequency_response_of_a_stuck_rig(tmp_path):
     assert own["frequency"] == pytest.approx(abs(first.imag) / (2.0 * np.pi), rel=2e-3)
 
 
+@pytest.mark.slow
 def test_wear_changes_the_response_to_a_blow(tmp_path):
     """E is frozen in each record; figures of what there is are drawn."""
     evolution = "evolution.stiffness={kind: table, energy: [0 J, 1 J], factor: [1, 2]}"
@@ -426,6 +428,7 @@ def test_wear_changes_the_response_to_a_blow(tmp_path):
         assert file.attrs["seen"].tolist() == ["m1", "m2"]
 
 
+@pytest.mark.slow
 def test_a_recorded_blow_moves_the_rig_as_a_hammer_does(tmp_path):
     """Sampled 50 times: the second order of a polygon leaves 1e-3."""
     times = np.linspace(0.0, 1e-3, 51)
@@ -447,7 +450,7 @@ def test_a_recorded_blow_moves_the_rig_as_a_hammer_does(tmp_path):
     )
 
 
-@pytest.mark.parametrize("kind", ["joint", pytest.param("rig", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", ["joint", slow("rig")])
 def test_what_new_writes_wears_without_a_warning(tmp_path, kind):
     """All energies that it asks for are reached, and friction has risen between them."""
     found = run(tmp_path, template(kind), "output.figures=false")
@@ -502,7 +505,9 @@ def test_a_finished_run_is_not_resumed_and_a_broken_one_starts_again(tmp_path):
     assert "start it again" in ended.stderr
 
 
-@pytest.mark.parametrize("name", ["rig_bouc_wen", "bolted_joint_test2", "bolted_joint_test4"])
+@pytest.mark.parametrize(
+    "name", [slow("rig_bouc_wen"), slow("bolted_joint_test2"), "bolted_joint_test4"]
+)
 def test_papers_joints_are_verified(tmp_path, name):
     assert verify_cases((CASES / f"{name}.yaml",), tmp_path)
 

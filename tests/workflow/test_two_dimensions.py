@@ -13,6 +13,7 @@ from fe_models.mesh import Face
 from fe_models.structure import InterfaceHistory, load_history
 from fe_models.transfer import FaceTransfer
 from sa_solver.types import Frame, Grid
+from tests.marks import slow
 from tests.workflow.conftest import Run, invoke
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.contact_stage import ContactStage, StageSettings
@@ -82,6 +83,7 @@ def test_results_are_per_length(plane):
         assert file["contact/intrados/00000/pressure"].shape == (128, 1)
 
 
+@pytest.mark.slow
 def test_only_what_a_section_has_is_warned_of(plane, plane_path, tmp_path):
     """The coarse grid misses the peaks at the edges along the slot; slot ends there are none."""
     assert not any("end" in line.split() for line in plane.summary["warnings"])
@@ -272,7 +274,7 @@ def test_settings_stand_as_written_unless_asked_otherwise(plane_path, dovetail_p
         assert ANALYSIS.choose(case) == (case, None)
 
 
-@pytest.mark.parametrize(("accuracy", "dimension"), [("5 %", 2), ("3 %", 3)])
+@pytest.mark.parametrize(("accuracy", "dimension"), [("5 %", 2), slow("3 %", 3)])
 @pytest.mark.usefixtures("dimension_only")
 def test_dimension_follows_the_accuracy(plane_path, accuracy, dimension):
     case = auto(plane_path, f"accuracy={accuracy}")
@@ -304,6 +306,7 @@ def test_skewed_slot_stays_in_space_unprobed(plane_path):
     assert "skewed" in decision.why
 
 
+@pytest.mark.slow
 def test_a_slot_rounded_far_in_stays_in_space(plane_path):
     """Its middle carries what its ends do not: far more than the mean."""
     decision = choose_dimension(auto(plane_path, "structure.end_width=20 mm"))
@@ -344,6 +347,7 @@ def test_check_says_that_a_probe_decides(plane_path):
     assert "128 strips" in fixed
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("dimension_only")
 def test_run_writes_what_was_chosen_and_why(plane_path, tmp_path):
     settings = "fidelity=auto", "structure.dimension=3", "accuracy=5 %", "wear.cycles=3e4"

@@ -30,6 +30,7 @@ def test_expectations_of_the_small_case_are_met(small_path, tmp_path):
     assert (tmp_path / "out" / "small" / "summary.json").exists()
 
 
+@pytest.mark.slow
 def test_wrong_expectation_is_missed(small_path, tmp_path):
     text = quiet(small_path.read_text("utf-8")).replace("value: -31.409 kN", "value: -32 kN")
     path = tmp_path / "small.yaml"

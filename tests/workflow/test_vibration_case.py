@@ -127,6 +127,7 @@ def test_a_curve_that_ends_early_or_has_no_peak_is_told(tmp_path):
 # --- what is left -------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_files_of_a_run(tmp_path):
     run(tmp_path, RIG, "output.figures=true")
     out = tmp_path / "out"

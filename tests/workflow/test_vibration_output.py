@@ -179,6 +179,7 @@ def test_every_figure_is_written_and_not_blank(folder: Path) -> None:
         assert all(part.any() for part in np.array_split(inked, 5, axis=1)), path
 
 
+@pytest.mark.slow
 def test_titles_fit_the_width(results: h5py.File) -> None:
     from matplotlib import rc_context
     from matplotlib.backends.backend_agg import FigureCanvasAgg

@@ -103,6 +103,7 @@ def summary(ended):
     return json.loads((ended / "summary.json").read_text(encoding="utf-8"))
 
 
+@pytest.mark.slow
 def test_friction_that_grows_within_a_few_cycles_is_followed(tmp_path):
     """The paper's friction grows fivefold in ten cycles: against one cycle after the other."""
     law = "evolution: {energy: [0 J, 1 mJ, 10 mJ, 0.1 J], factor: [1, 2, 2.5, 3]}"
@@ -253,6 +254,7 @@ def test_tables_hold_the_evolution_and_every_response(ended, summary):
     assert len(list(ended.glob("frf_*.csv"))) == 6
 
 
+@pytest.mark.slow
 def test_figures_are_drawn(ended, tmp_path):
     from workflow.analyses.vibration_wear.figures import figures_of
     from workflow.pictures.drawing import write_figures
@@ -299,6 +301,7 @@ def test_cycles_and_forces_ascend_and_the_mass_is_there(tmp_path):
     assert "structure.kind" in refusal(tmp_path, "structure.kind=reduced")
 
 
+@pytest.mark.slow
 def test_a_force_without_a_contact_in_reach_of_its_grid_is_warned_of(tmp_path):
     result = run(
         tmp_path, "wear.cycles=[10]", wear=WEAR.replace("0.9 mm, 0.9 mm", "0.5 mm, 0.5 mm")

@@ -317,9 +317,8 @@ def test_force_is_followed_through_folds_too():
 # --- Against time integration
 
 
-@pytest.mark.parametrize(
-    ("frequency", "force"), [pytest.param(100.0, 75.0, marks=pytest.mark.slow), (150.0, 40.0)]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize(("frequency", "force"), [(100.0, 75.0), (150.0, 40.0)])
 def test_rig_against_its_exact_steady_state(frequency, force):
     """Event-driven integration, settled to 1e-12; error falls below 1e-4 with the harmonics."""
     model, samples = rig(0.02), 256

@@ -17,6 +17,7 @@ from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.motion import Start
 from fe_models.dynamics.newmark import TimeStepControl, integrate
 from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from tests.marks import slow
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
 from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
@@ -174,11 +175,11 @@ def odd_balance(model, highest, samples):
 @pytest.mark.parametrize(
     ("ratio", "frequency", "force", "highest"),
     [
-        (0.001, 150.0, 40.0, 63),
+        slow(0.001, 150.0, 40.0, 63),
         (0.02, 150.0, 40.0, 63),
         (0.001, 240.0, 200.0, 31),
         # The second mode, at 2478 Hz with the joint free, is in the way of harmonic 63.
-        (0.02, 39.0, 60.0, 91),
+        slow(0.02, 39.0, 60.0, 91),
     ],
 )
 def test_jenkins_rig_is_the_fixed_point_of_event_driven_integration(
@@ -195,7 +196,8 @@ def test_jenkins_rig_is_the_fixed_point_of_event_driven_integration(
     assert solution.cycle.dissipated[0] == pytest.approx(lost, rel=WANTED)
 
 
-@pytest.mark.parametrize("ratio", [pytest.param(0.001, marks=pytest.mark.slow), 0.02])
+@pytest.mark.slow
+@pytest.mark.parametrize("ratio", [0.001, 0.02])
 def test_error_falls_with_the_third_power_of_the_harmonics(ratio):
     """The slope of the joint's force jumps where it begins to slip, and its harmonics fall as k⁻².
 
@@ -216,7 +218,8 @@ def test_error_falls_with_the_third_power_of_the_harmonics(ratio):
     assert np.all(np.divide(errors, estimates) < 10.0)
 
 
-@pytest.mark.parametrize("ratio", [pytest.param(0.001, marks=pytest.mark.slow), 0.02])
+@pytest.mark.slow
+@pytest.mark.parametrize("ratio", [0.001, 0.02])
 def test_jenkins_rig_is_the_fixed_point_of_newmark(ratio):
     """Second order in the step: what is left after extrapolation is below 1e-4."""
     model = rig(ratio)

@@ -117,6 +117,7 @@ def lagged(model, law, excitation, duration, step):
     return np.array(found)
 
 
+@pytest.mark.slow
 def test_lagged_friction_is_first_order_only(rig, law, drive, exact):
     parts = np.array([40, 80, 160])
     errors = []
@@ -141,6 +142,7 @@ def test_a_tolerance_chooses_the_steps(rig, law, drive, exact):
     assert errors[-1] < 1e-3
 
 
+@pytest.mark.slow
 def test_a_tolerance_spends_its_steps_where_they_are_needed():
     """After a short blow the rig swings slowly: few steps do."""
     rig = two_mass_rig((20e-3, 1e-3), (1.4e3, 27.3e3), 0.05)

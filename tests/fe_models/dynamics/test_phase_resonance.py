@@ -21,6 +21,7 @@ from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.phase_resonance import PhaseResonance, along_phase_resonance
 from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
+from tests.marks import slow
 from tests.oracles.cubic_springs import CubicSprings
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
 from tests.oracles.two_mass_rig import two_mass_rig
@@ -127,6 +128,7 @@ def test_derivatives_of_the_equations(case, seen):
     assert at.slope[-1] == pytest.approx(wanted[-1], rel=1e-7)
 
 
+@pytest.mark.slow
 def test_products_with_the_jacobian_are_those_of_the_matrix(monkeypatch):
     """Several contacts: the backbone is the same where no matrix is assembled."""
     problem = block_problem()
@@ -278,7 +280,7 @@ def test_rig_of_one_harmonic_falls_from_stuck_to_sliding():
 
 
 @pytest.mark.parametrize("given", ["peak", "response"])
-@pytest.mark.parametrize("force", [10.0, 50.0, 90.0])
+@pytest.mark.parametrize("force", [10.0, slow(50.0), 90.0])
 def test_any_response_leads_to_the_backbone(force, given):
     problem = on_rig((1, 3, 5))
     response = along_frequency(problem, force, (20.0, 400.0))
@@ -304,6 +306,7 @@ def work_of_forces(problem, solution):
     return solution.force * work
 
 
+@pytest.mark.slow
 def test_power_balances_with_the_samples():
     """All power is spent: what the joint takes is summed sample by sample, to second order."""
     left = []
@@ -320,7 +323,8 @@ def test_power_balances_with_the_samples():
     assert rate > 1.5
 
 
-@pytest.mark.parametrize("place", ["before", pytest.param("folded back", marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("place", ["before", "folded back"])
 def test_motion_in_time_has_the_phase(place):
     """Event-driven integration of the rig under a force and a frequency of the backbone.
 
