@@ -20,6 +20,7 @@ from scipy.integrate import solve_ivp
 
 from sa_solver.errors import InputError
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from tests.marks import slow
 from tests.oracles.worn_shapes import worn_cylinder
 from wear.coupled import (
     AT_STOP,
@@ -374,7 +375,7 @@ def same(one: InterfaceState, other: InterfaceState) -> None:
         np.testing.assert_array_equal(value, its[name], err_msg=name)
 
 
-@pytest.mark.parametrize("method", ["normal", "full"])
+@pytest.mark.parametrize("method", ["normal", slow("full")])
 def test_going_on_from_any_state_ends_bit_for_bit_alike(method: str) -> None:
     """Two contacts under loads that drift, with contacts and source made anew."""
     loads, control = (LOAD, 0.6 * LOAD), ErrorControl(0.02)

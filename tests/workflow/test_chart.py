@@ -294,7 +294,7 @@ def test_depths_in_the_plane_are_not_compared_with_those_in_space():
 
 CASES = sorted((Path(__file__).parents[2] / "cases").glob("*.yaml"))
 # Of a joint alone nothing can be charted: its test is as good as it is asked to be.
-CHARTED = [path for path in CASES if load_case(path).structure.kind != "joint"]
+CHARTED = [path for path in CASES if "kind: joint" not in path.read_text("utf-8")]
 
 
 # One case of each analysis; all others are for `make test-full`.

@@ -299,6 +299,7 @@ def test_results_hold_nodes_loops_and_responses(ended, summary):
     assert len(list(ended.root.glob("frf_*.csv"))) == 4
 
 
+@pytest.mark.slow
 def test_figures_are_drawn(ended, tmp_path):
     from workflow.analyses.vibration_wear.figures import figures_of
     from workflow.pictures.drawing import write_figures

@@ -65,7 +65,7 @@ def folder(tmp_path_factory):
 
 def run(folder, name, *overrides):
     """The folder of a run with overrides."""
-    quiet = () if name == "curved" else ("output.paraview=false", "output.figures=false")
+    quiet = () if name == "pictured" else ("output.paraview=false", "output.figures=false")
     settings = [part for entry in (*quiet, *overrides) for part in ("--set", entry)]
     result = invoke("run", folder / "small.yaml", "--out", folder / name, *settings)
     assert result.exit_code == 0, result.stderr
@@ -82,6 +82,12 @@ def summary_of(folder):
 @pytest.fixture(scope="module")
 def curved(folder):
     return run(folder, "curved")
+
+
+@pytest.fixture(scope="module")
+def pictured(folder, curved):
+    """The same with its pictures."""
+    return run(folder, "pictured")
 
 
 @pytest.fixture(scope="module")
@@ -233,7 +239,7 @@ class TestResults:
         np.testing.assert_allclose(frequencies, expected, rtol=1e-9)
 
     @pytest.mark.slow
-    def test_figures(self, curved):
+    def test_figures(self, pictured):
         from matplotlib import rc_context
         from matplotlib.backends.backend_agg import FigureCanvasAgg
         from matplotlib.image import imread
@@ -241,14 +247,14 @@ class TestResults:
         from workflow.analyses.specimens import figures as specimens
         from workflow.pictures.style import STYLE
 
-        assert manifest_has_all(curved)
+        assert manifest_has_all(pictured)
         names = {"pad", "loops", "kinetics", "half_space"}
-        assert {path.stem for path in (curved / "figures").iterdir()} == names
-        for path in (curved / "figures").iterdir():
+        assert {path.stem for path in (pictured / "figures").iterdir()} == names
+        for path in (pictured / "figures").iterdir():
             image = imread(path)
             assert 1000 <= image.shape[1] <= 1400
             assert np.any(image[..., :3] < 0.95, axis=-1).mean() > 0.02
-        with h5py.File(curved / "results.h5") as file, rc_context(STYLE):
+        with h5py.File(pictured / "results.h5") as file, rc_context(STYLE):
             for draw in specimens.figures_of(file).values():
                 figure = draw(file)
                 FigureCanvasAgg(figure).draw()
@@ -257,11 +263,12 @@ class TestResults:
                     assert box.x0 >= 0.0, text.get_text()
                     assert box.x1 <= figure.bbox.x1, text.get_text()
 
-    def test_paraview(self, curved):
+    @pytest.mark.slow
+    def test_paraview(self, pictured):
         import pyvista
 
-        reader = pyvista.get_reader(curved / "paraview" / "load_1.pvd")
-        with h5py.File(curved / "results.h5") as file:
+        reader = pyvista.get_reader(pictured / "paraview" / "load_1.pvd")
+        with h5py.File(pictured / "results.h5") as file:
             load, pad = file["loads/1"], file["specimens/pad/coordinates"][()]
             cycles = [state.attrs["cycles"] for state in load["states"].values()]
             np.testing.assert_allclose(reader.time_values, cycles)

@@ -292,6 +292,7 @@ def test_section_lies_where_it_says(axis: str) -> None:
 # --- pictures -----------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("method", ["normal", "line"])
 def test_figures_say_what_the_summary_says(request: pytest.FixtureRequest, method: str) -> None:
     from matplotlib import rc_context

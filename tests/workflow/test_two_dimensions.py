@@ -47,8 +47,16 @@ def run_case(path: Path, folder: Path, *overrides: str) -> Run:
 
 @pytest.fixture(scope="module")
 def plane(plane_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
-    """The section of the default dovetail, with its pictures, not to be changed."""
-    run = run_case(plane_path, tmp_path_factory.mktemp("plane") / "out")
+    """The section of the default dovetail, not to be changed."""
+    run = run_case(plane_path, tmp_path_factory.mktemp("plane") / "out", *QUIET)
+    assert run.ending.exit_code == 0, run.ending.stderr
+    return run
+
+
+@pytest.fixture(scope="module")
+def pictured(plane_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
+    """The same with its pictures."""
+    run = run_case(plane_path, tmp_path_factory.mktemp("pictured") / "out")
     assert run.ending.exit_code == 0, run.ending.stderr
     return run
 
@@ -95,11 +103,12 @@ def test_only_what_a_section_has_is_warned_of(plane, plane_path, tmp_path):
     assert all("at the edge" in line and "end" not in line for line in warned)
 
 
-def test_figures_speak_of_lengths_and_strips(plane):
-    written = {path.stem for path in (plane.folder / "figures").iterdir()}
+@pytest.mark.slow
+def test_figures_speak_of_lengths_and_strips(pictured):
+    written = {path.stem for path in (pictured.folder / "figures").iterdir()}
     assert {"resultants", "pressure_profiles", "worn_profiles", "kinetics"} <= written
     assert "pressure_maps" not in written
-    with h5py.File(plane.folder / "results.h5") as file, matplotlib.rc_context(STYLE):
+    with h5py.File(pictured.folder / "results.h5") as file, matplotlib.rc_context(STYLE):
         assert set(figures_of(file)) == written
         texts = {}
         for name in ("resultants", "pressure_profiles", "worn_profiles", "kinetics"):
@@ -116,17 +125,20 @@ def test_figures_speak_of_lengths_and_strips(plane):
     assert not any("y = 0" in text or " x 1" in text for text in texts.values())
 
 
-def test_paraview_shows_strips_and_plane_bodies(plane):
+@pytest.mark.slow
+def test_paraview_shows_strips_and_plane_bodies(pictured):
     import pyvista as pv
 
-    reader = pv.get_reader(plane.folder / "paraview/intrados.pvd")
+    reader = pv.get_reader(pictured.folder / "paraview/intrados.pvd")
     reader.set_active_time_value(reader.time_values[0])
     strip = reader.read()[0]
     assert strip.dimensions == (129, 2, 1)
     assert strip.bounds[2:4] == pytest.approx((-0.5, 0.5))  # 1 mm of the slot: forces are per mm
     force = strip.cell_data["pressure"].sum() * 11.0 / 128
-    assert force == pytest.approx(plane.summary["intrados"]["peak_load"]["unworn"]["P"], rel=1e-5)
-    reader = pv.get_reader(plane.folder / "paraview/structure.pvd")
+    assert force == pytest.approx(
+        pictured.summary["intrados"]["peak_load"]["unworn"]["P"], rel=1e-5
+    )
+    reader = pv.get_reader(pictured.folder / "paraview/structure.pvd")
     assert reader.time_values == [0.0, 3e5]
     for body in reader.read():
         assert set(body.celltypes) == {pv.CellType.TRIANGLE}

@@ -19,6 +19,7 @@ def quiet(text):
     return text.replace("figures: true", "figures: false")
 
 
+@pytest.mark.slow
 def test_expectations_of_the_small_case_are_met(small_path, tmp_path):
     path = tmp_path / "small.yaml"
     path.write_text(quiet(small_path.read_text("utf-8")), encoding="utf-8")

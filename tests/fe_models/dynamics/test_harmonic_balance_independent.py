@@ -298,6 +298,7 @@ def check_pressed_rig(pressed, steady, resolutions, allowed):
     return np.array(errors)
 
 
+@pytest.mark.slow
 def test_contact_that_lifts_off_is_the_fixed_point_of_newmark():
     """31 harmonics and 1024 steps: both leave less than 1e-3, 15 harmonics ten times as much."""
     pressed = PressedRig(0.02)
