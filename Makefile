@@ -18,7 +18,7 @@ run: $(INSTALLED)
 	$(BIN)/fretscale run cases/dovetail.yaml --out out/dovetail --force
 
 test: $(TESTABLE)
-	@echo 'fretscale: style, types and layers, then the tests: about 6 minutes on two cores.'
+	@echo 'fretscale: style, types and layers, then the tests: 4 to 6 minutes on two cores.'
 	@$(MAKE) --no-print-directory lint
 	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2
 

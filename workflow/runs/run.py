@@ -103,13 +103,13 @@ def _run(case: Case, folder: OutputFolder, resume: bool, stays: Sequence[str] = 
         return bring_to_end(load_case(file), root)
 
     analysis = analysis_of(case)
+    reporter = Reporter(folder.reserve_log(), append=resume)
 
     def draw() -> None:
         with reporter.stage("paraview and figures"):
             if analysis.pictures is not None:
                 write_pictures(case.output, folder, analysis.pictures())
 
-    reporter = Reporter(folder.reserve_log(), append=resume)
     try:
         if stays:
             reporter.warn(

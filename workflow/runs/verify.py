@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from rich.table import Column, Table
 from workflow.errors import UserError
 from workflow.kinds import load_case
 from workflow.runs.run import run_case
+from workflow.shell.folder import OutputFolder
 
 COLUMNS = "expected", "computed", "error", "verdict", "source"
 # Columns of text where the table goes to a file.
@@ -32,7 +32,7 @@ def verify_cases(cases: tuple[Path, ...], out: Path) -> bool:
     for path, case in loaded:
         folder = out / Path(path).stem
         run_case(case, folder, force=True)
-        summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+        summary = OutputFolder(folder).read_summary()
         table = Table(Column("quantity", no_wrap=True), *COLUMNS, title=str(path), box=SIMPLE)
         for entry in case.expect:
             computed = _lookup(summary, entry.quantity, path)

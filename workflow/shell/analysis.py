@@ -56,7 +56,7 @@ class Pictures:
     processes: int = 0
 
 
-def _as_written(case: Any) -> tuple[Any, None]:
+def as_written(case: Any) -> tuple[Any, None]:
     """The case, and no record: nothing is to choose."""
     return case, None
 
@@ -118,6 +118,6 @@ class Analysis(Generic[AnyCase]):
     memory: Callable[[AnyCase], Memory]
     pictures: Callable[[], Pictures] | None = None
     resumable: Callable[[OutputFolder], bool] | None = None
-    choose: Callable[[AnyCase], tuple[AnyCase, dict[str, Any] | None]] = _as_written
+    choose: Callable[[AnyCase], tuple[AnyCase, dict[str, Any] | None]] = as_written
     comparison: Comparison[AnyCase] = Comparison()
     write_loads: Callable[[AnyCase, str, Path, bool], Sequence[str]] | None = None

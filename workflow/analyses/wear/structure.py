@@ -8,6 +8,7 @@ from math import prod
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from workflow.analyses.wear.case.base import WearCase
+from workflow.shell.analysis import as_written
 from workflow.shell.memory import Memory, factor_bytes
 
 if TYPE_CHECKING:
@@ -32,10 +33,6 @@ def memory(case: WearCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:
     return Memory(dense + contact, "lower contact.grid", factor_bytes(nodes))
 
 
-def _as_written(case: Any) -> tuple[Any, None]:
-    return case, None
-
-
 def _nothing_to_warn_of(case: Any, stage: ContactStage, load: float) -> Iterator[str]:
     return iter(())
 
@@ -54,5 +51,5 @@ class WearStructure(Generic[AnyWearCase]):
     case: type[AnyWearCase]
     source: Callable[[AnyWearCase], LoadSource]
     memory: Callable[[AnyWearCase, int, int], Memory] = memory
-    choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = _as_written
+    choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = as_written
     warnings: Callable[[AnyWearCase, ContactStage, float], Iterator[str]] = _nothing_to_warn_of
