@@ -263,7 +263,7 @@ class LoadHistory:
 
     @classmethod
     def mix(cls, cycles: Sequence[LoadHistory], shares: Sequence[float]) -> LoadHistory:
-        """Closed ``cycles`` of one block each, of which each is so large a share of all cycles."""
+        """Closed ``cycles`` of one mission each, each so large a share of all cycles."""
         lengths = [len(cycle) for cycle in cycles]
         columns = {
             column.name: np.concatenate([getattr(cycle, column.name) for cycle in cycles])
@@ -274,8 +274,13 @@ class LoadHistory:
         return cls(**columns)
 
     @property
-    def blocks(self) -> list[slice]:
-        """The increments of each closed cycle."""
+    def resultants(self) -> Array:
+        """P, Qx, Qy, Mx, My and Mz ``(n, 6)``."""
+        return np.stack([self.P, self.Qx, self.Qy, self.Mx, self.My, self.Mz], axis=1)
+
+    @property
+    def missions(self) -> list[slice]:
+        """The increments of each mission, a closed cycle."""
         begins = np.flatnonzero(np.diff(self.block, prepend=-1)).tolist()
         return [slice(*ends) for ends in pairwise([*begins, len(self)])]
 

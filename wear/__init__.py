@@ -12,8 +12,9 @@ What is worn, in which steps
     - ``InterfaceSettings``: grid, gap, materials and laws of the contact of one interface.
     - ``CellNodes``: the transfer of a face whose nodes are the cells of its grid.
     - ``InterfaceContact``: such a contact, and how it wears under a cycle.
-    - ``Explicit``, ``Implicit``: steppers of first order.
-    - ``Heun``, ``SecondOrder``: of second order, at known pressures and at those solved for.
+    - ``ExplicitStepper``, ``ImplicitStepper``: steppers of first order.
+    - ``HeunStepper``, ``SecondOrderStepper``: of second order, at known pressures and at those
+      solved for.
     - ``ErrorControl``: the error of the depth that chooses their length.
     - ``ContactFailure``: a contact problem in between did not converge.
 
@@ -21,7 +22,7 @@ The coupled loop
     - ``CycleLoads``: what a contact carries over a closed cycle.
     - ``ConstantLoads``: a source of loads that wear does not change.
     - ``CoupledSettings``, ``JumpSize``, ``Stop``: how far it goes, and when loads are solved again.
-    - ``ContactsInTurn``: contacts that wear one after the other.
+    - ``Contacts``: the contacts of all interfaces, which wear one after the other.
     - ``CoupledWear``: loads, contacts, wear, and worn gaps that change the loads.
     - ``CoupledState``: all that a run needs to go on.
     - ``Observer``: what looks on.
@@ -40,12 +41,12 @@ cylinder of 10 mm that is pressed by 50 N/mm and slides 40 µm a cycle:
 >>> contact = InterfaceSettings(
 ...     name="cylinder", grid=grid, gap=grid.x**2 / 20.0, transfer=CellNodes(grid),
 ...     pair=ElasticPair(steel, steel), laws=(EnergyLaw(5e-9), EnergyLaw(5e-9)),
-...     friction=lambda energy: 0.5, stepper=Implicit(ErrorControl(0.01)),
+...     friction=lambda energy: 0.5, stepper=ImplicitStepper(ErrorControl(0.01)),
 ... )
 >>> zero, slip = np.zeros(1), np.zeros((1, 2, 70))
 >>> slip[:, 0] = 0.04
 >>> loads = [CycleLoads(LoadHistory(zero + 50.0, *[zero] * 7, sliding=zero == 0.0), slip)]
->>> contacts = ContactsInTurn([InterfaceContact(contact)])
+>>> contacts = Contacts([InterfaceContact(contact)])
 >>> loop = CoupledWear(CoupledSettings(cycles=1e5), ConstantLoads(loads), contacts)
 >>> state, first = loop.begin(loads)
 >>> *_, end = loop.march(state)
@@ -62,7 +63,7 @@ from sa_solver.lazy import lazy_names
 if TYPE_CHECKING:
     from wear.coupled import (
         ConstantLoads,
-        ContactsInTurn,
+        Contacts,
         CoupledSettings,
         CoupledState,
         CoupledWear,
@@ -75,7 +76,13 @@ if TYPE_CHECKING:
     from wear.kinetics import linear_regime
     from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
     from wear.life import findley, ruiz, smith_watson_topper
-    from wear.steppers import ErrorControl, Explicit, Heun, Implicit, SecondOrder
+    from wear.steppers import (
+        ErrorControl,
+        ExplicitStepper,
+        HeunStepper,
+        ImplicitStepper,
+        SecondOrderStepper,
+    )
     from wear.stepping import ContactFailure
 
 __all__ = [
@@ -83,7 +90,7 @@ __all__ = [
     "CellNodes",
     "ConstantLoads",
     "ContactFailure",
-    "ContactsInTurn",
+    "Contacts",
     "CoupledSettings",
     "CoupledState",
     "CoupledWear",
@@ -93,14 +100,14 @@ __all__ = [
     "EnergyTable",
     "ErrorControl",
     "EvolvingLaw",
-    "Explicit",
-    "Heun",
-    "Implicit",
+    "ExplicitStepper",
+    "HeunStepper",
+    "ImplicitStepper",
     "InterfaceContact",
     "InterfaceSettings",
     "JumpSize",
     "Observer",
-    "SecondOrder",
+    "SecondOrderStepper",
     "Stop",
     "WearLaw",
     "findley",
@@ -113,7 +120,7 @@ __getattr__, __dir__ = lazy_names(
     __name__,
     {
         "coupled": (
-            *("ConstantLoads", "ContactsInTurn", "CoupledSettings", "CoupledState"),
+            *("ConstantLoads", "Contacts", "CoupledSettings", "CoupledState"),
             *("CoupledWear", "JumpSize", "Observer", "Stop"),
         ),
         "evolution": ("EnergyTable",),
@@ -121,7 +128,10 @@ __getattr__, __dir__ = lazy_names(
         "kinetics": ("linear_regime",),
         "laws": ("ArchardLaw", "EnergyAmplitudeLaw", "EnergyLaw", "EvolvingLaw", "WearLaw"),
         "life": ("findley", "ruiz", "smith_watson_topper"),
-        "steppers": ("ErrorControl", "Explicit", "Heun", "Implicit", "SecondOrder"),
+        "steppers": (
+            *("ErrorControl", "ExplicitStepper", "HeunStepper", "ImplicitStepper"),
+            "SecondOrderStepper",
+        ),
         "stepping": ("ContactFailure",),
     },
 )

@@ -12,7 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, ExitStack, contextmanager, nullcontext
 from dataclasses import dataclass, replace
-from typing import Literal, NamedTuple, Protocol
+from typing import Any, Literal, Protocol, TypeVar
 
 import numpy as np
 
@@ -35,6 +35,7 @@ AT_STOP = 1e-3
 """How near to a stop a run must come: a jump that is to reach it is cut short to do so."""
 
 Stage = Literal["first cycle", "wear", "probe", "loads"]
+Number = TypeVar("Number", int, float)
 
 
 # --- what is given --------------------------------------------------------------------------------
@@ -129,74 +130,53 @@ class ConstantLoads:
 
     def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
         """Resultants where each contact is loaded most."""
-        rows = []
-        for own in self.histories:
-            loads, t = own.loads, int(np.argmax(own.loads.P))
-            columns = loads.P, loads.Qx, loads.Qy, loads.Mx, loads.My, loads.Mz
-            rows.append([column[t] for column in columns])
-        return np.array(rows)
+        return np.array([h.loads.resultants[int(np.argmax(h.loads.P))] for h in self.histories])
 
 
-class Contacts(Protocol):
-    """The contacts of all interfaces, which may wear side by side.
+class Contacts:
+    """The contacts of all interfaces, which wear one after the other in this process.
 
-    See :class:`wear.interface.InterfaceContact` for what each method does to one of them.
+    See :class:`wear.interface.InterfaceContact` for what each method does to one of them. Those of
+    a subclass may wear side by side: it answers :meth:`call`.
     """
-
-    @property
-    def grids(self) -> Sequence[Grid]: ...
-
-    def begin(
-        self, histories: Sequence[FaceLoads], cycles: float
-    ) -> Sequence[tuple[InterfaceState, FirstContact]]: ...
-
-    def jump(
-        self, states: Sequence[InterfaceState], cycles: float, left: float
-    ) -> Sequence[tuple[InterfaceState, Spent]]: ...
-
-    def follow(
-        self, states: Sequence[InterfaceState], histories: Sequence[FaceLoads]
-    ) -> Sequence[InterfaceState]: ...
-
-    def nodal_depths(self, states: Sequence[InterfaceState]) -> list[Array]: ...
-
-
-class ContactsInTurn:
-    """Contacts that wear one after the other, in this process."""
 
     def __init__(self, contacts: Sequence[InterfaceContact]) -> None:
         self.contacts = contacts
 
+    def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
+        """Call a method of every contact, each with its own share of the ``arguments``."""
+        answers = []
+        for contact, *shares in zip(self.contacts, *arguments, strict=True):
+            with failures_of(contact.name):
+                answers.append(getattr(contact, method)(*shares))
+        return answers
+
+    def each(self, number: Number) -> list[Number]:
+        """The same for every contact."""
+        return [number] * len(self.contacts)
+
     @property
-    def grids(self) -> Sequence[Grid]:
-        return [own.grid for own in self.contacts]
+    def grids(self) -> list[Grid]:
+        return [contact.grid for contact in self.contacts]
 
     def begin(
         self, histories: Sequence[FaceLoads], cycles: float
     ) -> list[tuple[InterfaceState, FirstContact]]:
-        begun = []
-        for own, history in zip(self.contacts, histories, strict=True):
-            with failures_of(own.name):
-                begun.append(own.begin(history, cycles))
-        return begun
+        return self.call("begin", histories, self.each(cycles))
 
     def jump(
         self, states: Sequence[InterfaceState], cycles: float, left: float
     ) -> list[tuple[InterfaceState, Spent]]:
-        jumped = []
-        for own, state in zip(self.contacts, states, strict=True):
-            with failures_of(own.name):
-                jumped.append(own.jump(state, cycles, left))
-        return jumped
+        return self.call("jump", states, self.each(cycles), self.each(left))
 
     def follow(
         self, states: Sequence[InterfaceState], histories: Sequence[FaceLoads]
     ) -> list[InterfaceState]:
         triples = zip(self.contacts, states, histories, strict=True)
-        return [own.follow(state, history) for own, state, history in triples]
+        return [contact.follow(state, history) for contact, state, history in triples]
 
     def nodal_depths(self, states: Sequence[InterfaceState]) -> list[Array]:
-        return [own.nodal_depth(s) for own, s in zip(self.contacts, states, strict=True)]
+        return [c.nodal_depth(state) for c, state in zip(self.contacts, states, strict=True)]
 
 
 # --- what comes out -------------------------------------------------------------------------------
@@ -229,12 +209,12 @@ class CoupledState:
     @property
     def depth(self) -> float:
         """Largest depth that any body has lost [mm]."""
-        return _worn(self.kinetics[-1]).depth
+        return _depth(self.kinetics[-1])
 
     @property
     def volume(self) -> float:
         """Volume that all bodies have lost [mm³]."""
-        return _worn(self.kinetics[-1]).volume
+        return _volume(self.kinetics[-1])
 
     def record(self, cycles: float, cell_areas: list[float], drift: float) -> CoupledState:
         """The state with a row of kinetics added."""
@@ -283,7 +263,7 @@ class CoupledWear:
         """
         with self._stage("first cycle"):
             begun = self.contacts.begin(unworn, self.settings.cycles)
-        interfaces = tuple(own for own, _ in begun)
+        interfaces = tuple(unworn_state for unworn_state, _ in begun)
         state = CoupledState(
             interfaces=interfaces,
             cycles=np.empty(0),
@@ -297,33 +277,33 @@ class CoupledWear:
 
     def march(self, state: CoupledState) -> Iterator[CoupledState]:
         """The states after every jump from ``state``, until cycles are over or a stop is met."""
-        for own in self.observers:
-            own.begin(state)
+        for observer in self.observers:
+            observer.begin(state)
         while not self.settings.ended(state):
             before, state = state, self._jump(state)
-            for own in self.observers:
-                own.jumped(before, state)
+            for observer in self.observers:
+                observer.jumped(before, state)
             yield state
 
     @contextmanager
     def _stage(self, name: Stage) -> Iterator[None]:
         with ExitStack() as stack:
-            for own in self.observers:
-                stack.enter_context(own.stage(name))
+            for observer in self.observers:
+                stack.enter_context(observer.stage(name))
             yield
 
     # -- one jump ----------------------------------------------------------------------------------
     def _jump(self, state: CoupledState) -> CoupledState:
         cycles, spent = self._jump_cycles(state), Spent()
-        for own in self.observers:
-            own.jumping(state, cycles)
+        for observer in self.observers:
+            observer.jumping(state, cycles)
         # The run ends at a stop if it comes to that.
         left = max(cycles, min(self._left(state), self._to_stop(state)))
         while True:
             with self._stage("wear"):
                 jumped = self.contacts.jump(state.interfaces, cycles, left)
-            spent = sum((found for _, found in jumped), spent)
-            interfaces = tuple(found for found, _ in jumped)
+            spent = sum((further for _, further in jumped), spent)
+            interfaces = tuple(worn for worn, _ in jumped)
             shorter = cycles * self._share_to_stop(state, interfaces)
             if shorter == cycles or cycles <= 1.0:
                 break
@@ -337,13 +317,11 @@ class CoupledWear:
         size, left = self.settings.jump, self._left(state)
         if size.cycles is not None:
             cycles = size.cycles
-        elif size.depth is not None:
-            cycles = _quotient(size.depth, _depth_rate(state))
-        elif size.volume is not None:
-            cycles = _quotient(size.volume, _volume_rate(state))
+        elif size.depth is not None or size.volume is not None:
+            cycles = _cycles_to(size.depth, size.volume, state)
         else:
             # The steps that are left, all of one length: none of them is a mere remainder.
-            proposed = min(own.next_cycles for own in state.interfaces)
+            proposed = min(interface.next_cycles for interface in state.interfaces)
             cycles = left / max(1.0, np.ceil(left / proposed * (1.0 - ROUNDING)))
         cycles = min(cycles, self._to_stop(state))
         return left if cycles > left * (1.0 - ROUNDING) else float(cycles)
@@ -355,19 +333,16 @@ class CoupledWear:
     def _to_stop(self, state: CoupledState) -> float:
         """Cycles to the nearest stop at the present rates, one at least."""
         stop = self.settings.stop
-        to_depth = to_volume = np.inf
-        if stop.depth is not None:
-            to_depth = _quotient(stop.depth - state.depth, _depth_rate(state))
-        if stop.volume is not None:
-            to_volume = _quotient(stop.volume - state.volume, _volume_rate(state))
-        return max(1.0, min(to_depth, to_volume))
+        depth = None if stop.depth is None else stop.depth - state.depth
+        volume = None if stop.volume is None else stop.volume - state.volume
+        return max(1.0, _cycles_to(depth, volume, state))
 
     def _share_to_stop(self, before: CoupledState, interfaces: Sequence[InterfaceState]) -> float:
         """Share of a jump at which it came to a stop that it went past; else 1."""
-        after, stop, share = _worn(_kinetics(interfaces, self._areas)), self.settings.stop, 1.0
+        after, stop, share = _kinetics(interfaces, self._areas), self.settings.stop, 1.0
         for limit, then, now in (
-            (stop.depth, before.depth, after.depth),
-            (stop.volume, before.volume, after.volume),
+            (stop.depth, before.depth, _depth(after)),
+            (stop.volume, before.volume, _volume(after)),
         ):
             if limit is not None and now > limit * (1.0 + AT_STOP):
                 share = min(share, (limit - then) / (now - then))
@@ -401,45 +376,38 @@ class CoupledWear:
     def _friction(self, interfaces: Sequence[InterfaceState]) -> list[float] | None:
         """Coefficients of friction of the interfaces, where they change."""
         friction = self.settings.friction
-        return None if friction is None else [friction(own.energy) for own in interfaces]
+        return None if friction is None else [friction(worn.energy) for worn in interfaces]
 
     @property
     def _areas(self) -> list[float]:
         return [grid.cell_area for grid in self.contacts.grids]
 
 
-class _Worn(NamedTuple):
-    """Largest depth of either body [mm] and volume of all [mm³]."""
-
-    depth: float
-    volume: float
+def _depth(kinetics: Array) -> float:
+    """Largest depth of any body [mm] in a row of kinetics ``(interfaces, 5)``."""
+    return float(kinetics[:, :2].max())
 
 
-def _worn(kinetics: Array) -> _Worn:
-    """Of a row of kinetics ``(interfaces, 5)``."""
-    last = dict(zip(KINETICS, kinetics.T, strict=True))
-    depth = max(last["depth_1"].max(), last["depth_2"].max())
-    return _Worn(float(depth), float((last["volume_1"] + last["volume_2"]).sum()))
+def _volume(kinetics: Array) -> float:
+    """Volume of all bodies [mm³] in a row of kinetics ``(interfaces, 5)``."""
+    return float(kinetics[:, 2:4].sum(axis=1).sum())
 
 
 def _kinetics(interfaces: Sequence[InterfaceState], cell_areas: Sequence[float]) -> Array:
     """Depths, volumes and energy of all interfaces ``(interfaces, 5)``."""
     rows = []
-    for own, area in zip(interfaces, cell_areas, strict=True):
-        depths = own.surfaces.depths
+    for interface, area in zip(interfaces, cell_areas, strict=True):
+        depths = interface.surfaces.depths
         volumes = (float(depth.sum()) * area for depth in depths)
-        rows.append([*(float(depth.max()) for depth in depths), *volumes, own.energy])
+        rows.append([*(float(depth.max()) for depth in depths), *volumes, interface.energy])
     return np.array(rows)
 
 
-def _depth_rate(state: CoupledState) -> float:
-    return max(own.depth_rate for own in state.interfaces)
-
-
-def _volume_rate(state: CoupledState) -> float:
-    return sum(own.volume_rate for own in state.interfaces)
-
-
-def _quotient(limit: float, rate: float) -> float:
-    """Cycles to a limit; all that remain where nothing wears."""
-    return limit / rate if rate > 0.0 else np.inf
+def _cycles_to(depth: float | None, volume: float | None, state: CoupledState) -> float:
+    """Cycles in which the present rates wear so much more [mm, mm³]; infinite where they do not."""
+    limits = (
+        (depth, max(interface.depth_rate for interface in state.interfaces)),
+        (volume, sum(interface.volume_rate for interface in state.interfaces)),
+    )
+    cycles = [limit / rate for limit, rate in limits if limit is not None and rate > 0.0]
+    return min(cycles, default=np.inf)

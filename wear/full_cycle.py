@@ -11,6 +11,7 @@ import numpy as np
 
 from sa_solver.contact import ContactLoad, ContactState, FrictionalContact
 from sa_solver.errors import ContactProblemError
+from sa_solver.history import ContactLoadPath
 from sa_solver.types import Array, LoadHistory
 from wear.stepping import ContactFailure
 
@@ -22,7 +23,7 @@ def march_cycle(
 
     ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies, or ``(t, nx, ny)`` that at the
     place of each increment. A cycle that ends with the bodies apart is closed; any other is marched
-    twice, and the second pass counts. In a mix every block is such a cycle of its own, begun with
+    twice, and the second pass counts. In a mix every mission is such a cycle of its own, begun with
     the bodies apart. ``motion`` ``(t, 2)`` [mm] of body 2 over body 1 in each increment, far from
     the contact, is imposed in the place of Qx, Qy and Mz, without twist; the bodies meet in the
     middle of it.
@@ -32,12 +33,10 @@ def march_cycle(
     """
     states: list[ContactState] = []
     heights = np.broadcast_to(height, (len(loads), *contact.grid.shape))
-    for block in loads.blocks:
-        increments = [_force(loads, t) for t in range(block.start, block.stop)]
-        if motion is not None:
-            shifts = _shifts(motion[block])
-            increments = [_motion(loads, t, shift) for t, shift in enumerate(shifts, block.start)]
-        states += _closed_cycle(contact, heights[block], increments, block.start)
+    path = _path(loads, motion)
+    for mission in loads.missions:
+        increments = [path.load(t) for t in range(mission.start, mission.stop)]
+        states += _closed_cycle(contact, heights[mission], increments, mission.start)
     return states
 
 
@@ -65,17 +64,14 @@ def _shifts(motion: Array) -> Array:
     return shifts
 
 
-def _force(loads: LoadHistory, t: int) -> ContactLoad:
-    """The resultants of an increment, and what it dissipates."""
-    columns = (loads.P, loads.Qx, loads.Qy, loads.Mx, loads.My, loads.Mz)
-    values = np.array([column[t] for column in columns])
-    return ContactLoad(values, energy=np.array([loads.Edx[t], loads.Edy[t]]))
-
-
-def _motion(loads: LoadHistory, t: int, shift: Array) -> ContactLoad:
-    """The pressing resultants of an increment, and the shift (2,) [mm] of body 1."""
-    values = np.array([loads.P[t], *shift, loads.Mx[t], loads.My[t], 0.0])
-    return ContactLoad(values, motion=(False, True, True, False, False, True))
+def _path(loads: LoadHistory, motion: Array | None) -> ContactLoadPath:
+    """The resultants of all increments and what these dissipate, or the shifts of body 1."""
+    values = loads.resultants
+    if motion is None:
+        return ContactLoadPath(values, energy=np.stack([loads.Edx, loads.Edy], axis=1))
+    values[:, 1:3] = np.concatenate([_shifts(motion[mission]) for mission in loads.missions])
+    values[:, 5] = 0.0
+    return ContactLoadPath(values, motion=(False, True, True, False, False, True))
 
 
 def _advance(

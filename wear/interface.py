@@ -112,7 +112,7 @@ class InterfaceSettings:
     tolerance: float = 1e-8
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, kw_only=True)
 class InterfaceState(WearState):
     """What an interface must remember between two jumps.
 
@@ -211,27 +211,12 @@ class InterfaceContact:
     """
 
     def __init__(self, settings: InterfaceSettings) -> None:
-        self.settings = settings
+        self.settings, self.name = settings, settings.name
+        self.grid, self.transfer, self.pair = settings.grid, settings.transfer, settings.pair
         self._contact = NormalContact(HalfSpace(settings.grid, settings.pair))
         self._frictional: FrictionalContact | None = None
         self._spent = Spent()
         self._current: tuple[tuple[Array, ...], _Loaded] | None = None
-
-    @property
-    def name(self) -> str:
-        return self.settings.name
-
-    @property
-    def grid(self) -> Grid:
-        return self.settings.grid
-
-    @property
-    def transfer(self) -> Transfer:
-        return self.settings.transfer
-
-    @property
-    def pair(self) -> ElasticPair:
-        return self.settings.pair
 
     # -- wear ------------------------------------------------------------------------------------
     def begin(self, history: FaceLoads, cycles: float) -> tuple[InterfaceState, FirstContact]:
@@ -239,23 +224,21 @@ class InterfaceContact:
 
         At every loaded increment. Raises :class:`MotionError`.
         """
-        unworn = WearState.unworn(self.settings.gap)
-        state = InterfaceState(
-            **vars(unworn), loads=history.loads, slip=history.slip, ends=np.empty((0, 2, 2))
+        state = InterfaceState.unworn(
+            self.settings.gap, loads=history.loads, slip=history.slip, ends=np.empty((0, 2, 2))
         )
-        loaded = np.flatnonzero(history.loads.P > 0.0).tolist()
-        before, own = self._spent, self._loaded(state)
-        result = own.contact.cycle(state, loaded)
+        before, loaded = self._spent, self._loaded(state)
+        result = loaded.contact.cycle(state, np.flatnonzero(history.loads.P > 0.0).tolist())
         depth_rate, volume_rate = result.per_cycle(self.grid.cell_area)
-        starts = {t: found.start for t, found in result.states.items()}
+        starts = {t: solved.start for t, solved in result.states.items()}
         state = replace(
             state,
             depth_rate=depth_rate,
             volume_rate=volume_rate,
             starts=starts,
-            ends=self._ends(own.slip, starts, history.loads),
+            ends=self._ends(loaded.slip, starts, history.loads),
         )
-        first_step = first_cycles(own.contact, state, cycles)
+        first_step = first_cycles(loaded.contact, state, cycles)
         states = result.states.values()
         return replace(state, next_cycles=first_step), FirstContact(
             energy=result.energy,
@@ -263,8 +246,8 @@ class InterfaceContact:
             touches_border=any(s.touches_border for s in states),
             largest_residual=max((s.residuals.largest for s in states), default=0.0),
             spent=self._spent - before + Spent(len(states), result.convolutions),
-            stable_cycles=own.contact.stable_cycles(state),
-            cycle=own.cycle,
+            stable_cycles=loaded.contact.stable_cycles(state),
+            cycle=loaded.cycle,
         )
 
     def follow(self, state: InterfaceState, history: FaceLoads) -> InterfaceState:
@@ -299,27 +282,26 @@ class InterfaceContact:
     # -- tractions ---------------------------------------------------------------------------------
     def fields(self, state: InterfaceState, increment: int) -> ContactFields:
         """Tractions and slip of an increment on the present surfaces."""
-        own = self._loaded(state)
-        if own.cycle:
-            found = own.cycle[increment]
-            return ContactFields(found.pressure, found.shear, found.slip)
+        loaded = self._loaded(state)
+        if loaded.cycle:
+            solved = loaded.cycle[increment]
+            return ContactFields(solved.pressure, solved.shear, solved.slip)
         slip, start = self.transfer.to_cells(state.slip[increment]), state.starts.get(increment)
-        pressure = own.contact.solve(state.surfaces, increment, start).pressure
+        pressure = loaded.contact.solve(state.surfaces, increment, start).pressure
         return ContactFields(pressure, self._sliding_shear(pressure, slip, state.energy), slip)
 
     def tractions(self, state: InterfaceState) -> CycleTractions:
         """Tractions of a cycle on the present surfaces."""
-        own = self._loaded(state)
-        if own.cycle:
-            return _own_tractions(own.cycle)
-        loaded = np.flatnonzero(state.loads.P > 0.0).tolist()
-        result = own.contact.cycle(state, loaded)
+        loaded = self._loaded(state)
+        if loaded.cycle:
+            return _half_space_tractions(loaded.cycle)
+        result = loaded.contact.cycle(state, np.flatnonzero(state.loads.P > 0.0).tolist())
         return self._given_tractions(state.slip, self._pressure(result), state.energy)
 
     def unworn_tractions(self, history: FaceLoads, first: FirstContact) -> CycleTractions:
         """Tractions of the first cycle, solved already."""
         if first.cycle:
-            return _own_tractions(first.cycle)
+            return _half_space_tractions(first.cycle)
         return self._given_tractions(history.slip, first.pressure, 0.0)
 
     def frictional(self, energy: float) -> FrictionalContact:
@@ -351,13 +333,12 @@ class InterfaceContact:
             key = *key, state.surfaces.gap, state.surfaces.depth_1
         if self._current is not None and all(map(np.array_equal, self._current[0], key)):
             return self._current[1]
-        ways = passages(self.grid, state.ends)
-        slip = self.transfer.to_cells(state.slip)
+        slip, ways = self.transfer.to_cells(state.slip), passages(self.grid, state.ends)
         sliding = SlidingCycle(state.loads, np.hypot(slip[:, 0], slip[:, 1]), None, ways)
         cycle: tuple[ContactState, ...] = ()
         if settings.method == "full":
-            cycle = self._own_cycle(state, sliding)
-            slip = np.stack([own.slip for own in cycle])
+            cycle = self._half_space_cycle(state, sliding)
+            slip = np.stack([increment.slip for increment in cycle])
             sizes = np.hypot(slip[:, 0], slip[:, 1])
             sliding = replace(sliding, slip=sizes, uplift=self._uplift(cycle))
         contact = WearingContact(
@@ -366,12 +347,14 @@ class InterfaceContact:
         self._current = key, _Loaded(contact, slip, cycle)
         return self._current[1]
 
-    def _own_cycle(self, state: InterfaceState, sliding: SlidingCycle) -> tuple[ContactState, ...]:
+    def _half_space_cycle(
+        self, state: InterfaceState, sliding: SlidingCycle
+    ) -> tuple[ContactState, ...]:
         """The closed cycle with the half-space's own friction, on the present surfaces."""
         gaps = np.stack([sliding.gap(state.surfaces, t) for t in range(len(state.loads))])
         motion = state.slip.mean(axis=2) if self.settings.driven else None
         cycle = tuple(march_cycle(self.frictional(state.energy), gaps, state.loads, motion))
-        self._spent += Spent(len(cycle), sum(own.convolutions for own in cycle))
+        self._spent += Spent(len(cycle), sum(increment.convolutions for increment in cycle))
         return cycle
 
     def _uplift(self, cycle: tuple[ContactState, ...]) -> Array | None:
@@ -379,7 +362,7 @@ class InterfaceContact:
         if self.pair.similar:
             return None
         half_space = self._contact.half_space
-        return np.stack([half_space.normal_under_shear(own.shear) for own in cycle])
+        return np.stack([half_space.normal_under_shear(increment.shear) for increment in cycle])
 
     def _ends(self, slip: Array, starts: Starts, loads: LoadHistory) -> Array:
         """Where body 2 is before and after each increment, if its motion is to be followed."""
@@ -387,7 +370,7 @@ class InterfaceContact:
         for start in starts.values():
             pressure += start.pressure
         law = self.settings.laws[0]
-        ends = followed(self.grid, slip, pressure, loads.blocks, self.settings.follow)
+        ends = followed(self.grid, slip, pressure, loads.missions, self.settings.follow)
         if len(ends) and isinstance(law, EvolvingLaw) and law.scope == "local":
             raise MotionError(
                 "the surfaces move over each other, and that of body 1 changes from place to "
@@ -423,9 +406,10 @@ class InterfaceContact:
         return shear
 
 
-def _own_tractions(cycle: tuple[ContactState, ...]) -> CycleTractions:
+def _half_space_tractions(cycle: tuple[ContactState, ...]) -> CycleTractions:
     """Tractions where the half-space has its own friction: known everywhere."""
     pressure, shear, slip = (
-        np.stack([getattr(own, name) for own in cycle]) for name in ("pressure", "shear", "slip")
+        np.stack([getattr(increment, name) for increment in cycle])
+        for name in ("pressure", "shear", "slip")
     )
     return CycleTractions(pressure, shear, slip, np.zeros(len(cycle)))

@@ -187,17 +187,17 @@ def followed(
     grid: Grid,
     slip: Array,
     pressure: Array,
-    blocks: Sequence[slice] = (slice(None),),
+    missions: Sequence[slice] = (slice(None),),
     forced: bool | None = None,
 ) -> Array:
     """Offsets of body 2 before and after each increment ``(t, 2, 2)`` [mm], if they count.
 
     ``(0, 2, 2)`` where the motion does not count. ``slip`` ``(t, 2, nx, ny)`` [mm] is that of the
     increments and ``pressure`` ``(nx, ny)`` that of the whole cycle, see :func:`offsets`;
-    ``blocks`` are the increments of each closed cycle of a mix. Motion that counts in one block
+    ``missions`` are the increments of each closed cycle of a mix. Motion that counts in one
     (:func:`moves`) is followed in all; ``forced`` says instead whether to follow it.
     """
-    paths = [offsets(slip[block], pressure) for block in blocks]
+    paths = [offsets(slip[mission], pressure) for mission in missions]
     if forced is None:
         forced = any(moves(path, pressure > 0.0, grid) for path in paths)
     if not forced:

@@ -49,12 +49,7 @@ class NodalCycle(Protocol):
 class NodalState(WornState):
     """What the wear of nodes must remember: ``start`` is that of the cycle that led to it."""
 
-    start: object
-
-    @classmethod
-    def unworn(cls, gap: Array) -> NodalState:
-        """Before the first cycle, at the gap ``(n,)`` [mm] of the unloaded bodies."""
-        return cls(**vars(WornState.of(gap)), start=None)
+    start: object = None
 
 
 @dataclass(frozen=True)
@@ -71,7 +66,7 @@ class NodalContact:
     @property
     def work(self) -> Array:
         """Energy per area that each node dissipates in a cycle ``(n,)`` [N/mm]."""
-        return _mean([own.friction * (own.slip * own.pressure).sum(axis=0) for own in self.cycles])
+        return _mean([c.friction * (c.slip * c.pressure).sum(axis=0) for c in self.cycles])
 
     @property
     def energy(self) -> float:
@@ -86,26 +81,25 @@ class NodalContact:
     def wear(self, state: NodalState, cycles: float = 0.0) -> tuple[Array, Array]:
         """Depths that body 1 and body 2 lose per cycle in a step of so many, ``(n,)`` each [mm]."""
         lost: tuple[list[Array], list[Array]] = [], []
-        for own in self.cycles:
-            for body, depth in zip(lost, self._per_pressure(own, state, cycles), strict=True):
-                body.append((depth * own.pressure).sum(axis=0))
+        for cycle in self.cycles:
+            for body, depth in zip(lost, self._per_pressure(cycle, state, cycles), strict=True):
+                body.append((depth * cycle.pressure).sum(axis=0))
         return _mean(lost[0]), _mean(lost[1])
 
     def stable_cycles(self, state: NodalState, cycles: float = 0.0) -> float:
         """Longest explicit step in which no error grows, by the laws of a step of ``cycles``."""
         limits = []
-        for own in self.cycles:
-            wear_1, wear_2 = self._per_pressure(own, state, cycles)
-            limits.append(own.stable_cycles((wear_1 + wear_2).sum(axis=0)))
+        for cycle in self.cycles:
+            wear_1, wear_2 = self._per_pressure(cycle, state, cycles)
+            limits.append(cycle.stable_cycles((wear_1 + wear_2).sum(axis=0)))
         return min(limits)
 
     def explicit_step(self, state: NodalState, cycles: float) -> WearStep[NodalState]:
         """Wear ``cycles`` cycles at these pressures and slips."""
         (depth_1, depth_2), work = self.wear(state, cycles), self.work
-        fields = (cycles * own for own in (depth_1, depth_2, work, work))
         after = replace(
             state,
-            surfaces=state.surfaces.worn(*fields),
+            surfaces=state.surfaces.worn(*(cycles * f for f in (depth_1, depth_2, work, work))),
             energy=state.energy + cycles * self.energy,
             depth_rate=float(max(depth_1.max(), depth_2.max())),
             volume_rate=float((depth_1 + depth_2) @ self.areas),

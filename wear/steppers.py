@@ -25,6 +25,7 @@ itself, undamped: where slip follows from wear, as in partial slip, no pressure 
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Generic, Protocol, Self, TypeVar
@@ -99,7 +100,7 @@ class AveragedContact(ExplicitContact[State], Protocol[State]):
 
 
 @dataclass(frozen=True)
-class Explicit:
+class ExplicitStepper:
     """Explicit Euler: steps of ``fraction`` times the stability limit, of so many ``cycles``, or as
     long as may be.
 
@@ -130,7 +131,7 @@ class Explicit:
 
 
 @dataclass(frozen=True)
-class Heun:
+class HeunStepper:
     """Heun's method, of second order: at the mean of the contact before and after an explicit step.
 
     Steps of at most a ``share`` of the stability limit, and such that the explicit step differs by
@@ -179,7 +180,7 @@ class Heun:
                 shortest=_shortest(self.share * min(ends)),
             )
 
-        return _tried(trial, first)
+        return _accepted(trial, first)
 
 
 def _stable(contact: ExplicitContact[State], state: State, most: float, fraction: float) -> float:
@@ -206,15 +207,15 @@ class _Trial(Generic[State]):
     shortest: float
 
 
-def _tried(trial: Callable[[float], _Trial[State]], cycles: float) -> WearStep[State]:
+def _accepted(attempt: Callable[[float], _Trial[State]], cycles: float) -> WearStep[State]:
     """A step whose error fits, begun with so many cycles; what all attempts have taken is its."""
     spent = Spent()
     while True:
-        found = trial(cycles)
-        spent += found.step.spent
-        if found.fits or cycles <= found.shortest:
-            return replace(found.step, spent=replace(spent, steps=found.step.spent.steps))
-        cycles = max(found.shorter, found.shortest)
+        trial = attempt(cycles)
+        spent += trial.step.spent
+        if trial.fits or cycles <= trial.shortest:
+            return replace(trial.step, spent=replace(spent, steps=trial.step.spent.steps))
+        cycles = max(trial.shorter, trial.shortest)
 
 
 def _shortest(stable: float) -> float:
@@ -254,106 +255,84 @@ def root_mean_square(field: Array, depth: Array) -> float:
     return float(np.sqrt(np.vdot(field, field) / worn))
 
 
+ContactAt = Callable[[WearState], WearingContact]
+Attempt = tuple[WearStep[WearState], Array]
+
+
 @dataclass(frozen=True)
-class Implicit:
-    """Implicit Euler: as long as asked for, or as ``control`` lets it be."""
+class _HalfSpaceStepper(ABC):
+    """Steps of a half-space contact: as long as asked for, or as ``control`` lets them be."""
 
     control: ErrorControl | None = None
 
+    @abstractmethod
+    def _attempt(
+        self, state: WearState, cycles: float, contact: WearingContact, contact_at: ContactAt
+    ) -> Attempt:
+        """A step of so many cycles from ``state``, whose contact is given, and its own error.
+
+        That is what it adds to the error of the depth ``(nx, ny)`` [mm], undamped.
+        """
+
     def step(
-        self,
-        state: WearState,
-        most: float,
-        left: float,
-        contact_at: Callable[[WearState], WearingContact],
+        self, state: WearState, most: float, left: float, contact_at: ContactAt
     ) -> WearStep[WearState]:
-        contact = contact_at(state)
-        rate = contact.rate(state)
+        """A step with the error of the depth after it, tried again until ``control`` agrees."""
+        contact, control = contact_at(state), self.control
 
-        def attempt(cycles: float) -> WearStep[WearState]:
-            return contact.implicit_step(state, cycles)
+        def trial(cycles: float) -> _Trial[WearState]:
+            step, raw = self._attempt(state, cycles, contact, contact_at)
+            shortest = _shortest(min(contact.stable_cycles(end) for end in (state, step.state)))
+            carried, added = contact.damped_errors([state.error, raw], state, cycles)
+            fits, proposed = True, cycles
+            if control is not None:
+                fits, change = _judged(control, state, step, left, carried, added, raw)
+                proposed = max(cycles * float(np.clip(change, SHRINKAGE, GROWTH)), shortest)
+            after = replace(
+                step.state,
+                error=carried + added,
+                volume_error=state.volume_error + abs(float(raw.sum())) * contact.grid.cell_area,
+                next_cycles=proposed,
+            )
+            return _Trial(replace(step, state=after), fits, min(proposed, 0.5 * cycles), shortest)
 
-        def error(step: WearStep[WearState]) -> Array:
-            ends = 0.5 * (rate + contact_at(step.state).rate(step.state))
-            return step.state.surfaces.depth - state.surfaces.depth - step.cycles * ends
-
-        return _estimated(_Attempts(contact, attempt, error), self.control, state, most, left)
+        return _accepted(trial, most if control is None else min(most, state.next_cycles))
 
 
 @dataclass(frozen=True)
-class SecondOrder:
-    """Second order in the step, also where slip changes with wear: as long as asked for, or less.
+class ImplicitStepper(_HalfSpaceStepper):
+    """Implicit Euler."""
+
+    def _attempt(
+        self, state: WearState, cycles: float, contact: WearingContact, contact_at: ContactAt
+    ) -> Attempt:
+        step = contact.implicit_step(state, cycles)
+        mean_rate = 0.5 * (contact.rate(state) + contact_at(step.state).rate(step.state))
+        return step, step.state.surfaces.depth - state.surfaces.depth - cycles * mean_rate
+
+
+@dataclass(frozen=True)
+class SecondOrderStepper(_HalfSpaceStepper):
+    """Second order in the step, also where slip changes with wear.
 
     A contact whose slips come from the half-space is worn once with those of the start, and again
-    with the mean of those and the ones found.
+    with the mean of those and the ones at its end.
     """
 
-    control: ErrorControl | None = None
-
-    def step(
-        self,
-        state: WearState,
-        most: float,
-        left: float,
-        contact_at: Callable[[WearState], WearingContact],
-    ) -> WearStep[WearState]:
-        contact = contact_at(state)
-
-        def attempt(cycles: float) -> WearStep[WearState]:
-            predicted = contact.second_order_step(state, cycles)
-            following = contact_at(predicted.state)
-            if following is contact:
-                return predicted
-            step = contact.midway(following).second_order_step(state, cycles)
-            return replace(
-                step,
-                drift=step.state.surfaces.depth - predicted.state.surfaces.depth,
-                spent=replace(predicted.spent + step.spent, steps=1),
-            )
-
-        def error(step: WearStep[WearState]) -> Array:
-            assert step.midway is not None
-            ends = 0.5 * (state.surfaces.depth + step.state.surfaces.depth)
-            return ends - step.midway + (0.0 if step.drift is None else step.drift)
-
-        return _estimated(_Attempts(contact, attempt, error), self.control, state, most, left)
-
-
-@dataclass(frozen=True)
-class _Attempts:
-    """A way to try a step of so many cycles, and the error that it adds, undamped ``(nx, ny)``."""
-
-    contact: WearingContact
-    attempt: Callable[[float], WearStep[WearState]]
-    error: Callable[[WearStep[WearState]], Array]
-
-
-def _estimated(
-    attempts: _Attempts, control: ErrorControl | None, state: WearState, most: float, left: float
-) -> WearStep[WearState]:
-    """A step with the error of the depth after it, tried again shorter until ``control`` agrees."""
-
-    def trial(cycles: float) -> _Trial[WearState]:
-        step = attempts.attempt(cycles)
-        shortest = _shortest(
-            min(attempts.contact.stable_cycles(ends) for ends in (state, step.state))
-        )
-        raw = attempts.error(step)
-        carried, added = attempts.contact.damped_errors([state.error, raw], state, cycles)
-        fits, proposed = True, cycles
-        if control is not None:
-            fits, change = _judged(control, state, step, left, carried, added, raw)
-            proposed = max(cycles * float(np.clip(change, SHRINKAGE, GROWTH)), shortest)
-        area = attempts.contact.grid.cell_area
-        after = replace(
-            step.state,
-            error=carried + added,
-            volume_error=state.volume_error + abs(float(raw.sum())) * area,
-            next_cycles=proposed,
-        )
-        return _Trial(replace(step, state=after), fits, min(proposed, 0.5 * cycles), shortest)
-
-    return _tried(trial, most if control is None else min(most, state.next_cycles))
+    def _attempt(
+        self, state: WearState, cycles: float, contact: WearingContact, contact_at: ContactAt
+    ) -> Attempt:
+        step = contact.second_order_step(state, cycles)
+        following = contact_at(step.state)
+        drift: Array | float = 0.0
+        if following is not contact:
+            predicted, step = step, contact.midway(following).second_order_step(state, cycles)
+            step = replace(step, spent=replace(predicted.spent + step.spent, steps=1))
+            # What slips and friction, changing on the way, have added.
+            drift = step.state.surfaces.depth - predicted.state.surfaces.depth
+        assert step.midway is not None
+        ends = 0.5 * (state.surfaces.depth + step.state.surfaces.depth)
+        return step, ends - step.midway + drift
 
 
 def _judged(
@@ -398,10 +377,10 @@ def first_cycles(contact: WearingContact, state: WearState, total: float) -> flo
 
 
 @dataclass(frozen=True)
-class Stretches(Generic[State, Contact]):
-    """Steps of a ``stepper`` in stretches, each as long as ``longest`` says of a state.
+class SubcyclingStepper(Generic[State, Contact]):
+    """Several steps of a ``stepper`` taken as one, as long as ``longest`` says of a state.
 
-    It is told the cycles that are left for a stretch.
+    It is told the most cycles that they may have together.
     """
 
     stepper: Stepper[State, Contact]
@@ -410,20 +389,7 @@ class Stretches(Generic[State, Contact]):
     def step(
         self, state: State, most: float, left: float, contact_at: Callable[[State], Contact]
     ) -> WearStep[State]:
-        cycles = self.longest(state, most)
-        done = advance_cycles(self.stepper, state, cycles, left, contact_at)
-        return WearStep(done.state, cycles, done.spent, error=done.error)
-
-
-@dataclass(frozen=True)
-class Advance(Generic[State]):
-    """So many cycles in as many steps as they took, and the largest error of any: see
-    :class:`wear.worn.WearStep`.
-    """
-
-    state: State
-    spent: Spent
-    error: float
+        return advance_cycles(self.stepper, state, self.longest(state, most), left, contact_at)
 
 
 def steps(
@@ -455,9 +421,9 @@ def advance_cycles(
     cycles: float,
     left: float,
     contact_at: Callable[[State], Contact],
-) -> Advance[State]:
+) -> WearStep[State]:
     """Wear ``cycles`` cycles of the ``left`` ones of the run, in as many steps as it takes."""
     spent, error = Spent(), 0.0
     for step in steps(stepper, state, lambda _, done: rest(cycles, done), left, contact_at):
         state, spent, error = step.state, spent + step.spent, max(error, step.error)
-    return Advance(state, spent, error)
+    return WearStep(state, cycles, spent, error=error)

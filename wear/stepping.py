@@ -23,7 +23,7 @@ stands for that: then no step is better than first order.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -64,11 +64,12 @@ class SlidingCycle:
     passages: tuple[Passage, ...] | None = None
 
     def gap(self, surfaces: Surfaces, increment: int) -> Array:
-        """Gap before loading ``(nx, ny)`` [mm], body 2 being where an increment has it."""
-        if self.passages is None:
-            return surfaces.gap
-        seen = self.passages[increment].carry(surfaces.depth_1)
-        return surfaces.initial_gap + surfaces.depth_2 + seen
+        """Gap before loading ``(nx, ny)`` [mm] where an increment has body 2, lifted by shear."""
+        gap = surfaces.gap
+        if self.passages is not None:
+            seen = self.passages[increment].carry(surfaces.depth_1)
+            gap = surfaces.initial_gap + surfaces.depth_2 + seen
+        return gap if self.uplift is None else gap + self.uplift[increment]
 
     def midway(self, other: SlidingCycle) -> SlidingCycle:
         """The mean of two cycles with the same loads and passages."""
@@ -109,12 +110,7 @@ class WearState(WornState):
     Fields are ``(nx, ny)``, one value per cell; ``starts`` are the contact solver's, by increment.
     """
 
-    starts: Starts
-
-    @classmethod
-    def unworn(cls, gap: Array) -> WearState:
-        """Before the first cycle, at the gap ``(nx, ny)`` [mm] of the unloaded bodies."""
-        return cls(**vars(WornState.of(gap)), starts={})
+    starts: Starts = field(default_factory=dict)
 
 
 class WearingContact:
@@ -168,18 +164,19 @@ class WearingContact:
             (surfaces.work_2, surfaces.work_2 + work_2),
         )
         first, second = (
-            self._by_block(law, work, energies) for law, work in zip(self._laws, ends, strict=True)
+            self._by_mission(law, work, energies)
+            for law, work in zip(self._laws, ends, strict=True)
         )
         return first, second
 
-    def _by_block(
+    def _by_mission(
         self, law: WearLaw, work: tuple[Array, Array], energies: tuple[float, float]
     ) -> Array:
-        """Depth per pressure of one body: each closed cycle of a mix for itself, by its share."""
+        """Depth per pressure of one body: each mission of a mix for itself, by its share."""
         loads, slip = self._cycle.loads, self._cycle.slip
         parts = [
-            law.depth_per_pressure(SlidingConditions(slip[block], self._friction, work, energies))
-            for block in loads.blocks
+            law.depth_per_pressure(SlidingConditions(slip[mission], self._friction, work, energies))
+            for mission in loads.missions
         ]
         depth: Array = loads.share[:, None, None] * np.concatenate(parts)
         return depth
@@ -225,10 +222,6 @@ class WearingContact:
         return [damping.apply(error[None])[0] for error in errors]
 
     # -- cycles on surfaces that do not change --------------------------------------------------
-    def solve(self, surfaces: Surfaces, increment: int, start: NormalStart | None) -> NormalState:
-        """Contact state of one increment on given surfaces."""
-        return self._solve(surfaces, increment, start, None)
-
     def cycle(self, state: WearState, increments: list[int]) -> CycleResult:
         """Solve the given increments on the surfaces of ``state``."""
         states: States = {}
@@ -276,16 +269,17 @@ class WearingContact:
         return replace(march.step(), midway=midway)
 
     # -- one increment --------------------------------------------------------------------------
-    def _solve(
+    def solve(
         self,
         surfaces: Surfaces,
         increment: int,
         start: NormalStart | None,
-        compliance: Array | None,
+        compliance: Array | None = None,
     ) -> NormalState:
+        """Contact state of one increment; a ``compliance`` ``(nx, ny)`` [mm/MPa] is worn on the way."""
         loads = self._cycle.loads
         state = self.contact.solve(
-            self.gap(surfaces, increment),
+            self._cycle.gap(surfaces, increment),
             float(loads.P[increment]),
             float(loads.Mx[increment]),
             float(loads.My[increment]),
@@ -296,11 +290,6 @@ class WearingContact:
         if not state.converged:
             raise ContactFailure(f"increment {increment + 1}: {state.message}")
         return state
-
-    def gap(self, surfaces: Surfaces, increment: int) -> Array:
-        """Gap before loading ``(nx, ny)`` [mm] at the place of an increment, lifted by shear."""
-        gap, uplift = self._cycle.gap(surfaces, increment), self._cycle.uplift
-        return gap if uplift is None else gap + uplift[increment]
 
     def _worn(
         self,
@@ -334,8 +323,7 @@ class WearingContact:
 
     def _work(self, starts: Starts) -> tuple[Array, Array]:
         """Energy per area of both bodies' surfaces and mean cycle, at the given pressures."""
-        unworn = Surfaces.unworn(np.zeros(self.grid.shape))
-        work_1, work_2 = unworn.work_1, unworn.work_2
+        work_1 = work_2 = np.zeros(self.grid.shape)
         for t, start in starts.items():
             work = self._dissipated(t, start.pressure)
             work_1, work_2 = work_1 + self._on_body_1(t, work), work_2 + work
@@ -355,7 +343,7 @@ class _March:
     def solve(self, increment: int, cycles: float) -> NormalState:
         """Contact whose wear over ``cycles`` is part of its gap."""
         wear_1, wear_2 = (body[increment] for body in self._per_pressure)
-        state = self._contact._solve(
+        state = self._contact.solve(
             self.surfaces, increment, self._starts.get(increment), (wear_1 + wear_2) * cycles
         )
         self._starts[increment] = state.start

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import Generic, TypeVar
+from dataclasses import astuple, dataclass
+from operator import add, sub
+from typing import Any, Generic, Self, TypeVar
 
 import numpy as np
 
@@ -20,18 +21,10 @@ class Spent:
     steps: int = 0
 
     def __add__(self, other: Spent) -> Spent:
-        return Spent(
-            self.contact_solves + other.contact_solves,
-            self.convolutions + other.convolutions,
-            self.steps + other.steps,
-        )
+        return Spent(*map(add, astuple(self), astuple(other)))
 
     def __sub__(self, other: Spent) -> Spent:
-        return Spent(
-            self.contact_solves - other.contact_solves,
-            self.convolutions - other.convolutions,
-            self.steps - other.steps,
-        )
+        return Spent(*map(sub, astuple(self), astuple(other)))
 
 
 @dataclass(frozen=True)
@@ -53,10 +46,13 @@ class WornState:
     volume_error: float
     next_cycles: float
 
-    @staticmethod
-    def of(gap: Array) -> WornState:
-        """Before the first cycle, at the ``gap`` of the unloaded bodies, by cell or node [mm]."""
-        return WornState(Surfaces.unworn(gap), 0.0, 0.0, 0.0, np.zeros_like(gap), 0.0, np.inf)
+    @classmethod
+    def unworn(cls, gap: Array, **further: Any) -> Self:
+        """Before the first cycle, at the ``gap`` of the unloaded bodies, by cell or node [mm].
+
+        ``further`` are the fields that a subclass adds and has no default for.
+        """
+        return cls(Surfaces.unworn(gap), 0.0, 0.0, 0.0, np.zeros_like(gap), 0.0, np.inf, **further)
 
 
 State = TypeVar("State", bound=WornState)
@@ -64,16 +60,15 @@ State = TypeVar("State", bound=WornState)
 
 @dataclass(frozen=True)
 class WearStep(Generic[State]):
-    """A step: the ``state`` after it, its ``cycles``, and what it took.
+    """A step, or several one after the other: the ``state`` after it, its ``cycles``, what it took.
 
-    ``midway`` is the depth of both bodies in the middle of a step of second order, and ``drift``
-    what its slips and friction, changing on the way, have added to it [mm], by cell. ``error`` is
-    what a step whose length is judged by itself may have got wrong, over what it wears.
+    ``midway`` is the depth of both bodies in the middle of a step of second order [mm], by cell.
+    ``error`` is what a step whose length is judged by itself may have got wrong, over what it
+    wears; of several steps the largest.
     """
 
     state: State
     cycles: float
     spent: Spent
     midway: Array | None = None
-    drift: Array | None = None
     error: float = 0.0

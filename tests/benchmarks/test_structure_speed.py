@@ -106,7 +106,7 @@ def test_default_joint(
 
     cached = shortest(from_cache)
     record["joint from the cache [s]"] = cached
-    amplitudes, friction = first.model.blocks[0].amplitudes, first.model.friction
+    amplitudes, friction = first.model.missions[0].amplitudes, first.model.friction
     gap = structure.gap()
     cycle = shortest(lambda: structure.solve_cycle(first.joint, amplitudes, gap, friction))
     record["cycle of 22 increments, twice [s]"] = cycle

@@ -25,7 +25,7 @@ from tests.oracles.worn_shapes import worn_cylinder
 from wear.coupled import (
     AT_STOP,
     ConstantLoads,
-    ContactsInTurn,
+    Contacts,
     CoupledSettings,
     CoupledState,
     CoupledWear,
@@ -43,7 +43,7 @@ from wear.interface import (
     MotionError,
 )
 from wear.laws import EnergyLaw, EvolvingLaw
-from wear.steppers import ErrorControl, Implicit
+from wear.steppers import ErrorControl, ImplicitStepper
 from wear.stepping import ContactFailure
 
 BODY = Material(115e3, 0.29)
@@ -77,7 +77,7 @@ def interface(grid: Grid, gap: Array, **settings) -> InterfaceSettings:
             "pair": PAIR,
             "laws": tuple(EnergyLaw(own) for own in COEFFICIENTS),
             "friction": lambda energy: FRICTION,
-            "stepper": Implicit(),
+            "stepper": ImplicitStepper(),
             "follow": False,
             "tolerance": 1e-10,
         }
@@ -140,8 +140,8 @@ def run_constant(
     return end
 
 
-def in_turn(contacts: list[InterfaceSettings]) -> ContactsInTurn:
-    return ContactsInTurn([InterfaceContact(own) for own in contacts])
+def in_turn(contacts: list[InterfaceSettings]) -> Contacts:
+    return Contacts([InterfaceContact(own) for own in contacts])
 
 
 # --- against closed forms -------------------------------------------------------------------------
@@ -150,7 +150,7 @@ def in_turn(contacts: list[InterfaceSettings]) -> ContactsInTurn:
 def test_a_cylinder_wears_to_its_closed_form() -> None:
     """Under a constant load, in automatic steps of 1 %; α times energy is exact."""
     load, volume = 50.0, 2.0 / 3.0 * 0.5**3 / RADIUS
-    contact = cylinder(stepper=Implicit(ErrorControl(0.01)))
+    contact = cylinder(stepper=ImplicitStepper(ErrorControl(0.01)))
     settings = CoupledSettings(volume / (PER_LOAD * load))
     end = run_constant(settings, load, contact)
     assert end.cycles[-1] == pytest.approx(settings.cycles, rel=1e-12)
@@ -272,7 +272,7 @@ def test_a_source_is_told_of_friction_that_changes() -> None:
 @pytest.mark.parametrize("stop", [Stop(volume=4e-4), Stop(depth=3.1e-4)])
 def test_a_stop_is_met_to_a_thousandth(stop: Stop, jump: float | None) -> None:
     """Whatever the jumps, and although the loads fall on the way."""
-    contact = patch(stepper=Implicit(ErrorControl(0.01)))
+    contact = patch(stepper=ImplicitStepper(ErrorControl(0.01)))
     settings = CoupledSettings(10.0 * SCALE, JumpSize(jump), stop, "every")
     states = run(settings, falling(), [contact])
     reached = states[-1].volume if stop.volume else states[-1].depth
@@ -380,7 +380,9 @@ def test_going_on_from_any_state_ends_bit_for_bit_alike(method: str) -> None:
     """Two contacts under loads that drift, with contacts and source made anew."""
     loads, control = (LOAD, 0.6 * LOAD), ErrorControl(0.02)
     contacts = [
-        patch(name=name, method=method, stepper=Implicit(control), driven=True, tolerance=1e-8)
+        patch(
+            name=name, method=method, stepper=ImplicitStepper(control), driven=True, tolerance=1e-8
+        )
         for name in ("left", "right")
     ]
     settings = CoupledSettings(0.3 * SCALE, drift=0.05)

@@ -187,11 +187,11 @@ def test_each_cycle_of_a_mix_is_closed_by_itself(last: float) -> None:
 
 def test_a_history_is_one_cycle_unless_mixed() -> None:
     plain, other = HEAVY[0], LIGHT[0]
-    assert plain.blocks == [slice(0, 3)]
+    assert plain.missions == [slice(0, 3)]
     assert not plain.mixed
     mixed = LoadHistory.mix([plain, other], (0.25, 0.75))
     assert mixed.mixed
-    assert mixed.blocks == [slice(0, 3), slice(3, 5)]
+    assert mixed.missions == [slice(0, 3), slice(3, 5)]
     assert mixed.share.tolist() == [0.25] * 3 + [0.75] * 2
 
 

@@ -14,7 +14,15 @@ from sa_solver.types import Array
 from wear.evolution import EnergyTable
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw
 from wear.nodes import NodalContact, NodalState
-from wear.steppers import Explicit, Heun, StabilityError, Stretches, advance_cycles, rest, steps
+from wear.steppers import (
+    ExplicitStepper,
+    HeunStepper,
+    StabilityError,
+    SubcyclingStepper,
+    advance_cycles,
+    rest,
+    steps,
+)
 
 FRICTION = 0.5
 AREAS = np.array([0.1, 0.2, 0.4])
@@ -132,7 +140,9 @@ def test_order_of_convergence(stepper, order) -> None:
     cycles, errors = float(SCALES.min()), []
     for count in (8, 16, 32):
         length = cycles / count
-        own = Explicit(cycles=length) if stepper == "explicit" else Heun(np.inf, np.inf)
+        own = (
+            ExplicitStepper(cycles=length) if stepper == "explicit" else HeunStepper(np.inf, np.inf)
+        )
         state = unworn()
         for _ in range(count):
             state = own.step(state, length, cycles, springs).state
@@ -146,7 +156,13 @@ def test_heuns_steps_keep_to_tolerance_and_limit() -> None:
     limit = springs(unworn()).stable_cycles(unworn())
     for tolerance in (0.3, 0.1, 0.03):
         taken = list(
-            steps(Heun(tolerance), unworn(), lambda _, done: rest(cycles, done), cycles, springs)
+            steps(
+                HeunStepper(tolerance),
+                unworn(),
+                lambda _, done: rest(cycles, done),
+                cycles,
+                springs,
+            )
         )
         assert max(step.error for step in taken) <= tolerance
         assert max(step.cycles for step in taken) <= 0.5 * limit * (1.0 + 1e-12)
@@ -161,7 +177,7 @@ def test_heuns_steps_keep_to_tolerance_and_limit() -> None:
 
 def test_explicit_steps_of_a_share_of_the_limit() -> None:
     limit = springs(unworn()).stable_cycles(unworn())
-    done = advance_cycles(Explicit(0.25), unworn(), 10.1 * limit, 10.1 * limit, springs)
+    done = advance_cycles(ExplicitStepper(0.25), unworn(), 10.1 * limit, 10.1 * limit, springs)
     assert done.spent.steps == 41
     assert done.spent.contact_solves == 41
 
@@ -169,12 +185,12 @@ def test_explicit_steps_of_a_share_of_the_limit() -> None:
 def test_given_steps_beyond_the_limit_are_refused() -> None:
     limit = springs(unworn()).stable_cycles(unworn())
     with pytest.raises(StabilityError, match=re.escape(f"take at most {limit:.4g}")):
-        Explicit(cycles=1.01 * limit).step(unworn(), 1.0, 1.0, springs)
-    step = Explicit(cycles=limit).step(unworn(), 10.0 * limit, 10.0 * limit, springs)
+        ExplicitStepper(cycles=1.01 * limit).step(unworn(), 1.0, 1.0, springs)
+    step = ExplicitStepper(cycles=limit).step(unworn(), 10.0 * limit, 10.0 * limit, springs)
     assert step.cycles == limit
 
 
-@pytest.mark.parametrize("stepper", [Explicit(0.2), Heun(0.05)])
+@pytest.mark.parametrize("stepper", [ExplicitStepper(0.2), HeunStepper(0.05)])
 def test_an_energy_threshold_is_passed_without_an_error(stepper) -> None:
     """V = α (ΣEd - Ed_th), exactly; before, any step is stable."""
     threshold = 0.02
@@ -201,13 +217,17 @@ def test_stretches_ask_before_each_of_them() -> None:
 
     length = 0.5 * springs(unworn()).stable_cycles(unworn())
     done = advance_cycles(
-        Stretches(Explicit(0.5), longest), unworn(), 6.0 * length, 6.0 * length, springs
+        SubcyclingStepper(ExplicitStepper(0.5), longest),
+        unworn(),
+        6.0 * length,
+        6.0 * length,
+        springs,
     )
     np.testing.assert_allclose(asked, [6.0 * length, 3.5 * length, length])
     assert done.spent.steps == 3 + 3 + 1
 
 
-@pytest.mark.parametrize("stepper", [Explicit(0.5), Heun(0.1)])
+@pytest.mark.parametrize("stepper", [ExplicitStepper(0.5), HeunStepper(0.1)])
 def test_volume_is_coefficient_times_energy(stepper) -> None:
     cycles = float(SCALES.max())
     state = advance_cycles(stepper, unworn(), cycles, cycles, springs).state

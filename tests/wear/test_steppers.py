@@ -12,16 +12,15 @@ from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from tests.marks import slow
 from wear.laws import EnergyLaw
 from wear.steppers import (
-    Advance,
     ErrorControl,
-    Explicit,
-    Implicit,
-    SecondOrder,
+    ExplicitStepper,
+    ImplicitStepper,
+    SecondOrderStepper,
     advance_cycles,
     root_mean_square,
 )
 from wear.stepping import SlidingCycle, WearingContact, WearState
-from wear.worn import Spent
+from wear.worn import Spent, WearStep
 
 BODY = Material(115e3, 0.29)
 GRID = Grid.strips(8.0, 40)
@@ -81,12 +80,12 @@ LIMIT = CONSTANT.stable_cycles(waved())
 @pytest.mark.parametrize(
     ("stepper", "order", "contact_at"),
     [
-        (Explicit(), 1, unchanging),
-        (Explicit(), 1, evolving),
-        (Implicit(), 1, unchanging),
-        (Implicit(), 1, evolving),
-        (SecondOrder(), 2, unchanging),
-        slow(SecondOrder(), 2, evolving),
+        (ExplicitStepper(), 1, unchanging),
+        (ExplicitStepper(), 1, evolving),
+        (ImplicitStepper(), 1, unchanging),
+        (ImplicitStepper(), 1, evolving),
+        (SecondOrderStepper(), 2, unchanging),
+        slow(SecondOrderStepper(), 2, evolving),
     ],
 )
 def test_order_of_convergence(stepper, order, contact_at) -> None:
@@ -108,9 +107,9 @@ def test_order_of_convergence(stepper, order, contact_at) -> None:
 def test_methods_agree_in_the_limit() -> None:
     cycles = 6.0 * LIMIT
     ends = []
-    for stepper in (Explicit(), Implicit(), SecondOrder()):
+    for stepper in (ExplicitStepper(), ImplicitStepper(), SecondOrderStepper()):
         coarse, fine = [advance_in(stepper, waved(), cycles, jumps) for jumps in (32, 64)]
-        order = 2 if isinstance(stepper, SecondOrder) else 1
+        order = 2 if isinstance(stepper, SecondOrderStepper) else 1
         ends.append(fine + (fine - coarse) / (2**order - 1))
     for end in ends[1:]:
         np.testing.assert_allclose(end, ends[0], rtol=2e-4)
@@ -125,7 +124,7 @@ def advance_in(stepper, state: WearState, cycles: float, jumps: int) -> Array:
 # --- automatic length -----------------------------------------------------------------------------
 
 
-def automatic(stepper, cycles: float) -> Advance:
+def automatic(stepper, cycles: float) -> WearStep:
     """A run whose steps choose their own length."""
     state = rounded()
     first = CONSTANT.cycle(state, CONSTANT.dissipating)
@@ -139,10 +138,10 @@ def automatic(stepper, cycles: float) -> Advance:
 @cache
 def exact_depth(cycles: float) -> Array:
     """Depth at the end of a run, by short steps of second order: to 2e-5 of it."""
-    return advance_in(SecondOrder(), rounded(), cycles, 100)
+    return advance_in(SecondOrderStepper(), rounded(), cycles, 100)
 
 
-@pytest.mark.parametrize("kind", [Implicit, SecondOrder])
+@pytest.mark.parametrize("kind", [ImplicitStepper, SecondOrderStepper])
 def test_automatic_steps_meet_their_tolerance_and_grow_fewer_with_it(kind) -> None:
     """At 1 % and above, implicit ones also say how large their error is, within 50 %."""
     cycles = 100.0 * CONSTANT.stable_cycles(rounded())
@@ -156,7 +155,7 @@ def test_automatic_steps_meet_their_tolerance_and_grow_fewer_with_it(kind) -> No
         assert told <= tolerance
         if tolerance >= 0.01:
             assert error < tolerance
-            assert kind is SecondOrder or error == pytest.approx(told, rel=0.5)
+            assert kind is SecondOrderStepper or error == pytest.approx(told, rel=0.5)
         assert depth.max() == pytest.approx(exact.max(), rel=tolerance)
         steps.append(end.spent.steps)
     assert steps == sorted(set(steps))
@@ -165,8 +164,8 @@ def test_automatic_steps_meet_their_tolerance_and_grow_fewer_with_it(kind) -> No
 def test_automatic_steps_take_a_tenth_of_the_explicit_ones() -> None:
     """One per cent of depth and volume, against explicit steps at their limit."""
     cycles = 150.0 * CONSTANT.stable_cycles(rounded())
-    explicit = automatic(Explicit(fraction=1.0), cycles)
-    implicit = automatic(Implicit(ErrorControl(0.01)), cycles)
+    explicit = automatic(ExplicitStepper(fraction=1.0), cycles)
+    implicit = automatic(ImplicitStepper(ErrorControl(0.01)), cycles)
     assert implicit.spent.contact_solves <= 0.1 * explicit.spent.contact_solves
     depth, other = (own.state.surfaces.depth for own in (implicit, explicit))
     assert depth.max() == pytest.approx(other.max(), rel=0.01)
@@ -180,7 +179,7 @@ def test_an_absolute_tolerance_is_a_depth() -> None:
     worn = exact > 0.0
     allowed = 0.01 * float(np.sqrt(np.mean(exact[worn] ** 2)))
     absolute, relative = (
-        automatic(Implicit(control), cycles)
+        automatic(ImplicitStepper(control), cycles)
         for control in (ErrorControl(absolute=allowed), ErrorControl(relative=0.01))
     )
     assert abs(absolute.spent.steps - relative.spent.steps) <= 2
@@ -191,19 +190,28 @@ def test_a_step_that_was_too_long_is_taken_again() -> None:
     """A first guess a hundred times too long costs contact problems, not accuracy."""
     cycles = 100.0 * CONSTANT.stable_cycles(rounded())
     exact = exact_depth(cycles)
-    end = advance_cycles(Implicit(ErrorControl(0.01)), rounded(), cycles, cycles, unchanging)
+    end = advance_cycles(ImplicitStepper(ErrorControl(0.01)), rounded(), cycles, cycles, unchanging)
     assert end.spent.contact_solves > 3 * end.spent.steps
     assert end.state.surfaces.depth.max() == pytest.approx(exact.max(), rel=0.01)
 
 
 def test_explicit_steps_keep_to_their_share_of_the_limit() -> None:
     limit = CONSTANT.stable_cycles(rounded())
-    end = advance_cycles(Explicit(fraction=0.5), rounded(), 10.0 * limit, 10.0 * limit, unchanging)
+    end = advance_cycles(
+        ExplicitStepper(fraction=0.5), rounded(), 10.0 * limit, 10.0 * limit, unchanging
+    )
     assert end.spent.steps >= 20
 
 
 @pytest.mark.parametrize(
-    "stepper", [Explicit(0.9), Explicit(), Implicit(), Implicit(ErrorControl(0.01)), SecondOrder()]
+    "stepper",
+    [
+        ExplicitStepper(0.9),
+        ExplicitStepper(),
+        ImplicitStepper(),
+        ImplicitStepper(ErrorControl(0.01)),
+        SecondOrderStepper(),
+    ],
 )
 def test_steps_add_up_to_the_cycles_asked_for(stepper) -> None:
     """Energy of gross sliding is that of so many cycles: µ Σ p s over them."""
@@ -212,7 +220,8 @@ def test_steps_add_up_to_the_cycles_asked_for(stepper) -> None:
     volume = state.surfaces.depth.sum() * GRID.cell_area
     assert volume == pytest.approx(3e-8 * state.energy, rel=1e-10)
     assert state.energy == pytest.approx(
-        advance_cycles(Implicit(), waved(), cycles, cycles, unchanging).state.energy, rel=0.01
+        advance_cycles(ImplicitStepper(), waved(), cycles, cycles, unchanging).state.energy,
+        rel=0.01,
     )
 
 
@@ -222,8 +231,8 @@ def test_the_volume_has_an_error_of_its_own() -> None:
     cycles, control = 6.0 * LIMIT, ErrorControl(0.01)
     reference = waved()
     for _ in range(40):
-        reference = SecondOrder().step(reference, cycles / 40, cycles, evolving).state
-    state = advance_cycles(Implicit(control), waved(), cycles, cycles, evolving).state
+        reference = SecondOrderStepper().step(reference, cycles / 40, cycles, evolving).state
+    state = advance_cycles(ImplicitStepper(control), waved(), cycles, cycles, evolving).state
     exact = reference.surfaces.depth.sum() * GRID.cell_area
     error = state.surfaces.depth.sum() * GRID.cell_area - exact
     # Slip grows by half over the run, and errors with it.

@@ -10,7 +10,7 @@ import pytest
 
 from tests.workflow.commands import command
 from wear.interface import InterfaceState
-from workflow.analyses.wear.contact_stage import ContactStage, StageSettings
+from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
 from workflow.analyses.wear.structures.bodies.source import BodiesSource
 from workflow.case.writing import dump_case
@@ -41,7 +41,7 @@ def worn(
 ) -> tuple[ContactStage, InterfaceState]:
     """The contact after the cycles of the case, in this process."""
     source = BodiesSource(case)
-    stage = ContactStage(StageSettings(case, source.faces[0]))
+    stage = ContactStage(case, source.faces[0])
     state, _ = stage.begin(source.unworn()[0], case.wear.cycles)
     for jump in range(jumps):
         left = case.wear.cycles * (1.0 - jump / jumps)
@@ -234,7 +234,7 @@ def test_partial_slip_over_a_given_stroke_is_that_of_mindlin() -> None:
         *("friction.coefficient=0.7", "contact.method=full", "wear.cycles=1"),
     )
     source = BodiesSource(case)
-    stage = ContactStage(StageSettings(case, source.faces[0]))
+    stage = ContactStage(case, source.faces[0])
     _, first = stage.begin(source.unworn()[0], case.wear.cycles)
     assert first.energy.sum() == pytest.approx(0.414092, rel=2e-2)
     forces = [state.resultants[1] for state in first.cycle]

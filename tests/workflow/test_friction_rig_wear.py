@@ -15,7 +15,7 @@ from tests.workflow.test_friction_rig import NODES, RIG, SPECIMENS
 from tests.workflow.test_time_cases import refused
 from wear.evolution import EnergyTable
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw
-from wear.steppers import Explicit, Heun, advance_cycles
+from wear.steppers import ExplicitStepper, HeunStepper, advance_cycles
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase
 from workflow.analyses.vibration_wear.pads import WearingPads
@@ -69,7 +69,7 @@ def with_laws(pads, *laws, force=75.0):
 
 def worn(pads, state, cycles, tolerance):
     """So many cycles more, in steps by the tolerance."""
-    return advance_cycles(Heun(tolerance), state, cycles, cycles, pads.contact_at)
+    return advance_cycles(HeunStepper(tolerance), state, cycles, cycles, pads.contact_at)
 
 
 @pytest.fixture(scope="module")
@@ -193,7 +193,7 @@ def test_flat_pads_wear_evenly_and_stick_as_pads_without_form(pads, unworn, flat
 
 def in_steps(pads, state, cycles, count):
     """So many steps of Heun's method of one length, whatever their error."""
-    stepper = Heun(tolerance=np.inf, share=np.inf)
+    stepper = HeunStepper(tolerance=np.inf, share=np.inf)
     for _ in range(count):
         state = stepper.step(state, cycles / count, cycles, pads.contact_at).state
     return state
@@ -221,7 +221,7 @@ def test_the_tolerance_bounds_the_error(pads, unworn):
 
 def test_explicit_steps_come_to_the_same(pads, unworn):
     """Euler's, of a tenth of their limit: of first order only."""
-    found = advance_cycles(Explicit(0.1), unworn, 1e5, 1e5, pads.contact_at)
+    found = advance_cycles(ExplicitStepper(0.1), unworn, 1e5, 1e5, pads.contact_at)
     best = worn(pads, unworn, 1e5, 0.02).state.surfaces.depth
     error = np.linalg.norm(found.state.surfaces.depth - best) / np.linalg.norm(best)
     assert error < 0.1

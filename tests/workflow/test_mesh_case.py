@@ -107,7 +107,7 @@ def dovetail_as_mesh(folder, dovetail, ending):
     file = folder / f"joint{ending}"
     (write_msh if ending == ".msh" else write_inp)(file, mesh)
     path, shape = dovetail.load_path, dovetail.structure
-    speeds = np.sqrt(model.blocks[0].amplitudes[:, 0]) / path.rotation_speed
+    speeds = np.sqrt(model.missions[0].amplitudes[:, 0]) / path.rotation_speed
     pull = path.airfoil_mass * path.airfoil_radius * path.rotation_speed**2
     widths = ("edge_width", "edge_radius", "end_width", "end_radius")
     rounded = {"shape": "rounded"} | {name: getattr(shape, name) for name in widths}

@@ -81,9 +81,9 @@ def test_blocks_of_a_mix_are_the_missions_one_after_the_other(staged):
         (mixed.worn(depths), [own.worn(depths) for own in alone]),
     ):
         for history, *own in zip(whole, *parts, strict=True):
-            assert history.loads.blocks == [slice(0, 8), slice(8, 16)]
+            assert history.loads.missions == [slice(0, 8), slice(8, 16)]
             assert history.loads.share.tolist() == [0.7] * 8 + [0.3] * 8
-            for block, part in zip(history.loads.blocks, own, strict=True):
+            for block, part in zip(history.loads.missions, own, strict=True):
                 np.testing.assert_array_equal(history.slip[block], part.slip)
                 np.testing.assert_array_equal(history.loads.P[block], part.loads.P)
                 np.testing.assert_array_equal(history.loads.Edx[block], part.loads.Edx)
@@ -143,7 +143,7 @@ def test_factors_of_a_mix_scale_the_loads_of_a_mesh(template_files):
         "structure.loads=[{kind: pressure, group: blade_top, pressure: 10, path: [1, 0]}, "
         f"{turning}]",
     ]
-    first, second = MeshModel(parse_case(template("mesh"), str(path), overrides)).blocks
+    first, second = MeshModel(parse_case(template("mesh"), str(path), overrides)).missions
     assert (first.share, second.share) == (0.6, 0.4)
     np.testing.assert_allclose(second.amplitudes, first.amplitudes * [0.5, 0.25], rtol=1e-14)
     with pytest.raises(CaseError, match=r"load_path\.mix\.0\.factors: 2 factors for 1 loads"):

@@ -9,7 +9,7 @@ from fe_models.specimens import pad_stiffness, reduced_specimens
 from sa_solver.types import Material
 from wear.laws import EnergyLaw
 from wear.nodes import NodalState
-from wear.steppers import Explicit, StabilityError, rest
+from wear.steppers import ExplicitStepper, StabilityError, rest
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.wear import FrettedPair, wear_in_cycle_blocks
 from workflow.errors import CaseError
@@ -49,7 +49,7 @@ def worn(
     cycles,
     force=17.0,
     laws=(ALPHA, ALPHA),
-    stepper=Explicit(0.5),  # noqa: B008 - frozen
+    stepper=ExplicitStepper(0.5),  # noqa: B008 - frozen
     stroke=STROKE,
 ):
     """States at all blocks."""
@@ -95,14 +95,14 @@ class TestWear:
     def test_shorter_blocks_converge_at_first_order(self, pair, curved):
         depths = []
         for block in (1600.0, 800.0, 400.0, 25.0):
-            *_, last = worn(pair, curved, 16e3, stepper=Explicit(cycles=block))
+            *_, last = worn(pair, curved, 16e3, stepper=ExplicitStepper(cycles=block))
             depths.append(last.depths[0])
         errors = [np.abs(depth - depths[-1]).max() for depth in depths[:-1]]
         assert np.all(np.divide(errors[:-1], errors[1:]) > 1.6)
 
     def test_too_long_a_block_is_refused(self, pair, flat):
         first = next(worn(pair, flat, 1e6))
-        block = Explicit(cycles=1.5 * first.stable_cycles)
+        block = ExplicitStepper(cycles=1.5 * first.stable_cycles)
         with pytest.raises(StabilityError, match="take at most"):
             list(worn(pair, flat, 1e6, stepper=block))
 
@@ -187,7 +187,7 @@ class TestLaws:
         fretted = FrettedPair(pair, own, FrettingConditions(87.0, STROKE, FRICTION))
         states = list(
             wear_in_cycle_blocks(
-                fretted, curved, Explicit(0.5), lambda block: rest(2e4, block.cycles)
+                fretted, curved, ExplicitStepper(0.5), lambda block: rest(2e4, block.cycles)
             )
         )
         assert states[0].stable_cycles == np.inf

@@ -16,7 +16,7 @@ from sa_solver.types import Frame, Grid
 from tests.marks import slow
 from tests.workflow.conftest import Run, invoke
 from workflow.analyses.wear import ANALYSIS
-from workflow.analyses.wear.contact_stage import ContactStage, StageSettings
+from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.fidelity import choosing
 from workflow.analyses.wear.fidelity.dimension import choose_dimension
 from workflow.analyses.wear.figures.wear import FIGURES, figures_of
@@ -204,7 +204,7 @@ def slot(small_path):
         small_path, ["mesh.flank_nodes=[6, 8]", "mesh.size=12", "contact.grid=[24, 48]"]
     )
     source = structure_of(case).source(case)
-    stages = [ContactStage(StageSettings(case, face)) for face in source.faces]
+    stages = [ContactStage(case, face) for face in source.faces]
     return (
         source,
         stages,
@@ -393,7 +393,7 @@ def in_the_middle(run: Run, name: str) -> dict[str, float]:
     case = load_case(run.folder / "case.yaml")
     source = structure_of(case).source(case)
     faces = {face.face.name: number for number, face in enumerate(source.faces)}
-    stage = ContactStage(StageSettings(case, source.faces[faces[name]]))
+    stage = ContactStage(case, source.faces[faces[name]])
     found = sections(stage.transfer, source.unworn()[faces[name]], source.peak).middle
     with h5py.File(run.folder / "results.h5") as file:
         surfaces = file[f"surfaces/{name}"]

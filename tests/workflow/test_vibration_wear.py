@@ -12,7 +12,7 @@ from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import Resolution
 from tests.workflow.conftest import invoke
 from wear.joints.periodic import PeriodicMarch
-from wear.steppers import ErrorControl, Implicit, advance_cycles, first_cycles
+from wear.steppers import ErrorControl, ImplicitStepper, advance_cycles, first_cycles
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.rig.structure import Rig
 from workflow.analyses.vibration_wear.case import VibrationWearCase
@@ -85,7 +85,7 @@ def contact_in_rig(folder, force=75.0, frequency=100.0):
 def worn(contact, cycles, tolerance=0.1):
     state = contact.unworn()
     state = replace(state, next_cycles=first_cycles(contact.wearing(state), state, cycles))
-    stepper = Implicit(ErrorControl(tolerance))
+    stepper = ImplicitStepper(ErrorControl(tolerance))
     return advance_cycles(stepper, state, cycles, cycles, contact.wearing).state
 
 
@@ -178,7 +178,7 @@ def test_energy_adds_up_from_cycle_to_cycle(tmp_path):
     cycles, energies, spent = np.linspace(0.0, 4000.0, 5), [], []
     state = contact.unworn()
     state = replace(state, next_cycles=first_cycles(contact.wearing(state), state, cycles[-1]))
-    stepper = Implicit(ErrorControl(0.01))
+    stepper = ImplicitStepper(ErrorControl(0.01))
     for length in (0.0, *np.diff(cycles)):
         if length:
             state = advance_cycles(stepper, state, length, cycles[-1], contact.wearing).state

@@ -15,7 +15,7 @@ import numpy as np
 from fe_models.mesh import MeshError
 from fe_models.reduced_contact import FrettingConditions, ReducedPair, VirginCurve
 from sa_solver.types import Array, ElasticPair
-from wear.steppers import Explicit, StabilityError, rest
+from wear.steppers import ExplicitStepper, StabilityError, rest
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import PadHalfSpace, bulk_compliance
 from workflow.analyses.specimens.memory import memory
@@ -121,7 +121,9 @@ def _blocks(
 ) -> Iterator[BlockState]:
     """The states of a worn pair, up to the end that the case asks for."""
     own = case.wear.cycle_block
-    stepper = Explicit(own.share) if own.length is None else Explicit(cycles=own.length)
+    stepper = (
+        ExplicitStepper(own.share) if own.length is None else ExplicitStepper(cycles=own.length)
+    )
     fretted = FrettedPair(pair, case.laws, conditions)
     states = wear_in_cycle_blocks(fretted, gap, stepper, partial(_to_go, case))
     for number, state in enumerate(states):

@@ -11,7 +11,7 @@ from fe_models.reduced_contact import FrettingConditions, FrettingCycle, Reduced
 from sa_solver.types import Array
 from wear.laws import WearLaw
 from wear.nodes import NodalContact, NodalState
-from wear.steppers import Explicit, steps
+from wear.steppers import ExplicitStepper, steps
 
 
 @dataclass(frozen=True)
@@ -100,7 +100,7 @@ class FrettedPair:
 def wear_in_cycle_blocks(
     fretted: FrettedPair,
     gap: Array,
-    stepper: Explicit,
+    stepper: ExplicitStepper,
     to_go: Callable[[BlockState], float],
 ) -> Iterator[BlockState]:
     """States of a contact of unworn ``gap`` ``(n,)`` that frets until nothing is ``to_go``.

@@ -8,7 +8,7 @@ import numpy as np
 
 from sa_solver.types import Array
 from wear.nodes import NodalState
-from wear.steppers import Heun, advance_cycles
+from wear.steppers import HeunStepper, advance_cycles
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Curves
@@ -36,7 +36,7 @@ def wear_specimens(case: FrictionRigWearCase, reporter: Reporter) -> VibrationWe
     file = case.structure.specimens
     specimens = load_named("structure.specimens", file, [SpecimensCase], "specimens")
     pads = WearingPads(unworn, specimens.laws, own.force, own.frequency)
-    stepper, total, done = Heun(own.tolerance), own.cycles[-1], 0.0
+    stepper, total, done = HeunStepper(own.tolerance), own.cycles[-1], 0.0
     state = pads.begin()
     with reporter.stage("wear"):
         pads.at(state)

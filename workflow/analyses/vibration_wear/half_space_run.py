@@ -15,7 +15,7 @@ from fe_models.dynamics.harmonics import Resolution
 from sa_solver.tangential_loop import TangentialLoop
 from wear.joints.jenkins import Jenkins
 from wear.moving import LARGE_STROKE
-from wear.steppers import Stretches, advance_cycles, first_cycles
+from wear.steppers import SubcyclingStepper, advance_cycles, first_cycles
 from wear.stepping import WearState
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.rig.rig_model import RigModel
@@ -57,7 +57,7 @@ def wear_half_space(case: VibrationWearCase, reporter: Reporter) -> VibrationWea
     own, wear = case.resolution, case.wear
     resolution = Resolution(tuple(own.harmonics), own.samples)
     contact = VibratingContact(bodies, rig, Shaking(wear.force, wear.frequency, resolution))
-    stepper = Stretches(stepper_of(bodies.wear), contact.alike_cycles)
+    stepper = SubcyclingStepper(stepper_of(bodies.wear), contact.alike_cycles)
     total, done = wear.cycles[-1], 0.0
     with reporter.stage("contact, first cycle"):
         state = contact.unworn()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -13,7 +12,13 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
 from wear.interface import InterfaceContact, InterfaceSettings, InterfaceState
-from wear.steppers import ErrorControl, Explicit, Implicit, SecondOrder, Stepper
+from wear.steppers import (
+    ErrorControl,
+    ExplicitStepper,
+    ImplicitStepper,
+    SecondOrderStepper,
+    Stepper,
+)
 from wear.stepping import WearingContact, WearState
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Duration
@@ -22,45 +27,28 @@ from workflow.analyses.wear.load_source import ContactFace
 from workflow.errors import UserError
 
 
-@dataclass(frozen=True)
-class StageSettings:
-    """What a contact stage is made from."""
-
-    case: WearCase
-    contact: ContactFace
-
-
 class ContactStage(InterfaceContact):
-    """One face of a case on its grid."""
+    """One face of a case on its grid.
 
-    def __init__(self, settings: StageSettings) -> None:
-        case, contact = settings.case, settings.contact
+    ``remedy`` is what to do where the contact reaches the border of that, ``coarse_grid`` another
+    with as many cells as the face has nodes.
+    """
+
+    transfer: FaceTransfer
+
+    def __init__(self, case: WearCase, contact: ContactFace) -> None:
         grid = contact.grid(case.contact.grid)
         _check_section(case.stress, grid)
         self._case, self._contact_face, self.face = case, contact, contact.face
-        self._transfer = FaceTransfer.between(contact.face, grid)
-        super().__init__(_interface(case, contact, self._transfer))
-
-    @property
-    def transfer(self) -> FaceTransfer:
-        return self._transfer
-
-    @property
-    def remedy(self) -> str:
-        """What to do where the contact reaches the border of the grid."""
-        return self._contact_face.remedy
-
-    @property
-    def coarse_grid(self) -> Grid:
-        """A grid with as many cells as the face has nodes."""
-        return self._contact_face.grid(self._contact_face.coarse)
+        self.remedy, self.coarse_grid = contact.remedy, contact.grid(contact.coarse)
+        super().__init__(_interface(case, contact, FaceTransfer.between(contact.face, grid)))
 
     def coarse_pressure(self, loads: LoadHistory, peak: int) -> Array:
         """Unworn peak pressure on a grid as coarse as the mesh of the structure."""
-        grid = self.coarse_grid
         at_peak = (float(column[peak]) for column in (loads.P, loads.Mx, loads.My))
-        contact = NormalContact(HalfSpace(grid, self.pair))
-        return contact.solve(_gap(self._contact_face, grid), *at_peak).pressure
+        contact = NormalContact(HalfSpace(self.coarse_grid, self.pair))
+        gap = gap_on(self._contact_face, self.coarse_grid)
+        return contact.solve(gap, *at_peak).pressure
 
     def face_of(self, body: Literal[1, 2]) -> Face:
         """The face of one body, with its own nodes."""
@@ -69,9 +57,9 @@ class ContactStage(InterfaceContact):
     def depths_of_bodies(self, state: InterfaceState) -> tuple[Array, Array]:
         """Worn depths of body 1 and body 2 at the nodes of their own faces, volumes kept."""
         face_1 = self.face_of(1)
-        own = self.transfer if face_1 is self.face else FaceTransfer.between(face_1, self.grid)
+        to_1 = self.transfer if face_1 is self.face else FaceTransfer.between(face_1, self.grid)
         surfaces = state.surfaces
-        return own.to_nodes(surfaces.depth_1), self.transfer.to_nodes(surfaces.depth_2)
+        return to_1.to_nodes(surfaces.depth_1), self.transfer.to_nodes(surfaces.depth_2)
 
     def loop(self, state: InterfaceState, peak: int) -> WornLoop:
         """The tangential loop that the case asks for, on the present surfaces."""
@@ -81,25 +69,26 @@ class ContactStage(InterfaceContact):
 
 def _interface(case: WearCase, contact: ContactFace, transfer: FaceTransfer) -> InterfaceSettings:
     """A face and how it wears, as the library takes it."""
-    grid, own = transfer.grid, case.contact
+    grid, settings = transfer.grid, case.contact
     return InterfaceSettings(
         name=contact.face.name,
         grid=grid,
-        gap=_gap(contact, grid),
+        gap=gap_on(contact, grid),
         transfer=transfer,
         pair=ElasticPair(case.material(1), case.material(2)),
         laws=(case.wear_of(1).described(), case.wear_of(2).described()),
         friction=case.friction.at,
         stepper=stepper_of(case.wear),
-        method=own.method,
-        gross_slip=own.gross_slip,
+        method=settings.method,
+        gross_slip=settings.gross_slip,
         driven=contact.driven,
         follow=_follow(case),
-        tolerance=own.tolerance,
+        tolerance=settings.tolerance,
     )
 
 
-def _gap(contact: ContactFace, grid: Grid) -> Array:
+def gap_on(contact: ContactFace, grid: Grid) -> Array:
+    """Unworn gap of a face on a grid over it ``(nx, ny)`` [mm]."""
     gap = contact.gap(grid.x, grid.y)
     return np.ascontiguousarray(np.broadcast_to(gap, grid.shape))
 
@@ -116,12 +105,12 @@ def stepper_of(wear: Duration) -> Stepper[WearState, WearingContact]:
     """What advances the surfaces of a contact, as the case asks for."""
     step = wear.step
     if step.kind == "explicit":
-        return Explicit(step.fraction)
+        return ExplicitStepper(step.fraction)
     control = None
     if step.automatic:
         relative = wear.tolerance if wear.depth_tolerance is None else None
         control = ErrorControl(relative, wear.depth_tolerance)
-    return Implicit(control) if step.kind == "implicit" else SecondOrder(control)
+    return ImplicitStepper(control) if step.kind == "implicit" else SecondOrderStepper(control)
 
 
 def _check_section(stress: ContactStress, grid: Grid) -> None:

@@ -6,14 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from fe_models.mesh import Interface, MeshError
 from fe_models.structure import InterfaceHistory
-from sa_solver.types import Array
 from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.contact_stage import gap_on
 from workflow.analyses.wear.load_source import ContactFace
-from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.analyses.wear.structure_stage import StructureStage, meshed_faces
 from workflow.analyses.wear.structures import resultants, structure_of
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.analyses.wear.structures.resultants.writing import (
@@ -72,10 +70,7 @@ def _claim(out: Path, force: bool) -> None:
 
 
 def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter) -> None:
-    with reporter.stage("mesh"):
-        faces = source.faces
-    nodes, interface_nodes = source.node_count(), source.interface_count()
-    structure_of(case).memory(case, nodes, interface_nodes).check()
+    faces = meshed_faces(case, source, reporter)
     with reporter.stage("condensation"):
         source.prepare()
     with reporter.stage("structural friction"):
@@ -83,7 +78,7 @@ def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter
             history.interface.name: _numbered(source, history) for history in source.unworn()
         }
     warn_of_structure(source, reporter)
-    heights = {face.face.name: _height(face, case) for face in faces}
+    heights = {face.face.name: gap_on(face, face.grid(case.contact.grid)) for face in faces}
     loads = {name: history.loads for name, history in histories.items()}
     write_resultants_csv(out / TABLE, loads, source.line)
     write_resultants_h5(out / FIELDS, histories, heights)
@@ -98,12 +93,6 @@ def _numbered(source: StructureStage, history: InterfaceHistory) -> InterfaceHis
         return history
     numbered = replace(face, nodes_1=numbers[0][face.nodes_1], nodes_2=numbers[1][face.nodes_2])
     return replace(history, interface=numbered)
-
-
-def _height(face: ContactFace, case: WearCase) -> Array:
-    """Unworn gap on the contact grid of the case, ``(nx, ny)`` [mm]."""
-    grid = face.grid(case.contact.grid)
-    return np.array(np.broadcast_to(face.gap(grid.x, grid.y), grid.shape))
 
 
 def _imported(case: WearCase, faces: tuple[ContactFace, ...], out: Path) -> ResultantsCase:
@@ -124,10 +113,10 @@ def _structure(faces: tuple[ContactFace, ...]) -> dict[str, Any]:
     """The structure of that case: faces in their order, sizes to the last digit."""
     line = faces[0].face.line
     sizes = [list(face.size[:1] if line else face.size) for face in faces]
-    interfaces: list[dict[str, Any]] = [{"name": face.face.name} for face in faces]
-    for interface, size in zip(interfaces, sizes, strict=True):
-        if size != sizes[0]:
-            interface["size"] = size
+    interfaces = [
+        {"name": face.face.name} | ({} if size == sizes[0] else {"size": size})
+        for face, size in zip(faces, sizes, strict=True)
+    ]
     return {
         "kind": "resultants",
         "dimension": 2 if line else 3,

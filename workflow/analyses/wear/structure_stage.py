@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Protocol, TypeVar
+from typing import Literal, Protocol, TypeVar
 
 import numpy as np
 
@@ -22,8 +22,10 @@ from fe_models.relinearised import (
 from fe_models.stress import StressField, deformation, stress_state
 from fe_models.structure import CycleSolution, InterfaceHistory, Structure, mixed
 from sa_solver.types import Array, Indices
+from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import Nonlinearity
-from workflow.analyses.wear.load_source import BODIES, ContactFace, UserFace
+from workflow.analyses.wear.load_source import BODIES, ContactFace, LoadSource, UserFace
+from workflow.analyses.wear.structures import structure_of
 from workflow.errors import MethodFailed
 from workflow.shell.cache import content_key, load_cycle, load_joint, save_cycle, save_joint
 from workflow.shell.reporter import Reporter
@@ -32,8 +34,8 @@ Solved = TypeVar("Solved", CycleSolution, FrictionState)
 
 
 @dataclass(frozen=True)
-class LoadBlock:
-    """A closed cycle of loads that is so large a ``share`` of all cycles.
+class MissionLoads:
+    """The loads of a mission, a closed cycle that is so large a ``share`` of all cycles.
 
     ``amplitudes`` ``(t, cases)`` are those of the load cases over the cycle and ``preload``
     ``(s, cases)`` those before the first one.
@@ -47,23 +49,20 @@ class LoadBlock:
 class StructureModel(Protocol):
     """A structure as a case describes it.
 
-    ``key`` is everything that its condensed joint depends on, ``blocks`` are the closed cycles of
-    its loads, one unless missions are mixed; ``peak`` is the increment of peak load, counted from 0
-    over all blocks, ``friction`` µ before any wear, ``order`` that of the elements.
+    ``key`` is everything that its condensed joint depends on, ``missions`` are the closed cycles of
+    its loads, one unless several are mixed; ``peak`` is the increment of peak load, counted from 0
+    over all missions, ``friction`` µ before any wear, ``order`` that of the elements.
     """
+
+    peak: int
+    order: Literal[1, 2]
+    friction: float
+    nonlinearity: Nonlinearity
 
     @property
     def key(self) -> tuple[object, ...]: ...
     @property
-    def blocks(self) -> tuple[LoadBlock, ...]: ...
-    @property
-    def peak(self) -> int: ...
-    @property
-    def order(self) -> int: ...
-    @property
-    def friction(self) -> float: ...
-    @property
-    def nonlinearity(self) -> Nonlinearity: ...
+    def missions(self) -> tuple[MissionLoads, ...]: ...
 
     def softening(self, structure: Structure) -> Softening:
         """Spin softening of both bodies at peak load."""
@@ -205,24 +204,23 @@ class StructureStage:
 
     @cached_property
     def unworn_cycle(self) -> CycleSolution:
-        """The closed cycle from rest with unworn faces, of all blocks one after the other."""
-        return self._mixed(self._unworn_blocks)
+        """The closed cycle from rest with unworn faces, of all missions one after the other."""
+        return self._mixed(self._unworn_missions)
 
     @cached_property
-    def _unworn_blocks(self) -> tuple[CycleSolution, ...]:
-        return tuple(map(self._unworn_block, self.model.blocks))
+    def _unworn_missions(self) -> tuple[CycleSolution, ...]:
+        return tuple(map(self._unworn_mission, self.model.missions))
 
-    def _unworn_block(self, block: LoadBlock) -> CycleSolution:
-        """The closed cycle of one block from rest, from the cache if it is there."""
+    def _unworn_mission(self, mission: MissionLoads) -> CycleSolution:
+        """The closed cycle of one mission from rest, from the cache if it is there."""
         friction = self.model.friction
-        loads = [path.tolist() for path in (block.preload, block.amplitudes)]
+        loads = [path.tolist() for path in (mission.preload, mission.amplitudes)]
         stiffness = self.model.nonlinearity.stiffness
         at = None if stiffness == "linear" else self._peak_amplitudes.tolist()
         key = content_key(*self.model.key, *loads, stiffness, at, friction)
         cycle = load_cycle(key, self.structure, friction)
         if cycle is None:
-            unworn = [np.zeros(len(i)) for i in self.mesh.interfaces]
-            cycle = self._cycle(block, unworn, None, None)
+            cycle = self._cycle(mission, self._no_wear(), None, None)
             save_cycle(key, cycle)
         return cycle
 
@@ -233,8 +231,9 @@ class StructureStage:
         self, depths: list[Array], friction: Sequence[float] | None = None
     ) -> CycleSolution:
         """The cycle that follows the unworn one when the gaps are wider by the worn depths."""
-        pairs = zip(self.model.blocks, self._unworn_blocks, strict=True)
-        return self._mixed([self._cycle(block, depths, own, friction) for block, own in pairs])
+        pairs = zip(self.model.missions, self._unworn_missions, strict=True)
+        cycles = [self._cycle(mission, depths, unworn, friction) for mission, unworn in pairs]
+        return self._mixed(cycles)
 
     def worn(
         self, depths: list[Array], friction: Sequence[float] | None = None
@@ -242,20 +241,22 @@ class StructureStage:
         return self.worn_cycle(depths, friction).histories
 
     def _mixed(self, cycles: Sequence[CycleSolution]) -> CycleSolution:
-        return mixed(cycles, [block.share for block in self.model.blocks])
+        return mixed(cycles, [mission.share for mission in self.model.missions])
 
     def _cycle(
         self,
-        block: LoadBlock,
+        mission: MissionLoads,
         depths: list[Array],
         after: CycleSolution | None,
         friction: Sequence[float] | None,
     ) -> CycleSolution:
         nodal = self._nodal_friction(friction)
-        solution = self.structure.solve_cycle(
-            self._joint_of(nodal), block.amplitudes, self._gap(depths), nodal, after, block.preload
+        joint, gap = self._joint_of(nodal), self._gap(depths)
+        return _converged(
+            self.structure.solve_cycle(
+                joint, mission.amplitudes, gap, nodal, after, mission.preload
+            )
         )
-        return _converged(solution)
 
     def user_faces(self, number: int) -> tuple[UserFace, ...]:
         """The nodes of the faces of a mesh of the user's own."""
@@ -263,8 +264,8 @@ class StructureStage:
         for body in BODIES:
             numbers = self.model.node_numbers(body)
             if numbers is not None:
-                own = numbers[interface.nodes(body)]
-                faces.append(UserFace(body, own, interface.frame))
+                nodes = interface.nodes(body)
+                faces.append(UserFace(body, numbers[nodes], interface.frame))
         return tuple(faces)
 
     def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
@@ -277,7 +278,10 @@ class StructureStage:
 
     @cached_property
     def _unworn_peak(self) -> FrictionState:
-        return self._march_to_peak([np.zeros(len(i)) for i in self.mesh.interfaces], [], None)
+        return self._march_to_peak(self._no_wear(), [], None)
+
+    def _no_wear(self) -> list[Array]:
+        return [np.zeros(len(interface)) for interface in self.mesh.interfaces]
 
     def _march_to_peak(
         self, depths: list[Array], guess: list[Array], friction: Sequence[float] | None
@@ -301,7 +305,7 @@ class StructureStage:
     @property
     def _peak_amplitudes(self) -> Array:
         """Amplitudes of the load cases at peak load ``(cases,)``."""
-        amplitudes = np.concatenate([block.amplitudes for block in self.model.blocks])
+        amplitudes = np.concatenate([mission.amplitudes for mission in self.model.missions])
         peak: Array = amplitudes[self.peak]
         return peak
 
@@ -315,6 +319,16 @@ class StructureStage:
 
     def _gap(self, depths: list[Array]) -> Array:
         return self.structure.gap() + np.concatenate(depths)
+
+
+def meshed_faces(case: WearCase, source: LoadSource, reporter: Reporter) -> tuple[ContactFace, ...]:
+    """The faces of a source of loads, once it is known that the memory is enough for the run."""
+    with reporter.stage("mesh"):
+        faces = source.faces
+    if isinstance(source, StructureStage):
+        nodes, interface_nodes = source.node_count(), source.interface_count()
+        structure_of(case).memory(case, nodes, interface_nodes).check()
+    return faces
 
 
 def _converged(solved: Solved) -> Solved:

@@ -16,11 +16,11 @@ import numpy as np
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, resultant_change
-from wear.coupled import ContactsInTurn, CoupledSettings, CoupledState, CoupledWear, JumpSize
-from wear.steppers import Implicit, advance_cycles
+from wear.coupled import Contacts, CoupledSettings, CoupledState, CoupledWear, JumpSize
+from wear.steppers import ImplicitStepper, advance_cycles
 from wear.stepping import SlidingCycle, WearingContact, WearState
 from workflow.analyses.wear.case.sections import Contact, ContactStress, Life, Step
-from workflow.analyses.wear.contact_stage import ContactStage, StageSettings
+from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.fidelity.estimate import Numbers
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
@@ -104,10 +104,10 @@ def _run(
 ) -> tuple[list[ContactStage], list[CoupledState]]:
     """The contacts of a life, and its states, the unworn one first."""
     structure = _structure(case)
-    stages = [ContactStage(StageSettings(case, contact)) for contact in structure.faces]
+    stages = [ContactStage(case, contact) for contact in structure.faces]
     cycles = case.wear.cycles
     settings = CoupledSettings(cycles, JumpSize(cycles / STEPS), resultants=resultants)
-    loop = CoupledWear(settings, structure, ContactsInTurn(stages))
+    loop = CoupledWear(settings, structure, Contacts(stages))
     state, _ = loop.begin(structure.unworn())
     return stages, [state, *loop.march(state)]
 
@@ -167,7 +167,7 @@ def _worn_away(contact: WearingContact, state: WearState, cycles: float) -> Arra
     """Depth of both bodies after so many cycles."""
     at = partial(_always, contact)
     for _ in range(STEPS):
-        state = advance_cycles(Implicit(), state, cycles / STEPS, cycles, at).state
+        state = advance_cycles(ImplicitStepper(), state, cycles / STEPS, cycles, at).state
     return state.surfaces.depth
 
 

@@ -11,7 +11,7 @@ from fe_models.mesh import Interface, StructureMesh
 from fe_models.relinearised import Softening
 from fe_models.structure import Structure
 from workflow.analyses.wear.load_source import ContactFace
-from workflow.analyses.wear.structure_stage import LoadBlock
+from workflow.analyses.wear.structure_stage import MissionLoads
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.shell.reporter import Reporter
 
@@ -40,10 +40,10 @@ class DovetailModel:
         return self.dovetail, case.structure.dimension, case.mesh, case.materials, pull
 
     @property
-    def blocks(self) -> tuple[LoadBlock, ...]:
+    def missions(self) -> tuple[MissionLoads, ...]:
         paths = [mission.amplitudes() for mission in self._missions]
         shares = self._case.load_path.shares
-        return tuple(LoadBlock(p, p[:0], share) for p, share in zip(paths, shares, strict=True))
+        return tuple(MissionLoads(p, p[:0], share) for p, share in zip(paths, shares, strict=True))
 
     def mesh(self) -> StructureMesh:
         mesh = self._case.mesh

@@ -17,7 +17,7 @@ from sa_solver.shapes import PARTING_SLOPE
 from sa_solver.types import Array, Grid, Indices
 from workflow.analyses.wear.gaps import GapFunction, gap_over
 from workflow.analyses.wear.load_source import ContactFace
-from workflow.analyses.wear.structure_stage import LoadBlock
+from workflow.analyses.wear.structure_stage import MissionLoads
 from workflow.analyses.wear.structures.mesh.case import MeshCase, face_size
 from workflow.analyses.wear.structures.mesh.loads import RotationLoad
 from workflow.shell.reporter import Reporter
@@ -35,8 +35,8 @@ class MeshModel:
         self.nonlinearity = case.nonlinearity
         self.order = case.structure.order
         path = case.load_path
-        self._begun = sum(path.increments[: path.cycle_from - 1])
-        self.peak = sum(path.increments[: path.peak_leg]) - 1 - self._begun
+        self._increments_before = sum(path.increments[: path.cycle_from - 1])
+        self.peak = sum(path.increments[: path.peak_leg]) - 1 - self._increments_before
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -48,12 +48,12 @@ class MeshModel:
         return contents, described, loads, gaps, self._case.materials
 
     @property
-    def blocks(self) -> tuple[LoadBlock, ...]:
-        begun, made = self._begun, []
+    def missions(self) -> tuple[MissionLoads, ...]:
+        before, missions = self._increments_before, []
         for factors, share in self._case.load_path.mixed(len(self._case.structure.loads)):
             path = self._path(factors)
-            made.append(LoadBlock(path[begun:], path[:begun], share))
-        return tuple(made)
+            missions.append(MissionLoads(path[before:], path[:before], share))
+        return tuple(missions)
 
     def _path(self, factors: tuple[float, ...]) -> Array:
         """Amplitudes of the loads, ``(t, loads)``; squared where a load is a rotation."""
@@ -110,7 +110,7 @@ class MeshModel:
 
     def softening(self, structure: Structure) -> Softening:
         loads = [load.described() for load in self._case.structure.loads]
-        return imported_softening(structure, loads, self.blocks[0].amplitudes[self.peak])
+        return imported_softening(structure, loads, self.missions[0].amplitudes[self.peak])
 
     def contact_face(self, interface: Interface) -> ContactFace:
         size, extra = face_size(interface), self._case_gap(interface)
