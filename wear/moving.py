@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from scipy.ndimage import convolve, correlate
 
 from sa_solver.errors import InputError
 from sa_solver.types import Array, Grid, Mask
@@ -61,18 +62,19 @@ class Passage:
     after: tuple[float, float]
 
     @cached_property
-    def _weights(self) -> dict[tuple[int, int], float]:
-        """Weight w_k of each shift k in cells."""
+    def _weights(self) -> Array:
+        """Weight w_k of each shift k in cells ``(2 m + 1, 2 n + 1)``, no shift in the middle."""
         start, end = (np.array(offset) / self.grid.pitch for offset in (self.before, self.after))
         if self.grid.line:
             start[1] = end[1] = 0.0
+        reach = np.ceil(np.abs([start, end])).max(axis=0).astype(int)
+        weights = np.zeros(2 * reach + 1)
         times = _crossings(start, end)
-        weights: dict[tuple[int, int], float] = {}
         for begin, length in zip(times[:-1], np.diff(times), strict=True):
             for point in GAUSS:
                 shift = start + (begin + point * length) * (end - start)
                 for cell, share in _overlaps(shift):
-                    weights[cell] = weights.get(cell, 0.0) + 0.5 * length * share
+                    weights[tuple(reach + cell)] += 0.5 * length * share
         return weights
 
     def carry(self, field: Array) -> Array:
@@ -80,11 +82,7 @@ class Passage:
 
         Beyond the grid it is taken for 0: nothing wears there.
         """
-        seen = np.zeros_like(field)
-        for (k, m), weight in self._weights.items():
-            here, there = _shifted(field.shape, k, m)
-            seen[here] += weight * field[there]
-        return seen
+        return np.asarray(correlate(field, self._weights, mode="constant"))
 
     def deposit(self, field: Array) -> Array:
         """What lies on the grid, ``(nx, ny)``, spread over body 1: the adjoint of ``carry``.
@@ -92,20 +90,16 @@ class Passage:
         Raises TravelError where some of it would leave the grid.
         """
         self._check_room(field)
-        spread = np.zeros_like(field)
-        for (k, m), weight in self._weights.items():
-            here, there = _shifted(field.shape, k, m)
-            spread[there] += weight * field[here]
-        return spread
+        return np.asarray(convolve(field, self._weights, mode="constant"))
 
     def _check_room(self, field: Array) -> None:
         occupied = np.nonzero(field)
         if len(occupied[0]) == 0:
             return
         for axis, name in enumerate("xy"):
-            shifts = [cell[axis] for cell in self._weights]
+            shifts = np.nonzero(self._weights)[axis] - self._weights.shape[axis] // 2
             first, last = int(occupied[axis].min()), int(occupied[axis].max())
-            beyond = max(-(first + min(shifts)), last + max(shifts) + 1 - field.shape[axis])
+            beyond = max(-(first + shifts.min()), last + shifts.max() + 1 - field.shape[axis])
             if beyond > 0:
                 raise TravelError(
                     f"the stroke carries wear {beyond} cells beyond the end of the grid along "
@@ -136,21 +130,6 @@ def _overlaps(shift: Array) -> Iterator[tuple[tuple[int, int], float]]:
     ):
         if share > 0.0:
             yield cell, float(share)
-
-
-def _shifted(
-    shape: tuple[int, ...], k: int, m: int
-) -> tuple[tuple[slice, slice], tuple[slice, slice]]:
-    """Cells whose neighbour ``k`` along x and ``m`` along y is on the grid, and the neighbours."""
-    pairs = [
-        (
-            slice(max(0, -by), max(0, min(count, count - by))),
-            slice(max(0, by), max(0, min(count, count + by))),
-        )
-        for by, count in zip((k, m), shape, strict=True)
-    ]
-    (here_x, there_x), (here_y, there_y) = pairs
-    return (here_x, here_y), (there_x, there_y)
 
 
 def offsets(slip: Array, weight: Array) -> Array:

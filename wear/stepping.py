@@ -276,7 +276,7 @@ class WearingContact:
         start: NormalStart | None,
         compliance: Array | None = None,
     ) -> NormalState:
-        """Contact state of one increment; a ``compliance`` ``(nx, ny)`` [mm/MPa] is worn on the way."""
+        """Contact state of one increment; ``compliance`` ``(nx, ny)`` [mm/MPa] is wear."""
         loads = self._cycle.loads
         state = self.contact.solve(
             self._cycle.gap(surfaces, increment),

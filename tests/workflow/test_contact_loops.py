@@ -25,8 +25,10 @@ from workflow.analyses.wear.contact_loops import (
 )
 from workflow.analyses.wear.figures import loops as loops_figure
 from workflow.analyses.wear.figures import wear as figures
-from workflow.analyses.wear.loop_table import read_loop_table
+from workflow.analyses.wear.loop_table import COLUMNS
 from workflow.analyses.wear.recording import Recorder
+from workflow.case.fields import Quantity
+from workflow.case.table_file import read_columns
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case
 from workflow.shell.folder import OutputFolder
@@ -276,7 +278,9 @@ def test_run_writes_a_table_for_every_interface(rubbed):
     """Cycles, energy, load and area are those of the run; the loop slides, so µ is the case's."""
     summary = rubbed.summary
     for name in ("left", "right"):
-        table = read_loop_table(rubbed.folder / f"loops_{name}.csv")
+        quantities = {column.name: Quantity(column.unit) for column in COLUMNS}
+        file = rubbed.folder / f"loops_{name}.csv"
+        table = SimpleNamespace(**read_columns(str(file), quantities))
         kinetics = summary["kinetics"][name]
         np.testing.assert_allclose(table.cycles, summary["kinetics"]["cycles"])
         np.testing.assert_allclose(table.energy, kinetics["energy"], rtol=1e-9)

@@ -11,7 +11,8 @@ from fe_models.structure import InterfaceHistory
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_stage import gap_on
 from workflow.analyses.wear.load_source import ContactFace
-from workflow.analyses.wear.structure_stage import StructureStage, meshed_faces
+from workflow.analyses.wear.run import meshed_faces
+from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import resultants, structure_of
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.analyses.wear.structures.resultants.writing import (

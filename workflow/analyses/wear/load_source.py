@@ -2,16 +2,23 @@
 
 from __future__ import annotations
 
+from abc import abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
 
+import numpy as np
+
 from fe_models.mesh import Face
 from sa_solver.types import Array, Frame, Grid, Indices
 from wear import coupled
-from wear.interface import FaceLoads
+from wear.interface import CycleLoads, FaceLoads
 
 BODIES: tuple[Literal[1, 2], ...] = (1, 2)
+# Without a mesh, the grid that shows what a coarse one misses has cells so many times larger.
+COARSER = 4
+# Cells below which a contact is hardly one.
+FEWEST = 8
 
 
 @dataclass(frozen=True)
@@ -77,3 +84,44 @@ class LoadSource(coupled.LoadSource, Protocol):
     def user_faces(self, number: int) -> Sequence[UserFace]:
         """Where the worn surfaces of interface ``number`` go back to nodes of the user's own."""
         ...
+
+
+class UncoupledSource:
+    """Base of load sources without a structure of ours: nothing to solve, and nothing to wear."""
+
+    peak: int
+
+    def prepare(self) -> None:
+        """Nothing is costly."""
+
+    @abstractmethod
+    def unworn(self) -> tuple[CycleLoads, ...]:
+        """The closed cycle."""
+
+    def worn(
+        self, depths: Sequence[Array], friction: Sequence[float] | None = None
+    ) -> tuple[CycleLoads, ...]:
+        """As unworn: no structure responds to wear."""
+        return self.unworn()
+
+    def probe(self, depths: Sequence[Array], friction: Sequence[float] | None = None) -> Array:
+        """Resultants ``(faces, 6)`` at peak load, whatever the wear."""
+        cycles = self.worn(depths, friction)
+        return np.array([cycle.loads.resultants[self.peak] for cycle in cycles])
+
+
+def nominal_face(
+    name: str, size: tuple[float, float], line: bool, frame: Frame | None = None
+) -> Face:
+    """A face of which nothing is known but its ``size`` [mm]: its nodes are its corners."""
+    x, y = 0.5 * size[0], 0.5 * size[1]
+    corners, facets = [[-x, -y], [x, -y], [x, y], [-x, y]], [[0, 1, 2], [0, 2, 3]]
+    if line:
+        corners, facets = [[-x, 0.0], [x, 0.0]], [[0, 1]]
+    frame = frame or Frame(np.zeros(3), np.eye(3))
+    return Face(name, frame, np.array(corners), np.array(facets))
+
+
+def coarse_cells(nx: float, ny: float, line: bool) -> tuple[int, int]:
+    """About so many cells along x and y, but enough for a contact."""
+    return max(FEWEST, round(nx)), 1 if line else max(FEWEST, round(ny))

@@ -66,24 +66,15 @@ NEEDED = ("energy", "P", "kt", "mu")
 
 @dataclass(frozen=True)
 class LoopTable:
-    """Columns of a table of loops, ``(k,)`` each, in base units: see ``COLUMNS``.
+    """What joint laws read of a table of loops, ``(k,)`` each, in base units: see ``COLUMNS``.
 
-    ``energy`` ascends; columns that the file does not have are NaN. ``per_length`` says that
-    energies, forces, stiffnesses and areas are per mm.
+    ``energy`` ascends. ``per_length`` says that energies, forces and stiffnesses are per mm.
     """
 
-    cycles: Array
     energy: Array
     P: Array
     kt: Array
     mu: Array
-    energy_per_loop: Array
-    area: Array
-    amplitude: Array
-    force: Array
-    sliding: Array
-    residual_stiffness: Array
-    border_load: Array
     per_length: bool
 
 
@@ -108,19 +99,14 @@ def read_loop_table(path: Path) -> LoopTable:
         units = {column.name: column.units(per_length)[0] for column in COLUMNS}
         # Other columns may be slips of the pen for those that need not be given.
         table.check(units)
-        columns = {
-            name: table.column(name, Quantity(unit))
-            if name in table.names
-            else np.full(len(table), np.nan)
-            for name, unit in units.items()
-        }
+        columns = {name: table.column(name, Quantity(units[name])) for name in table.names}
     except InputFileError as error:
         raise UserError(str(error)) from error
     falls = np.flatnonzero(np.diff(columns["energy"]) < 0.0)
     if falls.size:
         line = table.rows[falls[0] + 1][0]
         raise UserError(f"{path}:{line}: the energy falls; allowed: rows in order of their energy")
-    return LoopTable(**columns, per_length=per_length)
+    return LoopTable(**{name: columns[name] for name in NEEDED}, per_length=per_length)
 
 
 def _per_length(table: TableFile) -> bool:

@@ -14,10 +14,10 @@ from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.contact_workers import ContactProcesses, contact_workers
 from workflow.analyses.wear.fidelity.choosing import say
-from workflow.analyses.wear.load_source import LoadSource
+from workflow.analyses.wear.load_source import ContactFace, LoadSource
 from workflow.analyses.wear.recording import Recorder, RunLog
 from workflow.analyses.wear.results import Outcome, write_output
-from workflow.analyses.wear.structure_stage import StructureStage, meshed_faces
+from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.warnings import warn_of_contact, warn_of_structure
 from workflow.analyses.wear.worn_structure import nonlinearity_sentence
@@ -113,6 +113,16 @@ def _look_at(case: WearCase, structure: StructureStage, reporter: Reporter) -> N
         with reporter.stage("nonlinearity check"):
             check = structure.nonlinear_check
         reporter.say(nonlinearity_sentence(check))
+
+
+def meshed_faces(case: WearCase, source: LoadSource, reporter: Reporter) -> tuple[ContactFace, ...]:
+    """The faces of a source of loads, once it is known that the memory is enough for the run."""
+    with reporter.stage("mesh"):
+        faces = source.faces
+    if isinstance(source, StructureStage):
+        nodes, interface_nodes = source.node_count(), source.interface_count()
+        structure_of(case).memory(case, nodes, interface_nodes).check()
+    return faces
 
 
 def coupled_settings(case: WearCase) -> CoupledSettings:

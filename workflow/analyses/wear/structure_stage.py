@@ -22,10 +22,8 @@ from fe_models.relinearised import (
 from fe_models.stress import StressField, deformation, stress_state
 from fe_models.structure import CycleSolution, InterfaceHistory, Structure, mixed
 from sa_solver.types import Array, Indices
-from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import Nonlinearity
-from workflow.analyses.wear.load_source import BODIES, ContactFace, LoadSource, UserFace
-from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.load_source import BODIES, ContactFace, UserFace
 from workflow.errors import MethodFailed
 from workflow.shell.cache import content_key, load_cycle, load_joint, save_cycle, save_joint
 from workflow.shell.reporter import Reporter
@@ -319,16 +317,6 @@ class StructureStage:
 
     def _gap(self, depths: list[Array]) -> Array:
         return self.structure.gap() + np.concatenate(depths)
-
-
-def meshed_faces(case: WearCase, source: LoadSource, reporter: Reporter) -> tuple[ContactFace, ...]:
-    """The faces of a source of loads, once it is known that the memory is enough for the run."""
-    with reporter.stage("mesh"):
-        faces = source.faces
-    if isinstance(source, StructureStage):
-        nodes, interface_nodes = source.node_count(), source.interface_count()
-        structure_of(case).memory(case, nodes, interface_nodes).check()
-    return faces
 
 
 def _converged(solved: Solved) -> Solved:

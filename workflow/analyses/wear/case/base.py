@@ -8,7 +8,13 @@ from typing import ClassVar, Literal
 from sa_solver.types import Material as ElasticMaterial
 from workflow.analyses.wear.case.evolution import EvolvingFriction
 from workflow.analyses.wear.case.loops import Loops
-from workflow.analyses.wear.case.sections import BodiesThatWear, Contact, ContactStress, Coupling
+from workflow.analyses.wear.case.sections import (
+    BodiesThatWear,
+    Contact,
+    ContactStress,
+    Coupling,
+    Nonlinearity,
+)
 from workflow.analyses.wear.case.worn_bodies import Worn
 from workflow.case.sections import Case, Section, Title, disagreement, entry
 
@@ -79,3 +85,14 @@ class WearCase(Case):
     def recoupling(self) -> Coupling:
         """How often the worn surfaces go back to the structure: never, where there is none."""
         return Coupling(resultants="constant")
+
+
+class FiniteElementCase(WearCase):
+    """A case whose loads come from a structure of ours."""
+
+    nonlinearity: Nonlinearity = entry("geometric, of the structure", default=Nonlinearity())
+    coupling: Coupling = entry("worn surfaces back to the structure", default=Coupling())
+
+    @property
+    def recoupling(self) -> Coupling:
+        return self.coupling

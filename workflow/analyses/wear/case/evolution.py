@@ -4,15 +4,13 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from wear.evolution import EnergyTable
 from workflow.case.fields import Quantity
 from workflow.case.sections import Friction, Section, disagreement, entry
-
-if TYPE_CHECKING:
-    from wear.evolution import EnergyTable
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual material.
 EnergyPerArea = Annotated[
@@ -22,6 +20,7 @@ TotalEnergy = Annotated[
     float, Quantity("N*mm", at_least=0.0, at_most=1e15, range_text="0 to 1e12 J")
 ]
 Factor = Annotated[float, Quantity("1", at_least=0.0, at_most=1e6)]
+TOTAL = entry("dissipated so far in the contact, ascending [N*mm]", ["0 J", "1 kJ"], default=(0.0,))
 LARGEST_FRICTION = 2.0  # as for the coefficient itself
 
 
@@ -49,8 +48,6 @@ class Table(Section):
 
     def described(self) -> EnergyTable:
         """As the wear laws take it."""
-        from wear.evolution import EnergyTable
-
         return EnergyTable(self.energy, self.factor)
 
 
@@ -81,9 +78,7 @@ class GlobalEvolution(_WearEvolution):
     """The coefficient against the energy of the whole contact."""
 
     scope: Literal["global"] = entry("local, by place, or global, of the whole contact", "global")
-    energy: tuple[TotalEnergy, ...] = entry(
-        "dissipated so far in the contact, ascending [N*mm]", ["0 J", "1 kJ"], default=(0.0,)
-    )
+    energy: tuple[TotalEnergy, ...] = TOTAL
     threshold: TotalEnergy = entry("below which nothing wears [N*mm]", "100 J", default=0.0)
 
 
@@ -93,9 +88,7 @@ Evolution = Annotated[LocalEvolution | GlobalEvolution, Field(discriminator="sco
 class FrictionEvolution(Table):
     """The coefficient of friction against the energy of the whole contact."""
 
-    energy: tuple[TotalEnergy, ...] = entry(
-        "dissipated so far in the contact, ascending [N*mm]", ["0 J", "1 kJ"], default=(0.0,)
-    )
+    energy: tuple[TotalEnergy, ...] = TOTAL
 
 
 class EvolvingFriction(Friction):

@@ -34,16 +34,20 @@ class RoundedGap(Section):
             raise disagreement(
                 f"{given} alone; allowed: end_width and end_radius, or neither", given
             )
-        for name in ("edge", "end"):
-            width, radius = getattr(self, f"{name}_width"), getattr(self, f"{name}_radius")
-            if width is not None and width >= radius:
-                raise disagreement(
-                    f"{width:g} mm: the rounding ends beyond its own arc; "
-                    f"allowed: below {name}_radius, {radius:g} mm",
-                    f"{name}_width",
-                    f"{name}_radius",
-                )
+        check_arcs(self)
         return self
+
+
+def check_arcs(face: Section) -> None:
+    """Refuse a rounded edge or end of a face, where it has one, that is wider than its radius."""
+    for name in ("edge", "end"):
+        width, radius = getattr(face, f"{name}_width"), getattr(face, f"{name}_radius")
+        if width is not None and width >= radius:
+            raise disagreement(
+                f"{width:g} mm: the rounding ends beyond its own arc; "
+                f"allowed: below {name}_radius, {radius:g} mm",
+                *(f"{name}_width", f"{name}_radius"),
+            )
 
 
 class ParaboloidGap(Section):

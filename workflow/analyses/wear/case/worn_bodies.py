@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, GetJsonSchemaHandler
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
+from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
 from workflow.analyses.wear.case.evolution import Evolution
 from workflow.case.fields import Quantity
 from workflow.case.sections import Length, Section, entry
-
-if TYPE_CHECKING:
-    from wear.laws import WearLaw
 
 # Metals wear 1e2 to 1e6 um^3 per joule; a forgotten unit gives 1e16.
 VolumePerEnergy = Annotated[
@@ -33,8 +31,6 @@ class Worn(Section):
 
     def described(self) -> WearLaw:
         """As the wear steps take it."""
-        from wear.laws import EvolvingLaw
-
         law = self._base()
         if self.evolution is None:
             return law
@@ -61,8 +57,6 @@ class WornByEnergy(Worn, EnergyBody):
     law: Literal["energy"] = entry("of this body; without it wear.law", "energy", default=None)
 
     def _base(self) -> WearLaw:
-        from wear.laws import EnergyLaw
-
         return EnergyLaw(self.coefficient)
 
 
@@ -79,8 +73,6 @@ class WornByEnergyAmplitude(Worn, EnergyBody):
     )
 
     def _base(self) -> WearLaw:
-        from wear.laws import EnergyAmplitudeLaw
-
         assert self.reference_amplitude is not None
         return EnergyAmplitudeLaw(self.coefficient, self.reference_amplitude)
 
@@ -97,8 +89,6 @@ class WornByArchard(Worn):
     ] = entry("of the worn body [MPa]", "3.5 GPa")
 
     def _base(self) -> WearLaw:
-        from wear.laws import ArchardLaw
-
         return ArchardLaw(self.coefficient, self.hardness)
 
 

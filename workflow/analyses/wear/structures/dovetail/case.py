@@ -7,12 +7,12 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 from pydantic import model_validator
 
-from workflow.analyses.wear.case.base import WearCase
+from fe_models.mesh import MeshError
+from workflow.analyses.wear.case.base import FiniteElementCase
+from workflow.analyses.wear.case.gaps import check_arcs
 from workflow.analyses.wear.case.sections import (
     BladeAndDiskMaterials,
-    Coupling,
     DovetailWear,
-    Nonlinearity,
     Ratio,
     Share,
     check_shares,
@@ -100,15 +100,7 @@ class Dovetail(Section):
 
     @model_validator(mode="after")
     def _roundings_fit(self) -> Dovetail:
-        for name in ("edge", "end"):
-            width, radius = getattr(self, f"{name}_width"), getattr(self, f"{name}_radius")
-            if width >= radius:
-                raise disagreement(
-                    f"{width:g} mm: the rounding ends beyond its own arc; "
-                    f"allowed: below {name}_radius, {radius:g} mm",
-                    f"{name}_width",
-                    f"{name}_radius",
-                )
+        check_arcs(self)
         _require_below(self, "edge_width", self.flank_length / 2, "half the flank_length")
         _require_below(self, "end_width", self.slot_length / 2, "half the slot_length")
         return self
@@ -136,8 +128,6 @@ class Dovetail(Section):
 
     @model_validator(mode="after")
     def _can_be_drawn(self) -> Dovetail:
-        from fe_models.mesh import MeshError
-
         try:
             self.geometry().check()
         except MeshError as error:
@@ -236,7 +226,7 @@ class Mesh(Section):
     order: Literal[1, 2] = entry("of the tetrahedra, 1 or 2", 1, default=1)
 
 
-class DovetailCase(WearCase):
+class DovetailCase(FiniteElementCase):
     """A dovetail under its mission."""
 
     bodies: ClassVar[tuple[str, str]] = ("disk", "blade")
@@ -245,9 +235,7 @@ class DovetailCase(WearCase):
     materials: BladeAndDiskMaterials = entry("the two bodies in contact")
     load_path: LoadPath = entry("one cycle")
     mesh: Mesh = entry("finite elements of the structure", default=Mesh())
-    nonlinearity: Nonlinearity = entry("geometric, of the structure", default=Nonlinearity())
     wear: DovetailWear = entry("law, length of the run and step")
-    coupling: Coupling = entry("worn surfaces back to the structure", default=Coupling())
     accuracy: Ratio = entry(
         "of depth and volume in mid-slot, when fidelity is auto [1]", "5 %", default=0.05
     )
@@ -274,10 +262,6 @@ class DovetailCase(WearCase):
     @property
     def cores(self) -> int:
         return 2
-
-    @property
-    def recoupling(self) -> Coupling:
-        return self.coupling
 
     @model_validator(mode="after")
     def _airfoil_outside_disk(self) -> DovetailCase:

@@ -6,16 +6,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import numpy as np
 from pydantic import model_validator
 
-from workflow.analyses.wear.case.base import WearCase, check_interface_name
+from fe_models.mesh import Interface, MeshError, StructureMesh
+from workflow.analyses.wear.case.base import FiniteElementCase, check_interface_name
 from workflow.analyses.wear.case.gaps import Gap, check_gap
 from workflow.analyses.wear.case.sections import (
-    Coupling,
-    Nonlinearity,
     Share,
     TwoMaterials,
     Wear,
@@ -34,7 +33,6 @@ from workflow.case.sections import Length, Section, Title, disagreement, entry
 if TYPE_CHECKING:
     from fe_models import imported_structure as fe
     from fe_models.geometry.imported import ImportedMesh
-    from fe_models.mesh import Interface, StructureMesh
 
 # Files that hold shapes and no mesh.
 CAD = (".step", ".stp", ".brep")
@@ -214,22 +212,14 @@ class Legs(Section):
         return [(cycle.factors, cycle.share) for cycle in self.mix] or [((1.0,) * loads, 1.0)]
 
 
-class MeshCase(WearCase):
+class MeshCase(FiniteElementCase):
     """Bodies from a file under loads of the user's."""
-
-    bodies: ClassVar[tuple[str, str]] = ("body_1", "body_2")
 
     title: Title = entry("one line", "Two bodies of a mesh file")
     structure: ImportedStructure = entry("bodies, contacts, supports and loads, named by groups")
     materials: TwoMaterials = entry("the two bodies in contact")
     load_path: Legs = entry("one cycle")
-    nonlinearity: Nonlinearity = entry("geometric, of the structure", default=Nonlinearity())
     wear: Wear = entry("law, length of the run and step")
-    coupling: Coupling = entry("worn surfaces back to the structure", default=Coupling())
-
-    @property
-    def recoupling(self) -> Coupling:
-        return self.coupling
 
     @property
     def cores(self) -> int:
@@ -290,10 +280,9 @@ class MeshCase(WearCase):
         with _pointing_at("structure.body_2"):
             body_2 = named_body(imported, structure.body_2)
         for index, pair in enumerate(structure.contacts):
-            with _pointing_at(f"structure.contacts.{index}.face_1"):
-                contact_facets(imported, body_1, pair.face_1)
-            with _pointing_at(f"structure.contacts.{index}.face_2"):
-                contact_facets(imported, body_2, pair.face_2)
+            for key, body in (("face_1", body_1), ("face_2", body_2)):
+                with _pointing_at(f"structure.contacts.{index}.{key}"):
+                    contact_facets(imported, body, getattr(pair, key))
         for index, support in enumerate(structure.supports):
             with _pointing_at(f"structure.supports.{index}.group"):
                 check_support(imported, (body_1, body_2), support.described())
@@ -304,8 +293,6 @@ class MeshCase(WearCase):
 
     def _check_contacts(self) -> None:
         """Make the interfaces; where they cannot be, find the pair that is at fault."""
-        from fe_models.mesh import MeshError
-
         structure = self.structure
         try:
             interfaces = structure.mesh().interfaces
@@ -363,8 +350,6 @@ def _outline_of(interface: Interface) -> str:
 @contextmanager
 def _pointing_at(key: str) -> Iterator[None]:
     """Say of a mesh that cannot be used which entry asks for it."""
-    from fe_models.mesh import MeshError
-
     try:
         yield
     except MeshError as error:

@@ -24,6 +24,9 @@ Speed = Annotated[float, Quantity("rad/s", above=0.0, at_most=1e5)]
 Pace = Annotated[float, Quantity("mm/s^2", at_least=-1e12, at_most=1e12)]
 
 
+KINDS = "pressure, force, displacement, rotation or acceleration"
+
+
 class _Load(Section):
     """What every load needs."""
 
@@ -36,9 +39,7 @@ class _Load(Section):
 class PressureLoad(_Load):
     """Pressure on a boundary, into the body."""
 
-    kind: Literal["pressure"] = entry(
-        "pressure, force, displacement, rotation or acceleration", "pressure"
-    )
+    kind: Literal["pressure"] = entry(KINDS, "pressure")
     group: Name = entry("boundary", "blade_top")
     pressure: Push = entry("into the body [MPa]", "10 MPa")
 
@@ -52,9 +53,7 @@ class PressureLoad(_Load):
 class ForceLoad(_Load):
     """Force on a boundary, spread evenly."""
 
-    kind: Literal["force"] = entry(
-        "pressure, force, displacement, rotation or acceleration", "force"
-    )
+    kind: Literal["force"] = entry(KINDS, "force")
     group: Name = entry("boundary", "blade_top")
     force: tuple[Pull, Pull, Pull] = entry(
         "along the global axes; in the plane per length, N/mm [N]", [0.0, 0.0, "-1 kN"]
@@ -73,9 +72,7 @@ class DisplacementLoad(_Load):
     Several on one boundary add up as vectors: make them perpendicular.
     """
 
-    kind: Literal["displacement"] = entry(
-        "pressure, force, displacement, rotation or acceleration", "displacement"
-    )
+    kind: Literal["displacement"] = entry(KINDS, "displacement")
     group: Name = entry("boundary", "blade_top")
     displacement: tuple[Travel, Travel, Travel] = entry(
         "along the global axes [mm]", ["10 um", 0.0, 0.0]
@@ -97,9 +94,7 @@ class DisplacementLoad(_Load):
 class RotationLoad(_Load):
     """Rotation of both bodies; its path is that of the speed, whose square the forces follow."""
 
-    kind: Literal["rotation"] = entry(
-        "pressure, force, displacement, rotation or acceleration", "rotation"
-    )
+    kind: Literal["rotation"] = entry(KINDS, "rotation")
     axis: tuple[Component, Component, Component] = entry(
         "direction of the axis [1]", [0.0, 1.0, 0.0]
     )
@@ -124,9 +119,7 @@ class RotationLoad(_Load):
 class AccelerationLoad(_Load):
     """Acceleration of the frame of reference: both bodies are pulled against it."""
 
-    kind: Literal["acceleration"] = entry(
-        "pressure, force, displacement, rotation or acceleration", "acceleration"
-    )
+    kind: Literal["acceleration"] = entry(KINDS, "acceleration")
     acceleration: tuple[Pace, Pace, Pace] = entry(
         "along the global axes [mm/s^2]", [0.0, 0.0, "9.81 m/s^2"]
     )

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Literal
 import numpy as np
 from pydantic import model_validator
 
+from sa_solver.types import Frame
 from workflow.analyses.wear.case.base import WearCase, check_interface_name
 from workflow.analyses.wear.case.gaps import Gap, GapShape, check_cells, check_gap
 from workflow.analyses.wear.case.sections import Contact, TwoMaterials, Wear
@@ -16,7 +17,6 @@ from workflow.case.input_files import InputFileError
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 if TYPE_CHECKING:
-    from sa_solver.types import Frame
     from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
 
 # How far x and normal may be from perpendicular: six printed digits.
@@ -57,8 +57,6 @@ class FaceFrame(Section):
 
     def frame(self) -> Frame:
         """The frame, its axes of length 1."""
-        from sa_solver.types import Frame
-
         normal = np.array(self.normal) / np.linalg.norm(self.normal)
         x = np.array(self.x) - (np.array(self.x) @ normal) * normal
         x /= np.linalg.norm(x)

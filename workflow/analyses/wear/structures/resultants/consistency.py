@@ -7,10 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sa_solver.contact import GROSS_SHARE
-from sa_solver.types import Array, LoadHistory
+from sa_solver.types import Array, LoadHistory, Mask
 from workflow.analyses.wear.case.sections import SHARES_APART
 from workflow.analyses.wear.structures.resultants.imported import COLUMNS
 from workflow.case.input_files import InputFileError
@@ -34,8 +33,24 @@ class Bounds:
     line: bool = False
 
 
-def check_loads(columns: dict[str, Array], bounds: Bounds, refusal: Refusal) -> None:
-    """Raise what ``refusal`` makes of the first column ``(n,)`` that contradicts another."""
+def checked_loads(
+    columns: dict[str, Any],
+    sliding: Mask | None,
+    mix: Mapping[str, Array],
+    bounds: Bounds,
+    refusal: Refusal,
+) -> LoadHistory:
+    """The loads of ``columns``, where the file marks what is ``sliding`` or not, and of its mix.
+
+    Raises what ``refusal`` makes of the first column ``(n,)`` that contradicts another.
+    """
+    _check_columns(columns, bounds, refusal)
+    if sliding is None:
+        sliding = _slides_by_limit(columns, bounds.friction)
+    return LoadHistory(**columns, sliding=sliding, **_mix_columns(mix, refusal))
+
+
+def _check_columns(columns: dict[str, Array], bounds: Bounds, refusal: Refusal) -> None:
     remainder = {name: REMAINDER * float(np.abs(columns[name]).max()) for name in COLUMNS}
     for name in ("P", "Edx", "Edy"):
         meaning = "body 1 presses on body 2" if name == "P" else "energy is lost, not gained"
@@ -50,7 +65,7 @@ def check_loads(columns: dict[str, Array], bounds: Bounds, refusal: Refusal) -> 
         _check_moments(columns, bounds, refusal)
 
 
-def slides_by_limit(columns: dict[str, Array], friction: float | None) -> NDArray[np.bool_]:
+def _slides_by_limit(columns: dict[str, Array], friction: float | None) -> Mask:
     """Increments ``(n,)`` that slide as a whole: near Coulomb's limit, with energy lost.
 
     None of them where friction is not known. The contact solver decides by the same share.
@@ -67,7 +82,7 @@ MIX = ("block", "share")
 """Columns of files that hold several closed cycles, which take turns."""
 
 
-def mix_columns(columns: Mapping[str, Array], refusal: Refusal) -> dict[str, Any]:
+def _mix_columns(columns: Mapping[str, Array], refusal: Refusal) -> dict[str, Any]:
     """``block`` counted from 0 and ``share`` ``(n,)`` of a mix, from what a file calls them.
 
     Empty where the file has neither. Raises what ``refusal`` makes of columns that are no mix: the
@@ -93,19 +108,7 @@ def mix_columns(columns: Mapping[str, Array], refusal: Refusal) -> dict[str, Any
     return {"block": block, "share": share}
 
 
-def differently_mixed(loads: Mapping[str, LoadHistory]) -> str | None:
-    """An interface whose cycles are mixed otherwise than those of the first one."""
-    first = next(iter(loads.values()))
-    for name, history in loads.items():
-        pairs = ((history.block, first.block), (history.share, first.share))
-        if not all(np.array_equal(*pair) for pair in pairs):
-            return name
-    return None
-
-
-def _refuse_where(
-    wrong: NDArray[np.bool_], column: str, what: str, allowed: str, refusal: Refusal
-) -> None:
+def _refuse_where(wrong: Mask, column: str, what: str, allowed: str, refusal: Refusal) -> None:
     for increment in np.flatnonzero(wrong).tolist():
         raise refusal(increment, column, what, allowed)
 

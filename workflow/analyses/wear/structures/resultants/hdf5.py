@@ -13,9 +13,7 @@ from sa_solver.types import Array, Frame, Indices, LoadHistory
 from workflow.analyses.wear.structures.resultants.consistency import (
     MIX,
     Bounds,
-    check_loads,
-    mix_columns,
-    slides_by_limit,
+    checked_loads,
 )
 from workflow.analyses.wear.structures.resultants.faces import FaceError, check_facets, facets_over
 from workflow.analyses.wear.structures.resultants.imported import (
@@ -176,20 +174,17 @@ def _loads(group: Group, bounds: Bounds) -> LoadHistory:
         columns[name] = np.zeros(shape) if column is None else column
 
     optional = {name: group.shaped(name, "1", shape) for name in MIX}
-    mix_values = {name: column for name, column in optional.items() if column is not None}
+    mix = {name: column for name, column in optional.items() if column is not None}
 
     def refusal(increment: int, column: str, wrong: str, allowed: str) -> InputFileError:
-        value = (columns | mix_values)[column][increment]
+        value = (columns | mix)[column][increment]
         return group.error(column, f"increment {increment + 1}: {value:g}: {wrong}", allowed)
 
-    check_loads(columns, bounds, refusal)
-    mix = mix_columns(mix_values, refusal)
     marks = group.shaped("sliding", "1", shape)
-    if marks is None:
-        return LoadHistory(**columns, sliding=slides_by_limit(columns, bounds.friction), **mix)
-    if np.any((marks != 0.0) & (marks != 1.0)):
+    if marks is not None and not np.isin(marks, (0.0, 1.0)).all():
         raise group.error("sliding", "neither yes nor no", "0 or 1")
-    return LoadHistory(**columns, sliding=marks == 1.0, **mix)
+    sliding = None if marks is None else marks == 1.0
+    return checked_loads(columns, sliding, mix, bounds, refusal)
 
 
 def _frame(group: Group) -> Frame | None:

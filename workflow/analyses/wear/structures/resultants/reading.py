@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +13,7 @@ from sa_solver.types import Array, LoadHistory
 from workflow.analyses.wear.structures.resultants.consistency import (
     MIX,
     Bounds,
-    check_loads,
-    differently_mixed,
-    mix_columns,
-    slides_by_limit,
+    checked_loads,
 )
 from workflow.analyses.wear.structures.resultants.hdf5 import read_h5
 from workflow.analyses.wear.structures.resultants.imported import (
@@ -78,13 +74,17 @@ def read_resultants(
 
 def _alike(file: str, read: dict[str, ImportedLoads]) -> dict[str, ImportedLoads]:
     """What was read, if all interfaces go through the same mix of cycles."""
-    differing = differently_mixed({name: imported.loads for name, imported in read.items()})
-    if differing is not None:
-        first = next(iter(read))
-        raise InputFileError(
-            f"{file}: blocks or shares of {differing} and {first} differ; allowed: the same for "
-            "every interface"
-        )
+    first, *others = read
+    expected = read[first].loads
+    for name in others:
+        loads = read[name].loads
+        if not all(
+            map(np.array_equal, (loads.block, loads.share), (expected.block, expected.share))
+        ):
+            raise InputFileError(
+                f"{file}: blocks or shares of {name} and {first} differ; allowed: the same for "
+                "every interface"
+            )
     return read
 
 
@@ -137,19 +137,15 @@ def _loads(
     columns: dict[str, Any] = {
         name: numbers[name][rows] if name in numbers else zeros for name in base_units(bounds.line)
     }
-    refusal = partial(_refusal, table, rows)
-    check_loads(columns, bounds, refusal)
-    mix_values = {name: numbers[name][rows] for name in MIX if name in numbers}
-    mix = mix_columns(mix_values, refusal)
-    if SLIDING not in numbers:
-        return LoadHistory(**columns, sliding=slides_by_limit(columns, bounds.friction), **mix)
-    marks = numbers[SLIDING][rows]
-    for increment in np.flatnonzero((marks != 0.0) & (marks != 1.0)).tolist():
-        raise refusal(increment, SLIDING, "neither yes nor no", "0 or 1")
-    return LoadHistory(**columns, sliding=marks == 1.0, **mix)
 
+    def refusal(increment: int, column: str, wrong: str, allowed: str) -> InputFileError:
+        return table.refusal(rows[increment], column, wrong, allowed)
 
-def _refusal(
-    table: TableFile, rows: list[int], increment: int, column: str, wrong: str, allowed: str
-) -> InputFileError:
-    return table.refusal(rows[increment], column, wrong, allowed)
+    mix = {name: numbers[name][rows] for name in MIX if name in numbers}
+    sliding = None
+    if SLIDING in numbers:
+        marks = numbers[SLIDING][rows]
+        for increment in np.flatnonzero(~np.isin(marks, (0.0, 1.0))).tolist():
+            raise refusal(increment, SLIDING, "neither yes nor no", "0 or 1")
+        sliding = marks == 1.0
+    return checked_loads(columns, sliding, mix, bounds, refusal)

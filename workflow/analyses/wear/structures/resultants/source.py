@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import replace
 from functools import cached_property
 
@@ -12,20 +11,24 @@ from fe_models.mesh import Face
 from sa_solver.types import Array, Frame, Grid
 from wear.interface import CycleLoads
 from workflow.analyses.wear.gaps import gap_over
-from workflow.analyses.wear.load_source import BODIES, ContactFace, UserFace
+from workflow.analyses.wear.load_source import (
+    BODIES,
+    COARSER,
+    ContactFace,
+    UncoupledSource,
+    UserFace,
+    coarse_cells,
+    nominal_face,
+)
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.analyses.wear.structures.resultants.consistency import REMAINDER
 from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
 from workflow.analyses.wear.worn_nodes import read_nodes
 
-# Without a mesh, the grid that shows what a coarse one misses has cells so many times larger.
-COARSER = 4
-# Cells below which a contact is hardly one.
-FEWEST = 8
 REMEDY = "enlarge structure.size, and contact.grid with it"
 
 
-class ResultantsSource:
+class ResultantsSource(UncoupledSource):
     """The interfaces of a file as load source of a wear run."""
 
     def __init__(self, case: ResultantsCase) -> None:
@@ -41,8 +44,8 @@ class ResultantsSource:
     def faces(self) -> tuple[ContactFace, ...]:
         return tuple(self._contact_face(name, imported) for name, imported in self.imported.items())
 
-    @property
-    def peak(self) -> int:
+    @cached_property
+    def peak(self) -> int:  # type: ignore[override]
         """First increment in which a face carries the largest P of all."""
         heaviest = np.max([imported.loads.P for imported in self.imported.values()], axis=0)
         return int(np.argmax(heaviest >= (1.0 - REMAINDER) * heaviest.max()))
@@ -51,20 +54,11 @@ class ResultantsSource:
         """Where a face lies in the user's axes, None where nobody says."""
         return self._case.structure.frame_of(name) or self.imported[name].frame
 
-    def prepare(self) -> None:
-        """Nothing is costly."""
-
     def unworn(self) -> tuple[CycleLoads, ...]:
         return tuple(
             CycleLoads(imported.loads, _slip(imported, len(contact.face)))
             for imported, contact in zip(self.imported.values(), self.faces, strict=True)
         )
-
-    def worn(
-        self, depths: Sequence[Array], friction: Sequence[float] | None = None
-    ) -> tuple[CycleLoads, ...]:
-        """As unworn: no structure responds to wear."""
-        return self.unworn()
 
     def user_faces(self, number: int) -> tuple[UserFace, ...]:
         """Over the nodes of the case's tables, else over those of the file of loads."""
@@ -81,16 +75,6 @@ class ResultantsSource:
                 faces.append(UserFace(body, numbers, frame))
         return tuple(faces)
 
-    def probe(self, depths: Sequence[Array], friction: Sequence[float] | None = None) -> Array:
-        """Resultants ``(faces, 6)`` at peak load, whatever the wear."""
-        columns = ("P", "Qx", "Qy", "Mx", "My", "Mz")
-        return np.array(
-            [
-                [getattr(imported.loads, name)[self.peak] for name in columns]
-                for imported in self.imported.values()
-            ]
-        )
-
     def _contact_face(self, name: str, imported: ImportedLoads) -> ContactFace:
         structure = self._case.structure
         grid = Grid.over(structure.size_of(name), self._case.contact.grid, self.line)
@@ -100,28 +84,21 @@ class ResultantsSource:
 
     def _face(self, name: str, imported: ImportedLoads, size: tuple[float, float]) -> Face:
         """The face of the file, or the corners of the nominal one."""
-        frame = self.frame(name) or Frame(np.zeros(3), np.eye(3))
-        face = imported.face(name)
-        if face is not None:
-            return replace(face, frame=frame)
-        half_x, half_y = 0.5 * size[0], 0.5 * size[1]
-        if self.line:
-            return Face(name, frame, np.array([[-half_x, 0.0], [half_x, 0.0]]), np.array([[0, 1]]))
-        corners = [[-half_x, -half_y], [half_x, -half_y], [half_x, half_y], [-half_x, half_y]]
-        return Face(name, frame, np.array(corners), np.array([[0, 1, 2], [0, 2, 3]]))
+        frame, face = self.frame(name), imported.face(name)
+        if face is None:
+            return nominal_face(name, size, self.line, frame)
+        return replace(face, frame=frame or face.frame)
 
     def _coarse(self, imported: ImportedLoads, grid: Grid) -> tuple[int, int]:
         """About as many square-ish cells as the face has nodes; without nodes larger cells."""
-        nx, ny = grid.shape
         if imported.coordinates is None:
-            coarse = nx / COARSER, ny / COARSER
+            coarse = grid.shape[0] / COARSER, grid.shape[1] / COARSER
         elif self.line:
             coarse = float(len(imported.coordinates)), 1.0
         else:
             pitch = np.sqrt(grid.size[0] * grid.size[1] / len(imported.coordinates))
             coarse = grid.size[0] / pitch, grid.size[1] / pitch
-        cells = max(FEWEST, round(coarse[0])), max(FEWEST, round(coarse[1]))
-        return cells[0], 1 if self.line else cells[1]
+        return coarse_cells(*coarse, self.line)
 
 
 def _slip(imported: ImportedLoads, nodes: int) -> Array:
