@@ -35,7 +35,7 @@ AT_STOP = 1e-3
 """How near to a stop a run must come: a jump that is to reach it is cut short to do so."""
 
 Stage = Literal["first cycle", "wear", "probe", "loads"]
-Number = TypeVar("Number", int, float)
+Same = TypeVar("Same")
 
 
 # --- what is given --------------------------------------------------------------------------------
@@ -151,9 +151,9 @@ class Contacts:
                 answers.append(getattr(contact, method)(*shares))
         return answers
 
-    def each(self, number: Number) -> list[Number]:
+    def each(self, same: Same) -> list[Same]:
         """The same for every contact."""
-        return [number] * len(self.contacts)
+        return [same] * len(self.contacts)
 
     @property
     def grids(self) -> list[Grid]:

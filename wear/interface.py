@@ -174,11 +174,6 @@ class FirstContact:
     stable_cycles: float
     cycle: tuple[ContactState, ...]
 
-    @property
-    def highest_pressure(self) -> float:
-        """Largest pressure of all increments [MPa]."""
-        return float(self.pressure.max())
-
 
 @contextmanager
 def failures_of(name: str) -> Iterator[None]:

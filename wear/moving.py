@@ -21,7 +21,7 @@ therefore better taken for none (``LEAST_RESOLVED``).
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -67,14 +67,17 @@ class Passage:
         start, end = (np.array(offset) / self.grid.pitch for offset in (self.before, self.after))
         if self.grid.line:
             start[1] = end[1] = 0.0
-        reach = np.ceil(np.abs([start, end])).max(axis=0).astype(int)
+        reach = np.floor(np.abs([start, end]).max(axis=0)).astype(int) + 1
         weights = np.zeros(2 * reach + 1)
         times = _crossings(start, end)
         for begin, length in zip(times[:-1], np.diff(times), strict=True):
             for point in GAUSS:
                 shift = start + (begin + point * length) * (end - start)
-                for cell, share in _overlaps(shift):
-                    weights[tuple(reach + cell)] += 0.5 * length * share
+                # It lies over two cells along either axis, with these shares.
+                cell = np.floor(shift).astype(int)
+                (u, v), (i, j) = shift - cell, reach + cell
+                shares = np.outer([1.0 - u, u], [1.0 - v, v])
+                weights[i : i + 2, j : j + 2] += 0.5 * length * shares
         return weights
 
     def carry(self, field: Array) -> Array:
@@ -116,20 +119,6 @@ def _crossings(start: Array, end: Array) -> Array:
         borders = np.arange(np.floor(low) + 1.0, np.ceil(high))
         times += ((borders - begin) / (stop - begin)).tolist() if len(borders) else []
     return np.unique(np.clip(times, 0.0, 1.0))
-
-
-def _overlaps(shift: Array) -> Iterator[tuple[tuple[int, int], float]]:
-    """Cells that a cell shifted by ``shift`` cells lies over, and its share over each."""
-    k, m = (int(c) for c in np.floor(shift))
-    u, v = shift - (k, m)
-    for cell, share in (
-        ((k, m), (1.0 - u) * (1.0 - v)),
-        ((k + 1, m), u * (1.0 - v)),
-        ((k, m + 1), (1.0 - u) * v),
-        ((k + 1, m + 1), u * v),
-    ):
-        if share > 0.0:
-            yield cell, float(share)
 
 
 def offsets(slip: Array, weight: Array) -> Array:

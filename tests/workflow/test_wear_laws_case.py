@@ -178,7 +178,7 @@ def test_template_shows_how_a_body_names_its_own_law():
 def amplitudes(path, *overrides) -> list[Array]:
     from workflow.analyses.wear.structures.dovetail.model import DovetailModel
 
-    return [block.amplitudes for block in DovetailModel(load_case(path, overrides)).blocks]
+    return [loads.amplitudes for loads in DovetailModel(load_case(path, overrides)).missions]
 
 
 def test_missions_of_a_mix_differ_only_in_what_they_name(dovetail_path):

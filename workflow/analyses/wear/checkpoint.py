@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from sa_solver.normal import NormalStart
-from sa_solver.types import Array, LoadHistory
+from sa_solver.types import LoadHistory
 from wear.coupled import CoupledState
 from wear.interface import InterfaceState
 from wear.surfaces import Surfaces
@@ -17,26 +17,29 @@ from wear.worn import Spent
 from workflow.errors import UserError
 from workflow.shell.store import read_arrays, write_arrays
 
-# Numbers of the state of one interface.
+# What the state has of all jumps.
+HISTORIES = ("cycles", "kinetics", "drift", "solved_resultants")
+# What the state of one interface has: parts of arrays, arrays, numbers.
+PARTS: dict[str, type[Surfaces] | type[LoadHistory]] = {
+    "surfaces": Surfaces,
+    "loads": LoadHistory,
+}
+ARRAYS = ("slip", "error", "ends")
 SCALARS = ("energy", "depth_rate", "volume_rate", "volume_error", "next_cycles")
 
 
 def save(path: Path, state: CoupledState) -> None:
     """Write the state; the old file stays until the new one is whole."""
-    arrays: dict[str, object] = {
-        name: getattr(state, name) for name in ("cycles", "kinetics", "drift", "solved_resultants")
-    }
-    for number, own in enumerate(state.interfaces):
+    arrays: dict[str, object] = {name: getattr(state, name) for name in HISTORIES}
+    for number, interface in enumerate(state.interfaces):
         group = f"interface_{number}"
-        for part in fields(Surfaces):
-            arrays[f"{group}/surfaces/{part.name}"] = getattr(own.surfaces, part.name)
-        for column in fields(LoadHistory):
-            arrays[f"{group}/loads/{column.name}"] = getattr(own.loads, column.name)
-        arrays[f"{group}/slip"] = own.slip
-        arrays[f"{group}/error"] = own.error
-        arrays[f"{group}/ends"] = own.ends
-        arrays[f"{group}/scalars"] = np.array([getattr(own, name) for name in SCALARS])
-        for increment, start in own.starts.items():
+        for part, kind in PARTS.items():
+            for field in fields(kind):
+                values = getattr(getattr(interface, part), field.name)
+                arrays[f"{group}/{part}/{field.name}"] = values
+        arrays |= {f"{group}/{name}": getattr(interface, name) for name in ARRAYS}
+        arrays[f"{group}/scalars"] = np.array([getattr(interface, name) for name in SCALARS])
+        for increment, start in interface.starts.items():
             arrays[f"{group}/starts/{increment}/pressure"] = start.pressure
             arrays[f"{group}/starts/{increment}/displacement"] = start.displacement
     attributes = {"solutions": state.solutions, "interfaces": len(state.interfaces)}
@@ -68,16 +71,13 @@ def _restored(arrays: dict[str, Any], attributes: dict[str, Any]) -> CoupledStat
             _load_interface(arrays, f"interface_{number}")
             for number in range(int(attributes["interfaces"]))
         ),
-        cycles=arrays["cycles"],
-        kinetics=arrays["kinetics"],
-        drift=arrays["drift"],
-        solved_resultants=arrays["solved_resultants"],
+        **{name: arrays[name] for name in HISTORIES},
         solutions=int(attributes["solutions"]),
-        spent=Spent(*(int(attributes[own.name]) for own in fields(Spent))),
+        spent=Spent(*(int(attributes[count.name]) for count in fields(Spent))),
     )
 
 
-def _load_interface(arrays: dict[str, Array], group: str) -> InterfaceState:
+def _load_interface(arrays: dict[str, Any], group: str) -> InterfaceState:
     prefix = f"{group}/starts/"
     increments = sorted(
         {int(n[len(prefix) :].split("/")[0]) for n in arrays if n.startswith(prefix)}
@@ -87,14 +87,10 @@ def _load_interface(arrays: dict[str, Array], group: str) -> InterfaceState:
         for t in increments
     }
     scalars = dict(zip(SCALARS, arrays[f"{group}/scalars"].tolist(), strict=True))
-    surfaces = {part.name: arrays[f"{group}/surfaces/{part.name}"] for part in fields(Surfaces)}
-    loads = {column.name: arrays[f"{group}/loads/{column.name}"] for column in fields(LoadHistory)}
+    parts: dict[str, Any] = {
+        part: kind(**{f.name: arrays[f"{group}/{part}/{f.name}"] for f in fields(kind)})
+        for part, kind in PARTS.items()
+    }
     return InterfaceState(
-        surfaces=Surfaces(**surfaces),
-        loads=LoadHistory(**loads),  # type: ignore[arg-type]
-        slip=arrays[f"{group}/slip"],
-        error=arrays[f"{group}/error"],
-        ends=arrays[f"{group}/ends"],
-        starts=starts,
-        **scalars,
+        starts=starts, **parts, **{name: arrays[f"{group}/{name}"] for name in ARRAYS}, **scalars
     )

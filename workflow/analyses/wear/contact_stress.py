@@ -17,11 +17,12 @@ import numpy as np
 from fe_models.elasticity import von_mises
 from sa_solver.subsurface import COMPONENTS, SubsurfaceStress
 from sa_solver.types import Array, Grid, Material
-from wear.interface import CycleTractions, FaceLoads, FirstContact
+from wear.interface import CycleTractions
 from wear.life import Ruiz, findley, ruiz, smith_watson_topper
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Life
 from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.load_source import BODIES
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 from workflow.shell.results import ResultsWriter
@@ -176,41 +177,30 @@ class InterfaceStress:
 def contact_stresses(
     case: WearCase,
     peak: int,
-    stages: Sequence[ContactStage],
-    unworn: Sequence[tuple[FaceLoads, FirstContact]],
-    worn: Sequence[CycleTractions],
+    contacts: Sequence[tuple[ContactStage, tuple[CycleTractions, CycleTractions], Array]],
     reporter: Reporter,
 ) -> list[InterfaceStress]:
-    """Stress under every contact as the case asks for it; empty if it does not.
+    """Stress under all ``contacts`` as the case asks for it.
 
-    ``unworn`` are the loads and the contact of the first cycle, ``worn`` the tractions of the last;
-    ``peak`` is the increment of peak load.
+    Each has its tractions in an unworn and a worn cycle, and the share ``(t,)`` of each increment
+    in a mean cycle; ``peak`` is the increment of peak load.
     """
-    if not case.stress.wanted:
-        return []
-    stresses, unknown = [], []
-    for stage, (loads, first), last in zip(stages, unworn, worn, strict=True):
-        cycles = stage.unworn_tractions(loads, first), last
-        unknown += [cycle.unknown for cycle in cycles]
-        stresses.append(_interface_stress(case, stage, peak, cycles, loads.loads.share))
+    unknown = [cycle.unknown for _, cycles, _ in contacts for cycle in cycles]
     _report_stick(np.array(unknown), peak, reporter)
-    return stresses
+    return [_interface_stress(case, peak, *contact) for contact in contacts]
 
 
 def _interface_stress(
     case: WearCase,
-    stage: ContactStage,
     peak: int,
+    stage: ContactStage,
     cycles: tuple[CycleTractions, CycleTractions],
     share: Array,
 ) -> InterfaceStress:
     planes = Planes(case.stress, stage.grid)
     materials = case.material(1), case.material(2)
     # Each keeps the symbols of a depth: one per body serves both moments.
-    solvers = (
-        SubsurfaceStress(stage.grid, materials[0], 1),
-        SubsurfaceStress(stage.grid, materials[1], 2),
-    )
+    solvers = [SubsurfaceStress(stage.grid, materials[n - 1], n) for n in BODIES]
     moments = {}
     for moment, cycle in zip(MOMENTS, cycles, strict=True):
         known = cycle.unknown <= STUCK_SHARE
@@ -271,40 +261,30 @@ def life_maps(
     if life.parameter == "findley":
         plane = findley(history[known], life.sensitivity)
         what = "shear stress amplitude plus k largest normal stress, worst plane"
-        maps = {
-            "findley": Dataset(plane.value, "MPa", what),
-            "shear_amplitude": Dataset(
-                plane.amplitude, "MPa", "amplitude of the shear stress on the worst plane"
-            ),
-        }
+        amplitude = "shear_amplitude", "MPa", "amplitude of the shear stress on the worst plane"
     else:
         plane = smith_watson_topper(history[known], material)
         what = "largest normal stress times strain amplitude, worst plane"
-        maps = {
-            "smith_watson_topper": Dataset(plane.value, "MPa", what),
-            "strain_amplitude": Dataset(
-                plane.amplitude, "1", "amplitude of the normal strain on the worst plane"
-            ),
-        }
-    return maps | {
-        "normal_stress": Dataset(
-            plane.normal_stress, "MPa", "largest normal stress over a cycle on the worst plane"
-        ),
-        "normal": Dataset(
-            plane.normal, "1", "unit normal of the worst plane, in the interface frame"
-        ),
+        amplitude = "strain_amplitude", "1", "amplitude of the normal strain on the worst plane"
+    name, unit, of_amplitude = amplitude
+    largest = "largest normal stress over a cycle on the worst plane"
+    normal = "unit normal of the worst plane, in the interface frame"
+    return {
+        life.parameter: Dataset(plane.value, "MPa", what),
+        name: Dataset(plane.amplitude, unit, of_amplitude),
+        "normal_stress": Dataset(plane.normal_stress, "MPa", largest),
+        "normal": Dataset(plane.normal, "1", normal),
     }
 
 
 def _ruiz_maps(parameters: Ruiz) -> dict[str, Dataset]:
     work = "Ruiz's F1: a quarter of the friction work of a cycle per area"
     tension = "largest tension along the surface over a cycle, under the contact's tractions alone"
+    cracking = "Ruiz's F2: F1 times tension"
     return {
         "friction_parameter": Dataset(parameters.friction_parameter, "N/mm", work),
         "tension": Dataset(parameters.tension, "MPa", tension),
-        "cracking_parameter": Dataset(
-            parameters.cracking_parameter, "N^2/mm^3", "Ruiz's F2: F1 times tension"
-        ),
+        "cracking_parameter": Dataset(parameters.cracking_parameter, "N^2/mm^3", cracking),
     }
 
 

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from functools import partial
 from typing import Any
 
 from wear.coupled import Contacts
-from wear.interface import ContactFields, CycleTractions, InterfaceState, failures_of
+from wear.interface import ContactFields, CycleTractions, InterfaceState
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_loops import WornLoop
 from workflow.analyses.wear.contact_stage import ContactStage
@@ -20,18 +20,18 @@ def contact_workers(
     case: WearCase, faces: Sequence[ContactFace]
 ) -> AbstractContextManager[Workers]:
     """Start a worker for every face of a case and end them all at the end."""
-    return workers(partial(_NamedStage, case), faces)
+    return workers(partial(_worker, case), faces)
 
 
-class _NamedStage:
-    """A contact stage whose failures name it."""
+def _worker(case: WearCase, face: ContactFace) -> Callable[..., Any]:
+    """What answers for one contact, made where it is to live."""
+    contacts = Contacts([ContactStage(case, face)])
 
-    def __init__(self, case: WearCase, face: ContactFace) -> None:
-        self._stage = ContactStage(case, face)
+    def answer(method: str, *arguments: Any) -> Any:
+        (result,) = contacts.call(method, *([argument] for argument in arguments))
+        return result
 
-    def __call__(self, method: str, *arguments: Any) -> Any:
-        with failures_of(self._stage.name):
-            return getattr(self._stage, method)(*arguments)
+    return answer
 
 
 class ContactProcesses(Contacts):

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import partial
 
 import numpy as np
+from scipy.interpolate import make_interp_spline
 
 from sa_solver.shapes import rounded_edge
 from sa_solver.types import Array, Grid
@@ -68,9 +69,4 @@ def _linear(known: Array, wanted: Array) -> Array:
     """Weights ``(m, n)`` of values at ``known`` ``(n,)``, ascending, for those at ``wanted``."""
     if len(known) == 1:
         return np.ones((len(wanted), 1))
-    left = np.clip(np.searchsorted(known, wanted) - 1, 0, len(known) - 2)
-    share = (wanted - known[left]) / (known[left + 1] - known[left])
-    weights = np.zeros((len(wanted), len(known)))
-    rows = np.arange(len(wanted))
-    weights[rows, left], weights[rows, left + 1] = 1.0 - share, share
-    return weights
+    return np.asarray(make_interp_spline(known, np.eye(len(known)), k=1)(wanted))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 
 from sa_solver.normal import NormalContactError
-from sa_solver.types import LoadHistory
+from sa_solver.types import Array, LoadHistory
 from wear.coupled import KINETICS, CoupledState
-from wear.interface import CycleTractions, FaceLoads, FirstContact
+from wear.interface import CycleTractions, FaceLoads, FirstContact, InterfaceState
 from wear.kinetics import LinearRegime, linear_regime
 from wear.steppers import root_mean_square
 from workflow.analyses.contact.datasets import pressure_field, traction_fields
@@ -36,7 +36,7 @@ from workflow.analyses.wear.figures.wear import EXTRAPOLATION
 from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.uniformity import uniformities
-from workflow.analyses.wear.worn_faces import worn_faces, write_worn_faces
+from workflow.analyses.wear.worn_faces import write_worn_faces
 from workflow.analyses.wear.worn_structure import WornStructure, resultants_at, worn_structure
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset
@@ -48,36 +48,65 @@ from workflow.shell.summary import finish
 
 # What the file of a jump has of each interface.
 JUMP_FIELDS = {"surfaces": ("body_1", "body_2"), "contact": ("pressure", "shear", "slip")}
+# What the kinetics have of each linear regime; not numbers where there is none.
+REGIME_ATTRIBUTES = {"linear_from": "start", "rate": "rate", "trend": "trend", "scatter": "scatter"}
+
+
+@dataclass(frozen=True)
+class InterfaceOutcome:
+    """What a wear run found of one contact.
+
+    ``unworn`` are its loads before wear and ``first`` the contact of that cycle; ``state`` and
+    ``worn`` are its surfaces at the end and the tractions of a cycle on them, None where no stress
+    is asked for. ``kinetics`` ``(j, 5)`` are those at ``cycles`` ``(j,)``.
+    """
+
+    stage: ContactStage
+    unworn: FaceLoads
+    first: FirstContact
+    state: InterfaceState
+    worn: CycleTractions | None
+    cycles: Array
+    kinetics: Array
+
+    @cached_property
+    def regimes(self) -> dict[str, LinearRegime | None]:
+        """Linear regimes of depth and volume, both bodies together."""
+        columns = {"depth": self.kinetics[:, :2], "volume": self.kinetics[:, 2:4]}
+        return {
+            name: linear_regime(self.cycles, values.sum(axis=1)) for name, values in columns.items()
+        }
+
+    @property
+    def slip_per_cycle(self) -> float:
+        """Largest path of slip [mm] in an unworn cycle; of the half-space if loads have none."""
+        slip = self.unworn.slip
+        if self.first.cycle and not slip.any():
+            slip = np.stack([state.slip for state in self.first.cycle])
+        path = np.hypot(slip[:, 0], slip[:, 1])
+        return float(np.tensordot(self.unworn.loads.share, path, 1).max())
+
+    @property
+    def step_error(self) -> dict[str, float] | None:
+        """Errors of depth (root mean square) and volume by wear steps, relative; None unworn."""
+        depth = self.state.surfaces.depth
+        if not depth.any():
+            return None
+        volume = float(depth.sum()) * self.stage.grid.cell_area
+        return {
+            "depth": root_mean_square(self.state.error, depth) / root_mean_square(depth, depth),
+            "volume": abs(self.state.volume_error) / volume,
+        }
 
 
 @dataclass(frozen=True)
 class Outcome:
-    """Everything a wear run found.
-
-    ``unworn`` are the loads of the faces before wear and ``first`` the contact of that cycle, by
-    interface; ``worn`` the tractions of a cycle at the end, none where no stress is asked for.
-    """
+    """Everything a wear run found: its ``state`` at the end, and the contact of every interface."""
 
     case: WearCase
     source: LoadSource
-    stages: list[ContactStage]
     state: CoupledState
-    unworn: Sequence[FaceLoads]
-    first: list[FirstContact]
-    worn: list[CycleTractions]
-
-    @cached_property
-    def regimes(self) -> dict[str, dict[str, LinearRegime | None]]:
-        """Linear regimes of depth and volume, both bodies together, by interface."""
-        columns = {"depth": slice(0, 2), "volume": slice(2, 4)}
-        cycles, kinetics = self.state.cycles, self.state.kinetics
-        return {
-            stage.name: {
-                name: linear_regime(cycles, kinetics[:, number, pick].sum(axis=1))
-                for name, pick in columns.items()
-            }
-            for number, stage in enumerate(self.stages)
-        }
+    interfaces: list[InterfaceOutcome]
 
 
 @dataclass(frozen=True)
@@ -98,60 +127,47 @@ class PeakHistory:
 
 def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
-    folder, reporter, structure = run.folder, run.reporter, None
-    if isinstance(outcome.source, StructureStage):
-        structure = worn_structure(
-            outcome.source,
-            outcome.stages,
-            outcome.state,
-            outcome.case.friction,
-            folder,
-            reporter,
-        )
+    case, source, state = outcome.case, outcome.source, outcome.state
+    folder, reporter = run.folder, run.reporter
+    stages = [contact.stage for contact in outcome.interfaces]
+    structure = None
+    if isinstance(source, StructureStage):
+        structure = worn_structure(source, stages, state, case.friction, folder, reporter)
     with reporter.stage("stress under the contacts"):
-        stresses = contact_stresses(
-            outcome.case,
-            outcome.source.peak,
-            outcome.stages,
-            list(zip(outcome.unworn, outcome.first, strict=True)),
-            outcome.worn,
-            reporter,
-        )
+        stresses = _stresses(outcome, reporter)
     with reporter.stage("results"):
         recorded = _write_results(outcome, structure, stresses, run)
     run.draw()
-    worn_nodes = _write_worn_nodes(outcome, folder, reporter)
-    loops = write_loop_tables(folder, outcome.source.line)
-    warn_of_border(loops, outcome.case.loops, reporter)
+    worn_nodes = write_worn_faces(source, stages, state.interfaces, folder, reporter)
+    loops = write_loop_tables(folder, source.line)
+    warn_of_border(loops, case.loops, reporter)
     _warn_of_steps(outcome, reporter)
     summary = _summary(outcome, structure, stresses, recorded)
-    for name, written in worn_nodes.items():
-        summary[name]["worn_nodes"] = written
-    for name, found in loops.items():
-        summary[name]["loops"] = found
-    uniform = uniformities(outcome.source, outcome.stages, outcome.state.interfaces)
-    for name, own in uniform.items():
-        summary[name]["uniformity"] = vars(own)
+    uniform = uniformities(source, stages, state.interfaces)
+    uniformity = {name: vars(alike) for name, alike in uniform.items()}
+    further = {"worn_nodes": worn_nodes, "loops": loops, "uniformity": uniformity}
+    for key, by_interface in further.items():
+        for name, numbers in by_interface.items():
+            summary[name][key] = numbers
     lines = [
         *_lines(outcome, summary),
-        *(f"  {own.sentence(name)}" for name, own in uniform.items()),
-        *(f"  {loops_sentence(name, own, outcome.source.line)}" for name, own in loops.items()),
+        *(f"  {alike.sentence(name)}" for name, alike in uniform.items()),
+        *(f"  {loops_sentence(name, loop, source.line)}" for name, loop in loops.items()),
     ]
     finish(run, summary, lines)
     folder.discard(folder.jumps.name)
 
 
-def _write_worn_nodes(
-    outcome: Outcome, folder: OutputFolder, reporter: Reporter
-) -> dict[str, dict[str, Any]]:
-    """Worn surfaces at the user's own nodes, where the loads or the mesh are the user's."""
-    pairs = zip(outcome.stages, outcome.state.interfaces, strict=True)
-    faces = [
-        face
-        for number, (stage, state) in enumerate(pairs)
-        for face in worn_faces(outcome.source.user_faces(number), stage, state)
-    ]
-    return write_worn_faces(faces, folder, reporter)
+def _stresses(outcome: Outcome, reporter: Reporter) -> list[InterfaceStress]:
+    """Stress under every contact as the case asks for it; empty if it does not."""
+    if not outcome.case.stress.wanted:
+        return []
+    cycles = []
+    for contact in outcome.interfaces:
+        assert contact.worn is not None
+        unworn = contact.stage.unworn_tractions(contact.unworn, contact.first)
+        cycles.append((contact.stage, (unworn, contact.worn), contact.unworn.loads.share))
+    return contact_stresses(outcome.case, outcome.source.peak, cycles, reporter)
 
 
 def _write_results(
@@ -168,15 +184,16 @@ def _write_results(
         "bodies": list(case.bodies),
     }
     with run_results(run, case, attributes, source.line) as writer:
-        for stage, result, loads in zip(outcome.stages, outcome.first, outcome.unworn, strict=True):
+        for contact in outcome.interfaces:
+            stage, first, loads = contact.stage, contact.first, contact.unworn.loads
             writer.put_grid(f"grid/{stage.name}", stage.grid, stage.face.frame)
-            put_face(writer, f"structure/{stage.name}", stage.face, loads)
-            _write_coarse(writer, stage, loads.loads, source.peak)
+            put_face(writer, f"structure/{stage.name}", stage.face, contact.unworn)
+            _write_coarse(writer, stage, loads, source.peak)
             dissipated = "energy dissipated in each increment, half-space pressure"
-            energy = {"energy_half_space": Dataset(result.energy, "N mm", dissipated)}
+            energy = {"energy_half_space": Dataset(first.energy, "N mm", dissipated)}
             writer.put(f"contact/{stage.name}", energy)
-            if result.cycle:
-                write_comparison(writer, stage.name, result.cycle, loads.loads, source.peak)
+            if first.cycle:
+                write_comparison(writer, stage.name, first.cycle, loads, source.peak)
         recorded = _write_jumps(writer, outcome, run.folder)
         _write_kinetics(writer, outcome, recorded)
         write_loops(writer, run.folder, outcome.state.jump)
@@ -208,49 +225,37 @@ def _write_jumps(
     writer: ResultsWriter, outcome: Outcome, folder: OutputFolder
 ) -> dict[str, PeakHistory]:
     """Copy surfaces and contacts of all jumps; what they come to, by interface."""
-    recorded = {stage.name: PeakHistory([], []) for stage in outcome.stages}
+    recorded = {contact.stage.name: PeakHistory([], []) for contact in outcome.interfaces}
+    cell_areas = [contact.stage.grid.cell_area for contact in outcome.interfaces]
     for jump in range(outcome.state.jump + 1):
         arrays, attributes = read_arrays(folder.jump(jump))
-        for stage in outcome.stages:
-            surfaces, contact = (
-                {name: arrays[f"{kind}/{stage.name}/{name}"] for name in names}
-                for kind, names in JUMP_FIELDS.items()
+        cycles = attributes["cycles"]
+        for (name, peaks), cell_area in zip(recorded.items(), cell_areas, strict=True):
+            surfaces, tractions = (
+                {field: arrays[f"{kind}/{name}/{field}"] for field in fields}
+                for kind, fields in JUMP_FIELDS.items()
             )
-            place, cycles = f"{stage.name}/{jump:05d}", attributes["cycles"]
+            place, pressure = f"{name}/{jump:05d}", tractions["pressure"]
             writer.put(f"surfaces/{place}", surface_heights(**surfaces), cycles=cycles)
-            writer.put(f"contact/{place}", traction_fields(**contact), cycles=cycles)
-            pressure = contact["pressure"]
-            area = np.count_nonzero(pressure > 0.0) * stage.grid.cell_area
-            recorded[stage.name].area.append(area)
-            recorded[stage.name].pressure.append(float(pressure.max()))
+            writer.put(f"contact/{place}", traction_fields(**tractions), cycles=cycles)
+            peaks.area.append(np.count_nonzero(pressure > 0.0) * cell_area)
+            peaks.pressure.append(float(pressure.max()))
     return recorded
 
 
 def _write_kinetics(
     writer: ResultsWriter, outcome: Outcome, recorded: dict[str, PeakHistory]
 ) -> None:
-    state = outcome.state
-    writer.put("kinetics", {"cycles": cycles_column(state.cycles)})
-    for number, stage in enumerate(outcome.stages):
-        columns = kinetics_columns(state.kinetics[:, number], np.array(recorded[stage.name].area))
+    writer.put("kinetics", {"cycles": cycles_column(outcome.state.cycles)})
+    for contact in outcome.interfaces:
+        name = contact.stage.name
+        columns = kinetics_columns(contact.kinetics, np.array(recorded[name].area))
         regimes = {
-            f"{name}_{attribute}": value
-            for name, regime in outcome.regimes[stage.name].items()
-            for attribute, value in _regime_attributes(regime).items()
+            f"{quantity}_{attribute}": np.nan if regime is None else getattr(regime, field)
+            for quantity, regime in contact.regimes.items()
+            for attribute, field in REGIME_ATTRIBUTES.items()
         }
-        writer.put(f"kinetics/{stage.name}", columns, **regimes)
-
-
-def _regime_attributes(regime: LinearRegime | None) -> dict[str, float]:
-    """A linear regime as attributes, not numbers where there is none."""
-    if regime is None:
-        return dict.fromkeys(("linear_from", "rate", "trend", "scatter"), np.nan)
-    return {
-        "linear_from": regime.start,
-        "rate": regime.rate,
-        "trend": regime.trend,
-        "scatter": regime.scatter,
-    }
+        writer.put(f"kinetics/{name}", columns, **regimes)
 
 
 def _summary(
@@ -259,8 +264,8 @@ def _summary(
     stresses: list[InterfaceStress],
     recorded: dict[str, PeakHistory],
 ) -> dict[str, Any]:
-    state = outcome.state
-    stress = {own.name: {"stress": own.summary()} for own in stresses}
+    state, contacts = outcome.state, outcome.interfaces
+    stress = {found.name: {"stress": found.summary()} for found in stresses}
     return {
         "per_length": outcome.source.line,
         "cycles": float(state.cycles[-1]),
@@ -268,51 +273,48 @@ def _summary(
         "work": vars(state.spent),
         **({"structure": structure.summary(state)} if structure else {}),
         **{
-            stage.name: _interface_summary(outcome, number)
+            name: _interface_summary(outcome, contact)
             | (structure.interface_summary(number) if structure else {})
-            | recorded[stage.name].summary()
-            | stress.get(stage.name, {})
-            | {"worn_area": _worn_area(outcome, number)}
-            for number, stage in enumerate(outcome.stages)
+            | recorded[name].summary()
+            | stress.get(name, {})
+            | {"worn_area": _worn_area(contact)}
+            for number, (name, contact) in enumerate(zip(recorded, contacts, strict=True))
         },
         "kinetics": {
             "cycles": state.cycles.tolist(),
             **{
-                stage.name: dict(zip(KINETICS, state.kinetics[:, number].T.tolist(), strict=True))
-                | {"area": recorded[stage.name].area}
-                for number, stage in enumerate(outcome.stages)
+                name: dict(zip(KINETICS, contact.kinetics.T.tolist(), strict=True))
+                | {"area": recorded[name].area}
+                for name, contact in zip(recorded, contacts, strict=True)
             },
         },
     }
 
 
-def _worn_area(outcome: Outcome, number: int) -> float:
+def _worn_area(contact: InterfaceOutcome) -> float:
     """Area that has worn by the end [mm²]."""
-    worn = np.count_nonzero(outcome.state.interfaces[number].surfaces.depth > 0.0)
-    return worn * outcome.stages[number].grid.cell_area
+    return np.count_nonzero(contact.state.surfaces.depth > 0.0) * contact.stage.grid.cell_area
 
 
-def _interface_summary(outcome: Outcome, number: int) -> dict[str, Any]:
-    stage, first = outcome.stages[number], outcome.first[number]
-    unworn = outcome.unworn[number]
-    loads = unworn.loads
-    last = dict(zip(KINETICS, outcome.state.kinetics[-1, number].tolist(), strict=True))
+def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str, Any]:
+    first, loads = contact.first, contact.unworn.loads
+    explicit = outcome.case.wear.step.kind == "explicit"
     return {
-        **last,
+        **dict(zip(KINETICS, contact.kinetics[-1].tolist(), strict=True)),
         "peak_load": {"unworn": resultants_at(loads, outcome.source.peak)},
-        "slip_per_cycle": _slip_per_cycle(unworn, first),
+        "slip_per_cycle": contact.slip_per_cycle,
         "energy_per_cycle": {
             "half_space": float(first.energy.sum()),
             "structure": loads.mean_energy,
         },
         **({"by_increment": comparison_summary(first.cycle, loads)} if first.cycle else {}),
-        "step_error": _step_error(outcome, number),
+        "step_error": None if explicit else contact.step_error,
         "explicit_limit": first.stable_cycles if np.isfinite(first.stable_cycles) else None,
         "contact_residual": first.largest_residual,
         "convolutions": first.spent.convolutions,
         "linear_regime": {
             name: None if regime is None else _regime_summary(regime)
-            for name, regime in outcome.regimes[stage.name].items()
+            for name, regime in contact.regimes.items()
         },
     }
 
@@ -329,49 +331,24 @@ def _regime_summary(regime: LinearRegime) -> dict[str, Any]:
     }
 
 
-def _step_error(outcome: Outcome, number: int) -> dict[str, float] | None:
-    """Estimated errors by wear steps of depth (root mean square) and volume, relative.
-
-    None where they are unknown or nothing is worn.
-    """
-    own = outcome.state.interfaces[number]
-    depth = own.surfaces.depth
-    if outcome.case.wear.step.kind == "explicit" or not depth.any():
-        return None
-    volume = float(depth.sum()) * outcome.stages[number].grid.cell_area
-    return {
-        "depth": root_mean_square(own.error, depth) / root_mean_square(depth, depth),
-        "volume": abs(own.volume_error) / volume,
-    }
-
-
 def _warn_of_steps(outcome: Outcome, reporter: Reporter) -> None:
     """Automatic steps that did not meet their tolerance."""
     wear = outcome.case.wear
     if not wear.step.automatic:
         return
-    for number, stage in enumerate(outcome.stages):
-        found = _step_error(outcome, number)
-        if found is None:
+    for contact in outcome.interfaces:
+        if contact.step_error is None:
             continue
-        asked = wear.tolerance
+        error, asked = max(contact.step_error.values()), wear.tolerance
         if wear.depth_tolerance is not None:
-            depth = outcome.state.interfaces[number].surfaces.depth
+            depth = contact.state.surfaces.depth
             asked = wear.depth_tolerance / root_mean_square(depth, depth)
-        if max(found.values()) > asked:
+        if error > asked:
             reporter.warn(
-                f"{stage.name}: wear steps leave an estimated error of {max(found.values()):.2%} "
+                f"{contact.stage.name}: wear steps leave an estimated error of {error:.2%} "
                 f"where {asked:.2%} was asked for (wear.tolerance): try wear.step.kind: "
                 "second_order, or a smaller tolerance"
             )
-
-
-def _slip_per_cycle(unworn: FaceLoads, first: FirstContact) -> float:
-    """Largest path of slip [mm] per unworn, mean cycle: of the half-space where loads have none."""
-    slip = unworn.slip
-    if first.cycle and not slip.any():
-        slip = np.stack([state.slip for state in first.cycle])
-    return float(np.tensordot(unworn.loads.share, np.hypot(slip[:, 0], slip[:, 1]), 1).max())
 
 
 def _lines(outcome: Outcome, summary: dict[str, Any]) -> Iterator[str]:
@@ -379,12 +356,12 @@ def _lines(outcome: Outcome, summary: dict[str, Any]) -> Iterator[str]:
     yield f"{summary['cycles']:.6g} cycles in {summary['jumps']} jumps"
     name_1, name_2 = outcome.case.bodies
     unit = "mm^3/mm" if outcome.source.line else "mm^3"
-    for stage in outcome.stages:
-        own = summary[stage.name]
-        peaks = own["peak_pressure"]
+    for contact in outcome.interfaces:
+        name = contact.stage.name
+        found, peaks = summary[name], summary[name]["peak_pressure"]
         yield (
-            f"  {stage.name}: worn {own['depth_1'] * 1e3:.3g} um ({name_1}), "
-            f"{own['depth_2'] * 1e3:.3g} um ({name_2}); {own['volume_1']:.3g}, "
-            f"{own['volume_2']:.3g} {unit}; peak pressure {peaks['unworn']:.0f} -> "
+            f"  {name}: worn {found['depth_1'] * 1e3:.3g} um ({name_1}), "
+            f"{found['depth_2'] * 1e3:.3g} um ({name_2}); {found['volume_1']:.3g}, "
+            f"{found['volume_2']:.3g} {unit}; peak pressure {peaks['unworn']:.0f} -> "
             f"{peaks['worn']:.0f} MPa"
         )

@@ -16,7 +16,7 @@ from workflow.analyses.wear.contact_workers import ContactProcesses, contact_wor
 from workflow.analyses.wear.fidelity.choosing import say
 from workflow.analyses.wear.load_source import ContactFace, LoadSource
 from workflow.analyses.wear.recording import Recorder, RunLog
-from workflow.analyses.wear.results import Outcome, write_output
+from workflow.analyses.wear.results import InterfaceOutcome, Outcome, write_output
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.warnings import warn_of_contact, warn_of_structure
@@ -68,11 +68,16 @@ def _computed(run: Run[WearCase]) -> Outcome:
             stages = [ContactStage(case, face) for face in faces]
         contacts = ContactProcesses(stages, workers)
         state, first = _marched(run, source, contacts, unworn, kept)
-        worn: list[CycleTractions] = []
+        worn: Sequence[CycleTractions | None] = contacts.each(None)
         if case.stress.wanted:
             with reporter.stage("stress under the contacts"):
                 worn = contacts.tractions(state.interfaces)
-    return Outcome(case, source, stages, state, unworn, first, worn)
+    columns = stages, unworn, first, state.interfaces, worn
+    interfaces = [
+        InterfaceOutcome(*column, state.cycles, state.kinetics[:, number])
+        for number, column in enumerate(zip(*columns, strict=True))
+    ]
+    return Outcome(case, source, state, interfaces)
 
 
 def _marched(

@@ -58,7 +58,7 @@ def warn_of_contact(
         )
     yield_stress = min(case.material(number).yield_stress for number in (1, 2))
     for stage, interface, result in zip(stages, state.interfaces, first, strict=True):
-        highest = result.highest_pressure
+        highest = result.pressure.max()
         if highest > yield_stress:
             reporter.warn(
                 f"{stage.name}: the pressure reaches {highest:.0f} MPa, above the yield stress of "

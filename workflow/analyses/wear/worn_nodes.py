@@ -51,6 +51,12 @@ class NodalDepths:
     depth: Array
     volume_share: float
 
+    @classmethod
+    def of(cls, nodal: Array, areas: Array, grid: Grid, depth: Array) -> NodalDepths:
+        """Depths at nodes of such ``areas`` ``(n,)`` for ``depth`` ``(nx, ny)`` on the grid."""
+        worn = float(depth.sum()) * grid.cell_area
+        return cls(nodal, float(nodal @ areas) / worn if worn else np.nan)
+
 
 def read_nodes(file: str | Path) -> NodeTable:
     """Node table ``node, X, Y, Z`` in global axes; Z may be left out of a plane model.
@@ -88,11 +94,10 @@ def nodal_depths(points: Array, frame: Frame, grid: Grid, depth: Array) -> Nodal
     nodes, numbered = np.unique(facets, return_inverse=True)
     face = Face("worn", frame, coordinates[nodes], numbered.reshape(facets.shape))
     shared = FaceTransfer.between(face, grid).shared
-    nodal = np.zeros(len(points))
+    nodal, areas = np.zeros((2, len(points)))
+    areas[nodes] = face.nodal_areas
     nodal[nodes] = shared.T @ depth.ravel() / face.nodal_areas
-    worn = float(depth.sum()) * grid.cell_area
-    carried = float(nodal[nodes] @ face.nodal_areas)
-    return NodalDepths(nodal, carried / worn if worn else np.nan)
+    return NodalDepths.of(nodal, areas, grid, depth)
 
 
 def worn_displacement(depth: Array, frame: Frame, body: Literal[1, 2]) -> Array:

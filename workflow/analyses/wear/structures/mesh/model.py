@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 
@@ -115,8 +115,7 @@ class MeshModel:
     def contact_face(self, interface: Interface) -> ContactFace:
         size, extra = face_size(interface), self._case_gap(interface)
         (meshed,) = (i for i in self._meshed.interfaces if i.name == interface.name)
-        gap = _MeshGap(meshed) if extra is None else _Sum(_MeshGap(meshed), extra)
-        return ContactFace(interface, size, gap, _coarse(interface, size))
+        return ContactFace(interface, size, _MeshGap(meshed, extra), _coarse(interface, size))
 
     def node_numbers(self, body: int) -> Indices:
         structure = self._case.structure
@@ -133,23 +132,14 @@ class MeshModel:
             )
 
 
-@dataclass(frozen=True)
-class _Sum:
-    """Two gaps, one on the other."""
-
-    first: GapFunction
-    second: GapFunction
-
-    def __call__(self, x: Array, y: Array) -> Array:
-        """Gap ``(nx, ny)`` [mm] at ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``."""
-        return self.first(x, y) + self.second(x, y)
-
-
 class _MeshGap:
-    """Gap of the meshed faces, linear between nodes; the bodies part beyond them."""
+    """Gap of the meshed faces, linear between nodes; the bodies part beyond them.
 
-    def __init__(self, interface: Interface) -> None:
-        self._face, self._gap = interface, interface.gap
+    ``extra`` is a gap that the case gives beside it.
+    """
+
+    def __init__(self, interface: Interface, extra: GapFunction | None) -> None:
+        self._face, self._gap, self._extra = interface, interface.gap, extra
 
     def __call__(self, x: Array, y: Array) -> Array:
         """Gap ``(nx, ny)`` [mm] at ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``."""
@@ -158,7 +148,7 @@ class _MeshGap:
         points = np.stack(np.broadcast_arrays(x, y), axis=-1)[outside]
         distance, nearest = cKDTree(self._face.coordinates).query(points)
         gap[outside] = self._gap[nearest] + PARTING_SLOPE * distance
-        return gap
+        return gap if self._extra is None else gap + self._extra(x, y)
 
     def _on_segments(self, x: Array, y: Array) -> Array:
         gap = np.full((x.size, y.size), np.nan)
