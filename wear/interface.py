@@ -361,9 +361,7 @@ class InterfaceContact:
 
     def _ends(self, slip: Array, starts: Starts, loads: LoadHistory) -> Array:
         """Where body 2 is before and after each increment, if its motion is to be followed."""
-        pressure = np.zeros(self.grid.shape)
-        for start in starts.values():
-            pressure += start.pressure
+        pressure = sum((start.pressure for start in starts.values()), np.zeros(self.grid.shape))
         law = self.settings.laws[0]
         ends = followed(self.grid, slip, pressure, loads.missions, self.settings.follow)
         if len(ends) and isinstance(law, EvolvingLaw) and law.scope == "local":

@@ -156,18 +156,15 @@ class WearingContact:
         In mm/MPa and mean cycle. Laws that change with energy take that of the state and that
         expected after so many cycles at its pressures.
         """
-        surfaces, area = state.surfaces, self.grid.cell_area
+        surfaces, (law_1, law_2) = state.surfaces, self._laws
         work_1, work_2 = (cycles * work for work in self._work(state.starts))
-        energies = state.energy, state.energy + float(work_2.sum()) * area
-        ends = (
-            (surfaces.work_1, surfaces.work_1 + work_1),
-            (surfaces.work_2, surfaces.work_2 + work_2),
+        energies = state.energy, state.energy + float(work_2.sum()) * self.grid.cell_area
+        ends_1 = surfaces.work_1, surfaces.work_1 + work_1
+        ends_2 = surfaces.work_2, surfaces.work_2 + work_2
+        return (
+            self._by_mission(law_1, ends_1, energies),
+            self._by_mission(law_2, ends_2, energies),
         )
-        first, second = (
-            self._by_mission(law, work, energies)
-            for law, work in zip(self._laws, ends, strict=True)
-        )
-        return first, second
 
     def _by_mission(
         self, law: WearLaw, work: tuple[Array, Array], energies: tuple[float, float]

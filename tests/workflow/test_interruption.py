@@ -182,7 +182,7 @@ def test_worker_that_dies_is_one_line():
 def test_worker_that_cannot_be_set_up_says_why(own_processes):
     """What goes wrong in a worker is raised here, not printed there."""
     with (
-        contact_workers.contact_workers([None]) as team,
+        contact_workers.contact_workers(None, [None]) as team,
         pytest.raises(AttributeError, match="'NoneType'"),
     ):
         team.call("begin", [None])

@@ -187,7 +187,7 @@ def test_missions_of_a_mix_differ_only_in_what_they_name(dovetail_path):
     mix = "[{share: 30 %, rotation_speed: 3000 rpm, aerodynamic_moment: 20 N*m}, {share: 0.7}]"
     model = DovetailModel(load_case(dovetail_path, [f"load_path.mix={mix}"]))
     (whole,) = amplitudes(dovetail_path)
-    low, full = model.blocks
+    low, full = model.missions
     assert (low.share, full.share) == (0.3, 0.7)
     np.testing.assert_array_equal(full.amplitudes, whole)
     np.testing.assert_allclose(low.amplitudes[:, 0], 0.25 * whole[:, 0], rtol=1e-14)

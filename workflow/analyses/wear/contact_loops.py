@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
@@ -24,18 +24,15 @@ from sa_solver.tangential_loop import (
     march_loop,
 )
 from sa_solver.types import Array
+from wear.interface import InterfaceState
 from wear.stepping import ContactFailure
 from workflow.analyses.wear.case.loops import Loops
 from workflow.analyses.wear.loop_table import COLUMNS, write_loop_table
 from workflow.errors import UserError
 from workflow.shell.dataset import Dataset
-
-if TYPE_CHECKING:
-    from wear.interface import InterfaceState
-    from workflow.shell.folder import OutputFolder
-    from workflow.shell.reporter import Reporter
-    from workflow.shell.results import ResultsWriter
-
+from workflow.shell.folder import OutputFolder
+from workflow.shell.reporter import Reporter
+from workflow.shell.results import ResultsWriter
 
 # Measured by every loop; cycles come from the jump.
 MEASURED = tuple(column.name for column in COLUMNS if column.name != "cycles")
@@ -126,7 +123,7 @@ def kept_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Arr
     arrays: dict[str, Array] = {}
     for name, loop in zip(names, loops, strict=True):
         place = f"{LOOPS}/{name}"
-        arrays[f"{place}/values"] = np.array([loop.values[own] for own in MEASURED])
+        arrays[f"{place}/values"] = np.array([loop.values[column] for column in MEASURED])
         arrays |= {f"{place}/displacement": loop.displacement, f"{place}/force": loop.force}
     return arrays
 
@@ -158,7 +155,7 @@ def write_loop_tables(folder: OutputFolder, per_length: bool) -> dict[str, dict[
     summary: dict[str, dict[str, Any]] = {}
     with h5py.File(folder.results, "r") as file:
         for name, group in file.get(LOOPS, {}).items():
-            rows = [{c.name: float(own.attrs[c.name]) for c in COLUMNS} for own in group.values()]
+            rows = [{c.name: float(loop.attrs[c.name]) for c in COLUMNS} for loop in group.values()]
             table = f"loops_{name}.csv"
             path = folder.reserve(table, f"tangential loops of {name} as it wears")
             write_loop_table(path, rows, per_length)
@@ -168,8 +165,8 @@ def write_loop_tables(folder: OutputFolder, per_length: bool) -> dict[str, dict[
 
 def warn_of_border(loops: dict[str, dict[str, Any]], asked: Loops, reporter: Reporter) -> None:
     """Warn of loops under a normal force of their own that is too much for the grid."""
-    for name, own in loops.items():
-        share = max(own[when]["border_load"] for when in ("unworn", "worn"))
+    for name, loop in loops.items():
+        share = max(loop[when]["border_load"] for when in ("unworn", "worn"))
         if share > 0.0 and asked.normal_force is not None:
             reporter.warn(
                 f"{name}: in the tangential loops the contact reaches the border of its grid "

@@ -5,9 +5,9 @@ Extensive quantities are in the units of a contact over an area.
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
+from fe_models.mesh import Face
 from sa_solver.types import Array
+from wear.interface import FaceLoads
 from workflow.analyses.contact.datasets import (
     load_columns,
     pressure_field,
@@ -16,10 +16,6 @@ from workflow.analyses.contact.datasets import (
 )
 from workflow.shell.dataset import Dataset
 from workflow.shell.results import ResultsWriter
-
-if TYPE_CHECKING:
-    from fe_models.mesh import Face
-    from wear.interface import FaceLoads
 
 
 def face_mesh(face: Face) -> dict[str, Dataset]:
@@ -44,8 +40,8 @@ def put_face(writer: ResultsWriter, group: str, face: Face, carried: FaceLoads) 
 def surface_heights(body_1: Array, body_2: Array) -> dict[str, Dataset]:
     """Heights ``(nx, ny)`` of both bodies."""
     return {
-        "body_1": Dataset(body_1, "mm", "height of body 1 in the interface frame"),
-        "body_2": Dataset(body_2, "mm", "height of body 2 in the interface frame"),
+        f"body_{body}": Dataset(height, "mm", f"height of body {body} in the interface frame")
+        for body, height in enumerate((body_1, body_2), start=1)
     }
 
 

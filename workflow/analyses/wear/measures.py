@@ -30,7 +30,9 @@ def quantities(case: WearCase, summary: Summary) -> list[str]:
 
 def interfaces(summary: Mapping[str, Any]) -> list[str]:
     """Names of the contacts of a wear run."""
-    return [name for name, own in summary.items() if isinstance(own, Mapping) and "depth_1" in own]
+    return [
+        name for name, part in summary.items() if isinstance(part, Mapping) and "depth_1" in part
+    ]
 
 
 def extra_quantities(summary: Mapping[str, Any]) -> list[str]:
@@ -41,7 +43,10 @@ def extra_quantities(summary: Mapping[str, Any]) -> list[str]:
 # --- fields -------------------------------------------------------------------------------------
 
 
-def worn_depths(folder: Path, names: Iterable[str]) -> dict[str, tuple[Grid, Array, Array]]:
+WornDepths = Mapping[str, tuple[Grid, Array, Array]]
+
+
+def worn_depths(folder: Path, names: Iterable[str]) -> WornDepths:
     """Grid of each interface and worn depths ``(nx, ny)`` of body 1 and body 2 [mm]."""
     # Files are read when runs are compared, not when a case is.
     import h5py
@@ -49,14 +54,14 @@ def worn_depths(folder: Path, names: Iterable[str]) -> dict[str, tuple[Grid, Arr
     from workflow.shell.folder import OutputFolder
     from workflow.shell.results import grid_of
 
-    found = {}
+    depths = {}
     with h5py.File(OutputFolder(folder).results) as file:
         for name in names:
             jumps = file["surfaces"][name]
             first, last = (jumps[jump] for jump in (min(jumps), max(jumps)))
-            depths = [abs(last[body][()] - first[body][()]) for body in ("body_1", "body_2")]
-            found[name] = grid_of(file["grid"][name]), depths[0], depths[1]
-    return found
+            body_1, body_2 = (abs(last[b][()] - first[b][()]) for b in ("body_1", "body_2"))
+            depths[name] = grid_of(file["grid"][name]), body_1, body_2
+    return depths
 
 
 def middle_sections(folder: Path, names: Iterable[str]) -> dict[str, dict[str, float]]:
@@ -70,8 +75,8 @@ def middle_sections(folder: Path, names: Iterable[str]) -> dict[str, dict[str, f
         rows = slice(max(0, half - MIDDLE_ROWS), half + MIDDLE_ROWS)
         profiles = [np.mean(depth[:, rows] if half else depth, axis=1) for depth in depths]
         sections[name] = {
-            **{f"depth_{k}": float(own.max()) for k, own in enumerate(profiles, 1)},
-            **{f"area_{k}": float(own.sum()) * grid.pitch[0] for k, own in enumerate(profiles, 1)},
+            **{f"depth_{k}": float(depth.max()) for k, depth in enumerate(profiles, 1)},
+            **{f"area_{k}": float(d.sum()) * grid.pitch[0] for k, d in enumerate(profiles, 1)},
         }
     return sections
 
@@ -79,19 +84,22 @@ def middle_sections(folder: Path, names: Iterable[str]) -> dict[str, dict[str, f
 def middle_quantities(summary: Mapping[str, Any]) -> list[str]:
     """Paths of the numbers of :func:`middle_sections` in a summary that has them."""
     sections: Mapping[str, Mapping[str, float]] = summary.get(MIDDLE, {})
-    return [f"{MIDDLE}.{name}.{key}" for name, own in sections.items() for key in own if own[key]]
+    return [
+        f"{MIDDLE}.{name}.{key}"
+        for name, section in sections.items()
+        for key, number in section.items()
+        if number
+    ]
 
 
-def profile_difference(
-    own: Mapping[str, tuple[Grid, Array, Array]], other: Mapping[str, tuple[Grid, Array, Array]]
-) -> float | None:
-    """Largest difference of depth anywhere, over the largest depth of ``other``; both bodies.
+def profile_difference(coarse: WornDepths, fine: WornDepths) -> float | None:
+    """Largest difference of depth anywhere, over the largest depth of ``fine``; both bodies.
 
     None where the grids are not of one dimension.
     """
     largest = 0.0
-    for name, (grid, *depths) in own.items():
-        reference, *finer = other[name]
+    for name, (grid, *depths) in coarse.items():
+        reference, *finer = fine[name]
         if grid.line != reference.line:
             return None
         there = _resampled(sum(finer), reference, grid)
@@ -122,8 +130,7 @@ def _measured(folder: Path, summary: Summary) -> Summary:
 def _apart(folder: Path, reference: Path, summary: Summary) -> dict[str, float]:
     """Largest difference of worn depth anywhere to another run, over its largest depth."""
     names = interfaces(summary)
-    own, other = worn_depths(folder, names), worn_depths(reference, names)
-    difference = profile_difference(own, other)
+    difference = profile_difference(worn_depths(folder, names), worn_depths(reference, names))
     return {} if difference is None else {PROFILE: difference}
 
 

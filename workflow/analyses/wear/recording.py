@@ -16,8 +16,7 @@ from workflow.analyses.wear.contact_loops import kept_loops, loops_due
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.contact_workers import ContactProcesses
 from workflow.analyses.wear.warnings import warn_of_growth, warn_of_instability
-from workflow.shell.folder import OutputFolder
-from workflow.shell.reporter import Reporter
+from workflow.shell.analysis import Run
 from workflow.shell.store import write_arrays
 
 # What a run calls the parts of the loop.
@@ -33,25 +32,24 @@ STAGES: dict[Stage, str] = {
 class RunLog(Observer):
     """Times the parts of the loop, and says how far it has got and what to beware of."""
 
-    case: WearCase
+    run: Run[WearCase]
     stages: list[ContactStage]
-    reporter: Reporter
 
     def stage(self, name: Stage) -> AbstractContextManager[None]:
-        return self.reporter.stage(STAGES[name])
+        return self.run.reporter.stage(STAGES[name])
 
     def jumping(self, state: CoupledState, cycles: float) -> None:
-        step = self.case.wear.step
+        step = self.run.case.wear.step
         if step.kind == "explicit" and step.fraction is None:
-            warn_of_instability(self.stages, state, cycles, self.reporter)
+            warn_of_instability(self.stages, state, cycles, self.run.reporter)
 
     def jumped(self, before: CoupledState, after: CoupledState) -> None:
-        warn_of_growth(self.stages, after, self.reporter)
+        warn_of_growth(self.stages, after, self.run.reporter)
         drift, spent = after.drift[-1], after.spent - before.spent
         if after.solutions > before.solutions:
-            self.reporter.log(f"drift {drift:.2%}: resultants computed again")
-        depths = ", ".join(f"{own * 1e3:.3f}" for own in after.kinetics[-1, :, :2].ravel())
-        self.reporter.log(
+            self.run.reporter.log(f"drift {drift:.2%}: resultants computed again")
+        depths = ", ".join(f"{depth * 1e3:.3f}" for depth in after.kinetics[-1, :, :2].ravel())
+        self.run.reporter.log(
             f"jump {after.jump}: {after.cycles[-1]:.6g} cycles, depths {depths} um, "
             f"{spent.steps} steps, {spent.contact_solves} contact problems, "
             f"{spent.convolutions} convolutions, drift {drift:.2%}"
@@ -65,12 +63,10 @@ class Recorder(Observer):
     Fields are those at ``peak`` load. A run that is ``resumed`` has those of its first state.
     """
 
-    case: WearCase
+    run: Run[WearCase]
     settings: CoupledSettings
     peak: int
     contacts: ContactProcesses
-    folder: OutputFolder
-    reporter: Reporter
     resumed: bool
 
     def begin(self, state: CoupledState) -> None:
@@ -83,23 +79,22 @@ class Recorder(Observer):
     def keep(self, state: CoupledState) -> None:
         """Write the fields of this jump, then the state."""
         loops = self._loops(state)
-        with self.reporter.stage("checkpoints"):
+        with self.run.reporter.stage("checkpoints"):
             recorded = self.contacts.fields(state.interfaces, self.peak)
             arrays: dict[str, Array] = {}
             names = self.contacts.names
-            for name, own, fields in zip(names, state.interfaces, recorded, strict=True):
-                body_1, body_2 = own.surfaces.heights
-                arrays[f"surfaces/{name}/body_1"] = body_1
-                arrays[f"surfaces/{name}/body_2"] = body_2
+            for name, interface, fields in zip(names, state.interfaces, recorded, strict=True):
+                for body, height in enumerate(interface.surfaces.heights, start=1):
+                    arrays[f"surfaces/{name}/body_{body}"] = height
                 arrays |= {f"contact/{name}/{k}": field for k, field in vars(fields).items()}
             attributes = {"cycles": float(state.cycles[-1])}
-            write_arrays(self.folder.jump(state.jump), arrays | loops, attributes)
-            checkpoint.save(self.folder.checkpoint, state)
+            write_arrays(self.run.folder.jump(state.jump), arrays | loops, attributes)
+            checkpoint.save(self.run.folder.checkpoint, state)
 
     def _loops(self, state: CoupledState) -> dict[str, Array]:
         """Tangential loops on the present surfaces, where they are due."""
-        if not loops_due(self.case.loops, state.jump, self.settings.ended(state)):
+        if not loops_due(self.run.case.loops, state.jump, self.settings.ended(state)):
             return {}
-        with self.reporter.stage("tangential loops"):
-            found = self.contacts.loops(state.interfaces, self.peak)
-        return kept_loops(self.contacts.names, found)
+        with self.run.reporter.stage("tangential loops"):
+            loops = self.contacts.loops(state.interfaces, self.peak)
+        return kept_loops(self.contacts.names, loops)

@@ -265,7 +265,7 @@ def _summary(
     recorded: dict[str, PeakHistory],
 ) -> dict[str, Any]:
     state, contacts = outcome.state, outcome.interfaces
-    stress = {found.name: {"stress": found.summary()} for found in stresses}
+    stress = {under.name: {"stress": under.summary()} for under in stresses}
     return {
         "per_length": outcome.source.line,
         "cycles": float(state.cycles[-1]),
@@ -358,10 +358,10 @@ def _lines(outcome: Outcome, summary: dict[str, Any]) -> Iterator[str]:
     unit = "mm^3/mm" if outcome.source.line else "mm^3"
     for contact in outcome.interfaces:
         name = contact.stage.name
-        found, peaks = summary[name], summary[name]["peak_pressure"]
+        numbers, peaks = summary[name], summary[name]["peak_pressure"]
         yield (
-            f"  {name}: worn {found['depth_1'] * 1e3:.3g} um ({name_1}), "
-            f"{found['depth_2'] * 1e3:.3g} um ({name_2}); {found['volume_1']:.3g}, "
-            f"{found['volume_2']:.3g} {unit}; peak pressure {peaks['unworn']:.0f} -> "
+            f"  {name}: worn {numbers['depth_1'] * 1e3:.3g} um ({name_1}), "
+            f"{numbers['depth_2'] * 1e3:.3g} um ({name_2}); {numbers['volume_1']:.3g}, "
+            f"{numbers['volume_2']:.3g} {unit}; peak pressure {peaks['unworn']:.0f} -> "
             f"{peaks['worn']:.0f} MPa"
         )

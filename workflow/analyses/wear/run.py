@@ -88,14 +88,9 @@ def _marched(
     kept: CoupledState | None,
 ) -> tuple[CoupledState, list[FirstContact]]:
     """The state at the end, from ``kept`` or from unworn surfaces; and the first contact."""
-    case, folder, reporter, settings = (
-        run.case,
-        run.folder,
-        run.reporter,
-        coupled_settings(run.case),
-    )
-    log = RunLog(case, contacts.stages, reporter)
-    recorder = Recorder(case, settings, source.peak, contacts, folder, reporter, kept is not None)
+    case, reporter, settings = run.case, run.reporter, coupled_settings(run.case)
+    log = RunLog(run, contacts.stages)
+    recorder = Recorder(run, settings, source.peak, contacts, resumed=kept is not None)
     loop = CoupledWear(settings, source, contacts, (log, recorder))
     state, first = loop.begin(unworn)
     warn_of_contact(case, source.peak, contacts.stages, state, first, reporter)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from math import prod
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
@@ -33,10 +33,6 @@ def memory(case: WearCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:
     return Memory(dense + contact, "lower contact.grid", factor_bytes(nodes))
 
 
-def _nothing_to_warn_of(case: Any, stage: ContactStage, load: float) -> Iterator[str]:
-    return iter(())
-
-
 @dataclass(frozen=True)
 class WearStructure(Generic[AnyWearCase]):
     """What a wear run needs to know of a kind of structure.
@@ -52,4 +48,4 @@ class WearStructure(Generic[AnyWearCase]):
     source: Callable[[AnyWearCase], LoadSource]
     memory: Callable[[AnyWearCase, int, int], Memory] = memory
     choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = as_written
-    warnings: Callable[[AnyWearCase, ContactStage, float], Iterator[str]] = _nothing_to_warn_of
+    warnings: Callable[[AnyWearCase, ContactStage, float], Iterable[str]] = lambda *_: ()

@@ -245,8 +245,8 @@ class Laws(Section):
     @classmethod
     def _names(cls) -> list[str]:
         """The keys of the two bodies."""
-        pairs = [own for own in (BladeAndDisk, TwoBodies) if issubclass(cls, own)]
-        return [name for own in pairs for name in own.model_fields]
+        pairs = [pair for pair in (BladeAndDisk, TwoBodies) if issubclass(cls, pair)]
+        return [name for pair in pairs for name in pair.model_fields]
 
 
 class BodiesThatWear(Laws, Duration):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 import numpy as np
 from pydantic import model_validator
@@ -12,12 +12,11 @@ from sa_solver.types import Frame
 from workflow.analyses.wear.case.base import WearCase, check_interface_name
 from workflow.analyses.wear.case.gaps import Gap, GapShape, check_cells, check_gap
 from workflow.analyses.wear.case.sections import Contact, TwoMaterials, Wear
+from workflow.analyses.wear.structures.resultants.faces import FaceError
+from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
 from workflow.case.fields import File, Quantity, shown, split_dataset
 from workflow.case.input_files import InputFileError
 from workflow.case.sections import Length, Section, Title, disagreement, entry
-
-if TYPE_CHECKING:
-    from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
 
 # How far x and normal may be from perpendicular: six printed digits.
 PERPENDICULAR = 1e-6
@@ -139,10 +138,8 @@ class Resultants(Section):
 
     def nodes_of(self, name: str) -> dict[Literal[1, 2], str]:
         """Node tables of a face by body."""
-        nodes: NodeTables | None = getattr(self._interface(name), "nodes", None)
-        files: dict[Literal[1, 2], str | None] = {}
-        if nodes is not None:
-            files = {1: nodes.body_1, 2: nodes.body_2}
+        nodes: NodeTables = getattr(self._interface(name), "nodes", None) or NodeTables()
+        files: dict[Literal[1, 2], str | None] = {1: nodes.body_1, 2: nodes.body_2}
         return {body: file for body, file in files.items() if file is not None}
 
     def _interface(self, name: str) -> ImportedInterface | None:
@@ -281,7 +278,6 @@ class ResultantsCase(WearCase):
             check_cells(loads.height.shape, structure.file, self.cells)
 
     def _check_nodes(self, name: str, loads: ImportedLoads) -> None:
-        from workflow.analyses.wear.structures.resultants.faces import FaceError
         from workflow.analyses.wear.worn_nodes import check_nodes
 
         structure = self.structure

@@ -91,29 +91,22 @@ def read_h5(
     try:
         with h5py.File(file, "r") as opened:
             top = opened.get(group or "/")
-            interfaces = {} if not isinstance(top, h5py.Group) else _interfaces(file, top)
+            interfaces = [
+                (name, item)
+                for name, item in (top.items() if isinstance(top, h5py.Group) else ())
+                if isinstance(item, h5py.Group) and isinstance(item.get(LOADS), h5py.Group)
+            ]
             if not interfaces:
                 raise InputFileError(
                     f"{file}: /{group}: no interfaces; allowed: a group for each, with a group "
                     f"{LOADS} in it; at the top: {', '.join(opened) or 'nothing'}"
                 )
-            read = {
-                name: _read(interface, bounds(name), line) for name, interface in interfaces.items()
-            }
+            read = {name: _read(Group(file, item), bounds(name), line) for name, item in interfaces}
     except OSError as error:
         reason = " ".join(str(error).split())
         raise InputFileError(f"{file}: cannot be read ({reason})") from error
     _check_counts(file, read)
     return read
-
-
-def _interfaces(file: str, top: h5py.Group) -> dict[str, Group]:
-    groups = {name: item for name, item in top.items() if isinstance(item, h5py.Group)}
-    return {
-        name: Group(file, item)
-        for name, item in groups.items()
-        if isinstance(item.get(LOADS), h5py.Group)
-    }
 
 
 def _check_counts(file: str, read: dict[str, ImportedLoads]) -> None:

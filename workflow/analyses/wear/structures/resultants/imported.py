@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from fe_models.mesh import Face
 from sa_solver.types import Array, Frame, Indices, LoadHistory
 from workflow.analyses.contact.datasets import energy_columns, resultant_columns
 from workflow.shell.dataset import unit_in
-
-if TYPE_CHECKING:
-    from fe_models.mesh import Face
 
 COLUMNS = ("P", "Qx", "Qy", "Mx", "My", "Mz", "Edx", "Edy")
 # A line contact has none of these unless it is sheared along its length.
@@ -48,8 +45,6 @@ class ImportedLoads:
 
         In the global axes where the file does not say where it lies.
         """
-        from fe_models.mesh import Face
-
         if self.coordinates is None or self.facets is None:
             return None
         frame = self.frame or Frame(np.zeros(3), np.eye(3))

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from fe_models.mesh import Interface
+from fe_models.structure import InterfaceHistory
 from sa_solver.types import Array, LoadHistory
 from workflow.analyses.contact.datasets import load_columns, slip_field
 from workflow.analyses.wear.datasets import face_mesh
@@ -17,10 +19,6 @@ from workflow.analyses.wear.structures.resultants.imported import base_units
 from workflow.shell.dataset import Dataset
 from workflow.shell.results import writing
 from workflow.shell.tables import heading, write_table
-
-if TYPE_CHECKING:
-    from fe_models.mesh import Interface
-    from fe_models.structure import InterfaceHistory
 
 NOTE = "forces and moments of body 1 on body 2, in the frame of each interface; one closed cycle"
 
@@ -56,8 +54,6 @@ def write_resultants_h5(
 
     ``heights`` ``(nx, ny)`` [mm] are the unworn gaps on the grid of the case, by interface.
     """
-    from fe_models.mesh import Interface
-
     line = any(history.interface.line for history in histories.values())
     with writing(path, line) as writer:
         for name, history in histories.items():
