@@ -34,7 +34,7 @@ KINETICS = ("depth_1", "depth_2", "volume_1", "volume_2", "energy")
 AT_STOP = 1e-3
 """How near to a stop a run must come: a jump that is to reach it is cut short to do so."""
 
-Stage = Literal["first cycle", "wear", "probe", "loads"]
+Stage = Literal["contact, first cycle", "wear", "drift probe", "structural friction"]
 Same = TypeVar("Same")
 
 
@@ -261,7 +261,7 @@ class CoupledWear:
 
         ``unworn`` are the loads of all contacts before any wear.
         """
-        with self._stage("first cycle"):
+        with self._stage("contact, first cycle"):
             begun = self.contacts.begin(unworn, self.settings.cycles)
         interfaces = tuple(unworn_state for unworn_state, _ in begun)
         state = CoupledState(
@@ -354,13 +354,13 @@ class CoupledWear:
         settings = self.settings
         if settings.resultants == "constant":
             return state, 0.0
-        with self._stage("probe"):
+        with self._stage("drift probe"):
             probe = self._probe(state.interfaces)
         sizes = np.array([grid.size for grid in self.contacts.grids])
         drift = float(np.abs(resultant_change(probe, state.solved_resultants, sizes)).max())
         if settings.resultants == "drift" and drift <= settings.drift:
             return state, drift
-        with self._stage("loads"):
+        with self._stage("structural friction"):
             depths = self.contacts.nodal_depths(state.interfaces)
             histories = self.source.worn(depths, self._friction(state.interfaces))
         return replace(

@@ -387,15 +387,14 @@ class InterfaceContact:
         force = pressure.sum(axis=(1, 2))
         held = np.where(stuck, pressure, 0.0).sum(axis=(1, 2))
         unknown = np.divide(held, force, out=np.zeros_like(force), where=force > 0.0)
-        pairs = zip(pressure, slip, strict=True)
-        shear = np.stack([self._sliding_shear(p, s, energy) for p, s in pairs])
+        shear = self._sliding_shear(pressure, slip, energy)
         return CycleTractions(pressure, shear, slip, unknown)
 
     def _sliding_shear(self, pressure: Array, slip: Array, energy: float) -> Array:
-        """µp against ``slip`` ``(2, nx, ny)``; 0 where nothing slips."""
-        size = np.hypot(*slip)
+        """µp against ``slip`` ``(..., 2, nx, ny)``; 0 where nothing slips."""
+        size = np.hypot(slip[..., 0, :, :], slip[..., 1, :, :])[..., None, :, :]
         opposing = np.divide(-slip, size, out=np.zeros_like(slip), where=size > 0.0)
-        shear: Array = self.settings.friction(energy) * pressure * opposing
+        shear: Array = self.settings.friction(energy) * pressure[..., None, :, :] * opposing
         return shear
 
 

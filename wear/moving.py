@@ -26,6 +26,7 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+from numpy.typing import ArrayLike
 from scipy.ndimage import convolve, correlate
 
 from sa_solver.errors import InputError
@@ -58,8 +59,8 @@ class Passage:
     """
 
     grid: Grid
-    before: tuple[float, float]
-    after: tuple[float, float]
+    before: ArrayLike
+    after: ArrayLike
 
     @cached_property
     def _weights(self) -> Array:
@@ -177,9 +178,7 @@ def passages(grid: Grid, ends: Array) -> tuple[Passage, ...] | None:
     """The passages between offsets ``ends`` ``(t, 2, 2)`` [mm]; None where there are none."""
     if not len(ends):
         return None
-    return tuple(
-        Passage(grid, (float(x), float(y)), (float(u), float(v))) for (x, y), (u, v) in ends
-    )
+    return tuple(Passage(grid, before, after) for before, after in ends)
 
 
 def stroke_of(path: Array) -> tuple[float, Array]:

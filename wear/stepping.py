@@ -32,7 +32,7 @@ from sa_solver.errors import ConvergenceError
 from sa_solver.influence import Z
 from sa_solver.normal import NormalContact, NormalStart, NormalState
 from sa_solver.transform import SpectralFilter
-from sa_solver.types import Array, LoadHistory
+from sa_solver.types import Array, Grid, LoadHistory
 from wear.laws import SlidingConditions, WearLaw
 from wear.moving import Passage, TravelError
 from wear.surfaces import Surfaces
@@ -113,28 +113,24 @@ class WearState(WornState):
     starts: Starts = field(default_factory=dict)
 
 
+@dataclass(frozen=True, eq=False)
 class WearingContact:
-    """One interface under a cycle; ``laws`` are those of body 1 and body 2."""
+    """One interface under a ``sliding`` cycle; ``laws`` are those of body 1 and body 2."""
 
-    def __init__(
-        self,
-        contact: NormalContact,
-        laws: tuple[WearLaw, WearLaw],
-        friction: float,
-        cycle: SlidingCycle,
-        tolerance: float,
-    ) -> None:
-        self.contact, self.grid = contact, contact.grid
-        self._laws = laws
-        self._friction = friction
-        self._cycle = cycle
-        self._tolerance = tolerance
+    contact: NormalContact
+    laws: tuple[WearLaw, WearLaw]
+    friction: float
+    sliding: SlidingCycle
+    tolerance: float
+
+    @property
+    def grid(self) -> Grid:
+        return self.contact.grid
 
     def midway(self, other: WearingContact) -> WearingContact:
         """The contact under the mean of both cycles."""
-        cycle = self._cycle.midway(other._cycle)
-        friction = 0.5 * (self._friction + other._friction)
-        return WearingContact(self.contact, self._laws, friction, cycle, self._tolerance)
+        friction = 0.5 * (self.friction + other.friction)
+        return replace(self, friction=friction, sliding=self.sliding.midway(other.sliding))
 
     @cached_property
     def dissipating(self) -> list[int]:
@@ -143,8 +139,8 @@ class WearingContact:
         Over thousands of cycles it does not matter where a cycle begins. A step that ends with the
         widest contact leaves no unworn rim for the next one.
         """
-        loads = self._cycle.loads
-        works = (loads.P > 0.0) & (loads.share > 0.0) & self._cycle.slip.any(axis=(1, 2))
+        loads = self.sliding.loads
+        works = (loads.P > 0.0) & (loads.share > 0.0) & self.sliding.slip.any(axis=(1, 2))
         count, heaviest = len(loads), int(np.argmax(loads.P))
         order = [(heaviest + 1 + k) % count for k in range(count)]
         return [t for t in order if works[t]]
@@ -156,7 +152,7 @@ class WearingContact:
         In mm/MPa and mean cycle. Laws that change with energy take that of the state and that
         expected after so many cycles at its pressures.
         """
-        surfaces, (law_1, law_2) = state.surfaces, self._laws
+        surfaces, (law_1, law_2) = state.surfaces, self.laws
         work_1, work_2 = (cycles * work for work in self._work(state.starts))
         energies = state.energy, state.energy + float(work_2.sum()) * self.grid.cell_area
         ends_1 = surfaces.work_1, surfaces.work_1 + work_1
@@ -170,9 +166,9 @@ class WearingContact:
         self, law: WearLaw, work: tuple[Array, Array], energies: tuple[float, float]
     ) -> Array:
         """Depth per pressure of one body: each mission of a mix for itself, by its share."""
-        loads, slip = self._cycle.loads, self._cycle.slip
+        loads, slip = self.sliding.loads, self.sliding.slip
         parts = [
-            law.depth_per_pressure(SlidingConditions(slip[mission], self._friction, work, energies))
+            law.depth_per_pressure(SlidingConditions(slip[mission], self.friction, work, energies))
             for mission in loads.missions
         ]
         depth: Array = loads.share[:, None, None] * np.concatenate(parts)
@@ -229,7 +225,7 @@ class WearingContact:
 
     def _result(self, state: WearState, states: States) -> CycleResult:
         wear_1, wear_2 = self.depth_per_pressure(state)
-        energy = np.zeros(len(self._cycle.loads))
+        energy = np.zeros(len(self.sliding.loads))
         worn = Surfaces.unworn(state.surfaces.initial_gap)
         for t, solved in states.items():
             worn = self._worn(worn, t, solved.pressure, (wear_1, wear_2))
@@ -274,13 +270,13 @@ class WearingContact:
         compliance: Array | None = None,
     ) -> NormalState:
         """Contact state of one increment; ``compliance`` ``(nx, ny)`` [mm/MPa] is wear."""
-        loads = self._cycle.loads
+        loads = self.sliding.loads
         state = self.contact.solve(
-            self._cycle.gap(surfaces, increment),
+            self.sliding.gap(surfaces, increment),
             float(loads.P[increment]),
             float(loads.Mx[increment]),
             float(loads.My[increment]),
-            tolerance=self._tolerance,
+            tolerance=self.tolerance,
             start=start,
             compliance=compliance,
         )
@@ -304,7 +300,7 @@ class WearingContact:
 
     def _on_body_1(self, increment: int, field: Array) -> Array:
         """What the contact leaves behind on body 1's own surface, passing over it."""
-        passages = self._cycle.passages
+        passages = self.sliding.passages
         if passages is None:
             return field
         try:
@@ -314,8 +310,8 @@ class WearingContact:
 
     def _dissipated(self, increment: int, pressure: Array) -> Array:
         """Energy per area ``(nx, ny)`` [N/mm] of an increment of a mean cycle."""
-        share = float(self._cycle.loads.share[increment])
-        work: Array = share * self._friction * self._cycle.slip[increment] * pressure
+        share = float(self.sliding.loads.share[increment])
+        work: Array = share * self.friction * self.sliding.slip[increment] * pressure
         return work
 
     def _work(self, starts: Starts) -> tuple[Array, Array]:
@@ -335,7 +331,7 @@ class _March:
         self._contact, self._before, self._cycles = contact, state, cycles
         self._starts = dict(state.starts)
         self._per_pressure = contact.depth_per_pressure(state, cycles)
-        self._solves = self._convolutions = 0
+        self._spent = Spent(steps=1)
 
     def solve(self, increment: int, cycles: float) -> NormalState:
         """Contact whose wear over ``cycles`` is part of its gap."""
@@ -349,8 +345,7 @@ class _March:
     def wear(self, increment: int, state: NormalState, cycles: float) -> None:
         """Let an increment wear ``cycles`` times at the pressure of ``state``."""
         self._starts[increment] = state.start
-        self._solves += 1
-        self._convolutions += state.convolutions
+        self._spent += Spent(1, state.convolutions)
         self.surfaces = self._contact._worn(
             self.surfaces, increment, state.pressure * cycles, self._per_pressure
         )
@@ -374,4 +369,4 @@ class _March:
             volume_rate=float(sum(depth.sum() for depth in lost)) * area / self._cycles,
             starts=self._starts,
         )
-        return WearStep(state, self._cycles, Spent(self._solves, self._convolutions, 1))
+        return WearStep(state, self._cycles, self._spent)

@@ -340,9 +340,9 @@ def test_observers_see_every_state_once_and_in_order() -> None:
         assert jumping[2] == pytest.approx(cycles)
     assert len(seen) == 1 + 2 * (len(states) - 1)
     stages = [event[1] for event in diaries[0].events if event[0] == "stage"]
-    assert stages.count("wear") == stages.count("probe") == len(states) - 1
-    assert stages.count("loads") == states[-1].solutions - 1
-    assert stages[0] == "first cycle"
+    assert stages.count("wear") == stages.count("drift probe") == len(states) - 1
+    assert stages.count("structural friction") == states[-1].solutions - 1
+    assert stages[0] == "contact, first cycle"
 
 
 def test_an_observer_may_be_anything() -> None:

@@ -169,8 +169,7 @@ def test_a_stuck_cycle_wears_nothing(kind: str) -> None:
 
 
 def test_unsolvable_contact_is_a_failure_that_names_its_increment() -> None:
-    own = wearing()
-    own._tolerance = 1e-300
+    own = replace(wearing(), tolerance=1e-300)
     with pytest.raises(ContactFailure, match="increment 1: "):
         own.solve(Surfaces.unworn(BALL), 0, None)
 

@@ -19,6 +19,7 @@ from fe_models.mesh import Face
 from sa_solver.types import Array, Frame, LoadHistory
 from tests.workflow.commands import invoke
 from workflow import kinds
+from workflow.analyses import wear
 from workflow.analyses.wear import structures
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import TwoMaterials, Wear
@@ -249,6 +250,7 @@ SMALL = (
 def stamp(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Path:
     """The structure registered, and a new case of it."""
     monkeypatch.setattr(structures, "STRUCTURES", (*structures.STRUCTURES, STAMP))
+    monkeypatch.setitem(wear.ANALYSIS.cases, STAMP.name, STAMP.case)
     path = tmp_path / "stamp.yaml"
     done("new", "stamp", path)
     return path

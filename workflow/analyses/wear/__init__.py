@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.measures import COMPARISON
-from workflow.analyses.wear.structures import CasesOfStructures, structure_of
+from workflow.analyses.wear.structures import STRUCTURES, structure_of
 from workflow.shell.analysis import Analysis, Pictures, Run
-from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
     from workflow.shell.folder import OutputFolder
@@ -23,14 +22,6 @@ def _run(run: Run[WearCase]) -> None:
     from workflow.analyses.wear.run import run_wear
 
     run_wear(run)
-
-
-def _memory(case: WearCase) -> Memory:
-    return structure_of(case).memory(case, 0, 0)
-
-
-def _choose(case: WearCase) -> tuple[WearCase, dict[str, Any] | None]:
-    return structure_of(case).choose(case)
 
 
 def _resumable(folder: OutputFolder) -> bool:
@@ -55,12 +46,12 @@ def _pictures() -> Pictures:
 
 ANALYSIS = Analysis(
     name="wear",
-    cases=CasesOfStructures(),
+    cases={structure.name: structure.case for structure in STRUCTURES},
     run=_run,
     pictures=_pictures,
-    memory=_memory,
+    memory=lambda case: structure_of(case).memory(case, 0, 0),
     resumable=_resumable,
-    choose=_choose,
+    choose=lambda case: structure_of(case).choose(case),
     comparison=COMPARISON,
     write_loads=_write_loads,
 )

@@ -96,8 +96,7 @@ class InterfaceStress:
     """Stress under one contact; ``moments`` by the names in ``MOMENTS``."""
 
     name: str
-    body_names: tuple[str, str]
-    yield_stresses: tuple[float, float]
+    case: WearCase
     planes: Planes
     moments: dict[str, ContactMoment]
     convolutions: int
@@ -121,7 +120,7 @@ class InterfaceStress:
             "depths": Dataset(planes.depths, "mm", "of the section's points below the surface"),
         }
         attributes = {"axis": planes.settings.section, "at": planes.at, "components": COMPONENTS}
-        limits = dict(enumerate(self.yield_stresses, start=1))
+        limits = {n: self.case.material(n).yield_stress for n in BODIES}
         attributes |= {f"yield_stress_{n}": y for n, y in limits.items() if np.isfinite(y)}
         writer.put(group, axes, **attributes)
         for moment, contact in self.moments.items():
@@ -153,7 +152,7 @@ class InterfaceStress:
 
     def _of_bodies(self, largest: Any) -> dict[str, Any]:
         numbers = {}
-        for number, name in enumerate(self.body_names):
+        for number, name in enumerate(self.case.bodies):
             values = {m: largest(moment.bodies[number]) for m, moment in self.moments.items()}
             before, after = (values[moment]["value"] for moment in MOMENTS)
             numbers[name] = values | {"ratio": after / before if before else None}
@@ -212,14 +211,8 @@ def _interface_stress(
             for solver, material in zip(solvers, materials, strict=True)
         )
         moments[moment] = ContactMoment((body_1, body_2), np.flatnonzero(~known))
-    return InterfaceStress(
-        stage.name,
-        case.bodies,
-        (materials[0].yield_stress, materials[1].yield_stress),
-        planes,
-        moments,
-        sum(solver.count for solver in solvers),
-    )
+    convolutions = sum(solver.count for solver in solvers)
+    return InterfaceStress(stage.name, case, planes, moments, convolutions)
 
 
 def _section(stress: Array) -> dict[str, Dataset]:

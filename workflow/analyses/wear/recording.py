@@ -19,14 +19,6 @@ from workflow.analyses.wear.warnings import warn_of_growth, warn_of_instability
 from workflow.shell.analysis import Run
 from workflow.shell.store import write_arrays
 
-# What a run calls the parts of the loop.
-STAGES: dict[Stage, str] = {
-    "first cycle": "contact, first cycle",
-    "wear": "wear",
-    "probe": "drift probe",
-    "loads": "structural friction",
-}
-
 
 @dataclass(frozen=True)
 class RunLog(Observer):
@@ -36,7 +28,7 @@ class RunLog(Observer):
     stages: list[ContactStage]
 
     def stage(self, name: Stage) -> AbstractContextManager[None]:
-        return self.run.reporter.stage(STAGES[name])
+        return self.run.reporter.stage(name)
 
     def jumping(self, state: CoupledState, cycles: float) -> None:
         step = self.run.case.wear.step

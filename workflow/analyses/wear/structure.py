@@ -23,14 +23,20 @@ SPECTRA = 300
 DENSE_MATRICES = 6
 
 
-def memory(case: WearCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:
-    """Of one contact at a time, and of a structure condensed onto its interfaces.
+def memory(
+    case: WearCase,
+    nodes: int = 0,
+    interface_nodes: int = 0,
+    kept: int = SPECTRA,
+    remedy: str = "lower contact.grid",
+) -> Memory:
+    """Of the contacts, and of a structure condensed onto its interfaces.
 
-    The structure has so many nodes, and its interfaces so many, once they are known.
+    The structure has so many nodes, and its interfaces so many, once they are known; numbers
+    ``kept`` per cell of the grid are those of one contact at a time unless given.
     """
     dense = DENSE_MATRICES * (3 * interface_nodes) ** 2
-    contact = prod(case.contact.grid) * SPECTRA
-    return Memory(dense + contact, "lower contact.grid", factor_bytes(nodes))
+    return Memory(dense + prod(case.contact.grid) * kept, remedy, factor_bytes(nodes))
 
 
 @dataclass(frozen=True)

@@ -258,13 +258,12 @@ class StructureStage:
 
     def user_faces(self, number: int) -> tuple[UserFace, ...]:
         """The nodes of the faces of a mesh of the user's own."""
-        interface, faces = self.mesh.interfaces[number], []
-        for body in BODIES:
-            numbers = self.model.node_numbers(body)
-            if numbers is not None:
-                nodes = interface.nodes(body)
-                faces.append(UserFace(body, numbers[nodes], interface.frame))
-        return tuple(faces)
+        interface = self.mesh.interfaces[number]
+        return tuple(
+            UserFace(body, numbers[interface.nodes(body)], interface.frame)
+            for body in BODIES
+            if (numbers := self.model.node_numbers(body)) is not None
+        )
 
     def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
         """Resultants ``(interfaces, 6)`` at peak load reached in a single increment.

@@ -107,12 +107,11 @@ def uniformities(
     """Uniformity of every loaded contact of a structure in three dimensions, by interface."""
     if not isinstance(source, StructureStage) or source.line:
         return {}
-    results = {}
-    for stage, history, state in zip(stages, source.unworn(), states, strict=True):
-        result = uniformity(stage, history, state, source.peak)
-        if result is not None:
-            results[stage.name] = result
-    return results
+    return {
+        stage.name: result
+        for stage, history, state in zip(stages, source.unworn(), states, strict=True)
+        if (result := uniformity(stage, history, state, source.peak)) is not None
+    }
 
 
 def uniformity(

@@ -67,11 +67,9 @@ def read_nodes(file: str | Path) -> NodeTable:
     table.check({NODE: "1", **dict.fromkeys(AXES, "mm")})
     table.require(needed, ", ".join(needed))
     numbers = table.whole(NODE)
-    seen: set[int] = set()
-    for row, number in enumerate(numbers):
-        if number in seen:
-            raise table.refusal(row, NODE, "node given twice", "once")
-        seen.add(number)
+    _, first = np.unique(numbers, return_index=True)
+    for row in np.setdiff1d(np.arange(len(table)), first).tolist():
+        raise table.refusal(row, NODE, "node given twice", "once")
     columns = [
         table.column(axis, Quantity("mm")) if axis in table.names else np.zeros(len(table))
         for axis in AXES

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from math import prod
 from typing import TYPE_CHECKING, Any
 
-from workflow.analyses.wear.structure import DENSE_MATRICES, SPECTRA, WearStructure
+from workflow.analyses.wear.structure import SPECTRA, WearStructure, memory
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
-from workflow.shell.memory import Memory, factor_bytes
+from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
     from workflow.analyses.wear.contact_stage import ContactStage
@@ -28,16 +28,12 @@ def _source(case: DovetailCase) -> LoadSource:
 
 def _memory(case: DovetailCase, nodes: int = 0, interface_nodes: int = 0) -> Memory:
     """In space the nodes of both flanks are known beforehand, and all increments are kept."""
-    contact = prod(case.contact.grid) * SPECTRA
+    kept = SPECTRA
     if case.structure.dimension == 3:
         interface_nodes = 2 * prod(case.mesh.flank_nodes)
-        increments = len(case.load_path.shares) * case.load_path.increments
-        contact = 2 * prod(case.contact.grid) * increments * FIELDS
-    return Memory(
-        DENSE_MATRICES * (3 * interface_nodes) ** 2 + contact,
-        "lower mesh.flank_nodes, mesh.order or contact.grid, or raise mesh.size",
-        factor_bytes(nodes),
-    )
+        kept = 2 * len(case.load_path.shares) * case.load_path.increments * FIELDS
+    remedy = "lower mesh.flank_nodes, mesh.order or contact.grid, or raise mesh.size"
+    return memory(case, nodes, interface_nodes, kept, remedy)
 
 
 def _choose(case: DovetailCase) -> tuple[DovetailCase, dict[str, Any] | None]:

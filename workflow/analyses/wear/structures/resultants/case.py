@@ -124,26 +124,28 @@ class Resultants(Section):
 
     def size_of(self, name: str) -> tuple[float, float]:
         """Extent of a face along x and y [mm]; of a line contact a slice of 1 mm."""
-        size = getattr(self._interface(name), "size", None) or self.size
+        size = self._interface(name).size or self.size
         return size[0], 1.0 if self.line else size[1]
 
     def gap_of(self, name: str) -> GapShape | None:
         """Gap over a face, None where the file has it."""
-        return getattr(self._interface(name), "gap", None) or self.gap
+        return self._interface(name).gap or self.gap
 
     def frame_of(self, name: str) -> Frame | None:
         """Frame of a face where the case gives one."""
-        frame: FaceFrame | None = getattr(self._interface(name), "frame", None)
+        frame = self._interface(name).frame
         return None if frame is None else frame.frame()
 
     def nodes_of(self, name: str) -> dict[Literal[1, 2], str]:
         """Node tables of a face by body."""
-        nodes: NodeTables = getattr(self._interface(name), "nodes", None) or NodeTables()
+        nodes = self._interface(name).nodes or NodeTables()
         files: dict[Literal[1, 2], str | None] = {1: nodes.body_1, 2: nodes.body_2}
         return {body: file for body, file in files.items() if file is not None}
 
-    def _interface(self, name: str) -> ImportedInterface | None:
-        return next((interface for interface in self.interfaces if interface.name == name), None)
+    def _interface(self, name: str) -> ImportedInterface:
+        """What the case gives about an interface: nothing, unless it names that."""
+        named = {interface.name: interface for interface in self.interfaces}
+        return named.get(name) or ImportedInterface(name=name)
 
     def key_of(self, name: str, key: str) -> str:
         """The dotted path of an entry about a face: of the interface where that has it."""
