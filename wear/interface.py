@@ -335,7 +335,10 @@ class InterfaceContact:
             cycle = self._half_space_cycle(state, sliding)
             slip = np.stack([increment.slip for increment in cycle])
             sizes = np.hypot(slip[:, 0], slip[:, 1])
-            sliding = replace(sliding, slip=sizes, uplift=self._uplift(cycle))
+            sliding = replace(sliding, slip=sizes)
+            if not self.pair.similar:
+                lift = self._contact.half_space.normal_under_shear
+                sliding = replace(sliding, uplift=np.stack([lift(t.shear) for t in cycle]))
         contact = WearingContact(
             self._contact, settings.laws, friction, sliding, settings.tolerance
         )
@@ -351,13 +354,6 @@ class InterfaceContact:
         cycle = tuple(march_cycle(self.frictional(state.energy), gaps, state.loads, motion))
         self._spent += Spent(len(cycle), sum(increment.convolutions for increment in cycle))
         return cycle
-
-    def _uplift(self, cycle: tuple[ContactState, ...]) -> Array | None:
-        """Normal displacement under the shear of each increment; None for similar bodies."""
-        if self.pair.similar:
-            return None
-        half_space = self._contact.half_space
-        return np.stack([half_space.normal_under_shear(increment.shear) for increment in cycle])
 
     def _ends(self, slip: Array, starts: Starts, loads: LoadHistory) -> Array:
         """Where body 2 is before and after each increment, if its motion is to be followed."""

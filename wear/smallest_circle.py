@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,6 +23,9 @@ MAX_ROUNDS = 100
 
 SUPPORTS = ((0, 3, 3), (1, 3, 3), (2, 3, 3), (0, 1, 3), (0, 2, 3), (1, 2, 3))
 """What may hold the circle round three points and a fourth that was outside theirs."""
+
+
+_taken = partial(np.take_along_axis, axis=0)  # values (t, n) at places (k, n)
 
 
 def smallest_circle(x: Array, y: Array) -> Array:
@@ -82,9 +87,3 @@ def _circle(x: Array, y: Array) -> tuple[Array, Array, Array]:
     centre_x = np.where(flat, 0.5 * ax, (by * a - ay * b) / divisor)
     centre_y = np.where(flat, 0.5 * ay, (ax * b - bx * a) / divisor)
     return centre_x + x[2], centre_y + y[2], np.hypot(centre_x, centre_y)
-
-
-def _taken(values: Array, places: Places) -> Array:
-    """Values ``(t, n)`` at ``places`` ``(k, n)``."""
-    taken: Array = np.take_along_axis(values, places, axis=0)
-    return taken

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import h5py
 import numpy as np
@@ -105,17 +105,12 @@ def loop_path(loops: Loops, name: str, state: InterfaceState, peak: int) -> Loop
             f"loops: {name} carries nothing at peak load; allowed: loops.normal_force above 0"
         )
     force = P if loops.normal_force is None else loops.normal_force
-    arms = (Mx / P, My / P) if P > 0.0 else (0.0, 0.0)
+    share = force / P if P > 0.0 else 0.0
     amplitude = loops.amplitude if loops.force is None else loops.force
     assert amplitude is not None, "loops that are not wanted"
-    return LoopPath(
-        force,
-        amplitude,
-        "motion" if loops.force is None else "force",
-        loops.increments,
-        loops.axis,
-        (arms[0] * force, arms[1] * force),
-    )
+    drive: Literal["motion", "force"] = "motion" if loops.force is None else "force"
+    moments = share * Mx, share * My
+    return LoopPath(force, amplitude, drive, loops.increments, loops.axis, moments)
 
 
 def kept_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Array]:

@@ -89,9 +89,8 @@ def _marched(
 ) -> tuple[CoupledState, list[FirstContact]]:
     """The state at the end, from ``kept`` or from unworn surfaces; and the first contact."""
     case, reporter, settings = run.case, run.reporter, coupled_settings(run.case)
-    log = RunLog(run, contacts.stages)
     recorder = Recorder(run, settings, source.peak, contacts, resumed=kept is not None)
-    loop = CoupledWear(settings, source, contacts, (log, recorder))
+    loop = CoupledWear(settings, source, contacts, (RunLog(run, contacts.stages), recorder))
     state, first = loop.begin(unworn)
     warn_of_contact(case, source.peak, contacts.stages, state, first, reporter)
     end = kept or state
