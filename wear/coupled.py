@@ -17,7 +17,7 @@ from typing import Any, Literal, Protocol, TypeVar
 import numpy as np
 
 from sa_solver.errors import InputError
-from sa_solver.types import Array, Grid, resultant_change
+from sa_solver.types import Array, resultant_change
 from wear.interface import (
     FaceLoads,
     FirstContact,
@@ -154,10 +154,6 @@ class Contacts:
     def each(self, same: Same) -> list[Same]:
         """The same for every contact."""
         return [same] * len(self.contacts)
-
-    @property
-    def grids(self) -> list[Grid]:
-        return [contact.grid for contact in self.contacts]
 
     def begin(
         self, histories: Sequence[FaceLoads], cycles: float
@@ -356,7 +352,7 @@ class CoupledWear:
             return state, 0.0
         with self._stage("drift probe"):
             probe = self._probe(state.interfaces)
-        sizes = np.array([grid.size for grid in self.contacts.grids])
+        sizes = np.array([contact.grid.size for contact in self.contacts.contacts])
         drift = float(np.abs(resultant_change(probe, state.solved_resultants, sizes)).max())
         if settings.resultants == "drift" and drift <= settings.drift:
             return state, drift
@@ -380,7 +376,7 @@ class CoupledWear:
 
     @property
     def _areas(self) -> list[float]:
-        return [grid.cell_area for grid in self.contacts.grids]
+        return [contact.grid.cell_area for contact in self.contacts.contacts]
 
 
 def _depth(kinetics: Array) -> float:

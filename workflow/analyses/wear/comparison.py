@@ -34,7 +34,7 @@ def write_comparison(
     """Loads of the cycle, and its fields at the increments shown; of a mix, of the peak's cycle."""
     group = f"comparison/{name}"
     writer.put(f"{group}/load_history", load_columns(half_space_loads(cycle, structure)))
-    left = next(block.stop for block in structure.missions if peak < block.stop) - 1 - peak
+    left = next(mission.stop for mission in structure.missions if peak < mission.stop) - 1 - peak
     # A set: in a short cycle two of them may be the same.
     for increment in sorted({peak + round(share * left) for share in SHOWN}):
         state = cycle[increment]

@@ -36,13 +36,8 @@ STUCK_SHARE = 0.01
 
 LEFT_OUT = "increments without full knowledge of the shear, not in the life map"
 
-# What the summary has of each parameter's maps, the parameter itself first.
-SUMMARISED = {
-    "ruiz": ("cracking_parameter", "friction_parameter", "tension"),
-    "smith_watson_topper": ("smith_watson_topper",),
-    "findley": ("findley",),
-    "none": (),
-}
+# What the summary has of Ruiz's maps; of others the parameter's own.
+RUIZ = ("cracking_parameter", "friction_parameter", "tension")
 
 
 @dataclass(frozen=True)
@@ -144,7 +139,8 @@ class InterfaceStress:
         if not self.mapped:
             return numbers
         numbers["left_out"] = {m: len(contact.left_out) for m, contact in self.moments.items()}
-        for name in SUMMARISED[self.planes.settings.life.parameter]:
+        parameter = self.planes.settings.life.parameter
+        for name in RUIZ if parameter == "ruiz" else (parameter,):
             numbers[name] = self._of_bodies(
                 lambda body, name=name: self._largest(body.maps[name].values)
             )

@@ -78,6 +78,11 @@ class InterfaceOutcome:
         }
 
     @property
+    def worn_area(self) -> float:
+        """Area that has worn by the end [mm²]."""
+        return np.count_nonzero(self.state.surfaces.depth > 0.0) * self.stage.grid.cell_area
+
+    @property
     def slip_per_cycle(self) -> float:
         """Largest path of slip [mm] in an unworn cycle; of the half-space if loads have none."""
         slip = self.unworn.slip
@@ -277,7 +282,7 @@ def _summary(
             | (structure.interface_summary(number) if structure else {})
             | recorded[name].summary()
             | stress.get(name, {})
-            | {"worn_area": _worn_area(contact)}
+            | {"worn_area": contact.worn_area}
             for number, (name, contact) in enumerate(zip(recorded, contacts, strict=True))
         },
         "kinetics": {
@@ -289,11 +294,6 @@ def _summary(
             },
         },
     }
-
-
-def _worn_area(contact: InterfaceOutcome) -> float:
-    """Area that has worn by the end [mm²]."""
-    return np.count_nonzero(contact.state.surfaces.depth > 0.0) * contact.stage.grid.cell_area
 
 
 def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str, Any]:

@@ -34,7 +34,7 @@ def run_wear(run: Run[WearCase]) -> None:
     folder = run.folder
     say(run.choice, run.reporter)
     try:
-        write_output(_computed(run), run)
+        write_output(_compute(run), run)
     except (ContactFailure, NormalContactError, MethodFailed) as error:
         remedy = f"; the state is kept, see `fretscale resume {folder.root}`"
         raise MethodFailed(f"{error}{remedy if folder.checkpoint.exists() else ''}") from error
@@ -48,7 +48,7 @@ def run_wear(run: Run[WearCase]) -> None:
         raise UserError(f"{folder.case}: structure: {error}") from error
 
 
-def _computed(run: Run[WearCase]) -> Outcome:
+def _compute(run: Run[WearCase]) -> Outcome:
     """The run up to its end, without its files."""
     case, reporter, checkpoint_file = run.case, run.reporter, run.folder.checkpoint
     reporter.say(f"{'resume' if run.resume else 'run'}: {case.title}")
@@ -63,11 +63,11 @@ def _computed(run: Run[WearCase]) -> Outcome:
         with reporter.stage("structural friction"):
             unworn = source.unworn()
         if isinstance(source, StructureStage):
-            _look_at(case, source, reporter)
+            _check_structure(case, source, reporter)
         with reporter.stage("contact set-up"):
             stages = [ContactStage(case, face) for face in faces]
         contacts = ContactProcesses(stages, workers)
-        state, first = _marched(run, source, contacts, unworn, kept)
+        state, first = _march(run, source, contacts, unworn, kept)
         worn: Sequence[CycleTractions | None] = contacts.each(None)
         if case.stress.wanted:
             with reporter.stage("stress under the contacts"):
@@ -80,7 +80,7 @@ def _computed(run: Run[WearCase]) -> Outcome:
     return Outcome(case, source, state, interfaces)
 
 
-def _marched(
+def _march(
     run: Run[WearCase],
     source: LoadSource,
     contacts: ContactProcesses,
@@ -100,7 +100,7 @@ def _marched(
     return end, first
 
 
-def _look_at(case: WearCase, structure: StructureStage, reporter: Reporter) -> None:
+def _check_structure(case: WearCase, structure: StructureStage, reporter: Reporter) -> None:
     """Warnings about the structure, and the check of its nonlinearity."""
     warn_of_structure(structure, reporter)
     if case.friction.evolution and case.recoupling.resultants == "constant":

@@ -65,10 +65,8 @@ def warn_of_contact(
                 f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there"
             )
         structural, on_grid = interface.loads.mean_energy, float(result.energy.sum())
-        if (
-            abs(on_grid - structural) > ENERGIES_APART * max(on_grid, structural)
-            and not result.cycle
-        ):
+        apart = abs(on_grid - structural) > ENERGIES_APART * max(on_grid, structural)
+        if apart and not result.cycle:
             reporter.warn(
                 f"{stage.name}: pressure on the grid and slip of the structure dissipate "
                 f"{on_grid:.3g} N mm a cycle, the structure {structural:.3g}: its mesh is too "

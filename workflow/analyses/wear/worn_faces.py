@@ -39,7 +39,11 @@ def write_worn_faces(
             path, worn = folder.reserve(name, what), _worn_nodes(face, stage, state)
             displacement = worn_displacement(worn.depth, face.frame, face.body)
             write_worn_nodes(path, face.numbers, displacement)
-            _warn_of_share(worn, f"{stage.name}, body_{face.body}", reporter)
+            if worn.volume_share < FULL_SHARE:
+                reporter.warn(
+                    f"{stage.name}, body_{face.body}: the nodes carry {worn.volume_share:.1%} of "
+                    "the worn volume: the rest lies outside their face"
+                )
             summary.setdefault(stage.name, {})[f"body_{face.body}"] = {
                 "file": name,
                 "nodes": len(face.numbers),
@@ -56,11 +60,3 @@ def _worn_nodes(face: UserFace, stage: ContactStage, state: InterfaceState) -> N
         return nodal_depths(face.points, face.frame, stage.grid, depth)
     nodal = stage.depths_of_bodies(state)[face.body - 1]
     return NodalDepths.of(nodal, stage.face_of(face.body).facet_shares, stage.grid, depth)
-
-
-def _warn_of_share(nodal: NodalDepths, whose: str, reporter: Reporter) -> None:
-    if nodal.volume_share < FULL_SHARE:
-        reporter.warn(
-            f"{whose}: the nodes carry {nodal.volume_share:.1%} of the worn volume: the rest lies "
-            "outside their face"
-        )

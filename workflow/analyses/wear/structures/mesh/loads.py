@@ -17,11 +17,11 @@ Name = Annotated[str, Text()]
 Factor = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
 Coordinate = Annotated[float, Quantity("mm", at_least=-1e6, at_most=1e6)]
 Component = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
-Pull = Annotated[float, Quantity("N", at_least=-1e9, at_most=1e9)]
-Push = Annotated[float, Quantity("MPa", at_least=-1e5, at_most=1e5)]
-Travel = Annotated[float, Quantity("mm", at_least=-1e3, at_most=1e3)]
-Speed = Annotated[float, Quantity("rad/s", above=0.0, at_most=1e5)]
-Pace = Annotated[float, Quantity("mm/s^2", at_least=-1e12, at_most=1e12)]
+ForceComponent = Annotated[float, Quantity("N", at_least=-1e9, at_most=1e9)]
+PressureValue = Annotated[float, Quantity("MPa", at_least=-1e5, at_most=1e5)]
+DisplacementComponent = Annotated[float, Quantity("mm", at_least=-1e3, at_most=1e3)]
+AngularSpeed = Annotated[float, Quantity("rad/s", above=0.0, at_most=1e5)]
+AccelerationComponent = Annotated[float, Quantity("mm/s^2", at_least=-1e12, at_most=1e12)]
 
 
 KINDS = "pressure, force, displacement, rotation or acceleration"
@@ -41,7 +41,7 @@ class PressureLoad(_Load):
 
     kind: Literal["pressure"] = entry(KINDS, "pressure")
     group: Name = entry("boundary", "blade_top")
-    pressure: Push = entry("into the body [MPa]", "10 MPa")
+    pressure: PressureValue = entry("into the body [MPa]", "10 MPa")
 
     def described(self) -> fe.Pressure:
         """As the structure takes it."""
@@ -55,7 +55,7 @@ class ForceLoad(_Load):
 
     kind: Literal["force"] = entry(KINDS, "force")
     group: Name = entry("boundary", "blade_top")
-    force: tuple[Pull, Pull, Pull] = entry(
+    force: tuple[ForceComponent, ForceComponent, ForceComponent] = entry(
         "along the global axes; in the plane per length, N/mm [N]", [0.0, 0.0, "-1 kN"]
     )
 
@@ -74,8 +74,8 @@ class DisplacementLoad(_Load):
 
     kind: Literal["displacement"] = entry(KINDS, "displacement")
     group: Name = entry("boundary", "blade_top")
-    displacement: tuple[Travel, Travel, Travel] = entry(
-        "along the global axes [mm]", ["10 um", 0.0, 0.0]
+    displacement: tuple[DisplacementComponent, DisplacementComponent, DisplacementComponent] = (
+        entry("along the global axes [mm]", ["10 um", 0.0, 0.0])
     )
 
     @model_validator(mode="after")
@@ -101,7 +101,7 @@ class RotationLoad(_Load):
     through: tuple[Coordinate, Coordinate, Coordinate] = entry(
         "a point on the axis [mm]", [0.0, 0.0, 0.0]
     )
-    speed: Speed = entry("[rad/s]", "6000 rpm")
+    speed: AngularSpeed = entry("[rad/s]", "6000 rpm")
 
     @model_validator(mode="after")
     def _has_axis(self) -> RotationLoad:
@@ -120,8 +120,8 @@ class AccelerationLoad(_Load):
     """Acceleration of the frame of reference: both bodies are pulled against it."""
 
     kind: Literal["acceleration"] = entry(KINDS, "acceleration")
-    acceleration: tuple[Pace, Pace, Pace] = entry(
-        "along the global axes [mm/s^2]", [0.0, 0.0, "9.81 m/s^2"]
+    acceleration: tuple[AccelerationComponent, AccelerationComponent, AccelerationComponent] = (
+        entry("along the global axes [mm/s^2]", [0.0, 0.0, "9.81 m/s^2"])
     )
 
     def described(self) -> fe.Acceleration:
