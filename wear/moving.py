@@ -27,7 +27,6 @@ from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
-from scipy.ndimage import convolve, correlate
 
 from sa_solver.errors import InputError
 from sa_solver.types import Array, Grid, Mask
@@ -86,7 +85,7 @@ class Passage:
 
         Beyond the grid it is taken for 0: nothing wears there.
         """
-        return np.asarray(correlate(field, self._weights, mode="constant"))
+        return _weighted(field, self._weights)
 
     def deposit(self, field: Array) -> Array:
         """What lies on the grid, ``(nx, ny)``, spread over body 1: the adjoint of ``carry``.
@@ -94,7 +93,7 @@ class Passage:
         Raises TravelError where some of it would leave the grid.
         """
         self._check_room(field)
-        return np.asarray(convolve(field, self._weights, mode="constant"))
+        return _weighted(field, self._weights[::-1, ::-1])
 
     def _check_room(self, field: Array) -> None:
         occupied = np.nonzero(field)
@@ -110,6 +109,16 @@ class Passage:
                     f"{name}: make the grid (contact.size) longer by "
                     f"{2 * beyond * self.grid.pitch[axis]:.3g} mm or more"
                 )
+
+
+def _weighted(field: Array, weights: Array) -> Array:
+    """Sum of the ``field`` from as many cells away as each of ``weights`` is from their middle."""
+    nx, ny = field.shape
+    padded = np.pad(field, [(count // 2, count // 2) for count in weights.shape])
+    total = np.zeros_like(field)
+    for i, j in np.argwhere(weights):
+        total += weights[i, j] * padded[i : i + nx, j : j + ny]
+    return total
 
 
 def _crossings(start: Array, end: Array) -> Array:
