@@ -20,10 +20,7 @@ from workflow.shell.store import read_arrays, write_arrays
 # What the state has of all jumps.
 HISTORIES = ("cycles", "kinetics", "drift", "solved_resultants")
 # What the state of one interface has: parts of arrays, arrays, numbers.
-PARTS: dict[str, type[Surfaces] | type[LoadHistory]] = {
-    "surfaces": Surfaces,
-    "loads": LoadHistory,
-}
+PARTS: dict[str, Any] = {"surfaces": Surfaces, "loads": LoadHistory}
 ARRAYS = ("slip", "error", "ends")
 SCALARS = ("energy", "depth_rate", "volume_rate", "volume_error", "next_cycles")
 

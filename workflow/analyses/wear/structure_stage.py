@@ -250,11 +250,8 @@ class StructureStage:
     ) -> CycleSolution:
         nodal = self._nodal_friction(friction)
         joint, gap = self._joint_of(nodal), self._gap(depths)
-        return _converged(
-            self.structure.solve_cycle(
-                joint, mission.amplitudes, gap, nodal, after, mission.preload
-            )
-        )
+        amplitudes, preload = mission.amplitudes, mission.preload
+        return _converged(self.structure.solve_cycle(joint, amplitudes, gap, nodal, after, preload))
 
     def user_faces(self, number: int) -> tuple[UserFace, ...]:
         """The nodes of the faces of a mesh of the user's own."""
