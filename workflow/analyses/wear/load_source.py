@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from abc import abstractmethod
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal, Protocol
@@ -86,13 +86,13 @@ class LoadSource(coupled.LoadSource, Protocol):
         ...
 
 
-class UncoupledSource:
-    """Base of load sources without a structure of ours: nothing to solve, and nothing to wear."""
+class UncoupledSource(ABC):
+    """Base of load sources without a structure of ours: nothing to solve, no response to wear."""
 
     peak: int
 
-    def prepare(self) -> None:
-        """Nothing is costly."""
+    def prepare(self) -> None:  # noqa: B027 - nothing is costly here
+        """Nothing."""
 
     @abstractmethod
     def unworn(self) -> tuple[CycleLoads, ...]:
