@@ -7,51 +7,18 @@ import numpy as np
 from sa_solver.half_space import HalfSpace
 from sa_solver.history import ContactLoadPath
 from sa_solver.types import Array, ElasticPair, Grid, Material
-from workflow.analyses.contact.case import (
-    Body,
-    ContactCase,
-    Cylinder,
-    Ellipsoid,
-    FlatRounded,
-    Heights,
-    LineContactCase,
-    Sphere,
-)
+from workflow.analyses.contact.case import Body, ContactCase, Heights, LineContactCase
 from workflow.analyses.contact.load_table import LoadTable
 from workflow.case.input_files import read_heights
 
-Shape = Sphere | Ellipsoid | Cylinder | FlatRounded
-
 RIGID = Material(young=np.inf, poisson=0.0)
-
-
-def grid_of(case: ContactCase | LineContactCase) -> Grid:
-    """The grid, centred on the bodies."""
-    if isinstance(case, LineContactCase):
-        return Grid.strips(case.contact.size, case.contact.grid)
-    return Grid.covering(case.contact.size, case.contact.grid)
 
 
 def height_of(case: ContactCase | LineContactCase, grid: Grid) -> Array:
     """Gap before loading on ``grid``, ``(nx, ny)`` [mm]."""
     if isinstance(case.structure, Heights):
         return read_heights(case.structure.file)
-    return height_at(case.structure, grid.x, grid.y)
-
-
-def height_at(shape: Shape, x: Array, y: Array) -> Array:
-    """Gap before loading [mm] at ``x`` and ``y``, which broadcast against each other."""
-    match shape:
-        case Sphere():
-            height = (x**2 + y**2) / (2.0 * shape.radius)
-        case Ellipsoid():
-            height = x**2 / (2.0 * shape.radius_x) + y**2 / (2.0 * shape.radius_y)
-        case Cylinder():
-            height = x**2 / (2.0 * shape.radius)
-        case FlatRounded():
-            beyond = np.maximum(np.abs(x) - shape.half_width, 0.0)
-            height = beyond**2 / (2.0 * shape.edge_radius)
-    return height
+    return case.structure.height(grid.x, grid.y)
 
 
 def half_space_of(case: ContactCase | LineContactCase, grid: Grid) -> HalfSpace:

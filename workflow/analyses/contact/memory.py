@@ -13,8 +13,7 @@ STATE_FIELDS, SPECTRA = 6, 300
 
 def memory(case: ContactCase | LineContactCase) -> Memory:
     """Of the states of all increments."""
-    grid = case.contact.grid
-    cells = grid if isinstance(grid, int) else prod(grid)
+    cells = prod(case.contact.centred().shape)
     increments = len(case.load_path.table())
     return Memory(
         cells * (SPECTRA + STATE_FIELDS * increments),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from sa_solver.contact import ContactState
 from sa_solver.errors import ContactProblemError
 from sa_solver.history import History, HistoryError, march_history
-from workflow.analyses.contact.bodies import bodies_of, grid_of, half_space_of, height_of, path_of
+from workflow.analyses.contact.bodies import bodies_of, half_space_of, height_of, path_of
 from workflow.analyses.contact.case import ContactCase, LineContactCase
 from workflow.analyses.contact.results import (
     ContactOutcome,
@@ -41,7 +41,7 @@ def _march(
     case: ContactCase | LineContactCase, folder: OutputFolder, reporter: Reporter
 ) -> tuple[ContactOutcome, str]:
     """What the path has led to, and why it ended early if it did."""
-    grid, table = grid_of(case), case.load_path.table()
+    grid, table = case.contact.centred(), case.load_path.table()
     height, half_space = height_of(case, grid), half_space_of(case, grid)
     passed: dict[int, ContactState] = {}
     with reporter.increments(len(table)) as show, reporter.stage("contact"):

@@ -13,6 +13,7 @@ from pydantic import Field, model_validator
 
 from workflow.analyses.contact.case import (
     HEIGHTS,
+    Bodies,
     BodyMaterial,
     Cylinder,
     Ellipsoid,
@@ -44,20 +45,18 @@ FLAT = "flat"
 # --- bodies -------------------------------------------------------------------------------------
 
 
-class Flat(Section):
+class Flat(Bodies):
     """A flat rectangle with sharp edges on a step: the pad of a specimen."""
 
-    kind: Literal["bodies"] = entry("what the structure is", "bodies")
     shape: Literal["flat"] = entry("flat, or as in contact cases", "flat")
     half_width: Length = entry("of the rectangle, along x [mm]", "0.5 mm")
     half_length: Length = entry("of the rectangle, along y [mm]", "0.5 mm")
     step: Length = entry("from the rectangle back to the body [mm]", "0.1 mm", default=0.1)
 
 
-class FlatStrip(Section):
+class FlatStrip(Bodies):
     """A flat strip with sharp edges on a step: a line contact."""
 
-    kind: Literal["bodies"] = entry("what the structure is", "bodies")
     shape: Literal["flat"] = entry("flat, or as in contact cases", "flat")
     half_width: Length = entry("of the strip, along x [mm]", "0.5 mm")
     step: Length = entry("from the strip back to the body [mm]", "0.1 mm", default=0.1)

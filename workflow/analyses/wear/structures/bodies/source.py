@@ -10,8 +10,7 @@ import numpy as np
 from fe_models.mesh import Face
 from sa_solver.types import Array, Frame, Grid, LoadHistory
 from wear.interface import CycleLoads
-from workflow.analyses.contact.bodies import Shape, height_at
-from workflow.analyses.contact.case import Heights
+from workflow.analyses.contact.case import Heights, Smooth
 from workflow.analyses.wear.gaps import GapFunction, GridHeights
 from workflow.analyses.wear.load_source import ContactFace, UserFace
 from workflow.analyses.wear.structures.bodies.case import (
@@ -128,13 +127,13 @@ class BodiesSource:
         return Face(NAME, frame, corners, np.array([[0, 1, 2], [0, 2, 3]]))
 
 
-def gap_of(shape: Shape | Flat | FlatStrip | Heights, grid: Grid) -> GapFunction:
+def gap_of(shape: Smooth | Flat | FlatStrip | Heights, grid: Grid) -> GapFunction:
     """Gap [mm] of the unloaded bodies at x and y of the face that ``grid`` covers."""
     if isinstance(shape, Heights):
         return GridHeights(grid, read_heights(shape.file))
     if isinstance(shape, Flat | FlatStrip):
         return partial(step_around, shape)
-    return partial(height_at, shape)
+    return shape.height
 
 
 def step_around(shape: Flat | FlatStrip, x: Array, y: Array) -> Array:
