@@ -368,7 +368,7 @@ class TestCase:
             ("wear.cycles=1e5", "both given; allowed: either cycles or energy"),
             ("wear.energy=null", "neither given"),
             ("wear.energy=0", "--set wear.energy=0: 0: out of range"),
-            ("wear.cycle_block.share=150 %", "above 0 and at most 1"),
+            ("wear.step.fraction=150 %", "above 0 and at most 1"),
             ("wear.reported.0.normal_force=18 N", "not run; allowed: 87, 250 N"),
             ("contact.method=full", "unknown key; allowed: grid, tolerance"),
         ],
@@ -383,10 +383,10 @@ class TestCase:
         ("overrides", "message"),
         [
             (
-                ["wear.cycle_block.length=1e7"],
-                "wear.cycle_block.length: steps of 1e+07 cycles",
+                ["wear.step.cycles=1e7"],
+                "wear.step.cycles: steps of 1e+07 cycles",
             ),
-            (["wear.cycle_block.length=1"], "more than 20000 cycle blocks"),
+            (["wear.step.cycles=1"], "more than 20000 cycle blocks"),
             (["load_path.stroke=1e-9 mm"], "nothing slides at 87 N"),
             (["load_path.normal_forces.1=1e-6 N"], "a single node of the pad touches"),
         ],

@@ -129,12 +129,12 @@ class PadGrid(Section):
     )
 
 
-class CycleBlock(Section):
-    """Cycles of constant geometry."""
+class ExplicitStep(Section):
+    """A block of cycles of constant geometry."""
 
-    share: Ratio = entry("of the longest that is stable [1]", 0.5, default=0.5)
-    length: Cycles | None = entry(
-        "of every block instead, refused where it would be unstable [1]", 1000, default=None
+    fraction: Ratio = entry("of the stability limit [1]", 0.5, default=0.5)
+    cycles: Cycles | None = entry(
+        "of every step instead, refused where it would be unstable [1]", 1000, default=None
     )
 
 
@@ -146,29 +146,29 @@ class Reported(Section):
     cycles: Cycles = entry("when it has become steady [1]", 2.5e6)
 
 
-class CycleBlockWear(TwoBodies[BodyWear], Laws):
+class SpecimensWear(TwoBodies[BodyWear], Laws):
     """Wear of both specimens, node by node; ends by exactly one of cycles, energy."""
 
     cycles: Cycles | None = entry("under each normal force [1]", 3e5, default=None)
     energy: Energy | None = entry("dissipated under each normal force [N*mm]", "1 kJ", default=None)
-    cycle_block: CycleBlock = entry("cycles of constant geometry", default=CycleBlock())
+    step: ExplicitStep = entry("cycles of constant geometry", default=ExplicitStep())
     reported: tuple[Reported, ...] = entry("cycles that a source reports", default=())
 
     @model_validator(mode="after")
-    def _ends_once(self) -> CycleBlockWear:
+    def _ends_once(self) -> SpecimensWear:
         if (self.cycles is None) == (self.energy is None):
             given = "neither" if self.cycles is None else "both"
             raise disagreement(f"{given} given; allowed: either cycles or energy", "energy")
         return self
 
     @model_validator(mode="after")
-    def _something_wears(self) -> CycleBlockWear:
+    def _something_wears(self) -> SpecimensWear:
         if self.body_1.coefficient == self.body_2.coefficient == 0.0:
             raise disagreement("0 for both bodies; allowed: one of them at most", "body_1")
         return self
 
     @model_validator(mode="after")
-    def _reported_are_of_energy(self) -> CycleBlockWear:
+    def _reported_are_of_energy(self) -> SpecimensWear:
         """Cycles that a source reports give coefficients if shapes scale with these."""
         for body in (self.body_1, self.body_2):
             if self.reported and (isinstance(body, WornByArchard) or body.evolution is not None):
@@ -192,11 +192,12 @@ class SpecimensCase(Case):
     mesh: SpecimenMesh = entry("finite elements of each specimen", default=SpecimenMesh())
     reduction: Reduction = entry("of each specimen", default=Reduction())
     contact: PadGrid = entry("half-space beside the specimens", default=PadGrid())
-    wear: CycleBlockWear = entry("law, length of the run and of its cycle blocks")
+    wear: SpecimensWear = entry("law, length of the run and of its cycle blocks")
 
-    def material(self, number: int) -> ElasticMaterial:
-        """Material of body ``number``, 1 or 2."""
-        return (self.materials.body_1, self.materials.body_2)[number - 1].elastic()
+    @property
+    def elastic(self) -> tuple[ElasticMaterial, ElasticMaterial]:
+        """Materials of body 1 and body 2."""
+        return self.materials.body_1.elastic(), self.materials.body_2.elastic()
 
     @property
     def laws(self) -> tuple[WearLaw, WearLaw]:
@@ -214,8 +215,8 @@ class SpecimensCase(Case):
         forces = ", ".join(f"{force:g}" for force in self.load_path.normal_forces)
         nodes = (self.mesh.pad_elements + 1) ** 2
         end = f"{wear.energy:g} N mm" if wear.cycles is None else f"{wear.cycles:g} cycles"
-        share, length = wear.cycle_block.share, wear.cycle_block.length
-        block = f"{share:.0%} of their limit" if length is None else f"{length:g} cycles"
+        fraction, cycles = wear.step.fraction, wear.step.cycles
+        block = f"{fraction:.0%} of their limit" if cycles is None else f"{cycles:g} cycles"
         cells = " x ".join(map(str, self.contact.grid))
         return [
             ("structure", f"specimens, pad {pad:g} x {pad:g} mm of {nodes} nodes, {shape}"),

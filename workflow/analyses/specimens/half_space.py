@@ -90,7 +90,7 @@ class NodeGrid:
     def of(cls, face: Face) -> NodeGrid:
         """Rows and columns of a face that is meshed in squares."""
         digits = np.round(face.coordinates / SAME_PLACE).astype(np.int64)
-        (x, row), (y, column) = (np.unique(own, return_inverse=True) for own in digits.T)
+        (x, row), (y, column) = (np.unique(column, return_inverse=True) for column in digits.T)
         order = np.full((len(x), len(y)), -1)
         order[row, column] = np.arange(len(face))
         assert order.min() >= 0, "the pad is not meshed in rows and columns"

@@ -42,7 +42,7 @@ class SpecimensModel:
     def __init__(self, case: SpecimensCase, target_distance: float | None = None) -> None:
         self._case, self._target = case, target_distance
         self.specimen: Specimen = case.geometry()
-        self._materials = case.material(1), case.material(2)
+        self._materials = case.elastic
         self.from_cache = False
 
     @cached_property
@@ -67,15 +67,15 @@ class SpecimensModel:
         modes = case.reduction.modes
         further = () if self._target is None else (self._target,)
         key = content_key("specimens", flat, self._materials, case.mesh, modes, *further)
-        found = load_arrays(f"specimens-{key}")
-        self.from_cache = found is not None
-        if found is None:
-            found = self._reduce(modes)
-            save_arrays(f"specimens-{key}", found)
+        arrays = load_arrays(f"specimens-{key}")
+        self.from_cache = arrays is not None
+        if arrays is None:
+            arrays = self._reduce(modes)
+            save_arrays(f"specimens-{key}", arrays)
         return SpecimenReduction(
-            (_model(found, 1), _model(found, 2)),
-            (found["full/1"], found["full/2"]),
-            (found["reduced/1"], found["reduced/2"]),
+            (_model(arrays, 1), _model(arrays, 2)),
+            (arrays["full/1"], arrays["full/2"]),
+            (arrays["reduced/1"], arrays["reduced/2"]),
         )
 
     def node_count(self) -> int:
@@ -109,8 +109,7 @@ class SpecimensModel:
     def _full_frequencies(self, number: int, known: dict[str, Any]) -> Array:
         """Those of the finite elements; a specimen of the other's material has the other's."""
         if number == 2 and self._materials[0] == self._materials[1]:
-            alike: Array = known["full/1"]
-            return alike
+            return known["full/1"]
         body = (self.mesh.body_1, self.mesh.body_2)[number - 1]
         pad = self.face.nodes(number)
         material, order = self._materials[number - 1], self._case.mesh.order
@@ -125,6 +124,6 @@ def _lowest(stiffness: Any, mass: Any) -> Array:
 
 def _model(arrays: dict[str, Any], number: int) -> ReducedModel:
     prefix = f"{number}/"
-    own = {name.removeprefix(prefix): v for name, v in arrays.items() if name.startswith(prefix)}
-    names = tuple(name if isinstance(name, str) else name.decode() for name in own["names"])
-    return ReducedModel(**own | {"kept": np.asarray(own["kept"]), "names": names})
+    parts = {name.removeprefix(prefix): v for name, v in arrays.items() if name.startswith(prefix)}
+    names = tuple(name if isinstance(name, str) else name.decode() for name in parts["names"])
+    return ReducedModel(**parts | {"kept": np.asarray(parts["kept"]), "names": names})

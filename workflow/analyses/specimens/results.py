@@ -172,15 +172,15 @@ def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
         "explanation": explanation(outcome),
         "loads": loads,
         "collapse": collapse(loads),
-        "reported": [reported_summary(own, loads, coefficients) for own in case.wear.reported],
+        "reported": [reported_summary(entry, loads, coefficients) for entry in case.wear.reported],
     }
 
 
 def _lines(summary: dict[str, Any]) -> Iterator[str]:
     """The end of the run in a few lines."""
-    own = summary["frequencies"]["body_1"]
+    body = summary["frequencies"]["body_1"]
     for name in ("full", "reduced"):
-        values = ", ".join(f"{value:.0f}" for value in own[name])
+        values = ", ".join(f"{value:.0f}" for value in body[name])
         yield f"  free frequencies, {name}: {values} Hz"
     for load in summary["loads"]:
         first, last, steady = load["unworn"], load["worn"], load["steady"]["stiffness"]

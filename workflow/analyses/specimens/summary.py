@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from fe_models.reduced_contact import ReducedPair
 from sa_solver.types import Array
-from workflow.analyses.specimens.half_space import BulkCompliance
-
-if TYPE_CHECKING:
-    from fe_models.reduced_contact import ReducedPair
-    from workflow.analyses.specimens.case import Reported
-    from workflow.analyses.specimens.half_space import HalfSpaceState
-    from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
-    from workflow.analyses.specimens.wear import BlockState
+from workflow.analyses.specimens.case import Reported
+from workflow.analyses.specimens.half_space import BulkCompliance, HalfSpaceState
+from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
+from workflow.analyses.specimens.wear import BlockState
 
 # Steady is what stays within this of its last value: of the stiffness, and of the mean pressure.
 STEADY = 0.02
@@ -27,12 +24,10 @@ LATE = 0.8
 def frequencies(outcome: SpecimensOutcome) -> dict[str, Any]:
     """Natural frequencies of each free specimen [Hz]."""
     reduction = outcome.model.reduction
+    pairs = zip(reduction.full, reduction.reduced, strict=True)
     return {
-        f"body_{number + 1}": {
-            "full": reduction.full[number].tolist(),
-            "reduced": reduction.reduced[number].tolist(),
-        }
-        for number in (0, 1)
+        f"body_{number}": {"full": full.tolist(), "reduced": reduced.tolist()}
+        for number, (full, reduced) in enumerate(pairs, start=1)
     }
 
 
@@ -111,7 +106,9 @@ def _state_summary(outcome: SpecimensOutcome, load: LoadOutcome, place: int) -> 
     contact, areas = state.block.contact, outcome.pair.areas
     normal = contact.normal
     return {
-        **_stiffness(state),
+        # With all that touches stuck, and as the slope of the loop.
+        "stick_stiffness": contact.stick_stiffness,
+        "secant_stiffness": state.curve.secant_stiffness(SLOPE_SHARE),
         "area": normal.area,
         "approach": normal.approach,
         "peak_pressure": float(normal.pressure.max()),
@@ -120,14 +117,6 @@ def _state_summary(outcome: SpecimensOutcome, load: LoadOutcome, place: int) -> 
         "friction": contact.friction,
         "energy_per_cycle": contact.energy,
         "half_space": _beside(outcome, state, beside, load.force),
-    }
-
-
-def _stiffness(state: KeptState) -> dict[str, float]:
-    """With all that touches stuck, and as the slope of the loop."""
-    return {
-        "stick_stiffness": state.block.contact.stick_stiffness,
-        "secant_stiffness": state.curve.secant_stiffness(SLOPE_SHARE),
     }
 
 
@@ -177,7 +166,7 @@ def steady_states(pair: ReducedPair, blocks: tuple[BlockState, ...]) -> dict[str
     """First states from which stiffness and evenness of pressure stay within ``STEADY``."""
     stiffness = np.array([state.contact.stick_stiffness for state in blocks])
     pressures = (state.contact.normal.pressure for state in blocks)
-    deviation = np.array([pressure_deviation(pair.areas, own) for own in pressures])
+    deviation = np.array([pressure_deviation(pair.areas, pressure) for pressure in pressures])
     return {
         "stiffness": blocks[_settled(stiffness / stiffness[-1])],
         "pressure": blocks[_settled(deviation)],
@@ -196,12 +185,10 @@ def collapse(loads: list[dict[str, Any]]) -> dict[str, float] | None:
     None if it is so from the start under some force.
     """
     steady = [load["steady"]["stiffness"] for load in loads]
-    if min(own["energy"] for own in steady) == 0.0:
+    if min(state["energy"] for state in steady) == 0.0:
         return None
-    return {
-        key: max(own[key] for own in steady) / min(own[key] for own in steady)
-        for key in ("cycles", "energy")
-    }
+    values = {key: [state[key] for state in steady] for key in ("cycles", "energy")}
+    return {key: max(those) / min(those) for key, those in values.items()}
 
 
 def reported_summary(
@@ -211,8 +198,8 @@ def reported_summary(
 
     Shape and energy depend on cycles times coefficients alone. None if it is steady unworn.
     """
-    (own,) = [load for load in loads if load["normal_force"] == reported.normal_force]
-    cycles = own["steady"][reported.steady]["cycles"]
+    (load,) = [load for load in loads if load["normal_force"] == reported.normal_force]
+    cycles = load["steady"][reported.steady]["cycles"]
     ratio = cycles / reported.cycles
     return {
         "normal_force": reported.normal_force,
@@ -226,4 +213,4 @@ def reported_summary(
 def late(load: dict[str, Any]) -> bool:
     """Whether something becomes steady so late that a longer run might show it steady later."""
     end = load["cycles"]
-    return any(own["cycles"] > LATE * end > 0.0 for own in load["steady"].values())
+    return any(state["cycles"] > LATE * end > 0.0 for state in load["steady"].values())

@@ -75,10 +75,10 @@ class FrettedPair:
     def cycle_at(self, state: NodalState) -> PairCycle:
         """The cycle on the surfaces of ``state``, begun from the contact that wore to it."""
         if self._last is None or self._last[0].surfaces is not state.surfaces:
-            own = self._conditions
+            conditions = self._conditions
             guess = None if state.start is None else np.asarray(state.start)
-            contact = self._pair.fretting_cycle(state.surfaces.gap, own, guess)
-            self._last = state, PairCycle(self._pair, contact, own.friction)
+            contact = self._pair.fretting_cycle(state.surfaces.gap, conditions, guess)
+            self._last = state, PairCycle(self._pair, contact, conditions.friction)
         return self._last[1]
 
     def contact_at(self, state: NodalState) -> NodalContact:
