@@ -2,7 +2,7 @@
 
 from workflow.analyses.contact.case import ContactCase, LineContactCase
 from workflow.analyses.contact.memory import memory
-from workflow.shell.analysis import Analysis, Comparison, Pictures, Run, Summary
+from workflow.shell.analysis import Analysis, Comparison, Pictures, Run, Summary, expected
 
 __all__ = ["ANALYSIS"]
 
@@ -22,7 +22,7 @@ AT_THE_END = (
 
 
 def _quantities(case: ContactCase | LineContactCase, summary: Summary) -> list[str]:
-    return [own.quantity for own in case.expect if own.value] or list(AT_THE_END)
+    return expected(case, summary) or list(AT_THE_END)
 
 
 def _pictures() -> Pictures:

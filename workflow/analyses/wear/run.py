@@ -107,7 +107,7 @@ class WearRun:
         end = kept or state
         with reporter.jumps(settings.cycles, float(end.cycles[-1])) as bar:
             for end in loop.march(end):  # noqa: B020 - each from the one before
-                bar.update(float(end.cycles[-1]), end.jump)
+                bar(float(end.cycles[-1]), end.jump)
         return end, first
 
     def _look_at(self, structure: StructureStage) -> None:
