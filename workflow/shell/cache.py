@@ -44,10 +44,9 @@ def content_key(*parts: object) -> str:
 
 def load_joint(key: str) -> JointResolvent | None:
     """The condensed joint of that key, or None."""
-    found = _load(f"joint-{key}")
-    if found is None:
+    if (kept := _load(f"joint-{key}")) is None:
         return None
-    arrays, attributes = found
+    arrays, attributes = kept
     return JointResolvent(
         inverse=_inverse(arrays),
         rho=float(attributes["rho"]),
@@ -78,10 +77,9 @@ def _inverse(arrays: dict[str, Any]) -> Array | SplitMatrix:
 
 def load_cycle(key: str, structure: Structure, friction: float) -> CycleSolution | None:
     """The solved cycle of that key on its structure, or None."""
-    found = _load(f"cycle-{key}")
-    if found is None:
+    if (kept := _load(f"cycle-{key}")) is None:
         return None
-    arrays, attributes = found
+    arrays, attributes = kept
     fields = {name: arrays[name] for name in FIELDS}
     return CycleSolution(
         histories=structure.histories(**fields, friction=friction),
@@ -106,8 +104,8 @@ def save_cycle(key: str, cycle: CycleSolution) -> None:
 
 def load_arrays(name: str) -> dict[str, Any] | None:
     """Named arrays kept under that name, or None."""
-    found = _load(name)
-    return None if found is None else found[0]
+    kept = _load(name)
+    return None if kept is None else kept[0]
 
 
 def save_arrays(name: str, arrays: dict[str, Array]) -> None:
@@ -118,11 +116,10 @@ def save_arrays(name: str, arrays: dict[str, Array]) -> None:
 def _load(name: str) -> tuple[dict[str, Any], dict[str, Any]] | None:
     path = cache_folder() / f"{name}.h5"
     try:
-        found = read_arrays(path)
         os.utime(path)
+        return read_arrays(path)
     except OSError:
         return None
-    return found
 
 
 def _save(name: str, arrays: dict[str, Array], attributes: dict[str, Any]) -> None:

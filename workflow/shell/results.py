@@ -38,7 +38,7 @@ class ResultsWriter:
             )
             written.attrs["unit"] = unit_in(self._line, dataset.unit)
             written.attrs["description"] = dataset.description
-        place.attrs.update({name: own for name, own in attributes.items() if own is not None})
+        place.attrs.update({name: value for name, value in attributes.items() if value is not None})
 
     def put_grid(self, group: str, grid: Grid, frame: Frame | None = None) -> None:
         """A grid and, where it is known, its place in space."""

@@ -1,4 +1,4 @@
-"""``summary.json``: what every run says of itself around what its analysis has found."""
+"""``summary.json``: what every run says of itself around the numbers of its analysis."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from workflow.shell.analysis import Run
 from workflow.shell.versions import versions
 
 
-def finish(run: Run[Any], found: Mapping[str, Any], lines: Iterable[str]) -> None:
+def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> None:
     """Write the summary of a run, which marks it as finished, and say how it ended.
 
-    ``found`` is what the analysis tells, ``lines`` the same in short.
+    ``numbers`` are what the analysis tells, ``lines`` the same in short.
     """
     reporter = run.reporter
     seconds = {name: round(value, 2) for name, value in reporter.seconds.items()}
@@ -20,7 +20,7 @@ def finish(run: Run[Any], found: Mapping[str, Any], lines: Iterable[str]) -> Non
         {
             "title": run.case.title,
             "assumed": list(run.case.assumed),
-            **found,
+            **numbers,
             **({"fidelity": run.choice} if run.choice else {}),
             "warnings": reporter.warnings,
             "seconds": seconds,
