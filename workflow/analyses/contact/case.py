@@ -346,7 +346,15 @@ class BodiesCase(Case):
 
     @model_validator(mode="after")
     def _can_run(self) -> Self:
-        _require_elastic(self.materials, self.load_path.table())
+        loads = self.load_path.table().columns
+        for number in (1, 2):
+            body, key = f"body_{number}", f"bulk_stress_{number}"
+            if key in loads and getattr(self.materials, body) == "rigid":
+                raise disagreement(
+                    f"a rigid body carries no bulk stress, but load_path has {key}; "
+                    "allowed: an elastic body",
+                    f"materials.{body}",
+                )
         if isinstance(self.structure, Heights):
             require_shape(self.structure.file, self.contact.centred().shape)
         return self
@@ -405,18 +413,6 @@ def touches_along_a_line(source: Source, ambiguous: tuple[str, ...]) -> bool:
     shape = word_at(source, ("structure", "shape"), (*AREA_SHAPES, *LINE_SHAPES, *ambiguous))
     one_size = isinstance(source.at(("contact", "size")), str | int | float)
     return one_size if shape in ambiguous else shape in LINE_SHAPES
-
-
-def _require_elastic(materials: BodyMaterials, loads: LoadTable) -> None:
-    """Raise if a rigid body is to carry bulk stress."""
-    for number in (1, 2):
-        body, key = f"body_{number}", f"bulk_stress_{number}"
-        if key in loads.columns and getattr(materials, body) == "rigid":
-            raise disagreement(
-                f"a rigid body carries no bulk stress, but load_path has {key}; "
-                "allowed: an elastic body",
-                f"materials.{body}",
-            )
 
 
 def require_shape(file: str, grid: tuple[int, int]) -> None:

@@ -6,6 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
+from scipy.integrate import trapezoid
 
 from sa_solver.contact import ContactState
 from sa_solver.history import History
@@ -132,14 +133,9 @@ def loop_summary(
     if history.method == "full":
         stretching = [np.sum(state.traction[0] * grid.x) * grid.cell_area for state in states]
         strains = strain[history.indices[first : last + 1]]
-        work = sum(map(_area, forces.T, motions.T)) - _area(np.array(stretching), strains)
+        work = trapezoid(forces, motions, axis=0).sum() - trapezoid(stretching, strains)
         loop["area"] = float(work)
     return loop
-
-
-def _area(force: Array, motion: Array) -> float:
-    """∫ F dδ by trapezoids."""
-    return float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(motion)))
 
 
 def _last_cycle(friction: float, table: LoadTable, history: History) -> tuple[int, int] | None:

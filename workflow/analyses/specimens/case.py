@@ -2,12 +2,23 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from fe_models.geometry.specimens import Specimen
+from fe_models.mesh import MeshError
 from sa_solver.types import Material as ElasticMaterial
-from workflow.analyses.wear.case.sections import Cycles, Laws, Ratio, TwoBodies, TwoMaterials
+from wear.laws import WearLaw
+from workflow.analyses.wear.case.evolution import PositiveEnergy
+from workflow.analyses.wear.case.sections import (
+    Cycles,
+    Laws,
+    PressingForce,
+    Ratio,
+    TwoBodies,
+    TwoMaterials,
+)
 from workflow.analyses.wear.case.worn_bodies import BodyWear, WornByArchard
 from workflow.case.fields import Quantity, Whole
 from workflow.case.sections import (
@@ -23,17 +34,7 @@ from workflow.case.sections import (
     entry,
 )
 
-if TYPE_CHECKING:
-    from fe_models.geometry.specimens import Specimen
-    from wear.laws import WearLaw
-
 Depth = Annotated[float, Quantity("mm", at_least=0.0, at_most=1e4)]
-Pressing = Annotated[
-    float, Quantity("N", above=0.0, at_most=1e9, range_text="above 0 and at most 1e6 kN")
-]
-Energy = Annotated[
-    float, Quantity("N*mm", above=0.0, at_most=1e15, range_text="above 0 and at most 1e12 J")
-]
 
 
 class Form(Section):
@@ -61,8 +62,6 @@ class Specimens(Section):
 
     @model_validator(mode="after")
     def _can_be_drawn(self) -> Specimens:
-        from fe_models.mesh import MeshError
-
         try:
             self.geometry().check()
         except MeshError as error:
@@ -72,8 +71,6 @@ class Specimens(Section):
 
     def geometry(self, **settings: int) -> Specimen:
         """The specimen as the mesher takes it, with ``pad_elements`` if they are known."""
-        from fe_models.geometry.specimens import Specimen
-
         radii = None if self.form is None else (self.form.along, self.form.across)
         return Specimen(**self.model_dump(exclude={"kind", "form"}), radii=radii, **settings)
 
@@ -81,7 +78,7 @@ class Specimens(Section):
 class PressAndRub(Section):
     """One normal force after the other, each on unworn specimens."""
 
-    normal_forces: Annotated[tuple[Pressing, ...], Field(min_length=1)] = entry(
+    normal_forces: Annotated[tuple[PressingForce, ...], Field(min_length=1)] = entry(
         "constant while the pair is fretted [N]", ["17 N", "87 N", "150 N", "250 N"]
     )
     stroke: Length = entry("of body 2's ring along x, peak to peak [mm]", "14 um")
@@ -141,7 +138,7 @@ class ExplicitStep(Section):
 class Reported(Section):
     """A number of cycles that a source reports, to find the wear coefficient that gives it."""
 
-    normal_force: Pressing = entry("one of load_path.normal_forces [N]", "17 N")
+    normal_force: PressingForce = entry("one of load_path.normal_forces [N]", "17 N")
     steady: Literal["stiffness", "pressure"] = entry("what no longer changes then", "stiffness")
     cycles: Cycles = entry("when it has become steady [1]", 2.5e6)
 
@@ -150,7 +147,9 @@ class SpecimensWear(TwoBodies[BodyWear], Laws):
     """Wear of both specimens, node by node; ends by exactly one of cycles, energy."""
 
     cycles: Cycles | None = entry("under each normal force [1]", 3e5, default=None)
-    energy: Energy | None = entry("dissipated under each normal force [N*mm]", "1 kJ", default=None)
+    energy: PositiveEnergy | None = entry(
+        "dissipated under each normal force [N*mm]", "1 kJ", default=None
+    )
     step: ExplicitStep = entry("cycles of constant geometry", default=ExplicitStep())
     reported: tuple[Reported, ...] = entry("cycles that a source reports", default=())
 

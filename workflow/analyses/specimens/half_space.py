@@ -130,7 +130,11 @@ class PadHalfSpace:
         converge.
         """
         worn = self._nodes.smooth(depth)(self.grid.x.ravel(), self.grid.y.ravel())
-        normal = self._press(height + worn, force)
+        normal = _converged(
+            self._normal.solve(
+                height + worn, force, tilt_x=0.0, tilt_y=0.0, tolerance=self._tolerance
+            )
+        )
         states = [self._move(self._friction * normal.pressure, d) for d in path]
         last, area = states[-1], self.grid.cell_area
         # Body 1's shift against body 2 in sa_solver is body 2's here, backwards.
@@ -157,10 +161,6 @@ class PadHalfSpace:
         )
         return pressed.P / UNIT_MOTION, self._stuck(np.ones(self.grid.shape, dtype=np.bool_))
 
-    def _press(self, height: Array, force: float) -> NormalState:
-        state = self._normal.solve(height, force, tilt_x=0.0, tilt_y=0.0, tolerance=self._tolerance)
-        return _converged(state)
-
     def _move(self, limit: Array, displacement: float) -> TangentialState:
         state = self._tangential.solve(
             limit, shift_x=-displacement, shift_y=0.0, twist=0.0, tolerance=self._tolerance
@@ -174,12 +174,9 @@ class PadHalfSpace:
 
 def bulk_compliance(pair: ReducedPair, half_space: PadHalfSpace) -> BulkCompliance:
     """What the specimens give way beyond a half-space."""
-    count = len(pair.face)
-    specimens = []
-    for axis in (Z, X):
-        forces = np.linalg.solve(pair.block(axis), np.ones(count))
-        specimens.append(float(forces.sum()))
-    return BulkCompliance((specimens[0], specimens[1]), half_space.tied())
+    tied = np.ones(len(pair.face))
+    z, x = (float(np.linalg.solve(pair.block(axis), tied).sum()) for axis in (Z, X))
+    return BulkCompliance((z, x), half_space.tied())
 
 
 def _converged(state: State) -> State:

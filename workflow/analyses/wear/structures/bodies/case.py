@@ -24,14 +24,11 @@ from workflow.analyses.contact.case import (
     touches_along_a_line,
 )
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.case.sections import Contact, TwoBodies, Wear
+from workflow.analyses.wear.case.sections import Contact, PressingForce, TwoBodies, Wear
 from workflow.case.fields import Quantity, Whole
 from workflow.case.sections import GridCells, Length, Section, Title, disagreement, entry
 from workflow.case.source import Source
 
-PressingForce = Annotated[
-    float, Quantity("N", above=0.0, at_most=1e9, range_text="above 0 and at most 1e6 kN")
-]
 PressingLineForce = Annotated[
     float, Quantity("N/mm", above=0.0, at_most=1e9, range_text="above 0 and at most 1e6 kN/mm")
 ]
