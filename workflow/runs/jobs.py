@@ -17,8 +17,6 @@ from workflow.runs.cluster import run_on_cluster
 from workflow.runs.job import Finished, Job, finished, run_job
 from workflow.runs.run import kept_in
 
-Report = Callable[[Finished], None]
-
 
 def run_jobs(
     jobs: Sequence[Job],
@@ -27,7 +25,7 @@ def run_jobs(
     processes: int | None = None,
     alone: bool = False,
     dask: str | None = None,
-    report: Report | None = None,
+    report: Callable[[Finished], None] | None = None,
 ) -> list[Finished]:
     """Run every job in the folder of its name below ``out``; in the order of ``jobs``.
 

@@ -20,8 +20,6 @@ from workflow.shell.store import read_arrays, write_arrays
 
 # Files are pruned, least recently used first, above this size; one default dovetail takes 67 MB.
 LARGEST_CACHE = 4 * 1024**3
-# Datasets of a joint with a mirror symmetry.
-HALVES = "kept", "turned"
 SOLVERS = ("numpy", "scipy", "scikit-fem", "gmsh")
 
 
@@ -47,8 +45,14 @@ def load_joint(key: str) -> JointResolvent | None:
     if (kept := _load(f"joint-{key}")) is None:
         return None
     arrays, attributes = kept
+    inverse: Array | SplitMatrix
+    if "inverse" in arrays:
+        inverse = arrays["inverse"]
+    else:
+        mirror = Mirror(arrays["partner"], arrays["sign"])
+        inverse = SplitMatrix(mirror, (arrays["kept"], arrays["turned"]))
     return JointResolvent(
-        inverse=_inverse(arrays),
+        inverse=inverse,
         rho=float(attributes["rho"]),
         loads=arrays["loads"],
         rigid_modes=int(attributes["rigid_modes"]),
@@ -60,19 +64,11 @@ def save_joint(key: str, joint: JointResolvent) -> None:
     inverse = joint.inverse
     arrays: dict[str, Any] = {"loads": joint.loads}
     if isinstance(inverse, SplitMatrix):
-        mirror = {"partner": inverse.mirror.partner, "sign": inverse.mirror.sign}
-        arrays |= mirror | dict(zip(HALVES, inverse.blocks, strict=True))
+        arrays |= {"partner": inverse.mirror.partner, "sign": inverse.mirror.sign}
+        arrays["kept"], arrays["turned"] = inverse.blocks
     else:
         arrays["inverse"] = inverse
     _save(f"joint-{key}", arrays, {"rho": joint.rho, "rigid_modes": joint.rigid_modes})
-
-
-def _inverse(arrays: dict[str, Any]) -> Array | SplitMatrix:
-    """(H + ρ)⁻¹ as it was kept."""
-    if "inverse" in arrays:
-        return np.asarray(arrays["inverse"])
-    kept, turned = (arrays[name] for name in HALVES)
-    return SplitMatrix(Mirror(arrays["partner"], arrays["sign"]), (kept, turned))
 
 
 def load_cycle(key: str, structure: Structure, friction: float) -> CycleSolution | None:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 
 from sa_solver.half_space import HalfSpace
-from sa_solver.history import ContactLoadPath
 from sa_solver.types import Array, ElasticPair, Grid, Material
 from workflow.analyses.contact.case import Body, ContactCase, Heights, LineContactCase
 from workflow.analyses.contact.load_table import LoadTable
@@ -35,11 +34,6 @@ def bodies_of(case: ContactCase | LineContactCase) -> tuple[Material, Material]:
 
 def _material(body: Body) -> Material:
     return RIGID if body == "rigid" else body.elastic()
-
-
-def path_of(case: ContactCase | LineContactCase, table: LoadTable) -> ContactLoadPath:
-    """The path as the solver marches it."""
-    return ContactLoadPath(table.imposed, table.is_motion, bulk_strain(table, bodies_of(case)))
 
 
 def bulk_strain(table: LoadTable, bodies: tuple[Material, Material]) -> Array:

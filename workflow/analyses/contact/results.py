@@ -11,7 +11,6 @@ import numpy as np
 from sa_solver.contact import ContactState
 from sa_solver.history import History
 from sa_solver.types import Array, Frame, Grid
-from workflow.analyses.contact.bodies import bodies_of, bulk_strain
 from workflow.analyses.contact.case import ContactCase, LineContactCase
 from workflow.analyses.contact.datasets import BODIES, LOADS, RIGID_MOTIONS, traction_fields
 from workflow.analyses.contact.load_table import LoadTable
@@ -31,19 +30,23 @@ BULK_STRESSES = {
 
 @dataclass(frozen=True)
 class ContactOutcome:
-    """Everything a contact run found; ``height`` ``(nx, ny)`` is the gap before loading [mm]."""
+    """Everything a contact run found.
+
+    ``height`` ``(nx, ny)`` is the gap before loading [mm]; ``strain`` ``(n,)`` that of body 2 less
+    that of body 1 by bulk stress.
+    """
 
     case: ContactCase | LineContactCase
     grid: Grid
     height: Array
     table: LoadTable
+    strain: Array
     history: History
 
 
 def write_contact_output(outcome: ContactOutcome, run: ContactRun) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
-    reporter = run.reporter
-    with reporter.stage("results"):
+    with run.reporter.stage("results"):
         write_contact_results(outcome, run)
     run.draw()
     summary = _summary(outcome)
@@ -99,7 +102,6 @@ def _fields(state: ContactState, friction: float) -> dict[str, Dataset]:
 def _summary(outcome: ContactOutcome) -> dict[str, Any]:
     case, grid, history = outcome.case, outcome.grid, outcome.history
     friction = case.friction.coefficient
-    strain = bulk_strain(outcome.table, bodies_of(case))
     return {
         "increments": len(outcome.table),
         "history": {
@@ -109,7 +111,7 @@ def _summary(outcome: ContactOutcome) -> dict[str, Any]:
             "error_of": history.error_of,
         },
         "states": state_summaries(grid, friction, history),
-        "loop": loop_summary(grid, friction, outcome.table, history, strain),
+        "loop": loop_summary(grid, friction, outcome.table, history, outcome.strain),
         "convolutions": sum(state.convolutions for state in history.states),
     }
 

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from fe_models.geometry.specimens import Specimen
-from fe_models.mesh import MeshError
 from sa_solver.types import Material as ElasticMaterial
 from wear.laws import WearLaw
 from workflow.analyses.wear.case.evolution import PositiveEnergy
@@ -33,6 +31,9 @@ from workflow.case.sections import (
     disagreement,
     entry,
 )
+
+if TYPE_CHECKING:
+    from fe_models.geometry.specimens import Specimen
 
 Depth = Annotated[float, Quantity("mm", at_least=0.0, at_most=1e4)]
 
@@ -62,6 +63,8 @@ class Specimens(Section):
 
     @model_validator(mode="after")
     def _can_be_drawn(self) -> Specimens:
+        from fe_models.mesh import MeshError
+
         try:
             self.geometry().check()
         except MeshError as error:
@@ -71,6 +74,8 @@ class Specimens(Section):
 
     def geometry(self, **settings: int) -> Specimen:
         """The specimen as the mesher takes it, with ``pad_elements`` if they are known."""
+        from fe_models.geometry.specimens import Specimen
+
         radii = None if self.form is None else (self.form.along, self.form.across)
         return Specimen(**self.model_dump(exclude={"kind", "form"}), radii=radii, **settings)
 

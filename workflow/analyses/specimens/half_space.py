@@ -14,6 +14,7 @@ and 1/(1/k_half-space + c_bulk) is what the half-space then predicts for the spe
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -119,8 +120,10 @@ class PadHalfSpace:
         self._to_nodes = FaceTransfer.between(face, self.grid).to_nodes
         self._nodes = NodeGrid.of(face)
         half_space = HalfSpace(self.grid, pair)
-        self._normal, self._tangential = NormalContact(half_space), TangentialContact(half_space)
-        self._friction, self._tolerance = friction, tolerance
+        normal, tangential = NormalContact(half_space), TangentialContact(half_space)
+        self._press = partial(normal.solve, tilt_x=0.0, tilt_y=0.0, tolerance=tolerance)
+        self._shift = partial(tangential.solve, shift_y=0.0, twist=0.0, tolerance=tolerance)
+        self._friction = friction
 
     def rub(self, height: Array, depth: Array, force: float, path: Array) -> HalfSpaceState:
         """Press the shape ``height`` ``(nx, ny)`` with ``force`` [N] and move along ``path``.
@@ -130,11 +133,7 @@ class PadHalfSpace:
         converge.
         """
         worn = self._nodes.smooth(depth)(self.grid.x.ravel(), self.grid.y.ravel())
-        normal = _converged(
-            self._normal.solve(
-                height + worn, force, tilt_x=0.0, tilt_y=0.0, tolerance=self._tolerance
-            )
-        )
+        normal = _converged(self._press(height + worn, force))
         states = [self._move(self._friction * normal.pressure, d) for d in path]
         last, area = states[-1], self.grid.cell_area
         # Body 1's shift against body 2 in sa_solver is body 2's here, backwards.
@@ -156,16 +155,11 @@ class PadHalfSpace:
     def tied(self) -> tuple[float, float]:
         """Stiffness of the tied pad along z and x [N/mm]."""
         flat = np.zeros(self.grid.shape)
-        pressed = self._normal.solve(
-            flat, approach=UNIT_MOTION, tilt_x=0.0, tilt_y=0.0, tolerance=self._tolerance
-        )
+        pressed = self._press(flat, approach=UNIT_MOTION)
         return pressed.P / UNIT_MOTION, self._stuck(np.ones(self.grid.shape, dtype=np.bool_))
 
     def _move(self, limit: Array, displacement: float) -> TangentialState:
-        state = self._tangential.solve(
-            limit, shift_x=-displacement, shift_y=0.0, twist=0.0, tolerance=self._tolerance
-        )
-        return _converged(state)
+        return _converged(self._shift(limit, shift_x=-displacement))
 
     def _stuck(self, pressed: NDArray[np.bool_]) -> float:
         """Stiffness along x of the cells ``pressed``, stuck [N/mm]."""

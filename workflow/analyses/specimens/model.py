@@ -40,7 +40,7 @@ class SpecimensModel:
     """
 
     def __init__(self, case: SpecimensCase, target_distance: float | None = None) -> None:
-        self._case, self._target = case, target_distance
+        self.case, self._target = case, target_distance
         self.specimen: Specimen = case.geometry()
         self._materials = case.elastic
         self.from_cache = False
@@ -48,7 +48,7 @@ class SpecimensModel:
     @cached_property
     def mesh(self) -> StructureMesh:
         """Both specimens; raises :class:`~fe_models.mesh.MeshError`."""
-        return self.specimen.mesh(self._case.mesh.size)
+        return self.specimen.mesh(self.case.mesh.size)
 
     @property
     def face(self) -> Interface:
@@ -62,7 +62,7 @@ class SpecimensModel:
 
         The form is a gap: flat and curved specimens share them.
         """
-        case = self._case
+        case = self.case
         flat = replace(self.specimen, radii=None)
         modes = case.reduction.modes
         further = () if self._target is None else (self._target,)
@@ -80,8 +80,9 @@ class SpecimensModel:
 
     def node_count(self) -> int:
         """Nodes of both bodies, midsides included."""
-        return self.mesh.node_count(self._case.mesh.order)
+        return self.mesh.node_count(self.case.mesh.order)
 
+    @cached_property
     def pair(self) -> ReducedPair:
         """Both reduced models on the nodes of the pad, rings held."""
         one, two = (pad_stiffness(model, self.specimen) for model in self.reduction.models)
@@ -89,7 +90,7 @@ class SpecimensModel:
 
     def _reduce(self, modes: int) -> dict[str, Any]:
         """Everything that is worth keeping, by name."""
-        order = self._case.mesh.order
+        order = self.case.mesh.order
         models = reduced_specimens(
             self.specimen,
             self.mesh,
@@ -112,7 +113,7 @@ class SpecimensModel:
             return known["full/1"]
         body = (self.mesh.body_1, self.mesh.body_2)[number - 1]
         pad = self.face.nodes(number)
-        material, order = self._materials[number - 1], self._case.mesh.order
+        material, order = self._materials[number - 1], self.case.mesh.order
         matrices = specimen_matrices(self.specimen, body, pad, material, order)
         return _lowest(matrices.stiffness, matrices.mass)
 

@@ -88,7 +88,7 @@ def write_specimens_output(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -
 
 
 def _write_results(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -> None:
-    case, face, areas = outcome.case, outcome.model.face, outcome.pair.areas
+    case, face, areas = run.case, outcome.model.face, outcome.model.pair.areas
     with run_results(run, case, {"friction": case.friction.coefficient}) as writer:
         writer.put_grid(f"grid/{PAD}", outcome.half_space.grid, face.frame)
         writer.put("specimens/pad", face_mesh(face))
@@ -156,7 +156,7 @@ def _state(kept: KeptState, areas: Array) -> dict[str, Dataset]:
 
 
 def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
-    case, model = outcome.case, outcome.model
+    model, wear = outcome.model, outcome.model.case.wear
     loads = [load_summary(outcome, load) for load in outcome.loads]
     for load in loads:
         if late(load):
@@ -164,7 +164,7 @@ def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
                 f"{load['normal_force']:g} N: steady only near the end of the run; raise "
                 "wear.energy or wear.cycles to be sure"
             )
-    coefficients = case.wear.body_1.coefficient, case.wear.body_2.coefficient
+    coefficients = wear.body_1.coefficient, wear.body_2.coefficient
     return {
         "structure": {"nodes": model.node_count(), "pad_nodes": len(model.face)},
         "frequencies": frequencies(outcome),
@@ -172,7 +172,7 @@ def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
         "explanation": explanation(outcome),
         "loads": loads,
         "collapse": collapse(loads),
-        "reported": [reported_summary(entry, loads, coefficients) for entry in case.wear.reported],
+        "reported": [reported_summary(entry, loads, coefficients) for entry in wear.reported],
     }
 
 

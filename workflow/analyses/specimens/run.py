@@ -68,7 +68,7 @@ def _compute(case: SpecimensCase, reporter: Reporter) -> SpecimensOutcome:
         nodes = model.node_count()
     memory(case, nodes).check()
     with reporter.stage("reduction"):
-        pair = model.pair()
+        pair = model.pair
     if model.from_cache:
         reporter.log("reduction: from the cache")
     half_space = PadHalfSpace(
@@ -79,25 +79,20 @@ def _compute(case: SpecimensCase, reporter: Reporter) -> SpecimensOutcome:
         case.contact.tolerance,
     )
     loads = tuple(
-        _rub(case, model, pair, half_space, force, reporter)
-        for force in case.load_path.normal_forces
+        _rub(model, half_space, force, reporter) for force in case.load_path.normal_forces
     )
     with reporter.stage("half-space"):
         bulk = bulk_compliance(pair, half_space)
-    return SpecimensOutcome(case, model, pair, half_space, bulk, loads)
+    return SpecimensOutcome(model, half_space, bulk, loads)
 
 
 def _rub(
-    case: SpecimensCase,
-    model: SpecimensModel,
-    pair: ReducedPair,
-    half_space: PadHalfSpace,
-    force: float,
-    reporter: Reporter,
+    model: SpecimensModel, half_space: PadHalfSpace, force: float, reporter: Reporter
 ) -> LoadOutcome:
+    case, pair = model.case, model.pair
     conditions = FrettingConditions(force, case.load_path.stroke, case.friction.coefficient)
     with reporter.stage("wear"):
-        blocks = tuple(_blocks(case, pair, model.face.gap, conditions))
+        blocks = tuple(_blocks(model, conditions))
         kept = tuple(
             KeptState(state, first_loading(pair, state, conditions)) for state in _chosen(blocks)
         )
@@ -116,14 +111,13 @@ def _rub(
     return LoadOutcome(force, blocks, kept, (first, last), marched)
 
 
-def _blocks(
-    case: SpecimensCase, pair: ReducedPair, gap: Array, conditions: FrettingConditions
-) -> Iterator[BlockState]:
+def _blocks(model: SpecimensModel, conditions: FrettingConditions) -> Iterator[BlockState]:
     """The states of a worn pair, up to the end that the case asks for."""
+    case = model.case
     step = case.wear.step
     stepper = Explicit(step.fraction) if step.cycles is None else Explicit(cycles=step.cycles)
-    fretted = FrettedPair(pair, case.laws, conditions)
-    states = wear_in_cycle_blocks(fretted, gap, stepper, partial(_to_go, case))
+    fretted = FrettedPair(model.pair, case.laws, conditions)
+    states = wear_in_cycle_blocks(fretted, model.face.gap, stepper, partial(_to_go, case))
     for number, state in enumerate(states):
         _check(state, number, conditions, case)
         yield state

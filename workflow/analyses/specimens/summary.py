@@ -35,9 +35,9 @@ def explanation(outcome: SpecimensOutcome) -> list[str]:
     """Where specimens and half-space differ and why, in sentences."""
     bulk, first = outcome.bulk, outcome.loads[0]
     (stiff_z, stiff_x), (half_z, half_x) = bulk.specimens, bulk.half_space
-    ring = outcome.case.structure.ring_distance
+    ring = outcome.model.case.structure.ring_distance
     unworn, beside = first.kept[0].block.contact.normal, first.half_space[0]
-    shares = [edge_share(outcome.pair, p) for p in (unworn.pressure, beside.nodal_pressure)]
+    shares = [edge_share(outcome.model.pair, p) for p in (unworn.pressure, beside.nodal_pressure)]
     softer = ": they lack what a half-space has beside the strips" if bulk.tangential > 0.0 else ""
     held = f": held {ring:g} mm from the pad, where a half-space gives way"
     stiffer = held if bulk.normal < 0.0 else ""
@@ -70,8 +70,8 @@ def tied_pad(bulk: BulkCompliance) -> dict[str, Any]:
 
 def load_summary(outcome: SpecimensOutcome, load: LoadOutcome) -> dict[str, Any]:
     """Everything about one normal force."""
-    end, areas = load.blocks[-1], outcome.pair.areas
-    steady = steady_states(outcome.pair, load.blocks)
+    end, areas = load.blocks[-1], outcome.model.pair.areas
+    steady = steady_states(outcome.model.pair, load.blocks)
     return {
         "normal_force": load.force,
         "cycles": end.cycles,
@@ -103,7 +103,7 @@ def _relative(value: float, other: float) -> float:
 def _state_summary(outcome: SpecimensOutcome, load: LoadOutcome, place: int) -> dict[str, Any]:
     """The specimens on one shape, and the half-space beside them; ``place`` 0 or -1."""
     state, beside = load.kept[place], load.half_space[place]
-    contact, areas = state.block.contact, outcome.pair.areas
+    contact, areas = state.block.contact, outcome.model.pair.areas
     normal = contact.normal
     return {
         # With all that touches stuck, and as the slope of the loop.
@@ -112,7 +112,7 @@ def _state_summary(outcome: SpecimensOutcome, load: LoadOutcome, place: int) -> 
         "area": normal.area,
         "approach": normal.approach,
         "peak_pressure": float(normal.pressure.max()),
-        "edge_pressure_share": edge_share(outcome.pair, normal.pressure),
+        "edge_pressure_share": edge_share(outcome.model.pair, normal.pressure),
         "pressure_deviation": pressure_deviation(areas, normal.pressure),
         "friction": contact.friction,
         "energy_per_cycle": contact.energy,
@@ -124,7 +124,7 @@ def _beside(
     outcome: SpecimensOutcome, state: KeptState, beside: HalfSpaceState, force: float
 ) -> dict[str, float]:
     """The half-space, its stiffness corrected by what it lacks, and how its fields differ."""
-    areas, contact = outcome.pair.areas, state.block.contact
+    areas, contact = outcome.model.pair.areas, state.block.contact
     shear = contact.tangential.shear / areas
     return {
         "stick_stiffness": beside.stick_stiffness,
@@ -133,7 +133,7 @@ def _beside(
         "approach": beside.approach,
         "corrected_approach": beside.approach + force * outcome.bulk.normal,
         "peak_pressure": float(beside.pressure.max()),
-        "edge_pressure_share": edge_share(outcome.pair, beside.nodal_pressure),
+        "edge_pressure_share": edge_share(outcome.model.pair, beside.nodal_pressure),
         "energy_per_cycle": beside.energy,
         "pressure_difference": _difference(areas, contact.normal.pressure, beside.nodal_pressure),
         "shear_difference": _difference(areas, shear, beside.nodal_shear),
@@ -142,18 +142,16 @@ def _beside(
 
 def pressure_deviation(areas: Array, pressure: Array) -> float:
     """Root mean square of p/mean - 1 over the pad: 0 where the pressure is uniform."""
-    mean = np.sum(areas * pressure) / areas.sum()
-    return float(np.sqrt(np.sum(areas * (pressure / mean - 1.0) ** 2) / areas.sum()))
+    mean = np.average(pressure, weights=areas)
+    return float(np.sqrt(np.average((pressure / mean - 1.0) ** 2, weights=areas)))
 
 
 def edge_share(pair: ReducedPair, pressure: Array) -> float:
     """Mean pressure of the nodes on the border of the pad over that of the pad."""
     place = np.abs(pair.face.coordinates)
     border = np.any(place > place.max(axis=0) * (1.0 - 1e-9), axis=1)
-    areas = pair.areas
-    mean = np.sum(areas * pressure) / areas.sum()
-    on_border = np.sum((areas * pressure)[border]) / areas[border].sum()
-    return float(on_border / mean)
+    on_border = np.average(pressure[border], weights=pair.areas[border])
+    return float(on_border / np.average(pressure, weights=pair.areas))
 
 
 def _difference(areas: Array, field: Array, other: Array) -> float:
