@@ -310,8 +310,8 @@ class TestPadHalfSpace:
         height = (grid.x**2 + grid.y**2) / 100.0
         depth = (face.coordinates**2).sum(axis=1) / 100.0
         path = np.array([1e-5, 1e-2])
-        one = beside.rub(height, 0.0 * depth, 50.0, path)
-        other = beside.rub(0.0 * height, depth, 50.0, path)
+        one = beside.fretting_cycle(height, 0.0 * depth, 50.0, path)
+        other = beside.fretting_cycle(0.0 * height, depth, 50.0, path)
         np.testing.assert_allclose(one.pressure, other.pressure, atol=1e-6)
         # Stuck at first, sliding at last, against the motion.
         assert one.force[0] == pytest.approx(1e-5 * one.stick_stiffness, rel=0.1)

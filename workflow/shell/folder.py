@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Mapping
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -178,11 +179,8 @@ def _is_entry(name: str) -> bool:
 
 def _free(path: Path) -> Path:
     """The path, or the first with a number at its end that nothing has."""
-    number, free = 1, path
-    while free.exists():
-        number += 1
-        free = path.with_name(f"{path.name}{number}")
-    return free
+    numbered = (path.with_name(f"{path.name}{number}") for number in count(2))
+    return next(free for free in chain([path], numbered) if not free.exists())
 
 
 def _remove(path: Path) -> None:

@@ -1,4 +1,4 @@
-"""What the contact solver takes of a case of two bodies: grid, gap, materials and path."""
+"""What the contact solver takes of a case of two bodies: materials, half-space and bulk strain."""
 
 from __future__ import annotations
 
@@ -6,28 +6,20 @@ import numpy as np
 
 from sa_solver.half_space import HalfSpace
 from sa_solver.types import Array, ElasticPair, Grid, Material
-from workflow.analyses.contact.case import Body, ContactCase, Heights, LineContactCase
+from workflow.analyses.contact.case import BodiesCase, Body, LineContactCase
 from workflow.analyses.contact.load_table import LoadTable
-from workflow.case.input_files import read_heights
 
 RIGID = Material(young=np.inf, poisson=0.0)
 
 
-def height_of(case: ContactCase | LineContactCase, grid: Grid) -> Array:
-    """Gap before loading on ``grid``, ``(nx, ny)`` [mm]."""
-    if isinstance(case.structure, Heights):
-        return read_heights(case.structure.file)
-    return case.structure.height(grid.x, grid.y)
-
-
-def half_space_of(case: ContactCase | LineContactCase, grid: Grid) -> HalfSpace:
+def half_space_of(case: BodiesCase, grid: Grid) -> HalfSpace:
     """Both bodies as half-spaces, or half-planes, on ``grid``."""
     pair = ElasticPair(*bodies_of(case))
     datum = case.contact.datum if isinstance(case, LineContactCase) else None
     return HalfSpace(grid, pair, datum=datum)
 
 
-def bodies_of(case: ContactCase | LineContactCase) -> tuple[Material, Material]:
+def bodies_of(case: BodiesCase) -> tuple[Material, Material]:
     """Materials of body 1 and body 2."""
     return _material(case.materials.body_1), _material(case.materials.body_2)
 

@@ -72,16 +72,23 @@ class Bodies(Section):
     kind: Literal["bodies"] = entry("what the structure is", "bodies")
     shape: str  # each narrows it to its name
 
+    @abstractmethod
+    def gap_on(self, grid: Grid) -> Array:
+        """Gap before loading on ``grid``, ``(nx, ny)`` [mm]."""
 
-class Smooth(Bodies):
-    """Two bodies whose gap is known everywhere."""
+
+class Shape(Bodies):
+    """Two bodies whose gap is known at any point."""
 
     @abstractmethod
     def height(self, x: Array, y: Array) -> Array:
         """Gap before loading [mm] at ``x`` and ``y``, which broadcast against each other."""
 
+    def gap_on(self, grid: Grid) -> Array:
+        return self.height(grid.x, grid.y)
 
-class Sphere(Smooth):
+
+class Sphere(Shape):
     """Hertz's paraboloid (x² + y²) / 2 R."""
 
     shape: Literal["sphere"] = entry("sphere, ellipsoid or heights", "sphere")
@@ -91,7 +98,7 @@ class Sphere(Smooth):
         return (x**2 + y**2) / (2.0 * self.radius)
 
 
-class Ellipsoid(Smooth):
+class Ellipsoid(Shape):
     """Paraboloid x² / 2 Rx + y² / 2 Ry."""
 
     shape: Literal["ellipsoid"] = entry("sphere, ellipsoid or heights", "ellipsoid")
@@ -102,7 +109,7 @@ class Ellipsoid(Smooth):
         return x**2 / (2.0 * self.radius_x) + y**2 / (2.0 * self.radius_y)
 
 
-class Cylinder(Smooth):
+class Cylinder(Shape):
     """Parabola x² / 2 R, the same all along y: a line contact."""
 
     shape: Literal["cylinder"] = entry("cylinder, flat_rounded or heights", "cylinder")
@@ -112,7 +119,7 @@ class Cylinder(Smooth):
         return x**2 / (2.0 * self.radius)
 
 
-class FlatRounded(Smooth):
+class FlatRounded(Shape):
     """Flat, and a parabola beyond either end of it: a line contact."""
 
     shape: Literal["flat_rounded"] = entry("cylinder, flat_rounded or heights", "flat_rounded")
@@ -131,6 +138,9 @@ class Heights(Bodies):
     file: Annotated[str, File((".npy", ".csv", ".h5"))] = entry(
         "gap in mm, a value per cell; for .h5 with :dataset at the end", "gap.npy"
     )
+
+    def gap_on(self, grid: Grid) -> Array:
+        return read_heights(self.file)
 
 
 class BodyMaterial(ElasticBody):

@@ -11,7 +11,7 @@ import numpy as np
 from sa_solver.contact import ContactState
 from sa_solver.history import History
 from sa_solver.types import Array, Frame, Grid
-from workflow.analyses.contact.case import ContactCase, LineContactCase
+from workflow.analyses.contact.case import BodiesCase
 from workflow.analyses.contact.datasets import BODIES, LOADS, RIGID_MOTIONS, traction_fields
 from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.contact.summary import loop_summary, slides, state_summaries, stick_zone
@@ -20,7 +20,7 @@ from workflow.shell.dataset import Dataset, described
 from workflow.shell.results import run_results
 from workflow.shell.summary import finish
 
-ContactRun = Run[ContactCase | LineContactCase]
+ContactRun = Run[BodiesCase]
 
 BULK_STRESSES = {
     "bulk_stress_1": ("MPa", "stress along x in body 1 far below the contact"),
@@ -36,7 +36,7 @@ class ContactOutcome:
     that of body 1 by bulk stress.
     """
 
-    case: ContactCase | LineContactCase
+    case: BodiesCase
     grid: Grid
     height: Array
     table: LoadTable
@@ -105,10 +105,7 @@ def _summary(outcome: ContactOutcome) -> dict[str, Any]:
     return {
         "increments": len(outcome.table),
         "history": {
-            "method": history.method,
-            "reason": history.reason,
-            "error": history.error,
-            "error_of": history.error_of,
+            key: getattr(history, key) for key in ("method", "reason", "error", "error_of")
         },
         "states": state_summaries(grid, friction, history),
         "loop": loop_summary(grid, friction, outcome.table, history, outcome.strain),

@@ -5,8 +5,8 @@ from __future__ import annotations
 from sa_solver.contact import ContactState
 from sa_solver.errors import ContactProblemError
 from sa_solver.history import ContactLoadPath, History, HistoryError, march_history
-from workflow.analyses.contact.bodies import bodies_of, bulk_strain, half_space_of, height_of
-from workflow.analyses.contact.case import ContactCase, LineContactCase
+from workflow.analyses.contact.bodies import bodies_of, bulk_strain, half_space_of
+from workflow.analyses.contact.case import BodiesCase
 from workflow.analyses.contact.results import (
     ContactOutcome,
     ContactRun,
@@ -38,11 +38,11 @@ def run_contact(run: ContactRun) -> None:
 
 
 def _march(
-    case: ContactCase | LineContactCase, folder: OutputFolder, reporter: Reporter
+    case: BodiesCase, folder: OutputFolder, reporter: Reporter
 ) -> tuple[ContactOutcome, str]:
     """What the path has led to, and why it ended early if it did."""
     grid, table = case.contact.centred(), case.load_path.table()
-    height, half_space = height_of(case, grid), half_space_of(case, grid)
+    height, half_space = case.structure.gap_on(grid), half_space_of(case, grid)
     strain = bulk_strain(table, bodies_of(case))
     passed: dict[int, ContactState] = {}
     with reporter.increments(len(table)) as show, reporter.stage("contact"):

@@ -80,7 +80,7 @@ class Specimens(Section):
         return Specimen(**self.model_dump(exclude={"kind", "form"}), radii=radii, **settings)
 
 
-class PressAndRub(Section):
+class FrettingLoads(Section):
     """One normal force after the other, each on unworn specimens."""
 
     normal_forces: Annotated[tuple[PressingForce, ...], Field(min_length=1)] = entry(
@@ -89,7 +89,7 @@ class PressAndRub(Section):
     stroke: Length = entry("of body 2's ring along x, peak to peak [mm]", "14 um")
 
     @model_validator(mode="after")
-    def _forces_differ(self) -> PressAndRub:
+    def _forces_differ(self) -> FrettingLoads:
         for index, force in enumerate(self.normal_forces):
             if force in self.normal_forces[:index]:
                 raise disagreement(
@@ -192,7 +192,7 @@ class SpecimensCase(Case):
     structure: Specimens = entry("two specimens alike, turned 90° to each other")
     materials: TwoMaterials = entry("the two specimens")
     friction: Friction = entry("Coulomb's law on the pad")
-    load_path: PressAndRub = entry("what every cycle does")
+    load_path: FrettingLoads = entry("what every cycle does")
     mesh: SpecimenMesh = entry("finite elements of each specimen", default=SpecimenMesh())
     reduction: Reduction = entry("of each specimen", default=Reduction())
     contact: PadGrid = entry("half-space beside the specimens", default=PadGrid())

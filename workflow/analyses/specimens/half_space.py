@@ -125,7 +125,9 @@ class PadHalfSpace:
         self._shift = partial(tangential.solve, shift_y=0.0, twist=0.0, tolerance=tolerance)
         self._friction = friction
 
-    def rub(self, height: Array, depth: Array, force: float, path: Array) -> HalfSpaceState:
+    def fretting_cycle(
+        self, height: Array, depth: Array, force: float, path: Array
+    ) -> HalfSpaceState:
         """Press the shape ``height`` ``(nx, ny)`` with ``force`` [N] and move along ``path``.
 
         ``depth`` ``(n,)`` is worn off both bodies at the nodes [mm], ``path`` ``(k,)`` rising

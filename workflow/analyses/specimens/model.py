@@ -25,12 +25,11 @@ RIGID_MOTIONS, FREQUENCIES = 6, 6
 class SpecimenReduction:
     """Reduced models of body 1 and 2, and natural frequencies of each, free, ``(6,)`` [Hz].
 
-    ``full`` are those of the finite elements, ``reduced`` those of the reduced model.
+    ``frequencies`` of a body are those of its finite elements and those of its reduced model.
     """
 
     models: tuple[ReducedModel, ReducedModel]
-    full: tuple[Array, Array]
-    reduced: tuple[Array, Array]
+    frequencies: tuple[tuple[Array, Array], ...]
 
 
 class SpecimensModel:
@@ -74,8 +73,7 @@ class SpecimensModel:
             save_arrays(f"specimens-{key}", arrays)
         return SpecimenReduction(
             (_model(arrays, 1), _model(arrays, 2)),
-            (arrays["full/1"], arrays["full/2"]),
-            (arrays["reduced/1"], arrays["reduced/2"]),
+            tuple((arrays[f"full/{n}"], arrays[f"reduced/{n}"]) for n in (1, 2)),
         )
 
     def node_count(self) -> int:

@@ -92,8 +92,7 @@ def _write_results(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -> None:
     with run_results(run, case, {"friction": case.friction.coefficient}) as writer:
         writer.put_grid(f"grid/{PAD}", outcome.half_space.grid, face.frame)
         writer.put("specimens/pad", face_mesh(face))
-        reduction = outcome.model.reduction
-        for number, both in enumerate(zip(reduction.full, reduction.reduced, strict=True), 1):
+        for number, both in enumerate(outcome.model.reduction.frequencies, 1):
             writer.put(f"specimens/body_{number}", described(FREQUENCIES, both))
         for number, load in enumerate(outcome.loads):
             _put_load(writer, f"loads/{number}", load, areas)

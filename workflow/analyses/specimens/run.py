@@ -79,14 +79,14 @@ def _compute(case: SpecimensCase, reporter: Reporter) -> SpecimensOutcome:
         case.contact.tolerance,
     )
     loads = tuple(
-        _rub(model, half_space, force, reporter) for force in case.load_path.normal_forces
+        _fret(model, half_space, force, reporter) for force in case.load_path.normal_forces
     )
     with reporter.stage("half-space"):
         bulk = bulk_compliance(pair, half_space)
     return SpecimensOutcome(model, half_space, bulk, loads)
 
 
-def _rub(
+def _fret(
     model: SpecimensModel, half_space: PadHalfSpace, force: float, reporter: Reporter
 ) -> LoadOutcome:
     case, pair = model.case, model.pair
@@ -101,7 +101,7 @@ def _rub(
     path = 0.5 * conditions.stroke * rising(HALF_SPACE_POINTS)
     with reporter.stage("half-space"):
         first, last = (
-            half_space.rub(height, state.depths.sum(axis=0), force, path)
+            half_space.fretting_cycle(height, state.depths.sum(axis=0), force, path)
             for state in (blocks[0], blocks[-1])
         )
     with reporter.stage("coupled cycle"):

@@ -23,11 +23,9 @@ LATE = 0.8
 
 def frequencies(outcome: SpecimensOutcome) -> dict[str, Any]:
     """Natural frequencies of each free specimen [Hz]."""
-    reduction = outcome.model.reduction
-    pairs = zip(reduction.full, reduction.reduced, strict=True)
     return {
         f"body_{number}": {"full": full.tolist(), "reduced": reduced.tolist()}
-        for number, (full, reduced) in enumerate(pairs, start=1)
+        for number, (full, reduced) in enumerate(outcome.model.reduction.frequencies, 1)
     }
 
 
@@ -85,19 +83,17 @@ def load_summary(outcome: SpecimensOutcome, load: LoadOutcome) -> dict[str, Any]
             name: {"cycles": state.cycles, "energy": state.energy} for name, state in steady.items()
         },
         "coupled_cycle": {
-            "energy": load.marched.energy[0],
-            "energy_uncoupled": load.marched.energy[1],
-            "energy_difference": _relative(*load.marched.energy),
-            "secant_stiffness": load.marched.secant_stiffness[0],
-            "secant_stiffness_uncoupled": load.marched.secant_stiffness[1],
-            "secant_stiffness_difference": _relative(*load.marched.secant_stiffness),
+            **_uncoupled("energy", *load.marched.energy),
+            **_uncoupled("secant_stiffness", *load.marched.secant_stiffness),
             "pressure_change": load.marched.pressure_change,
         },
     }
 
 
-def _relative(value: float, other: float) -> float:
-    return float(other / value - 1.0) if value else 0.0
+def _uncoupled(name: str, marched: float, uncoupled: float) -> dict[str, float]:
+    """A quantity of the coupled cycle beside that of the uncoupled one."""
+    difference = float(uncoupled / marched - 1.0) if marched else 0.0
+    return {name: marched, f"{name}_uncoupled": uncoupled, f"{name}_difference": difference}
 
 
 def _state_summary(outcome: SpecimensOutcome, load: LoadOutcome, place: int) -> dict[str, Any]:

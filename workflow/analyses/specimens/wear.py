@@ -29,11 +29,6 @@ class BlockState:
     stable_cycles: float
 
     @property
-    def gap(self) -> Array:
-        """Of the unloaded faces ``(n,)`` [mm]."""
-        return self.state.surfaces.gap
-
-    @property
     def depths(self) -> Array:
         """Worn off each body ``(2, n)`` [mm]."""
         return np.stack(self.state.surfaces.depths)

@@ -9,16 +9,18 @@ from __future__ import annotations
 from math import cos, inf, sin
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from sa_solver.types import Array
 from workflow.analyses.contact.case import (
     HEIGHTS,
-    Bodies,
     BodyMaterial,
     Cylinder,
     Ellipsoid,
     FlatRounded,
     Heights,
+    Shape,
     Sphere,
     require_shape,
     touches_along_a_line,
@@ -42,7 +44,7 @@ FLAT = "flat"
 # --- bodies -------------------------------------------------------------------------------------
 
 
-class Flat(Bodies):
+class Flat(Shape):
     """A flat rectangle with sharp edges on a step: the pad of a specimen."""
 
     shape: Literal["flat"] = entry("flat, or as in contact cases", "flat")
@@ -50,13 +52,20 @@ class Flat(Bodies):
     half_length: Length = entry("of the rectangle, along y [mm]", "0.5 mm")
     step: Length = entry("from the rectangle back to the body [mm]", "0.1 mm", default=0.1)
 
+    def height(self, x: Array, y: Array) -> Array:
+        on_top = (np.abs(x) < self.half_width) & (np.abs(y) < self.half_length)
+        return np.where(on_top, 0.0, self.step)
 
-class FlatStrip(Bodies):
+
+class FlatStrip(Shape):
     """A flat strip with sharp edges on a step: a line contact."""
 
     shape: Literal["flat"] = entry("flat, or as in contact cases", "flat")
     half_width: Length = entry("of the strip, along x [mm]", "0.5 mm")
     step: Length = entry("from the strip back to the body [mm]", "0.1 mm", default=0.1)
+
+    def height(self, x: Array, y: Array) -> Array:
+        return np.where(np.abs(x) < self.half_width, 0.0, self.step)
 
 
 class BodyMaterials(TwoBodies[BodyMaterial]):

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
 from fe_models.mesh import Face
 from sa_solver.types import Array, Frame, Grid, LoadHistory
 from wear.interface import CycleLoads
-from workflow.analyses.contact.case import Heights, Smooth
+from workflow.analyses.contact.case import Heights, Shape
 from workflow.analyses.wear.gaps import GapFunction, GridHeights
 from workflow.analyses.wear.load_source import ContactFace, UserFace
-from workflow.analyses.wear.structures.bodies.case import (
-    BodiesWearCase,
-    Flat,
-    FlatStrip,
-    LineBodiesWearCase,
-)
+from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
 from workflow.case.input_files import read_heights
 
 NAME = "interface"
@@ -127,18 +122,8 @@ class BodiesSource:
         return Face(NAME, frame, corners, np.array([[0, 1, 2], [0, 2, 3]]))
 
 
-def gap_of(shape: Smooth | Flat | FlatStrip | Heights, grid: Grid) -> GapFunction:
+def gap_of(shape: Shape | Heights, grid: Grid) -> GapFunction:
     """Gap [mm] of the unloaded bodies at x and y of the face that ``grid`` covers."""
     if isinstance(shape, Heights):
         return GridHeights(grid, read_heights(shape.file))
-    if isinstance(shape, Flat | FlatStrip):
-        return partial(step_around, shape)
     return shape.height
-
-
-def step_around(shape: Flat | FlatStrip, x: Array, y: Array) -> Array:
-    """Gap [mm] around a flat rectangle or strip, at ``x`` and ``y``, which broadcast."""
-    on_top = np.abs(x) < shape.half_width
-    if isinstance(shape, Flat):
-        on_top = on_top & (np.abs(y) < shape.half_length)
-    return np.where(on_top, 0.0, shape.step)
