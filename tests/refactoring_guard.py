@@ -48,7 +48,9 @@ RUNS: dict[str, dict[str, Any]] = LIST["runs"]
 # the later side has in its place (as re.sub takes them); texts are compared in the new words too.
 # Since 838e474:
 RENAMED: tuple[tuple[str, str], ...] = (
-    (r"\bwear\.stint\b", "wear.cycle_block"),
+    (r"\bwear\.stint\.share\b", "wear.step.fraction"),
+    (r"\bwear\.stint\.length\b", "wear.step.cycles"),
+    (r"\bwear\.stint\b", "wear.step"),
     (r"\bstint_limit\b", "stable_cycles"),
     (r"(loads\.\d+)\.stints\b", r"\1.cycle_blocks"),
 )

@@ -24,7 +24,9 @@ class _OneLineGroup(click.Group):
         try:
             code = super().main(*args, **settings)
         except (FretscaleError, OSError, ImportError, MemoryError) as error:
-            code = _report(error)
+            message, code = _ending(error)
+            for line in message.splitlines():
+                click.echo(f"fretscale: {line}", err=True)
         except click.Abort:
             advice = "a run continues with `resume DIR`, many with the same command"
             click.echo(f"fretscale: interrupted; {advice}", err=True)
@@ -38,16 +40,8 @@ class _OneLineGroup(click.Group):
         sys.exit(code if isinstance(code, int) else errors.DONE)
 
 
-def _report(error: Exception) -> int:
-    """Say what ended the command, one line for each thing wrong, and give the exit code."""
-    message, code = _ending(error)
-    for line in message.splitlines():
-        click.echo(f"fretscale: {line}", err=True)
-    return code
-
-
 def _ending(error: Exception) -> tuple[str, int]:
-    """Message and exit code of ``error``."""
+    """What to say of ``error``, one line for each thing wrong, and the exit code."""
     if isinstance(error, MemoryError):
         return f"out of memory: {error}".rstrip(": "), errors.OutOfMemory.exit_code
     if isinstance(error, FretscaleError):
@@ -265,10 +259,7 @@ def new(kind: str, file: Path | None) -> None:
     """Write a commented case of KIND to FILE, or print it."""
     from workflow.kinds import template
 
-    try:
-        text = template(kind)
-    except ValueError as error:
-        raise errors.UserError(str(error)) from None
+    text = template(kind)
     if file is None:
         click.echo(text, nl=False)
         return

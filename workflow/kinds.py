@@ -12,6 +12,7 @@ from workflow.analyses import contact, specimens, time, vibration, vibration_wea
 from workflow.case import loading
 from workflow.case.sections import Case
 from workflow.case.template import template as write_template
+from workflow.errors import UserError
 from workflow.shell.analysis import Analysis
 
 ANALYSES: tuple[Analysis[Any], ...] = (
@@ -50,9 +51,9 @@ def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
 
 
 def template(kind: str) -> str:
-    """A commented case of a kind, ready to run. Raises ValueError for a kind that there is not."""
+    """A commented case of a kind, ready to run. Raises UserError for a kind that there is not."""
     if kind not in kinds():
-        raise ValueError(f"{kind}: no such kind of case; allowed: {', '.join(kinds())}")
+        raise UserError(f"{kind}: no such kind of case; allowed: {', '.join(kinds())}")
     return write_template(kinds()[kind])
 
 

@@ -419,7 +419,9 @@ def stated(leaf):
     example = str(example).lower() if isinstance(example, bool) else example
     plain = f"{leaf.key}={example}"
     match leaf.key:
-        case "wear.step.depth" | "wear.step.volume" | "wear.step.fraction":
+        case "wear.step.depth" | "wear.step.volume" | "wear.step.fraction" if (
+            leaf.kind != "specimens"
+        ):
             return [f"wear.step={{kind: explicit, {leaf.name}: {example}}}"]
         case "wear.reference_amplitude":
             return ["wear.law=energy_amplitude", plain]

@@ -8,7 +8,7 @@ import pytest
 
 from sa_solver.types import Material
 from tests.workflow.scenes import BALL
-from workflow.analyses.contact.bodies import bulk_strain, grid_of, height_of
+from workflow.analyses.contact.bodies import bulk_strain
 from workflow.analyses.contact.case import ContactCase, LineContactCase
 from workflow.analyses.contact.load_table import FORCES, LoadTable
 from workflow.case.input_files import InputFileError, read_heights
@@ -221,8 +221,8 @@ def test_path_file_of_a_line_has_no_moment_about_x(tmp_path):
 
 def gap(text, **changes):
     case = parse_case(text, "case.yaml")
-    grid = grid_of(case)
-    return height_of(case, grid), np.broadcast_arrays(grid.x, grid.y)
+    grid = case.contact.centred()
+    return case.structure.gap_on(grid), np.broadcast_arrays(grid.x, grid.y)
 
 
 def test_gaps_of_the_shapes():
@@ -254,7 +254,7 @@ def heights(tmp_path):
 def test_heights_are_read_as_written(tmp_path, heights, name):
     text = BALL.replace("shape: sphere, radius: 10 mm", f"shape: heights, file: '{name}'")
     case = parse_case(text, str(tmp_path / "case.yaml"))
-    np.testing.assert_array_equal(height_of(case, grid_of(case)), heights)
+    np.testing.assert_array_equal(case.structure.gap_on(case.contact.centred()), heights)
     assert parse_case(dump_case(case), "elsewhere/case.yaml") == case
 
 
@@ -263,7 +263,7 @@ def test_heights_of_one_column_are_a_line_contact(tmp_path):
     text = ROLLER.replace("shape: cylinder, radius: 10 mm", "shape: heights, file: gap.npy")
     case = parse_case(text, str(tmp_path / "case.yaml"))
     assert isinstance(case, LineContactCase)
-    assert height_of(case, grid_of(case)).shape == (64, 1)
+    assert case.structure.gap_on(case.contact.centred()).shape == (64, 1)
 
 
 def test_heights_on_another_grid_are_refused(tmp_path, heights):

@@ -103,7 +103,8 @@ def outcome():
     table = case.load_path.table()
     forces = table["Qx"].tolist()
     states = [mindlin_state(forces[: k + 1]) for k in range(len(table))]
-    return ContactOutcome(case, GRID, (GRID.x**2 + GRID.y**2) / 20.0, table, history(states))
+    height, strain = (GRID.x**2 + GRID.y**2) / 20.0, np.zeros(len(table))
+    return ContactOutcome(case, GRID, height, table, strain, history(states))
 
 
 @pytest.fixture(scope="module")
@@ -317,7 +318,7 @@ def test_line_has_no_maps_and_no_images(tmp_path):
     states = [state((pressure * k, 0 * pressure), [1.0, k, 0, 0, 0, 0], [0, k, 0, 0, 0, 0.0],
                     grid=grid, pressure=pressure) for k in (0.0, 0.5, -0.5)]  # fmt: skip
     table = case.load_path.table()
-    outcome = ContactOutcome(case, grid, grid.x**2, table, history(states))
+    outcome = ContactOutcome(case, grid, grid.x**2, table, np.zeros(len(table)), history(states))
     folder = OutputFolder(tmp_path / "out")
     folder.claim(case, force=False, resumable=False)
     write_contact_results(outcome, SimpleNamespace(kind="line", folder=folder))

@@ -310,8 +310,8 @@ class TestPadHalfSpace:
         height = (grid.x**2 + grid.y**2) / 100.0
         depth = (face.coordinates**2).sum(axis=1) / 100.0
         path = np.array([1e-5, 1e-2])
-        one = beside.rub(height, 0.0 * depth, 50.0, path)
-        other = beside.rub(0.0 * height, depth, 50.0, path)
+        one = beside.fretting_cycle(height, 0.0 * depth, 50.0, path)
+        other = beside.fretting_cycle(0.0 * height, depth, 50.0, path)
         np.testing.assert_allclose(one.pressure, other.pressure, atol=1e-6)
         # Stuck at first, sliding at last, against the motion.
         assert one.force[0] == pytest.approx(1e-5 * one.stick_stiffness, rel=0.1)
@@ -368,7 +368,7 @@ class TestCase:
             ("wear.cycles=1e5", "both given; allowed: either cycles or energy"),
             ("wear.energy=null", "neither given"),
             ("wear.energy=0", "--set wear.energy=0: 0: out of range"),
-            ("wear.cycle_block.share=150 %", "above 0 and at most 1"),
+            ("wear.step.fraction=150 %", "above 0 and at most 1"),
             ("wear.reported.0.normal_force=18 N", "not run; allowed: 87, 250 N"),
             ("contact.method=full", "unknown key; allowed: grid, tolerance"),
         ],
@@ -383,10 +383,10 @@ class TestCase:
         ("overrides", "message"),
         [
             (
-                ["wear.cycle_block.length=1e7"],
-                "wear.cycle_block.length: steps of 1e+07 cycles",
+                ["wear.step.cycles=1e7"],
+                "wear.step.cycles: steps of 1e+07 cycles",
             ),
-            (["wear.cycle_block.length=1"], "more than 20000 cycle blocks"),
+            (["wear.step.cycles=1"], "more than 20000 cycle blocks"),
             (["load_path.stroke=1e-9 mm"], "nothing slides at 87 N"),
             (["load_path.normal_forces.1=1e-6 N"], "a single node of the pad touches"),
         ],

@@ -66,12 +66,14 @@ class TestWear:
         assert last.contact.converged
         volumes = last.depths @ pair.areas
         np.testing.assert_allclose(volumes, [ALPHA * last.energy, 3.0 * ALPHA * last.energy])
-        np.testing.assert_allclose(last.gap, curved + last.depths.sum(axis=0), rtol=1e-12)
+        np.testing.assert_allclose(
+            last.state.surfaces.gap, curved + last.depths.sum(axis=0), rtol=1e-12
+        )
 
     def test_cycles_scale_with_the_wear_coefficients(self, pair, curved):
         *_, slow = worn(pair, curved, 1e5)
         *_, fast = worn(pair, curved, 1e4, laws=(20.0 * ALPHA, 0.0))
-        np.testing.assert_allclose(fast.gap, slow.gap, rtol=1e-9)
+        np.testing.assert_allclose(fast.state.surfaces.gap, slow.state.surfaces.gap, rtol=1e-9)
 
     def test_flat_pads_wear_to_an_even_pressure(self, pair, flat):
         first, *_, last = worn(pair, flat, 1e6)

@@ -7,7 +7,9 @@ from click.testing import CliRunner
 
 from workflow.cli import cli
 from workflow.errors import UserError
-from workflow.runs.verify import _lookup
+from workflow.runs import verify as verification
+from workflow.shell.folder import OutputFolder
+from workflow.shell.summary import QuantityError, required_number
 
 
 def verify(path, out):
@@ -55,10 +57,20 @@ def test_wrong_expectation_is_missed(small_path, tmp_path):
 )
 def test_expectation_of_what_is_not_computed_is_named(quantity, words):
     summary = {"a": {"b": [1.0, 2.0]}, "on": True}
-    assert _lookup(summary, "a.b.-1", "case.yaml") == 2.0
-    with pytest.raises(UserError, match=r"case\.yaml: expect: ") as refusal:
-        _lookup(summary, quantity, "case.yaml")
+    assert required_number(summary, "a.b.-1") == 2.0
+    with pytest.raises(QuantityError) as refusal:
+        required_number(summary, quantity)
     assert words in str(refusal.value)
+
+
+def test_case_is_named_that_expects_what_is_not_computed(small_path, tmp_path, monkeypatch):
+    def run_case(case, out, force):
+        out.mkdir(parents=True)
+        OutputFolder(out).write_summary({})
+
+    monkeypatch.setattr(verification, "run_case", run_case)
+    with pytest.raises(UserError, match=r"\.yaml: expect: no quantity "):
+        verification.verify_cases((small_path,), tmp_path)
 
 
 def test_case_without_expectations_is_refused_before_it_runs(dovetail_path, tmp_path):

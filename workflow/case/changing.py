@@ -12,13 +12,8 @@ Chosen = TypeVar("Chosen", bound=Section)
 
 def changed(section: Chosen, values: Mapping[str, Any]) -> Chosen:
     """The section with other values at dotted paths; the caller knows which go together."""
-    for entry, value in values.items():
-        section = _changed(section, entry.split("."), value)
+    for path, value in values.items():
+        name, _, below = path.partition(".")
+        inner = changed(getattr(section, name), {below: value}) if below else value
+        section = section.model_copy(update={name: inner})
     return section
-
-
-def _changed(section: Chosen, path: list[str], value: Any) -> Chosen:
-    name, *rest = path
-    if rest:
-        value = _changed(getattr(section, name), rest, value)
-    return section.model_copy(update={name: value})

@@ -28,18 +28,14 @@ SENTENCES = {
 }
 
 
-def lines_about(source: Source, case: type[Section], errors: Iterable[ErrorDetails]) -> list[str]:
-    """The lines of text about ``errors`` of a ``case``, in the order of the file."""
-    return _Explanation(source, case).lines(list(errors))
-
-
-class _Explanation:
+class Explanation:
     """What is wrong with one text, read as one kind of case."""
 
     def __init__(self, source: Source, case: type[Section]) -> None:
         self.source, self.case = source, case
 
-    def lines(self, errors: list[ErrorDetails]) -> list[str]:
+    def lines(self, errors: Sequence[ErrorDetails]) -> list[str]:
+        """The lines of text about ``errors``, in the order of the file."""
         unknown = [
             self._path(details) for details in errors if details["type"] == "extra_forbidden"
         ]

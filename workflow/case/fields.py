@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import os
+import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path as Pathname
@@ -18,6 +19,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
 from workflow.case import units
 
+DOTTED = r"[\w-]+(\.[\w-]+)*"
 LONGEST_SHOWN = 60  # of a wrong value in a message, which must stay one readable line
 
 
@@ -164,9 +166,7 @@ class Whole(Entry):
 class Text(Entry):
     """One line of printable text."""
 
-    @property
-    def allowed(self) -> str:
-        return "one line of text"
+    allowed = "one line of text"
 
     def parse(self, value: object) -> str:
         if not isinstance(value, str):
@@ -185,19 +185,15 @@ class Text(Entry):
 class Path(Entry):
     """Keys joined by dots, such as ``wear.blade.coefficient``; list entries by their number."""
 
-    @property
-    def allowed(self) -> str:
-        return "keys joined by dots, such as wear.blade.coefficient"
+    allowed = "keys joined by dots, such as wear.blade.coefficient"
 
     def parse(self, value: object) -> str:
-        if not isinstance(value, str):
-            raise self.refusal(value, "not a dotted path")
-        if not all(key.replace("-", "_").replace("_", "a").isalnum() for key in value.split(".")):
+        if not isinstance(value, str) or not re.fullmatch(DOTTED, value):
             raise self.refusal(value, "not a dotted path")
         return value
 
     def json_schema(self) -> dict[str, Any]:
-        return {"type": "string", "pattern": r"^[\w-]+(\.[\w-]+)*$"}
+        return {"type": "string", "pattern": f"^{DOTTED}$"}
 
 
 @dataclass(frozen=True)

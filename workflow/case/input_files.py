@@ -60,12 +60,6 @@ def number_in(place: str, cell: str) -> float:
     return number
 
 
-def height_shape(file: str) -> tuple[int, int]:
-    """Cells along x and y of a file of heights. Raises InputFileError."""
-    rows, columns = read_heights(file).shape
-    return rows, columns
-
-
 def read_heights(file: str) -> Array:
     """Heights ``(nx, ny)`` [mm] of ``.npy``, ``.csv`` or ``.h5:dataset``; a list is one column.
 

@@ -8,13 +8,14 @@ from typing import TypeVar
 
 from pydantic import ValidationError
 
-from workflow.case.explain import lines_about
+from workflow.case.explain import Explanation
 from workflow.case.fields import shown
-from workflow.case.sections import Case, words_of
+from workflow.case.sections import Case, Section, words_of
 from workflow.case.source import KeyPath, Source, dotted, read_text
 from workflow.errors import CaseError, UserError
 
 AnyCase = TypeVar("AnyCase", bound=Case)
+AnySection = TypeVar("AnySection", bound=Section)
 
 
 def load_case(
@@ -36,11 +37,15 @@ def parse_case(
     Files that the case names are looked for from the folder of ``name``.
     """
     source = Source(name, text, overrides)
-    kind = _kind_of_case(source, kinds)
+    return validated(source, _kind_of_case(source, kinds))
+
+
+def validated(source: Source, model: type[AnySection]) -> AnySection:
+    """What the source says, as a ``model``. Raises ``CaseError``, a line for each thing wrong."""
     try:
-        return kind.model_validate(source.data, context={"folder": str(Path(name).parent)})
+        return model.model_validate(source.data, context={"folder": str(Path(source.name).parent)})
     except ValidationError as error:
-        raise CaseError("\n".join(lines_about(source, kind, error.errors()))) from None
+        raise CaseError("\n".join(Explanation(source, model).lines(error.errors()))) from None
 
 
 class OtherKind(CaseError):
@@ -68,13 +73,8 @@ def _kind_of_case(source: Source, kinds: Sequence[type[AnyCase]]) -> type[AnyCas
         word = word_at(source, path, tuple(words))
         kinds = [kind for kind in kinds if word in words_of(kind, *path)]
         if path == ("analysis",):
-            kinds = _suiting(source, kinds)
+            kinds = [kind for kind in kinds if kind.suits(source)] or kinds
     return kinds[0]
-
-
-def _suiting(source: Source, kinds: Sequence[type[AnyCase]]) -> list[type[AnyCase]]:
-    """Those that the source may mean; all of them where none suits."""
-    return [kind for kind in kinds if kind.suits(source)] or list(kinds)
 
 
 def word_at(source: Source, path: KeyPath, allowed: tuple[str, ...]) -> str:

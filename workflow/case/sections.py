@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Self, get_args
+from typing import Annotated, Any, ClassVar, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, field_validator, model_validator
 from pydantic.fields import FieldInfo
@@ -16,9 +16,7 @@ from pydantic_core import PydanticCustomError
 
 from sa_solver.types import Material as ElasticMaterial
 from workflow.case.fields import Entry, Path, Quantity, Text, Whole
-
-if TYPE_CHECKING:
-    from workflow.case.source import Source
+from workflow.case.source import Source
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual machine.
 Length = Annotated[float, Quantity("mm", above=0.0, at_most=1e4)]

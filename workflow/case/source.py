@@ -104,7 +104,7 @@ class _Reading:
         """``node`` as dictionaries, lists and scalars; its lines are noted in ``lines``."""
         self.lines[path] = line
         if len(path) > DEEPEST or len(self.lines) > MOST_ENTRIES:
-            raise CaseError(f"{self._place(line)}: nested too deeply or too long for a case")
+            raise CaseError(f"{_place(self.name, line)}: nested too deeply or too long for a case")
         if isinstance(node, CommentedMap):
             return dict(self._item(key, node, path, line) for key in node)
         if isinstance(node, CommentedSeq):
@@ -116,19 +116,16 @@ class _Reading:
         if node is None:
             return None
         raise CaseError(
-            f"{self._place(line)}: {dotted(path)}: a {type(node).__name__}; "
+            f"{_place(self.name, line)}: {dotted(path)}: a {type(node).__name__}; "
             "allowed: number, text (in quotes if it looks like a date), true, false, list, section"
         )
 
     def _item(self, key: Any, node: CommentedMap, path: KeyPath, line: int) -> tuple[str, Any]:
         below = _line_of(node, key, line)
         if not isinstance(key, str):
-            raise CaseError(f"{self._place(below)}: {shown(key)}: not a key; allowed: words")
+            raise CaseError(f"{_place(self.name, below)}: {shown(key)}: not a key; allowed: words")
         name = str(key)
         return name, self.plain(node[key], (*path, name), below)
-
-    def _place(self, line: int) -> str:
-        return _place(self.name, line)
 
 
 def read_text(path: Path) -> str:

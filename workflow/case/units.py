@@ -11,6 +11,7 @@ import difflib
 import re
 from decimal import Decimal
 from functools import cache
+from math import prod
 from typing import TYPE_CHECKING, NamedTuple
 
 if TYPE_CHECKING:
@@ -102,10 +103,8 @@ def split(text: str) -> tuple[Decimal, str]:
 def _base_factor(powers: dict[str, Decimal]) -> Decimal:
     """Size in root units of the base unit of a dimension: mm and tonne instead of m and g."""
     base = {"meter": Decimal("1e-3"), "gram": Decimal("1e6")}
-    factor = Decimal(1)
-    for root, power in powers.items():
-        factor *= base.get(root, Decimal(1)) ** power
-    return factor
+    one = Decimal(1)
+    return prod((base.get(root, one) ** power for root, power in powers.items()), start=one)
 
 
 @cache

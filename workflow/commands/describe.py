@@ -24,7 +24,6 @@ def _length(text: str) -> float:
     """A length in mm. Raises UserError."""
     value = float(text) if text.replace(".", "", 1).isdecimal() else text
     try:
-        length: float = TypeAdapter(Length).validate_python(value)
+        return TypeAdapter(Length).validate_python(value)
     except ValidationError as error:
         raise UserError(f"--size: {error.errors()[0]['msg']}") from error
-    return length

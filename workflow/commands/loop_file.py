@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from pathlib import Path
 
 from sa_solver.types import Array
@@ -16,30 +15,21 @@ BASE_UNITS = {"displacement": "mm", "force": "N", "time": "s", "normal_load": "N
 NEEDED = ("displacement", "force")
 
 
-@dataclass(frozen=True)
-class LoopFile:
-    """Columns of a file, ``(t,)`` each, in base units; None for those that it does not have."""
+def read_loop_file(path: Path, names: Mapping[str, str]) -> dict[str, Array]:
+    """The columns ``(t,)`` of ``BASE_UNITS`` that a file has, in these units.
 
-    displacement: Array
-    force: Array
-    time: Array | None
-    normal_load: Array | None
-
-
-def read_loop_file(path: Path, names: Mapping[str, str]) -> LoopFile:
-    """Read the columns of ``BASE_UNITS``, of which ``names`` gives those named otherwise.
-
-    Other columns are left alone. Raises UserError with the line.
+    ``names`` gives those named otherwise; other columns are left alone. Raises UserError with the
+    line.
     """
     called = {key: names.get(key, key) for key in BASE_UNITS}
     try:
         table = read_table_file(path)
         for key in (*NEEDED, *names):
             table.require([called[key]], f"a column of that name, or --column {key}=NAME")
-        columns = {
-            key: table.column(called[key], Quantity(unit)) if called[key] in table.names else None
+        return {
+            key: table.column(called[key], Quantity(unit))
             for key, unit in BASE_UNITS.items()
+            if called[key] in table.names
         }
     except InputFileError as error:
         raise UserError(str(error)) from error
-    return LoopFile(**columns)  # type: ignore[arg-type]

@@ -12,7 +12,7 @@ from wear.joints.loop_record import MeasuredLoopError
 from wear.joints.measured_loops import MeanEstimate, MeasuredLoops, mean_estimate, measure_loops
 from workflow.analyses.wear.loop_table import write_loop_table
 from workflow.case.units import UnitError, to_base
-from workflow.commands.loop_file import BASE_UNITS, LoopFile, read_loop_file
+from workflow.commands.loop_file import BASE_UNITS, read_loop_file
 from workflow.errors import UserError
 
 TABLE, FIGURE = "loops.csv", "loops.png"
@@ -29,9 +29,8 @@ def loops_of_file(path: Path, columns: Sequence[str], normal_load: str | None) -
     """
     record = read_loop_file(path, _names(columns))
     try:
-        return measure_loops(
-            record.displacement, record.force, _normal_load(path, record, normal_load), record.time
-        )
+        load = _normal_load(path, record.get("normal_load"), normal_load)
+        return measure_loops(record["displacement"], record["force"], load, record.get("time"))
     except MeasuredLoopError as error:
         raise UserError(f"{path}: {error}") from error
 
@@ -50,11 +49,11 @@ def _names(columns: Sequence[str]) -> dict[str, str]:
     return names
 
 
-def _normal_load(path: Path, record: LoopFile, text: str | None) -> Array | float | None:
+def _normal_load(path: Path, column: Array | None, text: str | None) -> Array | float | None:
     """The normal load of the file or of the command."""
     if text is None:
-        return record.normal_load
-    if record.normal_load is not None:
+        return column
+    if column is not None:
         raise UserError(f"{path}: has a column of the normal load; allowed: it or --normal-load")
     try:
         load = _number(text) or to_base(text, "N")

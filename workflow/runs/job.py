@@ -66,22 +66,18 @@ def main() -> None:
     threading.Thread(target=_end_with_parent, daemon=True).start()
     arguments = json.loads(sys.argv[1])
     job = Job(arguments["name"], Path(arguments["case"]), tuple(arguments["overrides"]))
-    error = ""
+    root, error = Path(arguments["out"]) / job.name, ""
     try:
-        bring_to_end(job.load(), Path(arguments["out"]) / job.name)
+        bring_to_end(job.load(), root)
     except FretscaleError as ending:
         error = str(ending)
     except Exception as ending:
         error = f"{type(ending).__name__}: {ending}"
-        _log(OutputFolder(Path(arguments["out"]) / job.name), traceback.format_exc())
+        # What one line cannot say is kept in the log of the run.
+        with suppress(OSError), OutputFolder(root).reserve_log().open("a", encoding="utf-8") as log:
+            log.write(traceback.format_exc())
     answer.write(json.dumps({"error": error}))
     answer.close()
-
-
-def _log(folder: OutputFolder, text: str) -> None:
-    """Keep what one line cannot say in the log of the run."""
-    with suppress(OSError), folder.reserve_log().open("a", encoding="utf-8") as log:
-        log.write(text)
 
 
 def _end_with_parent() -> None:

@@ -9,7 +9,6 @@ import os
 import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ThreadPoolExecutor, wait
-from dataclasses import dataclass
 from pathlib import Path
 
 from workflow.case.sections import Case
@@ -17,8 +16,6 @@ from workflow.errors import Ending, one_line
 from workflow.runs.cluster import run_on_cluster
 from workflow.runs.job import Finished, Job, finished, run_job
 from workflow.runs.run import kept_in
-
-Report = Callable[[Finished], None]
 
 
 def run_jobs(
@@ -28,7 +25,7 @@ def run_jobs(
     processes: int | None = None,
     alone: bool = False,
     dask: str | None = None,
-    report: Report | None = None,
+    report: Callable[[Finished], None] | None = None,
 ) -> list[Finished]:
     """Run every job in the folder of its name below ``out``; in the order of ``jobs``.
 
@@ -49,7 +46,7 @@ def run_jobs(
         if report is not None:
             report(ended[job.name])
 
-    left: list[_Waiting] = []
+    left: list[tuple[Job, Case]] = []
     for job in jobs:
         try:
             case = job.load()
@@ -59,19 +56,13 @@ def run_jobs(
         if kept_in(out / job.name, case) == "finished":
             end(job, "")
         else:
-            left.append(_Waiting(job, case))
+            left.append((job, case))
     if dask is not None:
-        run_on_cluster([(waiting.job, waiting.case) for waiting in left], out, dask, end)
+        run_on_cluster(left, out, dask, end)
     else:
         cores = 1 if alone else processes or os.cpu_count() or 1
         _run_here(left, out, cores, end, one_thread=not alone)
     return [ended[job.name] for job in jobs]
-
-
-@dataclass(frozen=True)
-class _Waiting:
-    job: Job
-    case: Case
 
 
 def _check_names(jobs: Sequence[Job]) -> None:
@@ -84,7 +75,7 @@ def _check_names(jobs: Sequence[Job]) -> None:
 
 
 def _run_here(
-    jobs: Sequence[_Waiting],
+    jobs: Sequence[tuple[Job, Case]],
     out: Path,
     cores: int,
     end: Callable[[Job, str], None],
@@ -92,7 +83,7 @@ def _run_here(
 ) -> None:
     """Run jobs side by side, first come, first served; one that wants more cores runs alone."""
     stop = threading.Event()
-    queue = [(waiting.job, min(waiting.case.cores, cores)) for waiting in jobs]
+    queue = [(job, min(case.cores, cores)) for job, case in jobs]
     running: dict[Future[str], tuple[Job, int]] = {}
     with ThreadPoolExecutor(max_workers=cores) as pool:
         try:

@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 from workflow.case.changing import changed
 from workflow.case.sections import Case
@@ -14,7 +14,7 @@ from workflow.case.writing import dump_case
 from workflow.errors import CaseError, UserError
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import write_pictures
-from workflow.shell.analysis import Run
+from workflow.shell.analysis import Analysis, Run
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
 from workflow.shell.reporter import Reporter
 
@@ -35,7 +35,7 @@ def run_case(case: Case, out: Path, force: bool) -> None:
     folder = OutputFolder(out)
     stays = folder.claim(case, force, resumable=analysis.resumable is not None)
     folder.keep_choice(choice)
-    _run(case, folder, resume=False, stays=stays)
+    _run(analysis, case, folder, resume=False, stays=stays)
 
 
 def resume_run(out: Path) -> bool:
@@ -60,7 +60,7 @@ def resume_run(out: Path) -> bool:
     analysis.memory(case).check()
     folder.clear_partial()
     folder.reserve_state()
-    _run(case, folder, resume=True)
+    _run(analysis, case, folder, resume=True)
     return True
 
 
@@ -90,7 +90,8 @@ def kept_in(root: Path, case: Case) -> Kept:
         return "nothing"
     finished = folder.summary.exists()
     record = folder.read_summary().get("fidelity") if finished else folder.choice
-    if not _is_case(folder.case, _as_chosen(case, record)):
+    # As a run of it was claimed, after its open settings had been chosen.
+    if not _is_case(folder.case, changed(case, (record or {}).get("chosen", {}))):
         return "other"
     if finished:
         return "finished"
@@ -98,11 +99,12 @@ def kept_in(root: Path, case: Case) -> Kept:
     return "unfinished" if listed and analysis_of(case).resumable is not None else "nothing"
 
 
-def _run(case: Case, folder: OutputFolder, resume: bool, stays: Sequence[str] = ()) -> None:
+def _run(
+    analysis: Analysis, case: Case, folder: OutputFolder, resume: bool, stays: Sequence[str] = ()
+) -> None:
     def compute(file: Path, root: Path) -> bool:
         return bring_to_end(load_case(file), root)
 
-    analysis = analysis_of(case)
     reporter = Reporter(folder.reserve_log(), append=resume)
 
     def draw() -> None:
@@ -130,11 +132,6 @@ def _is_case(path: Path, case: Case) -> bool:
         return load_case(path) == case
     except CaseError:
         return False
-
-
-def _as_chosen(case: Case, record: dict[str, Any] | None) -> Case:
-    """The case as a run of it was claimed, after its open settings had been chosen."""
-    return changed(case, (record or {}).get("chosen", {}))
 
 
 def _refuse_foreign(root: Path) -> None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
 
 from rich.box import SIMPLE
 from rich.console import Console
@@ -13,6 +12,7 @@ from workflow.errors import UserError
 from workflow.kinds import load_case
 from workflow.runs.run import run_case
 from workflow.shell.folder import OutputFolder
+from workflow.shell.summary import QuantityError, required_number
 
 COLUMNS = "expected", "computed", "error", "verdict", "source"
 # Columns of text where the table goes to a file.
@@ -30,12 +30,15 @@ def verify_cases(cases: tuple[Path, ...], out: Path) -> bool:
         console.width = FILE_WIDTH
     met_all = True
     for path, case in loaded:
-        folder = out / Path(path).stem
+        folder = out / path.stem
         run_case(case, folder, force=True)
         summary = OutputFolder(folder).read_summary()
         table = Table(Column("quantity", no_wrap=True), *COLUMNS, title=str(path), box=SIMPLE)
         for entry in case.expect:
-            computed = _lookup(summary, entry.quantity, path)
+            try:
+                computed = required_number(summary, entry.quantity)
+            except QuantityError as wrong:
+                raise UserError(f"{path}: expect: {wrong}") from wrong
             error = abs(computed - entry.value) / (abs(entry.value) or 1.0)
             met = error <= entry.tolerance
             met_all &= met
@@ -48,24 +51,3 @@ def verify_cases(cases: tuple[Path, ...], out: Path) -> bool:
             table.add_row(entry.quantity, *row, entry.source)
         console.print(table)
     return met_all
-
-
-def _lookup(summary: dict[str, Any], quantity: str, path: Path) -> float:
-    """The number a dotted path leads to."""
-    node: Any = summary
-    for key in quantity.split("."):
-        if (
-            isinstance(node, list)
-            and key.lstrip("-").isdecimal()
-            and -len(node) <= int(key) < len(node)
-        ):
-            node = node[int(key)]
-        elif isinstance(node, dict) and key in node:
-            node = node[key]
-        else:
-            raise UserError(
-                f"{path}: expect: no quantity {quantity} in summary.json ({key} is missing)"
-            )
-    if isinstance(node, bool) or not isinstance(node, int | float):
-        raise UserError(f"{path}: expect: {quantity} is not a number")
-    return float(node)

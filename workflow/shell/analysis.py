@@ -61,21 +61,9 @@ def as_written(case: Any) -> tuple[Any, None]:
     return case, None
 
 
-def _expected(case: Case, summary: Summary) -> list[str]:
+def expected(case: Case, summary: Summary) -> list[str]:
     """What a case expects to find; of 0 there is no relative error."""
-    return [own.quantity for own in case.expect if own.value]
-
-
-def _none(summary: Summary) -> list[str]:
-    return []
-
-
-def _as_it_is(folder: Path, summary: Summary) -> Summary:
-    return summary
-
-
-def _no_fields(folder: Path, reference: Path, summary: Summary) -> dict[str, float]:
-    return {}
+    return [entry.quantity for entry in case.expect if entry.value]
 
 
 @dataclass(frozen=True)
@@ -89,13 +77,13 @@ class Comparison(Generic[AnyCase]):
     the results in the folder tell, ``apart`` how far they are from those in another, by name.
     """
 
-    quantities: Callable[[AnyCase, Summary], list[str]] = _expected
-    extras: Callable[[Summary], list[str]] = _none
-    sections: Callable[[Summary], list[str]] = _none
+    quantities: Callable[[AnyCase, Summary], list[str]] = expected
+    extras: Callable[[Summary], list[str]] = lambda summary: []
+    sections: Callable[[Summary], list[str]] = lambda summary: []
     at_the_end: tuple[str, ...] = ()
     plain: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    measured: Callable[[Path, Summary], Summary] = _as_it_is
-    apart: Callable[[Path, Path, Summary], dict[str, float]] = _no_fields
+    measured: Callable[[Path, Summary], Summary] = lambda folder, summary: summary
+    apart: Callable[[Path, Path, Summary], dict[str, float]] = lambda *runs: {}
 
 
 @dataclass(frozen=True)

@@ -20,8 +20,6 @@ from workflow.shell.store import read_arrays, write_arrays
 
 # Files are pruned, least recently used first, above this size; one default dovetail takes 67 MB.
 LARGEST_CACHE = 4 * 1024**3
-# Datasets of a joint with a mirror symmetry.
-HALVES = "kept", "turned"
 SOLVERS = ("numpy", "scipy", "scikit-fem", "gmsh")
 
 
@@ -44,12 +42,17 @@ def content_key(*parts: object) -> str:
 
 def load_joint(key: str) -> JointResolvent | None:
     """The condensed joint of that key, or None."""
-    found = _load(f"joint-{key}")
-    if found is None:
+    if (kept := _load(f"joint-{key}")) is None:
         return None
-    arrays, attributes = found
+    arrays, attributes = kept
+    inverse: Array | SplitMatrix
+    if "inverse" in arrays:
+        inverse = arrays["inverse"]
+    else:
+        mirror = Mirror(arrays["partner"], arrays["sign"])
+        inverse = SplitMatrix(mirror, (arrays["kept"], arrays["turned"]))
     return JointResolvent(
-        inverse=_inverse(arrays),
+        inverse=inverse,
         rho=float(attributes["rho"]),
         loads=arrays["loads"],
         rigid_modes=int(attributes["rigid_modes"]),
@@ -61,27 +64,18 @@ def save_joint(key: str, joint: JointResolvent) -> None:
     inverse = joint.inverse
     arrays: dict[str, Any] = {"loads": joint.loads}
     if isinstance(inverse, SplitMatrix):
-        mirror = {"partner": inverse.mirror.partner, "sign": inverse.mirror.sign}
-        arrays |= mirror | dict(zip(HALVES, inverse.blocks, strict=True))
+        arrays |= {"partner": inverse.mirror.partner, "sign": inverse.mirror.sign}
+        arrays["kept"], arrays["turned"] = inverse.blocks
     else:
         arrays["inverse"] = inverse
     _save(f"joint-{key}", arrays, {"rho": joint.rho, "rigid_modes": joint.rigid_modes})
 
 
-def _inverse(arrays: dict[str, Any]) -> Array | SplitMatrix:
-    """(H + ρ)⁻¹ as it was kept."""
-    if "inverse" in arrays:
-        return np.asarray(arrays["inverse"])
-    kept, turned = (arrays[name] for name in HALVES)
-    return SplitMatrix(Mirror(arrays["partner"], arrays["sign"]), (kept, turned))
-
-
 def load_cycle(key: str, structure: Structure, friction: float) -> CycleSolution | None:
     """The solved cycle of that key on its structure, or None."""
-    found = _load(f"cycle-{key}")
-    if found is None:
+    if (kept := _load(f"cycle-{key}")) is None:
         return None
-    arrays, attributes = found
+    arrays, attributes = kept
     fields = {name: arrays[name] for name in FIELDS}
     return CycleSolution(
         histories=structure.histories(**fields, friction=friction),
@@ -106,8 +100,8 @@ def save_cycle(key: str, cycle: CycleSolution) -> None:
 
 def load_arrays(name: str) -> dict[str, Any] | None:
     """Named arrays kept under that name, or None."""
-    found = _load(name)
-    return None if found is None else found[0]
+    kept = _load(name)
+    return None if kept is None else kept[0]
 
 
 def save_arrays(name: str, arrays: dict[str, Array]) -> None:
@@ -118,11 +112,10 @@ def save_arrays(name: str, arrays: dict[str, Array]) -> None:
 def _load(name: str) -> tuple[dict[str, Any], dict[str, Any]] | None:
     path = cache_folder() / f"{name}.h5"
     try:
-        found = read_arrays(path)
         os.utime(path)
+        return read_arrays(path)
     except OSError:
         return None
-    return found
 
 
 def _save(name: str, arrays: dict[str, Array], attributes: dict[str, Any]) -> None:

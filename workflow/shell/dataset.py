@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,3 +32,11 @@ Datasets = Mapping[str, Dataset]
 def unit_in(line: bool, unit: str) -> str:
     """The ``unit`` in a contact over an area, or in a ``line`` contact, where forces are per mm."""
     return PER_LENGTH.get(unit, unit) if line else unit
+
+
+def described(
+    quantities: Mapping[str, tuple[str, str]], values: Iterable[NDArray[Any]]
+) -> dict[str, Dataset]:
+    """Values as datasets, given in the order of ``quantities``: unit and description by name."""
+    pairs = zip(quantities.items(), values, strict=True)
+    return {name: Dataset(array, *what) for (name, what), array in pairs}

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import shutil
 from collections.abc import Mapping
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -71,7 +72,7 @@ class OutputFolder:
         """Remove what the run has no more use for."""
         _remove(self.root / name)
         listed = self.manifest or {}
-        write_json(self.root / MANIFEST, {own: listed[own] for own in listed if own != name})
+        write_json(self.root / MANIFEST, {n: what for n, what in listed.items() if n != name})
 
     def reserve_state(self) -> None:
         """Make room for what a run needs to go on where it was cut off."""
@@ -88,8 +89,7 @@ class OutputFolder:
 
     def read_summary(self) -> dict[str, Any]:
         """The summary of a finished run."""
-        summary: dict[str, Any] = json.loads(self.summary.read_text(encoding="utf-8"))
-        return summary
+        return json.loads(self.summary.read_text(encoding="utf-8"))
 
     def keep_choice(self, record: Mapping[str, Any] | None) -> None:
         """Keep what was chosen for the case with the run until it is finished."""
@@ -100,10 +100,7 @@ class OutputFolder:
     def choice(self) -> dict[str, Any] | None:
         """What was chosen for the case, of a run that is not finished yet; None for nothing."""
         path = self.jumps / CHOICE
-        record: dict[str, Any] | None = None
-        if path.exists():
-            record = json.loads(path.read_text(encoding="utf-8"))
-        return record
+        return json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
 
     # --- whose it is ----------------------------------------------------------------------------
 
@@ -182,11 +179,8 @@ def _is_entry(name: str) -> bool:
 
 def _free(path: Path) -> Path:
     """The path, or the first with a number at its end that nothing has."""
-    number, free = 1, path
-    while free.exists():
-        number += 1
-        free = path.with_name(f"{path.name}{number}")
-    return free
+    numbered = (path.with_name(f"{path.name}{number}") for number in count(2))
+    return next(free for free in chain([path], numbered) if not free.exists())
 
 
 def _remove(path: Path) -> None:

@@ -39,10 +39,9 @@ class Workers:
         gone.
         """
         try:
-            for connection, own in zip(
-                self._connections, zip(*arguments, strict=True), strict=True
-            ):
-                connection.send((method, own))
+            shares = zip(*arguments, strict=True)
+            for connection, share in zip(self._connections, shares, strict=True):
+                connection.send((method, share))
         except OSError as error:
             raise _gone(error) from error
         return _answers(self._connections)
@@ -54,7 +53,9 @@ def workers(make: Callable[[Any], Answering], settings: Sequence[Any]) -> Iterat
 
     What ``make`` makes of them lives in the worker.
     """
-    with _processes(_serve, [(make, own) for own in settings], one_thread=True) as connections:
+    with _processes(
+        _serve, [(make, setting) for setting in settings], one_thread=True
+    ) as connections:
         yield Workers(connections)
 
 
@@ -80,9 +81,9 @@ def _processes(
             if one_thread:
                 stack.enter_context(_environment(dict.fromkeys(THREAD_SETTINGS, "1")))
             stack.enter_context(_interrupts_held())
-            for own in arguments:
+            for parts in arguments:
                 ours, theirs = context.Pipe()
-                process = context.Process(target=_run, args=(target, theirs, *own), daemon=True)
+                process = context.Process(target=_run, args=(target, theirs, *parts), daemon=True)
                 process.start()
                 theirs.close()
                 connections.append(ours)

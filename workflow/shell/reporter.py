@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
+from functools import partial
 from pathlib import Path
 
 from rich.console import Console
@@ -65,52 +66,30 @@ class Reporter:
     @contextmanager
     def increments(self, total: int) -> Iterator[Callable[[int], None]]:
         """A bar over the increments of a path; yields what is told the number reached."""
-        columns = (
-            TextColumn("contact"),
-            BarColumn(),
-            MofNCompleteColumn(),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-        )
-        with self._bar(*columns) as progress:
-            task = progress.add_task("contact", total=total)
-            yield lambda reached: progress.update(task, completed=reached)
+        with self._bar("contact", total, MofNCompleteColumn()) as update:
+            yield lambda reached: update(completed=reached)
 
     @contextmanager
-    def jumps(self, total: float, done: float) -> Iterator[JumpProgress]:
-        """A bar over the cycles of a run."""
-        columns = (
-            TextColumn("wear"),
-            BarColumn(),
-            TextColumn("{task.fields[text]}"),
-            TimeElapsedColumn(),
-            TextColumn("left"),
-            TimeRemainingColumn(),
-        )
-        with self._bar(*columns) as progress:
-            yield JumpProgress(progress, total, done)
+    def jumps(self, total: float, done: float) -> Iterator[Callable[[float, int], None]]:
+        """A bar over the cycles of a run; yields what is told those reached, and of the jumps."""
+        with self._bar("wear", total, TextColumn("{task.fields[text]}")) as update:
+
+            def show(cycles: float, jump: int) -> None:
+                update(completed=cycles, text=f"jump {jump}, {cycles:.4g} cycles")
+
+            show(done, 0)
+            yield show
 
     @contextmanager
-    def _bar(self, *columns: ProgressColumn) -> Iterator[Progress]:
-        """A bar on the screen, where no stage is shown beside it."""
+    def _bar(
+        self, name: str, total: float, reached: ProgressColumn
+    ) -> Iterator[Callable[..., None]]:
+        """A bar on the screen, where no stage is shown beside it; yields what moves it."""
+        left = TextColumn("left"), TimeRemainingColumn()
+        columns = TextColumn(name), BarColumn(), reached, TimeElapsedColumn(), *left
         self._bar_shown = True
         try:
             with Progress(*columns, console=self._console, transient=True) as progress:
-                yield progress
+                yield partial(progress.update, progress.add_task(name, total=total, text=""))
         finally:
             self._bar_shown = False
-
-
-class JumpProgress:
-    """The bar of a wear run."""
-
-    def __init__(self, progress: Progress, total: float, done: float) -> None:
-        self._progress = progress
-        self._task = progress.add_task("wear", total=total, text="")
-        self.update(done, 0)
-
-    def update(self, cycles: float, jump: int) -> None:
-        """Show the cycles reached and the number of the jump."""
-        text = f"jump {jump}, {cycles:.4g} cycles"
-        self._progress.update(self._task, completed=cycles, text=text)

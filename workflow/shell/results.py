@@ -20,6 +20,7 @@ from workflow.shell.versions import versions
 
 # Datasets of more values are worth packing.
 LARGE = 4096
+PACKED = {"compression": "gzip", "compression_opts": 1}
 
 
 class ResultsWriter:
@@ -32,13 +33,11 @@ class ResultsWriter:
         """Write a group, new or there already; attributes that are None are left out."""
         place = self._file.require_group(group)
         for name, dataset in datasets.items():
-            packed = {"compression": "gzip", "compression_opts": 1}
-            written = place.create_dataset(
-                name, data=dataset.values, **(packed if np.size(dataset.values) > LARGE else {})
-            )
+            packed = PACKED if np.size(dataset.values) > LARGE else {}
+            written = place.create_dataset(name, data=dataset.values, **packed)
             written.attrs["unit"] = unit_in(self._line, dataset.unit)
             written.attrs["description"] = dataset.description
-        place.attrs.update({name: own for name, own in attributes.items() if own is not None})
+        place.attrs.update({name: value for name, value in attributes.items() if value is not None})
 
     def put_grid(self, group: str, grid: Grid, frame: Frame | None = None) -> None:
         """A grid and, where it is known, its place in space."""

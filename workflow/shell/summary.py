@@ -1,4 +1,4 @@
-"""``summary.json``: what every run says of itself around what its analysis has found."""
+"""``summary.json``: what every run says of itself around the numbers of its analysis."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from workflow.shell.analysis import Run
 from workflow.shell.versions import versions
 
 
-def finish(run: Run[Any], found: Mapping[str, Any], lines: Iterable[str]) -> None:
+def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> None:
     """Write the summary of a run, which marks it as finished, and say how it ended.
 
-    ``found`` is what the analysis tells, ``lines`` the same in short.
+    ``numbers`` are what the analysis tells, ``lines`` the same in short.
     """
     reporter = run.reporter
     seconds = {name: round(value, 2) for name, value in reporter.seconds.items()}
@@ -20,7 +20,7 @@ def finish(run: Run[Any], found: Mapping[str, Any], lines: Iterable[str]) -> Non
         {
             "title": run.case.title,
             "assumed": list(run.case.assumed),
-            **found,
+            **numbers,
             **({"fidelity": run.choice} if run.choice else {}),
             "warnings": reporter.warnings,
             "seconds": seconds,
@@ -34,13 +34,26 @@ def finish(run: Run[Any], found: Mapping[str, Any], lines: Iterable[str]) -> Non
     )
 
 
-def number_at(summary: Mapping[str, Any], path: str) -> float | None:
-    """The number that a dotted path leads to; None where there is none."""
+class QuantityError(ValueError):
+    """A dotted path that leads to no number of a summary; the message says where it ends."""
+
+
+def required_number(summary: Mapping[str, Any], path: str) -> float:
+    """The number that a dotted path leads to. Raises QuantityError."""
     node: Any = summary
     for key in path.split("."):
-        if isinstance(node, list) and key.lstrip("-").isdecimal():
-            place = int(key)
-            node = node[place] if -len(node) <= place < len(node) else None
-        else:
-            node = node.get(key) if isinstance(node, Mapping) else None
-    return None if isinstance(node, bool) or not isinstance(node, int | float) else float(node)
+        try:
+            node = node[int(key) if isinstance(node, list) else key]
+        except (LookupError, TypeError, ValueError):
+            raise QuantityError(f"no quantity {path} in summary.json ({key} is missing)") from None
+    if isinstance(node, bool) or not isinstance(node, int | float):
+        raise QuantityError(f"{path} is not a number")
+    return float(node)
+
+
+def number_at(summary: Mapping[str, Any], path: str) -> float | None:
+    """The number that a dotted path leads to; None where there is none."""
+    try:
+        return required_number(summary, path)
+    except QuantityError:
+        return None

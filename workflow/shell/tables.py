@@ -43,7 +43,7 @@ def write_table(
     Numbers have so many digits, or as many as it takes to read back the same. None is an empty
     cell.
     """
-    values = [own.tolist() if isinstance(own, np.ndarray) else own for own in columns.values()]
+    values = [v.tolist() if isinstance(v, np.ndarray) else v for v in columns.values()]
     with replacing(path) as partial, partial.open("w", encoding="utf-8", newline="") as file:
         if note:
             file.write(f"# {note}\n")

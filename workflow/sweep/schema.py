@@ -8,11 +8,11 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, create_model, model_validator
+from pydantic import Field, create_model, model_validator
 
 from workflow.case import units
-from workflow.case.explain import lines_about
 from workflow.case.fields import Entry, File, Whole, shown
+from workflow.case.loading import validated
 from workflow.case.sections import Section, Title, disagreement, entry
 from workflow.case.source import Source, read_text
 from workflow.case.writing import scalar
@@ -258,12 +258,7 @@ class Sweep:
 def load_sweep(path: Path) -> Sweep:
     """Read the file of a sweep. Raises CaseError, a line ``file:line: key: ...`` for each thing."""
     source = Source(str(path), read_text(path))
-    kind = _kind_of(source)
-    try:
-        file = kind.model_validate(source.data, context={"folder": str(path.parent)})
-    except ValidationError as error:
-        raise CaseError("\n".join(lines_about(source, kind, error.errors()))) from None
-    sweep = Sweep(str(path), file, source)
+    sweep = Sweep(str(path), validated(source, _kind_of(source)), source)
     if wrong := list(_disagreements(sweep)):
         raise CaseError("\n".join(wrong))
     return sweep

@@ -1,13 +1,13 @@
 """Contact of two bodies along a path of loads: no structure, no wear."""
 
-from workflow.analyses.contact.case import ContactCase, LineContactCase
+from workflow.analyses.contact.case import BodiesCase, ContactCase, LineContactCase
 from workflow.analyses.contact.memory import memory
-from workflow.shell.analysis import Analysis, Comparison, Pictures, Run, Summary
+from workflow.shell.analysis import Analysis, Comparison, Pictures, Run, Summary, expected
 
 __all__ = ["ANALYSIS"]
 
 
-def _run(run: Run[ContactCase | LineContactCase]) -> None:
+def _run(run: Run[BodiesCase]) -> None:
     # Solvers take a second to load: where they are used.
     from workflow.analyses.contact.run import run_contact
 
@@ -21,8 +21,8 @@ AT_THE_END = (
 )
 
 
-def _quantities(case: ContactCase | LineContactCase, summary: Summary) -> list[str]:
-    return [own.quantity for own in case.expect if own.value] or list(AT_THE_END)
+def _quantities(case: BodiesCase, summary: Summary) -> list[str]:
+    return expected(case, summary) or list(AT_THE_END)
 
 
 def _pictures() -> Pictures:
@@ -33,7 +33,7 @@ def _pictures() -> Pictures:
     return Pictures(figures_of, write_contact)
 
 
-ANALYSIS: Analysis[ContactCase | LineContactCase] = Analysis(
+ANALYSIS: Analysis[BodiesCase] = Analysis(
     name="contact",
     cases={"bodies": ContactCase, "line": LineContactCase},
     run=_run,

@@ -1,78 +1,31 @@
-"""What the contact solver takes of a case of two bodies: grid, gap, materials and path."""
+"""What the contact solver takes of a case of two bodies: materials, half-space and bulk strain."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from sa_solver.half_space import HalfSpace
-from sa_solver.history import ContactLoadPath
 from sa_solver.types import Array, ElasticPair, Grid, Material
-from workflow.analyses.contact.case import (
-    Body,
-    ContactCase,
-    Cylinder,
-    Ellipsoid,
-    FlatRounded,
-    Heights,
-    LineContactCase,
-    Sphere,
-)
+from workflow.analyses.contact.case import BodiesCase, Body, LineContactCase
 from workflow.analyses.contact.load_table import LoadTable
-from workflow.case.input_files import read_heights
-
-Shape = Sphere | Ellipsoid | Cylinder | FlatRounded
 
 RIGID = Material(young=np.inf, poisson=0.0)
 
 
-def grid_of(case: ContactCase | LineContactCase) -> Grid:
-    """The grid, centred on the bodies."""
-    if isinstance(case, LineContactCase):
-        return Grid.strips(case.contact.size, case.contact.grid)
-    return Grid.covering(case.contact.size, case.contact.grid)
-
-
-def height_of(case: ContactCase | LineContactCase, grid: Grid) -> Array:
-    """Gap before loading on ``grid``, ``(nx, ny)`` [mm]."""
-    if isinstance(case.structure, Heights):
-        return read_heights(case.structure.file)
-    return height_at(case.structure, grid.x, grid.y)
-
-
-def height_at(shape: Shape, x: Array, y: Array) -> Array:
-    """Gap before loading [mm] at ``x`` and ``y``, which broadcast against each other."""
-    match shape:
-        case Sphere():
-            height = (x**2 + y**2) / (2.0 * shape.radius)
-        case Ellipsoid():
-            height = x**2 / (2.0 * shape.radius_x) + y**2 / (2.0 * shape.radius_y)
-        case Cylinder():
-            height = x**2 / (2.0 * shape.radius)
-        case FlatRounded():
-            beyond = np.maximum(np.abs(x) - shape.half_width, 0.0)
-            height = beyond**2 / (2.0 * shape.edge_radius)
-    return height
-
-
-def half_space_of(case: ContactCase | LineContactCase, grid: Grid) -> HalfSpace:
+def half_space_of(case: BodiesCase, grid: Grid) -> HalfSpace:
     """Both bodies as half-spaces, or half-planes, on ``grid``."""
     pair = ElasticPair(*bodies_of(case))
     datum = case.contact.datum if isinstance(case, LineContactCase) else None
     return HalfSpace(grid, pair, datum=datum)
 
 
-def bodies_of(case: ContactCase | LineContactCase) -> tuple[Material, Material]:
+def bodies_of(case: BodiesCase) -> tuple[Material, Material]:
     """Materials of body 1 and body 2."""
     return _material(case.materials.body_1), _material(case.materials.body_2)
 
 
 def _material(body: Body) -> Material:
     return RIGID if body == "rigid" else body.elastic()
-
-
-def path_of(case: ContactCase | LineContactCase, table: LoadTable) -> ContactLoadPath:
-    """The path as the solver marches it."""
-    return ContactLoadPath(table.imposed, table.is_motion, bulk_strain(table, bodies_of(case)))
 
 
 def bulk_strain(table: LoadTable, bodies: tuple[Material, Material]) -> Array:

@@ -6,13 +6,16 @@ kind of case, though both are written ``analysis: contact``.
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, TypeVar
+from abc import abstractmethod
+from typing import Annotated, Generic, Literal, Self, TypeVar
 
+import numpy as np
 from pydantic import Discriminator, Field, StrictBool, Tag, model_validator
 
+from sa_solver.types import Array, Grid
 from workflow.analyses.contact.load_table import LoadTable, conflict, ramps
 from workflow.case.fields import File, Quantity, Whole
-from workflow.case.input_files import InputFileError, height_shape
+from workflow.case.input_files import InputFileError, read_heights
 from workflow.case.loading import word_at
 from workflow.case.sections import (
     Case,
@@ -28,6 +31,7 @@ from workflow.case.sections import (
     disagreement,
     entry,
     quantities_of,
+    sections_of,
 )
 from workflow.case.source import Source
 from workflow.case.table_file import read_columns
@@ -62,48 +66,81 @@ HEIGHTS = "heights"
 # --- bodies -------------------------------------------------------------------------------------
 
 
-class Sphere(Section):
-    """Hertz's paraboloid (x² + y²) / 2 R."""
+class Bodies(Section):
+    """Two bodies without finite elements."""
 
     kind: Literal["bodies"] = entry("what the structure is", "bodies")
+    shape: str  # each narrows it to its name
+
+    @abstractmethod
+    def gap_on(self, grid: Grid) -> Array:
+        """Gap before loading on ``grid``, ``(nx, ny)`` [mm]."""
+
+
+class Shape(Bodies):
+    """Two bodies whose gap is known at any point."""
+
+    @abstractmethod
+    def height(self, x: Array, y: Array) -> Array:
+        """Gap before loading [mm] at ``x`` and ``y``, which broadcast against each other."""
+
+    def gap_on(self, grid: Grid) -> Array:
+        return self.height(grid.x, grid.y)
+
+
+class Sphere(Shape):
+    """Hertz's paraboloid (x² + y²) / 2 R."""
+
     shape: Literal["sphere"] = entry("sphere, ellipsoid or heights", "sphere")
     radius: RoundingRadius = entry("relative, 1/R = 1/R1 + 1/R2 [mm]", "10 mm")
 
+    def height(self, x: Array, y: Array) -> Array:
+        return (x**2 + y**2) / (2.0 * self.radius)
 
-class Ellipsoid(Section):
+
+class Ellipsoid(Shape):
     """Paraboloid x² / 2 Rx + y² / 2 Ry."""
 
-    kind: Literal["bodies"] = entry("what the structure is", "bodies")
     shape: Literal["ellipsoid"] = entry("sphere, ellipsoid or heights", "ellipsoid")
     radius_x: RoundingRadius = entry("relative, of the section along x [mm]", "10 mm")
     radius_y: RoundingRadius = entry("relative, of the section along y [mm]", "20 mm")
 
+    def height(self, x: Array, y: Array) -> Array:
+        return x**2 / (2.0 * self.radius_x) + y**2 / (2.0 * self.radius_y)
 
-class Cylinder(Section):
+
+class Cylinder(Shape):
     """Parabola x² / 2 R, the same all along y: a line contact."""
 
-    kind: Literal["bodies"] = entry("what the structure is", "bodies")
     shape: Literal["cylinder"] = entry("cylinder, flat_rounded or heights", "cylinder")
     radius: RoundingRadius = entry("relative, 1/R = 1/R1 + 1/R2 [mm]", "10 mm")
 
+    def height(self, x: Array, y: Array) -> Array:
+        return x**2 / (2.0 * self.radius)
 
-class FlatRounded(Section):
+
+class FlatRounded(Shape):
     """Flat, and a parabola beyond either end of it: a line contact."""
 
-    kind: Literal["bodies"] = entry("what the structure is", "bodies")
     shape: Literal["flat_rounded"] = entry("cylinder, flat_rounded or heights", "flat_rounded")
     half_width: Length = entry("of the flat [mm]", "4 mm")
     edge_radius: RoundingRadius = entry("of the parabola beyond it [mm]", "10 mm")
 
+    def height(self, x: Array, y: Array) -> Array:
+        beyond = np.maximum(np.abs(x) - self.half_width, 0.0)
+        return beyond**2 / (2.0 * self.edge_radius)
 
-class Heights(Section):
+
+class Heights(Bodies):
     """Gap before loading from a file, rows along x and columns along y, over ``contact.size``."""
 
-    kind: Literal["bodies"] = entry("what the structure is", "bodies")
     shape: Literal["heights"] = entry("heights: the gap before loading from a file", "heights")
     file: Annotated[str, File((".npy", ".csv", ".h5"))] = entry(
         "gap in mm, a value per cell; for .h5 with :dataset at the end", "gap.npy"
     )
+
+    def gap_on(self, grid: Grid) -> Array:
+        return read_heights(self.file)
 
 
 class BodyMaterial(ElasticBody):
@@ -116,13 +153,9 @@ class BodyMaterial(ElasticBody):
     )
 
 
-def _body_tag(value: object) -> str:
-    return "(name)" if isinstance(value, str) else "(section)"
-
-
 Body = Annotated[
     Annotated[BodyMaterial, Tag("(section)")] | Annotated[Literal["rigid"], Tag("(name)")],
-    Discriminator(_body_tag),
+    Discriminator(lambda value: "(name)" if isinstance(value, str) else "(section)"),
 ]
 
 
@@ -195,10 +228,10 @@ HistoryFile = Annotated[str, File((".csv",))]
 LegT = TypeVar("LegT", Leg, LineLeg)
 
 
-class ContactPath(Section):
+class LegsOrFile(Section, Generic[LegT]):
     """Legs one after the other from the unloaded state, or a file."""
 
-    legs: tuple[Leg, ...] = entry("one after the other, from no load", default=())
+    legs: tuple[LegT, ...] = entry("one after the other, from no load", default=())
     file: HistoryFile | None = entry(
         "instead of legs: columns named like their entries, a row per increment, base units",
         "history.csv",
@@ -206,78 +239,51 @@ class ContactPath(Section):
     )
 
     @model_validator(mode="after")
-    def _can_be_followed(self) -> ContactPath:
-        _check_path(self.legs, self.file, Leg)
-        return self
-
-    def table(self) -> LoadTable:
-        """Every increment of the path."""
-        return _table(self.legs, self.file, Leg)
-
-
-class LineContactPath(Section):
-    """Legs one after the other from the unloaded state, or a file; forces are per length."""
-
-    legs: tuple[LineLeg, ...] = entry("one after the other, from no load", default=())
-    file: HistoryFile | None = entry(
-        "instead of legs: columns named like their entries, a row per increment, base units",
-        "history.csv",
-        default=None,
-    )
-
-    @model_validator(mode="after")
-    def _can_be_followed(self) -> LineContactPath:
-        _check_path(self.legs, self.file, LineLeg)
-        return self
-
-    def table(self) -> LoadTable:
-        """Every increment of the path."""
-        return _table(self.legs, self.file, LineLeg)
-
-
-def _check_path(legs: tuple[LegT, ...], file: str | None, model: type[LegT]) -> None:
-    """Raise unless the path is given once, presses, and no two entries conflict."""
-    if (file is None) == (not legs):
-        problem = "both given" if legs else "neither given"
-        raise disagreement(f"{problem}; allowed: either legs or file", "file" if legs else "legs")
-    if file is not None:
+    def _can_be_followed(self) -> Self:
+        """Raise unless the path is given once, presses, and no two entries conflict."""
+        if (self.file is None) == (not self.legs):
+            problem = "both given" if self.legs else "neither given"
+            raise disagreement(
+                f"{problem}; allowed: either legs or file", "file" if self.legs else "legs"
+            )
         try:
-            named = list(_table(legs, file, model).columns)
+            places = dict.fromkeys(self.table().columns, "file")
         except InputFileError as error:
             raise disagreement(str(error), "file") from error
-        places = dict.fromkeys(named, "file")
-    else:
-        places = {
-            key: f"legs.{number}.{key}"
-            for number, leg in reversed(list(enumerate(legs)))
-            for key in quantities_of(model)
-            if getattr(leg, key) is not None
-        }
-    if wrong := conflict(places):
-        key, message = wrong
-        raise disagreement(message, places.get(key, "legs" if legs else "file"))
+        for number, leg in reversed(list(enumerate(self.legs))):
+            given = [key for key in places if getattr(leg, key) is not None]
+            places |= {key: f"legs.{number}.{key}" for key in given}
+        if wrong := conflict(places):
+            key, message = wrong
+            raise disagreement(message, places.get(key, "legs" if self.legs else "file"))
+        return self
+
+    def table(self) -> LoadTable:
+        """Every increment of the path."""
+        (leg_model,) = sections_of(type(self).model_fields["legs"].annotation)
+        quantities = quantities_of(leg_model)
+        if self.file is not None:
+            return LoadTable(read_columns(self.file, quantities))
+        targets = {key: [getattr(leg, key) for leg in self.legs] for key in quantities}
+        return LoadTable(ramps(targets, [leg.increments for leg in self.legs]))
 
 
-def _table(legs: tuple[LegT, ...], file: str | None, model: type[LegT]) -> LoadTable:
-    if file is not None:
-        return LoadTable(read_columns(file, quantities_of(model)))
-    steps = [leg.increments for leg in legs]
-    targets = {key: [getattr(leg, key) for leg in legs] for key in quantities_of(model)}
-    return LoadTable(ramps(targets, steps))
+class ContactPath(LegsOrFile[Leg]):
+    """Legs one after the other from the unloaded state, or a file."""
+
+
+class LineContactPath(LegsOrFile[LineLeg]):
+    """Legs one after the other from the unloaded state, or a file; forces are per length."""
 
 
 # --- grids --------------------------------------------------------------------------------------
 
 
-class ContactGrid(Section):
-    """Half-space solution on a grid centred on the bodies."""
+class HalfSpaceGrid(Section):
+    """How a contact is solved along its path."""
 
-    grid: tuple[GridCells, GridCells] = entry(
-        "cells along x, along y; of heights as many as their file has",
-        [128, 128],
-        default=(128, 128),
-    )
-    size: tuple[Length, Length] = entry("of the grid along x, along y [mm]", ["1 mm", "1 mm"])
+    grid: object  # each dimension narrows the cells and the size
+    size: object
     tolerance: Tolerance = entry("relative, of every residual [1]", 1e-8, default=1e-8)
     history: Literal["auto", "full", "reversals"] = entry(
         "auto: the cheapest that is exact; full: all increments; reversals: turning points",
@@ -290,8 +296,26 @@ class ContactGrid(Section):
         default=False,
     )
 
+    @abstractmethod
+    def centred(self) -> Grid:
+        """The grid, centred on the bodies."""
 
-class LineContactGrid(Section):
+
+class ContactGrid(HalfSpaceGrid):
+    """Half-space solution on a grid centred on the bodies."""
+
+    grid: tuple[GridCells, GridCells] = entry(
+        "cells along x, along y; of heights as many as their file has",
+        [128, 128],
+        default=(128, 128),
+    )
+    size: tuple[Length, Length] = entry("of the grid along x, along y [mm]", ["1 mm", "1 mm"])
+
+    def centred(self) -> Grid:
+        return Grid.covering(self.size, self.grid)
+
+
+class LineContactGrid(HalfSpaceGrid):
     """Half-plane solution on strips centred on the bodies."""
 
     grid: GridCells = entry(
@@ -303,17 +327,6 @@ class LineContactGrid(Section):
         "50 mm",
         default=None,
     )
-    tolerance: Tolerance = entry("relative, of every residual [1]", 1e-8, default=1e-8)
-    history: Literal["auto", "full", "reversals"] = entry(
-        "auto: the cheapest that is exact; full: all increments; reversals: turning points",
-        "auto",
-        default="auto",
-    )
-    estimate_error: StrictBool = entry(
-        "follow a full history with half its increments too, and report the difference",
-        False,
-        default=False,
-    )
 
     @model_validator(mode="after")
     def _datum_beyond_grid(self) -> LineContactGrid:
@@ -324,20 +337,58 @@ class LineContactGrid(Section):
             )
         return self
 
+    def centred(self) -> Grid:
+        return Grid.strips(self.size, self.grid)
+
 
 # --- cases --------------------------------------------------------------------------------------
 
 
-class ContactCase(Case):
+class BodiesCase(Case):
+    """Two bodies in contact, over an area or along a line."""
+
+    analysis: Literal["contact"] = entry("what is computed", "contact")
+    structure: Bodies
+    materials: BodyMaterials = entry("the two bodies in contact")
+    friction: Friction = entry("Coulomb's law")
+    load_path: LegsOrFile
+    contact: HalfSpaceGrid
+
+    @model_validator(mode="after")
+    def _can_run(self) -> Self:
+        loads = self.load_path.table().columns
+        for number in (1, 2):
+            body, key = f"body_{number}", f"bulk_stress_{number}"
+            if key in loads and getattr(self.materials, body) == "rigid":
+                raise disagreement(
+                    f"a rigid body carries no bulk stress, but load_path has {key}; "
+                    "allowed: an elastic body",
+                    f"materials.{body}",
+                )
+        if isinstance(self.structure, Heights):
+            require_shape(self.structure.file, self.contact.centred().shape)
+        return self
+
+    def outline(self) -> list[tuple[str, str]]:
+        table, grid = self.load_path.table(), self.contact.centred()
+        (nx, ny), (dx, dy) = grid.shape, grid.pitch
+        kind, cells = "no structure", f"{nx} x {ny} cells of {dx:.4g} x {dy:.4g} mm"
+        if grid.line:
+            kind, cells = "line contact", f"{nx} strips of {dx:.4g} mm"
+        return [
+            ("structure", f"{self.structure.shape}, {kind}"),
+            ("load path", f"{len(table)} increments of {', '.join(table.columns)}"),
+            ("contact", f"{cells}, history {self.contact.history}"),
+        ]
+
+
+class ContactCase(BodiesCase):
     """Two bodies in contact over an area of both directions."""
 
     title: Title = entry("one line", "Ball on a flat, pressed and sheared")
-    analysis: Literal["contact"] = entry("what is computed", "contact")
     structure: Annotated[Sphere | Ellipsoid | Heights, Field(discriminator="shape")] = entry(
         "the bodies: no finite elements"
     )
-    materials: BodyMaterials = entry("the two bodies in contact")
-    friction: Friction = entry("Coulomb's law")
     load_path: ContactPath = entry("forces or motions, in turn")
     contact: ContactGrid = entry("half-space grid")
 
@@ -345,55 +396,20 @@ class ContactCase(Case):
     def suits(cls, source: Source) -> bool:
         return not touches_along_a_line(source, (HEIGHTS,))
 
-    @model_validator(mode="after")
-    def _can_run(self) -> ContactCase:
-        _require_elastic(self.materials, self.load_path.table())
-        if isinstance(self.structure, Heights):
-            require_shape(self.structure.file, self.contact.grid)
-        return self
 
-    def outline(self) -> list[tuple[str, str]]:
-        (nx, ny), (x, y) = self.contact.grid, self.contact.size
-        cells = f"{nx} x {ny} cells of {x / nx:.4g} x {y / ny:.4g} mm"
-        return _outline(self, "no structure", cells)
-
-
-class LineContactCase(Case):
+class LineContactCase(BodiesCase):
     """Two bodies in contact along a line, in plane strain: everything is per length of it."""
 
     title: Title = entry("one line", "Cylinder on a flat, pressed and sheared")
-    analysis: Literal["contact"] = entry("what is computed", "contact")
     structure: Annotated[Cylinder | FlatRounded | Heights, Field(discriminator="shape")] = entry(
         "the bodies: no finite elements"
     )
-    materials: BodyMaterials = entry("the two bodies in contact")
-    friction: Friction = entry("Coulomb's law")
     load_path: LineContactPath = entry("forces or motions per length, in turn")
     contact: LineContactGrid = entry("half-plane grid")
 
     @classmethod
     def suits(cls, source: Source) -> bool:
         return touches_along_a_line(source, (HEIGHTS,))
-
-    @model_validator(mode="after")
-    def _can_run(self) -> LineContactCase:
-        _require_elastic(self.materials, self.load_path.table())
-        if isinstance(self.structure, Heights):
-            require_shape(self.structure.file, (self.contact.grid, 1))
-        return self
-
-    def outline(self) -> list[tuple[str, str]]:
-        strips, size = self.contact.grid, self.contact.size
-        return _outline(self, "line contact", f"{strips} strips of {size / strips:.4g} mm")
-
-
-def _outline(case: ContactCase | LineContactCase, kind: str, cells: str) -> list[tuple[str, str]]:
-    table = case.load_path.table()
-    return [
-        ("structure", f"{case.structure.shape}, {kind}"),
-        ("load path", f"{len(table)} increments of {', '.join(table.columns)}"),
-        ("contact", f"{cells}, history {case.contact.history}"),
-    ]
 
 
 def touches_along_a_line(source: Source, ambiguous: tuple[str, ...]) -> bool:
@@ -409,22 +425,10 @@ def touches_along_a_line(source: Source, ambiguous: tuple[str, ...]) -> bool:
     return one_size if shape in ambiguous else shape in LINE_SHAPES
 
 
-def _require_elastic(materials: BodyMaterials, loads: LoadTable) -> None:
-    """Raise if a rigid body is to carry bulk stress."""
-    for number in (1, 2):
-        body, key = f"body_{number}", f"bulk_stress_{number}"
-        if key in loads.columns and getattr(materials, body) == "rigid":
-            raise disagreement(
-                f"a rigid body carries no bulk stress, but load_path has {key}; "
-                "allowed: an elastic body",
-                f"materials.{body}",
-            )
-
-
 def require_shape(file: str, grid: tuple[int, int]) -> None:
     """Raise unless a file of heights has a value for each cell of ``grid``."""
     try:
-        shape = height_shape(file)
+        shape = read_heights(file).shape
     except InputFileError as error:
         raise disagreement(str(error), "structure.file") from error
     if shape != grid:

@@ -5,68 +5,44 @@ Extensive quantities are in the units of a contact over an area.
 
 from __future__ import annotations
 
-from sa_solver.types import Array, LoadHistory, Mask
-from workflow.shell.dataset import Dataset
+from sa_solver.types import Array, LoadHistory
+from workflow.shell.dataset import Dataset, described
 
 # Name of the only interface of a contact case.
 BODIES = "bodies"
 
 
-def resultant_columns(
-    P: Array, Qx: Array, Qy: Array, Mx: Array, My: Array, Mz: Array
-) -> dict[str, Dataset]:
-    """Forces and moments on body 2, ``(n,)`` each."""
-    return {
-        "P": Dataset(P, "N", "normal force on body 2"),
-        "Qx": Dataset(Qx, "N", "tangential force on body 2 along x"),
-        "Qy": Dataset(Qy, "N", "tangential force on body 2 along y"),
-        "Mx": Dataset(Mx, "N mm", "moment of the pressure about x"),
-        "My": Dataset(My, "N mm", "moment of the pressure about y"),
-        "Mz": Dataset(Mz, "N mm", "moment of the shear about z"),
-    }
-
-
-def energy_columns(Edx: Array, Edy: Array) -> dict[str, Dataset]:
-    """Energies of increments, ``(n,)`` each."""
-    return {
-        "Edx": Dataset(Edx, "N mm", "energy dissipated in the increment by slip along x"),
-        "Edy": Dataset(Edy, "N mm", "energy dissipated in the increment by slip along y"),
-    }
-
-
-def motion_columns(
-    approach: Array, shift_x: Array, shift_y: Array, tilt_x: Array, tilt_y: Array, twist: Array
-) -> dict[str, Dataset]:
-    """Rigid motions of body 1, ``(n,)`` each."""
-    return {
-        "approach": Dataset(approach, "mm", "motion of body 1 towards body 2"),
-        "shift_x": Dataset(shift_x, "mm", "motion of body 1 relative to body 2 along x"),
-        "shift_y": Dataset(shift_y, "mm", "motion of body 1 relative to body 2 along y"),
-        "tilt_x": Dataset(tilt_x, "rad", "rotation of body 1 relative to body 2 about x"),
-        "tilt_y": Dataset(tilt_y, "rad", "rotation of body 1 relative to body 2 about y"),
-        "twist": Dataset(twist, "rad", "rotation of body 1 relative to body 2 about z"),
-    }
-
-
-def sliding_column(sliding: Mask) -> Dataset:
-    """Which increments ``(n,)`` slide."""
-    return Dataset(sliding, "1", "whether the whole face slides")
+# Unit and description of the quantities of increments, ``(n,)`` each.
+LOADS = {
+    "P": ("N", "normal force on body 2"),
+    "Qx": ("N", "tangential force on body 2 along x"),
+    "Qy": ("N", "tangential force on body 2 along y"),
+    "Mx": ("N mm", "moment of the pressure about x"),
+    "My": ("N mm", "moment of the pressure about y"),
+    "Mz": ("N mm", "moment of the shear about z"),
+    "Edx": ("N mm", "energy dissipated in the increment by slip along x"),
+    "Edy": ("N mm", "energy dissipated in the increment by slip along y"),
+    "sliding": ("1", "whether the whole face slides"),
+}
+RIGID_MOTIONS = {
+    "approach": ("mm", "motion of body 1 towards body 2"),
+    "shift_x": ("mm", "motion of body 1 relative to body 2 along x"),
+    "shift_y": ("mm", "motion of body 1 relative to body 2 along y"),
+    "tilt_x": ("rad", "rotation of body 1 relative to body 2 about x"),
+    "tilt_y": ("rad", "rotation of body 1 relative to body 2 about y"),
+    "twist": ("rad", "rotation of body 1 relative to body 2 about z"),
+}
+# Of a mix of missions.
+MISSIONS = {
+    "share": ("1", "of the mission's cycles among all cycles of the mix"),
+    "block": ("1", "mission of the mix, counted from 0"),
+}
 
 
 def load_columns(loads: LoadHistory) -> dict[str, Dataset]:
     """The columns of a load history; those of a mix only where there is one."""
-    columns = {
-        **resultant_columns(loads.P, loads.Qx, loads.Qy, loads.Mx, loads.My, loads.Mz),
-        **energy_columns(loads.Edx, loads.Edy),
-        "sliding": sliding_column(loads.sliding),
-    }
-    if loads.mixed:
-        share = "of the mission's cycles among all cycles of the mix"
-        columns |= {
-            "share": Dataset(loads.share, "1", share),
-            "block": Dataset(loads.block, "1", "mission of the mix, counted from 0"),
-        }
-    return columns
+    quantities = LOADS | MISSIONS if loads.mixed else LOADS
+    return described(quantities, (getattr(loads, name) for name in quantities))
 
 
 def traction_fields(pressure: Array, shear: Array, slip: Array) -> dict[str, Dataset]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate, pairwise
 
 import numpy as np
 
@@ -53,12 +54,9 @@ def ramps(
     for name, ends in targets.items():
         if all(end is None for end in ends):
             continue
-        value, parts = 0.0, []
-        for end, count in zip(ends, increments, strict=True):
-            reached = value if end is None else end
-            parts.append(np.linspace(value, reached, count + 1)[1:])
-            value = reached
-        columns[name] = np.concatenate(parts)
+        reached = accumulate(ends, lambda value, end: value if end is None else end, initial=0.0)
+        steps = zip(pairwise(reached), increments, strict=True)
+        columns[name] = np.concatenate([np.linspace(*leg, count + 1)[1:] for leg, count in steps])
     return columns
 
 

@@ -4,17 +4,16 @@ from __future__ import annotations
 
 from math import prod
 
-from workflow.analyses.contact.case import ContactCase, LineContactCase
+from workflow.analyses.contact.case import BodiesCase
 from workflow.shell.memory import Memory
 
 # Fields kept of a state, and spectra and iterates alive during a solve, per cell.
 STATE_FIELDS, SPECTRA = 6, 300
 
 
-def memory(case: ContactCase | LineContactCase) -> Memory:
+def memory(case: BodiesCase) -> Memory:
     """Of the states of all increments."""
-    grid = case.contact.grid
-    cells = grid if isinstance(grid, int) else prod(grid)
+    cells = prod(case.contact.centred().shape)
     increments = len(case.load_path.table())
     return Memory(
         cells * (SPECTRA + STATE_FIELDS * increments),

@@ -4,50 +4,49 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from sa_solver.contact import ContactState
+from sa_solver.history import History
 from sa_solver.types import Array, Frame, Grid
-from workflow.analyses.contact.bodies import bodies_of, bulk_strain
-from workflow.analyses.contact.case import ContactCase, LineContactCase
-from workflow.analyses.contact.datasets import (
-    BODIES,
-    energy_columns,
-    motion_columns,
-    resultant_columns,
-    sliding_column,
-    traction_fields,
-)
-from workflow.analyses.contact.load_table import FORCES, MOTIONS, LoadTable
+from workflow.analyses.contact.case import BodiesCase
+from workflow.analyses.contact.datasets import BODIES, LOADS, RIGID_MOTIONS, traction_fields
+from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.contact.summary import loop_summary, slides, state_summaries, stick_zone
 from workflow.shell.analysis import Run
-from workflow.shell.dataset import Dataset
+from workflow.shell.dataset import Dataset, described
 from workflow.shell.results import run_results
 from workflow.shell.summary import finish
 
-if TYPE_CHECKING:
-    from sa_solver.contact import ContactState
-    from sa_solver.history import History
+ContactRun = Run[BodiesCase]
 
-ContactRun = Run[ContactCase | LineContactCase]
+BULK_STRESSES = {
+    "bulk_stress_1": ("MPa", "stress along x in body 1 far below the contact"),
+    "bulk_stress_2": ("MPa", "stress along x in body 2 far above the contact"),
+}
 
 
 @dataclass(frozen=True)
 class ContactOutcome:
-    """Everything a contact run found; ``height`` ``(nx, ny)`` is the gap before loading [mm]."""
+    """Everything a contact run found.
 
-    case: ContactCase | LineContactCase
+    ``height`` ``(nx, ny)`` is the gap before loading [mm]; ``strain`` ``(n,)`` that of body 2 less
+    that of body 1 by bulk stress.
+    """
+
+    case: BodiesCase
     grid: Grid
     height: Array
     table: LoadTable
+    strain: Array
     history: History
 
 
 def write_contact_output(outcome: ContactOutcome, run: ContactRun) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
-    reporter = run.reporter
-    with reporter.stage("results"):
+    with run.reporter.stage("results"):
         write_contact_results(outcome, run)
     run.draw()
     summary = _summary(outcome)
@@ -72,17 +71,8 @@ def write_contact_results(outcome: ContactOutcome, run: ContactRun) -> None:
 
 def _path(table: LoadTable) -> dict[str, Dataset]:
     """What the path imposes, ``(n,)`` each."""
-    columns = {
-        **resultant_columns(*(table[name] for name in FORCES)),
-        **motion_columns(*(table[name] for name in MOTIONS)),
-        "bulk_stress_1": Dataset(
-            table["bulk_stress_1"], "MPa", "stress along x in body 1 far below the contact"
-        ),
-        "bulk_stress_2": Dataset(
-            table["bulk_stress_2"], "MPa", "stress along x in body 2 far above the contact"
-        ),
-    }
-    return {name: columns[name] for name in table.columns}
+    quantities = LOADS | RIGID_MOTIONS | BULK_STRESSES
+    return {name: Dataset(column, *quantities[name]) for name, column in table.columns.items()}
 
 
 def _columns(history: History, friction: float) -> dict[str, Dataset]:
@@ -94,10 +84,8 @@ def _columns(history: History, friction: float) -> dict[str, Dataset]:
     increment = np.array(history.indices) + 1
     return {
         "increment": Dataset(increment, "1", "row of the path, counted from 1"),
-        **resultant_columns(*forces.T),
-        **motion_columns(*motions.T),
-        **energy_columns(*energies.T),
-        "sliding": sliding_column(sliding),
+        **described(LOADS, (*forces.T, *energies.T, sliding)),
+        **described(RIGID_MOTIONS, motions.T),
     }
 
 
@@ -114,17 +102,13 @@ def _fields(state: ContactState, friction: float) -> dict[str, Dataset]:
 def _summary(outcome: ContactOutcome) -> dict[str, Any]:
     case, grid, history = outcome.case, outcome.grid, outcome.history
     friction = case.friction.coefficient
-    strain = bulk_strain(outcome.table, bodies_of(case))
     return {
         "increments": len(outcome.table),
         "history": {
-            "method": history.method,
-            "reason": history.reason,
-            "error": history.error,
-            "error_of": history.error_of,
+            key: getattr(history, key) for key in ("method", "reason", "error", "error_of")
         },
         "states": state_summaries(grid, friction, history),
-        "loop": loop_summary(grid, friction, outcome.table, history, strain),
+        "loop": loop_summary(grid, friction, outcome.table, history, outcome.strain),
         "convolutions": sum(state.convolutions for state in history.states),
     }
 

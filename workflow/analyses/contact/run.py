@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from sa_solver.contact import ContactState
 from sa_solver.errors import ContactProblemError
-from sa_solver.history import History, HistoryError, march_history
-from workflow.analyses.contact.bodies import bodies_of, grid_of, half_space_of, height_of, path_of
-from workflow.analyses.contact.case import ContactCase, LineContactCase
+from sa_solver.history import ContactLoadPath, History, HistoryError, march_history
+from workflow.analyses.contact.bodies import bodies_of, bulk_strain, half_space_of
+from workflow.analyses.contact.case import BodiesCase
 from workflow.analyses.contact.results import (
     ContactOutcome,
     ContactRun,
@@ -38,11 +38,12 @@ def run_contact(run: ContactRun) -> None:
 
 
 def _march(
-    case: ContactCase | LineContactCase, folder: OutputFolder, reporter: Reporter
+    case: BodiesCase, folder: OutputFolder, reporter: Reporter
 ) -> tuple[ContactOutcome, str]:
     """What the path has led to, and why it ended early if it did."""
-    grid, table = grid_of(case), case.load_path.table()
-    height, half_space = height_of(case, grid), half_space_of(case, grid)
+    grid, table = case.contact.centred(), case.load_path.table()
+    height, half_space = case.structure.gap_on(grid), half_space_of(case, grid)
+    strain = bulk_strain(table, bodies_of(case))
     passed: dict[int, ContactState] = {}
     with reporter.increments(len(table)) as show, reporter.stage("contact"):
 
@@ -58,7 +59,7 @@ def _march(
             history = march_history(
                 half_space,
                 height,
-                path_of(case, table),
+                ContactLoadPath(table.imposed, table.is_motion, strain),
                 case.friction.coefficient,
                 history=case.contact.history,
                 tolerance=case.contact.tolerance,
@@ -75,7 +76,7 @@ def _march(
             last, row = history.states[-1], history.indices[-1] + 1
             message = f"increment {row} of {len(table)} did not converge: {last.message}"
             message = "" if last.converged else message
-    return ContactOutcome(case, grid, height, table, history), message
+    return ContactOutcome(case, grid, height, table, strain, history), message
 
 
 def _warn(outcome: ContactOutcome, reporter: Reporter) -> None:

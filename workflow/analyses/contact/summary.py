@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from scipy.integrate import trapezoid
 
-from sa_solver.types import Array, Grid
+from sa_solver.contact import ContactState
+from sa_solver.history import History
+from sa_solver.types import Array, Grid, Mask
 from workflow.analyses.contact.load_table import FORCES, MOTIONS, LoadTable
-
-if TYPE_CHECKING:
-    from sa_solver.contact import ContactState
-    from sa_solver.history import History
 
 # A cell sticks when its shear is below µp by more than this share: rounding of the slip circle.
 STICK_MARGIN = 1e-6
@@ -46,12 +45,11 @@ def state_summaries(grid: Grid, friction: float, history: History) -> list[dict[
     ]
 
 
-def stick_zone(state: ContactState, friction: float) -> np.ndarray:
+def stick_zone(state: ContactState, friction: float) -> Mask:
     """Cells ``(nx, ny)`` that are pressed and whose shear is below µp."""
     pressure = state.traction[2]
     shear = np.hypot(*state.traction[:2])
-    zone: np.ndarray = (pressure > 0.0) & (shear < friction * pressure * (1.0 - STICK_MARGIN))
-    return zone
+    return (pressure > 0.0) & (shear < friction * pressure * (1.0 - STICK_MARGIN))
 
 
 def slides(state: ContactState, friction: float) -> bool:
@@ -88,7 +86,7 @@ def _shear_summary(grid: Grid, friction: float, state: ContactState) -> dict[str
     return numbers | {"radial_shear_share": share, "full_slip_moment": float(moment)}
 
 
-def _extent(grid: Grid, cells: np.ndarray, name: str) -> dict[str, float]:
+def _extent(grid: Grid, cells: Mask, name: str) -> dict[str, float]:
     """Area of ``cells``, and the radius of a disk or the half width of a strip as large."""
     area = float(np.count_nonzero(cells)) * grid.cell_area
     if grid.line:
@@ -96,7 +94,7 @@ def _extent(grid: Grid, cells: np.ndarray, name: str) -> dict[str, float]:
     return {f"{name}_area": area, f"{name}_radius": float(np.sqrt(area / np.pi))}
 
 
-def _centre(grid: Grid, cells: np.ndarray) -> list[float] | None:
+def _centre(grid: Grid, cells: Mask) -> list[float] | None:
     """Centroid of ``cells`` [mm]; None where there are none."""
     if not cells.any():
         return None
@@ -135,14 +133,9 @@ def loop_summary(
     if history.method == "full":
         stretching = [np.sum(state.traction[0] * grid.x) * grid.cell_area for state in states]
         strains = strain[history.indices[first : last + 1]]
-        work = sum(map(_area, forces.T, motions.T)) - _area(np.array(stretching), strains)
+        work = trapezoid(forces, motions, axis=0).sum() - trapezoid(stretching, strains)
         loop["area"] = float(work)
     return loop
-
-
-def _area(force: Array, motion: Array) -> float:
-    """∫ F dδ by trapezoids."""
-    return float(np.sum(0.5 * (force[1:] + force[:-1]) * np.diff(motion)))
 
 
 def _last_cycle(friction: float, table: LoadTable, history: History) -> tuple[int, int] | None:

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from workflow.analyses.wear.case.evolution import Table, TotalEnergy
+from workflow.analyses.wear.case.evolution import PositiveEnergy, Table, TotalEnergy
 from workflow.case.fields import File, Quantity
 from workflow.case.sections import Section, disagreement, entry
 from workflow.errors import UserError
@@ -21,9 +21,6 @@ Slope = Annotated[
     float, Quantity("1/(N*mm)", at_least=-1e12, at_most=1e12, range_text="-1e15 to 1e15 1/J")
 ]
 Final = Annotated[float, Quantity("1", at_least=0.0, at_most=1e6)]
-EnergyScale = Annotated[
-    float, Quantity("N*mm", above=0.0, at_most=1e15, range_text="above 0 and at most 1e12 J")
-]
 Part = Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)]
 
 
@@ -40,7 +37,7 @@ class Arrhenius(Section):
 
     kind: Literal["arrhenius"] = entry("1 + change exp(-scale / E)", "arrhenius")
     change: Change = entry("of the factor in the end [1]", 1.32)
-    scale: EnergyScale = entry("energy that it takes [N*mm]", "150 J")
+    scale: PositiveEnergy = entry("energy that it takes [N*mm]", "150 J")
 
 
 class Linear(Section):

@@ -7,7 +7,16 @@ from typing import TYPE_CHECKING, Annotated, Literal
 from pydantic import Field, model_validator
 
 from sa_solver.types import Material as ElasticMaterial
-from workflow.analyses.wear.case.sections import Cycles, Laws, Ratio, TwoBodies, TwoMaterials
+from wear.laws import WearLaw
+from workflow.analyses.wear.case.evolution import PositiveEnergy
+from workflow.analyses.wear.case.sections import (
+    Cycles,
+    Laws,
+    PressingForce,
+    Ratio,
+    TwoBodies,
+    TwoMaterials,
+)
 from workflow.analyses.wear.case.worn_bodies import BodyWear, WornByArchard
 from workflow.case.fields import Quantity, Whole
 from workflow.case.sections import (
@@ -25,15 +34,8 @@ from workflow.case.sections import (
 
 if TYPE_CHECKING:
     from fe_models.geometry.specimens import Specimen
-    from wear.laws import WearLaw
 
 Depth = Annotated[float, Quantity("mm", at_least=0.0, at_most=1e4)]
-Pressing = Annotated[
-    float, Quantity("N", above=0.0, at_most=1e9, range_text="above 0 and at most 1e6 kN")
-]
-Energy = Annotated[
-    float, Quantity("N*mm", above=0.0, at_most=1e15, range_text="above 0 and at most 1e12 J")
-]
 
 
 class Form(Section):
@@ -78,16 +80,16 @@ class Specimens(Section):
         return Specimen(**self.model_dump(exclude={"kind", "form"}), radii=radii, **settings)
 
 
-class PressAndRub(Section):
+class FrettingLoads(Section):
     """One normal force after the other, each on unworn specimens."""
 
-    normal_forces: Annotated[tuple[Pressing, ...], Field(min_length=1)] = entry(
+    normal_forces: Annotated[tuple[PressingForce, ...], Field(min_length=1)] = entry(
         "constant while the pair is fretted [N]", ["17 N", "87 N", "150 N", "250 N"]
     )
     stroke: Length = entry("of body 2's ring along x, peak to peak [mm]", "14 um")
 
     @model_validator(mode="after")
-    def _forces_differ(self) -> PressAndRub:
+    def _forces_differ(self) -> FrettingLoads:
         for index, force in enumerate(self.normal_forces):
             if force in self.normal_forces[:index]:
                 raise disagreement(
@@ -129,46 +131,48 @@ class PadGrid(Section):
     )
 
 
-class CycleBlock(Section):
-    """Cycles of constant geometry."""
+class ExplicitStep(Section):
+    """A block of cycles of constant geometry."""
 
-    share: Ratio = entry("of the longest that is stable [1]", 0.5, default=0.5)
-    length: Cycles | None = entry(
-        "of every block instead, refused where it would be unstable [1]", 1000, default=None
+    fraction: Ratio = entry("of the stability limit [1]", 0.5, default=0.5)
+    cycles: Cycles | None = entry(
+        "of every step instead, refused where it would be unstable [1]", 1000, default=None
     )
 
 
 class Reported(Section):
     """A number of cycles that a source reports, to find the wear coefficient that gives it."""
 
-    normal_force: Pressing = entry("one of load_path.normal_forces [N]", "17 N")
+    normal_force: PressingForce = entry("one of load_path.normal_forces [N]", "17 N")
     steady: Literal["stiffness", "pressure"] = entry("what no longer changes then", "stiffness")
     cycles: Cycles = entry("when it has become steady [1]", 2.5e6)
 
 
-class CycleBlockWear(TwoBodies[BodyWear], Laws):
+class SpecimensWear(TwoBodies[BodyWear], Laws):
     """Wear of both specimens, node by node; ends by exactly one of cycles, energy."""
 
     cycles: Cycles | None = entry("under each normal force [1]", 3e5, default=None)
-    energy: Energy | None = entry("dissipated under each normal force [N*mm]", "1 kJ", default=None)
-    cycle_block: CycleBlock = entry("cycles of constant geometry", default=CycleBlock())
+    energy: PositiveEnergy | None = entry(
+        "dissipated under each normal force [N*mm]", "1 kJ", default=None
+    )
+    step: ExplicitStep = entry("cycles of constant geometry", default=ExplicitStep())
     reported: tuple[Reported, ...] = entry("cycles that a source reports", default=())
 
     @model_validator(mode="after")
-    def _ends_once(self) -> CycleBlockWear:
+    def _ends_once(self) -> SpecimensWear:
         if (self.cycles is None) == (self.energy is None):
             given = "neither" if self.cycles is None else "both"
             raise disagreement(f"{given} given; allowed: either cycles or energy", "energy")
         return self
 
     @model_validator(mode="after")
-    def _something_wears(self) -> CycleBlockWear:
+    def _something_wears(self) -> SpecimensWear:
         if self.body_1.coefficient == self.body_2.coefficient == 0.0:
             raise disagreement("0 for both bodies; allowed: one of them at most", "body_1")
         return self
 
     @model_validator(mode="after")
-    def _reported_are_of_energy(self) -> CycleBlockWear:
+    def _reported_are_of_energy(self) -> SpecimensWear:
         """Cycles that a source reports give coefficients if shapes scale with these."""
         for body in (self.body_1, self.body_2):
             if self.reported and (isinstance(body, WornByArchard) or body.evolution is not None):
@@ -188,15 +192,16 @@ class SpecimensCase(Case):
     structure: Specimens = entry("two specimens alike, turned 90° to each other")
     materials: TwoMaterials = entry("the two specimens")
     friction: Friction = entry("Coulomb's law on the pad")
-    load_path: PressAndRub = entry("what every cycle does")
+    load_path: FrettingLoads = entry("what every cycle does")
     mesh: SpecimenMesh = entry("finite elements of each specimen", default=SpecimenMesh())
     reduction: Reduction = entry("of each specimen", default=Reduction())
     contact: PadGrid = entry("half-space beside the specimens", default=PadGrid())
-    wear: CycleBlockWear = entry("law, length of the run and of its cycle blocks")
+    wear: SpecimensWear = entry("law, length of the run and of its cycle blocks")
 
-    def material(self, number: int) -> ElasticMaterial:
-        """Material of body ``number``, 1 or 2."""
-        return (self.materials.body_1, self.materials.body_2)[number - 1].elastic()
+    @property
+    def elastic(self) -> tuple[ElasticMaterial, ElasticMaterial]:
+        """Materials of body 1 and body 2."""
+        return self.materials.body_1.elastic(), self.materials.body_2.elastic()
 
     @property
     def laws(self) -> tuple[WearLaw, WearLaw]:
@@ -214,8 +219,8 @@ class SpecimensCase(Case):
         forces = ", ".join(f"{force:g}" for force in self.load_path.normal_forces)
         nodes = (self.mesh.pad_elements + 1) ** 2
         end = f"{wear.energy:g} N mm" if wear.cycles is None else f"{wear.cycles:g} cycles"
-        share, length = wear.cycle_block.share, wear.cycle_block.length
-        block = f"{share:.0%} of their limit" if length is None else f"{length:g} cycles"
+        fraction, cycles = wear.step.fraction, wear.step.cycles
+        block = f"{fraction:.0%} of their limit" if cycles is None else f"{cycles:g} cycles"
         cells = " x ".join(map(str, self.contact.grid))
         return [
             ("structure", f"specimens, pad {pad:g} x {pad:g} mm of {nodes} nodes, {shape}"),

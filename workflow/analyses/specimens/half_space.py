@@ -14,6 +14,7 @@ and 1/(1/k_half-space + c_bulk) is what the half-space then predicts for the spe
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -90,7 +91,7 @@ class NodeGrid:
     def of(cls, face: Face) -> NodeGrid:
         """Rows and columns of a face that is meshed in squares."""
         digits = np.round(face.coordinates / SAME_PLACE).astype(np.int64)
-        (x, row), (y, column) = (np.unique(own, return_inverse=True) for own in digits.T)
+        (x, row), (y, column) = (np.unique(column, return_inverse=True) for column in digits.T)
         order = np.full((len(x), len(y)), -1)
         order[row, column] = np.arange(len(face))
         assert order.min() >= 0, "the pad is not meshed in rows and columns"
@@ -119,10 +120,14 @@ class PadHalfSpace:
         self._to_nodes = FaceTransfer.between(face, self.grid).to_nodes
         self._nodes = NodeGrid.of(face)
         half_space = HalfSpace(self.grid, pair)
-        self._normal, self._tangential = NormalContact(half_space), TangentialContact(half_space)
-        self._friction, self._tolerance = friction, tolerance
+        normal, tangential = NormalContact(half_space), TangentialContact(half_space)
+        self._press = partial(normal.solve, tilt_x=0.0, tilt_y=0.0, tolerance=tolerance)
+        self._shift = partial(tangential.solve, shift_y=0.0, twist=0.0, tolerance=tolerance)
+        self._friction = friction
 
-    def rub(self, height: Array, depth: Array, force: float, path: Array) -> HalfSpaceState:
+    def fretting_cycle(
+        self, height: Array, depth: Array, force: float, path: Array
+    ) -> HalfSpaceState:
         """Press the shape ``height`` ``(nx, ny)`` with ``force`` [N] and move along ``path``.
 
         ``depth`` ``(n,)`` is worn off both bodies at the nodes [mm], ``path`` ``(k,)`` rising
@@ -130,7 +135,7 @@ class PadHalfSpace:
         converge.
         """
         worn = self._nodes.smooth(depth)(self.grid.x.ravel(), self.grid.y.ravel())
-        normal = self._press(height + worn, force)
+        normal = _converged(self._press(height + worn, force))
         states = [self._move(self._friction * normal.pressure, d) for d in path]
         last, area = states[-1], self.grid.cell_area
         # Body 1's shift against body 2 in sa_solver is body 2's here, backwards.
@@ -152,20 +157,11 @@ class PadHalfSpace:
     def tied(self) -> tuple[float, float]:
         """Stiffness of the tied pad along z and x [N/mm]."""
         flat = np.zeros(self.grid.shape)
-        pressed = self._normal.solve(
-            flat, approach=UNIT_MOTION, tilt_x=0.0, tilt_y=0.0, tolerance=self._tolerance
-        )
+        pressed = self._press(flat, approach=UNIT_MOTION)
         return pressed.P / UNIT_MOTION, self._stuck(np.ones(self.grid.shape, dtype=np.bool_))
 
-    def _press(self, height: Array, force: float) -> NormalState:
-        state = self._normal.solve(height, force, tilt_x=0.0, tilt_y=0.0, tolerance=self._tolerance)
-        return _converged(state)
-
     def _move(self, limit: Array, displacement: float) -> TangentialState:
-        state = self._tangential.solve(
-            limit, shift_x=-displacement, shift_y=0.0, twist=0.0, tolerance=self._tolerance
-        )
-        return _converged(state)
+        return _converged(self._shift(limit, shift_x=-displacement))
 
     def _stuck(self, pressed: NDArray[np.bool_]) -> float:
         """Stiffness along x of the cells ``pressed``, stuck [N/mm]."""
@@ -174,12 +170,9 @@ class PadHalfSpace:
 
 def bulk_compliance(pair: ReducedPair, half_space: PadHalfSpace) -> BulkCompliance:
     """What the specimens give way beyond a half-space."""
-    count = len(pair.face)
-    specimens = []
-    for axis in (Z, X):
-        forces = np.linalg.solve(pair.block(axis), np.ones(count))
-        specimens.append(float(forces.sum()))
-    return BulkCompliance((specimens[0], specimens[1]), half_space.tied())
+    tied = np.ones(len(pair.face))
+    z, x = (float(np.linalg.solve(pair.block(axis), tied).sum()) for axis in (Z, X))
+    return BulkCompliance((z, x), half_space.tied())
 
 
 def _converged(state: State) -> State:

@@ -25,12 +25,11 @@ RIGID_MOTIONS, FREQUENCIES = 6, 6
 class SpecimenReduction:
     """Reduced models of body 1 and 2, and natural frequencies of each, free, ``(6,)`` [Hz].
 
-    ``full`` are those of the finite elements, ``reduced`` those of the reduced model.
+    ``frequencies`` of a body are those of its finite elements and those of its reduced model.
     """
 
     models: tuple[ReducedModel, ReducedModel]
-    full: tuple[Array, Array]
-    reduced: tuple[Array, Array]
+    frequencies: tuple[tuple[Array, Array], ...]
 
 
 class SpecimensModel:
@@ -40,15 +39,15 @@ class SpecimensModel:
     """
 
     def __init__(self, case: SpecimensCase, target_distance: float | None = None) -> None:
-        self._case, self._target = case, target_distance
+        self.case, self._target = case, target_distance
         self.specimen: Specimen = case.geometry()
-        self._materials = case.material(1), case.material(2)
+        self._materials = case.elastic
         self.from_cache = False
 
     @cached_property
     def mesh(self) -> StructureMesh:
         """Both specimens; raises :class:`~fe_models.mesh.MeshError`."""
-        return self.specimen.mesh(self._case.mesh.size)
+        return self.specimen.mesh(self.case.mesh.size)
 
     @property
     def face(self) -> Interface:
@@ -62,26 +61,26 @@ class SpecimensModel:
 
         The form is a gap: flat and curved specimens share them.
         """
-        case = self._case
+        case = self.case
         flat = replace(self.specimen, radii=None)
         modes = case.reduction.modes
         further = () if self._target is None else (self._target,)
         key = content_key("specimens", flat, self._materials, case.mesh, modes, *further)
-        found = load_arrays(f"specimens-{key}")
-        self.from_cache = found is not None
-        if found is None:
-            found = self._reduce(modes)
-            save_arrays(f"specimens-{key}", found)
+        arrays = load_arrays(f"specimens-{key}")
+        self.from_cache = arrays is not None
+        if arrays is None:
+            arrays = self._reduce(modes)
+            save_arrays(f"specimens-{key}", arrays)
         return SpecimenReduction(
-            (_model(found, 1), _model(found, 2)),
-            (found["full/1"], found["full/2"]),
-            (found["reduced/1"], found["reduced/2"]),
+            (_model(arrays, 1), _model(arrays, 2)),
+            tuple((arrays[f"full/{n}"], arrays[f"reduced/{n}"]) for n in (1, 2)),
         )
 
     def node_count(self) -> int:
         """Nodes of both bodies, midsides included."""
-        return self.mesh.node_count(self._case.mesh.order)
+        return self.mesh.node_count(self.case.mesh.order)
 
+    @cached_property
     def pair(self) -> ReducedPair:
         """Both reduced models on the nodes of the pad, rings held."""
         one, two = (pad_stiffness(model, self.specimen) for model in self.reduction.models)
@@ -89,7 +88,7 @@ class SpecimensModel:
 
     def _reduce(self, modes: int) -> dict[str, Any]:
         """Everything that is worth keeping, by name."""
-        order = self._case.mesh.order
+        order = self.case.mesh.order
         models = reduced_specimens(
             self.specimen,
             self.mesh,
@@ -109,11 +108,10 @@ class SpecimensModel:
     def _full_frequencies(self, number: int, known: dict[str, Any]) -> Array:
         """Those of the finite elements; a specimen of the other's material has the other's."""
         if number == 2 and self._materials[0] == self._materials[1]:
-            alike: Array = known["full/1"]
-            return alike
+            return known["full/1"]
         body = (self.mesh.body_1, self.mesh.body_2)[number - 1]
         pad = self.face.nodes(number)
-        material, order = self._materials[number - 1], self._case.mesh.order
+        material, order = self._materials[number - 1], self.case.mesh.order
         matrices = specimen_matrices(self.specimen, body, pad, material, order)
         return _lowest(matrices.stiffness, matrices.mass)
 
@@ -125,6 +123,6 @@ def _lowest(stiffness: Any, mass: Any) -> Array:
 
 def _model(arrays: dict[str, Any], number: int) -> ReducedModel:
     prefix = f"{number}/"
-    own = {name.removeprefix(prefix): v for name, v in arrays.items() if name.startswith(prefix)}
-    names = tuple(name if isinstance(name, str) else name.decode() for name in own["names"])
-    return ReducedModel(**own | {"kept": np.asarray(own["kept"]), "names": names})
+    parts = {name.removeprefix(prefix): v for name, v in arrays.items() if name.startswith(prefix)}
+    names = tuple(name if isinstance(name, str) else name.decode() for name in parts["names"])
+    return ReducedModel(**parts | {"kept": np.asarray(parts["kept"]), "names": names})

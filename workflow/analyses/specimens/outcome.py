@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from fe_models.reduced_contact import ReducedPair, VirginCurve
+from fe_models.reduced_contact import VirginCurve
 from sa_solver.types import Array
-from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import BulkCompliance, HalfSpaceState, PadHalfSpace
 from workflow.analyses.specimens.model import SpecimensModel
 from workflow.analyses.specimens.wear import BlockState
@@ -56,9 +55,7 @@ class LoadOutcome:
 class SpecimensOutcome:
     """Everything a run of specimens found."""
 
-    case: SpecimensCase
     model: SpecimensModel
-    pair: ReducedPair
     half_space: PadHalfSpace
     bulk: BulkCompliance
     loads: tuple[LoadOutcome, ...]

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from fe_models.reduced_contact import masing_loop
 from fe_models.reduction import save_reduced
 from sa_solver.types import Array
-from workflow.analyses.contact.datasets import pressure_field
 from workflow.analyses.specimens.case import SpecimensCase
+from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
 from workflow.analyses.specimens.summary import (
     SLOPE_SHARE,
     collapse,
@@ -23,21 +23,50 @@ from workflow.analyses.specimens.summary import (
     reported_summary,
     tied_pad,
 )
+from workflow.analyses.specimens.wear import BlockState
 from workflow.analyses.wear.datasets import cycles_column, face_mesh, kinetics_columns
 from workflow.shell.analysis import Run
-from workflow.shell.dataset import Dataset
+from workflow.shell.dataset import Dataset, described
 from workflow.shell.reporter import Reporter
 from workflow.shell.results import ResultsWriter, run_results
 from workflow.shell.store import replacing
 from workflow.shell.summary import finish
 
-if TYPE_CHECKING:
-    from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
-    from workflow.analyses.specimens.wear import BlockState
-
 # Name of the pad's grid, and of the two shapes that a half-space is put beside.
 PAD = "pad"
 SHAPES = "unworn", "worn"
+
+# Unit and description of what is written.
+FREQUENCIES = {
+    "full": ("Hz", "natural frequencies of the free body, finite elements"),
+    "reduced": ("Hz", "natural frequencies of the free body, reduced model"),
+}
+KINETICS = {
+    "energy_per_cycle": ("N mm", "energy dissipated in a cycle"),
+    "stick_stiffness": ("N/mm", "tangential stiffness with all that touches stuck"),
+    "approach": ("mm", "motion of body 1 towards body 2"),
+    "peak_pressure": ("MPa", "largest pressure"),
+    "pressure_deviation": ("1", "root mean square of pressure/mean - 1 over the pad"),
+    "friction": ("1", "largest tangential over normal force"),
+    # Infinite where nothing slides.
+    "stable_cycles": ("1", "cycles of constant shape beyond which errors of shape grow"),
+}
+# At the nodes of the pad or the cells of its grid; tractions are those of first loading.
+PAD_FIELDS = {
+    "pressure": ("MPa", "contact pressure"),
+    "shear_x": ("MPa", "shear on body 2 along x at the end of first loading"),
+    "cycle_slip": ("mm", "path of slip along x in a cycle"),
+}
+NODAL_FIELDS = {
+    "gap": ("mm", "distance of the deformed faces"),
+    "worn_1": ("mm", "worn depth of body 1"),
+    "worn_2": ("mm", "worn depth of body 2"),
+    "secant_stiffness": ("N/mm", "slope of the loop up to half of its largest force"),
+}
+RING_LOOP = {
+    "ring_displacement": ("mm", "motion of body 2's ring along x"),
+    "ring_force": ("N", "force along x that moves body 2's ring"),
+}
 
 
 def write_specimens_output(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -> None:
@@ -59,25 +88,14 @@ def write_specimens_output(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -
 
 
 def _write_results(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -> None:
-    case, face, areas = outcome.case, outcome.model.face, outcome.pair.areas
+    case, face, areas = run.case, outcome.model.face, outcome.model.pair.areas
     with run_results(run, case, {"friction": case.friction.coefficient}) as writer:
         writer.put_grid(f"grid/{PAD}", outcome.half_space.grid, face.frame)
         writer.put("specimens/pad", face_mesh(face))
-        reduction = outcome.model.reduction
-        for number, frequencies in enumerate(
-            zip(reduction.full, reduction.reduced, strict=True), start=1
-        ):
-            writer.put(f"specimens/body_{number}", _natural_frequencies(*frequencies))
+        for number, both in enumerate(outcome.model.reduction.frequencies, 1):
+            writer.put(f"specimens/body_{number}", described(FREQUENCIES, both))
         for number, load in enumerate(outcome.loads):
             _put_load(writer, f"loads/{number}", load, areas)
-
-
-def _natural_frequencies(full: Array, reduced: Array) -> dict[str, Dataset]:
-    what = "natural frequencies of the free body"
-    return {
-        "full": Dataset(full, "Hz", f"{what}, finite elements"),
-        "reduced": Dataset(reduced, "Hz", f"{what}, reduced model"),
-    }
 
 
 def _put_load(writer: ResultsWriter, group: str, load: LoadOutcome, areas: Array) -> None:
@@ -87,102 +105,57 @@ def _put_load(writer: ResultsWriter, group: str, load: LoadOutcome, areas: Array
         name, loop = f"{group}/states/{number:05d}", masing_loop(kept.curve)
         numbers = {"cycles": kept.block.cycles, "energy": kept.block.energy}
         writer.put(name, _state(kept, areas), **numbers)
-        writer.put(f"{name}/loop", _ring_loop(loop.displacement, loop.force))
+        writer.put(f"{name}/loop", described(RING_LOOP, (loop.displacement, loop.force)))
     for shape, beside in zip(SHAPES, load.half_space, strict=True):
         name = f"{group}/half_space/{shape}"
-        writer.put(name, _pad_fields(beside.pressure, beside.shear, 4.0 * beside.slip))
-        writer.put(f"{name}/first_loading", _ring_loop(beside.displacement, beside.force))
-    marched = load.marched
-    writer.put(f"{group}/coupled_cycle", _ring_loop(marched.displacement, marched.force))
+        fields = beside.pressure, beside.shear, 4.0 * beside.slip
+        first_loading = beside.displacement, beside.force
+        writer.put(name, described(PAD_FIELDS, fields))
+        writer.put(f"{name}/first_loading", described(RING_LOOP, first_loading))
+    marched = load.marched.displacement, load.marched.force
+    writer.put(f"{group}/coupled_cycle", described(RING_LOOP, marched))
 
 
 def _kinetics(blocks: tuple[BlockState, ...], areas: Array) -> dict[str, Dataset]:
     """Numbers at the start of every cycle block, ``(blocks + 1,)`` each."""
-    contacts = [state.contact for state in blocks]
-    pressures = [contact.normal.pressure for contact in contacts]
     worn = [
         (*(d.max() for d in state.depths), *(d @ areas for d in state.depths), state.energy)
         for state in blocks
     ]
-    area = np.array([contact.normal.area for contact in contacts])
-
-    def column(values: Iterable[float], unit: str, description: str) -> Dataset:
-        return Dataset(np.array([*values], dtype=np.float64), unit, description)
-
+    rows = [
+        (
+            state.contact.energy,
+            state.contact.stick_stiffness,
+            state.contact.normal.approach,
+            state.contact.normal.pressure.max(),
+            pressure_deviation(areas, state.contact.normal.pressure),
+            state.contact.friction,
+            state.stable_cycles,
+        )
+        for state in blocks
+    ]
     return {
-        "cycles": cycles_column(np.array([state.cycles for state in blocks], dtype=np.float64)),
-        **kinetics_columns(np.array(worn), area),
-        "energy_per_cycle": column(
-            (contact.energy for contact in contacts), "N mm", "energy dissipated in a cycle"
-        ),
-        "stick_stiffness": column(
-            (contact.stick_stiffness for contact in contacts),
-            "N/mm",
-            "tangential stiffness with all that touches stuck",
-        ),
-        "approach": column(
-            (contact.normal.approach for contact in contacts),
-            "mm",
-            "motion of body 1 towards body 2",
-        ),
-        "peak_pressure": column(
-            (pressure.max() for pressure in pressures), "MPa", "largest pressure"
-        ),
-        "pressure_deviation": column(
-            (pressure_deviation(areas, pressure) for pressure in pressures),
-            "1",
-            "root mean square of pressure/mean - 1 over the pad",
-        ),
-        "friction": column(
-            (contact.friction for contact in contacts), "1", "largest tangential over normal force"
-        ),
-        # Infinite where nothing slides.
-        "stable_cycles": column(
-            (state.stable_cycles for state in blocks),
-            "1",
-            "cycles of constant shape beyond which errors of shape grow",
-        ),
+        "cycles": cycles_column(np.array([state.cycles for state in blocks])),
+        **kinetics_columns(np.array(worn), np.array([s.contact.normal.area for s in blocks])),
+        **described(KINETICS, np.array(rows).T),
     }
 
 
 def _state(kept: KeptState, areas: Array) -> dict[str, Dataset]:
     """The pad in a worn state, at its nodes."""
     block, contact = kept.block, kept.block.contact
+    fields = contact.normal.pressure, contact.tangential.shear / areas, contact.cycle_slip
     secant = np.array(kept.curve.secant_stiffness(SLOPE_SHARE))
-    slope = "slope of the loop up to half of its largest force"
-    return {
-        **_pad_fields(
-            contact.normal.pressure, contact.tangential.shear / areas, contact.cycle_slip
-        ),
-        "gap": Dataset(contact.normal.gap, "mm", "distance of the deformed faces"),
-        "worn_1": Dataset(block.depths[0], "mm", "worn depth of body 1"),
-        "worn_2": Dataset(block.depths[1], "mm", "worn depth of body 2"),
-        "secant_stiffness": Dataset(secant, "N/mm", slope),
-    }
-
-
-def _pad_fields(pressure: Array, shear: Array, cycle_slip: Array) -> dict[str, Dataset]:
-    """Tractions of first loading, and slip, at the nodes of the pad or the cells of its grid."""
-    along = "shear on body 2 along x at the end of first loading"
-    return {
-        "pressure": pressure_field(pressure),
-        "shear_x": Dataset(shear, "MPa", along),
-        "cycle_slip": Dataset(cycle_slip, "mm", "path of slip along x in a cycle"),
-    }
-
-
-def _ring_loop(displacement: Array, force: Array) -> dict[str, Dataset]:
-    return {
-        "ring_displacement": Dataset(displacement, "mm", "motion of body 2's ring along x"),
-        "ring_force": Dataset(force, "N", "force along x that moves body 2's ring"),
-    }
+    return described(PAD_FIELDS, fields) | described(
+        NODAL_FIELDS, (contact.normal.gap, *block.depths, secant)
+    )
 
 
 # --- summary ------------------------------------------------------------------------------------
 
 
 def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
-    case, model = outcome.case, outcome.model
+    model, wear = outcome.model, outcome.model.case.wear
     loads = [load_summary(outcome, load) for load in outcome.loads]
     for load in loads:
         if late(load):
@@ -190,7 +163,7 @@ def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
                 f"{load['normal_force']:g} N: steady only near the end of the run; raise "
                 "wear.energy or wear.cycles to be sure"
             )
-    coefficients = case.wear.body_1.coefficient, case.wear.body_2.coefficient
+    coefficients = wear.body_1.coefficient, wear.body_2.coefficient
     return {
         "structure": {"nodes": model.node_count(), "pad_nodes": len(model.face)},
         "frequencies": frequencies(outcome),
@@ -198,15 +171,15 @@ def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
         "explanation": explanation(outcome),
         "loads": loads,
         "collapse": collapse(loads),
-        "reported": [reported_summary(own, loads, coefficients) for own in case.wear.reported],
+        "reported": [reported_summary(entry, loads, coefficients) for entry in wear.reported],
     }
 
 
 def _lines(summary: dict[str, Any]) -> Iterator[str]:
     """The end of the run in a few lines."""
-    own = summary["frequencies"]["body_1"]
+    body = summary["frequencies"]["body_1"]
     for name in ("full", "reduced"):
-        values = ", ".join(f"{value:.0f}" for value in own[name])
+        values = ", ".join(f"{value:.0f}" for value in body[name])
         yield f"  free frequencies, {name}: {values} Hz"
     for load in summary["loads"]:
         first, last, steady = load["unworn"], load["worn"], load["steady"]["stiffness"]

@@ -58,7 +58,7 @@ def run_specimens(run: Run[SpecimensCase]) -> None:
     except MeshError as error:
         raise UserError(f"{run.folder.case}: {error}") from error
     except StabilityError as error:
-        raise UserError(f"{run.folder.case}: wear.cycle_block.length: {error}") from error
+        raise UserError(f"{run.folder.case}: wear.step.cycles: {error}") from error
     write_specimens_output(outcome, run)
 
 
@@ -68,46 +68,41 @@ def _compute(case: SpecimensCase, reporter: Reporter) -> SpecimensOutcome:
         nodes = model.node_count()
     memory(case, nodes).check()
     with reporter.stage("reduction"):
-        pair = model.pair()
+        pair = model.pair
     if model.from_cache:
         reporter.log("reduction: from the cache")
     half_space = PadHalfSpace(
         model.face,
         case.contact.grid,
-        ElasticPair(case.material(1), case.material(2)),
+        ElasticPair(*case.elastic),
         case.friction.coefficient,
         case.contact.tolerance,
     )
     loads = tuple(
-        _rub(case, model, pair, half_space, force, reporter)
-        for force in case.load_path.normal_forces
+        _fret(model, half_space, force, reporter) for force in case.load_path.normal_forces
     )
     with reporter.stage("half-space"):
         bulk = bulk_compliance(pair, half_space)
-    return SpecimensOutcome(case, model, pair, half_space, bulk, loads)
+    return SpecimensOutcome(model, half_space, bulk, loads)
 
 
-def _rub(
-    case: SpecimensCase,
-    model: SpecimensModel,
-    pair: ReducedPair,
-    half_space: PadHalfSpace,
-    force: float,
-    reporter: Reporter,
+def _fret(
+    model: SpecimensModel, half_space: PadHalfSpace, force: float, reporter: Reporter
 ) -> LoadOutcome:
+    case, pair = model.case, model.pair
     conditions = FrettingConditions(force, case.load_path.stroke, case.friction.coefficient)
     with reporter.stage("wear"):
-        blocks = tuple(_blocks(case, pair, model.face.gap, conditions))
+        blocks = tuple(_blocks(model, conditions))
         kept = tuple(
-            KeptState(own, first_loading(pair, own, conditions)) for own in _chosen(blocks)
+            KeptState(state, first_loading(pair, state, conditions)) for state in _chosen(blocks)
         )
     grid = half_space.grid
     height = model.specimen.gap(grid.x, grid.y)
     path = 0.5 * conditions.stroke * rising(HALF_SPACE_POINTS)
     with reporter.stage("half-space"):
         first, last = (
-            half_space.rub(height, own.block.depths.sum(axis=0), force, path)
-            for own in (kept[0], kept[-1])
+            half_space.fretting_cycle(height, state.depths.sum(axis=0), force, path)
+            for state in (blocks[0], blocks[-1])
         )
     with reporter.stage("coupled cycle"):
         marched = marched_cycle(pair, model.face.gap, conditions)
@@ -116,16 +111,17 @@ def _rub(
     return LoadOutcome(force, blocks, kept, (first, last), marched)
 
 
-def _blocks(
-    case: SpecimensCase, pair: ReducedPair, gap: Array, conditions: FrettingConditions
-) -> Iterator[BlockState]:
+def _blocks(model: SpecimensModel, conditions: FrettingConditions) -> Iterator[BlockState]:
     """The states of a worn pair, up to the end that the case asks for."""
-    own = case.wear.cycle_block
+    case = model.case
+    step = case.wear.step
     stepper = (
-        ExplicitStepper(own.share) if own.length is None else ExplicitStepper(cycles=own.length)
+        ExplicitStepper(step.fraction)
+        if step.cycles is None
+        else ExplicitStepper(cycles=step.cycles)
     )
-    fretted = FrettedPair(pair, case.laws, conditions)
-    states = wear_in_cycle_blocks(fretted, gap, stepper, partial(_to_go, case))
+    fretted = FrettedPair(model.pair, case.laws, conditions)
+    states = wear_in_cycle_blocks(fretted, model.face.gap, stepper, partial(_to_go, case))
     for number, state in enumerate(states):
         _check(state, number, conditions, case)
         yield state
@@ -148,8 +144,8 @@ def _to_go(case: SpecimensCase, state: BlockState) -> float:
 
 def _block(case: SpecimensCase, state: BlockState) -> float:
     """Cycles of a whole block after ``state``."""
-    own = case.wear.cycle_block
-    return own.share * state.stable_cycles if own.length is None else own.length
+    step = case.wear.step
+    return step.fraction * state.stable_cycles if step.cycles is None else step.cycles
 
 
 def _check(
@@ -160,7 +156,7 @@ def _check(
     if not contact.converged:
         raise MethodFailed(
             f"contact at {force} did not converge after {state.cycles:.4g} cycles; change "
-            "mesh.pad_elements or lower wear.cycle_block.share"
+            "mesh.pad_elements or lower wear.step.fraction"
         )
     if case.wear.energy is not None and contact.energy == 0.0:
         raise UserError(
@@ -172,20 +168,13 @@ def _check(
             f"mesh.pad_elements: a single node of the pad touches at {force}, too few to wear; "
             "raise it, or load_path.normal_forces"
         )
-    if number > MOST_BLOCKS or (number == 0 and _blocks_needed(state, case) > MOST_BLOCKS):
+    # As many as the run takes if they are as long as the first one.
+    needed = number or _to_go(case, state) / _block(case, state)
+    if needed > MOST_BLOCKS:
         raise UserError(
             f"wear: more than {MOST_BLOCKS} cycle blocks at {force}; lower the wear coefficients, "
-            "the cycles or the energy, or lengthen wear.cycle_block"
+            "the cycles or the energy, or lengthen wear.step"
         )
-
-
-def _blocks_needed(state: BlockState, case: SpecimensCase) -> float:
-    """About as many cycle blocks as the run takes, as long as the first one."""
-    wear, block = case.wear, _block(case, state)
-    if wear.cycles is not None:
-        return wear.cycles / block
-    assert wear.energy is not None
-    return wear.energy / (state.contact.energy * block)
 
 
 def _chosen(blocks: tuple[BlockState, ...]) -> list[BlockState]:
@@ -194,14 +183,13 @@ def _chosen(blocks: tuple[BlockState, ...]) -> list[BlockState]:
         return list(blocks)
     cycles = np.array([state.cycles for state in blocks])
     wanted = np.geomspace(cycles[1], cycles[-1], KEPT_STATES - 1)
-    places = np.unique([0, *(int(np.abs(cycles - own).argmin()) for own in wanted)])
+    places = np.unique([0, *(int(np.abs(cycles - value).argmin()) for value in wanted)])
     return [blocks[place] for place in places]
 
 
 def rising(points: int) -> Array:
     """Shares ``(points,)`` from 0 to 1, denser near 0."""
-    shares: Array = np.linspace(0.0, 1.0, points) ** CURVE_POWER
-    return shares
+    return np.linspace(0.0, 1.0, points) ** CURVE_POWER
 
 
 def first_loading(

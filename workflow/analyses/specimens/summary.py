@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
+from fe_models.reduced_contact import ReducedPair
 from sa_solver.types import Array
-from workflow.analyses.specimens.half_space import BulkCompliance
-
-if TYPE_CHECKING:
-    from fe_models.reduced_contact import ReducedPair
-    from workflow.analyses.specimens.case import Reported
-    from workflow.analyses.specimens.half_space import HalfSpaceState
-    from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
-    from workflow.analyses.specimens.wear import BlockState
+from workflow.analyses.specimens.case import Reported
+from workflow.analyses.specimens.half_space import BulkCompliance, HalfSpaceState
+from workflow.analyses.specimens.outcome import KeptState, LoadOutcome, SpecimensOutcome
+from workflow.analyses.specimens.wear import BlockState
 
 # Steady is what stays within this of its last value: of the stiffness, and of the mean pressure.
 STEADY = 0.02
@@ -26,13 +23,9 @@ LATE = 0.8
 
 def frequencies(outcome: SpecimensOutcome) -> dict[str, Any]:
     """Natural frequencies of each free specimen [Hz]."""
-    reduction = outcome.model.reduction
     return {
-        f"body_{number + 1}": {
-            "full": reduction.full[number].tolist(),
-            "reduced": reduction.reduced[number].tolist(),
-        }
-        for number in (0, 1)
+        f"body_{number}": {"full": full.tolist(), "reduced": reduced.tolist()}
+        for number, (full, reduced) in enumerate(outcome.model.reduction.frequencies, 1)
     }
 
 
@@ -40,9 +33,9 @@ def explanation(outcome: SpecimensOutcome) -> list[str]:
     """Where specimens and half-space differ and why, in sentences."""
     bulk, first = outcome.bulk, outcome.loads[0]
     (stiff_z, stiff_x), (half_z, half_x) = bulk.specimens, bulk.half_space
-    ring = outcome.case.structure.ring_distance
+    ring = outcome.model.case.structure.ring_distance
     unworn, beside = first.kept[0].block.contact.normal, first.half_space[0]
-    shares = [edge_share(outcome.pair, p) for p in (unworn.pressure, beside.nodal_pressure)]
+    shares = [edge_share(outcome.model.pair, p) for p in (unworn.pressure, beside.nodal_pressure)]
     softer = ": they lack what a half-space has beside the strips" if bulk.tangential > 0.0 else ""
     held = f": held {ring:g} mm from the pad, where a half-space gives way"
     stiffer = held if bulk.normal < 0.0 else ""
@@ -75,8 +68,8 @@ def tied_pad(bulk: BulkCompliance) -> dict[str, Any]:
 
 def load_summary(outcome: SpecimensOutcome, load: LoadOutcome) -> dict[str, Any]:
     """Everything about one normal force."""
-    end, areas = load.blocks[-1], outcome.pair.areas
-    steady = steady_states(outcome.pair, load.blocks)
+    end, areas = load.blocks[-1], outcome.model.pair.areas
+    steady = steady_states(outcome.model.pair, load.blocks)
     return {
         "normal_force": load.force,
         "cycles": end.cycles,
@@ -90,32 +83,32 @@ def load_summary(outcome: SpecimensOutcome, load: LoadOutcome) -> dict[str, Any]
             name: {"cycles": state.cycles, "energy": state.energy} for name, state in steady.items()
         },
         "coupled_cycle": {
-            "energy": load.marched.energy[0],
-            "energy_uncoupled": load.marched.energy[1],
-            "energy_difference": _relative(*load.marched.energy),
-            "secant_stiffness": load.marched.secant_stiffness[0],
-            "secant_stiffness_uncoupled": load.marched.secant_stiffness[1],
-            "secant_stiffness_difference": _relative(*load.marched.secant_stiffness),
+            **_uncoupled("energy", *load.marched.energy),
+            **_uncoupled("secant_stiffness", *load.marched.secant_stiffness),
             "pressure_change": load.marched.pressure_change,
         },
     }
 
 
-def _relative(value: float, other: float) -> float:
-    return float(other / value - 1.0) if value else 0.0
+def _uncoupled(name: str, marched: float, uncoupled: float) -> dict[str, float]:
+    """A quantity of the coupled cycle beside that of the uncoupled one."""
+    difference = float(uncoupled / marched - 1.0) if marched else 0.0
+    return {name: marched, f"{name}_uncoupled": uncoupled, f"{name}_difference": difference}
 
 
 def _state_summary(outcome: SpecimensOutcome, load: LoadOutcome, place: int) -> dict[str, Any]:
     """The specimens on one shape, and the half-space beside them; ``place`` 0 or -1."""
     state, beside = load.kept[place], load.half_space[place]
-    contact, areas = state.block.contact, outcome.pair.areas
+    contact, areas = state.block.contact, outcome.model.pair.areas
     normal = contact.normal
     return {
-        **_stiffness(state),
+        # With all that touches stuck, and as the slope of the loop.
+        "stick_stiffness": contact.stick_stiffness,
+        "secant_stiffness": state.curve.secant_stiffness(SLOPE_SHARE),
         "area": normal.area,
         "approach": normal.approach,
         "peak_pressure": float(normal.pressure.max()),
-        "edge_pressure_share": edge_share(outcome.pair, normal.pressure),
+        "edge_pressure_share": edge_share(outcome.model.pair, normal.pressure),
         "pressure_deviation": pressure_deviation(areas, normal.pressure),
         "friction": contact.friction,
         "energy_per_cycle": contact.energy,
@@ -123,19 +116,11 @@ def _state_summary(outcome: SpecimensOutcome, load: LoadOutcome, place: int) -> 
     }
 
 
-def _stiffness(state: KeptState) -> dict[str, float]:
-    """With all that touches stuck, and as the slope of the loop."""
-    return {
-        "stick_stiffness": state.block.contact.stick_stiffness,
-        "secant_stiffness": state.curve.secant_stiffness(SLOPE_SHARE),
-    }
-
-
 def _beside(
     outcome: SpecimensOutcome, state: KeptState, beside: HalfSpaceState, force: float
 ) -> dict[str, float]:
     """The half-space, its stiffness corrected by what it lacks, and how its fields differ."""
-    areas, contact = outcome.pair.areas, state.block.contact
+    areas, contact = outcome.model.pair.areas, state.block.contact
     shear = contact.tangential.shear / areas
     return {
         "stick_stiffness": beside.stick_stiffness,
@@ -144,7 +129,7 @@ def _beside(
         "approach": beside.approach,
         "corrected_approach": beside.approach + force * outcome.bulk.normal,
         "peak_pressure": float(beside.pressure.max()),
-        "edge_pressure_share": edge_share(outcome.pair, beside.nodal_pressure),
+        "edge_pressure_share": edge_share(outcome.model.pair, beside.nodal_pressure),
         "energy_per_cycle": beside.energy,
         "pressure_difference": _difference(areas, contact.normal.pressure, beside.nodal_pressure),
         "shear_difference": _difference(areas, shear, beside.nodal_shear),
@@ -153,18 +138,16 @@ def _beside(
 
 def pressure_deviation(areas: Array, pressure: Array) -> float:
     """Root mean square of p/mean - 1 over the pad: 0 where the pressure is uniform."""
-    mean = np.sum(areas * pressure) / areas.sum()
-    return float(np.sqrt(np.sum(areas * (pressure / mean - 1.0) ** 2) / areas.sum()))
+    mean = np.average(pressure, weights=areas)
+    return float(np.sqrt(np.average((pressure / mean - 1.0) ** 2, weights=areas)))
 
 
 def edge_share(pair: ReducedPair, pressure: Array) -> float:
     """Mean pressure of the nodes on the border of the pad over that of the pad."""
     place = np.abs(pair.face.coordinates)
     border = np.any(place > place.max(axis=0) * (1.0 - 1e-9), axis=1)
-    areas = pair.areas
-    mean = np.sum(areas * pressure) / areas.sum()
-    on_border = np.sum((areas * pressure)[border]) / areas[border].sum()
-    return float(on_border / mean)
+    on_border = np.average(pressure[border], weights=pair.areas[border])
+    return float(on_border / np.average(pressure, weights=pair.areas))
 
 
 def _difference(areas: Array, field: Array, other: Array) -> float:
@@ -177,7 +160,7 @@ def steady_states(pair: ReducedPair, blocks: tuple[BlockState, ...]) -> dict[str
     """First states from which stiffness and evenness of pressure stay within ``STEADY``."""
     stiffness = np.array([state.contact.stick_stiffness for state in blocks])
     pressures = (state.contact.normal.pressure for state in blocks)
-    deviation = np.array([pressure_deviation(pair.areas, own) for own in pressures])
+    deviation = np.array([pressure_deviation(pair.areas, pressure) for pressure in pressures])
     return {
         "stiffness": blocks[_settled(stiffness / stiffness[-1])],
         "pressure": blocks[_settled(deviation)],
@@ -196,12 +179,10 @@ def collapse(loads: list[dict[str, Any]]) -> dict[str, float] | None:
     None if it is so from the start under some force.
     """
     steady = [load["steady"]["stiffness"] for load in loads]
-    if min(own["energy"] for own in steady) == 0.0:
+    if min(state["energy"] for state in steady) == 0.0:
         return None
-    return {
-        key: max(own[key] for own in steady) / min(own[key] for own in steady)
-        for key in ("cycles", "energy")
-    }
+    values = {key: [state[key] for state in steady] for key in ("cycles", "energy")}
+    return {key: max(those) / min(those) for key, those in values.items()}
 
 
 def reported_summary(
@@ -211,8 +192,8 @@ def reported_summary(
 
     Shape and energy depend on cycles times coefficients alone. None if it is steady unworn.
     """
-    (own,) = [load for load in loads if load["normal_force"] == reported.normal_force]
-    cycles = own["steady"][reported.steady]["cycles"]
+    (load,) = [load for load in loads if load["normal_force"] == reported.normal_force]
+    cycles = load["steady"][reported.steady]["cycles"]
     ratio = cycles / reported.cycles
     return {
         "normal_force": reported.normal_force,
@@ -226,4 +207,4 @@ def reported_summary(
 def late(load: dict[str, Any]) -> bool:
     """Whether something becomes steady so late that a longer run might show it steady later."""
     end = load["cycles"]
-    return any(own["cycles"] > LATE * end > 0.0 for own in load["steady"].values())
+    return any(state["cycles"] > LATE * end > 0.0 for state in load["steady"].values())

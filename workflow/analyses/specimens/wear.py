@@ -29,11 +29,6 @@ class BlockState:
     stable_cycles: float
 
     @property
-    def gap(self) -> Array:
-        """Of the unloaded faces ``(n,)`` [mm]."""
-        return self.state.surfaces.gap
-
-    @property
     def depths(self) -> Array:
         """Worn off each body ``(2, n)`` [mm]."""
         return np.stack(self.state.surfaces.depths)
@@ -75,10 +70,10 @@ class FrettedPair:
     def cycle_at(self, state: NodalState) -> PairCycle:
         """The cycle on the surfaces of ``state``, begun from the contact that wore to it."""
         if self._last is None or self._last[0].surfaces is not state.surfaces:
-            own = self._conditions
+            conditions = self._conditions
             guess = None if state.start is None else np.asarray(state.start)
-            contact = self._pair.fretting_cycle(state.surfaces.gap, own, guess)
-            self._last = state, PairCycle(self._pair, contact, own.friction)
+            contact = self._pair.fretting_cycle(state.surfaces.gap, conditions, guess)
+            self._last = state, PairCycle(self._pair, contact, conditions.friction)
         return self._last[1]
 
     def contact_at(self, state: NodalState) -> NodalContact:

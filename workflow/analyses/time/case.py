@@ -12,7 +12,7 @@ from workflow.analyses.rig.excitation import Drive, Excitation, Hammer, Harmonic
 from workflow.analyses.rig.joint_evolution import JointEvolution
 from workflow.analyses.rig.joint_sections import ContactLaw, FrictionContactJoint, Joint, JointLaw
 from workflow.analyses.rig.structure import ReducedBody, Rig
-from workflow.analyses.wear.case.evolution import TotalEnergy
+from workflow.analyses.wear.case.evolution import PositiveEnergy, TotalEnergy
 from workflow.analyses.wear.case.sections import Cycles
 from workflow.case.fields import Quantity
 from workflow.case.sections import (
@@ -25,10 +25,6 @@ from workflow.case.sections import (
     entry,
 )
 
-EndEnergy = Annotated[
-    float,
-    Quantity("N*mm", above=0.0, at_most=1e15, range_text="above 0 and at most 1e12 J"),
-]
 StepError = Annotated[float, Quantity("1", above=0.0, at_most=0.1)]
 JumpError = Annotated[float, Quantity("1", at_least=1e-10, at_most=0.1)]
 
@@ -42,7 +38,7 @@ class SingleJoint(Section):
 class Ageing(Section):
     """How long the joint is driven: by energy or by cycles."""
 
-    energy: EndEnergy | None = entry("dissipated until the end [N*mm]", "2800 J", default=None)
+    energy: PositiveEnergy | None = entry("dissipated until the end [N*mm]", "2800 J", default=None)
     cycles: Cycles | None = entry("until the end [1]", 1.08e6, default=None)
     tolerance: JumpError = entry("of the cycles, for the jumps in energy [1]", 1e-4, default=1e-4)
 

@@ -16,9 +16,8 @@ from workflow.analyses.rig.joint_sections import (
     JointStiffness,
 )
 from workflow.analyses.rig.structure import FrictionRig, Rig
-from workflow.analyses.specimens.case import Pressing
 from workflow.analyses.vibration.case import DrivenMass, VibrationCase, VibrationCaseBase, wears
-from workflow.analyses.wear.case.sections import Cycles
+from workflow.analyses.wear.case.sections import Cycles, PressingForce
 from workflow.case.fields import File, Quantity
 from workflow.case.sections import OutputWithoutFields, Section, Title, disagreement, entry
 from workflow.case.source import Source
@@ -73,7 +72,7 @@ class PadContacts(Joint):
 
     law: Literal["friction_contact"] = entry("at every node of the pads", "friction_contact")
     friction: WearingFriction = entry("limit of the friction force over the normal load [1]", 0.88)
-    normal_load: Pressing = entry("that presses the pads together [N]", "60 N")
+    normal_load: PressingForce = entry("that presses the pads together [N]", "60 N")
     stiffness: JointStiffness = entry("along the pads, stuck [N/mm]", "45 N/um")
     normal_stiffness: JointStiffness = entry("in contact [N/mm]", "58.5 N/um")
 

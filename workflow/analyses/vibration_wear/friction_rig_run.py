@@ -48,7 +48,7 @@ def wear_specimens(case: FrictionRigWearCase, reporter: Reporter) -> VibrationWe
             state, done, error = worn.state, cycles, max(error, worn.error)
             _warn_of_steps(case, cycles, error, reporter)
             states.append(_kept(case, pads, state, (cycles, worn.spent.steps), reporter))
-            progress.update(cycles, len(states) - 1)
+            progress(cycles, len(states) - 1)
     rig = unworn.rig
     assert rig.places is not None
     assert rig.area is not None

@@ -72,7 +72,7 @@ def wear_half_space(case: VibrationWearCase, reporter: Reporter) -> VibrationWea
                 worn = advance_cycles(stepper, state, cycles - done, left, contact.wearing)
             state, done = worn.state, cycles
             states.append(keeper.keep(state, cycles, worn.spent.steps))
-            progress.update(cycles, len(states) - 1)
+            progress(cycles, len(states) - 1)
     return VibrationWearOutcome(case, tuple(states), grid=contact.grid)
 
 

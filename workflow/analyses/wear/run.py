@@ -96,7 +96,7 @@ def _march(
     end = kept or state
     with reporter.jumps(settings.cycles, float(end.cycles[-1])) as bar:
         for end in loop.march(end):  # noqa: B020 - each from the one before
-            bar.update(float(end.cycles[-1]), end.jump)
+            bar(float(end.cycles[-1]), end.jump)
     return end, first
 
 

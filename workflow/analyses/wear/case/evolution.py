@@ -16,6 +16,9 @@ from workflow.case.sections import Friction, Section, disagreement, entry
 EnergyPerArea = Annotated[
     float, Quantity("N/mm", at_least=0.0, at_most=1e9, range_text="0 to 1e6 J/mm^2")
 ]
+PositiveEnergy = Annotated[
+    float, Quantity("N*mm", above=0.0, at_most=1e15, range_text="above 0 and at most 1e12 J")
+]
 TotalEnergy = Annotated[
     float, Quantity("N*mm", at_least=0.0, at_most=1e15, range_text="0 to 1e12 J")
 ]

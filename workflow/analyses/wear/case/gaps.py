@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from workflow.case.fields import File
-from workflow.case.input_files import InputFileError, height_shape
+from workflow.case.input_files import InputFileError, read_heights
 from workflow.case.sections import Length, RoundingRadius, Section, disagreement, entry
 
 # Share of a face's size that is rounding.
@@ -101,7 +101,7 @@ def check_gap(
                 raise disagreement("no radius_x; allowed: one, in 2 dimensions", key)
         case HeightsGap():
             try:
-                shape = height_shape(gap.file)
+                shape = read_heights(gap.file).shape
             except InputFileError as error:
                 raise disagreement(str(error), f"{key}.file") from error
             check_cells(shape, gap.file, cells)

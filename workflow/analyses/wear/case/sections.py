@@ -40,6 +40,9 @@ Volume = Annotated[float, Quantity("mm^3", above=0.0, at_most=1e9)]
 Cycles = Annotated[float, Quantity("1", at_least=1.0, at_most=1e12)]
 Ratio = Annotated[float, Quantity("1", above=0.0, at_most=1.0)]
 Share = Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)]
+PressingForce = Annotated[
+    float, Quantity("N", above=0.0, at_most=1e9, range_text="above 0 and at most 1e6 kN")
+]
 Place = Annotated[float, Quantity("mm", at_least=-1e4, at_most=1e4)]
 
 # Shares add up to 1 but for the rounding of what was written.

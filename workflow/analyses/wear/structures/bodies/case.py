@@ -9,8 +9,10 @@ from __future__ import annotations
 from math import cos, inf, sin
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import Field, model_validator
 
+from sa_solver.types import Array
 from workflow.analyses.contact.case import (
     HEIGHTS,
     BodyMaterial,
@@ -18,19 +20,17 @@ from workflow.analyses.contact.case import (
     Ellipsoid,
     FlatRounded,
     Heights,
+    Shape,
     Sphere,
     require_shape,
     touches_along_a_line,
 )
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.case.sections import Contact, TwoBodies, Wear
+from workflow.analyses.wear.case.sections import Contact, PressingForce, TwoBodies, Wear
 from workflow.case.fields import Quantity, Whole
 from workflow.case.sections import GridCells, Length, Section, Title, disagreement, entry
 from workflow.case.source import Source
 
-PressingForce = Annotated[
-    float, Quantity("N", above=0.0, at_most=1e9, range_text="above 0 and at most 1e6 kN")
-]
 PressingLineForce = Annotated[
     float, Quantity("N/mm", above=0.0, at_most=1e9, range_text="above 0 and at most 1e6 kN/mm")
 ]
@@ -44,23 +44,28 @@ FLAT = "flat"
 # --- bodies -------------------------------------------------------------------------------------
 
 
-class Flat(Section):
+class Flat(Shape):
     """A flat rectangle with sharp edges on a step: the pad of a specimen."""
 
-    kind: Literal["bodies"] = entry("what the structure is", "bodies")
     shape: Literal["flat"] = entry("flat, or as in contact cases", "flat")
     half_width: Length = entry("of the rectangle, along x [mm]", "0.5 mm")
     half_length: Length = entry("of the rectangle, along y [mm]", "0.5 mm")
     step: Length = entry("from the rectangle back to the body [mm]", "0.1 mm", default=0.1)
 
+    def height(self, x: Array, y: Array) -> Array:
+        on_top = (np.abs(x) < self.half_width) & (np.abs(y) < self.half_length)
+        return np.where(on_top, 0.0, self.step)
 
-class FlatStrip(Section):
+
+class FlatStrip(Shape):
     """A flat strip with sharp edges on a step: a line contact."""
 
-    kind: Literal["bodies"] = entry("what the structure is", "bodies")
     shape: Literal["flat"] = entry("flat, or as in contact cases", "flat")
     half_width: Length = entry("of the strip, along x [mm]", "0.5 mm")
     step: Length = entry("from the strip back to the body [mm]", "0.1 mm", default=0.1)
+
+    def height(self, x: Array, y: Array) -> Array:
+        return np.where(np.abs(x) < self.half_width, 0.0, self.step)
 
 
 class BodyMaterials(TwoBodies[BodyMaterial]):

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import cached_property, partial
+from functools import cached_property
 
 import numpy as np
 
 from sa_solver.types import Array, Grid, LoadHistory
 from wear.interface import CycleLoads
-from workflow.analyses.contact.bodies import Shape, height_at
-from workflow.analyses.contact.case import Heights
+from workflow.analyses.contact.case import Heights, Shape
 from workflow.analyses.wear.gaps import GapFunction, GridHeights
 from workflow.analyses.wear.load_source import (
     COARSER,
@@ -20,12 +19,7 @@ from workflow.analyses.wear.load_source import (
     coarse_cells,
     nominal_face,
 )
-from workflow.analyses.wear.structures.bodies.case import (
-    BodiesWearCase,
-    Flat,
-    FlatStrip,
-    LineBodiesWearCase,
-)
+from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
 from workflow.case.input_files import read_heights
 
 NAME = "interface"
@@ -96,18 +90,8 @@ class BodiesSource(UncoupledSource):
         return Grid.over(size, contact.grid, self.line)
 
 
-def gap_of(shape: Shape | Flat | FlatStrip | Heights, grid: Grid) -> GapFunction:
+def gap_of(shape: Shape | Heights, grid: Grid) -> GapFunction:
     """Gap [mm] of the unloaded bodies at x and y of the face that ``grid`` covers."""
     if isinstance(shape, Heights):
         return GridHeights(grid, read_heights(shape.file))
-    if isinstance(shape, Flat | FlatStrip):
-        return partial(step_around, shape)
-    return partial(height_at, shape)
-
-
-def step_around(shape: Flat | FlatStrip, x: Array, y: Array) -> Array:
-    """Gap [mm] around a flat rectangle or strip, at ``x`` and ``y``, which broadcast."""
-    on_top = np.abs(x) < shape.half_width
-    if isinstance(shape, Flat):
-        on_top = on_top & (np.abs(y) < shape.half_length)
-    return np.where(on_top, 0.0, shape.step)
+    return shape.height

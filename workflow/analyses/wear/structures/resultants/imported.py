@@ -8,7 +8,7 @@ import numpy as np
 
 from fe_models.mesh import Face
 from sa_solver.types import Array, Frame, Indices, LoadHistory
-from workflow.analyses.contact.datasets import energy_columns, resultant_columns
+from workflow.analyses.contact.datasets import LOADS
 from workflow.shell.dataset import unit_in
 
 COLUMNS = ("P", "Qx", "Qy", "Mx", "My", "Mz", "Edx", "Edy")
@@ -53,8 +53,7 @@ class ImportedLoads:
 
 def base_units(line: bool) -> dict[str, str]:
     """Base unit of every column; per length in a line contact."""
-    columns = resultant_columns(*np.empty((6, 0))) | energy_columns(*np.empty((2, 0)))
-    return {name: unit_in(line, column.unit) for name, column in columns.items()}
+    return {name: unit_in(line, unit) for name, (unit, _) in LOADS.items() if name != "sliding"}
 
 
 def required_columns(line: bool) -> list[str]:
