@@ -105,10 +105,11 @@ def _run(case: Case, folder: OutputFolder, resume: bool, stays: Sequence[str] = 
     analysis = analysis_of(case)
     reporter = Reporter(folder.reserve_log(), append=resume)
 
-    def draw() -> None:
+    def draw(contents: Any) -> None:
         with reporter.stage("paraview and figures"):
             if analysis.pictures is not None:
-                write_pictures(case.output, folder, analysis.pictures())
+                processes = analysis.drawing_processes
+                write_pictures(case.output, folder, analysis.pictures, contents, processes)
 
     try:
         if stays:

@@ -13,6 +13,7 @@ from workflow.analyses.contact.bodies import bodies_of, bulk_strain
 from workflow.analyses.contact.case import ContactCase, LineContactCase
 from workflow.analyses.contact.datasets import (
     BODIES,
+    Contents,
     energy_columns,
     motion_columns,
     resultant_columns,
@@ -49,7 +50,7 @@ def write_contact_output(outcome: ContactOutcome, run: ContactRun) -> None:
     reporter = run.reporter
     with reporter.stage("results"):
         write_contact_results(outcome, run)
-    run.draw()
+    run.draw(Contents(outcome.grid.line, len(outcome.history.states)))
     summary = _summary(outcome)
     finish(run, summary, _lines(summary, outcome.grid))
 

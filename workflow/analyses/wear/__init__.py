@@ -50,7 +50,7 @@ def _pictures() -> Pictures:
     from workflow.analyses.wear.figures.wear import figures_of
     from workflow.analyses.wear.paraview.wear import write_wear
 
-    return Pictures(figures_of, write_wear, processes=2)  # ten seconds and more on one core
+    return Pictures(figures_of, write_wear)
 
 
 ANALYSIS = Analysis(
@@ -58,6 +58,7 @@ ANALYSIS = Analysis(
     cases=CasesOfStructures(),
     run=_run,
     pictures=_pictures,
+    drawing_processes=2,  # ten seconds and more on one core
     memory=_memory,
     resumable=_resumable,
     choose=_choose,
