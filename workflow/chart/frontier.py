@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from math import inf, isfinite
 
 
@@ -37,11 +38,6 @@ class Combination:
     ratio: float = 1.0
     error: float = 0.0
 
-    def with_one(self, option: Option) -> Combination:
-        """This and a choice on one more axis."""
-        names = (*self.names, option.name)
-        return Combination(names, self.ratio * option.ratio, self.error + option.error)
-
 
 def cheapest(axes: Sequence[Sequence[Option]], accuracy: float) -> Combination | None:
     """The cheapest choice on every axis whose errors add up to ``accuracy`` at most, if any.
@@ -51,7 +47,10 @@ def cheapest(axes: Sequence[Sequence[Option]], accuracy: float) -> Combination |
     """
     kept = [Combination()]
     for options in axes:
-        grown = [choice.with_one(option) for choice in kept for option in options]
+        grown = [
+            Combination((*c.names, o.name), c.ratio * o.ratio, c.error + o.error)
+            for c, o in product(kept, options)
+        ]
         # What is no frontier point so far is none of any longer combination either.
         flags = efficient([choice.ratio for choice in grown], [choice.error for choice in grown])
         kept = [choice for choice, flag in zip(grown, flags, strict=True) if flag]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -20,9 +19,6 @@ from workflow.shell.versions import versions
 
 # Columns of text where the tables go to a file.
 FILE_WIDTH = 120
-HEAD = ("axis", "branch", "rung", "settings", "own", "folder")
-TAIL = ("error", "worst", "bound", "floor", "unresolved", "seconds", "convolutions", "solves")
-FRONTIER = ("efficient_by_seconds", "efficient_by_convolutions")
 
 
 def write_chart(chart: Chart, out: Path) -> None:
@@ -152,31 +148,36 @@ def _marks(rung: Judged) -> list[str]:
 
 def _write_table(chart: Chart, path: Path) -> None:
     """One row for each rung; a quantity that its axis does not have is empty."""
-    points = [rung.point for ladder in chart.ladders for rung in ladder.rungs]
-    quantities = list(dict.fromkeys(q for p in points for q in (*p.values, *p.extras)))
-    rows = [row for ladder in chart.ladders for row in _rows(ladder)]
-    names = [*HEAD, *quantities, *TAIL, *FRONTIER]
+    cells = [_cells(ladder, rung) for ladder in chart.ladders for rung in ladder.rungs]
+    names = dict.fromkeys(name for part in zip(*cells, strict=True) for own in part for name in own)
+    rows = [head | values | tail for head, values, tail in cells]
     write_table(path, {name: [row.get(name) for row in rows] for name in names})
 
 
-def _rows(ladder: Ladder) -> Iterator[dict[str, object]]:
-    for rung in ladder.rungs:
-        point, cost = rung.point, rung.point.cost
-        head = (
-            *(ladder.axis.name, point.rung.branch, rung.name, " ".join(point.rung.overrides)),
-            *(point.baseline, point.folder),
-        )
-        tail = (
-            *(rung.error, rung.worst, rung.bound, ladder.floor, rung.unresolved),
-            *(round(cost.seconds, 2), cost.convolutions, cost.solves),
-        )
-        yield {
-            **dict(zip(HEAD, head, strict=True)),
-            **point.values,
-            **point.extras,
-            **dict(zip(TAIL, tail, strict=True)),
-            **dict(zip(FRONTIER, (rung.by_seconds, rung.by_convolutions), strict=True)),
-        }
+def _cells(ladder: Ladder, rung: Judged) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """What a rung is, the quantities that its axis has, and what came of it."""
+    point, cost = rung.point, rung.point.cost
+    head = {
+        "axis": ladder.axis.name,
+        "branch": point.rung.branch,
+        "rung": rung.name,
+        "settings": " ".join(point.rung.overrides),
+        "own": point.baseline,
+        "folder": point.folder,
+    }
+    tail = {
+        "error": rung.error,
+        "worst": rung.worst,
+        "bound": rung.bound,
+        "floor": ladder.floor,
+        "unresolved": rung.unresolved,
+        "seconds": round(cost.seconds, 2),
+        "convolutions": cost.convolutions,
+        "solves": cost.solves,
+        "efficient_by_seconds": rung.by_seconds,
+        "efficient_by_convolutions": rung.by_convolutions,
+    }
+    return head, {**point.values, **point.extras}, tail
 
 
 # --- summary ------------------------------------------------------------------------------------

@@ -7,12 +7,10 @@ as it is and an interrupted one goes on.
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +26,7 @@ from workflow.kinds import analysis_of, load_case
 from workflow.runs.job import Finished, Job
 from workflow.runs.jobs import run_jobs
 from workflow.runs.run import kept_in
+from workflow.shell.processes import environment
 from workflow.shell.summary import number_at
 
 CACHE = "FRETSCALE_CACHE"
@@ -91,7 +90,7 @@ def chart_case(
     settings = axes_of(case, base, axes)
     jobs = _jobs(case, base, settings)
     _claim(out, load_case(case, base))
-    with _environment(CACHE, str((out / STRUCTURES).absolute())):
+    with environment({CACHE: str((out / STRUCTURES).absolute())}):
         ended, left_out = _run(jobs, settings, out / RUNS, quantities, report)
     runs = _runs(ended)
     if not runs:
@@ -160,7 +159,7 @@ def _run(
 
     The first one shows whether there are such ``quantities``, before all others are run.
     """
-    progress = _Progress(len(jobs), report)
+    progress = _progress(len(jobs), report)
     baseline, *others = jobs.values()
     ended = run_jobs([baseline], out, alone=True, report=progress)
     if (summary := ended[0].summary) is not None:
@@ -184,32 +183,17 @@ def _too_long(setting: Setting, summary: Mapping[str, Any]) -> str:
     return f"it would take {steps:.2g} steps of {length:.3g} cycles" if steps > MOST_STEPS else ""
 
 
-class _Progress:
+def _progress(total: int, report: Callable[[str], None]) -> Callable[[Finished], None]:
     """Reports each run as it ends."""
+    numbers = count(1)
 
-    def __init__(self, total: int, report: Callable[[str], None]) -> None:
-        self._total, self._report, self._done = total, report, 0
-
-    def __call__(self, finished: Finished) -> None:
-        self._done += 1
+    def ended(finished: Finished) -> None:
         ending = f"failed: {finished.error}"
         if finished.summary is not None:
             ending = f"{sum(finished.summary.get('seconds', {}).values()):.1f} s"
-        self._report(f"{self._done}/{self._total} {finished.job.name}: {ending}")
+        report(f"{next(numbers)}/{total} {finished.job.name}: {ending}")
 
-
-@contextmanager
-def _environment(name: str, value: str) -> Iterator[None]:
-    """Set an environment variable for the processes started within."""
-    before = os.environ.get(name)
-    os.environ[name] = value
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[name]
-        else:
-            os.environ[name] = before
+    return ended
 
 
 def _runs(ended: Sequence[Finished]) -> dict[str, _Run]:

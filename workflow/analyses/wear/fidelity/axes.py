@@ -107,12 +107,7 @@ class _Climb:
 
 def choose_mesh(case: DovetailCase, allowed: float) -> Decision:
     """The coarsest mesh, along and away in proportion, whose section wears as it should."""
-    section = plane_section(case)
-
-    def worn(rung: _Rung) -> Numbers:
-        return life(changed(section, rung.settings))
-
-    climb = _climb(list(_meshes(case)), worn, allowed)
+    climb = _climb(list(_meshes(case)), partial(_worn, plane_section(case)), allowed)
     why = _sentence(climb, allowed, "elements across the flank")
     return _decision(climb.taken.settings, why, climb.probed, allowed, climb.error)
 
@@ -138,12 +133,14 @@ def choose_grid(case: DovetailCase, allowed: float) -> Decision:
     across, along = case.contact.grid
     if case.structure.dimension == 2:
         most = max(across, MOST_STRIPS)
-        climb = _climb_grid(across, most, allowed, partial(_strips, section))
+        climb = _climb_grid(across, most, allowed, partial(_worn, section))
         grid, climbs = (climb.taken.size, along), [climb]
     else:
         half = 0.5 * allowed
-        first = _climb_grid(across, FINER_SPACE * across, half, partial(_strips, section))
-        second = _climb_grid(along, FINER_SPACE * along, half, partial(_ends, section))
+        first = _climb_grid(across, FINER_SPACE * across, half, partial(_worn, section))
+        second = _climb_grid(
+            along, FINER_SPACE * along, half, lambda rung: end_life(section, rung.size)
+        )
         grid, climbs = (first.taken.size, second.taken.size), [first, second]
     names = "strips across the flank", "strips along the slot"
     part = allowed / len(climbs)
@@ -155,18 +152,14 @@ def choose_grid(case: DovetailCase, allowed: float) -> Decision:
     return _decision({"contact.grid": grid}, why, probe, allowed, error)
 
 
-def _strips(section: DovetailCase, rung: _Rung) -> Numbers:
-    return life(changed(section, {"contact.grid": (rung.size, rung.size)}))
-
-
-def _ends(section: DovetailCase, rung: _Rung) -> Numbers:
-    return end_life(section, rung.size)
+def _worn(section: DovetailCase, rung: _Rung) -> Numbers:
+    return life(changed(section, rung.settings))
 
 
 def _climb_grid(cells: int, most: int, allowed: float, worn: Callable[[_Rung], Numbers]) -> _Climb:
     """Up the halves and doubles of so many cells."""
     sizes = _doublings(cells, max(FEWEST_CELLS, cells // COARSER), most)
-    return _climb([_Rung(size, {}) for size in sizes], worn, allowed)
+    return _climb([_Rung(n, {"contact.grid": (n, n)}) for n in sizes], worn, allowed)
 
 
 def _doublings(count: int, fewest: int, most: int) -> list[int]:
