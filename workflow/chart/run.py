@@ -96,21 +96,12 @@ def chart_case(
     if not runs:
         raise MethodFailed(f"{out}: not a single rung ran: {ended[0].job.name}: {ended[0].error}")
     first = runs.get(BASELINE) or next(iter(runs.values()))
-    errors = left_out | {
-        finished.job.name: finished.error for finished in ended if finished.summary is None
-    }
+    failed = {end.job.name: end.error for end in ended if end.summary is None}
     ladders = [
-        _ladder(
-            axis,
-            [(setting, jobs[setting.text].name) for setting in rungs],
-            runs,
-            errors,
-            quantities,
-        )
+        _ladder(axis, rungs, jobs, runs, left_out | failed, quantities)
         for axis, rungs in settings.items()
     ]
-    complete = all(finished.summary is not None for finished in ended)
-    return Chart(first.case.title, tuple(ladders), accuracy, complete)
+    return Chart(first.case.title, tuple(ladders), accuracy, complete=not failed)
 
 
 def _plain(case: Case, quantities: Sequence[str]) -> Iterator[str]:
@@ -225,23 +216,21 @@ def _check(quantities: Sequence[str], summary: Mapping[str, Any]) -> None:
 
 def _ladder(
     axis: Axis,
-    rungs: Sequence[tuple[Setting, str]],
+    settings: Sequence[Setting],
+    jobs: Mapping[str, Job],
     runs: Mapping[str, _Run],
     errors: Mapping[str, str],
     picked: Sequence[str],
 ) -> Ladder:
-    """The rungs of an axis, each with the name of its job, that ran or did not."""
-    completed = [(setting.rung, runs[name]) for setting, name in rungs if name in runs]
-    failed = {setting.rung.name: errors[name] for setting, name in rungs if name in errors}
+    """The rungs of an axis that ran or did not."""
+    rungs = [(setting.rung, jobs[setting.text].name) for setting in settings]
+    completed = [(rung, runs[name]) for rung, name in rungs if name in runs]
+    failed = {rung.name: errors[name] for rung, name in rungs if name in errors}
     if not completed:
         return Ladder(axis, (), {}, failed)
     last = completed[-1][1]
     wanted = _quantities(axis, runs.get(BASELINE, last), picked)
-    exact = {
-        expectation.quantity: expectation.value
-        for expectation in last.case.expect
-        if expectation.exact
-    }
+    exact = {entry.quantity: entry.value for entry in last.case.expect if entry.exact}
     points = [
         Point(
             rung=rung,
@@ -253,7 +242,7 @@ def _ladder(
         )
         for rung, run in completed
     ]
-    return judge(axis, points, exact, failed, finest=rungs[-1][0].rung.name)
+    return judge(axis, points, exact, failed, finest=rungs[-1][0].name)
 
 
 def _quantities(axis: Axis, run: _Run, picked: Sequence[str]) -> list[str]:

@@ -59,12 +59,8 @@ def profiles(file: h5py.File) -> Figure:
     bottom.fill_between(x, -limit, limit, color="#BBBBBB", alpha=0.4, lw=0, label="±µp, last")
     component, reach = "xy"[along], _reach(file, names)
     top.set(ylabel="pressure [MPa]", ylim=(0.0, None), title="pressure at y = 0")
-    bottom.set(
-        xlabel="x [mm]",
-        xlim=(-reach, reach),
-        ylabel=f"shear q{component} [MPa]",
-        title=f"shear along {component} at y = 0",
-    )
+    bottom.set(xlabel="x [mm]", xlim=(-reach, reach), ylabel=f"shear q{component} [MPa]")
+    bottom.set_title(f"shear along {component} at y = 0")
     bottom.legend(loc="center left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
@@ -192,18 +188,13 @@ def forces(file: h5py.File) -> Figure:
     moved, words = TO_MICRONS * motions, motion.replace("_", " ")
     left.plot(moved, values, line, color=BLUE, markersize=4)
     left.plot(moved[-1:], values[-1:], "D", color=ORANGE, label="last")
-    left.set(
-        xlabel=f"{words} [{'mrad' if history[motion].attrs['unit'] == 'rad' else 'µm'}]",
-        ylabel=f"{force} [{history[force].attrs['unit']}]",
-        title=f"{force} against {words} of body 1",
-    )
+    left.set_xlabel(f"{words} [{'mrad' if history[motion].attrs['unit'] == 'rad' else 'µm'}]")
+    left.set_ylabel(f"{force} [{history[force].attrs['unit']}]")
+    left.set_title(f"{force} against {words} of body 1")
     left.legend(loc="best")
     right.plot(history["increment"][()], energy, line, color=GREEN, markersize=4)
-    right.set(
-        xlabel="increment",
-        ylabel=f"energy dissipated so far [{history['Edx'].attrs['unit']}]",
-        title="energy dissipated by slip",
-    )
+    right.set(xlabel="increment", title="energy dissipated by slip")
+    right.set_ylabel(f"energy dissipated so far [{history['Edx'].attrs['unit']}]")
     return figure
 
 

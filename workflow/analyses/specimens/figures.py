@@ -175,17 +175,14 @@ def _label_kinetics(panels: Any) -> None:
     (over_cycles, over_energy), (areas, pressures) = panels
     for axis in panels.ravel():
         axis.set(xscale="log", xlabel="cycles")
-    stiffness = "tangential stiffness [N/µm]"
-    over_cycles.set(
-        title="stiffness: all stuck (lines), slope of the loop (dots)", ylabel=stiffness
-    )
-    over_energy.set(
-        title="the same over the energy", xlabel="energy dissipated so far [J]", ylabel=stiffness
-    )
+    over_energy.set_xlabel("energy dissipated so far [J]")
+    over_cycles.set_title("stiffness: all stuck (lines), slope of the loop (dots)")
+    over_energy.set_title("the same over the energy")
+    for axis in (over_cycles, over_energy):
+        axis.set_ylabel("tangential stiffness [N/µm]")
     areas.set(title="area in contact", ylabel="area [mm²]", ylim=(0.0, None))
-    pressures.set(
-        title="unevenness of the pressure", ylabel="rms of p/mean - 1 [%]", ylim=(0.0, None)
-    )
+    pressures.set(title="unevenness of the pressure", ylim=(0.0, None))
+    pressures.set_ylabel("rms of p/mean - 1 [%]")
     areas.legend(loc="lower right")
 
 

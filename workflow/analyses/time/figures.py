@@ -44,22 +44,18 @@ MOST_POINTS = 20_000
 
 def figures_of(contents: Contents) -> Figures:
     """The figures of a run, by name."""
+    groups = contents.curves
     drawn = {
-        "loops": (LOOP, loops),
-        "frequency_response": (RESPONSE, frequency_response),
-        "ring_down": (RING_DOWN, ring_down),
-        "motion": (MOTION, motion),
+        "loops": (loops, LOOP in groups),
+        "frequency_response": (frequency_response, RESPONSE in groups),
+        "ring_down": (ring_down, RING_DOWN in groups),
+        # A ring-down shows it too.
+        "motion": (motion, MOTION in groups and RING_DOWN not in groups),
+        "evolution": (evolution, bool(contents.evolution)),
     }
-    if RING_DOWN in contents.curves:
-        del drawn["motion"]  # it is shown there
-    figures = {
-        name: partial(draw, contents=contents)
-        for name, (group, draw) in drawn.items()
-        if group in contents.curves
+    return {
+        name: partial(draw, contents=contents) for name, (draw, there) in drawn.items() if there
     }
-    if contents.evolution:
-        figures["evolution"] = partial(evolution, contents=contents)
-    return figures
 
 
 def _states(file: h5py.File, contents: Contents, group: str) -> list[tuple[str, Any, h5py.Group]]:
@@ -90,11 +86,8 @@ def loops(file: h5py.File, contents: Contents) -> Figure:
     for label, colour, loop in shown:
         displacement, force = TO_MICRONS * loop["displacement"][()], loop["force"][()]
         axis.plot(displacement, force, color=colour, label=label)
-    axis.set(
-        xlabel="displacement of the joint [µm]",
-        ylabel="force of the joint [N]",
-        title=f"{LAW_NAMES[file.attrs['law']]}: settled cycles after so much energy",
-    )
+    axis.set(xlabel="displacement of the joint [µm]", ylabel="force of the joint [N]")
+    axis.set_title(f"{LAW_NAMES[file.attrs['law']]}: settled cycles after so much energy")
     legend_beside(axis, "dissipated so far")
     return figure
 
@@ -136,11 +129,8 @@ def _draw_parameter(axis: Axes, file: h5py.File, name: str) -> None:
     energies = [TO_JOULES * float(state.attrs["energy"]) for state in states]
     values = [factor * float(state.attrs[name]) for state in states]
     axis.plot(energies, values, "o", color=BLACK, mfc="none", label="looked at")
-    axis.set(
-        xlabel="energy dissipated so far [J]",
-        ylabel=label,
-        ylim=(0.0, HEADROOM * max(axis.dataLim.y1, 1e-300)),
-    )
+    axis.set(xlabel="energy dissipated so far [J]", ylabel=label)
+    axis.set_ylim(0.0, HEADROOM * max(axis.dataLim.y1, 1e-300))
     axis.legend(loc="lower right")
 
 

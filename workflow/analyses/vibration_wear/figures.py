@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import partial
 from typing import Any
 
@@ -39,6 +40,15 @@ PROFILE = {
     "energy": "energy per cycle\nand area [mJ/mm²]",
 }
 FORCE_COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
+# What is shown over the cycles, two on a panel: dataset, scale and label.
+Curve = tuple[str, float, str]
+MOTION: tuple[Curve, Curve] = (
+    ("stroke", TO_MICRONS, "stroke under the force that wears [µm]"),
+    ("energy_per_cycle", 1.0, "energy per cycle [mJ]"),
+)
+DEPTH: Curve = ("depth", TO_MICRONS, "largest worn depth [µm]")
+ON_GRID = DEPTH, ("area", 1.0, "area in contact [mm²]")
+AT_NODES = DEPTH, ("touching", 1.0, "nodes in contact")
 
 
 def figures_of(contents: Contents) -> Figures:
@@ -86,23 +96,8 @@ def evolution(file: h5py.File, contents: Contents) -> Figure:
         frequency.plot(place, history["resonance"][:, column], "o-", color=colour, label=label)
     frequency.set_ylabel("resonance [Hz]")
     frequency.legend()
-    _two(
-        motion,
-        place,
-        (TO_MICRONS * history["stroke"][()], "stroke under the force that wears [µm]"),
-        (history["energy_per_cycle"][()], "energy per cycle [mJ]"),
-    )
-    if contents.at_nodes:
-        touching = history["touching"][()], "nodes in contact"
-    else:
-        touching = history["area"][()], "area in contact [mm²]"
-    _two(
-        depth,
-        place,
-        (TO_MICRONS * history["depth"][()], "largest worn depth [µm]"),
-        touching,
-    )
-    for axis in (motion, depth):
+    for axis, curves in ((motion, MOTION), (depth, AT_NODES if contents.at_nodes else ON_GRID)):
+        _draw_pair(axis, place, history, curves)
         axis.set(xlabel=f"cycles (unworn at {place[0]:.3g})", xscale="log")
     return figure
 
@@ -184,11 +179,12 @@ def _loop(group: h5py.Group) -> tuple[Array, Array]:
     return TO_MICRONS * group["displacement"][()], group["force"][()]
 
 
-def _two(axis: Axes, place: Array, first: tuple[Array, str], second: tuple[Array, str]) -> None:
+def _draw_pair(axis: Axes, place: Array, history: h5py.Group, curves: Sequence[Curve]) -> None:
     """Two curves on one panel, each on its own scale."""
     right = axis.twinx()
-    for side, (values, label), colour in ((axis, first, BLUE), (right, second, ORANGE)):
-        side.plot(place, values, "o-", color=colour)
+    sides = zip((axis, right), curves, (BLUE, ORANGE), strict=True)
+    for side, (name, scale, label), colour in sides:
+        side.plot(place, scale * history[name][()], "o-", color=colour)
         side.set_ylabel(label, color=colour)
     right.grid(visible=False)
 

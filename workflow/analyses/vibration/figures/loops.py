@@ -48,11 +48,8 @@ def _label(left: Axes, right: Axes, response: h5py.Group) -> None:
     if coarse:
         text += f"; dashed: the force in {', '.join(map(_harmonics, coarse))} alone"
     left.set(title=text, xlabel="displacement [µm]", ylabel="tangential force [N]")
-    right.set(
-        title="rising branches from one origin",
-        xlabel="displacement since the reversal [µm]",
-        ylabel="force since the reversal [N]",
-    )
+    right.set_title("rising branches from one origin")
+    right.set(xlabel="displacement since the reversal [µm]", ylabel="force since the reversal [N]")
     right.legend(loc="lower right", title="excitation: stick slope (dashed)")
 
 

@@ -75,10 +75,8 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
         lows.append(size.min() / force)
         axis.plot(response.attrs["resonance"], peaks[-1], "o", color=colour, markersize=5)
     _over_frequency(axis, file)
-    axis.set(
-        ylabel=f"amplitude of {_seen(file)} / force [µm/N]",
-        ylim=(BELOW * min(lows), ABOVE * max(peaks)),
-    )
+    axis.set_ylabel(f"amplitude of {_seen(file)} / force [µm/N]")
+    axis.set_ylim(BELOW * min(lows), ABOVE * max(peaks))
     legend_beside(axis, "resonance")
     return figure
 

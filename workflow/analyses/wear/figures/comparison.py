@@ -18,11 +18,8 @@ from workflow.shell.results import grid_of
 COLOURS = BLUE, ORANGE, GREEN
 # Resultants shown, with the unit of a thousand; a line contact has no Mz.
 LOADS = ("Qx", "kN"), ("Mz", "N m")
-FIELDS = (
-    ("pressure", "p [MPa]", 1.0),
-    ("shear", "qx [MPa]", 1.0),
-    ("slip", "slip x [µm]", TO_MICRONS),
-)
+PRESSURE, SHEAR = ("pressure", "p [MPa]", 1.0), ("shear", "qx [MPa]", 1.0)
+FIELDS = PRESSURE, SHEAR, ("slip", "slip x [µm]", TO_MICRONS)
 
 
 def half_space_and_structure(file: h5py.File, contents: Contents) -> Figure:

@@ -58,9 +58,8 @@ def _draw_evolution(figure: Any, groups: h5py.Group, per: str) -> None:
         stiffness.plot(worn, PER_MICRON * _column(group, "kt"), markersize=size, **look)
         energy.plot(worn, _column(group, "energy_per_loop"), markersize=size, **look)
     for axis in (stiffness, energy):
-        axis.set(
-            xlabel=f"energy dissipated so far [J{per}]", ylim=(0.0, HEADROOM * axis.dataLim.y1)
-        )
+        axis.set_xlabel(f"energy dissipated so far [J{per}]")
+        axis.set_ylim(0.0, HEADROOM * axis.dataLim.y1)
     stiffness.set(title="stiffness of the stuck contact", ylabel=f"kt [N/µm{per}]")
     energy.set(title="energy per loop", ylabel=f"energy [mJ{per}]")
     stiffness.legend(loc="best")

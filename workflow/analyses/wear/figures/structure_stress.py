@@ -44,22 +44,24 @@ class _Section(NamedTuple):
 
 def structure_stress(file: h5py.File, contents: Contents) -> Figure:
     """Von Mises stress of both bodies around the faces: unworn, worn and what wear changed."""
+    right, up = _shown_axes(file)
+    low, high = _window(file)
     panels = {state: _sections(file, state) for state in _states(file)}
-    ranges = {state: _range_in_view(file, sections) for state, sections in panels.items()}
+    ranges = {state: _range_within(low, high, cuts) for state, cuts in panels.items()}
     top = max(ranges[state][1] for state in panels if state != CHANGE)
     texts = (f"{ranges[state][1]:.0f} MPa {state}" for state in panels if state != CHANGE)
     title = f"Von Mises stress {_place(file, contents)} at peak load: at most {', '.join(texts)}"
     figure = new_figure(title, 1.0 + 4.2 * len(panels))
     axes = figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for axis, (state, sections) in zip(axes, panels.items(), strict=True):
-        low, high = ranges[state]
-        scale = max(-low, high) if state == CHANGE else top
-        colours = _draw_sections(axis, sections, scale, signed=state == CHANGE)
-        _zoom(axis, file)
-        title = f"{state}: {low:+.0f} to {high:+.0f} MPa" if state == CHANGE else state
-        axis.set(title=title, ylabel=f"{'XYZ'[_plane(file)[2]]} [mm]")
+        least, most = ranges[state]
+        signed = state == CHANGE
+        colours = _draw_sections(axis, sections, max(-least, most) if signed else top, signed)
+        # The surroundings of the faces, where wear makes the difference.
+        axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), ylabel=f"{'XYZ'[up]} [mm]")
+        axis.set_title(f"{state}: {least:+.0f} to {most:+.0f} MPa" if signed else state)
         figure.colorbar(colours, ax=axis, label="[MPa]", pad=0.01)
-    axes[-1].set_xlabel(f"{'XYZ'[_plane(file)[1]]} [mm]")
+    axes[-1].set_xlabel(f"{'XYZ'[right]} [mm]")
     return figure
 
 
@@ -86,29 +88,25 @@ def _states(file: h5py.File) -> list[str]:
     return [*MOMENTS, CHANGE] if one_mesh else [*MOMENTS]
 
 
-def _plane(file: h5py.File) -> tuple[int, int, int]:
-    """Global axes nearest to the first face's y (the plane's normal), to right and to top."""
+def _shown_axes(file: h5py.File) -> list[int]:
+    """Global axes to the right and to the top; the third is nearest to the first face's y."""
     y = np.abs(next(iter(file["grid"].values())).attrs["axes"][1])
-    normal = int(np.argmax(y))
-    right, top = (axis for axis in range(3) if axis != normal)
-    return normal, right, top
+    return [axis for axis in range(3) if axis != np.argmax(y)]
 
 
 def _sections(file: h5py.File, state: str) -> list[_Section]:
     """Both bodies in the plane y = 0 of the first face."""
-    cuts = []
-    for body in file["bodies"].values():
-        if state == CHANGE:
-            change = body["worn/von_mises"][()] - body["unworn/von_mises"][()]
-            cuts.append(_cut(file, body["unworn"], change))
-        else:
-            cuts.append(_cut(file, body[state], body[state]["von_mises"][()]))
-    return cuts
+    bodies = file["bodies"].values()
+    if state != CHANGE:
+        return [_cut(file, body[state], body[state]["von_mises"][()]) for body in bodies]
+    changes = [body["worn/von_mises"][()] - body["unworn/von_mises"][()] for body in bodies]
+    pairs = zip(bodies, changes, strict=True)
+    return [_cut(file, body["unworn"], change) for body, change in pairs]
 
 
 def _cut(file: h5py.File, body: h5py.Group, stress: Array) -> _Section:
     """One body and a nodal stress cut by the plane y = 0 of the first face; a plane body whole."""
-    shown = list(_plane(file)[1:])
+    shown = _shown_axes(file)
     face = next(iter(file["grid"].values())).attrs
     mesh = body_mesh(body)
     mesh.point_data["stress"] = stress
@@ -148,7 +146,7 @@ def _draw_sections(axis: Axes, sections: list[_Section], top: float, signed: boo
 
 def _window(file: h5py.File) -> tuple[Array, Array]:
     """Lower left and upper right corner of the view, ``(2,)`` each [mm]."""
-    shown = list(_plane(file)[1:])
+    shown = _shown_axes(file)
     ends = []
     for group in file["grid"].values():
         half = 0.5 * grid_of(group).size[0] * group.attrs["axes"][0]
@@ -158,15 +156,8 @@ def _window(file: h5py.File) -> tuple[Array, Array]:
     return low - margin, high + margin
 
 
-def _range_in_view(file: h5py.File, sections: list[_Section]) -> tuple[float, float]:
-    """Smallest and largest stress in view [MPa]."""
-    low, high = _window(file)
+def _range_within(low: Array, high: Array, sections: list[_Section]) -> tuple[float, float]:
+    """Smallest and largest stress between two corners [MPa]."""
     seen = [s.stress[np.all((s.points >= low) & (s.points <= high), axis=1)] for s in sections]
     every = np.concatenate(seen)
     return float(every.min()), float(every.max())
-
-
-def _zoom(axis: Axes, file: h5py.File) -> None:
-    """Show the surroundings of the faces, where wear makes the difference."""
-    low, high = _window(file)
-    axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]))

@@ -46,6 +46,7 @@ BAND_POINTS = 50
 # What a profile along x and one along y show; a line contact has no y.
 ALONG = "along x at y = 0", "along y at x = 0"
 ALONG_LINE = ("along x",)
+NO_SLIDING = "no face slides as a whole"
 
 
 def figures_of(contents: Contents) -> Figures:
@@ -105,11 +106,9 @@ def _cycles_shown(file: h5py.File, contents: Contents) -> str:
 
 def _who_slides(file: h5py.File) -> str:
     """What the faces do, for the title."""
-    sliding = [group["load_history/sliding"][()] for group in file["structure"].values()]
-    count, total = sum(int(s.sum()) for s in sliding), sum(len(s) for s in sliding)
-    if count == 0:
-        return "no face slides as a whole"
-    return f"faces slide as a whole in {count / total:.0%} of the increments"
+    slides = [group["load_history/sliding"][()] for group in file["structure"].values()]
+    share = np.mean(np.concatenate(slides))
+    return f"faces slide as a whole in {share:.0%} of the increments" if share else NO_SLIDING
 
 
 def _draw_normal_force(
@@ -140,12 +139,8 @@ def _draw_tangential_force(
 
 def _ranges(numbers: Iterable[Any]) -> str:
     """``1-3, 7`` of ``1, 2, 3, 7``; ``none`` of nothing."""
-    runs: list[list[int]] = []
-    for number in map(int, numbers):
-        if runs and number == runs[-1][-1] + 1:
-            runs[-1].append(number)
-        else:
-            runs.append([number])
+    whole = np.array([*numbers], dtype=int)
+    runs = np.split(whole, np.flatnonzero(np.diff(whole) > 1) + 1) if whole.size else []
     texts = (f"{run[0]}–{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs)
     return ", ".join(texts) or "none"
 
