@@ -73,7 +73,8 @@ def _error(ladder: Ladder, rung: Judged) -> str:
 
 def combination(chart: Chart) -> Combination | None:
     """The cheapest rung on every axis with errors that add up to no more than the accuracy."""
-    return cheapest([ladder.options() for ladder in chart.ladders], chart.accuracy)
+    options = {ladder.axis.name: ladder.options() for ladder in chart.ladders}
+    return cheapest(options, chart.accuracy)
 
 
 def _together(chart: Chart) -> str:
@@ -83,12 +84,11 @@ def _together(chart: Chart) -> str:
             f"all axes: for {percent(chart.accuracy)} no choice of rungs is known to be enough: "
             "their errors, each axis varied alone, add up to more"
         )
-    names = zip(chart.ladders, best.names, strict=True)
-    choice = ", ".join(f"{ladder.axis.name} {name}" for ladder, name in names)
+    choice = ", ".join(f"{axis} {rung}" for axis, rung in best.rungs.items())
     return (
         f"all axes: for {percent(chart.accuracy)} take {choice}: errors, each axis varied alone, "
-        f"add up to {percent(best.error)} at most, and about {best.ratio:.2g} times the seconds "
-        "of the case as written"
+        f"add up to {percent(best.error)} at most, and about {best.seconds_ratio:.2g} times the "
+        "seconds of the case as written"
     )
 
 
@@ -149,7 +149,7 @@ def _marks(rung: Judged) -> list[str]:
 def _write_table(chart: Chart, path: Path) -> None:
     """One row for each rung; a quantity that its axis does not have is empty."""
     cells = [_cells(ladder, rung) for ladder in chart.ladders for rung in ladder.rungs]
-    names = dict.fromkeys(name for part in zip(*cells, strict=True) for own in part for name in own)
+    names = dict.fromkeys(name for part in zip(*cells, strict=True) for row in part for name in row)
     rows = [head | values | tail for head, values, tail in cells]
     write_table(path, {name: [row.get(name) for row in rows] for name in names})
 
@@ -189,16 +189,7 @@ def _summary(chart: Chart) -> dict[str, Any]:
         "title": chart.title,
         "accuracy": chart.accuracy,
         "axes": {ladder.axis.name: _axis_summary(ladder, chart) for ladder in chart.ladders},
-        "together": None
-        if best is None
-        else {
-            "rungs": {
-                ladder.axis.name: name
-                for ladder, name in zip(chart.ladders, best.names, strict=True)
-            },
-            "error": best.error,
-            "seconds_ratio": best.ratio,
-        },
+        "together": None if best is None else vars(best),
         "sentences": sentences(chart),
         "versions": versions(),
     }

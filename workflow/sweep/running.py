@@ -8,7 +8,7 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -94,15 +94,11 @@ def _explained(sweep: Sweep, job: Job, text: str) -> Iterator[str]:
         unknown = re.search(r":\d+: (\S+): unknown key", line)
         if start:
             yield f"{sweep.place(paths[start])}: {line.removeprefix(start)}"
-        elif unknown and (path := _below(unknown[1], paths.values())):
-            yield f"{sweep.place(path)}: {line[unknown.start(1) :]}"
+        elif unknown and (below := [p for p in paths.values() if p.startswith(f"{unknown[1]}.")]):
+            # The case has no such section: what the sweep sets below it is what made it.
+            yield f"{sweep.place(below[0])}: {line[unknown.start(1) :]}"
         else:
             yield line
-
-
-def _below(section: str, paths: Iterable[str]) -> str:
-    """What is given below a section that the case has not but for that; "" if nothing is."""
-    return next((path for path in paths if path.startswith(f"{section}.")), "")
 
 
 def _run(

@@ -54,8 +54,8 @@ def choose_dimension(case: DovetailCase) -> Decision:
         "the ends of the slot, which may wear more, are left out"
     )
     allowed = MOST_USED * case.accuracy
-    dimension, error = (3, 0.0) if largest > allowed else (2, largest)
-    return Decision(ENTRY, dimension, text, probe, allowed=allowed, error=error)
+    dimension, used = (3, 0.0) if largest > allowed else (2, largest)
+    return Decision(ENTRY, dimension, text, probe, allowed=allowed, error=used)
 
 
 def _mid_slot(case: DovetailCase, dimension: int) -> Numbers:

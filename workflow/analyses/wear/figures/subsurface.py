@@ -105,10 +105,10 @@ def fretting_life(file: h5py.File, contents: Contents) -> Figure:
     groups = {name: file["stress/life"][name] for name in contents.life}
     fields = {name: _values(group) for name, group in groups.items()}
     grids = [grid_of(file["grid"][name]) for name in groups]
-    told = groups[contents.life[0]].attrs
-    _, symbol, unit = PARAMETERS[told["parameter"]]
+    life = groups[contents.life[0]].attrs
+    _, symbol, unit = PARAMETERS[life["parameter"]]
     largest = changes({name: field.max(axis=(0, 2, 3)) for name, field in fields.items()}, ".3g")
-    depth = TO_MICRONS * float(told["depth"])
+    depth = TO_MICRONS * float(life["depth"])
     title = f"{symbol} [{unit}] {depth:.3g} µm below the surface: {largest}"
     draw = _curves if contents.line else _maps
     return draw(title, f"{symbol} [{unit}]", fields, grids, contents.bodies)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
@@ -51,7 +51,7 @@ NO_SLIDING = "no face slides as a whole"
 
 def figures_of(contents: Contents) -> Figures:
     """The figures of a run, by name."""
-    drawn: dict[str, tuple[Callable[[h5py.File, Contents], Figure], bool]] = {
+    drawn = {
         "resultants": (resultants, True),
         "pressure_maps": (pressure_maps, not contents.line),
         "pressure_profiles": (pressure_profiles, True),

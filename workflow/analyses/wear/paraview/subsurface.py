@@ -12,6 +12,7 @@ import numpy as np
 from sa_solver.types import Array, Frame
 from workflow.analyses.wear.layout import Contents
 from workflow.pictures.vtk import Fields, Step, attach, cells, write_series
+from workflow.shell.results import frame_of
 
 if TYPE_CHECKING:
     import pyvista
@@ -36,19 +37,16 @@ def life_fields(contents: Contents, file: h5py.File, interface: str, jump: str) 
     return fields
 
 
-def write_sections(
-    contents: Contents, file: h5py.File, interface: str, frame: Frame, folder: Path
-) -> list[Path]:
+def write_sections(contents: Contents, file: h5py.File, interface: str, folder: Path) -> list[Path]:
     """The section through both bodies, unworn and worn, and the series that lists them."""
     if not contents.sections:
         return []
     path = folder / f"section_{interface}.pvd"
-    return write_series(path, _sections(contents, file, interface, frame, folder / "section"))
+    return write_series(path, _sections(contents, file, interface, folder / "section"))
 
 
-def _sections(
-    contents: Contents, file: h5py.File, interface: str, frame: Frame, folder: Path
-) -> Iterator[Step]:
+def _sections(contents: Contents, file: h5py.File, interface: str, folder: Path) -> Iterator[Step]:
+    frame = frame_of(file["grid"][interface])
     contact, section = file["contact"][interface], file["stress/section"][interface]
     for moment, jump in contents.ends:
         for body in (1, 2):

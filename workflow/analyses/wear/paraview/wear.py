@@ -44,11 +44,10 @@ def write_wear(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
     """Write the files that show a wear run; returns their paths."""
     written: list[Path] = []
     for name in contents.names:
-        grid, frame = grid_of(file["grid"][name]), frame_of(file["grid"][name])
-        faces = _faces(contents, file, name, folder)
-        written += write_series(folder / f"{name}.pvd", faces)
-        written += write_sections(contents, file, name, frame, folder)
-        if not grid.line:
+        images = _images(contents, file, name, folder / name)
+        written += write_series(folder / f"{name}.pvd", images)
+        written += write_sections(contents, file, name, folder)
+        if not contents.line:
             written += _write_worn_surfaces(contents, file, name, folder)
     if contents.structure:
         written += write_series(folder / "structure.pvd", _bodies(file, folder / "structure"))
@@ -58,7 +57,7 @@ def write_wear(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
 # --- faces --------------------------------------------------------------------------------------
 
 
-def _faces(contents: Contents, file: h5py.File, interface: str, folder: Path) -> Iterator[Step]:
+def _images(contents: Contents, file: h5py.File, interface: str, folder: Path) -> Iterator[Step]:
     """Images of one face, one per jump."""
     grid, frame = grid_of(file["grid"][interface]), frame_of(file["grid"][interface])
     surfaces = file["surfaces"][interface]
@@ -66,7 +65,7 @@ def _faces(contents: Contents, file: h5py.File, interface: str, folder: Path) ->
         contact, image = file["contact"][interface][jump], grid_image(grid, frame)
         fields = traction_fields(contact, frame) | _surface_fields(surfaces, jump)
         attach(image.cell_data, fields | life_fields(contents, file, interface, jump))
-        yield float(contact.attrs["cycles"]), interface, folder / interface / f"{jump}.vti", image
+        yield float(contact.attrs["cycles"]), interface, folder / f"{jump}.vti", image
 
 
 def _surface_fields(surfaces: h5py.Group, jump: str) -> Fields:
