@@ -96,12 +96,11 @@ def _loads(file: h5py.File, name: str) -> str:
     increment = int(file["contact"][BODIES][name].attrs["increment"])
     history = file["history"]
     row = int(np.flatnonzero(history["increment"][()] == increment)[0])
-    values = {key: float(history[key][row]) for key in FORCES}
-    largest = {key: np.abs(history[key][()]).max() for key in FORCES}
+    largest = max(np.abs(history[key][()]).max() for key in FORCES)
     texts = [
-        f"{key} {value:.3g} {history[key].attrs['unit']}"
-        for key, value in values.items()
-        if abs(value) > 1e-6 * max(largest.values()) or key == "P"
+        f"{key} {history[key][row]:.3g} {history[key].attrs['unit']}"
+        for key in FORCES
+        if abs(history[key][row]) > 1e-6 * largest or key == "P"
     ]
     return f"{increment}: " + ", ".join(texts)
 

@@ -8,14 +8,7 @@ from pathlib import Path
 import h5py
 
 from workflow.analyses.contact.datasets import BODIES, Contents
-from workflow.pictures.vtk import (
-    Step,
-    attach,
-    cells,
-    grid_image,
-    traction_fields,
-    write_series,
-)
+from workflow.pictures.vtk import Step, attach, cells, grid_image, traction_fields, write_series
 from workflow.shell.results import frame_of, grid_of
 
 

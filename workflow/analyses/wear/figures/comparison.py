@@ -71,20 +71,18 @@ def _draw_profiles(
         axis.plot(centres(grid, 0), scale * middle(along, 0), color=colour, label=label)
         # Loads of another code may be resultants alone, without tractions and of no slip.
         if contents.structure or (name == "slip" and file["structure"][interface][name][()].any()):
-            place, values = _nodes_across(file, interface, name, int(key))
+            place, values = nodes_on_middle(file["structure"][interface], name, int(key))
             axis.plot(place, scale * values, "x", color=colour, mew=2)
     axis.set_xlabel("x [mm]")
 
 
-def _nodes_across(
-    file: h5py.File, interface: str, name: str, increment: int
+def nodes_on_middle(
+    face: h5py.Group, name: str, increment: int, direction: int = 0
 ) -> tuple[Array, Array]:
-    """Places and values of a field's x component at the nodes nearest to y = 0."""
-    group = file["structure"][interface]
-    coordinates, field = group["coordinates"][()], group[name][increment]
-    near = near_middle(coordinates, 0)
-    along = field if field.ndim == 1 else field[0]
-    return coordinates[near, 0], along[near]
+    """Places and values of a field, or its x component, at the nodes nearest to a middle line."""
+    coordinates, field = face["coordinates"][()], face[name][increment]
+    near = near_middle(coordinates, direction)
+    return coordinates[near, direction], (field if field.ndim == 1 else field[0])[near]
 
 
 def _largest_difference(file: h5py.File) -> str:

@@ -13,7 +13,7 @@ from matplotlib.figure import Figure
 
 from sa_solver.types import Array, Grid
 from wear.kinetics import LinearRegime
-from workflow.analyses.wear.figures.comparison import half_space_and_structure
+from workflow.analyses.wear.figures.comparison import half_space_and_structure, nodes_on_middle
 from workflow.analyses.wear.figures.loops import loops
 from workflow.analyses.wear.figures.structure_stress import structure_stress
 from workflow.analyses.wear.figures.subsurface import fretting_life, subsurface_stress
@@ -25,7 +25,6 @@ from workflow.pictures.fields import (
     draw_map,
     map_top,
     middle,
-    near_middle,
 )
 from workflow.pictures.panels import Figures, changes, legend_below, new_figure, shaded
 from workflow.pictures.scales import TO_MICRONS
@@ -217,17 +216,15 @@ def _draw_profile(
         label = f"half-space {_cells(coarse)}, unworn"
         axis.plot(centres(coarse, direction), profile, "o", color=BLACK, mfc="none", label=label)
     if contents.structure:
-        place, pressure = _nodes_on_middle(file, interface, direction)
+        place, pressure = _nodal_pressure(file, interface, direction)
         axis.plot(place, pressure, "x", color=PURPLE, mew=2, label="finite elements, unworn")
     axis.set_xlabel(("x [mm]", "y [mm]")[direction])
 
 
-def _nodes_on_middle(file: h5py.File, interface: str, direction: int) -> tuple[Array, Array]:
+def _nodal_pressure(file: h5py.File, interface: str, direction: int) -> tuple[Array, Array]:
     """Places and pressures at peak load of the FE nodes nearest to the middle line."""
-    group, peak = file["structure"][interface], int(file.attrs["peak_increment"])
-    coordinates, pressure = group["coordinates"][()], group["pressure"][peak]
-    near = near_middle(coordinates, direction)
-    return coordinates[near, direction], pressure[near]
+    peak = int(file.attrs["peak_increment"])
+    return nodes_on_middle(file["structure"][interface], "pressure", peak, direction)
 
 
 def _edge_peak(file: h5py.File, contents: Contents) -> str:
@@ -245,7 +242,7 @@ def _edge_peak(file: h5py.File, contents: Contents) -> str:
         cells = "" if contents.line else " cells"
         text += f"; {_cells(grid_of(coarse))}{cells} see {peak:.0f} MPa"
     if contents.structure:
-        text += f", finite elements {_nodes_on_middle(file, name, 0)[1].max():.0f} MPa"
+        text += f", finite elements {_nodal_pressure(file, name, 0)[1].max():.0f} MPa"
     return text
 
 
