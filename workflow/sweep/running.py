@@ -10,7 +10,6 @@ import re
 import time
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from workflow.errors import CaseError, UserError
 from workflow.runs.job import Finished, Job
@@ -156,8 +155,8 @@ def _title(sweep: Sweep, rows: Sequence[Row]) -> str:
     """Of the sweep, or else of its first run's case."""
     if sweep.file.title is not None:
         return sweep.file.title
-    titles: list[Any] = [row.finished.summary["title"] for row in rows if row.finished.summary]
-    return str(titles[0]) if titles else sweep.name
+    summaries = (row.finished.summary for row in rows if row.finished.summary)
+    return next((str(summary["title"]) for summary in summaries), sweep.name)
 
 
 def _write_figures(sweep: Sweep, rows: list[Row], out: Path) -> None:

@@ -45,16 +45,13 @@ def _cycle(contact: h5py.Group, response: h5py.Group, folder: Path) -> Iterator[
     cycle, frequency = response["resonance"], float(response.attrs["resonance"])
     count = len(cycle["state"])
     mean = TO_FRAME * cycle["displacement"][()].mean(axis=0)
-    for number, step in enumerate(_steps(count)):
+    # Every so many samples, as evenly as they can be.
+    shown = min(count, MOST_STEPS)
+    samples = (np.arange(shown) * count / shown).round().astype(int).tolist()
+    for number, step in enumerate(samples):
         mesh = _pad(contact)
         attach(mesh.point_data, _fields(contact, cycle, step, mean))
         yield step / count / frequency, "pad", folder / f"{number:03d}.vtu", mesh
-
-
-def _steps(count: int) -> list[int]:
-    """Every so many samples of a cycle, as evenly as they can be."""
-    shown = min(count, MOST_STEPS)
-    return [round(step * count / shown) for step in range(shown)]
 
 
 def _fields(contact: h5py.Group, cycle: h5py.Group, step: int, mean: Array) -> Fields:

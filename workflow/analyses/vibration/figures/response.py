@@ -65,8 +65,11 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
     """Amplitude of what is looked at over the force, a curve per force, with linear limits."""
     figure = new_figure(_title(file), 7.0)
     axis, peaks, lows = figure.subplots(), [], []
+    linear = file["linear"]
     for name, style in STYLES.items():
-        _draw_limit(axis, file["linear"], name, style)
+        frequency, receptance = linear["frequency"][()], TO_MICRONS * linear[name][()]
+        label = f"{name}: {frequency[receptance.argmax()]:.4g} Hz"
+        axis.plot(frequency, receptance, style, label=label, **LIMIT)
     for response, colour in _shown(file, contents):
         force, size = float(response.attrs["force"]), TO_MICRONS * response["amplitude"][:, -1]
         label = f"{force:g} N: {response.attrs['resonance']:.4g} Hz"
@@ -79,12 +82,6 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
     axis.set_ylim(BELOW * min(lows), ABOVE * max(peaks))
     legend_beside(axis, "resonance")
     return figure
-
-
-def _draw_limit(axis: Axes, linear: h5py.Group, name: str, style: str) -> None:
-    frequency, receptance = linear["frequency"][()], TO_MICRONS * linear[name][()]
-    label = f"{name}: {frequency[receptance.argmax()]:.4g} Hz"
-    axis.plot(frequency, receptance, style, label=label, **LIMIT)
 
 
 def _over_frequency(axis: Axes, file: h5py.File) -> None:

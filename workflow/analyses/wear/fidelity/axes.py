@@ -131,23 +131,18 @@ def choose_grid(case: DovetailCase, allowed: float) -> Decision:
     """The coarsest grid across the flank, and along the slot, whose line contact wears alike."""
     section = plane_section(case)
     across, along = case.contact.grid
-    if case.structure.dimension == 2:
-        most = max(across, MOST_STRIPS)
-        climb = _climb_grid(across, most, allowed, partial(_worn, section))
-        grid, climbs = (climb.taken.size, along), [climb]
-    else:
-        half = 0.5 * allowed
-        first = _climb_grid(across, FINER_SPACE * across, half, partial(_worn, section))
-        second = _climb_grid(
-            along, FINER_SPACE * along, half, lambda rung: end_life(section, rung.size)
-        )
-        grid, climbs = (first.taken.size, second.taken.size), [first, second]
-    names = "strips across the flank", "strips along the slot"
-    part = allowed / len(climbs)
-    why = "; ".join(
-        _sentence(climb, part, name) for climb, name in zip(climbs, names, strict=False)
-    )
-    probe = {name: climb.probed for climb, name in zip(climbs, names, strict=False)}
+    in_space = case.structure.dimension == 3
+    most = FINER_SPACE * across if in_space else max(across, MOST_STRIPS)
+    part = 0.5 * allowed if in_space else allowed
+    climbs = [_climb_grid(across, most, part, partial(_worn, section))]
+    if in_space:
+        most = FINER_SPACE * along
+        climbs.append(_climb_grid(along, most, part, lambda rung: end_life(section, rung.size)))
+        along = climbs[-1].taken.size
+    grid = climbs[0].taken.size, along
+    named = dict(zip(("strips across the flank", "strips along the slot"), climbs, strict=False))
+    why = "; ".join(_sentence(climb, part, name) for name, climb in named.items())
+    probe = {name: climb.probed for name, climb in named.items()}
     error = sum(climb.error for climb in climbs)
     return _decision({"contact.grid": grid}, why, probe, allowed, error)
 

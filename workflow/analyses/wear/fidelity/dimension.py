@@ -39,14 +39,11 @@ def choose_dimension(case: DovetailCase) -> Decision:
     except (MeshError, MethodFailed) as error:
         return Decision(ENTRY, 3, f"the coarse probe failed: {error}")
     differences = _differences(values[2], values[3], case.friction.coefficient)
-    flank, quantity, largest = max(
-        (
-            (flank, name, value)
-            for flank, quantities in differences.items()
-            for name, value in quantities.items()
-        ),
-        key=lambda item: item[2],
-    )
+    named = {
+        (flank, name): v for flank, of_flank in differences.items() for name, v in of_flank.items()
+    }
+    flank, quantity = max(named, key=lambda place: named[place])
+    largest = named[flank, quantity]
     probe = {"two": values[2], "three": values[3], "differences": differences}
     text = (
         f"in a coarse probe of mid-slot two dimensions differ from three by at most {largest:.1%} "

@@ -35,11 +35,10 @@ PARAMETERS = {
 def subsurface_stress(file: h5py.File, contents: Contents) -> Figure:
     """Von Mises stress in the section of every contact at peak load, unworn above worn."""
     sections = file["stress/section"]
-    fields = {
-        name: [_both_bodies(section, m) for m in MOMENTS] for name, section in sections.items()
-    }
-    largest = {name: [float(field.max()) for field in both] for name, both in fields.items()}
-    top = max(max(values) for values in largest.values())
+    # By moment, both bodies together.
+    fields = {name: _values(group, "von_mises").swapaxes(0, 1) for name, group in sections.items()}
+    largest = {name: field.max(axis=(1, 2, 3)) for name, field in fields.items()}
+    top = float(max(moments.max() for moments in largest.values()))
     title = f"Von Mises stress under the contact at peak load: {changes(largest, '.0f', ' MPa')}"
     figure = new_figure(title, 9.0)
     axes = figure.subplots(2, len(sections), sharex="col", sharey=True, squeeze=False)
@@ -59,9 +58,11 @@ def subsurface_stress(file: h5py.File, contents: Contents) -> Figure:
     return figure
 
 
-def _both_bodies(group: h5py.Group, moment: str) -> Array:
-    """Von Mises stress ``(2, n, k)`` of body 1 and body 2 [MPa]."""
-    return np.stack([group[f"{moment}/body_{body}/von_mises"][()] for body in (1, 2)])
+def _values(group: h5py.Group, field: str) -> Array:
+    """A field of both bodies, unworn and worn, ``(2, 2, ...)``."""
+    return np.array(
+        [[group[f"{moment}/body_{body}/{field}"][()] for moment in MOMENTS] for body in (1, 2)]
+    )
 
 
 def _heights(group: h5py.Group, body: int) -> Array:
@@ -103,23 +104,15 @@ def _draw_yield(axis: Axes, group: h5py.Group, field: Array) -> None:
 def fretting_life(file: h5py.File, contents: Contents) -> Figure:
     """The fretting parameter over every contact, both bodies, unworn beside worn."""
     groups = {name: file["stress/life"][name] for name in contents.life}
-    fields = {name: _values(group) for name, group in groups.items()}
     grids = [grid_of(file["grid"][name]) for name in groups]
     life = groups[contents.life[0]].attrs
-    _, symbol, unit = PARAMETERS[life["parameter"]]
+    parameter, symbol, unit = PARAMETERS[life["parameter"]]
+    fields = {name: _values(group, parameter) for name, group in groups.items()}
     largest = changes({name: field.max(axis=(0, 2, 3)) for name, field in fields.items()}, ".3g")
     depth = TO_MICRONS * float(life["depth"])
     title = f"{symbol} [{unit}] {depth:.3g} µm below the surface: {largest}"
     draw = _curves if contents.line else _maps
     return draw(title, f"{symbol} [{unit}]", fields, grids, contents.bodies)
-
-
-def _values(group: h5py.Group) -> Array:
-    """The parameter of both bodies, unworn and worn, ``(2, 2, nx, ny)``."""
-    key, _, _ = PARAMETERS[group.attrs["parameter"]]
-    return np.array(
-        [[group[f"{moment}/body_{body}/{key}"][()] for moment in MOMENTS] for body in (1, 2)]
-    )
 
 
 def _maps(
