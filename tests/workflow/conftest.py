@@ -15,6 +15,9 @@ from fe_models.gmsh_session import gmsh_model
 from sa_solver.types import Array, Frame, Grid
 from tests.workflow.commands import invoke, runs_here
 from workflow.analyses.wear import contact_workers
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.layout import Contents
+from workflow.kinds import load_case
 from workflow.pictures import drawing
 from workflow.shell import processes
 
@@ -23,6 +26,16 @@ EDGE_RADIUS, END_RADIUS = 30.0, 150.0
 INTERFACES = {"intrados": 1.0, "extrados": 0.8}  # name and its share of the load
 INCREMENTS, PEAK, FRICTION = 22, 7, 0.4
 JUMPS = np.array([0.0, 5e3, 1e4, 2e4, 4e4, 7e4, 1e5])
+NAMES = tuple(sorted(INTERFACES))
+# Of the synthetic results.
+CONTENTS = Contents(
+    names=NAMES,
+    bodies=("disk", "blade"),
+    jumps=len(JUMPS) - 1,
+    structure=True,
+    coarse=NAMES,
+    comparison=True,
+)
 
 
 def flank_frame(side: float) -> Frame:
@@ -120,11 +133,12 @@ def put_kinetics(file: h5py.File, name: str, grid: Grid) -> None:
         worn = np.abs(heights - heights[0])
         volume = worn.sum(axis=(1, 2)) * grid.cell_area
         put(group, **{f"depth_{body}": worn.max(axis=(1, 2)), f"volume_{body}": volume})
-    put(group, energy=1e3 * JUMPS)
+    put(group, energy=1e3 * JUMPS, area=np.linspace(500.0, 600.0, len(JUMPS)))
     for quantity in ("depth", "volume"):
         both = group[f"{quantity}_1"][()] + group[f"{quantity}_2"][()]
         group.attrs[f"{quantity}_rate"] = (both[-1] - both[-2]) / (JUMPS[-1] - JUMPS[-2])
         group.attrs[f"{quantity}_linear_from"] = 4e4
+        group.attrs[f"{quantity}_trend"] = group.attrs[f"{quantity}_scatter"] = 0.0
     if name == "extrados":  # its depth has not become linear
         group.attrs["depth_rate"] = group.attrs["depth_linear_from"] = np.nan
 
@@ -240,6 +254,26 @@ class Run:
 
 
 Runner = Callable[..., Run]
+
+
+def contents_of(folder: Path) -> Contents:
+    """What a finished wear run of one of our structures has written."""
+    summary = json.loads((folder / "summary.json").read_text("utf-8"))
+    case = load_case(folder / "case.yaml")
+    assert isinstance(case, WearCase)
+    names = tuple(sorted(summary["kinetics"].keys() - {"cycles"}))
+    return Contents(
+        names=names,
+        bodies=case.bodies,
+        jumps=summary["jumps"],
+        line=summary["per_length"],
+        structure="structure" in summary,
+        coarse=names,
+        comparison=case.contact.method == "full",
+        loops=case.loops.wanted,
+        sections=case.stress.section != "none",
+        life=() if case.stress.life.parameter == "none" else names,
+    )
 
 
 def manifest_has_all(folder: Path) -> bool:

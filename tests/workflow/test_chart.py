@@ -46,19 +46,22 @@ def test_of_points_alike_one_is_efficient():
 
 def test_cheapest_combination_is_that_of_an_exhaustive_search():
     random = np.random.default_rng(2)
-    axes = [
-        [Option(f"{axis}{k}", *random.uniform((0.2, 0.0), (3.0, 0.02)).tolist()) for k in range(5)]
+    axes = {
+        axis: [
+            Option(f"{axis}{k}", *random.uniform((0.2, 0), (3, 0.02)).tolist()) for k in range(5)
+        ]
         for axis in "abcd"
-    ]
-    everything = list(product(*axes))
+    }
+    everything = list(product(*axes.values()))
     for accuracy in (0.02, 0.03, 0.05):
         met = [c for c in everything if sum(option.error for option in c) <= accuracy]
         best = min(np.prod([option.ratio for option in c]) for c in met)
         found = cheapest(axes, accuracy)
         assert found is not None
-        assert found.ratio == pytest.approx(best, rel=1e-12)
+        assert found.seconds_ratio == pytest.approx(best, rel=1e-12)
         assert found.error <= accuracy
-        assert [name[0] for name in found.names] == list("abcd")
+        assert all(rung.startswith(axis) for axis, rung in found.rungs.items())
+        assert list(found.rungs) == list("abcd")
     assert cheapest(axes, 1e-6) is None
 
 

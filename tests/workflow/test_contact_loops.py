@@ -11,7 +11,7 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.marks import slow
-from tests.workflow.conftest import Run, invoke
+from tests.workflow.conftest import CONTENTS, Run, invoke
 from wear.stepping import ContactFailure
 from workflow.analyses.wear.case.loops import Loops
 from workflow.analyses.wear.contact_loops import (
@@ -25,6 +25,7 @@ from workflow.analyses.wear.contact_loops import (
 )
 from workflow.analyses.wear.figures import loops as loops_figure
 from workflow.analyses.wear.figures import wear as figures
+from workflow.analyses.wear.layout import Contents
 from workflow.analyses.wear.loop_table import COLUMNS
 from workflow.analyses.wear.recording import Recorder
 from workflow.case.fields import Quantity
@@ -201,8 +202,7 @@ def test_results_have_the_loops_of_their_jumps(written, sphere):
 
 def test_figure_shows_the_loops(written, sphere):
     with h5py.File(written.results) as file:
-        assert "loops" in figures.figures_of(file)
-        figure = loops_figure.loops(file)
+        figure = loops_figure.loops(file, Contents(("sphere",), ("body_1", "body_2"), 1))
     kt = sphere.values["kt"] * 1e-3
     assert f"sphere {kt:.4g} → {kt:.4g} N/µm" in figure.get_suptitle()
     loop, stiffness, energy = figure.axes
@@ -218,10 +218,8 @@ def test_kinetics_show_area_and_the_band_of_the_extrapolation(results, tmp_path)
     copy.write_bytes(results.read_bytes())
     with h5py.File(copy, "a") as file:
         group = file["kinetics/intrados"]
-        for own in ("intrados", "extrados"):
-            file[f"kinetics/{own}/area"] = np.linspace(500.0, 600.0, 7)
         group.attrs.update(depth_trend=-1e-16, depth_scatter=1e-11)
-        figure = figures.kinetics(file)
+        figure = figures.kinetics(file, CONTENTS)
         rate = group.attrs["depth_rate"]
         last = group["depth_1"][-1] + group["depth_2"][-1]
     panel, areas = figure.axes[1], figure.axes[5]

@@ -12,10 +12,9 @@ from sa_solver.history import History
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.reference.torsion import TwistedSphere
 from sa_solver.types import Grid, Material
-from workflow.analyses.contact import figures
-from workflow.analyses.contact.figures import figures_of
+from workflow.analyses.contact import ANALYSIS, figures
+from workflow.analyses.contact.datasets import Contents
 from workflow.analyses.contact.load_table import LoadTable
-from workflow.analyses.contact.paraview import write_contact
 from workflow.analyses.contact.results import ContactOutcome, write_contact_results
 from workflow.analyses.contact.summary import loop_summary, state_summaries
 from workflow.case.writing import dump_case
@@ -29,6 +28,7 @@ FRICTION, LOAD, TANGENTIAL, RADIUS = 0.7, 400.0, 210.0, 10.0
 GRID = Grid.covering((1.0, 0.9), (100, 90))
 # Steps between turning points, of Q up, down and up again.
 STEPS = 12
+AREA = Contents(line=False, increments=1 + 3 * STEPS)
 CASE = f"""\
 title: Ball
 analysis: contact
@@ -254,7 +254,7 @@ def test_results_hold_states_path_and_case(outcome, folder):
 def test_figures_are_wide_and_not_blank(folder, tmp_path):
     from matplotlib.image import imread
 
-    written = write_figures(figures_of, folder.results, tmp_path)
+    written = write_figures(ANALYSIS.pictures, AREA, folder.results, tmp_path)
     assert {path.stem for path in written} == {"profiles", "maps", "forces"}
     for path in written:
         image = imread(path)
@@ -296,7 +296,7 @@ def test_forces_are_drawn_against_the_motion_they_work_on(folder):
 
 
 def test_paraview_steps_through_the_increments(outcome, folder, tmp_path):
-    written = write_paraview(write_contact, folder.results, tmp_path)
+    written = write_paraview(ANALYSIS.pictures, AREA, folder.results, tmp_path)
     assert sorted(written) == sorted(path for path in tmp_path.rglob("*") if path.is_file())
     reader = pv.PVDReader(tmp_path / "contact.pvd")
     assert reader.time_values == list(range(1, 2 + 3 * STEPS))
@@ -322,8 +322,9 @@ def test_line_has_no_maps_and_no_images(tmp_path):
     folder = OutputFolder(tmp_path / "out")
     folder.claim(case, force=False, resumable=False)
     write_contact_results(outcome, SimpleNamespace(kind="line", folder=folder))
-    assert write_paraview(write_contact, folder.results, folder.root / "paraview") == []
-    written = write_figures(figures_of, folder.results, folder.root / "figures")
+    told = ANALYSIS.pictures, Contents(line=True, increments=len(states)), folder.results
+    assert write_paraview(*told, folder.root / "paraview") == []
+    written = write_figures(*told, folder.root / "figures")
     assert {path.stem for path in written} == {"profiles", "forces"}
     with h5py.File(folder.results) as file:
         assert file.attrs["kind"] == "line"

@@ -1,5 +1,6 @@
 """Figures: all there, legible in size, not blank, and true to the data where they show numbers."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -7,6 +8,8 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.workflow.conftest import CONTENTS
+from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.figures import structure_stress
 from workflow.analyses.wear.figures import wear as figures
 from workflow.analyses.wear.figures.wear import figures_of
@@ -26,7 +29,8 @@ NAMES = {
 
 @pytest.fixture(scope="module")
 def written(results: Path) -> list[Path]:
-    return write_figures(figures_of, results, results.parent / "figures")
+    assert ANALYSIS.pictures is not None
+    return write_figures(ANALYSIS.pictures, CONTENTS, results, results.parent / "figures")
 
 
 @pytest.fixture
@@ -66,7 +70,7 @@ def test_titles_fit_the_width(results: Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     with h5py.File(results) as file, rc_context(STYLE):
-        for draw, _ in figures.FIGURES.values():
+        for draw in figures_of(CONTENTS).values():
             figure = draw(file)
             FigureCanvasAgg(figure).draw()
             titles = [axis._left_title for axis in figure.axes] + [figure._suptitle]
@@ -78,7 +82,7 @@ def test_titles_fit_the_width(results: Path) -> None:
 
 def test_resultants_stay_inside_the_axes_and_the_coulomb_limits(results: Path) -> None:
     with h5py.File(results) as file:
-        figure = figures.resultants(file)
+        figure = figures.resultants(file, CONTENTS)
         peak = max(group["load_history/P"][()].max() for group in file["structure"].values())
         assert figure.axes[0].get_ylim()[1] >= peak / 1e3
         assert "64%" in title(figure)  # 14 of 22 increments on either flank
@@ -86,7 +90,7 @@ def test_resultants_stay_inside_the_axes_and_the_coulomb_limits(results: Path) -
 
 def test_pressure_maps_share_one_scale_and_name_the_peaks(results: Path) -> None:
     with h5py.File(results) as file:
-        figure = figures.pressure_maps(file)
+        figure = figures.pressure_maps(file, CONTENTS)
         for name, contact in file["contact"].items():
             first, last = contact["00000/pressure"][()].max(), contact["00006/pressure"][()].max()
             assert f"{name} {first:.0f} → {last:.0f} MPa" in title(figure)
@@ -100,7 +104,7 @@ def test_pressure_map_puts_x_up_and_y_right(changed: Path) -> None:
         pressure = file["contact/extrados/00000/pressure"]
         pressure[...] = 0.0
         pressure[-1, 0] = 100.0  # largest x, smallest y
-        image = figures.pressure_maps(file).axes[0].images[0]
+        image = figures.pressure_maps(file, CONTENTS).axes[0].images[0]
     (row,), (column,) = np.nonzero(image.get_array().filled(0.0))
     assert image.origin == "lower"
     assert (row, column) == (image.get_array().shape[0] - 1, 0)
@@ -108,7 +112,7 @@ def test_pressure_map_puts_x_up_and_y_right(changed: Path) -> None:
 
 def test_profiles_show_all_three_methods(results: Path) -> None:
     with h5py.File(results) as file:
-        figure = figures.pressure_profiles(file)
+        figure = figures.pressure_profiles(file, CONTENTS)
         lines = {line.get_label(): line for line in figure.axes[0].lines}
         contact = file["contact/extrados"]
         middle = contact["00000/pressure"][()][:, 20]
@@ -122,7 +126,7 @@ def test_profiles_show_all_three_methods(results: Path) -> None:
 
 def test_kinetics_mark_what_is_extrapolated(results: Path) -> None:
     with h5py.File(results) as file:
-        figure = figures.kinetics(file)
+        figure = figures.kinetics(file, CONTENTS)
         rate = file["kinetics/intrados"].attrs["depth_rate"]
     linear = figure.axes[1]
     assert "linear from 40,000 cycles" in linear.get_title()
@@ -136,7 +140,7 @@ def test_kinetics_mark_what_is_extrapolated(results: Path) -> None:
 
 def test_kinetics_without_a_linear_regime_extrapolate_nothing(results: Path) -> None:
     with h5py.File(results) as file:
-        axis = figures.kinetics(file).axes[0]
+        axis = figures.kinetics(file, CONTENTS).axes[0]
     assert "not yet linear at 100,000" in axis.get_title()
     assert all(line.get_linestyle() != "--" for line in axis.lines)
 
@@ -154,7 +158,7 @@ def test_stress_section_cuts_every_body_in_mid_slot(changed: Path) -> None:
 
 def test_change_of_stress_is_shown_where_the_meshes_agree(changed: Path) -> None:
     with h5py.File(changed, "a") as file:
-        figure = structure_stress.structure_stress(file)
+        figure = structure_stress.structure_stress(file, CONTENTS)
         panels = [axis.get_title() for axis in figure.axes if axis.get_title()]
         assert panels[:2] == ["unworn", "worn"]
         assert panels[2].startswith(structure_stress.CHANGE)
@@ -179,14 +183,28 @@ def test_ranges_of_increments() -> None:
     assert figures._ranges([]) == "none"
 
 
-@pytest.mark.slow
-def test_figures_without_data_are_left_out(changed: Path, tmp_path: Path) -> None:
+def test_figures_are_those_of_what_a_run_has_written() -> None:
+    bare = replace(CONTENTS, structure=False, coarse=(), comparison=False)
+    assert set(figures_of(bare)) == NAMES - {"structure_stress", "half_space_and_structure"}
+    assert "pressure_maps" not in figures_of(replace(CONTENTS, line=True))
+    asked = replace(CONTENTS, loops=True, sections=True, life=CONTENTS.names)
+    assert set(figures_of(asked)) == NAMES | {"loops", "subsurface_stress", "fretting_life"}
+
+
+@pytest.mark.parametrize(
+    ("group", "name"),
+    [
+        ("structure/intrados/load_history/Qx", "resultants"),
+        ("contact/intrados/coarse", "pressure_profiles"),
+        ("kinetics/intrados/area", "kinetics"),
+        ("comparison/intrados/load_history", "half_space_and_structure"),
+    ],
+)
+def test_what_should_be_there_and_is_not_is_an_error(changed: Path, group: str, name: str) -> None:
     with h5py.File(changed, "a") as file:
-        for group in ("structure", "structure_worn", "bodies"):
-            del file[group]
-        del file["contact/intrados/coarse"]
-    names = {path.stem for path in write_figures(figures_of, changed, tmp_path / "figures")}
-    assert names == NAMES - {"resultants", "structure_stress", "half_space_and_structure"}
+        del file[group]
+        with pytest.raises(KeyError, match=group.split("/")[-1]):
+            figures_of(CONTENTS)[name](file)
 
 
 @pytest.mark.slow
@@ -195,8 +213,7 @@ def test_run_without_wear_can_be_drawn(changed: Path, tmp_path: Path) -> None:
         for name in file["grid"]:
             for jump in list(file["surfaces"][name])[1:]:
                 del file["surfaces"][name][jump], file["contact"][name][jump]
-        for body in file["bodies"].values():
-            del body["worn"]
-        del file["kinetics"]
-    names = {path.stem for path in write_figures(figures_of, changed, tmp_path / "figures")}
-    assert names == NAMES - {"kinetics"}
+    assert ANALYSIS.pictures is not None
+    contents = replace(CONTENTS, jumps=0)
+    written = write_figures(ANALYSIS.pictures, contents, changed, tmp_path / "figures")
+    assert {path.stem for path in written} == NAMES

@@ -301,10 +301,12 @@ def test_results_hold_nodes_loops_and_responses(ended, summary):
 
 @pytest.mark.slow
 def test_figures_are_drawn(ended, tmp_path):
-    from workflow.analyses.vibration_wear.figures import figures_of
+    from workflow.analyses.vibration_wear import ANALYSIS
+    from workflow.analyses.vibration_wear.outcome import Contents
     from workflow.pictures.drawing import write_figures
 
-    drawn = {path.stem for path in write_figures(figures_of, ended.results, tmp_path)}
+    told = ANALYSIS.pictures, Contents(at_nodes=True), ended.results
+    drawn = {path.stem for path in write_figures(*told, tmp_path)}
     assert drawn == {"frequency_response", "evolution", "profile", "loops"}
 
 

@@ -2,6 +2,7 @@
 
 import re
 import xml.etree.ElementTree as ElementTree
+from dataclasses import replace
 from pathlib import Path
 
 import h5py
@@ -10,7 +11,9 @@ import pytest
 import pyvista as pv
 
 from sa_solver.types import Array, Frame, Grid
-from workflow.analyses.wear.paraview.wear import write_wear
+from tests.workflow.conftest import CONTENTS
+from workflow.analyses.wear import ANALYSIS
+from workflow.analyses.wear.layout import Contents
 from workflow.pictures.drawing import write_paraview
 from workflow.shell.results import frame_of, grid_of
 
@@ -22,7 +25,7 @@ SINGLE = 2e-7  # rounding of single precision
 @pytest.fixture(scope="module")
 def folder(results: Path) -> Path:
     written = results.parent / "paraview"
-    paths = write_paraview(write_wear, results, written)
+    paths = write_wear(CONTENTS, results, written)
     assert sorted(paths) == sorted(path for path in written.rglob("*") if path.is_file())
     return written
 
@@ -176,22 +179,21 @@ def test_arrays_carry_their_units(folder: Path) -> None:
     assert "mm" in units["wear_depth"]
 
 
+def write_wear(contents: Contents, results: Path, folder: Path) -> list[Path]:
+    assert ANALYSIS.pictures is not None
+    return write_paraview(ANALYSIS.pictures, contents, results, folder)
+
+
 def test_failed_write_leaves_nothing_behind(results: Path, tmp_path: Path) -> None:
     blocked = tmp_path / "paraview"
     (blocked / "intrados.pvd").mkdir(parents=True)  # a folder where the series should go
     with pytest.raises(OSError, match=r"intrados\.pvd"):
-        write_paraview(write_wear, results, blocked)
+        write_wear(CONTENTS, results, blocked)
     assert not list(blocked.rglob("*.part"))
 
 
 def test_run_without_structure_writes_the_flanks(results: Path, tmp_path: Path) -> None:
-    bare = tmp_path / "results.h5"
-    bare.write_bytes(results.read_bytes())
-    with h5py.File(bare, "a") as file:
-        for group in ("structure", "structure_worn", "bodies"):
-            del file[group]
-        nodes = int(np.prod(file["grid/intrados"].attrs["shape"]))
-    written = {path.name for path in write_paraview(write_wear, bare, tmp_path / "paraview")}
+    contents = replace(CONTENTS, structure=False)
+    written = {path.name for path in write_wear(contents, results, tmp_path)}
     assert "intrados.pvd" in written
     assert "structure.pvd" not in written
-    assert pv.read(tmp_path / "paraview" / "flank_intrados_disk.stl").n_points == nodes

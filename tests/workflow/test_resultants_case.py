@@ -14,10 +14,10 @@ from fe_models.geometry.dovetail import Dovetail
 from sa_solver.types import Array, Grid
 from tests.marks import slow
 from tests.workflow.commands import command
+from tests.workflow.conftest import contents_of
+from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.case.gaps import ParaboloidGap, RoundedGap
-from workflow.analyses.wear.figures.wear import figures_of
 from workflow.analyses.wear.gaps import GridHeights, gap_over
-from workflow.analyses.wear.paraview.wear import write_wear
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
 from workflow.case.writing import dump_case
@@ -321,9 +321,10 @@ def test_a_new_run_takes_away_the_nodes_of_the_old(typed, tmp_path):
 def test_pictures_of_resultants_alone(typed, tmp_path):
     """Figures leave out what another code did not tell; ParaView shows every face."""
     results = typed[0] / "results.h5"
-    figures = {path.stem for path in write_figures(figures_of, results, tmp_path / "figures")}
+    told = ANALYSIS.pictures, contents_of(typed[0]), results
+    figures = {path.stem for path in write_figures(*told, tmp_path / "figures")}
     assert {"resultants", "half_space_and_structure", "pressure_maps", "kinetics"} <= figures
-    written = {path.name for path in write_paraview(write_wear, results, tmp_path / "paraview")}
+    written = {path.name for path in write_paraview(*told, tmp_path / "paraview")}
     assert {"early.pvd", "late.pvd", "never.pvd", "flank_early_body_1.stl"} <= written
 
 

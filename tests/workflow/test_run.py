@@ -1,16 +1,18 @@
 """Runs of the small case: what they leave, what they conserve, and how odd cases end."""
 
+from functools import partial
+
 import h5py
 import numpy as np
 import pytest
 
 from tests.marks import slow
 from tests.workflow.commands import invoke
-from tests.workflow.conftest import Run, manifest_has_all
+from tests.workflow.conftest import Run, contents_of, manifest_has_all
 from tests.workflow.scenes import ROLLER_LOADS, ROLLER_WEAR
 from workflow.analyses.wear.figures.wear import figures_of
 from workflow.kinds import load_case
-from workflow.pictures.style import save
+from workflow.pictures.style import write_figures
 from workflow.shell import memory
 
 UM3_PER_J = 1e-12
@@ -354,7 +356,8 @@ def test_where_the_flank_slides_energy_is_the_structures(full, flank):
 
 def test_fields_are_kept_and_drawn(full, tmp_path):
     with h5py.File(full.folder / "results.h5") as file:
-        save(figures_of(file)["half_space_and_structure"](file), tmp_path / "cycles.png")
+        draw = figures_of(contents_of(full.folder))["half_space_and_structure"]
+        write_figures([("cycles", partial(draw, file))], tmp_path)
         assert (tmp_path / "cycles.png").stat().st_size > 10_000
         shown = [key for key in file["comparison/intrados"] if key != "load_history"]
         assert 1 <= len(shown) <= 3

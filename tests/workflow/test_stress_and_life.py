@@ -10,10 +10,10 @@ import pytest
 from sa_solver.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Grid, Material
 from tests.marks import slow
+from tests.workflow.conftest import contents_of
 from wear.interface import CycleTractions
 from workflow.analyses.wear.case.sections import ContactStress, Life
 from workflow.analyses.wear.contact_stress import Planes, _report_stick, life_maps
-from workflow.analyses.wear.layout import jump_names
 from workflow.shell.results import grid_of
 
 FLANKS = ("intrados", "extrados")
@@ -53,7 +53,7 @@ def line(start: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 def peak_traction(file: h5py.File, flank: str, moment: str) -> Array:
     """Tractions qx, qy, p that the run recorded at peak load."""
-    jump = jump_names(file, flank)[0 if moment == "unworn" else -1]
+    jump = sorted(file["surfaces"][flank])[0 if moment == "unworn" else -1]
     own = file["contact"][flank][jump]
     return np.concatenate([own["shear"][()], own["pressure"][()][None]])
 
@@ -307,7 +307,7 @@ def test_figures_say_what_the_summary_says(request: pytest.FixtureRequest, metho
         "fretting_life": ("cracking_parameter", ".3g"),
     }
     with h5py.File(run.folder / "results.h5") as file, rc_context(STYLE):
-        found = figures.figures_of(file)
+        found = figures.figures_of(contents_of(run.folder))
         for name, (quantity, digits) in told.items():
             figure = found[name](file)
             FigureCanvasAgg(figure).draw()
@@ -325,10 +325,11 @@ def test_figures_say_what_the_summary_says(request: pytest.FixtureRequest, metho
 @pytest.fixture(scope="module")
 def paraview(normal: Any) -> Path:
     from workflow.analyses.wear.paraview.wear import write_wear
-    from workflow.pictures.drawing import write_paraview
 
     folder = normal.folder / "shown"
-    write_paraview(write_wear, normal.folder / "results.h5", folder)
+    folder.mkdir()
+    with h5py.File(normal.folder / "results.h5") as file:
+        write_wear(contents_of(normal.folder), file, folder)
     return folder
 
 
@@ -336,7 +337,7 @@ def test_maps_are_on_the_flanks(normal: Any, paraview: Path) -> None:
     import pyvista
 
     with h5py.File(normal.folder / "results.h5") as file:
-        last = jump_names(file, "intrados")[-1]
+        last = sorted(file["surfaces/intrados"])[-1]
         for jump, moment in {"00000": "unworn", last: "worn"}.items():
             image = pyvista.read(paraview / "intrados" / f"{jump}.vti")
             for number in BODIES:

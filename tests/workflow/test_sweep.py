@@ -373,7 +373,7 @@ def test_bands_over_the_cycles(tmp_path):
     rows = [worn(depth) for depth in (0.1, 0.2, 0.3, 0.4, 0.5)]
     rows[0].finished.summary["kinetics"]["cycles"] = [0.0, 10.0, 20.0]
     rows.append(Row(worn(0.6).run, Finished(None, Path(), None, "it broke")))
-    figure = kinetics_bands("Flanks", rows)
+    figure = kinetics_bands("Flanks", rows, ["flank"])
     depth, volume = figure.axes
     assert figure.get_suptitle() == "Flanks: 5 runs, median (least to largest) at their end"
     assert depth.get_title() == "flank: depth 900 (300 to 1.5e+03) µm"

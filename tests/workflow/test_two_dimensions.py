@@ -14,12 +14,12 @@ from fe_models.structure import InterfaceHistory, load_history
 from fe_models.transfer import FaceTransfer
 from sa_solver.types import Frame, Grid
 from tests.marks import slow
-from tests.workflow.conftest import Run, invoke
+from tests.workflow.conftest import Run, contents_of, invoke
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.fidelity import choosing
 from workflow.analyses.wear.fidelity.dimension import choose_dimension
-from workflow.analyses.wear.figures.wear import FIGURES, figures_of
+from workflow.analyses.wear.figures.wear import figures_of
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.uniformity import ALIKE, Uniformity, sections, uniformities
@@ -109,10 +109,11 @@ def test_figures_speak_of_lengths_and_strips(pictured):
     assert {"resultants", "pressure_profiles", "worn_profiles", "kinetics"} <= written
     assert "pressure_maps" not in written
     with h5py.File(pictured.folder / "results.h5") as file, matplotlib.rc_context(STYLE):
-        assert set(figures_of(file)) == written
+        figures = figures_of(contents_of(pictured.folder))
+        assert set(figures) == written
         texts = {}
         for name in ("resultants", "pressure_profiles", "worn_profiles", "kinetics"):
-            figure = FIGURES[name][0](file)
+            figure = figures[name](file)
             shown = [figure.get_suptitle()]
             for axis in figure.axes:
                 shown += [axis.get_title("left"), axis.get_ylabel()]

@@ -15,10 +15,11 @@ from sa_solver.types import Array
 from tests.workflow.conftest import invoke, manifest_has_all
 from tests.workflow.vibration_pad import LOAD, ROWS, block, places, run_block
 from wear.joints.periodic import SEPARATED, SLIP
+from workflow.analyses.vibration import ANALYSIS
 from workflow.analyses.vibration.figures import loops as vibration_loops
 from workflow.analyses.vibration.figures import response as vibration
 from workflow.analyses.vibration.figures import states as vibration_states
-from workflow.analyses.vibration.figures.response import figures_of
+from workflow.analyses.vibration.outcome import Contents
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
 from workflow.analyses.vibration.paraview import write_vibration
 from workflow.pictures.drawing import write_figures
@@ -39,6 +40,7 @@ BACKBONE = {
     "energy_per_cycle": "N mm",
     "slip": "1",
 }
+CONTENTS = Contents(("00000", "00001"), ("00000", "00001"), places=True, backbone=True)
 NAMES = {"frequency_response", "resonance", "loops", "node_states", "pad_states"}
 
 
@@ -185,7 +187,7 @@ def test_titles_fit_the_width(results: h5py.File) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
 
     with rc_context(STYLE):
-        for draw in vibration.figures_of(results).values():
+        for draw in vibration.figures_of(CONTENTS).values():
             figure = draw(results)
             FigureCanvasAgg(figure).draw()
             texts = [axis._left_title for axis in figure.axes] + [figure._suptitle]
@@ -198,7 +200,7 @@ def test_titles_fit_the_width(results: h5py.File) -> None:
 def test_responses_are_named_after_what_is_seen(
     results: h5py.File, summary: dict[str, Any]
 ) -> None:
-    (axis,) = vibration.frequency_response(results).axes
+    (axis,) = vibration.frequency_response(results, CONTENTS).axes
     assert axis.get_ylabel() == "amplitude of block x / force [µm/N]"
     lines = {str(line.get_label()): line for line in axis.lines}
     own = results["responses/00001"]
@@ -207,7 +209,7 @@ def test_responses_are_named_after_what_is_seen(
 
 
 def test_backbone_and_peaks_against_force(results: h5py.File, summary: dict[str, Any]) -> None:
-    curves, frequency, damping = vibration.resonance(results).axes
+    curves, frequency, damping = vibration.resonance(results, CONTENTS).axes
     dashed = next(line for line in curves.lines if line.get_label() == "phase resonance")
     np.testing.assert_allclose(dashed.get_ydata(), 1e3 * results["backbone/amplitude"][()])
     for axis, name, factor in ((frequency, "resonance", 1.0), (damping, "damping", 1e2)):
@@ -218,7 +220,7 @@ def test_backbone_and_peaks_against_force(results: h5py.File, summary: dict[str,
 
 
 def test_loops_and_their_branches(results: h5py.File, summary: dict[str, Any]) -> None:
-    figure = vibration_loops.loops(results)
+    figure = vibration_loops.loops(results, CONTENTS)
     left, right = figure.axes
     # Of two forces, each in one and in three harmonics.
     assert len(left.lines) == 4
@@ -268,7 +270,7 @@ def test_low_forces_stick_and_high_ones_slip(results: h5py.File) -> None:
     corners = [0, ROWS - 1, -ROWS, -1]
     assert (low[0, corners] == open_kind).all()
     assert (high == sticks).sum(axis=1).min() == 0
-    figure = vibration_states.pad_states(results)
+    figure = vibration_states.pad_states(results, CONTENTS)
     assert title(figure).endswith("under 25 N")
     assert [axis.get_ylabel().split("\n")[0] for axis in figure.axes[::2]] == [
         "below",
@@ -286,10 +288,15 @@ def test_of_a_folded_curve_the_largest_motion_is_shown() -> None:
 
 
 def test_figures_without_data_are_left_out(changed: h5py.File, tmp_path: Path) -> None:
-    del changed["contact"], changed["backbone"], changed["responses/00000"]
-    del changed["responses/00001/loops"]
-    assert set(vibration.figures_of(changed)) == {"frequency_response"}
-    assert write_vibration(changed, tmp_path / "paraview") == []
+    bare = Contents(("00001",), (), places=False, backbone=False)
+    assert set(vibration.figures_of(bare)) == {"frequency_response"}
+    assert write_vibration(bare, changed, tmp_path / "paraview") == []
+
+
+def test_what_should_be_there_and_is_not_is_an_error(changed: h5py.File) -> None:
+    del changed["backbone"]
+    with pytest.raises(KeyError, match="backbone"):
+        vibration.resonance(changed, CONTENTS)
 
 
 # --- ParaView -----------------------------------------------------------------------------------
@@ -350,10 +357,10 @@ def test_nodes_out_of_rows_are_shown_as_points(changed: h5py.File, tmp_path: Pat
     x = changed["contact/x"]
     x[...] = x[()] * (1.0 + 0.05 * np.arange(len(x)))
     assert rows_and_columns(x[()], changed["contact/y"][()]) is None
-    written = write_vibration(changed, tmp_path / "paraview")
+    written = write_vibration(CONTENTS, changed, tmp_path / "paraview")
     mesh = pv.read(written[0])
     assert mesh.n_cells == mesh.n_points == ROWS**2
-    axis = vibration_states.pad_states(changed).axes[0]
+    axis = vibration_states.pad_states(changed, CONTENTS).axes[0]
     assert len(axis.collections[0].get_offsets()) == ROWS**2
 
 
@@ -382,6 +389,7 @@ def test_case_without_figures_and_paraview_has_none(tmp_path: Path) -> None:
     assert (out / "frf_00000.csv").exists()
     for name in ("figures", "paraview", "loop_00000.csv", "backbone.csv"):
         assert not (out / name).exists()
-    assert {
-        path.name for path in write_figures(figures_of, out / "results.h5", tmp_path / "later")
-    } == {*("frequency_response.png", "node_states.png", "pad_states.png")}
+    one = Contents(("00000",), (), places=True, backbone=False)
+    assert ANALYSIS.pictures is not None
+    later = write_figures(ANALYSIS.pictures, one, out / "results.h5", tmp_path / "later")
+    assert {path.stem for path in later} == {"frequency_response", "node_states", "pad_states"}

@@ -191,16 +191,15 @@ def _histories(case: Case) -> Iterator[Rung]:
         yield Rung("reversals", ("contact.history=reversals",), branch="reversals")
         yield from _legs(case)
     else:
-        finer = INCREMENTS_2D if _is_line(case) else INCREMENTS
-        yield from _cycle(entry_at(case, "load_path"), finer)
+        yield from _cycle(case)
 
 
-def _cycle(path: Any, factors: Sequence[float]) -> Iterator[Rung]:
+def _cycle(case: Case) -> Iterator[Rung]:
     """The loads of a wear cycle in fewer and in more increments."""
-    increments, peak = getattr(path, "increments", None), getattr(path, "peak_at", None)
+    increments, peak = (entry_at(case, f"load_path.{key}") for key in ("increments", "peak_at"))
     if increments is None:
         return
-    for factor in factors:
+    for factor in INCREMENTS_2D if _is_line(case) else INCREMENTS:
         legs = (increments,) if isinstance(increments, int) else increments
         counts = [max(1, round(factor * count)) for count in legs]
         overrides = [f"load_path.increments={counts[0] if isinstance(increments, int) else counts}"]
@@ -320,15 +319,9 @@ def _meshes(case: Case) -> Iterator[Rung]:
             size = entry_at(case, "mesh.size") / factor
             overrides = f"mesh.pad_elements={elements}", f"mesh.size={size!r}"
             yield Rung(f"{elements} elements on the pad", overrides, 1.0 / factor)
-        elif (longest := _element_size(case)) is not None:
-            size = longest / factor
+        elif entry_at(case, "structure.kind") == "mesh" and entry_at(case, "structure.size"):
+            size = entry_at(case, "structure.size") / factor  # of elements of a CAD file
             yield Rung(f"elements of {size:.3g} mm", (f"structure.size={size!r}",), 1.0 / factor)
-
-
-def _element_size(case: Case) -> float | None:
-    """Of the elements that a CAD file is meshed with [mm]; None for other structures."""
-    size: float | None = entry_at(case, "structure.size")
-    return size if entry_at(case, "structure.kind") == "mesh" else None
 
 
 def _orders(case: Case) -> Iterator[Rung]:

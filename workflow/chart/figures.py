@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 from math import inf, isfinite, log10
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, STYLE, new_figure, save
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-    from workflow.chart.ladder import Judged, Ladder
-    from workflow.chart.run import Chart
+from workflow.chart.ladder import Judged, Ladder
+from workflow.chart.run import Chart
+from workflow.pictures.panels import legend_below, new_figure
+from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, write_figures
 
 COSTS = {"seconds": "seconds, alone on this machine", "convolutions": "convolutions"}
 COLOURS = (BLUE, ORANGE, GREEN, PURPLE, "#E69F00", "#56B4E9", "#F0E442", BLACK, "#999999")
@@ -38,20 +38,14 @@ SMALLEST = 1e-12
 
 def write_chart_figures(chart: Chart, folder: Path) -> list[Path]:
     """Draw a figure for each axis and one for all, as PNG files; returns their paths."""
-    import matplotlib
-
-    folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    with matplotlib.rc_context(STYLE):
-        ladders = [ladder for ladder in chart.ladders if ladder.rungs]
-        drawn = {ladder.axis.name: axis_figure(ladder, chart.accuracy) for ladder in ladders}
-        if len(drawn) > 1:
-            drawn["all"] = all_figure(chart)
-        for name, figure in drawn.items():
-            path = folder / f"chart_{name}.png"
-            save(figure, path)
-            written.append(path)
-    return written
+    ladders = [ladder for ladder in chart.ladders if ladder.rungs]
+    drawn: dict[str, Callable[[], Figure]] = {
+        f"chart_{ladder.axis.name}": partial(axis_figure, ladder, chart.accuracy)
+        for ladder in ladders
+    }
+    if len(drawn) > 1:
+        drawn["chart_all"] = partial(all_figure, chart)
+    return write_figures(drawn.items(), folder)
 
 
 def axis_figure(ladder: Ladder, accuracy: float) -> Figure:
@@ -74,8 +68,7 @@ def axis_figure(ladder: Ladder, accuracy: float) -> Figure:
         if len(branches) == 1 and 1 < len(ladder.references) <= MOST_QUANTITIES:
             _draw_quantities(axis, ladder, cost)
         _finish(axis, cost, accuracy, (bottom, _top([ladder], accuracy)))
-    figure.axes[0].set_ylabel("largest relative error of the quantities")
-    _legend(figure)
+    _label(figure)
     return figure
 
 
@@ -93,8 +86,7 @@ def all_figure(chart: Chart) -> Figure:
             _draw_baseline(axis, baseline, cost, lowest)
         axis.axhline(lowest, color=BLACK, lw=0.6, ls=":")
         _finish(axis, cost, chart.accuracy, (lowest, _top(ladders, chart.accuracy)))
-    figure.axes[0].set_ylabel("largest relative error of the quantities")
-    _legend(figure)
+    _label(figure)
     return figure
 
 
@@ -217,13 +209,8 @@ def _draw_quantities(axis: Axes, ladder: Ladder, cost: str) -> None:
 
 def _finish(axis: Axes, cost: str, accuracy: float, ends: tuple[float, float]) -> None:
     """Scales and labels; ``ends`` are the lowest and the highest error shown."""
-    from matplotlib.ticker import LogLocator
-
     axis.axhline(accuracy, color=BLACK, lw=1.0, ls="--", label=f"required: {100 * accuracy:g} %")
-    axis.set_xscale("log")
-    axis.set_yscale("log")
-    axis.set_xlabel(COSTS[cost])
-    axis.set_ylim(ends[0] / 1.6, ends[1])
+    axis.set(xlabel=COSTS[cost], xscale="log", yscale="log", ylim=(ends[0] / 1.6, ends[1]))
     # Room for the name of the dearest rung.
     low, high = axis.get_xlim()
     high *= (high / low) ** 0.18
@@ -235,13 +222,6 @@ def _finish(axis: Axes, cost: str, accuracy: float, ends: tuple[float, float]) -
     axis.yaxis.set_minor_formatter("")
 
 
-def _legend(figure: Figure) -> None:
-    handles, labels = figure.axes[0].get_legend_handles_labels()
-    unique = dict(zip(labels, handles, strict=True))
-    figure.legend(
-        unique.values(),
-        unique.keys(),
-        loc="outside lower center",
-        ncols=LEGEND_COLUMNS,
-        fontsize=LEGEND_SIZE,
-    )
+def _label(figure: Figure) -> None:
+    figure.axes[0].set_ylabel("largest relative error of the quantities")
+    legend_below(figure, figure.axes[:1], columns=LEGEND_COLUMNS, fontsize=LEGEND_SIZE)

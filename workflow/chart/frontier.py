@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import compress, product
 from math import inf, isfinite
 
 
@@ -31,29 +32,31 @@ class Option:
 
 @dataclass(frozen=True)
 class Combination:
-    """A choice on every axis: names in their order, costs multiplied, errors added."""
+    """A choice on every axis: rungs by the axis' name, errors added, costs multiplied."""
 
-    names: tuple[str, ...] = ()
-    ratio: float = 1.0
+    rungs: Mapping[str, str] = field(default_factory=dict)
     error: float = 0.0
-
-    def with_one(self, option: Option) -> Combination:
-        """This and a choice on one more axis."""
-        names = (*self.names, option.name)
-        return Combination(names, self.ratio * option.ratio, self.error + option.error)
+    seconds_ratio: float = 1.0
 
 
-def cheapest(axes: Sequence[Sequence[Option]], accuracy: float) -> Combination | None:
+def cheapest(axes: Mapping[str, Sequence[Option]], accuracy: float) -> Combination | None:
     """The cheapest choice on every axis whose errors add up to ``accuracy`` at most, if any.
 
     Each axis was varied alone: that errors add is a bound as far as they do not feed each other,
     and that costs multiply an estimate.
     """
     kept = [Combination()]
-    for options in axes:
-        grown = [choice.with_one(option) for choice in kept for option in options]
+    for axis, options in axes.items():
+        grown = [
+            Combination(
+                {**choice.rungs, axis: option.name},
+                choice.error + option.error,
+                choice.seconds_ratio * option.ratio,
+            )
+            for choice, option in product(kept, options)
+        ]
         # What is no frontier point so far is none of any longer combination either.
-        flags = efficient([choice.ratio for choice in grown], [choice.error for choice in grown])
-        kept = [choice for choice, flag in zip(grown, flags, strict=True) if flag]
+        ratios, errors = [c.seconds_ratio for c in grown], [c.error for c in grown]
+        kept = list(compress(grown, efficient(ratios, errors)))
     met = [choice for choice in kept if isfinite(choice.error) and choice.error <= accuracy]
-    return min(met, key=lambda choice: choice.ratio, default=None)
+    return min(met, key=lambda choice: choice.seconds_ratio, default=None)

@@ -159,10 +159,8 @@ def _reference(
 def _convergence(axis: Axis, points: Sequence[Point], quantity: str) -> Convergence:
     """Of the branch that the last point belongs to; one that refines nothing is a choice."""
     last = points[-1]
-    if axis.order is None:
-        return Convergence(None, 0.0)
     branch = [p for p in points if p.rung.branch == last.rung.branch and p.rung.step is not None]
-    if not branch:
+    if axis.order is None or not branch:
         return Convergence(None, 0.0)
     values = [point.values[quantity] for point in branch]
     steps = [float(point.rung.step or nan) for point in branch]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -20,9 +19,6 @@ from workflow.shell.versions import versions
 
 # Columns of text where the tables go to a file.
 FILE_WIDTH = 120
-HEAD = ("axis", "branch", "rung", "settings", "own", "folder")
-TAIL = ("error", "worst", "bound", "floor", "unresolved", "seconds", "convolutions", "solves")
-FRONTIER = ("efficient_by_seconds", "efficient_by_convolutions")
 
 
 def write_chart(chart: Chart, out: Path) -> None:
@@ -77,7 +73,8 @@ def _error(ladder: Ladder, rung: Judged) -> str:
 
 def combination(chart: Chart) -> Combination | None:
     """The cheapest rung on every axis with errors that add up to no more than the accuracy."""
-    return cheapest([ladder.options() for ladder in chart.ladders], chart.accuracy)
+    options = {ladder.axis.name: ladder.options() for ladder in chart.ladders}
+    return cheapest(options, chart.accuracy)
 
 
 def _together(chart: Chart) -> str:
@@ -87,12 +84,11 @@ def _together(chart: Chart) -> str:
             f"all axes: for {percent(chart.accuracy)} no choice of rungs is known to be enough: "
             "their errors, each axis varied alone, add up to more"
         )
-    names = zip(chart.ladders, best.names, strict=True)
-    choice = ", ".join(f"{ladder.axis.name} {name}" for ladder, name in names)
+    choice = ", ".join(f"{axis} {rung}" for axis, rung in best.rungs.items())
     return (
         f"all axes: for {percent(chart.accuracy)} take {choice}: errors, each axis varied alone, "
-        f"add up to {percent(best.error)} at most, and about {best.ratio:.2g} times the seconds "
-        "of the case as written"
+        f"add up to {percent(best.error)} at most, and about {best.seconds_ratio:.2g} times the "
+        "seconds of the case as written"
     )
 
 
@@ -152,31 +148,36 @@ def _marks(rung: Judged) -> list[str]:
 
 def _write_table(chart: Chart, path: Path) -> None:
     """One row for each rung; a quantity that its axis does not have is empty."""
-    points = [rung.point for ladder in chart.ladders for rung in ladder.rungs]
-    quantities = list(dict.fromkeys(q for p in points for q in (*p.values, *p.extras)))
-    rows = [row for ladder in chart.ladders for row in _rows(ladder)]
-    names = [*HEAD, *quantities, *TAIL, *FRONTIER]
+    cells = [_cells(ladder, rung) for ladder in chart.ladders for rung in ladder.rungs]
+    names = dict.fromkeys(name for part in zip(*cells, strict=True) for row in part for name in row)
+    rows = [head | values | tail for head, values, tail in cells]
     write_table(path, {name: [row.get(name) for row in rows] for name in names})
 
 
-def _rows(ladder: Ladder) -> Iterator[dict[str, object]]:
-    for rung in ladder.rungs:
-        point, cost = rung.point, rung.point.cost
-        head = (
-            *(ladder.axis.name, point.rung.branch, rung.name, " ".join(point.rung.overrides)),
-            *(point.baseline, point.folder),
-        )
-        tail = (
-            *(rung.error, rung.worst, rung.bound, ladder.floor, rung.unresolved),
-            *(round(cost.seconds, 2), cost.convolutions, cost.solves),
-        )
-        yield {
-            **dict(zip(HEAD, head, strict=True)),
-            **point.values,
-            **point.extras,
-            **dict(zip(TAIL, tail, strict=True)),
-            **dict(zip(FRONTIER, (rung.by_seconds, rung.by_convolutions), strict=True)),
-        }
+def _cells(ladder: Ladder, rung: Judged) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    """What a rung is, the quantities that its axis has, and what came of it."""
+    point, cost = rung.point, rung.point.cost
+    head = {
+        "axis": ladder.axis.name,
+        "branch": point.rung.branch,
+        "rung": rung.name,
+        "settings": " ".join(point.rung.overrides),
+        "own": point.baseline,
+        "folder": point.folder,
+    }
+    tail = {
+        "error": rung.error,
+        "worst": rung.worst,
+        "bound": rung.bound,
+        "floor": ladder.floor,
+        "unresolved": rung.unresolved,
+        "seconds": round(cost.seconds, 2),
+        "convolutions": cost.convolutions,
+        "solves": cost.solves,
+        "efficient_by_seconds": rung.by_seconds,
+        "efficient_by_convolutions": rung.by_convolutions,
+    }
+    return head, {**point.values, **point.extras}, tail
 
 
 # --- summary ------------------------------------------------------------------------------------
@@ -188,16 +189,7 @@ def _summary(chart: Chart) -> dict[str, Any]:
         "title": chart.title,
         "accuracy": chart.accuracy,
         "axes": {ladder.axis.name: _axis_summary(ladder, chart) for ladder in chart.ladders},
-        "together": None
-        if best is None
-        else {
-            "rungs": {
-                ladder.axis.name: name
-                for ladder, name in zip(chart.ladders, best.names, strict=True)
-            },
-            "error": best.error,
-            "seconds_ratio": best.ratio,
-        },
+        "together": None if best is None else vars(best),
         "sentences": sentences(chart),
         "versions": versions(),
     }

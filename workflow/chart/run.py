@@ -7,12 +7,10 @@ as it is and an interrupted one goes on.
 
 from __future__ import annotations
 
-import os
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import chain
+from itertools import chain, count
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +26,7 @@ from workflow.kinds import analysis_of, load_case
 from workflow.runs.job import Finished, Job
 from workflow.runs.jobs import run_jobs
 from workflow.runs.run import kept_in
+from workflow.shell.processes import environment
 from workflow.shell.summary import number_at
 
 CACHE = "FRETSCALE_CACHE"
@@ -91,27 +90,18 @@ def chart_case(
     settings = axes_of(case, base, axes)
     jobs = _jobs(case, base, settings)
     _claim(out, load_case(case, base))
-    with _environment(CACHE, str((out / STRUCTURES).absolute())):
+    with environment({CACHE: str((out / STRUCTURES).absolute())}):
         ended, left_out = _run(jobs, settings, out / RUNS, quantities, report)
     runs = _runs(ended)
     if not runs:
         raise MethodFailed(f"{out}: not a single rung ran: {ended[0].job.name}: {ended[0].error}")
     first = runs.get(BASELINE) or next(iter(runs.values()))
-    errors = left_out | {
-        finished.job.name: finished.error for finished in ended if finished.summary is None
-    }
+    failed = {end.job.name: end.error for end in ended if end.summary is None}
     ladders = [
-        _ladder(
-            axis,
-            [(setting, jobs[setting.text].name) for setting in rungs],
-            runs,
-            errors,
-            quantities,
-        )
+        _ladder(axis, rungs, jobs, runs, left_out | failed, quantities)
         for axis, rungs in settings.items()
     ]
-    complete = all(finished.summary is not None for finished in ended)
-    return Chart(first.case.title, tuple(ladders), accuracy, complete)
+    return Chart(first.case.title, tuple(ladders), accuracy, complete=not failed)
 
 
 def _plain(case: Case, quantities: Sequence[str]) -> Iterator[str]:
@@ -160,7 +150,7 @@ def _run(
 
     The first one shows whether there are such ``quantities``, before all others are run.
     """
-    progress = _Progress(len(jobs), report)
+    progress = _progress(len(jobs), report)
     baseline, *others = jobs.values()
     ended = run_jobs([baseline], out, alone=True, report=progress)
     if (summary := ended[0].summary) is not None:
@@ -184,32 +174,17 @@ def _too_long(setting: Setting, summary: Mapping[str, Any]) -> str:
     return f"it would take {steps:.2g} steps of {length:.3g} cycles" if steps > MOST_STEPS else ""
 
 
-class _Progress:
+def _progress(total: int, report: Callable[[str], None]) -> Callable[[Finished], None]:
     """Reports each run as it ends."""
+    numbers = count(1)
 
-    def __init__(self, total: int, report: Callable[[str], None]) -> None:
-        self._total, self._report, self._done = total, report, 0
-
-    def __call__(self, finished: Finished) -> None:
-        self._done += 1
+    def ended(finished: Finished) -> None:
         ending = f"failed: {finished.error}"
         if finished.summary is not None:
             ending = f"{sum(finished.summary.get('seconds', {}).values()):.1f} s"
-        self._report(f"{self._done}/{self._total} {finished.job.name}: {ending}")
+        report(f"{next(numbers)}/{total} {finished.job.name}: {ending}")
 
-
-@contextmanager
-def _environment(name: str, value: str) -> Iterator[None]:
-    """Set an environment variable for the processes started within."""
-    before = os.environ.get(name)
-    os.environ[name] = value
-    try:
-        yield
-    finally:
-        if before is None:
-            del os.environ[name]
-        else:
-            os.environ[name] = before
+    return ended
 
 
 def _runs(ended: Sequence[Finished]) -> dict[str, _Run]:
@@ -241,23 +216,21 @@ def _check(quantities: Sequence[str], summary: Mapping[str, Any]) -> None:
 
 def _ladder(
     axis: Axis,
-    rungs: Sequence[tuple[Setting, str]],
+    settings: Sequence[Setting],
+    jobs: Mapping[str, Job],
     runs: Mapping[str, _Run],
     errors: Mapping[str, str],
     picked: Sequence[str],
 ) -> Ladder:
-    """The rungs of an axis, each with the name of its job, that ran or did not."""
-    completed = [(setting.rung, runs[name]) for setting, name in rungs if name in runs]
-    failed = {setting.rung.name: errors[name] for setting, name in rungs if name in errors}
+    """The rungs of an axis that ran or did not."""
+    rungs = [(setting.rung, jobs[setting.text].name) for setting in settings]
+    completed = [(rung, runs[name]) for rung, name in rungs if name in runs]
+    failed = {rung.name: errors[name] for rung, name in rungs if name in errors}
     if not completed:
         return Ladder(axis, (), {}, failed)
     last = completed[-1][1]
     wanted = _quantities(axis, runs.get(BASELINE, last), picked)
-    exact = {
-        expectation.quantity: expectation.value
-        for expectation in last.case.expect
-        if expectation.exact
-    }
+    exact = {entry.quantity: entry.value for entry in last.case.expect if entry.exact}
     points = [
         Point(
             rung=rung,
@@ -269,7 +242,7 @@ def _ladder(
         )
         for rung, run in completed
     ]
-    return judge(axis, points, exact, failed, finest=rungs[-1][0].rung.name)
+    return judge(axis, points, exact, failed, finest=rungs[-1][0].name)
 
 
 def _quantities(axis: Axis, run: _Run, picked: Sequence[str]) -> list[str]:

@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from sa_solver.types import Array
 from wear.joints.measured_loops import MeasuredLoops
-from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, STYLE, new_figure, save
+from workflow.pictures.panels import new_figure
+from workflow.pictures.scales import PER_MICRON, TO_MICRONS
+from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, write_figures
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-TO_MICRONS, PER_MICRON = 1e3, 1e-3  # mm to µm, N/mm to N/µm
 # More loops than this are drawn as every so many.
 MOST_LOOPS = 40
 HEADROOM = 1.15
@@ -23,10 +22,7 @@ HEADROOM = 1.15
 
 def write_figure(loops: MeasuredLoops, name: str, path: Path) -> None:
     """Draw the loops of the record ``name``."""
-    import matplotlib
-
-    with matplotlib.rc_context(STYLE):
-        save(figure(loops, name), path)
+    write_figures([(path.stem, partial(figure, loops, name))], path.parent)
 
 
 def figure(loops: MeasuredLoops, name: str) -> Figure:

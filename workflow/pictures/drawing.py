@@ -1,7 +1,8 @@
 """Pictures of a run: figures, and files for ParaView.
 
-Each figure reads ``results.h5`` and nothing else; numbers in the titles come from the data. Images
-are 1200 pixels wide.
+Each is told what the results hold, and reads ``results.h5`` and nothing else: numbers in the titles
+come from the data. A dataset that should be there and is not is an error. Images are 1200 pixels
+wide.
 
 In files for ParaView lengths are in mm, stresses in MPa; each array carries its unit. ``shear`` and
 ``slip`` are global vectors, so that glyphs point the right way; those with an axis at the end of
@@ -11,35 +12,40 @@ files: the doubles are in ``results.h5``.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
+from functools import partial
+from itertools import islice
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 
 from workflow.case.sections import Output
-from workflow.pictures.style import STYLE, save
 from workflow.shell.analysis import Pictures
 from workflow.shell.folder import OutputFolder
 from workflow.shell.processes import side_by_side
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
 
+def write_pictures(
+    output: Output,
+    folder: OutputFolder,
+    pictures: Callable[[], Pictures],
+    contents: Any,
+    processes: int = 0,
+) -> None:
+    """Write the pictures of the results in a folder that a case asks for in its ``output``.
 
-def write_pictures(output: Output, folder: OutputFolder, pictures: Pictures) -> None:
-    """Write the pictures of the results in a folder that a case asks for in its ``output``."""
-    results, figures_of, paraview_of = folder.results, pictures.figures_of, pictures.paraview_of
+    ``contents`` is what the results hold, as ``pictures`` are told it.
+    """
+    told = pictures, contents, folder.results
     jobs: list[tuple[Callable[..., Any], tuple[Any, ...]]] = []
-    if output.paraview and paraview_of is not None:
-        files = folder.reserve("paraview", "files for ParaView")
-        jobs.append((write_paraview, (paraview_of, results, files)))
+    if output.paraview:
+        jobs.append((write_paraview, (*told, folder.reserve("paraview", "files for ParaView"))))
     if output.figures:
-        parts = max(pictures.processes, 1)
+        parts = max(processes, 1)
         figures = folder.reserve("figures", "figures of the results")
-        shares = [(figures_of, results, figures, part, parts) for part in range(parts)]
-        jobs += [(write_figures, share) for share in shares]
-    if pictures.processes:
+        jobs += [(write_figures, (*told, figures, part, parts)) for part in range(parts)]
+    if processes:
         side_by_side(jobs)
         return
     for write, arguments in jobs:
@@ -47,19 +53,22 @@ def write_pictures(output: Output, folder: OutputFolder, pictures: Pictures) -> 
 
 
 def write_paraview(
-    paraview_of: Callable[[h5py.File, Path], list[Path]], results: Path, folder: Path
+    pictures: Callable[[], Pictures], contents: Any, results: Path, folder: Path
 ) -> list[Path]:
     """Write the files that show ``results`` in ParaView; returns their paths.
 
     Every file appears under its name only when it is complete.
     """
     folder.mkdir(parents=True, exist_ok=True)
+    write = pictures().write_paraview
+    assert write is not None, "output.paraview of a case without fields"
     with h5py.File(results) as file:
-        return paraview_of(file, folder)
+        return write(contents, file, folder)
 
 
 def write_figures(
-    figures_of: Callable[[h5py.File], Mapping[str, Callable[[h5py.File], Figure]]],
+    pictures: Callable[[], Pictures],
+    contents: Any,
     results: Path,
     folder: Path,
     first: int = 0,
@@ -69,13 +78,9 @@ def write_figures(
 
     ``every`` so many of them from the ``first`` on, so that several processes may share them.
     """
-    import matplotlib
+    # Plots take a second to load: where they are drawn.
+    from workflow.pictures import style
 
-    folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    with h5py.File(results) as file, matplotlib.rc_context(STYLE):
-        for name, draw in list(figures_of(file).items())[first::every]:
-            path = folder / f"{name}.png"
-            save(draw(file), path)
-            written.append(path)
-    return written
+    drawn = islice(pictures().figures_of(contents).items(), first, None, every)
+    with h5py.File(results) as file:
+        return style.write_figures(((name, partial(draw, file)) for name, draw in drawn), folder)

@@ -2,18 +2,14 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
-import h5py
 import numpy as np
+from matplotlib.axes import Axes
 
 from sa_solver.types import Array, Grid
-from workflow.shell.results import grid_of
+from workflow.pictures.style import COLOUR_MAP
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-PRESSURE_COLOURS = "viridis"
 # Edge peaks are a few cells: a scale that reached them would leave the rest in one colour.
 MAP_PERCENTILE = 99.5
 # More profiles than this overlap.
@@ -32,7 +28,7 @@ def draw_map(axis: Axes, field: Array, grid: Grid, top: float) -> Any:
         np.ma.masked_less_equal(field, 0.0),
         origin="lower",
         extent=(-half[0], half[0], -half[1], half[1]),
-        cmap=PRESSURE_COLOURS,
+        cmap=COLOUR_MAP,
         vmin=0.0,
         vmax=top,
         interpolation="nearest",
@@ -60,14 +56,3 @@ def near_middle(coordinates: Array, direction: int) -> Any:
 def centres(grid: Grid, direction: int) -> Array:
     """Cell centres along x (0) or y (1)."""
     return (grid.x, grid.y)[direction].ravel()
-
-
-def spread(items: list[str], count: int) -> list[str]:
-    """At most ``count`` of the items, evenly spread, first and last among them."""
-    places = np.linspace(0, len(items) - 1, min(count, len(items)))
-    return [items[round(place)] for place in places]
-
-
-def line_contacts(file: h5py.File) -> bool:
-    """Whether the contacts of a wear run are line contacts."""
-    return grid_of(next(iter(file["grid"].values()))).line

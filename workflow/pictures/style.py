@@ -1,16 +1,17 @@
-"""What all figures share: size, type and colours, and how one is begun and written."""
+"""The look of all figures: type and colours; and how they are written."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
+
+from matplotlib import rc_context
+from matplotlib.figure import Figure
 
 from workflow.shell.store import replacing
 
-if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
-WIDTH_INCHES, DOTS_PER_INCH = 12.0, 100
+DOTS_PER_INCH = 100
 FONT_SIZE = 13
 STYLE: dict[Any, Any] = {
     "font.size": FONT_SIZE,
@@ -25,18 +26,23 @@ STYLE: dict[Any, Any] = {
 }
 # Okabe and Ito's colours, which colour-blind readers distinguish too.
 BLUE, ORANGE, GREEN, PURPLE, BLACK = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222"
+# Of fields, and of curves in an order; its end is too bright for lines.
+COLOUR_MAP, LAST_SHADE = "viridis", 0.9
+# Of panels that begin at 0, over the largest value.
+HEADROOM = 1.1
 
 
-def save(figure: Figure, path: Path) -> None:
-    """Write ``figure``; it appears under its name only when it is complete."""
-    with replacing(path) as partial:
-        figure.savefig(partial, format="png", dpi=DOTS_PER_INCH)
+def write_figures(figures: Iterable[tuple[str, Callable[[], Figure]]], folder: Path) -> list[Path]:
+    """Draw figures, given by their names, as PNG files; returns their paths.
 
-
-def new_figure(title: str, height: float) -> Figure:
-    """An empty figure with a title, ``height`` in inches."""
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(WIDTH_INCHES, height), layout="constrained")
-    figure.suptitle(title, fontweight="bold")
-    return figure
+    Each appears under its name only when it is complete.
+    """
+    folder.mkdir(parents=True, exist_ok=True)
+    written = []
+    with rc_context(STYLE):
+        for name, draw in figures:
+            path = folder / f"{name}.png"
+            with replacing(path) as partial:
+                draw().savefig(partial, format="png", dpi=DOTS_PER_INCH)
+            written.append(path)
+    return written

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
@@ -16,7 +17,8 @@ if TYPE_CHECKING:
     import pyvista
 
 Fields = dict[str, tuple[Array, str]]
-Step = tuple[float, str, Path]
+Step = tuple[float, str, Path, Any]
+"""Time, name, file and data set of a part of a series."""
 
 
 def grid_image(grid: Grid, frame: Frame) -> pyvista.ImageData:
@@ -37,6 +39,16 @@ def cells(field: h5py.Dataset | Array) -> Array:
     return np.ravel(field[()], order="F")
 
 
+def traction_fields(contact: h5py.Group, frame: Frame) -> Fields:
+    """Pressure, shear and slip on a grid: vectors are global, and components in the frame."""
+    fields: Fields = {"pressure": (cells(contact["pressure"]), "MPa")}
+    for name, unit in (("shear", "MPa"), ("slip", "mm")):
+        x, y = (cells(component) for component in contact[name][()])
+        fields[name] = frame.to_global(np.stack([x, y, np.zeros_like(x)], axis=1)), unit
+        fields[f"{name}_x"], fields[f"{name}_y"] = (x, unit), (y, unit)
+    return fields
+
+
 def attach(data: pyvista.DataSetAttributes, fields: Fields) -> None:
     """Add ``fields`` to point or cell data, each with its unit and the names of its components."""
     from vtkmodules.vtkCommonCore import vtkDataArray
@@ -51,7 +63,41 @@ def attach(data: pyvista.DataSetAttributes, fields: Fields) -> None:
                 array.SetComponentName(number, axis)
 
 
-def write_xml(data: Any, path: Path) -> None:
+def write_stl(surface: pyvista.PolyData, path: Path) -> None:
+    """Write triangles as binary STL."""
+    from vtkmodules.vtkIOGeometry import vtkSTLWriter
+
+    writer = vtkSTLWriter()
+    writer.SetInputData(surface)
+    writer.SetFileTypeToBinary()
+    _run(writer, path)
+
+
+def write_series(path: Path, steps: Iterable[Step]) -> list[Path]:
+    """Write the data sets of a series, and a ``.pvd`` over them; returns all files.
+
+    Those of one time are its parts. Times are written with all digits.
+    """
+    parts: dict[float, int] = {}
+    lines, written = [], []
+    for time, name, file, data in steps:
+        _write_xml(data, file)
+        written.append(file)
+        part = parts[time] = parts.get(time, -1) + 1
+        relative = quoteattr(file.relative_to(path.parent).as_posix())
+        attributes = f'timestep="{time!r}" part="{part}" name={quoteattr(name)} file={relative}'
+        lines.append(f"    <DataSet {attributes}/>\n")
+    with replacing(path) as partial:
+        partial.write_text(
+            '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
+            + "".join(lines)
+            + "  </Collection>\n</VTKFile>\n",
+            encoding="utf-8",
+        )
+    return [*written, path]
+
+
+def _write_xml(data: Any, path: Path) -> None:
     """Write a data set as VTK XML: raw appended data, compressed."""
     from vtkmodules.vtkIOXML import vtkXMLDataSetWriter
 
@@ -65,41 +111,9 @@ def write_xml(data: Any, path: Path) -> None:
     _run(writer, path)
 
 
-def write_stl(surface: pyvista.PolyData, path: Path) -> None:
-    """Write triangles as binary STL."""
-    from vtkmodules.vtkIOGeometry import vtkSTLWriter
-
-    writer = vtkSTLWriter()
-    writer.SetInputData(surface)
-    writer.SetFileTypeToBinary()
-    _run(writer, path)
-
-
 def _run(writer: Any, path: Path) -> None:
     """Let a VTK writer write ``path``; raises OSError where it cannot."""
     with replacing(path) as partial:
         writer.SetFileName(str(partial))
         if not writer.Write():
             raise OSError(writer.GetErrorCode(), "could not be written", str(path))
-
-
-def write_series(path: Path, steps: list[Step]) -> list[Path]:
-    """Write a ``.pvd`` over files already written; returns these and itself.
-
-    The files of one time are its parts. Times are written with all digits.
-    """
-    parts: dict[float, int] = {}
-    lines = []
-    for time, name, file in steps:
-        part = parts[time] = parts.get(time, -1) + 1
-        relative = quoteattr(file.relative_to(path.parent).as_posix())
-        attributes = f'timestep="{time!r}" part="{part}" name={quoteattr(name)} file={relative}'
-        lines.append(f"    <DataSet {attributes}/>\n")
-    with replacing(path) as partial:
-        partial.write_text(
-            '<?xml version="1.0"?>\n<VTKFile type="Collection" version="0.1">\n  <Collection>\n'
-            + "".join(lines)
-            + "  </Collection>\n</VTKFile>\n",
-            encoding="utf-8",
-        )
-    return [*(file for _, _, file in steps), path]

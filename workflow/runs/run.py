@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 from workflow.case.changing import changed
 from workflow.case.sections import Case
@@ -107,10 +107,11 @@ def _run(
 
     reporter = Reporter(folder.reserve_log(), append=resume)
 
-    def draw() -> None:
+    def draw(contents: Any) -> None:
         with reporter.stage("paraview and figures"):
             if analysis.pictures is not None:
-                write_pictures(case.output, folder, analysis.pictures())
+                processes = analysis.drawing_processes
+                write_pictures(case.output, folder, analysis.pictures, contents, processes)
 
     try:
         if stays:

@@ -29,7 +29,7 @@ class Run(Generic[AnyCase]):
     to ``resume``. ``choice`` is the record of the settings that were chosen for the case, None
     where they stand as written. ``compute`` runs another case file into a folder, from where an
     earlier run there has got to; False if that was finished already. ``draw`` writes the pictures
-    of the results that the case asks for.
+    of the results that the case asks for, told what these hold.
     """
 
     kind: str
@@ -39,21 +39,20 @@ class Run(Generic[AnyCase]):
     resume: bool
     choice: dict[str, Any] | None
     compute: Callable[[Path, Path], bool]
-    draw: Callable[[], None]
+    draw: Callable[[Any], None]
 
 
 @dataclass(frozen=True)
 class Pictures:
     """How results are shown.
 
-    ``figures_of`` are the figures that there are data for, by name; ``paraview_of`` writes files
-    for ParaView into a folder and gives their paths, None where there are no fields. Figures are
-    drawn in so many ``processes``, and the files beside them; 0: all in the process of the run.
+    Both are told what the results hold: a frozen description that the run makes of what it has
+    written. ``figures_of`` gives the figures to draw, by name; ``write_paraview`` writes files for
+    ParaView into a folder and gives their paths, None for cases without fields.
     """
 
-    figures_of: Callable[[h5py.File], Mapping[str, Callable[[h5py.File], Figure]]]
-    paraview_of: Callable[[h5py.File, Path], list[Path]] | None = None
-    processes: int = 0
+    figures_of: Callable[[Any], Mapping[str, Callable[[h5py.File], Figure]]]
+    write_paraview: Callable[[Any, h5py.File, Path], list[Path]] | None = None
 
 
 def as_written(case: Any) -> tuple[Any, None]:
@@ -92,9 +91,10 @@ class Analysis(Generic[AnyCase]):
 
     ``cases`` are its kinds of case by the names that ``fretscale new`` has for them; these say
     themselves how they are told apart, what they would run and on how many cores. ``memory`` is
-    what a run needs before anything is meshed, ``pictures`` how its results are shown. Of an
-    unfinished run with a checkpoint ``resumable`` says whether it can go on from there; None where
-    runs leave none.
+    what a run needs before anything is meshed, ``pictures`` how its results are shown:
+    figures in so many ``drawing_processes``, and the files beside them; 0: all in that of the run.
+    Of an unfinished run with a checkpoint ``resumable`` says whether it can go on from there; None
+    where runs leave none.
     ``choose`` gives the case with the settings that it leaves open, and a record of why.
     ``write_loads`` solves the structure of a case alone and writes the loads of its contacts into a
     folder, None where there is no structure.
@@ -105,6 +105,7 @@ class Analysis(Generic[AnyCase]):
     run: Callable[[Run[AnyCase]], None]
     memory: Callable[[AnyCase], Memory]
     pictures: Callable[[], Pictures] | None = None
+    drawing_processes: int = 0
     resumable: Callable[[OutputFolder], bool] | None = None
     choose: Callable[[AnyCase], tuple[AnyCase, dict[str, Any] | None]] = as_written
     comparison: Comparison[AnyCase] = Comparison()

@@ -79,7 +79,7 @@ def _processes(
     try:
         with ExitStack() as stack:
             if one_thread:
-                stack.enter_context(_environment(dict.fromkeys(THREAD_SETTINGS, "1")))
+                stack.enter_context(environment(dict.fromkeys(THREAD_SETTINGS, "1")))
             stack.enter_context(_interrupts_held())
             for parts in arguments:
                 ours, theirs = context.Pipe()
@@ -172,7 +172,7 @@ def _interrupts_held() -> Iterator[None]:
 
 
 @contextmanager
-def _environment(changes: dict[str, str]) -> Iterator[None]:
+def environment(changes: dict[str, str]) -> Iterator[None]:
     """Set environment variables for processes started within."""
     before = {name: os.environ.get(name) for name in changes}
     os.environ.update(changes)

@@ -45,11 +45,8 @@ def runs_of(sweep: Sweep) -> list[Run]:
         rows = _sampled(list(varied.values()), sweep.file.samples or 0, sweep.file.seed)
     else:
         rows = _combined(sweep, [_listed(variation) for variation in varied.values()])
-    names = _names(_short_names(list(varied)), rows)
-    return [
-        Run(name, dict(zip(varied, row, strict=True)))
-        for name, row in zip(names, rows, strict=True)
-    ]
+    named = zip(_names(_short_names(list(varied)), rows), rows, strict=True)
+    return [Run(name, dict(zip(varied, row, strict=True))) for name, row in named]
 
 
 def _combined(sweep: Sweep, columns: list[list[Any]]) -> list[tuple[Any, ...]]:
@@ -74,18 +71,15 @@ def _listed(variation: Variation) -> list[Any]:
     assert variation.range.count is not None
     first, last = variation.range.ends
     share = np.linspace(0.0, 1.0, variation.range.count)
-    return [
-        _written(first, number) for number in _between(first, last, share, variation.range.scale)
-    ]
+    numbers = _between(first, last, share, variation.range.scale)
+    return [_written(first, number) for number in numbers]
 
 
 def _between(first: Amount, last: Amount, share: Array, scale: str) -> Array:
     """Numbers at ``share`` (0 to 1) of the way between two ends."""
     if scale == "log":
-        ratio: Array = first.number * (last.number / first.number) ** share
-        return ratio
-    number: Array = first.number * (1.0 - share) + last.number * share
-    return number
+        return np.asarray(first.number * (last.number / first.number) ** share)
+    return np.asarray(first.number * (1.0 - share) + last.number * share)
 
 
 def _written(like: Amount, number: float) -> int | float | str:

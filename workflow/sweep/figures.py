@@ -5,18 +5,19 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.pictures.style import BLACK, BLUE, ORANGE, STYLE, new_figure, save
+from workflow.pictures.panels import legend_below, new_figure
+from workflow.pictures.scales import TO_MICRONS
+from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
 from workflow.sweep.table import Row, Varied, columns_of, interfaces_of, unit_of, varied_in
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 # So many runs can be distinguished as separate lines.
 LINES = 30
@@ -24,8 +25,12 @@ LINES = 30
 LOGARITHMIC = 30.0
 # With fewer runs a rank correlation says nothing.
 FEWEST_TO_CORRELATE = 6
-# What to show, with scale and unit: of a wear run, and of others what they have of these.
-WEAR = ("depth", 1e3, "µm"), ("volume", 1.0, "")
+# What to show, in words: of a wear run, with scale and unit ("" for that of the table), and of
+# others what they have of these.
+WEAR = (
+    ("depth", "largest depths, both bodies", TO_MICRONS, "µm"),
+    ("volume", "volume, both bodies", 1.0, ""),
+)
 OTHERS = (
     ("states.-1.peak_pressure", "peak pressure at the end", "MPa"),
     ("loop.energy", "energy of the last closed cycle", "N mm"),
@@ -38,48 +43,44 @@ LINE_CONTACT = "states.-1.contact_half_width"
 
 def write_sweep_figures(title: str, rows: Sequence[Row], folder: Path) -> list[Path]:
     """Draw the figures of a sweep as PNG files; returns their paths."""
-    import matplotlib
-
-    folder.mkdir(parents=True, exist_ok=True)
-    with matplotlib.rc_context(STYLE):
-        figures = {} if (bands := kinetics_bands(title, rows)) is None else {"kinetics": bands}
-        panels = _panels(rows)
+    figures = {}
+    if names := _wearing(rows):
+        figures["kinetics"] = partial(kinetics_bands, title, rows, names)
+    if panels := _panels(rows, names):
         for varied in varied_in(rows):
             name = "against_" + re.sub(r"[^\w-]", "_", varied.path)
-            if panels:
-                figures[name] = against(title, varied, panels)
-        for name, figure in figures.items():
-            save(figure, folder / f"{name}.png")
-    return [folder / f"{name}.png" for name in figures]
+            figures[name] = partial(against, title, varied, panels)
+    return write_figures(figures.items(), folder)
+
+
+def _wearing(rows: Sequence[Row]) -> list[str]:
+    """The interfaces that wear in any of the runs."""
+    summaries = [row.finished.summary or {} for row in rows]
+    return list(dict.fromkeys(name for summary in summaries for name in interfaces_of(summary)))
 
 
 # --- over the cycles ----------------------------------------------------------------------------
 
 
-def kinetics_bands(title: str, rows: Sequence[Row]) -> Figure | None:
-    """Depth and volume of all runs against cycles, by interface; None where nothing wears."""
+def kinetics_bands(title: str, rows: Sequence[Row], names: Sequence[str]) -> Figure:
+    """Depth and volume of all runs against cycles, by interface."""
     done = [row.finished.summary for row in rows if row.finished.summary]
-    names = list(dict.fromkeys(name for summary in done for name in interfaces_of(summary)))
-    if not names:
-        return None
     statistics = "median (least to largest) at their end"
     figure = new_figure(f"{title}: {len(done)} runs, {statistics}", 9.0)
     axes = figure.subplots(2, len(names), sharex=True, sharey="row", squeeze=False)
     for column, name in zip(axes.T, names, strict=True):
         summaries = [summary for summary in done if name in interfaces_of(summary)]
-        for axis, (quantity, scale, unit) in zip(column, WEAR, strict=True):
-            unit = unit or _unit(f"{name}.{quantity}", rows)
+        for axis, (quantity, words, scale, shown) in zip(column, WEAR, strict=True):
+            unit = shown or _unit(f"{name}.{quantity}", rows)
             last = _draw_bands(axis, summaries, name, quantity, scale)
             low, middle, high = (float(np.quantile(last, q)) for q in (0.0, 0.5, 1.0))
             values = f"{quantity} {middle:.3g} ({low:.3g} to {high:.3g})"
-            axis.set_title(f"{name}: {values} {unit}")
-            axis.set_ylabel(f"{_worded(quantity)} [{unit}]")
+            axis.set(title=f"{name}: {values} {unit}", ylabel=f"{words} [{unit}]")
             axis.label_outer()
         column[-1].set_xlabel("cycles")
         column[-1].xaxis.set_major_formatter("{x:,.0f}")
         column[-1].locator_params(axis="x", nbins=5)
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    legend_below(figure, [axes[0, 0]])
     return figure
 
 
@@ -91,15 +92,23 @@ def _draw_bands(
     cycles = np.unique(np.concatenate([counts for counts, _ in curves]))
     # A run says nothing beyond its end.
     values = np.array([np.interp(cycles, *curve, right=np.nan) for curve in curves])
-    low, quarter, middle, three, high = np.nanquantile(values, [0, 0.25, 0.5, 0.75, 1], axis=0)
-    axis.fill_between(cycles, low, high, color=BLUE, alpha=0.15, lw=0, label="all runs")
-    axis.fill_between(cycles, quarter, three, color=BLUE, alpha=0.35, lw=0, label="middle half")
+    median = _fill_bands(axis, cycles, values.T)
     if len(curves) <= LINES:
         for index, curve in enumerate(curves):
             label = None if index else "each run"
             axis.plot(*curve, color=BLACK, lw=0.6, alpha=0.5, label=label)
-    axis.plot(cycles, middle, color=ORANGE, lw=2.2, label="median")
+    axis.plot(cycles, median, color=ORANGE, lw=2.2, label="median")
     return np.array([curve[1][-1] for curve in curves])
+
+
+def _fill_bands(axis: Axes, places: Array, values: Sequence[Array] | Array) -> Array:
+    """All and the middle half of the values at each place, those that are numbers; the medians."""
+    quantiles = [np.nanquantile(at, [0.0, 0.25, 0.5, 0.75, 1.0]) for at in values]
+    low, quarter, median, three, high = np.transpose(quantiles)
+    look: dict[str, Any] = {"color": BLUE, "lw": 0}
+    axis.fill_between(places, low, high, alpha=0.15, label="all runs", **look)
+    axis.fill_between(places, quarter, three, alpha=0.35, label="middle half", **look)
+    return median
 
 
 def _curve(summary: dict[str, Any], name: str, quantity: str, scale: float) -> tuple[Array, Array]:
@@ -121,22 +130,20 @@ class Panel:
     values: Array
 
 
-def _panels(rows: Sequence[Row]) -> list[list[Panel]]:
-    """Panels by row and column of a figure."""
+def _panels(rows: Sequence[Row], names: Sequence[str]) -> list[list[Panel]]:
+    """Panels by row and column of a figure, of what wears at the interfaces ``names``, if any."""
     columns = columns_of(rows)
-    summaries = [row.finished.summary for row in rows if row.finished.summary]
-    names = list(dict.fromkeys(name for summary in summaries for name in interfaces_of(summary)))
     if names:
         return [
             [
                 Panel(
-                    f"{_worded(quantity)} [{unit or _unit(f'{name}.{quantity}', rows)}]",
+                    f"{words} [{unit or _unit(f'{name}.{quantity}', rows)}]",
                     f"{name}: {quantity} at the end",
                     scale * columns[f"{name}.{quantity}"],
                 )
                 for name in names
             ]
-            for quantity, scale, unit in WEAR
+            for quantity, words, scale, unit in WEAR
         ]
     shown = [quantity for quantity in OTHERS if quantity[0] in columns][:MOST_ROWS]
     per = "/mm" if LINE_CONTACT in columns else ""
@@ -151,11 +158,6 @@ def _unit(name: str, rows: Sequence[Row]) -> str:
     return unit_of(name, rows).replace("^3", "³")
 
 
-def _worded(quantity: str) -> str:
-    """A quantity of both bodies together."""
-    return {"depth": "largest depths, both bodies", "volume": "volume, both bodies"}[quantity]
-
-
 def against(title: str, varied: Varied, panels: list[list[Panel]]) -> Figure:
     """Results of the runs against one entry that varies."""
     figure = new_figure(f"{title}: against {varied.path}", 4.5 * len(panels))
@@ -164,16 +166,13 @@ def against(title: str, varied: Varied, panels: list[list[Panel]]) -> Figure:
     for axis, panel in zip(axes.flat, (panel for row in panels for panel in row), strict=True):
         _draw_against(axis, places, panel)
         correlation = "" if ticks else _correlation(places, panel.values)
-        axis.set_title(f"{panel.title}{correlation}")
-        axis.set_ylabel(panel.label)
-        axis.set_xlabel(varied.heading)
+        axis.set(title=f"{panel.title}{correlation}", xlabel=varied.heading, ylabel=panel.label)
         axis.label_outer()
         if ticks:
             axis.set_xticks(range(len(ticks)), ticks)
         elif places.min() > 0.0 and places.max() > LOGARITHMIC * places.min():
             axis.set_xscale("log")
-    handles, labels = axes[0, 0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=len(labels))
+    legend_below(figure, [axes[0, 0]])
     return figure
 
 
@@ -191,13 +190,8 @@ def _draw_against(axis: Axes, places: Array, panel: Panel) -> None:
     distinct = np.unique(places[done])
     groups = [panel.values[done & (places == place)] for place in distinct]
     if len(distinct) > 1 and any(len(group) > 1 for group in groups):
-        quantiles = np.array([np.quantile(group, [0, 0.25, 0.5, 0.75, 1]) for group in groups]).T
-        low, quarter, middle, three, high = quantiles
-        axis.fill_between(distinct, low, high, color=BLUE, alpha=0.15, lw=0, label="all runs")
-        axis.fill_between(
-            distinct, quarter, three, color=BLUE, alpha=0.35, lw=0, label="middle half"
-        )
-        axis.plot(distinct, middle, color=ORANGE, lw=2.2, label="median")
+        median = _fill_bands(axis, distinct, groups)
+        axis.plot(distinct, median, color=ORANGE, lw=2.2, label="median")
     axis.plot(places[done], panel.values[done], "o", color=BLACK, ms=5, alpha=0.6, label="a run")
     if not done.all():
         bottom = axis.get_xaxis_transform()

@@ -8,9 +8,8 @@ from __future__ import annotations
 import os
 import re
 import time
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
 
 from workflow.errors import CaseError, UserError
 from workflow.runs.job import Finished, Job
@@ -94,15 +93,11 @@ def _explained(sweep: Sweep, job: Job, text: str) -> Iterator[str]:
         unknown = re.search(r":\d+: (\S+): unknown key", line)
         if start:
             yield f"{sweep.place(paths[start])}: {line.removeprefix(start)}"
-        elif unknown and (path := _below(unknown[1], paths.values())):
-            yield f"{sweep.place(path)}: {line[unknown.start(1) :]}"
+        elif unknown and (below := [p for p in paths.values() if p.startswith(f"{unknown[1]}.")]):
+            # The case has no such section: what the sweep sets below it is what made it.
+            yield f"{sweep.place(below[0])}: {line[unknown.start(1) :]}"
         else:
             yield line
-
-
-def _below(section: str, paths: Iterable[str]) -> str:
-    """What is given below a section that the case has not but for that; "" if nothing is."""
-    return next((path for path in paths if path.startswith(f"{section}.")), "")
 
 
 def _run(
@@ -160,8 +155,8 @@ def _title(sweep: Sweep, rows: Sequence[Row]) -> str:
     """Of the sweep, or else of its first run's case."""
     if sweep.file.title is not None:
         return sweep.file.title
-    titles: list[Any] = [row.finished.summary["title"] for row in rows if row.finished.summary]
-    return str(titles[0]) if titles else sweep.name
+    summaries = (row.finished.summary for row in rows if row.finished.summary)
+    return next((str(summary["title"]) for summary in summaries), sweep.name)
 
 
 def _write_figures(sweep: Sweep, rows: list[Row], out: Path) -> None:

@@ -270,11 +270,8 @@ def _kind_of(source: Source) -> type[SweepFile]:
     names = list(entries) if isinstance(entries, dict) else []
     fields: Any = {name: (Variation, entry("values, range or distribution")) for name in names}
     vary: Any = create_model("Vary", __base__=Section, **fields)
-    return create_model(
-        "SweepFile",
-        __base__=SweepFile,
-        vary=(vary, SweepFile.model_fields["vary"]),
-    )
+    field = SweepFile.model_fields["vary"]
+    return create_model("SweepFile", __base__=SweepFile, vary=(vary, field))
 
 
 def _disagreements(sweep: Sweep) -> Iterator[str]:

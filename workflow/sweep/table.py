@@ -125,10 +125,9 @@ def _varied(path: str, values: list[Any]) -> Varied:
     if len(amounts) < len(values):
         return Varied(path, "", [_text(value) for value in values], None)
     unit = amounts[0].unit
-    numbers = np.array([amount.over(unit) for amount in amounts])
-    if all(amount.unit == unit for amount in amounts):
-        return Varied(path, unit, [_text(amount.number) for amount in amounts], numbers)
-    return Varied(path, unit, [_text(value) for value in values], numbers)
+    shared = all(amount.unit == unit for amount in amounts)
+    texts = [_text(number) for number in ([a.number for a in amounts] if shared else values)]
+    return Varied(path, unit, texts, np.array([amount.over(unit) for amount in amounts]))
 
 
 def _text(value: object) -> str:

@@ -5,11 +5,24 @@ Extensive quantities are in the units of a contact over an area.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 from sa_solver.types import Array, LoadHistory
 from workflow.shell.dataset import Dataset, described
 
 # Name of the only interface of a contact case.
 BODIES = "bodies"
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What ``results.h5`` of a contact case holds: a ``line`` contact or one over an area.
+
+    ``increments`` are computed, not only prescribed.
+    """
+
+    line: bool
+    increments: int
 
 
 # Unit and description of the quantities of increments, ``(n,)`` each.

@@ -2,25 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
-from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from sa_solver.types import Array, Grid
-from workflow.analyses.contact.datasets import BODIES
+from workflow.analyses.contact.datasets import BODIES, Contents
 from workflow.analyses.contact.load_table import FORCES, MOTIONS
-from workflow.pictures.fields import MAX_PROFILES, centres, draw_map, middle, spread
-from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, new_figure
+from workflow.pictures.fields import MAX_PROFILES, centres, draw_map, middle
+from workflow.pictures.panels import Figures, new_figure, shaded, spread
+from workflow.pictures.scales import TO_MICRONS
+from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE
 from workflow.shell.results import grid_of
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
-
-PROFILE_COLOURS = "viridis"
 # One per profile: those of a closed cycle lie on each other.
 DASHES = ("-", "--", "-.", ":", (0, (8, 2)), (0, (1, 3)))
 STICK, SLIP = "#9DC3DE", "#F2B48C"
@@ -32,14 +31,13 @@ ARROWS = 17
 FEWEST_POINTS = 3
 
 
-def figures_of(file: h5py.File) -> dict[str, Callable[[h5py.File], Figure]]:
-    """The figures there are data for, by name."""
-    figures: dict[str, Callable[[h5py.File], Figure]] = {"profiles": profiles}
-    if not _grid(file).line:
-        figures["maps"] = maps
-    if len(file["history/increment"]) >= FEWEST_POINTS:
-        figures["forces"] = forces
-    return figures
+def figures_of(contents: Contents) -> Figures:
+    """The figures of a run, by name."""
+    return {
+        "profiles": profiles,
+        **({} if contents.line else {"maps": maps}),
+        **({"forces": forces} if contents.increments >= FEWEST_POINTS else {}),
+    }
 
 
 # --- profiles -----------------------------------------------------------------------------------
@@ -47,28 +45,22 @@ def figures_of(file: h5py.File) -> dict[str, Callable[[h5py.File], Figure]]:
 
 def profiles(file: h5py.File) -> Figure:
     """Pressure and shear along x through the centre, at the states where the path turns."""
-    import matplotlib
-
     names = _shown(file)
     along = _main_shear(file, names)
     figure = new_figure(_profile_title(file, names), 8.5)
     top, bottom = figure.subplots(2, 1, sharex=True)
-    colours = matplotlib.colormaps[PROFILE_COLOURS](np.linspace(0.0, 0.9, len(names)))
     x = centres(_grid(file), 0)
-    for name, colour, dashes in zip(names, colours, DASHES, strict=False):
+    for (name, colour), dashes in zip(shaded(names, MAX_PROFILES), DASHES, strict=False):
         state = file["contact"][BODIES][name]
         look = {"color": colour, "linestyle": dashes, "label": _loads(file, name)}
         top.plot(x, middle(state["pressure"][()], 0), **look)
         bottom.plot(x, middle(state["shear"][along], 0), **look)
     limit = float(file.attrs["friction"]) * middle(state["pressure"][()], 0)
     bottom.fill_between(x, -limit, limit, color="#BBBBBB", alpha=0.4, lw=0, label="±µp, last")
-    bottom.set_xlim(-_reach(file, names), _reach(file, names))
-    top.set_ylabel("pressure [MPa]")
-    top.set_ylim(bottom=0.0)
-    bottom.set_ylabel(f"shear q{'xy'[along]} [MPa]")
-    bottom.set_xlabel("x [mm]")
-    top.set_title("pressure at y = 0")
-    bottom.set_title(f"shear along {'xy'[along]} at y = 0")
+    component, reach = "xy"[along], _reach(file, names)
+    top.set(ylabel="pressure [MPa]", ylim=(0.0, None), title="pressure at y = 0")
+    bottom.set(xlabel="x [mm]", xlim=(-reach, reach), ylabel=f"shear q{component} [MPa]")
+    bottom.set_title(f"shear along {component} at y = 0")
     bottom.legend(loc="center left", bbox_to_anchor=(1.0, 1.0))
     return figure
 
@@ -104,12 +96,11 @@ def _loads(file: h5py.File, name: str) -> str:
     increment = int(file["contact"][BODIES][name].attrs["increment"])
     history = file["history"]
     row = int(np.flatnonzero(history["increment"][()] == increment)[0])
-    values = {key: float(history[key][row]) for key in FORCES}
-    largest = {key: np.abs(history[key][()]).max() for key in FORCES}
+    largest = max(np.abs(history[key][()]).max() for key in FORCES)
     texts = [
-        f"{key} {value:.3g} {history[key].attrs['unit']}"
-        for key, value in values.items()
-        if abs(value) > 1e-6 * max(largest.values()) or key == "P"
+        f"{key} {history[key][row]:.3g} {history[key].attrs['unit']}"
+        for key in FORCES
+        if abs(history[key][row]) > 1e-6 * largest or key == "P"
     ]
     return f"{increment}: " + ", ".join(texts)
 
@@ -130,11 +121,8 @@ def _reach(file: h5py.File, names: list[str]) -> float:
 
 def maps(file: h5py.File) -> Figure:
     """Pressure, and where the contact sticks and slips with its shear, at the last state."""
-    from matplotlib.colors import ListedColormap
-    from matplotlib.patches import Patch
-
     name = list(file["contact"][BODIES])[-1]
-    state, grid = file["contact"][BODIES][name], _grid(file)
+    state, grid, reach = file["contact"][BODIES][name], _grid(file), _reach(file, [name])
     pressure, shear = state["pressure"][()], state["shear"][()]
     # 0 open, 1 stick, 2 slip.
     regions = np.where(pressure > 0.0, np.where(state["sticking"][()], 1.0, 2.0), 0.0)
@@ -143,7 +131,7 @@ def maps(file: h5py.File) -> Figure:
     turned = Grid(grid.shape[::-1], grid.pitch[::-1])  # x to the right
     image = draw_map(left, pressure.T, turned, max(float(pressure.max()), 1e-300))
     draw_map(right, regions.T, turned, 2.0).set_cmap(ListedColormap(["white", STICK, SLIP]))
-    _draw_arrows(right, shear, grid, _reach(file, [name]))
+    _draw_arrows(right, shear, grid, reach)
     figure.colorbar(image, ax=left, label="pressure [MPa]", shrink=0.8)
     pressed = max(int(np.count_nonzero(regions)), 1)
     stuck = np.count_nonzero(regions == 1.0) / pressed
@@ -154,9 +142,7 @@ def maps(file: h5py.File) -> Figure:
         loc="upper right",
     )
     for axis in (left, right):
-        axis.set_xlabel("x [mm]")
-        axis.set_xlim(-_reach(file, [name]), _reach(file, [name]))
-        axis.set_ylim(-_reach(file, [name]), _reach(file, [name]))
+        axis.set(xlabel="x [mm]", xlim=(-reach, reach), ylim=(-reach, reach))
     left.set_ylabel("y [mm]")
     return figure
 
@@ -197,16 +183,17 @@ def forces(file: h5py.File) -> Figure:
     line = "o-" if history.attrs["method"] == "full" else "o"
     figure = new_figure(_forces_title(history, energy[-1]), 6.0)
     left, right = figure.subplots(1, 2)
-    left.plot(1e3 * motions, values, line, color=BLUE, markersize=4)
-    left.plot(1e3 * motions[-1:], values[-1:], "D", color=ORANGE, label="last")
-    left.set_xlabel(f"{motion.replace('_', ' ')} [{_motion_unit(motion)}]")
+    # A thousandth of mm or rad.
+    moved, words = TO_MICRONS * motions, motion.replace("_", " ")
+    left.plot(moved, values, line, color=BLUE, markersize=4)
+    left.plot(moved[-1:], values[-1:], "D", color=ORANGE, label="last")
+    left.set_xlabel(f"{words} [{'mrad' if history[motion].attrs['unit'] == 'rad' else 'µm'}]")
     left.set_ylabel(f"{force} [{history[force].attrs['unit']}]")
-    left.set_title(f"{force} against {motion.replace('_', ' ')} of body 1")
+    left.set_title(f"{force} against {words} of body 1")
     left.legend(loc="best")
     right.plot(history["increment"][()], energy, line, color=GREEN, markersize=4)
-    right.set_xlabel("increment")
+    right.set(xlabel="increment", title="energy dissipated by slip")
     right.set_ylabel(f"energy dissipated so far [{history['Edx'].attrs['unit']}]")
-    right.set_title("energy dissipated by slip")
     return figure
 
 
@@ -228,10 +215,6 @@ def _driven(history: h5py.Group) -> tuple[str, str]:
     return max(
         [pair for pair in shearing if work[pair] > 1e-6 * largest] or pairs, key=work.__getitem__
     )
-
-
-def _motion_unit(motion: str) -> str:
-    return "mrad" if motion in ("tilt_x", "tilt_y", "twist") else "µm"
 
 
 def _grid(file: h5py.File) -> Grid:

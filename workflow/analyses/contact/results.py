@@ -12,7 +12,13 @@ from sa_solver.contact import ContactState
 from sa_solver.history import History
 from sa_solver.types import Array, Frame, Grid
 from workflow.analyses.contact.case import BodiesCase
-from workflow.analyses.contact.datasets import BODIES, LOADS, RIGID_MOTIONS, traction_fields
+from workflow.analyses.contact.datasets import (
+    BODIES,
+    LOADS,
+    RIGID_MOTIONS,
+    Contents,
+    traction_fields,
+)
 from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.contact.summary import loop_summary, slides, state_summaries, stick_zone
 from workflow.shell.analysis import Run
@@ -48,7 +54,7 @@ def write_contact_output(outcome: ContactOutcome, run: ContactRun) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
     with run.reporter.stage("results"):
         write_contact_results(outcome, run)
-    run.draw()
+    run.draw(Contents(outcome.grid.line, len(outcome.history.states)))
     summary = _summary(outcome)
     finish(run, summary, _lines(summary, outcome.grid))
 

@@ -79,7 +79,7 @@ def write_specimens_output(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -
             with replacing(reduced / f"body_{number}.h5") as partial:
                 save_reduced(partial, model)
         _write_results(outcome, run)
-    run.draw()
+    run.draw(None)  # every run leaves the same
     summary = _summary(outcome, reporter)
     finish(run, summary, _lines(summary))
 

@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from functools import partial
+from typing import Any
 
 import h5py
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.analyses.time.outcome import LOOP, MOTION, RESPONSE, RING_DOWN
-from workflow.pictures.fields import spread
-from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from workflow.analyses.time.outcome import LOOP, MOTION, RESPONSE, RING_DOWN, Contents
+from workflow.pictures.panels import Figures, legend_beside, new_figure, shaded
+from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
+from workflow.pictures.style import BLACK, BLUE, GREEN, HEADROOM, ORANGE, PURPLE
 
 # More curves than this in a panel overlap.
 MOST_CURVES = 6
-ENERGY_COLOURS = "viridis"
-# Of panels that begin at 0, over the largest value.
-HEADROOM = 1.1
-# mm to µm, N/mm to N/µm, N mm to J, and mm/s² to m/s².
-TO_MICRONS, PER_MICRON, TO_JOULES, TO_METRES = 1e3, 1e-3, 1e-3, 1e-3
+# mm/s² to m/s².
+TO_METRES = 1e-3
 # Colour, file's unit to shown one, and label of the parameters.
 SHOWN = {
     "friction": (BLUE, 1.0, "coefficient of friction µ [1]"),
@@ -46,68 +42,57 @@ FADED = 0.02
 MOST_POINTS = 20_000
 
 
-def figures_of(file: h5py.File) -> dict[str, Callable[[h5py.File], Figure]]:
-    """The figures there are data for, by name."""
-    groups = set().union(*(state for state in file["states"].values()))
-    drawn: dict[str, tuple[str, Callable[[h5py.File], Figure]]] = {
-        "loops": (LOOP, loops),
-        "frequency_response": (RESPONSE, frequency_response),
-        "ring_down": (RING_DOWN, ring_down),
-        "motion": (MOTION, motion),
+def figures_of(contents: Contents) -> Figures:
+    """The figures of a run, by name."""
+    groups = contents.curves
+    drawn = {
+        "loops": (loops, LOOP in groups),
+        "frequency_response": (frequency_response, RESPONSE in groups),
+        "ring_down": (ring_down, RING_DOWN in groups),
+        # A ring-down shows it too.
+        "motion": (motion, MOTION in groups and RING_DOWN not in groups),
+        "evolution": (evolution, bool(contents.evolution)),
     }
-    if RING_DOWN in groups:
-        del drawn["motion"]  # it is shown there
-    figures = {name: draw for name, (group, draw) in drawn.items() if group in groups}
-    if len(file["evolution/energy"]) > 1:
-        figures["evolution"] = evolution
-    return figures
+    return {
+        name: partial(draw, contents=contents) for name, (draw, there) in drawn.items() if there
+    }
 
 
-def _states(file: h5py.File, group: str) -> list[tuple[str, Any, h5py.Group]]:
+def _states(file: h5py.File, contents: Contents, group: str) -> list[tuple[str, Any, h5py.Group]]:
     """Label, colour and curves of the states that have such a group; of many, some."""
-    from matplotlib import colormaps
-
-    names = [name for name in sorted(file["states"]) if group in file["states"][name]]
-    chosen = spread(names, MOST_CURVES)
-    shades = np.linspace(0.0, 0.85, len(chosen))
+    states = file["states"]
     return [
-        (
-            _label(file["states"][name]),
-            colormaps[ENERGY_COLOURS](shade),
-            file["states"][name][group],
-        )
-        for name, shade in zip(chosen, shades, strict=True)
+        (_label(states[name], contents.aged), colour, states[name][group])
+        for name, colour in shaded(contents.curves[group], MOST_CURVES)
     ]
 
 
-def _label(state: h5py.Group) -> str:
+def _label(state: h5py.Group, aged: bool) -> str:
     energy = TO_JOULES * float(state.attrs["energy"])
     text = f"{energy:,.4g} J" if energy else "unworn"
-    if cycles := float(state.attrs.get("cycles", 0.0)):
-        text += f", {cycles:,.0f} cycles"
+    if aged and state.attrs["cycles"]:
+        text += f", {state.attrs['cycles']:,.0f} cycles"
     return text
 
 
 # --- loops and evolution ------------------------------------------------------------------------
 
 
-def loops(file: h5py.File) -> Figure:
+def loops(file: h5py.File, contents: Contents) -> Figure:
     """Force against displacement of the joint over a closed cycle, at several energies."""
-    shown = _states(file, LOOP)
-    figure = new_figure(_loops_title(file), 7.0)
+    shown = _states(file, contents, LOOP)
+    figure = new_figure(_loops_title([_area(loop) for _, _, loop in shown]), 7.0)
     axis = figure.subplots()
     for label, colour, loop in shown:
-        displacement, force = TO_MICRONS * _column(loop, "displacement"), _column(loop, "force")
+        displacement, force = TO_MICRONS * loop["displacement"][()], loop["force"][()]
         axis.plot(displacement, force, color=colour, label=label)
-    axis.set_xlabel("displacement of the joint [µm]")
-    axis.set_ylabel("force of the joint [N]")
+    axis.set(xlabel="displacement of the joint [µm]", ylabel="force of the joint [N]")
     axis.set_title(f"{LAW_NAMES[file.attrs['law']]}: settled cycles after so much energy")
-    axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="dissipated so far")
+    legend_beside(axis, "dissipated so far")
     return figure
 
 
-def _loops_title(file: h5py.File) -> str:
-    energies = [_area(loop) for _, _, loop in _states(file, LOOP)]
+def _loops_title(energies: list[float]) -> str:
     if len(energies) == 1:
         return f"A cycle dissipates {energies[0]:.3g} mJ"
     return f"Energy of a cycle: {energies[0]:.3g} mJ at first, {energies[-1]:.3g} mJ in the end"
@@ -115,23 +100,22 @@ def _loops_title(file: h5py.File) -> str:
 
 def _area(loop: h5py.Group) -> float:
     """Area of a closed loop [N mm]."""
-    displacement, force = _column(loop, "displacement"), _column(loop, "force")
-    return float(abs(np.trapezoid(force, displacement)))
+    return float(abs(np.trapezoid(loop["force"][()], loop["displacement"][()])))
 
 
-def evolution(file: h5py.File) -> Figure:
+def evolution(file: h5py.File, contents: Contents) -> Figure:
     """The parameters that change, over the dissipated energy; below them the cycles it takes."""
     group = file["evolution"]
-    changing = [name for name in SHOWN if name in group and np.ptp(group[name][()]) > 0.0]
-    panels = changing or ["friction", "stiffness"]
-    aged = "cycles" in group
-    rows = (len(panels) + 2 * aged + 1) // 2
-    figure = new_figure(_evolution_title(group, panels), 1.0 + 3.4 * rows)
+    present = [name for name in SHOWN if name in contents.evolution]
+    panels = [name for name in present if np.ptp(group[name][()]) > 0.0]
+    panels = panels or ["friction", "stiffness"]
+    rows = (len(panels) + 2 * contents.aged + 1) // 2
+    figure = new_figure(_evolution_title(group, panels, contents.aged), 1.0 + 3.4 * rows)
     axes = list(figure.subplots(rows, 2, squeeze=False).ravel())
     for name in panels:
         _draw_parameter(axes.pop(0), file, name)
-    if aged:
-        _draw_ageing(axes.pop(0), axes.pop(0), file)
+    if contents.aged:
+        _draw_ageing(axes.pop(0), axes.pop(0), group)
     for axis in axes:
         axis.set_axis_off()
     return figure
@@ -140,69 +124,61 @@ def evolution(file: h5py.File) -> Figure:
 def _draw_parameter(axis: Axes, file: h5py.File, name: str) -> None:
     colour, factor, label = SHOWN[name]
     group = file["evolution"]
-    axis.plot(TO_JOULES * _column(group, "energy"), factor * _column(group, name), color=colour)
+    axis.plot(TO_JOULES * group["energy"][()], factor * group[name][()], color=colour)
     states = list(file["states"].values())
     energies = [TO_JOULES * float(state.attrs["energy"]) for state in states]
     values = [factor * float(state.attrs[name]) for state in states]
     axis.plot(energies, values, "o", color=BLACK, mfc="none", label="looked at")
+    axis.set(xlabel="energy dissipated so far [J]", ylabel=label)
     axis.set_ylim(0.0, HEADROOM * max(axis.dataLim.y1, 1e-300))
-    axis.set_xlabel("energy dissipated so far [J]")
-    axis.set_ylabel(label)
     axis.legend(loc="lower right")
 
 
-def _draw_ageing(left: Axes, right: Axes, file: h5py.File) -> None:
+def _draw_ageing(left: Axes, right: Axes, group: h5py.Group) -> None:
     """Energy of a cycle, and the cycles it has taken, over the energy."""
-    group = file["evolution"]
-    energy = TO_JOULES * _column(group, "energy")
-    left.plot(energy, _column(group, "energy_per_cycle"), color=BLUE)
-    left.set_ylabel("energy of a cycle [mJ]")
-    left.set_ylim(0.0, HEADROOM * left.dataLim.y1)
-    right.plot(energy, _column(group, "cycles"), color=ORANGE)
-    right.set_ylabel("cycles")
-    right.set_ylim(bottom=0.0)
+    energy = TO_JOULES * group["energy"][()]
+    left.plot(energy, group["energy_per_cycle"][()], color=BLUE)
+    left.set(ylabel="energy of a cycle [mJ]", ylim=(0.0, HEADROOM * left.dataLim.y1))
+    right.plot(energy, group["cycles"][()], color=ORANGE)
+    right.set(ylabel="cycles", ylim=(0.0, None))
     right.yaxis.set_major_formatter("{x:,.0f}")
     for axis in (left, right):
         axis.set_xlabel("energy dissipated so far [J]")
 
 
-def _evolution_title(group: h5py.Group, panels: list[str]) -> str:
+def _evolution_title(group: h5py.Group, panels: list[str], aged: bool) -> str:
     texts = []
     for name in panels[:2]:
         _, factor, label = SHOWN[name]
-        first, last = factor * _column(group, name)[[0, -1]]
+        first, last = factor * group[name][()][[0, -1]]
         word, _, unit = label.rstrip("]").partition(" [")
         texts.append(f"{word} {first:.3g} → {last:.3g} {unit}".removesuffix(" 1"))
     text = ", ".join(texts)
-    if "cycles" in group:
-        text += f" in {_column(group, 'cycles')[-1]:,.0f} cycles"
+    if aged:
+        text += f" in {group['cycles'][-1]:,.0f} cycles"
     return text[0].upper() + text[1:]
 
 
 # --- hammer blows -------------------------------------------------------------------------------
 
 
-def frequency_response(file: h5py.File) -> Figure:
+def frequency_response(file: h5py.File, contents: Contents) -> Figure:
     """Acceleration over force: all of it, and the first mode larger."""
-    shown = _states(file, RESPONSE)
+    shown = _states(file, contents, RESPONSE)
     figure = new_figure(_response_title(shown), 8.5)
     top, bottom = figure.subplots(2, 1)
     first = max(_first(response, "frequency") for _, _, response in shown)
     for label, colour, response in shown:
-        frequency, magnitude = (
-            _column(response, "frequency"),
-            TO_METRES * _column(response, "magnitude"),
-        )
+        frequency, magnitude = response["frequency"][()], TO_METRES * response["magnitude"][()]
         for axis in (top, bottom):
             axis.semilogy(frequency, magnitude, color=colour, label=label)
     top.set_xlim(0.0, FIRST_MODE * first)
     lowest = min(_first(response, "frequency") for _, _, response in shown) / FIRST_MODE
     inside = [_within(response, lowest, FIRST_MODE * first) for _, _, response in shown]
     top.set_ylim(0.5 * min(map(np.min, inside)), 2.0 * max(map(np.max, inside)))
-    bottom.set_xlim(0.0, max(float(_column(response, "frequency")[-1]) for _, _, response in shown))
+    highest = max(float(response["frequency"][-1]) for _, _, response in shown)
     top.set_title("first mode")
-    bottom.set_title("all that was recorded")
-    bottom.set_xlabel("frequency [Hz]")
+    bottom.set(title="all that was recorded", xlabel="frequency [Hz]", xlim=(0.0, highest))
     for axis in (top, bottom):
         axis.set_ylabel("acceleration / force [m/s²/N]")
     top.legend(loc="lower right", title="dissipated so far")
@@ -211,8 +187,8 @@ def frequency_response(file: h5py.File) -> Figure:
 
 def _within(response: h5py.Group, lowest: float, highest: float) -> Array:
     """Magnitudes between two frequencies."""
-    frequency = _column(response, "frequency")
-    return TO_METRES * _column(response, "magnitude")[(frequency > lowest) & (frequency < highest)]
+    frequency = response["frequency"][()]
+    return TO_METRES * response["magnitude"][()][(frequency > lowest) & (frequency < highest)]
 
 
 def _first(response: h5py.Group, name: str) -> float:
@@ -231,9 +207,9 @@ def _response_title(shown: list[tuple[str, Any, h5py.Group]]) -> str:
     )
 
 
-def ring_down(file: h5py.File) -> Figure:
+def ring_down(file: h5py.File, contents: Contents) -> Figure:
     """Frequency and damping of the first mode against its amplitude, and the motion itself."""
-    shown = _states(file, RING_DOWN)
+    shown = _states(file, contents, RING_DOWN)
     figure = new_figure("First mode of the ring-down against its amplitude", 8.5)
     top, bottom = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.3))[:, 0]
     history = top.subplots()
@@ -242,12 +218,11 @@ def ring_down(file: h5py.File) -> Figure:
         moved = envelope.parent[MOTION]
         stuck = float(envelope.parent.attrs["stuck"][0])
         _draw_history(history, moved, colour, f"{label}: stuck {stuck:.4g} Hz")
-        amplitude = TO_MICRONS * _column(envelope, "amplitude")
-        softened = 100.0 * (_column(envelope, "frequency") / stuck - 1.0)
+        amplitude = TO_MICRONS * envelope["amplitude"][()]
+        softened = 100.0 * (envelope["frequency"][()] / stuck - 1.0)
         left.semilogx(amplitude, softened, color=colour)
-        right.loglog(amplitude, 100.0 * np.abs(_column(envelope, "damping_ratio")), color=colour)
-    history.set_xlabel("time [s]")
-    history.set_ylabel(f"displacement of {_seen(file)} [µm]")
+        right.loglog(amplitude, 100.0 * np.abs(envelope["damping_ratio"][()]), color=colour)
+    history.set(xlabel="time [s]", ylabel=f"displacement of {_seen(file)} [µm]")
     history.legend(loc="upper right", title="dissipated so far")
     left.set_ylabel("frequency over that of the stuck joint [%]")
     right.set_ylabel("damping ratio [%]")
@@ -274,15 +249,15 @@ def _faded(moved: h5py.Group) -> int:
 # --- forces -------------------------------------------------------------------------------------
 
 
-def motion(file: h5py.File) -> Figure:
+def motion(file: h5py.File, contents: Contents) -> Figure:
     """Force, displacement and what the joint has dissipated, over time."""
-    shown = _states(file, MOTION)
+    shown = _states(file, contents, MOTION)
     figure = new_figure("Motion of the rig under its excitation", 9.0)
     top, middle, bottom = figure.subplots(3, 1, sharex=True)
     longest = max(_faded(history) for _, _, history in shown)
     for label, colour, history in shown:
         every = max(1, longest // MOST_POINTS)
-        time = _column(history, "time")[:longest:every]
+        time = history["time"][()][:longest:every]
         look = {"color": colour, "label": label, "linewidth": 1.0}
         if label == shown[0][0]:
             top.plot(time, history["excitation"][:longest:every], color=BLACK, linewidth=1.0)
@@ -290,8 +265,7 @@ def motion(file: h5py.File) -> Figure:
         bottom.plot(time, history["dissipated"][:longest:every], **look)
     top.set_ylabel("excitation [N]")
     middle.set_ylabel(f"displacement of {_seen(file)} [µm]")
-    bottom.set_ylabel("dissipated by the joint [mJ]")
-    bottom.set_xlabel("time [s]")
+    bottom.set(xlabel="time [s]", ylabel="dissipated by the joint [mJ]")
     middle.legend(loc="upper right", title="dissipated before")
     return figure
 
@@ -299,8 +273,3 @@ def motion(file: h5py.File) -> Figure:
 def _seen(file: h5py.File) -> str:
     """What is looked at: the last of what is kept of a motion."""
     return str(file.attrs["seen"][-1])
-
-
-def _column(group: h5py.Group, name: str) -> Array:
-    values: Array = group[name][()]
-    return values

@@ -46,6 +46,30 @@ class TimeOutcome:
     numbers: Mapping[str, Any] = field(default_factory=dict)
     seen: tuple[str, ...] = ()
 
+    @property
+    def contents(self) -> Contents:
+        """What ``results.h5`` holds of it."""
+        curves: dict[str, tuple[str, ...]] = {}
+        for number, state in enumerate(self.states):
+            for group in state.curves:
+                curves[group] = (*curves.get(group, ()), f"{number:05d}")
+        changes = len(self.evolution["energy"].values) > 1
+        evolution = tuple(self.evolution) if changes else ()
+        return Contents(curves, evolution, aged=self.states[0].cycles is not None)
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What ``results.h5`` of a case in time holds.
+
+    ``curves`` are the states that have each group of them, ``evolution`` the columns over the
+    energy, none where nothing changes. States of an ``aged`` joint know their cycles.
+    """
+
+    curves: Mapping[str, tuple[str, ...]]
+    evolution: tuple[str, ...]
+    aged: bool
+
 
 def loop_curves(displacement: Array, force: Array) -> dict[str, Dataset]:
     """A loop of the joint, or of several together."""

@@ -25,7 +25,7 @@ def write_time_output(outcome: TimeOutcome, run: TimeRun) -> None:
     with reporter.stage("results"):
         _write_results(outcome, run)
         _write_tables(outcome, folder)
-    run.draw()
+    run.draw(outcome.contents)
     summary = _summary(outcome, reporter)
     finish(run, summary, _lines(summary))
 

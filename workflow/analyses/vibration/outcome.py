@@ -66,6 +66,32 @@ class VibrationOutcome:
     backbone: Curves | None = None
     force_sweeps: tuple[Curves, ...] = ()
 
+    @property
+    def contents(self) -> Contents:
+        """What ``results.h5`` holds of it."""
+        names = [f"{number:05d}" for number in range(len(self.responses))]
+        loops = (n for n, response in zip(names, self.responses, strict=True) if response.loops)
+        return Contents(
+            responses=tuple(names),
+            loops=tuple(loops),
+            places=self.contact is not None,
+            backbone=self.backbone is not None,
+        )
+
+
+@dataclass(frozen=True)
+class Contents:
+    """What ``results.h5`` of a vibration case holds.
+
+    ``responses`` by force, and those of them with ``loops``. Joints with ``places`` have states
+    along every response, and the cycle at resonance. There may be a ``backbone``.
+    """
+
+    responses: tuple[str, ...]
+    loops: tuple[str, ...]
+    places: bool
+    backbone: bool
+
 
 def trend(values: Sequence[float]) -> float:
     """1 where values rise and never fall, -1 where they fall and never rise, else 0."""

@@ -10,6 +10,7 @@ best seen on points or glyphs.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -17,8 +18,9 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array
+from workflow.analyses.vibration.outcome import Contents
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
-from workflow.pictures.vtk import Fields, Step, attach, write_series, write_xml
+from workflow.pictures.vtk import Fields, Step, attach, write_series
 
 if TYPE_CHECKING:
     import pyvista
@@ -30,41 +32,26 @@ MOST_STEPS = 48
 TO_FRAME = np.array([1.0, 1.0, -1.0])
 
 
-def write_vibration(file: h5py.File, folder: Path) -> list[Path]:
-    """Write the cycle of every force that has one; returns the paths.
-
-    Nothing where joints have no places.
-    """
+def write_vibration(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
+    """Write the cycle of every force; returns the paths. Nothing where joints have no places."""
     written: list[Path] = []
-    if "contact" not in file:
-        return written
-    for number in sorted(file["responses"]):
-        response = file["responses"][number]
-        if "resonance" in response:
-            written += _write_cycle(file["contact"], response, number, folder)
+    for number in contents.responses if contents.places else ():
+        cycle = _cycle(file["contact"], file["responses"][number], folder / f"cycle_{number}")
+        written += write_series(folder / f"cycle_{number}.pvd", cycle)
     return written
 
 
-def _write_cycle(
-    contact: h5py.Group, response: h5py.Group, number: str, folder: Path
-) -> list[Path]:
+def _cycle(contact: h5py.Group, response: h5py.Group, folder: Path) -> Iterator[Step]:
     cycle, frequency = response["resonance"], float(response.attrs["resonance"])
     count = len(cycle["state"])
     mean = TO_FRAME * cycle["displacement"][()].mean(axis=0)
-    steps: list[Step] = []
-    for step in _steps(count):
-        path = folder / f"cycle_{number}" / f"{len(steps):03d}.vtu"
+    # Every so many samples, as evenly as they can be.
+    shown = min(count, MOST_STEPS)
+    samples = (np.arange(shown) * count / shown).round().astype(int).tolist()
+    for number, step in enumerate(samples):
         mesh = _pad(contact)
         attach(mesh.point_data, _fields(contact, cycle, step, mean))
-        write_xml(mesh, path)
-        steps.append((step / count / frequency, "pad", path))
-    return write_series(folder / f"cycle_{number}.pvd", steps)
-
-
-def _steps(count: int) -> list[int]:
-    """Every so many samples of a cycle, as evenly as they can be."""
-    shown = min(count, MOST_STEPS)
-    return [round(step * count / shown) for step in range(shown)]
+        yield step / count / frequency, "pad", folder / f"{number:03d}.vtu", mesh
 
 
 def _fields(contact: h5py.Group, cycle: h5py.Group, step: int, mean: Array) -> Fields:

@@ -31,7 +31,7 @@ def write_vibration_output(outcome: VibrationOutcome, run: Run[VibrationCase]) -
     with reporter.stage("results"):
         _write_results(outcome, run)
         _write_tables(outcome, folder)
-    run.draw()
+    run.draw(outcome.contents)
     finish(run, _summary(outcome), _lines(outcome))
 
 

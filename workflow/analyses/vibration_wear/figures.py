@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from collections.abc import Sequence
+from functools import partial
+from typing import Any
 
 import h5py
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from sa_solver.types import Array, Indices
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
@@ -19,20 +22,15 @@ from workflow.analyses.vibration_wear.outcome import (
     PLACES,
     RESPONSES,
     WORN,
+    Contents,
 )
-from workflow.pictures.fields import spread
-from workflow.pictures.style import BLUE, GREEN, ORANGE, PURPLE, new_figure
+from workflow.pictures.panels import Figures, legend_beside, new_figure, plain_ticks, shaded, spread
+from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
+from workflow.pictures.style import BLUE, GREEN, ORANGE, PURPLE
 from workflow.shell.results import grid_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 # More curves, or panels, than this overlap.
 MOST_STATES, MOST_FORCES = 6, 3
-STATE_COLOURS = "viridis"
-# mm to µm, N/mm to N/µm, N mm to J.
-TO_MICRONS, PER_MICRON, TO_JOULES = 1e3, 1e-3, 1e-3
 # Where the unworn contact stands on an axis of logarithms: so far before the first worn one.
 BEFORE = 0.1
 # What is shown along the pad: of these datasets, the latter two per area of each node.
@@ -42,23 +40,31 @@ PROFILE = {
     "energy": "energy per cycle\nand area [mJ/mm²]",
 }
 FORCE_COLOURS = (BLUE, ORANGE, GREEN, PURPLE)
+# What is shown over the cycles, two on a panel: dataset, scale and label.
+Curve = tuple[str, float, str]
+MOTION: tuple[Curve, Curve] = (
+    ("stroke", TO_MICRONS, "stroke under the force that wears [µm]"),
+    ("energy_per_cycle", 1.0, "energy per cycle [mJ]"),
+)
+DEPTH: Curve = ("depth", TO_MICRONS, "largest worn depth [µm]")
+ON_GRID = DEPTH, ("area", 1.0, "area in contact [mm²]")
+AT_NODES = DEPTH, ("touching", 1.0, "nodes in contact")
 
 
-def figures_of(file: h5py.File) -> dict[str, Callable[[h5py.File], Figure]]:
-    """The figures, by name."""
-    at_nodes = PLACES in file
+def figures_of(contents: Contents) -> Figures:
+    """The figures of a run, by name."""
     return {
         "frequency_response": frequency_response,
-        "evolution": evolution,
-        **({"profile": profile} if at_nodes else {"scar": scar}),
-        "loops": loops,
+        "evolution": partial(evolution, contents=contents),
+        **({"profile": profile} if contents.at_nodes else {"scar": scar}),
+        "loops": partial(loops, contents=contents),
     }
 
 
 def frequency_response(file: h5py.File) -> Figure:
     """Amplitude of the last mass over the force, a panel per force, a curve per state."""
     forces = list(file.attrs["forces"])
-    shown = _some(len(forces), MOST_FORCES)
+    shown = spread(range(len(forces)), MOST_FORCES)
     figure = new_figure(_title(file), 4.0 * len(shown) + 0.5)
     panels = figure.subplots(len(shown), 1, sharex=True, squeeze=False)[:, 0]
     for axis, place in zip(panels, shown, strict=True):
@@ -67,18 +73,14 @@ def frequency_response(file: h5py.File) -> Figure:
             receptance = TO_MICRONS * response["amplitude"][:, -1] / forces[place]
             label = f"{_cycles(state)}: {response.attrs['resonance']:.4g} Hz"
             axis.plot(response["frequency"][()], receptance, color=colour, label=label)
-        axis.set_yscale("log")
-        axis.set_title(f"{forces[place]:g} N")
-        axis.set_ylabel("amplitude / force [µm/N]")
-        axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="resonance")
-    panels[-1].set_xscale("log")
-    for setting in (panels[-1].xaxis.set_major_formatter, panels[-1].xaxis.set_minor_formatter):
-        setting("{x:g}")
-    panels[-1].set_xlabel("frequency [Hz]")
+        axis.set(title=f"{forces[place]:g} N", ylabel="amplitude / force [µm/N]", yscale="log")
+        legend_beside(axis, "resonance")
+    panels[-1].set(xlabel="frequency [Hz]", xscale="log")
+    plain_ticks(panels[-1])
     return figure
 
 
-def evolution(file: h5py.File) -> Figure:
+def evolution(file: h5py.File, contents: Contents) -> Figure:
     """Stiffness, resonances, motion and scar against cycles; the unworn contact at the left."""
     history, forces = file[EVOLUTION], list(file.attrs["forces"])
     cycles = history["cycles"][()]
@@ -88,29 +90,15 @@ def evolution(file: h5py.File) -> Figure:
     stiffness.plot(place, PER_MICRON * history["stiffness"][()], "o-", color=BLUE)
     stiffness.set_ylabel("stiffness kt while the contact sticks [N/µm]")
     frequency.plot(place, history["stuck"][:, 0], "k--", label="stuck")
-    for column, colour in zip(_some(len(forces), len(FORCE_COLOURS)), FORCE_COLOURS, strict=False):
+    columns = spread(range(len(forces)), len(FORCE_COLOURS))
+    for column, colour in zip(columns, FORCE_COLOURS, strict=False):
         label = f"{forces[column]:g} N"
         frequency.plot(place, history["resonance"][:, column], "o-", color=colour, label=label)
     frequency.set_ylabel("resonance [Hz]")
     frequency.legend()
-    _two(
-        motion,
-        place,
-        (TO_MICRONS * history["stroke"][()], "stroke under the force that wears [µm]"),
-        (history["energy_per_cycle"][()], "energy per cycle [mJ]"),
-    )
-    touching = ("area", "area in contact [mm²]")
-    if "touching" in history:
-        touching = ("touching", "nodes in contact")
-    _two(
-        depth,
-        place,
-        (TO_MICRONS * history["depth"][()], "largest worn depth [µm]"),
-        (history[touching[0]][()], touching[1]),
-    )
-    for axis in (motion, depth):
-        axis.set_xscale("log")
-        axis.set_xlabel(f"cycles (unworn at {place[0]:.3g})")
+    for axis, curves in ((motion, MOTION), (depth, AT_NODES if contents.at_nodes else ON_GRID)):
+        _draw_pair(axis, place, history, curves)
+        axis.set(xlabel=f"cycles (unworn at {place[0]:.3g})", xscale="log")
     return figure
 
 
@@ -128,10 +116,9 @@ def scar(file: h5py.File) -> Figure:
         energy.plot(along, contact["energy"][:, middle], color=colour)
     depth.invert_yaxis()
     depth.set_ylabel("worn depth [µm]")
-    depth.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="cycles")
+    legend_beside(depth, "cycles")
     pressure.set_ylabel("pressure [MPa]")
-    energy.set_ylabel("energy per cycle\nand area [mJ/mm²]")
-    energy.set_xlabel("x [mm]")
+    energy.set(xlabel="x [mm]", ylabel="energy per cycle\nand area [mJ/mm²]")
     return figure
 
 
@@ -145,14 +132,13 @@ def profile(file: h5py.File) -> Figure:
         for state, colour in _states(file):
             area = places["area"][nodes]
             gap, force, energy = (state[NODES][n][()][nodes] for n in PROFILE)
-            for axis, values in zip(
-                column, (TO_MICRONS * gap, force / area, energy / area), strict=True
-            ):
+            curves = TO_MICRONS * gap, force / area, energy / area
+            for axis, values in zip(column, curves, strict=True):
                 axis.plot(along, values, ".-", color=colour, label=_cycles(state))
         column[-1].set_xlabel(label)
     for axis, label in zip(panels[:, 0], PROFILE.values(), strict=True):
         axis.set_ylabel(label)
-    panels[0, -1].legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="cycles")
+    legend_beside(panels[0, -1], "cycles")
     return figure
 
 
@@ -171,51 +157,41 @@ def _sections(x: Array, y: Array) -> list[tuple[Array, Indices, str]]:
     return [(x[middle], middle, "x [mm]"), (across, diagonal, "along the diagonal [mm]")]
 
 
-def loops(file: h5py.File) -> Figure:
+def loops(file: h5py.File, contents: Contents) -> Figure:
     """Loops under the force that wears; of a half-space also that of the tangential problem."""
     figure = new_figure(_title(file), 7.0)
-    axis: Any = figure.subplots()
+    axis = figure.subplots()
     for state, colour in _states(file):
-        loop = state[LOOP]
         label = f"{_cycles(state)}: {state.attrs['energy_per_cycle']:.4g} mJ"
-        axis.plot(
-            TO_MICRONS * loop["displacement"][()], loop["force"][()], color=colour, label=label
-        )
-        if HALF_SPACE not in state:
-            continue
-        half_space = state[HALF_SPACE]
-        moved = TO_MICRONS * half_space["displacement"][()]
-        axis.plot(moved, half_space["force"][()], "o", color=colour, markersize=3)
-    between = "between the targets" if PLACES in file else "of the joint"
-    axis.set_xlabel(f"displacement {between} [µm]")
-    points = "" if PLACES in file else "; points: whole tangential problem"
-    axis.set_ylabel(f"force [N]{points}")
-    axis.legend(loc="center left", bbox_to_anchor=(1.0, 0.5), title="cycles, energy")
+        axis.plot(*_loop(state[LOOP]), color=colour, label=label)
+        if not contents.at_nodes:
+            axis.plot(*_loop(state[HALF_SPACE]), "o", color=colour, markersize=3)
+    if contents.at_nodes:
+        axis.set(xlabel="displacement between the targets [µm]", ylabel="force [N]")
+    else:
+        label = "force [N]; points: whole tangential problem"
+        axis.set(xlabel="displacement of the joint [µm]", ylabel=label)
+    legend_beside(axis, "cycles, energy")
     return figure
 
 
-def _two(axis: Axes, place: Array, first: tuple[Array, str], second: tuple[Array, str]) -> None:
+def _loop(group: h5py.Group) -> tuple[Array, Array]:
+    return TO_MICRONS * group["displacement"][()], group["force"][()]
+
+
+def _draw_pair(axis: Axes, place: Array, history: h5py.Group, curves: Sequence[Curve]) -> None:
     """Two curves on one panel, each on its own scale."""
     right = axis.twinx()
-    for side, (values, label), colour in ((axis, first, BLUE), (right, second, ORANGE)):
-        side.plot(place, values, "o-", color=colour)
+    sides = zip((axis, right), curves, (BLUE, ORANGE), strict=True)
+    for side, (name, scale, label), colour in sides:
+        side.plot(place, scale * history[name][()], "o-", color=colour)
         side.set_ylabel(label, color=colour)
     right.grid(visible=False)
 
 
 def _states(file: h5py.File) -> list[tuple[h5py.Group, Any]]:
     """The states that are shown, each with its colour."""
-    from matplotlib import colormaps
-
-    names = spread(sorted(file[WORN]), MOST_STATES)
-    shades = np.linspace(0.0, 0.9, len(names))
-    colours = [colormaps[STATE_COLOURS](shade) for shade in shades]
-    return [(file[WORN][name], colour) for name, colour in zip(names, colours, strict=True)]
-
-
-def _some(count: int, most: int) -> list[int]:
-    """At most so many places of ``count``, evenly spread, first and last among them."""
-    return [round(place) for place in np.linspace(0, count - 1, min(most, count))]
+    return [(file[WORN][name], colour) for name, colour in shaded(sorted(file[WORN]), MOST_STATES)]
 
 
 def _cycles(state: h5py.Group) -> str:

@@ -22,6 +22,16 @@ WORN, EVOLUTION = "worn", "evolution"
 
 
 @dataclass(frozen=True)
+class Contents:
+    """What ``results.h5`` of such a case holds.
+
+    The contact is ``at_nodes``, or on a grid with loops of its tangential problem.
+    """
+
+    at_nodes: bool
+
+
+@dataclass(frozen=True)
 class WornState:
     """The contact after so many ``cycles``, and what the rig does on it.
 

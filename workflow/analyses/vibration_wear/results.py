@@ -14,6 +14,7 @@ from workflow.analyses.vibration_wear.outcome import (
     PLACES,
     RESPONSES,
     WORN,
+    Contents,
     VibrationWearOutcome,
     WornState,
 )
@@ -37,7 +38,7 @@ def write_vibration_wear_output(outcome: VibrationWearOutcome, run: VibrationWea
     with reporter.stage("results"):
         _write_results(outcome, run)
         _write_tables(outcome, folder)
-    run.draw()
+    run.draw(Contents(outcome.places is not None))
     finish(run, _summary(outcome), (f"  {_line(state)}" for state in outcome.states))
 
 

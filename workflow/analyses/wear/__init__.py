@@ -41,7 +41,7 @@ def _pictures() -> Pictures:
     from workflow.analyses.wear.figures.wear import figures_of
     from workflow.analyses.wear.paraview.wear import write_wear
 
-    return Pictures(figures_of, write_wear, processes=2)  # ten seconds and more on one core
+    return Pictures(figures_of, write_wear)
 
 
 ANALYSIS = Analysis(
@@ -49,6 +49,7 @@ ANALYSIS = Analysis(
     cases={structure.name: structure.case for structure in STRUCTURES},
     run=_run,
     pictures=_pictures,
+    drawing_processes=2,  # ten seconds and more on one core
     memory=lambda case: structure_of(case).memory(case, 0, 0),
     resumable=_resumable,
     choose=lambda case: structure_of(case).choose(case),

@@ -22,12 +22,11 @@ from wear.life import Ruiz, findley, ruiz, smith_watson_topper
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Life
 from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.layout import MOMENTS
 from workflow.analyses.wear.load_source import BODIES
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 from workflow.shell.results import ResultsWriter
-
-MOMENTS = ("unworn", "worn")
 
 # Share of the load whose shear may be unknown. A hole in the shear makes stress of the order of µp
 # at its rim, whatever its size; the cells at the edge of a sliding contact that find no slipping

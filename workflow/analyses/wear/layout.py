@@ -2,15 +2,55 @@
 
 from __future__ import annotations
 
-import h5py
+from dataclasses import dataclass
+
+MOMENTS = "unworn", "worn"
+# How far kinetics are extended, in computed numbers of cycles.
+EXTRAPOLATION = 2.0
 
 
-def body_names(file: h5py.File) -> dict[int, str]:
-    """Names of body 1 and body 2."""
-    name_1, name_2 = file.attrs["bodies"]
-    return {1: str(name_1), 2: str(name_2)}
+def jump_name(number: int) -> str:
+    """The group of a jump, below that of its interface."""
+    return f"{number:05d}"
 
 
-def jump_names(file: h5py.File, interface: str) -> list[str]:
-    """Names of the jumps that have both surfaces and a contact solution, ascending."""
-    return sorted(set(file["surfaces"][interface]) & set(file["contact"][interface]))
+@dataclass(frozen=True)
+class Contents:
+    """What is there beside loads, contact, surfaces and kinetics of the interfaces ``names``.
+
+    ``bodies`` are the names of body 1 and 2, ``jumps`` how many there are beside the unworn state.
+    ``line`` contacts have forces and energies per length, a ``mix`` of missions has the share of
+    each. A ``structure`` of finite elements gives tractions at its nodes, and both bodies unworn
+    and worn. ``coarse`` are the interfaces with a solution on a coarse grid. The rest is there
+    where a case asks for it: a ``comparison`` of half-space and structure, tangential ``loops``,
+    ``sections`` of the stress under the contacts, and the interfaces with maps of fretting
+    ``life``.
+    """
+
+    names: tuple[str, ...]
+    bodies: tuple[str, str]
+    jumps: int
+    line: bool = False
+    mix: bool = False
+    structure: bool = False
+    coarse: tuple[str, ...] = ()
+    comparison: bool = False
+    loops: bool = False
+    sections: bool = False
+    life: tuple[str, ...] = ()
+
+    @property
+    def jump_names(self) -> list[str]:
+        """Groups of all jumps, the unworn state first."""
+        return [jump_name(number) for number in range(self.jumps + 1)]
+
+    @property
+    def ends(self) -> list[tuple[str, str]]:
+        """Unworn and worn, each with its jump: both with the only one where nothing wore."""
+        names = self.jump_names
+        return [("unworn", names[0]), ("worn", names[-1])]
+
+    @property
+    def per(self) -> str:
+        """What units of forces and energies end in."""
+        return "/mm" if self.line else ""

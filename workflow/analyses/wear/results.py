@@ -32,7 +32,7 @@ from workflow.analyses.wear.datasets import (
     put_face,
     surface_heights,
 )
-from workflow.analyses.wear.figures.wear import EXTRAPOLATION
+from workflow.analyses.wear.layout import EXTRAPOLATION, Contents
 from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.uniformity import uniformities
@@ -141,8 +141,8 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
     with reporter.stage("stress under the contacts"):
         stresses = _stresses(outcome, reporter)
     with reporter.stage("results"):
-        recorded = _write_results(outcome, structure, stresses, run)
-    run.draw()
+        recorded, contents = _write_results(outcome, structure, stresses, run)
+    run.draw(contents)
     worn_nodes = write_worn_faces(source, stages, state.interfaces, folder, reporter)
     loops = write_loop_tables(folder, source.line)
     warn_of_border(loops, case.loops, reporter)
@@ -180,20 +180,22 @@ def _write_results(
     structure: WornStructure | None,
     stresses: list[InterfaceStress],
     run: Run[WearCase],
-) -> dict[str, PeakHistory]:
-    """Write ``results.h5``; what the jumps recorded, by interface."""
+) -> tuple[dict[str, PeakHistory], Contents]:
+    """Write ``results.h5``; what the jumps recorded, by interface, and what is there."""
     case, source = outcome.case, outcome.source
     attributes = {
         "friction": case.friction.at(0.0),
         "peak_increment": source.peak,
         "bodies": list(case.bodies),
     }
+    coarse: list[str] = []
     with run_results(run, case, attributes, source.line) as writer:
         for contact in outcome.interfaces:
             stage, first, loads = contact.stage, contact.first, contact.unworn.loads
             writer.put_grid(f"grid/{stage.name}", stage.grid, stage.face.frame)
             put_face(writer, f"structure/{stage.name}", stage.face, contact.unworn)
-            _write_coarse(writer, stage, loads, source.peak)
+            if _write_coarse(writer, stage, loads, source.peak):
+                coarse.append(stage.name)
             dissipated = "energy dissipated in each increment, half-space pressure"
             energy = {"energy_half_space": Dataset(first.energy, "N mm", dissipated)}
             writer.put(f"contact/{stage.name}", energy)
@@ -206,13 +208,26 @@ def _write_results(
             structure.write(writer)
         for stress in stresses:
             stress.write(writer)
-    return recorded
+    contents = Contents(
+        names=tuple(sorted(contact.stage.name for contact in outcome.interfaces)),
+        bodies=case.bodies,
+        jumps=outcome.state.jump,
+        line=source.line,
+        mix=outcome.interfaces[0].unworn.loads.mixed,
+        structure=structure is not None,
+        coarse=tuple(coarse),
+        comparison=case.contact.method == "full",
+        loops=case.loops.wanted,
+        sections=case.stress.section != "none",
+        life=tuple(sorted(stress.name for stress in stresses if stress.mapped)),
+    )
+    return recorded, contents
 
 
 def _write_coarse(
     writer: ResultsWriter, stage: ContactStage, loads: LoadHistory, peak: int
-) -> None:
-    """The peak load on a grid as coarse as the mesh, to compare with.
+) -> bool:
+    """The peak load on a grid as coarse as the mesh, to compare with; whether there is one.
 
     None where the moments put that load outside the middles of the coarse cells: no reason to lose
     the run.
@@ -220,10 +235,11 @@ def _write_coarse(
     try:
         pressure = stage.coarse_pressure(loads, peak)
     except NormalContactError:
-        return
+        return False
     grid = stage.coarse_grid
     shape = {"shape": grid.shape, "pitch": grid.pitch, "line": grid.line}
     writer.put(f"contact/{stage.name}/coarse", {"pressure": pressure_field(pressure)}, **shape)
+    return True
 
 
 def _write_jumps(

@@ -2,46 +2,37 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.pictures.fields import spread
-from workflow.pictures.style import new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from workflow.analyses.vibration.outcome import Contents
+from workflow.pictures.panels import new_figure, shaded
+from workflow.pictures.scales import PER_MICRON, TO_MICRONS
 
 # More loops than this overlap.
 MOST_LOOPS = 8
-FORCE_COLOURS = "viridis"
-TO_MICRONS, PER_MICRON = 1e3, 1e-3  # mm to µm, N/mm to N/µm
 COARSE: dict[str, Any] = {"linestyle": (0, (2, 1)), "linewidth": 1.0}
 # Of the way on which the tallest loop would gain its height if it stuck: what the branches show.
 REACH = 1.6
 HEADROOM = 1.08
 
 
-def has_loops(file: h5py.File) -> bool:
-    """Whether there is a loop under some force."""
-    return any("loops" in response for response in file["responses"].values())
-
-
-def loops(file: h5py.File) -> Figure:
+def loops(file: h5py.File, contents: Contents) -> Figure:
     """Force against displacement in a cycle, and the rising branches from one reversal on.
 
     Of coarser resolutions than the last the force is shown, thin and dashed, as their harmonics
     alone give it: too few of them deform the loop.
     """
-    responses = file["responses"]
-    names = spread([name for name in sorted(responses) if "loops" in responses[name]], MOST_LOOPS)
-    shown = [responses[name] for name in names]
+    chosen = shaded(contents.loops, MOST_LOOPS)
+    shown = [file["responses"][name] for name, _ in chosen]
     figure = new_figure(_title(shown), 7.5)
     left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
-    for response, colour in zip(shown, _colours(len(shown)), strict=True):
+    for response, colour in zip(shown, (colour for _, colour in chosen), strict=True):
         for coarse in _resolutions(response)[:-1]:
             left.plot(*_curve(coarse, "expansion"), color=colour, **COARSE)
         left.plot(*_curve(_finest(response)), color=colour)
@@ -56,12 +47,9 @@ def _label(left: Axes, right: Axes, response: h5py.Group) -> None:
     text = f"{finest.attrs['frequency']:.4g} Hz, {_harmonics(finest)} harmonics"
     if coarse:
         text += f"; dashed: the force in {', '.join(map(_harmonics, coarse))} alone"
-    left.set_title(text)
+    left.set(title=text, xlabel="displacement [µm]", ylabel="tangential force [N]")
     right.set_title("rising branches from one origin")
-    left.set_xlabel("displacement [µm]")
-    left.set_ylabel("tangential force [N]")
-    right.set_xlabel("displacement since the reversal [µm]")
-    right.set_ylabel("force since the reversal [N]")
+    right.set(xlabel="displacement since the reversal [µm]", ylabel="force since the reversal [N]")
     right.legend(loc="lower right", title="excitation: stick slope (dashed)")
 
 
@@ -77,12 +65,6 @@ def _finest(response: h5py.Group) -> h5py.Group:
 def _harmonics(loop: h5py.Group) -> str:
     """How many harmonics the motion has, the mean apart."""
     return str(int(np.count_nonzero(loop.attrs["harmonics"])))
-
-
-def _colours(count: int) -> list[Any]:
-    from matplotlib import colormaps
-
-    return [colormaps[FORCE_COLOURS](shade) for shade in np.linspace(0.0, 0.9, count)]
 
 
 def _curve(loop: h5py.Group, force: str = "force") -> tuple[Array, Array]:

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import h5py
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
 
 from sa_solver.types import Array, Indices
-from workflow.analyses.vibration.figures.axes import plain_ticks
+from workflow.analyses.vibration.outcome import Contents
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
-from workflow.pictures.fields import spread
-from workflow.pictures.style import BLACK, BLUE, ORANGE, new_figure
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
+from workflow.pictures.panels import new_figure, plain_ticks, spread
+from workflow.pictures.scales import TO_MICRONS
+from workflow.pictures.style import BLACK, BLUE, ORANGE
 
 # As many forces as have a readable map each, over frequency and of the pad.
 MOST_MAPS, MOST_PADS = 3, 6
@@ -28,6 +29,11 @@ KINDS = {
     "open all the time": "#E3E3E3",
 }
 STICKS, SLIPS_BRIEFLY, SLIPS_LONG, LIFTS_OFF, OPEN = range(len(KINDS))
+CELLS: dict[str, Any] = {
+    "cmap": ListedColormap(list(KINDS.values())),
+    "vmin": -0.5,
+    "vmax": len(KINDS) - 0.5,
+}
 HALF = 0.5
 # Shares of a cycle, of few samples: rounding.
 ROUNDING = 1e-9
@@ -40,18 +46,11 @@ MOST_TICKS = 6
 # Heights of what is around the maps of the pad, and of these [inch]; more columns than ``WIDE`` ask
 # for less.
 AROUND_PADS, PAD_ROWS, WIDE = 2.4, 6.6, 4
-TO_MICRONS = 1e3
 
 
-def has_states(file: h5py.File) -> bool:
-    """Whether there are nodes with places and states."""
-    responses = file["responses"].values()
-    return "contact/x" in file and any("nodes" in response for response in responses)
-
-
-def node_states(file: h5py.File) -> Figure:
+def node_states(file: h5py.File, contents: Contents) -> Figure:
     """The state of every node over frequency, below the response, under some forces."""
-    shown = _with_states(file, MOST_MAPS)
+    shown = [file["responses"][name] for name in spread(contents.responses, MOST_MAPS)]
     figure = new_figure(_title(shown), 8.5)
     panels = figure.subplots(
         2, len(shown), sharex=True, sharey="row", squeeze=False, height_ratios=(1.0, 1.6)
@@ -66,10 +65,8 @@ def node_states(file: h5py.File) -> Figure:
             axis.axvline(response.attrs["resonance"], color=BLACK, linestyle=":", linewidth=1.2)
         top.set_title(f"{response.attrs['force']:g} N: {response.attrs['resonance']:.4g} Hz")
         bottom.set_xlabel("frequency [Hz]")
-    panels[0, 0].set_xscale("log")
-    panels[0, 0].set_yscale("log")
+    panels[0, 0].set(xscale="log", yscale="log", ylabel="amplitude / force [µm/N]")
     plain_ticks(bottom)
-    panels[0, 0].set_ylabel("amplitude / force [µm/N]")
     panels[1, 0].set_ylabel("nodes by distance from the middle [mm]")
     ticks = np.unique(np.linspace(0, len(order) - 1, MOST_TICKS).round().astype(int))
     panels[1, 0].set_yticks(ticks + 0.5, [f"{distance[order[tick]]:.2g}" for tick in ticks])
@@ -77,9 +74,9 @@ def node_states(file: h5py.File) -> Figure:
     return figure
 
 
-def pad_states(file: h5py.File) -> Figure:
+def pad_states(file: h5py.File, contents: Contents) -> Figure:
     """The state of the nodes on the pad: below, at and above the peak of each force."""
-    shown = _with_states(file, MOST_PADS)
+    shown = [file["responses"][name] for name in spread(contents.responses, MOST_PADS)]
     height = PAD_ROWS * min(1.0, WIDE / len(shown))
     figure = new_figure(_title(shown), AROUND_PADS + height)
     panels = figure.subplots(len(OCTAVES), len(shown), sharex=True, sharey=True, squeeze=False)
@@ -94,13 +91,6 @@ def pad_states(file: h5py.File) -> Figure:
         axis.set_xlabel("x [mm]")
     _legend(figure)
     return figure
-
-
-def _with_states(file: h5py.File, most: int) -> list[h5py.Group]:
-    """The forces that have states; of many, some."""
-    responses = file["responses"]
-    names = [name for name in sorted(responses) if "nodes" in responses[name]]
-    return [responses[name] for name in spread(names, most)]
 
 
 def _kinds(response: h5py.Group) -> Indices:
@@ -132,7 +122,7 @@ def _draw_over_frequency(axis: Axes, response: h5py.Group, order: Indices) -> No
     points = largest_at(frequency, response["amplitude"][:, -1], np.sqrt(edges[1:] * edges[:-1]))
     nodes = np.arange(len(order) + 1)
     axis.grid(visible=False)
-    axis.pcolormesh(edges, nodes, _kinds(response)[points][:, order].T, **_look())
+    axis.pcolormesh(edges, nodes, _kinds(response)[points][:, order].T, **CELLS)
 
 
 def largest_at(frequency: Array, amplitude: Array, wanted: Array) -> Indices:
@@ -166,10 +156,10 @@ def _draw_pad(axis: Axes, contact: h5py.Group, kinds: Indices) -> None:
     axis.grid(visible=False)
     numbers = rows_and_columns(x, y)
     if numbers is None:
-        axis.scatter(x, y, c=kinds, **_look())
+        axis.scatter(x, y, c=kinds, **CELLS)
         return
     edges = (_edges(x[numbers].mean(axis=1)), _edges(y[numbers].mean(axis=0)))
-    axis.pcolormesh(*edges, kinds[numbers].T, edgecolors="white", linewidth=0.5, **_look())
+    axis.pcolormesh(*edges, kinds[numbers].T, edgecolors="white", linewidth=0.5, **CELLS)
 
 
 def _edges(lines: Array) -> Array:
@@ -178,14 +168,6 @@ def _edges(lines: Array) -> Array:
     return np.concatenate([[2.0 * lines[0] - between[0]], between, [2.0 * lines[-1] - between[-1]]])
 
 
-def _look() -> dict[str, Any]:
-    from matplotlib.colors import ListedColormap
-
-    return {"cmap": ListedColormap(list(KINDS.values())), "vmin": -0.5, "vmax": len(KINDS) - 0.5}
-
-
 def _legend(figure: Figure) -> None:
-    from matplotlib.patches import Patch
-
     patches = [Patch(facecolor=colour, label=name) for name, colour in KINDS.items()]
     figure.legend(handles=patches, loc="outside lower center", ncols=len(KINDS), columnspacing=1.2)

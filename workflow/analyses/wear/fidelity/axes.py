@@ -107,12 +107,7 @@ class _Climb:
 
 def choose_mesh(case: DovetailCase, allowed: float) -> Decision:
     """The coarsest mesh, along and away in proportion, whose section wears as it should."""
-    section = plane_section(case)
-
-    def worn(rung: _Rung) -> Numbers:
-        return life(changed(section, rung.settings))
-
-    climb = _climb(list(_meshes(case)), worn, allowed)
+    climb = _climb(list(_meshes(case)), partial(_worn, plane_section(case)), allowed)
     why = _sentence(climb, allowed, "elements across the flank")
     return _decision(climb.taken.settings, why, climb.probed, allowed, climb.error)
 
@@ -136,37 +131,30 @@ def choose_grid(case: DovetailCase, allowed: float) -> Decision:
     """The coarsest grid across the flank, and along the slot, whose line contact wears alike."""
     section = plane_section(case)
     across, along = case.contact.grid
-    if case.structure.dimension == 2:
-        most = max(across, MOST_STRIPS)
-        climb = _climb_grid(across, most, allowed, partial(_strips, section))
-        grid, climbs = (climb.taken.size, along), [climb]
-    else:
-        half = 0.5 * allowed
-        first = _climb_grid(across, FINER_SPACE * across, half, partial(_strips, section))
-        second = _climb_grid(along, FINER_SPACE * along, half, partial(_ends, section))
-        grid, climbs = (first.taken.size, second.taken.size), [first, second]
-    names = "strips across the flank", "strips along the slot"
-    part = allowed / len(climbs)
-    why = "; ".join(
-        _sentence(climb, part, name) for climb, name in zip(climbs, names, strict=False)
-    )
-    probe = {name: climb.probed for climb, name in zip(climbs, names, strict=False)}
+    in_space = case.structure.dimension == 3
+    most = FINER_SPACE * across if in_space else max(across, MOST_STRIPS)
+    part = 0.5 * allowed if in_space else allowed
+    climbs = [_climb_grid(across, most, part, partial(_worn, section))]
+    if in_space:
+        most = FINER_SPACE * along
+        climbs.append(_climb_grid(along, most, part, lambda rung: end_life(section, rung.size)))
+        along = climbs[-1].taken.size
+    grid = climbs[0].taken.size, along
+    named = dict(zip(("strips across the flank", "strips along the slot"), climbs, strict=False))
+    why = "; ".join(_sentence(climb, part, name) for name, climb in named.items())
+    probe = {name: climb.probed for name, climb in named.items()}
     error = sum(climb.error for climb in climbs)
     return _decision({"contact.grid": grid}, why, probe, allowed, error)
 
 
-def _strips(section: DovetailCase, rung: _Rung) -> Numbers:
-    return life(changed(section, {"contact.grid": (rung.size, rung.size)}))
-
-
-def _ends(section: DovetailCase, rung: _Rung) -> Numbers:
-    return end_life(section, rung.size)
+def _worn(section: DovetailCase, rung: _Rung) -> Numbers:
+    return life(changed(section, rung.settings))
 
 
 def _climb_grid(cells: int, most: int, allowed: float, worn: Callable[[_Rung], Numbers]) -> _Climb:
     """Up the halves and doubles of so many cells."""
     sizes = _doublings(cells, max(FEWEST_CELLS, cells // COARSER), most)
-    return _climb([_Rung(size, {}) for size in sizes], worn, allowed)
+    return _climb([_Rung(n, {"contact.grid": (n, n)}) for n in sizes], worn, allowed)
 
 
 def _doublings(count: int, fewest: int, most: int) -> list[int]:

@@ -11,13 +11,14 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import asdict, replace
+from operator import attrgetter
 from typing import Any
 
 from fe_models.mesh import MeshError
 from sa_solver.normal import NormalContactError
 from wear.stepping import ContactFailure
 from workflow.analyses.wear.fidelity.axes import AXES
-from workflow.analyses.wear.fidelity.decision import Axis, Decision, value_at
+from workflow.analyses.wear.fidelity.decision import Axis, Decision
 from workflow.analyses.wear.fidelity.dimension import choose_dimension
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.case.changing import changed
@@ -55,8 +56,8 @@ def _decide(axis: Axis, case: DovetailCase, allowed: float) -> Decision:
         decision = axis.decide(case, allowed)
     except (MeshError, MethodFailed, ContactFailure, NormalContactError) as error:
         why = f"as the case has it: the probe failed: {error}"
-        value = value_at(case, axis.entry)
-        decision = Decision(axis.entry, value, why, allowed=allowed, met=False)
+        written = attrgetter(axis.entry)(case)
+        decision = Decision(axis.entry, written, why, allowed=allowed, met=False)
     return replace(decision, seconds=_since(begin))
 
 

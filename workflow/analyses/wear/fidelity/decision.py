@@ -7,7 +7,6 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
-from workflow.case.sections import Section
 
 
 @dataclass(frozen=True)
@@ -45,11 +44,3 @@ class Axis:
     entry: str
     share: float
     decide: Callable[[DovetailCase, float], Decision]
-
-
-def value_at(case: Section, entry: str) -> Any:
-    """The value of a case at a dotted path."""
-    node: Any = case
-    for key in entry.split("."):
-        node = getattr(node, key)
-    return node

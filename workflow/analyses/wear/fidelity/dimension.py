@@ -7,6 +7,7 @@ from math import ceil
 from fe_models.mesh import MeshError
 from fe_models.transfer import FaceTransfer
 from workflow.analyses.wear.fidelity.decision import Decision
+from workflow.analyses.wear.fidelity.estimate import Numbers, scales
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.analyses.wear.structures.dovetail.model import DovetailModel
@@ -20,12 +21,8 @@ ENTRY = "structure.dimension"
 # but for slip and energy of the lesser flank, which scatter by 4 %. Fewer rows blur the ends.
 NODES_ACROSS = 8
 ROWS_PER_WIDTH = 3
-# A flank that carries or dissipates less than this share of the other's is measured by that share.
-LESSER_FLANK = 0.1
 # The most that two dimensions may use of the accuracy: the other approximations need some of it.
 MOST_USED = 0.9
-
-Numbers = dict[str, dict[str, float]]  # by interface and quantity
 
 
 def choose_dimension(case: DovetailCase) -> Decision:
@@ -42,14 +39,11 @@ def choose_dimension(case: DovetailCase) -> Decision:
     except (MeshError, MethodFailed) as error:
         return Decision(ENTRY, 3, f"the coarse probe failed: {error}")
     differences = _differences(values[2], values[3], case.friction.coefficient)
-    flank, quantity, largest = max(
-        (
-            (flank, name, value)
-            for flank, quantities in differences.items()
-            for name, value in quantities.items()
-        ),
-        key=lambda item: item[2],
-    )
+    named = {
+        (flank, name): v for flank, of_flank in differences.items() for name, v in of_flank.items()
+    }
+    flank, quantity = max(named, key=lambda place: named[place])
+    largest = named[flank, quantity]
     probe = {"two": values[2], "three": values[3], "differences": differences}
     text = (
         f"in a coarse probe of mid-slot two dimensions differ from three by at most {largest:.1%} "
@@ -57,9 +51,8 @@ def choose_dimension(case: DovetailCase) -> Decision:
         "the ends of the slot, which may wear more, are left out"
     )
     allowed = MOST_USED * case.accuracy
-    if largest > allowed:
-        return Decision(ENTRY, 3, text, probe, allowed=allowed, error=0.0)
-    return Decision(ENTRY, 2, text, probe, allowed=allowed, error=largest)
+    dimension, used = (3, 0.0) if largest > allowed else (2, largest)
+    return Decision(ENTRY, dimension, text, probe, allowed=allowed, error=used)
 
 
 def _mid_slot(case: DovetailCase, dimension: int) -> Numbers:
@@ -79,18 +72,11 @@ def _mid_slot(case: DovetailCase, dimension: int) -> Numbers:
 
 def _differences(two: Numbers, three: Numbers, friction: float) -> Numbers:
     """Relative differences of every quantity on every flank; those of Qx relative to µP."""
-    largest = {
-        name: max(abs(quantities[name]) for quantities in three.values())
-        for name in next(iter(three.values()))
-    }
     differences: Numbers = {}
-    for flank, quantities in three.items():
-        scales = {
-            name: max(abs(quantities[name]), LESSER_FLANK * largest[name]) for name in quantities
-        }
-        scales["Qx"] = friction * scales["P"]
+    for flank, relative_to in scales(three).items():
+        relative_to["Qx"] = friction * relative_to["P"]
         differences[flank] = {
-            name: abs(two[flank][name] - quantities[name]) / scale if scale > 0.0 else 0.0
-            for name, scale in scales.items()
+            name: abs(two[flank][name] - three[flank][name]) / scale if scale > 0.0 else 0.0
+            for name, scale in relative_to.items()
         }
     return differences

@@ -9,7 +9,8 @@ from workflow.shell.convergence import richardson
 
 Numbers = dict[str, dict[str, float]]  # by interface and quantity
 
-# A flank that wears less than this share of the other's is measured by that share.
+# A flank that carries, dissipates or wears less than this share of the other's is measured by that
+# share.
 LESSER_FLANK = 0.1
 # An order that is taken for granted beyond the probed rungs where these show none.
 LEAST_ORDER = 0.5
@@ -58,6 +59,19 @@ class Estimate:
         return max(deviation.refinement(allowed) for deviation in self.deviations)
 
 
+def scales(values: Numbers) -> Numbers:
+    """What errors of the values are relative to."""
+    names = next(iter(values.values()))
+    largest = {name: max(abs(quantities[name]) for quantities in values.values()) for name in names}
+    return {
+        flank: {
+            name: max(abs(value), LESSER_FLANK * largest[name])
+            for name, value in quantities.items()
+        }
+        for flank, quantities in values.items()
+    }
+
+
 def estimate(values: Sequence[Numbers], steps: Sequence[float], order: float) -> Estimate:
     """Errors of the rungs, coarse to fine, of methods of at most this ``order`` in their ``steps``.
 
@@ -65,13 +79,9 @@ def estimate(values: Sequence[Numbers], steps: Sequence[float], order: float) ->
     distances from it on top, so that an early one that is near by chance counts for no more than
     the last.
     """
-    last = values[-1]
-    names = next(iter(last.values()))
-    largest = {name: max(abs(quantities[name]) for quantities in last.values()) for name in names}
     deviations = []
-    for flank, quantities in last.items():
-        for name, value in quantities.items():
-            scale = max(abs(value), LESSER_FLANK * largest[name])
+    for flank, quantities in scales(values[-1]).items():
+        for name, scale in quantities.items():
             series = [rung[flank][name] for rung in values]
             deviations.append(_deviation(f"{name} on the {flank}", series, scale, steps, order))
     return Estimate(tuple(deviations))

@@ -7,7 +7,7 @@ so that their error, some per cent of the depth, is nearly the same in all and l
 
 from __future__ import annotations
 
-from functools import lru_cache, partial
+from functools import lru_cache
 from math import ceil, gcd
 from typing import Literal
 
@@ -165,11 +165,8 @@ def _along(loads: LoadHistory, factor: float) -> LoadHistory:
 
 def _worn_away(contact: WearingContact, state: WearState, cycles: float) -> Array:
     """Depth of both bodies after so many cycles."""
-    at = partial(_always, contact)
     for _ in range(STEPS):
-        state = advance_cycles(ImplicitStepper(), state, cycles / STEPS, cycles, at).state
+        step = cycles / STEPS
+        stepper = ImplicitStepper()
+        state = advance_cycles(stepper, state, step, cycles, lambda worn: contact).state
     return state.surfaces.depth
-
-
-def _always(contact: WearingContact, state: WearState) -> WearingContact:
-    return contact

@@ -2,20 +2,21 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.tri import Triangulation
 
 from sa_solver.types import Array
 from workflow.analyses.wear.body_mesh import body_mesh
-from workflow.pictures.fields import line_contacts
-from workflow.pictures.style import BLACK, new_figure
+from workflow.analyses.wear.layout import MOMENTS, Contents
+from workflow.pictures.panels import new_figure
+from workflow.pictures.style import BLACK
 from workflow.shell.results import grid_of
-
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-    from matplotlib.figure import Figure
 
 STRESS_COLOURS, CHANGE_COLOURS = "magma_r", "RdBu_r"
 CHANGE = "worn less unworn"
@@ -41,30 +42,32 @@ class _Section(NamedTuple):
     outline: Array
 
 
-def structure_stress(file: h5py.File) -> Figure:
+def structure_stress(file: h5py.File, contents: Contents) -> Figure:
     """Von Mises stress of both bodies around the faces: unworn, worn and what wear changed."""
+    right, up = _shown_axes(file)
+    low, high = _window(file)
     panels = {state: _sections(file, state) for state in _states(file)}
-    ranges = {state: _range_in_view(file, sections) for state, sections in panels.items()}
+    ranges = {state: _range_within(low, high, cuts) for state, cuts in panels.items()}
     top = max(ranges[state][1] for state in panels if state != CHANGE)
     texts = (f"{ranges[state][1]:.0f} MPa {state}" for state in panels if state != CHANGE)
-    title = f"Von Mises stress {_place(file)} at peak load: at most {', '.join(texts)}"
+    title = f"Von Mises stress {_place(file, contents)} at peak load: at most {', '.join(texts)}"
     figure = new_figure(title, 1.0 + 4.2 * len(panels))
     axes = figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
     for axis, (state, sections) in zip(axes, panels.items(), strict=True):
-        low, high = ranges[state]
-        scale = max(-low, high) if state == CHANGE else top
-        colours = _draw_sections(axis, sections, scale, signed=state == CHANGE)
-        _zoom(axis, file)
-        axis.set_title(f"{state}: {low:+.0f} to {high:+.0f} MPa" if state == CHANGE else state)
-        axis.set_ylabel(f"{'XYZ'[_plane(file)[2]]} [mm]")
+        least, most = ranges[state]
+        signed = state == CHANGE
+        colours = _draw_sections(axis, sections, max(-least, most) if signed else top, signed)
+        # The surroundings of the faces, where wear makes the difference.
+        axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), ylabel=f"{'XYZ'[up]} [mm]")
+        axis.set_title(f"{state}: {least:+.0f} to {most:+.0f} MPa" if signed else state)
         figure.colorbar(colours, ax=axis, label="[MPa]", pad=0.01)
-    axes[-1].set_xlabel(f"{'XYZ'[_plane(file)[1]]} [mm]")
+    axes[-1].set_xlabel(f"{'XYZ'[right]} [mm]")
     return figure
 
 
-def _place(file: h5py.File) -> str:
+def _place(file: h5py.File, contents: Contents) -> str:
     """Which section of the bodies is shown, for the title."""
-    if line_contacts(file):
+    if contents.line:
         return "in plane strain"
     (name, first), *others = ((name, group.attrs) for name, group in file["grid"].items())
     y, far = first["axes"][1], SAME_PLANE * grid_of(file["grid"][name]).size[1]
@@ -78,38 +81,32 @@ def _place(file: h5py.File) -> str:
 
 def _states(file: h5py.File) -> list[str]:
     """What there is to show; a change needs both states on one mesh."""
-    bodies = list(file["bodies"].values())
-    states = [state for state in ("unworn", "worn") if all(state in body for body in bodies)]
-    if len(states) == 2 and all(
-        np.array_equal(body["unworn/elements"], body["worn/elements"]) for body in bodies
-    ):
-        states.append(CHANGE)
-    return states
+    one_mesh = all(
+        np.array_equal(body["unworn/elements"], body["worn/elements"])
+        for body in file["bodies"].values()
+    )
+    return [*MOMENTS, CHANGE] if one_mesh else [*MOMENTS]
 
 
-def _plane(file: h5py.File) -> tuple[int, int, int]:
-    """Global axes nearest to the first face's y (the plane's normal), to right and to top."""
+def _shown_axes(file: h5py.File) -> list[int]:
+    """Global axes to the right and to the top; the third is nearest to the first face's y."""
     y = np.abs(next(iter(file["grid"].values())).attrs["axes"][1])
-    normal = int(np.argmax(y))
-    right, top = (axis for axis in range(3) if axis != normal)
-    return normal, right, top
+    return [axis for axis in range(3) if axis != np.argmax(y)]
 
 
 def _sections(file: h5py.File, state: str) -> list[_Section]:
     """Both bodies in the plane y = 0 of the first face."""
-    cuts = []
-    for body in file["bodies"].values():
-        if state == CHANGE:
-            change = body["worn/von_mises"][()] - body["unworn/von_mises"][()]
-            cuts.append(_cut(file, body["unworn"], change))
-        else:
-            cuts.append(_cut(file, body[state], body[state]["von_mises"][()]))
-    return cuts
+    bodies = file["bodies"].values()
+    if state != CHANGE:
+        return [_cut(file, body[state], body[state]["von_mises"][()]) for body in bodies]
+    changes = [body["worn/von_mises"][()] - body["unworn/von_mises"][()] for body in bodies]
+    pairs = zip(bodies, changes, strict=True)
+    return [_cut(file, body["unworn"], change) for body, change in pairs]
 
 
 def _cut(file: h5py.File, body: h5py.Group, stress: Array) -> _Section:
     """One body and a nodal stress cut by the plane y = 0 of the first face; a plane body whole."""
-    shown = list(_plane(file)[1:])
+    shown = _shown_axes(file)
     face = next(iter(file["grid"].values())).attrs
     mesh = body_mesh(body)
     mesh.point_data["stress"] = stress
@@ -132,9 +129,6 @@ def _cut(file: h5py.File, body: h5py.Group, stress: Array) -> _Section:
 
 def _draw_sections(axis: Axes, sections: list[_Section], top: float, signed: bool) -> Any:
     """Colours and outlines of the bodies; returns the colours."""
-    from matplotlib.collections import LineCollection
-    from matplotlib.tri import Triangulation
-
     axis.set_aspect("equal")
     axis.grid(visible=False)
     for section in sections:
@@ -152,7 +146,7 @@ def _draw_sections(axis: Axes, sections: list[_Section], top: float, signed: boo
 
 def _window(file: h5py.File) -> tuple[Array, Array]:
     """Lower left and upper right corner of the view, ``(2,)`` each [mm]."""
-    shown = list(_plane(file)[1:])
+    shown = _shown_axes(file)
     ends = []
     for group in file["grid"].values():
         half = 0.5 * grid_of(group).size[0] * group.attrs["axes"][0]
@@ -162,16 +156,8 @@ def _window(file: h5py.File) -> tuple[Array, Array]:
     return low - margin, high + margin
 
 
-def _range_in_view(file: h5py.File, sections: list[_Section]) -> tuple[float, float]:
-    """Smallest and largest stress in view [MPa]."""
-    low, high = _window(file)
+def _range_within(low: Array, high: Array, sections: list[_Section]) -> tuple[float, float]:
+    """Smallest and largest stress between two corners [MPa]."""
     seen = [s.stress[np.all((s.points >= low) & (s.points <= high), axis=1)] for s in sections]
     every = np.concatenate(seen)
     return float(every.min()), float(every.max())
-
-
-def _zoom(axis: Axes, file: h5py.File) -> None:
-    """Show the surroundings of the faces, where wear makes the difference."""
-    low, high = _window(file)
-    axis.set_xlim(low[0], high[0])
-    axis.set_ylim(low[1], high[1])

@@ -2,52 +2,60 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
 
 from sa_solver.types import Array, Frame
-from workflow.analyses.wear.layout import jump_names
-from workflow.pictures.vtk import Fields, Step, attach, cells, write_series, write_xml
+from workflow.analyses.wear.layout import Contents
+from workflow.pictures.vtk import Fields, Step, attach, cells, write_series
+from workflow.shell.results import frame_of
+
+if TYPE_CHECKING:
+    import pyvista
 
 
-def life_fields(file: h5py.File, interface: str, jump: str) -> Fields:
+def life_fields(contents: Contents, file: h5py.File, interface: str, jump: str) -> Fields:
     """Maps of the fretting parameter and what it is made of, by name and body; scalars only.
 
     They are computed before the first and after the last jump: not a number in between.
     """
-    name = f"stress/life/{interface}"
-    if name not in file:
+    if interface not in contents.life:
         return {}
-    jumps = jump_names(file, interface)
-    moment = {jumps[0]: "unworn", jumps[-1]: "worn"}.get(jump)
+    life = file["stress/life"][interface]
+    moment = {last: moment for moment, last in contents.ends}.get(jump)
     fields: Fields = {}
     for body in (1, 2):
-        for key, values in file[name]["unworn"][f"body_{body}"].items():
+        for key, values in life["unworn"][f"body_{body}"].items():
             if values.ndim == 2:
-                known = values if moment is None else file[name][moment][f"body_{body}"][key]
+                known = values if moment is None else life[moment][f"body_{body}"][key]
                 field = cells(known) if moment else np.full(values.size, np.nan)
                 fields[f"{key}_{body}"] = field, str(values.attrs["unit"])
     return fields
 
 
-def write_sections(file: h5py.File, interface: str, frame: Frame, folder: Path) -> list[Path]:
+def write_sections(contents: Contents, file: h5py.File, interface: str, folder: Path) -> list[Path]:
     """The section through both bodies, unworn and worn, and the series that lists them."""
-    name = f"stress/section/{interface}"
-    if name not in file:
+    if not contents.sections:
         return []
-    contact, jumps = file["contact"][interface], jump_names(file, interface)
-    steps: list[Step] = []
-    for moment, jump in (("unworn", jumps[0]), ("worn", jumps[-1])):
+    path = folder / f"section_{interface}.pvd"
+    return write_series(path, _sections(contents, file, interface, folder / "section"))
+
+
+def _sections(contents: Contents, file: h5py.File, interface: str, folder: Path) -> Iterator[Step]:
+    frame = frame_of(file["grid"][interface])
+    contact, section = file["contact"][interface], file["stress/section"][interface]
+    for moment, jump in contents.ends:
         for body in (1, 2):
-            path = folder / "section" / f"{interface}_{moment}_{body}.vts"
-            _write_section(file[name], f"{moment}/body_{body}", body, frame, path)
-            steps.append((float(contact[jump].attrs["cycles"]), f"body_{body}", path))
-    return write_series(folder / f"section_{interface}.pvd", steps)
+            mesh = _section(section, f"{moment}/body_{body}", body, frame)
+            path = folder / f"{interface}_{moment}_{body}.vts"
+            yield float(contact[jump].attrs["cycles"]), f"body_{body}", path, mesh
 
 
-def _write_section(group: h5py.Group, state: str, body: int, frame: Frame, path: Path) -> None:
+def _section(group: h5py.Group, state: str, body: int, frame: Frame) -> pyvista.StructuredGrid:
     """One body's section; the components of stress are those of the interface frame."""
     import pyvista
 
@@ -59,7 +67,7 @@ def _write_section(group: h5py.Group, state: str, body: int, frame: Frame, path:
     for component, values in zip(group.attrs["components"], group[state]["stress"], strict=True):
         fields[f"stress_{component}"] = np.ravel(values), "MPa"
     attach(mesh.point_data, fields)
-    write_xml(mesh, path)
+    return mesh
 
 
 def _places(group: h5py.Group, body: int) -> Array:

@@ -14,15 +14,15 @@ Written into one folder:
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import h5py
 import numpy as np
 
-from sa_solver.types import Frame, Grid
+from sa_solver.types import Array, Grid
 from workflow.analyses.wear.body_mesh import body_mesh
-from workflow.analyses.wear.layout import body_names, jump_names
+from workflow.analyses.wear.layout import Contents, jump_name
 from workflow.analyses.wear.paraview.subsurface import life_fields, write_sections
 from workflow.pictures.vtk import (
     Fields,
@@ -30,57 +30,42 @@ from workflow.pictures.vtk import (
     attach,
     cells,
     grid_image,
+    traction_fields,
     write_series,
     write_stl,
-    write_xml,
 )
 from workflow.shell.results import frame_of, grid_of
 
-if TYPE_CHECKING:
-    import pyvista
-
-UNWORN = "00000"
+# Fields at the nodes of a body, with units.
+NODAL = {"displacement": "mm", "von_mises": "MPa", "maximum_principal": "MPa"}
 
 
-def write_wear(file: h5py.File, folder: Path) -> list[Path]:
+def write_wear(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
     """Write the files that show a wear run; returns their paths."""
     written: list[Path] = []
-    for interface in file["grid"]:
-        written += _write_face(file, interface, folder)
-        written += write_sections(file, interface, _placement(file, interface)[1], folder)
-        if not grid_of(file["grid"][interface]).line:
-            written += _write_worn_surfaces(file, interface, folder)
-    if "bodies" in file:
-        written += _write_structure(file, folder)
+    for name in contents.names:
+        images = _images(contents, file, name, folder / name)
+        written += write_series(folder / f"{name}.pvd", images)
+        written += write_sections(contents, file, name, folder)
+        if not contents.line:
+            written += _write_worn_surfaces(contents, file, name, folder)
+    if contents.structure:
+        written += write_series(folder / "structure.pvd", _bodies(file, folder / "structure"))
     return written
 
 
 # --- faces --------------------------------------------------------------------------------------
 
 
-def _write_face(file: h5py.File, interface: str, folder: Path) -> list[Path]:
-    """Images of one face, one per jump, and the series that lists them."""
-    grid, frame = _placement(file, interface)
-    steps: list[Step] = []
-    for jump in jump_names(file, interface):
-        path = folder / interface / f"{jump}.vti"
-        image = grid_image(grid, frame)
-        attach(image.cell_data, _face_fields(file, interface, jump, frame))
-        write_xml(image, path)
-        steps.append((float(file["contact"][interface][jump].attrs["cycles"]), interface, path))
-    return write_series(folder / f"{interface}.pvd", steps)
-
-
-def _face_fields(file: h5py.File, interface: str, jump: str, frame: Frame) -> Fields:
-    """Cell fields of one jump, in the order in which an image counts its cells."""
-    contact = file["contact"][interface][jump]
-    fields: Fields = {"pressure": (cells(contact["pressure"]), "MPa")}
-    for name, unit in (("shear", "MPa"), ("slip", "mm")):
-        x, y = (cells(component) for component in contact[name][()])
-        fields[name] = frame.to_global(np.stack([x, y, np.zeros_like(x)], axis=1)), unit
-        fields[f"{name}_x"], fields[f"{name}_y"] = (x, unit), (y, unit)
-    fields |= _surface_fields(file["surfaces"][interface], jump)
-    return fields | life_fields(file, interface, jump)
+def _images(contents: Contents, file: h5py.File, interface: str, folder: Path) -> Iterator[Step]:
+    """Images of one face, one per jump."""
+    grid, frame = grid_of(file["grid"][interface]), frame_of(file["grid"][interface])
+    surfaces = file["surfaces"][interface]
+    for jump in contents.jump_names:
+        contact, image = file["contact"][interface][jump], grid_image(grid, frame)
+        fields = traction_fields(contact, frame) | _surface_fields(surfaces, jump)
+        attach(image.cell_data, fields | life_fields(contents, file, interface, jump))
+        yield float(contact.attrs["cycles"]), interface, folder / f"{jump}.vti", image
 
 
 def _surface_fields(surfaces: h5py.Group, jump: str) -> Fields:
@@ -88,23 +73,19 @@ def _surface_fields(surfaces: h5py.Group, jump: str) -> Fields:
     fields: Fields = {}
     for body in (1, 2):
         height = cells(surfaces[jump][f"body_{body}"])
-        unworn = cells(surfaces[UNWORN][f"body_{body}"])
+        unworn = cells(surfaces[jump_name(0)][f"body_{body}"])
         fields[f"height_{body}"] = height, "mm"
         fields[f"wear_depth_{body}"] = np.abs(height - unworn), "mm"
     total = sum(fields[f"wear_depth_{body}"][0] for body in (1, 2))
     return fields | {"wear_depth": (np.asarray(total), "mm")}
 
 
-def _placement(file: h5py.File, interface: str) -> tuple[Grid, Frame]:
-    """Grid and frame of an interface."""
-    group = file["grid"][interface]
-    return grid_of(group), frame_of(group)
-
-
 # --- worn surfaces ------------------------------------------------------------------------------
 
 
-def _write_worn_surfaces(file: h5py.File, interface: str, folder: Path) -> list[Path]:
+def _write_worn_surfaces(
+    contents: Contents, file: h5py.File, interface: str, folder: Path
+) -> list[Path]:
     """STL of both worn surfaces of one face, for CAD and meshers.
 
     Vertices are the centres of the grid cells that lie on the FE contact face, rounding included:
@@ -113,11 +94,11 @@ def _write_worn_surfaces(file: h5py.File, interface: str, folder: Path) -> list[
     """
     import pyvista
 
-    grid, frame = _placement(file, interface)
-    rows, columns = _face_window(file, interface, grid)
-    last = jump_names(file, interface)[-1]
+    grid, frame = grid_of(file["grid"][interface]), frame_of(file["grid"][interface])
+    rows, columns = _face_window(file["structure"][interface]["coordinates"][()], grid)
+    last = contents.jump_names[-1]
     written = []
-    for body, name in body_names(file).items():
+    for body, name in enumerate(contents.bodies, start=1):
         height = file["surfaces"][interface][last][f"body_{body}"][()]
         x, y, z = np.broadcast_arrays(grid.x, grid.y, height)
         local = np.stack([field[rows, columns] for field in (x, y, z)], axis=-1)
@@ -131,11 +112,8 @@ def _write_worn_surfaces(file: h5py.File, interface: str, folder: Path) -> list[
     return written
 
 
-def _face_window(file: h5py.File, interface: str, grid: Grid) -> tuple[slice, slice]:
-    """Rows and columns of the grid whose centres lie on the FE face; all without an FE face."""
-    face = file.get(f"structure/{interface}/coordinates")
-    if face is None:
-        return slice(None), slice(None)
+def _face_window(face: Array, grid: Grid) -> tuple[slice, slice]:
+    """Rows and columns of the grid whose centres lie on the face with the nodes ``(n, 2)``."""
     low, high = np.min(face, axis=0), np.max(face, axis=0)
     inside_x = np.flatnonzero((grid.x.ravel() >= low[0]) & (grid.x.ravel() <= high[0]))
     inside_y = np.flatnonzero((grid.y.ravel() >= low[1]) & (grid.y.ravel() <= high[1]))
@@ -153,24 +131,12 @@ def _triangles(nx: int, ny: int) -> np.ndarray:
 # --- structure ----------------------------------------------------------------------------------
 
 
-def _write_structure(file: h5py.File, folder: Path) -> list[Path]:
-    """All bodies at peak load, unworn and (where there is one) worn."""
-    times = {"unworn": 0.0}
-    if "kinetics" in file:
-        times["worn"] = float(file["kinetics/cycles"][-1])
-    steps: list[Step] = []
+def _bodies(file: h5py.File, folder: Path) -> Iterator[Step]:
+    """All bodies at peak load, unworn and worn, with nodal displacement and stresses."""
+    times = {"unworn": 0.0, "worn": float(file["kinetics/cycles"][-1])}
     for state, time in times.items():
         for body, states in file["bodies"].items():
-            if state in states:
-                path = folder / "structure" / f"{body}_{state}.vtu"
-                write_xml(_stressed_body(states[state]), path)
-                steps.append((time, body, path))
-    return write_series(folder / "structure.pvd", steps)
-
-
-def _stressed_body(group: h5py.Group) -> pyvista.UnstructuredGrid:
-    """One body with nodal displacement and stresses."""
-    mesh = body_mesh(group)
-    units = {"displacement": "mm", "von_mises": "MPa", "maximum_principal": "MPa"}
-    attach(mesh.point_data, {name: (group[name][()], unit) for name, unit in units.items()})
-    return mesh
+            mesh = body_mesh(states[state])
+            fields = {name: (states[state][name][()], unit) for name, unit in NODAL.items()}
+            attach(mesh.point_data, fields)
+            yield time, body, folder / f"{body}_{state}.vtu", mesh
