@@ -26,12 +26,11 @@ import numpy as np
 from numba import njit, vectorize
 
 from sa_solver.types import Array
-from wear.joints.law import JointResponse, JointState
+from wear.joints.law import JointState
 from wear.joints.parameters import (
     JointError,
     Parameter,
     UniaxialLaw,
-    kernel_response,
     parameter_columns,
 )
 
@@ -221,6 +220,9 @@ class BoucWen(UniaxialLaw):
     the mean of the tangents forwards and backwards.
     """
 
+    columns = 2
+    kernel = staticmethod(_respond)
+
     sigma: Parameter = 0.5
     exponent: Parameter = 2.0
 
@@ -249,14 +251,8 @@ class BoucWen(UniaxialLaw):
         return self.stiffness, self.residual_stiffness, self.limit, self.exponent, gain
 
     @cached_property
-    def _parameters(self) -> Array:
+    def parameters(self) -> Array:
         return parameter_columns(*self._constants)
-
-    def rest(self, joints: int) -> JointState:
-        return np.zeros((joints, 2))
-
-    def respond(self, state: JointState, increment: Array) -> JointResponse:
-        return kernel_response(_respond, self._parameters, state, increment)
 
     def loop_energy(self, amplitude: Parameter) -> Array:
         """Energy lost in a settled cycle between ± ``amplitude`` [mm], in [N mm].

@@ -22,7 +22,10 @@ from wear.joints.periodic_sliders import (
     MAX_PERIODS,
     PLAIN_PERIODS,
     REPEATED,
+    DrivenJoints,
+    Period,
     differences,
+    relative_change,
 )
 
 # A force below the circle by no more than this share of it slips: rounding.
@@ -202,17 +205,13 @@ def _settle_contact(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _project_stuck(
-    stiffness: float,
-    basis: Array,
-    weights: Array,
-    shares: Array,
-    record: PeriodRecord,
-    jacobian: Array,
+    stiffness: float, period: Period, shares: Array, record: PeriodRecord, jacobian: Array
 ) -> None:
     """Tangential part of the derivative where all samples stick.
 
     The stretch at a sample is that at the first one and the displacement since.
     """
+    basis, weights = period.basis, period.weights
     size = basis.shape[1]
     first = record.gradient[0]
     for row in range(size):
@@ -231,70 +230,42 @@ def _project(stiffness: float, weights: Array, record: PeriodRecord, jacobian: A
     """Tangential part of the derivative."""
     size = weights.shape[0]
     flat = record.gradient.reshape(len(record.gradient), 6 * size)
-    slopes = np.dot(weights, flat)
-    for row in range(size):
-        for direction in range(2):
-            for by in range(3):
-                place = (3 * direction + by) * size
-                for c in range(size):
-                    jacobian[row, direction, c, by] = stiffness * slopes[row, place + c]
+    slopes = np.dot(weights, flat).reshape(size, 2, 3, size)
+    jacobian[:, :2] = stiffness * slopes.transpose(0, 1, 3, 2)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _project_normal(
-    stiffness: float, basis: Array, weights: Array, shares: Array, states: Array, jacobian: Array
+    stiffness: float, period: Period, shares: Array, states: Array, jacobian: Array
 ) -> None:
     """Normal part of the derivative: kn as long as there is contact."""
-    size = basis.shape[1]
-    apart = np.count_nonzero(states == 2)
     pressed = shares
-    if apart > 0:
-        touching = np.zeros_like(basis)
-        for at in range(len(basis)):
-            if states[at] != 2:
-                touching[at] = basis[at]
-        pressed = np.dot(weights, touching)
-    for row in range(size):
-        for c in range(size):
-            jacobian[row, 2, c, 0] = jacobian[row, 2, c, 1] = 0.0
-            jacobian[row, 2, c, 2] = stiffness * pressed[row, c]
+    if np.any(states == 2):
+        touching = period.basis.copy()
+        touching[states == 2] = 0.0
+        pressed = np.dot(period.weights, touching)
+    jacobian[:, 2] = 0.0
+    jacobian[:, 2, :, 2] = stiffness * pressed
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def settle_contacts(
-    basis: Array,
-    weights: Array,
-    lead: Array,
-    parameters: Array,
-    path: Array,
-    before: Array,
-    force: Array,
-    states: Array,
-    projected: Array,
-    jacobian: Array,
-    dissipated: Array,
-    change: Array,
-) -> None:
-    """Settle contacts: ``parameters`` ``(j, 5)`` are those of the law.
-
-    ``path`` ``(j, t, 3)`` and ``before`` ``(j, p, 3)`` [mm] are the displacements, the last of
-    ``before`` being the first of ``path``. The others are written.
-    """
+def settle_contacts(period: Period, joints: DrivenJoints) -> None:
+    """Settle contacts; parameters are those of the law."""
+    basis = period.basis
     samples, size = basis.shape
     gradient = np.empty((samples, 2, 3, size))
-    steps, shares = differences(basis), np.dot(weights, basis)
+    steps, shares = differences(basis), np.dot(period.weights, basis)
     memory = Memory(np.empty(3), np.empty((2, 3, size)), np.empty(3), np.empty(3), np.empty((3, 6)))
-    for j in range(len(parameters)):
-        joint, record = parameters[j], PeriodRecord(force[j], states[j], gradient)
-        _lead_in(joint, memory, before[j], lead)
-        dissipated[j], missing, sticks = _settle_contact(
-            joint, memory, path[j], basis, steps, record
+    for j in range(len(joints.parameters)):
+        joint, jacobian = joints.parameters[j], joints.jacobian[j]
+        record = PeriodRecord(joints.force[j], joints.states[j], gradient)
+        _lead_in(joint, memory, joints.before[j], period.lead)
+        joints.dissipated[j], missing, sticks = _settle_contact(
+            joint, memory, joints.path[j], basis, steps, record
         )
-        largest = np.max(np.abs(force[j]))
-        change[j] = missing / largest if largest > 0.0 else 0.0
-        projected[j] = np.dot(weights, force[j])
+        joints.change[j] = relative_change(missing, record.force)
         if sticks:
-            _project_stuck(joint[0], basis, weights, shares, record, jacobian[j])
+            _project_stuck(joint[0], period, shares, record, jacobian)
         else:
-            _project(joint[0], weights, record, jacobian[j])
-        _project_normal(joint[1], basis, weights, shares, states[j], jacobian[j])
+            _project(joint[0], period.weights, record, jacobian)
+        _project_normal(joint[1], period, shares, record.states, jacobian)

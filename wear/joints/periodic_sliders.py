@@ -9,6 +9,7 @@ beside the one of the law itself.
 from __future__ import annotations
 
 from math import copysign, exp
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -19,7 +20,8 @@ from wear.joints.jenkins import advance_jenkins
 from wear.joints.masing import DEPTH, DISPLACEMENT, POINTS, advance_masing, turns
 
 JENKINS, BOUC_WEN = 0.0, 1.0
-"""First parameter of a joint with one number of memory; K, kr, µN, n and 2 σ - 1 follow."""
+"""First parameter of a joint with one number of memory; K, kr, µN follow, of the latter n and
+2 σ - 1."""
 
 # Periods after which a joint that still changes is given up. Newton's steps on the memory double
 # its digits in each: more mean that it has no attractor.
@@ -41,11 +43,37 @@ LEFT_IN_SLIP = 0.5
 CURVE_PERIODS = 2
 
 
+class Period(NamedTuple):
+    """Functions of time: ``basis`` ``(t, m)``, ``weights`` ``(m, t)`` and ``lead`` ``(p, m)``."""
+
+    basis: Array
+    weights: Array
+    lead: Array
+
+
+class DrivenJoints(NamedTuple):
+    """Joints driven through a period; the last two axes only where they have three directions.
+
+    ``parameters`` ``(j, k)`` of the law, displacements ``path`` ``(j, t, d)`` in the period and
+    ``before`` ``(j, p, d)`` on the way to it [mm], the last of which is the first of ``path``.
+    The others are written: see :class:`wear.joints.periodic.SettledCycle`.
+    """
+
+    parameters: Array
+    path: Array
+    before: Array
+    force: Array
+    states: Array
+    jacobian: Array
+    dissipated: Array
+    change: Array
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _move(joint: Array, stretch: float, increment: float) -> tuple[float, float, float, float]:
     """One increment: stretch at its end, derivatives by stretch and increment, energy lost."""
-    kind, spring, limit = joint[0], joint[1], joint[3]
-    if kind == JENKINS:
+    spring, limit = joint[1], joint[3]
+    if joint[0] == JENKINS:
         _, slope, _, end, lost = advance_jenkins(spring, 0.0, limit, 0.0, stretch, increment)
         held = 1.0 if slope > 0.0 else 0.0
         return end, held, held, lost
@@ -122,36 +150,26 @@ def _settle_slider(
     gradient: Array,
 ) -> tuple[float, float]:
     """March until stretch and derivative repeat: energy lost, last change of the stretch."""
-    size = steps.shape[1]
-    before = np.empty(size)
+    before = np.empty_like(derivative)
     repeated = REPEATED * min(joint[3] / joint[1], np.max(np.abs(path)))
     lost, change = 0.0, 0.0
     for period in range(MAX_PERIODS):
         before[:] = derivative
         end, total, lost = _round(joint, stretch, path, steps, derivative, force, states, gradient)
         change = end - stretch
-        if abs(change) <= repeated and _furthest(derivative, before) <= DERIVATIVE_REPEATED:
+        turned = np.max(np.abs(derivative - before))
+        if abs(change) <= repeated and turned <= DERIVATIVE_REPEATED:
             break
         part = 1.0
         if period >= PLAIN_PERIODS and 1.0 - total > FORGETTING:
             part = 1.0 / (1.0 - total)
         stretch += part * change
-        for c in range(size):
-            derivative[c] = before[c] + part * (derivative[c] - before[c])
+        derivative[:] = before + part * (derivative - before)
     return lost, change
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _furthest(one: Array, other: Array) -> float:
-    """Largest distance of two arrays ``(m,)``."""
-    furthest = 0.0
-    for c in range(one.size):
-        furthest = max(furthest, abs(one[c] - other[c]))
-    return furthest
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _relative_change(change: float, force: Array) -> float:
+def relative_change(change: float, force: Array) -> float:
     """A change of force over the largest force."""
     largest = np.max(np.abs(force))
     return abs(change) / largest if largest > 0.0 else 0.0
@@ -168,48 +186,24 @@ def differences(basis: Array) -> Array:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def settle_sliders(
-    basis: Array,
-    weights: Array,
-    lead: Array,
-    parameters: Array,
-    path: Array,
-    before: Array,
-    force: Array,
-    states: Array,
-    projected: Array,
-    jacobian: Array,
-    dissipated: Array,
-    change: Array,
-) -> None:
-    """Settle Jenkins's and Bouc-Wen's joints.
-
-    ``parameters`` ``(j, 6)``: kind, K, kr, µN, n, 2 σ - 1. ``path`` ``(j, t, 1)`` and ``before``
-    ``(j, p, 1)`` [mm] are the displacements, the last of ``before`` being the first of ``path``.
-    The others are written.
-    """
-    samples, size = basis.shape
-    gradient, derivative, steps = np.empty((samples, size)), np.empty(size), differences(basis)
+def settle_sliders(period: Period, joints: DrivenJoints) -> None:
+    """Settle Jenkins's and Bouc-Wen's joints; parameters begin with their kind."""
+    samples, size = period.basis.shape
+    gradient, derivative = np.empty((samples, size)), np.empty(size)
+    steps = differences(period.basis)
     # Needed for residual stiffness only: for one joint as much work as all the rest.
-    beside = np.any(parameters[:, 2] != 0.0)
-    shares = np.dot(weights, basis) if beside else np.zeros((size, size))
-    joint_force, joint_path = np.empty(samples), np.empty(samples)
-    for j in range(len(parameters)):
-        joint = parameters[j]
-        joint_path[:] = path[j, :, 0]
-        start = _lead_in(joint, before[j, :, 0], lead, derivative)
-        dissipated[j], missing = _settle_slider(
-            joint, start, joint_path, steps, derivative, joint_force, states[j], gradient
+    beside = np.any(joints.parameters[:, 2] != 0.0)
+    shares = np.dot(period.weights, period.basis) if beside else np.zeros((size, size))
+    for j in range(len(joints.parameters)):
+        joint, path, force = joints.parameters[j], joints.path[j], joints.force[j]
+        stretch = _lead_in(joint, joints.before[j], period.lead, derivative)
+        joints.dissipated[j], missing = _settle_slider(
+            joint, stretch, path, steps, derivative, force, joints.states[j], gradient
         )
-        change[j] = _relative_change(joint[1] * missing, joint_force)
-        slopes = np.dot(weights, gradient)
-        for at in range(samples):
-            joint_force[at] += joint[2] * joint_path[at]
-            force[j, at, 0] = joint_force[at]
-        projected[j, :, 0] = np.dot(weights, joint_force)
-        for row in range(size):
-            for c in range(size):
-                jacobian[j, row, 0, c, 0] = joint[1] * slopes[row, c] + joint[2] * shares[row, c]
+        joints.change[j] = relative_change(joint[1] * missing, force)
+        force += joint[2] * path
+        slopes = np.dot(period.weights, gradient)
+        joints.jacobian[j] = joint[1] * slopes + joint[2] * shares
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
@@ -247,24 +241,9 @@ def _follow_curve(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def settle_curves(
-    basis: Array,
-    weights: Array,
-    lead: Array,
-    parameters: Array,
-    path: Array,
-    before: Array,
-    force: Array,
-    states: Array,
-    projected: Array,
-    jacobian: Array,
-    dissipated: Array,
-    change: Array,
-) -> None:
-    """Settle joints of spread sliders: ``parameters`` ``(j, 5)``, K, kr, µN, c and m.
-
-    The others as in :func:`settle_sliders`.
-    """
+def settle_curves(period: Period, joints: DrivenJoints) -> None:
+    """Settle joints of spread sliders; parameters are K, kr, µN, c and m."""
+    basis, lead = period.basis, period.lead
     samples, size = basis.shape
     # Turning points that may be open at once: those of the way in, and of a period and its first
     # samples again.
@@ -272,40 +251,26 @@ def settle_curves(
     memory = np.empty(POINTS + 2 * depth)
     places, forces = np.empty((depth, size)), np.empty((depth, size))
     gradients, gradient, nowhere = np.empty((samples, size)), np.empty(size), np.zeros(size)
-    shares = np.dot(weights, basis)
-    joint_force = np.empty(samples)
-    for j in range(len(parameters)):
-        joint = parameters[j]
+    shares = np.dot(period.weights, basis)
+    for j in range(len(joints.parameters)):
+        joint, path, force = joints.parameters[j], joints.path[j], joints.force[j]
         memory[:], gradient[:], here = 0.0, 0.0, nowhere
         for i in range(len(lead)):
-            end = before[j, i, 0]
-            joint_force[0], _, _ = _follow_curve(
-                joint, memory, places, forces, here, lead[i], end, gradient
+            force[0], _, _ = _follow_curve(
+                joint, memory, places, forces, here, lead[i], joints.before[j, i], gradient
             )
             here = lead[i]
         for _ in range(CURVE_PERIODS):
-            start, dissipated[j] = joint_force[0], 0.0
+            start, joints.dissipated[j] = force[0], 0.0
             for step in range(1, samples + 1):
                 at = step if step < samples else 0
-                joint_force[at], left, lost = _follow_curve(
-                    joint,
-                    memory,
-                    places,
-                    forces,
-                    basis[step - 1],
-                    basis[at],
-                    path[j, at, 0],
-                    gradient,
+                here, there = basis[step - 1], basis[at]
+                force[at], left, lost = _follow_curve(
+                    joint, memory, places, forces, here, there, path[at], gradient
                 )
                 gradients[at] = gradient
-                dissipated[j] += lost
-                states[j, at] = 1 if left < LEFT_IN_SLIP else 0
-            change[j] = _relative_change(joint_force[0] - start, joint_force)
-        slopes = np.dot(weights, gradients)
-        for at in range(samples):
-            joint_force[at] += joint[1] * path[j, at, 0]
-            force[j, at, 0] = joint_force[at]
-        projected[j, :, 0] = np.dot(weights, joint_force)
-        for row in range(size):
-            for c in range(size):
-                jacobian[j, row, 0, c, 0] = slopes[row, c] + joint[1] * shares[row, c]
+                joints.dissipated[j] += lost
+                joints.states[j, at] = 1 if left < LEFT_IN_SLIP else 0
+            joints.change[j] = relative_change(force[0] - start, force)
+        force += joint[1] * path
+        joints.jacobian[j] = np.dot(period.weights, gradients) + joint[1] * shares

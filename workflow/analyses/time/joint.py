@@ -18,7 +18,8 @@ from wear.joints.ageing import (
     steady_stroke,
 )
 from wear.joints.law import march_joints
-from wear.joints.measured_loops import MeasuredLoopError, measure_loops
+from wear.joints.loop_record import MeasuredLoopError
+from wear.joints.measured_loops import measure_loops
 from workflow.analyses.rig.laws import Law
 from workflow.analyses.time.case import Ageing, JointCase, joules
 from workflow.analyses.time.joint_model import JointModel

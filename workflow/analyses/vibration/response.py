@@ -25,7 +25,8 @@ from fe_models.dynamics.harmonics import Resolution
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
-from wear.joints.measured_loops import MeasuredLoopError, MeasuredLoops, measure_loops
+from wear.joints.loop_record import MeasuredLoopError
+from wear.joints.measured_loops import MeasuredLoops, measure_loops
 from wear.joints.periodic import SEPARATED, SLIP, STICK
 from wear.moving import LARGE_STROKE
 from workflow.analyses.vibration.case import VibrationCase
