@@ -361,33 +361,27 @@ def steady_stroke(law: UniaxialLaw, evolution: JointEvolution, amplitude: float)
     return energy_per_cycle
 
 
-class MarchedStroke:
+def marched_stroke(
+    law: UniaxialLaw, evolution: JointEvolution, amplitude: float, start: float = 0.0
+) -> EnergyPerCycle:
     """The same, marched: cycle after cycle with the memory of the ones before.
 
     One joint goes from +``amplitude`` [mm] to -``amplitude`` and back, with the parameters that
     belong to the energy at the cycle's begin: laws are exact along a straight path. It is brought
-    to +``amplitude`` without counting what that takes.
+    to +``amplitude`` without counting what that takes, with the parameters of ``start`` [N mm].
     """
+    begun = evolution.at(law, start)
+    state = begun.respond(begun.rest(1), np.array([[amplitude]])).state
 
-    def __init__(
-        self,
-        law: UniaxialLaw,
-        evolution: JointEvolution,
-        amplitude: float,
-        start: float = 0.0,
-    ) -> None:
-        self._law, self._evolution, self._stroke = law, evolution, 2.0 * amplitude
-        begun = evolution.at(law, start)
-        self._state = begun.respond(begun.rest(1), np.array([[amplitude]])).state
-
-    def __call__(self, energy: float) -> float:
-        """Energy of the next cycle [N mm] where ``energy`` [N mm] was dissipated before."""
-        law, total = self._evolution.at(self._law, energy), 0.0
-        for step in (-self._stroke, self._stroke):
-            response = law.respond(self._state, np.array([[step]]))
-            self._state = response.state
-            total += float(response.dissipated[0])
+    def energy_per_cycle(energy: float) -> float:
+        nonlocal state
+        worn, total = evolution.at(law, energy), 0.0
+        for step in (-2.0 * amplitude, 2.0 * amplitude):
+            response = worn.respond(state, np.array([[step]]))
+            state, total = response.state, total + float(response.dissipated[0])
         return total
+
+    return energy_per_cycle
 
 
 # --- checking -----------------------------------------------------------------------------------

@@ -12,10 +12,10 @@ import wear.joints.ageing
 from tests.wear.joints.papers import BOLTED, KJ, RIG, RIG_AMPLITUDE, RIG_EVOLUTION, J
 from wear.joints.ageing import (
     AgeingError,
-    MarchedStroke,
     NeverReachedError,
     integrate_cycles,
     long_test,
+    marched_stroke,
     steady_stroke,
 )
 from wear.joints.bouc_wen import BoucWen
@@ -250,7 +250,7 @@ def test_settled_bouc_wen_loop(energy, amplitude) -> None:
 def test_settled_loops_are_those_of_a_march(energy) -> None:
     """At frozen parameters; a law of one straight increment per branch is exact."""
     for law, evolution, amplitude in (TEST_4, (RIG, RIG_EVOLUTION, RIG_AMPLITUDE)):
-        marched = MarchedStroke(law, evolution, amplitude, start=energy)
+        marched = marched_stroke(law, evolution, amplitude, start=energy)
         for _ in range(3):
             found = marched(energy)
         expected = steady_stroke(law, evolution, amplitude)(energy)
@@ -300,7 +300,7 @@ def test_rig_on_a_stretch(rig, first) -> None:
 def test_rig_on_a_marched_stretch(rig, first) -> None:
     """The law's own memory from cycle to cycle makes no difference: the joint slides fully."""
     start = float(rig.energy_at(first))
-    marched = MarchedStroke(RIG, RIG_EVOLUTION, RIG_AMPLITUDE, start=start)
+    marched = marched_stroke(RIG, RIG_EVOLUTION, RIG_AMPLITUDE, start=start)
     stretch = integrate_cycles(rig, marched, first, 1000)
     assert abs(stretch.difference) < 1e-4
 
@@ -348,7 +348,7 @@ def test_bolted_joint_counted_to_its_end(bolted) -> None:
 @pytest.mark.parametrize("first", [0.0, 245e3, 1e6])
 def test_bolted_joint_on_a_marched_stretch(bolted, first) -> None:
     law, evolution, amplitude = TEST_4
-    marched = MarchedStroke(law, evolution, amplitude, start=float(bolted.energy_at(first)))
+    marched = marched_stroke(law, evolution, amplitude, start=float(bolted.energy_at(first)))
     stretch = integrate_cycles(bolted, marched, first, 500)
     assert abs(stretch.difference) <= stretch.stated + 1e-7
 

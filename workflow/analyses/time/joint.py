@@ -11,10 +11,10 @@ from sa_solver.types import Array
 from wear.joints.ageing import (
     AgeingError,
     LongTest,
-    MarchedStroke,
     NeverReachedError,
     integrate_cycles,
     long_test,
+    marched_stroke,
     steady_stroke,
 )
 from wear.joints.law import march_joints
@@ -194,7 +194,7 @@ def _ageing_numbers(model: JointModel, test: LongTest, amplitude: float) -> dict
     if cycles < 1:
         return numbers
     begin = float(test.energy_at(first))
-    marched = MarchedStroke(model.line_law, model.evolution, amplitude, start=begin)
+    marched = marched_stroke(model.line_law, model.evolution, amplitude, start=begin)
     stretch = integrate_cycles(test, marched, first, cycles)
     return numbers | {
         "stretch": {
