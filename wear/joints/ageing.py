@@ -391,12 +391,11 @@ def marched_stroke(
 class IntegratedCycles:
     """Cycles of a long test integrated one after the other.
 
-    ``energy`` ``(k + 1,)`` [N mm] is that of ``k`` cycles from ``first`` on and ``jumped`` that of
-    the test after the same cycles; ``difference`` is that of their last, in cycles, and ``stated``
-    the one that the test allows for.
+    ``energy`` ``(k + 1,)`` [N mm] is that of ``k`` cycles and ``jumped`` that of the test after the
+    same cycles; ``difference`` is that of their last, in cycles, and ``stated`` the one that the
+    test allows for.
     """
 
-    first: float
     energy: Array
     jumped: Array
     difference: float
@@ -428,4 +427,4 @@ def integrate_cycles(
     ]
     # A jump errs by this at either end of these cycles.
     stated = 2.0 * sum(jump.error for jump in touched)
-    return IntegratedCycles(float(first), energy, jumped, difference, stated)
+    return IntegratedCycles(energy, jumped, difference, stated)

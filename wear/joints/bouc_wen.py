@@ -32,6 +32,7 @@ from wear.joints.parameters import (
     Parameter,
     UniaxialLaw,
     parameter_columns,
+    require,
 )
 
 # Largest step n s of the fourth-order rule, and the largest as a share of |ξ| or, by ξ = 0, at all:
@@ -145,24 +146,13 @@ def advance_bouc_wen(
             xi = copysign(1.0, increment)
         return residual * displacement, residual, displacement, xi, 0.0
     if increment == 0.0:
-        slope = 1.0 - 0.5 * (1.0 - gain) * abs(xi) ** exponent
-        return (
-            limit * xi + residual * displacement,
-            residual + spring * slope,
-            displacement,
-            xi,
-            0.0,
-        )
-    sign = copysign(1.0, increment)
-    eta, lost = travel(sign * xi, spring * abs(increment) / limit, exponent, gain)
-    xi = sign * eta
-    return (
-        limit * xi + residual * displacement,
-        residual + spring * xi_rate(eta, exponent, gain),
-        displacement,
-        xi,
-        limit * (limit / spring) * max(lost, 0.0),
-    )
+        slope, lost = 1.0 - 0.5 * (1.0 - gain) * abs(xi) ** exponent, 0.0
+    else:
+        sign = copysign(1.0, increment)
+        eta, lost = travel(sign * xi, spring * abs(increment) / limit, exponent, gain)
+        xi, slope = sign * eta, xi_rate(eta, exponent, gain)
+    force, lost = limit * xi + residual * displacement, limit * (limit / spring) * max(lost, 0.0)
+    return force, residual + spring * slope, displacement, xi, lost
 
 
 @njit(cache=True)
@@ -233,17 +223,11 @@ class BoucWen(UniaxialLaw):
                 f"residual_stiffness of a Bouc-Wen joint is {self.residual_stiffness}: it must be "
                 f"below its stiffness {self.stiffness}, which is the whole initial slope"
             )
-        if not np.all((np.asarray(self.sigma) >= 0.5) & (np.asarray(self.sigma) <= 1.0)):
-            raise JointError(
-                f"sigma of a joint is {self.sigma}: it must be from 0.5 (below, unloading would "
-                "create energy) to 1"
-            )
-        if not (
-            np.all(np.greater_equal(self.exponent, 1.0)) and np.all(np.isfinite(self.exponent))
-        ):
-            raise JointError(
-                f"exponent of a joint is {self.exponent}: it must be finite, 1 or more"
-            )
+        sigma, exponent = np.asarray(self.sigma), np.asarray(self.exponent)
+        range_text = "from 0.5 (below, unloading would create energy) to 1"
+        require("sigma", sigma, (sigma >= 0.5) & (sigma <= 1.0), range_text)
+        proper = (exponent >= 1.0) & (exponent < np.inf)
+        require("exponent", exponent, proper, "finite, 1 or more")
 
     @cached_property
     def _constants(self) -> tuple[Parameter, ...]:

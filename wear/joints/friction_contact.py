@@ -385,16 +385,16 @@ def advance_contact(
 
 @njit(cache=True)
 def _respond(
-    parameters: Array, start: Array, increment: Array
+    parameters: Array, state: Array, increment: Array
 ) -> tuple[Array, Array, Array, Array]:
     """:func:`advance_contact` for every joint: forces, tangents, states and energies lost."""
-    joints = len(start)
+    joints = len(state)
     force, end, jacobian = np.empty((joints, 3)), np.empty((joints, 3)), np.empty((joints, 3, 6))
     dissipated = np.empty(joints)
     for j in range(joints):
         joint = parameters[j % len(parameters)]
         dissipated[j] = advance_contact(
-            joint, start[j], increment[j], force[j], end[j], jacobian[j]
+            joint, state[j], increment[j], force[j], end[j], jacobian[j]
         )
     return force, jacobian[:, :, 3:], end, dissipated
 

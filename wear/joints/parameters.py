@@ -8,7 +8,6 @@ most of it in making the arrays it returns.
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
 from dataclasses import dataclass, fields
 from typing import ClassVar
 
@@ -19,27 +18,30 @@ from sa_solver.types import Array
 from wear.joints.law import JointResponse, JointState
 
 Parameter = float | Array
-ResponseKernel = Callable[[Array, Array, Array], tuple[Array, Array, Array, Array]]
 
 
 class JointError(InputError):
     """Parameters that a joint law cannot have, or arrays that do not fit its joints."""
 
 
+def require(name: str, value: Parameter, proper: np.ndarray, range_text: str) -> None:
+    """Raise :class:`JointError` unless a parameter is ``proper`` throughout."""
+    if not np.all(proper):
+        raise JointError(f"{name} of a joint is {value}: it must be {range_text}")
+
+
 def require_positive(**values: Parameter) -> None:
     """Raise :class:`JointError` naming the first of ``values`` that is not above 0 throughout."""
     for name, value in values.items():
         given = np.asarray(value)
-        if not ((given > 0.0) & (given < np.inf)).all():
-            raise JointError(f"{name} of a joint is {value}: it must be finite and above 0")
+        require(name, value, (given > 0.0) & (given < np.inf), "finite and above 0")
 
 
 def require_not_negative(**values: Parameter) -> None:
     """Raise :class:`JointError` naming the first of ``values`` that is somewhere below 0."""
     for name, value in values.items():
         given = np.asarray(value)
-        if not ((given >= 0.0) & (given < np.inf)).all():
-            raise JointError(f"{name} of a joint is {value}: it must be finite and 0 or more")
+        require(name, value, (given >= 0.0) & (given < np.inf), "finite and 0 or more")
 
 
 def require_one_each(*values: Parameter) -> None:
@@ -63,13 +65,18 @@ def parameter_columns(*values: Parameter) -> Array:
 class CompiledLaw(ABC):
     """A law whose response is that of a compiled loop over its joints.
 
-    The ``kernel`` takes parameters, state and increment, and answers what :class:`JointResponse`
-    holds. A state at rest has so many ``columns``.
+    A state at rest has so many ``columns``.
     """
 
     directions: ClassVar[int]
     columns: ClassVar[int]
-    kernel: ClassVar[ResponseKernel]
+
+    @staticmethod
+    @abstractmethod
+    def kernel(
+        parameters: Array, state: Array, increment: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """The loop: all that :class:`JointResponse` holds."""
 
     @property
     @abstractmethod

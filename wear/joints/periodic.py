@@ -36,6 +36,7 @@ from wear.joints.periodic_sliders import (
     JENKINS,
     DrivenJoints,
     Period,
+    differences,
     settle_curves,
     settle_sliders,
 )
@@ -44,7 +45,7 @@ STICK, SLIP, SEPARATED = 0, 1, 2
 """States of a joint at a sample. A spread or smooth joint slips where less than half of the
 stiffness that it may lose is left."""
 
-SettlingKernel = Callable[..., None]
+SettlingKernel = Callable[[Period, DrivenJoints], None]
 
 
 @dataclass(frozen=True)
@@ -107,9 +108,10 @@ class PeriodicMarch:
                 force=force[..., 0],
                 jacobian=jacobian[:, :, 0, :, 0],
             )
+        period = Period(basis, weights, lead, differences(basis))
 
         def work(share: slice) -> None:
-            kernel(Period(basis, weights, lead), DrivenJoints(*(part[share] for part in driven)))
+            kernel(period, DrivenJoints(*(part[share] for part in driven)))
 
         self._in_shares(joints, work)
         return SettledCycle(
@@ -118,7 +120,18 @@ class PeriodicMarch:
 
     @cached_property
     def _kernel(self) -> tuple[SettlingKernel, Array]:
-        return _kernel_of(self.law)
+        """The compiled march of the law, and its parameters ``(1 or j, p)``."""
+        law = self.law
+        if isinstance(law, FrictionContact):
+            return settle_contacts, law.parameters
+        if isinstance(law, MasingLaw):
+            return settle_curves, law.parameters
+        if isinstance(law, Jenkins):
+            return settle_sliders, np.insert(law.parameters, 0, JENKINS, axis=1)
+        parameters = np.insert(law.parameters, 0, BOUC_WEN, axis=1)
+        # Of its stiffness the spring has what is not residual.
+        parameters[:, 1] -= parameters[:, 2]
+        return settle_sliders, parameters
 
     def _in_shares(self, joints: int, work: Callable[[slice], None]) -> None:
         """Do the work for all joints, in a share per thread."""
@@ -144,19 +157,3 @@ class PeriodicMarch:
         laws = len(self._kernel[1])
         if laws not in (1, joints):
             raise JointError(f"the law is that of {laws} joints, the coefficients of {joints}")
-
-
-def _kernel_of(
-    law: Jenkins | BoucWen | MasingLaw | FrictionContact,
-) -> tuple[SettlingKernel, Array]:
-    """The compiled march of a law, and its parameters ``(1 or j, p)``."""
-    if isinstance(law, FrictionContact):
-        return settle_contacts, law.parameters
-    if isinstance(law, MasingLaw):
-        return settle_curves, law.parameters
-    if isinstance(law, Jenkins):
-        return settle_sliders, np.insert(law.parameters, 0, JENKINS, axis=1)
-    parameters = np.insert(law.parameters, 0, BOUC_WEN, axis=1)
-    # Of its stiffness the spring has what is not residual.
-    parameters[:, 1] -= parameters[:, 2]
-    return settle_sliders, parameters

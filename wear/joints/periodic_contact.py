@@ -24,7 +24,7 @@ from wear.joints.periodic_sliders import (
     REPEATED,
     DrivenJoints,
     Period,
-    differences,
+    PeriodRecord,
     relative_change,
 )
 
@@ -103,20 +103,11 @@ class Memory(NamedTuple):
     slopes: Array
 
 
-class PeriodRecord(NamedTuple):
-    """What is written of a period: ``gradient`` ``(t, 2, 3, m)`` of the stretch, and the rest."""
-
-    force: Array
-    states: Array
-    gradient: Array
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
-def _move(joint: Array, memory: Memory, end: Array) -> float:
-    """One increment to the displacement ``end`` ``(3,)``; return the energy lost.
-
-    ``memory.increment`` has the tangential part of it already.
-    """
+def _move(joint: Array, memory: Memory, start: Array, end: Array) -> float:
+    """One increment between displacements ``(3,)``; return the energy lost."""
+    for direction in range(2):
+        memory.increment[direction] = end[direction] - start[direction]
     memory.increment[2] = end[2] - memory.state[2]
     lost: float = advance_contact(
         joint, memory.state, memory.increment, memory.force, memory.state, memory.slopes
@@ -129,13 +120,10 @@ def _move(joint: Array, memory: Memory, end: Array) -> float:
 def _lead_in(joint: Array, memory: Memory, before: Array, lead: Array) -> None:
     """Drive a contact from rest to the first sample."""
     memory.state[:], memory.derivative[:] = 0.0, 0.0
-    start, step = np.zeros(lead.shape[1]), np.empty(lead.shape[1])
+    here, start, step = np.zeros(3), np.zeros(lead.shape[1]), np.empty(lead.shape[1])
     for i in range(len(lead)):
-        there = before[i]
-        for direction in range(2):
-            here = before[i - 1, direction] if i > 0 else 0.0
-            memory.increment[direction] = there[direction] - here
-        _move(joint, memory, there)
+        _move(joint, memory, here, before[i])
+        here = before[i]
         step[:] = lead[i] - start
         _carry(memory.slopes, joint[0], start, step, memory.derivative)
         start[:] = lead[i]
@@ -146,8 +134,7 @@ def _round(
     joint: Array,
     memory: Memory,
     path: Array,
-    basis: Array,
-    steps: Array,
+    period: Period,
     record: PeriodRecord,
     total: Array,
 ) -> tuple[float, bool]:
@@ -155,15 +142,14 @@ def _round(
 
     ``total`` ``(2, 2)`` becomes the derivative of the stretch at its end by that at its start.
     """
+    basis, steps = period.basis, period.steps
     samples = len(basis)
     total[0, 0] = total[1, 1] = 1.0
     total[0, 1] = total[1, 0] = 0.0
     lost, sticks = 0.0, True
     for step in range(1, samples + 1):
         at = step if step < samples else 0
-        for direction in range(2):
-            memory.increment[direction] = path[at, direction] - path[step - 1, direction]
-        lost += _move(joint, memory, path[at])
+        lost += _move(joint, memory, path[step - 1], path[at])
         if not _carry(memory.slopes, joint[0], basis[step - 1], steps[at], memory.derivative):
             sticks = False
             _chain(memory.slopes, joint[0], total)
@@ -175,31 +161,27 @@ def _round(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _settle_contact(
-    joint: Array, memory: Memory, path: Array, basis: Array, steps: Array, record: PeriodRecord
+    joint: Array, memory: Memory, path: Array, period: Period, record: PeriodRecord
 ) -> tuple[float, float, bool]:
     """March until stretch and derivative repeat: energy lost, change of force, all stuck."""
     total, stretch, derivative = np.empty((2, 2)), np.empty(2), np.empty_like(memory.derivative)
     span = max(np.max(np.abs(path[:, 0])), np.max(np.abs(path[:, 1])))
     lost, change, sticks = 0.0, 0.0, True
-    for period in range(MAX_PERIODS):
+    for number in range(MAX_PERIODS):
         stretch[:], derivative[:] = memory.state[:2], memory.derivative
-        lost, sticks = _round(joint, memory, path, basis, steps, record, total)
+        lost, sticks = _round(joint, memory, path, period, record, total)
         x, y = memory.state[0] - stretch[0], memory.state[1] - stretch[1]
         change = max(abs(x), abs(y))
         turned = np.max(np.abs(memory.derivative - derivative))
         if change <= REPEATED * span and turned <= DERIVATIVE_REPEATED:
             break
-        if period < PLAIN_PERIODS:
+        if number < PLAIN_PERIODS:
             continue
         g, h, k, m = _to_the_limit(total)
         memory.state[0], memory.state[1] = stretch[0] + g * x + h * y, stretch[1] + k * x + m * y
-        memory.derivative[:] -= derivative
-        for direction in range(3):
-            for c in range(len(steps[0])):
-                x, y = memory.derivative[0, direction, c], memory.derivative[1, direction, c]
-                memory.derivative[0, direction, c] = g * x + h * y
-                memory.derivative[1, direction, c] = k * x + m * y
-        memory.derivative[:] += derivative
+        change_x, change_y = memory.derivative - derivative
+        memory.derivative[0] = derivative[0] + (g * change_x + h * change_y)
+        memory.derivative[1] = derivative[1] + (k * change_x + m * change_y)
     return lost, joint[0] * change, sticks
 
 
@@ -251,17 +233,15 @@ def _project_normal(
 @njit(cache=True, nogil=True, error_model="numpy")
 def settle_contacts(period: Period, joints: DrivenJoints) -> None:
     """Settle contacts; parameters are those of the law."""
-    basis = period.basis
-    samples, size = basis.shape
-    gradient = np.empty((samples, 2, 3, size))
-    steps, shares = differences(basis), np.dot(period.weights, basis)
+    samples, size = period.basis.shape
+    gradient, shares = np.empty((samples, 2, 3, size)), np.dot(period.weights, period.basis)
     memory = Memory(np.empty(3), np.empty((2, 3, size)), np.empty(3), np.empty(3), np.empty((3, 6)))
     for j in range(len(joints.parameters)):
         joint, jacobian = joints.parameters[j], joints.jacobian[j]
         record = PeriodRecord(joints.force[j], joints.states[j], gradient)
         _lead_in(joint, memory, joints.before[j], period.lead)
         joints.dissipated[j], missing, sticks = _settle_contact(
-            joint, memory, joints.path[j], basis, steps, record
+            joint, memory, joints.path[j], period, record
         )
         joints.change[j] = relative_change(missing, record.force)
         if sticks:

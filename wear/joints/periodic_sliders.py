@@ -44,11 +44,24 @@ CURVE_PERIODS = 2
 
 
 class Period(NamedTuple):
-    """Functions of time: ``basis`` ``(t, m)``, ``weights`` ``(m, t)`` and ``lead`` ``(p, m)``."""
+    """Functions of time: ``basis`` ``(t, m)``, ``weights`` ``(m, t)`` and ``lead`` ``(p, m)``.
+
+    ``steps`` ``(t, m)`` are the :func:`differences` of the basis.
+    """
 
     basis: Array
     weights: Array
     lead: Array
+    steps: Array
+
+
+class PeriodRecord(NamedTuple):
+    """What is written of a joint in a period: ``gradient`` ``(t, ..., m)`` of the stretch, and the
+    rest."""
+
+    force: Array
+    states: np.ndarray
+    gradient: Array
 
 
 class DrivenJoints(NamedTuple):
@@ -63,7 +76,7 @@ class DrivenJoints(NamedTuple):
     path: Array
     before: Array
     force: Array
-    states: Array
+    states: np.ndarray
     jacobian: Array
     dissipated: Array
     change: Array
@@ -109,20 +122,14 @@ def _lead_in(joint: Array, before: Array, lead: Array, derivative: Array) -> flo
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _round(
-    joint: Array,
-    stretch: float,
-    path: Array,
-    steps: Array,
-    derivative: Array,
-    force: Array,
-    states: Array,
-    gradient: Array,
+    joint: Array, stretch: float, path: Array, steps: Array, derivative: Array, record: PeriodRecord
 ) -> tuple[float, float, float]:
     """One period: stretch at its end, its derivative by that at the start, energy lost.
 
-    ``steps`` ``(t, m)`` are the differences of the basis from the sample before; written are
-    forces K z and ``states`` ``(t,)`` and the ``gradient`` ``(t, m)`` of z.
+    ``steps`` ``(t, m)`` are the differences of the basis from the sample before; forces that are
+    written are K z.
     """
+    force, states, gradient = record
     samples, size = steps.shape
     total, lost = 1.0, 0.0
     for step in range(1, samples + 1):
@@ -140,14 +147,7 @@ def _round(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _settle_slider(
-    joint: Array,
-    stretch: float,
-    path: Array,
-    steps: Array,
-    derivative: Array,
-    force: Array,
-    states: Array,
-    gradient: Array,
+    joint: Array, stretch: float, path: Array, steps: Array, derivative: Array, record: PeriodRecord
 ) -> tuple[float, float]:
     """March until stretch and derivative repeat: energy lost, last change of the stretch."""
     before = np.empty_like(derivative)
@@ -155,7 +155,7 @@ def _settle_slider(
     lost, change = 0.0, 0.0
     for period in range(MAX_PERIODS):
         before[:] = derivative
-        end, total, lost = _round(joint, stretch, path, steps, derivative, force, states, gradient)
+        end, total, lost = _round(joint, stretch, path, steps, derivative, record)
         change = end - stretch
         turned = np.max(np.abs(derivative - before))
         if abs(change) <= repeated and turned <= DERIVATIVE_REPEATED:
@@ -179,9 +179,7 @@ def relative_change(change: float, force: Array) -> float:
 def differences(basis: Array) -> Array:
     """Differences ``(t, m)`` of a basis from the sample before, round the period."""
     steps = np.empty_like(basis)
-    for at in range(len(basis)):
-        for c in range(basis.shape[1]):
-            steps[at, c] = basis[at, c] - basis[at - 1 if at > 0 else len(basis) - 1, c]
+    steps[0], steps[1:] = basis[0] - basis[-1], basis[1:] - basis[:-1]
     return steps
 
 
@@ -190,15 +188,15 @@ def settle_sliders(period: Period, joints: DrivenJoints) -> None:
     """Settle Jenkins's and Bouc-Wen's joints; parameters begin with their kind."""
     samples, size = period.basis.shape
     gradient, derivative = np.empty((samples, size)), np.empty(size)
-    steps = differences(period.basis)
     # Needed for residual stiffness only: for one joint as much work as all the rest.
     beside = np.any(joints.parameters[:, 2] != 0.0)
     shares = np.dot(period.weights, period.basis) if beside else np.zeros((size, size))
     for j in range(len(joints.parameters)):
         joint, path, force = joints.parameters[j], joints.path[j], joints.force[j]
+        record = PeriodRecord(force, joints.states[j], gradient)
         stretch = _lead_in(joint, joints.before[j], period.lead, derivative)
         joints.dissipated[j], missing = _settle_slider(
-            joint, stretch, path, steps, derivative, force, joints.states[j], gradient
+            joint, stretch, path, period.steps, derivative, record
         )
         joints.change[j] = relative_change(joint[1] * missing, force)
         force += joint[2] * path
@@ -206,23 +204,25 @@ def settle_sliders(period: Period, joints: DrivenJoints) -> None:
         joints.jacobian[j] = joint[1] * slopes + joint[2] * shares
 
 
+class OpenLoops(NamedTuple):
+    """The ``memory`` of a law, and the derivatives ``(depth, m)`` of displacement, ``places``, and
+    ``forces`` at its turning points."""
+
+    memory: Array
+    places: Array
+    forces: Array
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _follow_curve(
-    joint: Array,
-    memory: Array,
-    places: Array,
-    forces: Array,
-    here: Array,
-    there: Array,
-    end: float,
-    gradient: Array,
+    joint: Array, loops: OpenLoops, here: Array, there: Array, end: float, gradient: Array
 ) -> tuple[float, float, float]:
     """Drive a joint of spread sliders to ``end``: force, share of stiffness left, energy lost.
 
     ``here`` and ``there`` ``(m,)`` are the derivatives of displacement at both ends; ``gradient``
-    that of the force, read and written. ``places`` and ``forces`` ``(depth, m)`` are those of
-    displacement and force at the turning points.
+    that of the force, read and written.
     """
+    memory, places, forces = loops
     increment = end - memory[DISPLACEMENT]
     depth = int(memory[DEPTH])
     if increment != 0.0 and turns(memory, depth, memory[DISPLACEMENT] + increment):
@@ -249,7 +249,7 @@ def settle_curves(period: Period, joints: DrivenJoints) -> None:
     # samples again.
     depth = len(lead) + 2 * samples
     memory = np.empty(POINTS + 2 * depth)
-    places, forces = np.empty((depth, size)), np.empty((depth, size))
+    loops = OpenLoops(memory, np.empty((depth, size)), np.empty((depth, size)))
     gradients, gradient, nowhere = np.empty((samples, size)), np.empty(size), np.zeros(size)
     shares = np.dot(period.weights, basis)
     for j in range(len(joints.parameters)):
@@ -257,7 +257,7 @@ def settle_curves(period: Period, joints: DrivenJoints) -> None:
         memory[:], gradient[:], here = 0.0, 0.0, nowhere
         for i in range(len(lead)):
             force[0], _, _ = _follow_curve(
-                joint, memory, places, forces, here, lead[i], joints.before[j, i], gradient
+                joint, loops, here, lead[i], joints.before[j, i], gradient
             )
             here = lead[i]
         for _ in range(CURVE_PERIODS):
@@ -265,9 +265,7 @@ def settle_curves(period: Period, joints: DrivenJoints) -> None:
             for step in range(1, samples + 1):
                 at = step if step < samples else 0
                 here, there = basis[step - 1], basis[at]
-                force[at], left, lost = _follow_curve(
-                    joint, memory, places, forces, here, there, path[at], gradient
-                )
+                force[at], left, lost = _follow_curve(joint, loops, here, there, path[at], gradient)
                 gradients[at] = gradient
                 joints.dissipated[j] += lost
                 joints.states[j, at] = 1 if left < LEFT_IN_SLIP else 0
