@@ -87,11 +87,11 @@ def flat(pads, unworn):
 
 
 def test_the_volume_is_that_of_the_dissipated_energy(pads, flat):
-    rubbed = pads.at(flat)
-    volumes = [float(depth @ rubbed.areas) for depth in flat.surfaces.depths]
+    cycle = pads.at(flat)
+    volumes = [float(depth @ cycle.areas) for depth in flat.surfaces.depths]
     np.testing.assert_allclose(volumes, np.multiply(COEFFICIENTS, flat.energy), rtol=ROUNDING)
     gap = pads.unworn.rig.gap + flat.surfaces.depth
-    np.testing.assert_allclose(rubbed.law.gap, gap, rtol=ROUNDING)
+    np.testing.assert_allclose(cycle.law.gap, gap, rtol=ROUNDING)
 
 
 def test_energy_is_that_of_the_motions_on_the_way(pads, unworn):
@@ -107,13 +107,11 @@ def test_energy_is_that_of_the_motions_on_the_way(pads, unworn):
 
 def test_what_a_node_dissipates_is_its_force_along_its_path(pads, unworn):
     """µ ∮ N |ds|: N hardly changes in the cycle, but at two sides of a pad that rocks a little."""
-    rubbed = pads.at(unworn)
-    pressed = rubbed.motion.cycle.samples[:, :, 2].mean(axis=0)
+    cycle = pads.at(unworn)
+    pressed = cycle.motion.cycle.samples[:, :, 2].mean(axis=0)
+    np.testing.assert_allclose(FRICTION * pressed * cycle.path, cycle.energy, rtol=1e-4, atol=1e-15)
     np.testing.assert_allclose(
-        FRICTION * pressed * rubbed.path, rubbed.energy, rtol=1e-4, atol=1e-15
-    )
-    np.testing.assert_allclose(
-        rubbed.pressure[0] * rubbed.areas, pressed, rtol=1e-4, atol=1e-9 * pressed.max()
+        cycle.pressure[0] * cycle.areas, pressed, rtol=1e-4, atol=1e-9 * pressed.max()
     )
 
 
@@ -122,9 +120,9 @@ def test_what_a_node_dissipates_is_its_force_along_its_path(pads, unworn):
 
 def rates(pads, state, *laws):
     """Depths of both bodies per cycle, and pressure and path of that cycle."""
-    rubbed = pads.at(state)
+    cycle = pads.at(state)
     wear = with_laws(pads, *laws).contact_at(state).wear(state)
-    return np.array(wear), rubbed.energy / rubbed.areas, rubbed.path
+    return np.array(wear), cycle.energy / cycle.areas, cycle.path
 
 
 def test_every_law_takes_off_what_it_says(pads, unworn):
@@ -145,10 +143,10 @@ def test_nothing_is_lost_below_a_threshold(pads, unworn):
     cycles = 2e4
     threshold = 0.5 * cycles * float(pads.at(unworn).energy.sum())
     law = EvolvingLaw(EnergyLaw(3e-9), EnergyTable(threshold=threshold), "global")
-    own = with_laws(pads, law, law)
-    done = worn(own, unworn, cycles, 0.1)
+    limited = with_laws(pads, law, law)
+    done = worn(limited, unworn, cycles, 0.1)
     assert done.state.energy > 1.8 * threshold
-    volume = float(done.state.surfaces.depth @ own.at(unworn).areas)
+    volume = float(done.state.surfaces.depth @ limited.at(unworn).areas)
     assert volume == pytest.approx(6e-9 * (done.state.energy - threshold), rel=1e-9)
 
 
@@ -164,26 +162,26 @@ def test_nothing_wears_where_nothing_slips(pads):
 
 
 def test_gaps_grow_only_where_energy_is_dissipated(pads, unworn):
-    rubbed = pads.at(unworn)
-    open_nodes = rubbed.energy == 0.0
+    cycle = pads.at(unworn)
+    open_nodes = cycle.energy == 0.0
     assert 0 < open_nodes.sum() < NODES
-    assert not rubbed.model.touching[open_nodes].any()
+    assert not cycle.model.touching[open_nodes].any()
     depth = in_steps(pads, unworn, 1e4, 1).surfaces.depth
     np.testing.assert_array_equal(depth > 0.0, ~open_nodes)
 
 
 def test_flat_pads_wear_evenly_and_stick_as_pads_without_form(pads, unworn, flat):
     """In the end depths grow alike: e/A is even; all nodes touch, as those of flat pads do."""
-    rubbed, begun = pads.at(flat), pads.at(unworn)
-    rate, first = (sum(pads.contact_at(own).wear(own)) for own in (flat, unworn))
+    cycle, begun = pads.at(flat), pads.at(unworn)
+    rate, first = (sum(pads.contact_at(state).wear(state)) for state in (flat, unworn))
     np.testing.assert_allclose(rate, rate.mean(), rtol=5e-3)
     assert np.ptp(first) > first.mean()
-    assert begun.model.touching.sum() < rubbed.model.touching.sum() == NODES
-    law = rubbed.law
+    assert begun.model.touching.sum() < cycle.model.touching.sum() == NODES
+    law = cycle.law
     springs = [law.stiffness, law.stiffness, law.normal_stiffness]
     stuck = np.broadcast_to(np.column_stack(springs), (NODES, 3))[:, :, None] * np.eye(3)
     expected = natural_frequencies(pads.unworn.rig.model, stuck)[0]
-    before, after = (own.model.numbers()["stuck"][0] for own in (begun, rubbed))
+    before, after = (pad_cycle.model.numbers()["stuck"][0] for pad_cycle in (begun, cycle))
     assert after == pytest.approx(expected, rel=1e-9)
     assert before < 0.97 * after
 
@@ -212,18 +210,18 @@ def test_the_tolerance_bounds_the_error(pads, unworn):
     best = worn(pads, unworn, 2e5, 0.005)
     exact = best.state.surfaces.depth
     for tolerance in (0.2, 0.1, 0.05):
-        found = worn(pads, unworn, 2e5, tolerance)
-        error = np.linalg.norm(found.state.surfaces.depth - exact) / np.linalg.norm(exact)
+        done = worn(pads, unworn, 2e5, tolerance)
+        error = np.linalg.norm(done.state.surfaces.depth - exact) / np.linalg.norm(exact)
         assert error < 0.2 * tolerance
-        assert 0.0 < found.error <= tolerance
-        assert found.spent.steps < best.spent.steps
+        assert 0.0 < done.error <= tolerance
+        assert done.spent.steps < best.spent.steps
 
 
 def test_explicit_steps_come_to_the_same(pads, unworn):
     """Euler's, of a tenth of their limit: of first order only."""
-    found = advance_cycles(ExplicitStepper(0.1), unworn, 1e5, 1e5, pads.contact_at)
+    done = advance_cycles(ExplicitStepper(0.1), unworn, 1e5, 1e5, pads.contact_at)
     best = worn(pads, unworn, 1e5, 0.02).state.surfaces.depth
-    error = np.linalg.norm(found.state.surfaces.depth - best) / np.linalg.norm(best)
+    error = np.linalg.norm(done.state.surfaces.depth - best) / np.linalg.norm(best)
     assert error < 0.1
 
 
@@ -234,7 +232,7 @@ def test_half_the_limit_presses_roughness_away(pads, flat, seed):
     area, length = pads.at(flat).areas, 0.5 * pads.contact_at(flat).stable_cycles(flat)
     rough -= (area @ rough) / area.sum()
     disturbed = replace(flat, surfaces=flat.surfaces.worn(0.0, rough))
-    smooth, other = (in_steps(pads, own, length, 1).surfaces.depth for own in (flat, disturbed))
+    smooth, other = (in_steps(pads, state, length, 1).surfaces.depth for state in (flat, disturbed))
     left = other - smooth
 
     def size(depth):
@@ -294,7 +292,7 @@ def test_results_hold_nodes_loops_and_responses(ended, summary):
     with (ended.root / "evolution.csv").open(newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
     assert [float(row["touching [1]"]) for row in rows] == [
-        own["touching"] for own in summary["states"]
+        state["touching"] for state in summary["states"]
     ]
     assert len(list(ended.root.glob("frf_*.csv"))) == 4
 

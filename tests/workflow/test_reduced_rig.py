@@ -150,14 +150,14 @@ def test_names_and_places_are_stored(body, specimen):
 
 def test_a_case_of_specimens_is_reduced_first(coarsest, specimen, body):
     """The same rig as from the file of its run, the second time from the cache."""
-    own = f"structure.file={coarsest}"
-    rigs = [rig_of(specimen, *given)[0] for given in ((), (own, "structure.body=2"))]
+    setting = f"structure.file={coarsest}"
+    rigs = [rig_of(specimen, *given)[0] for given in ((), (setting, "structure.body=2"))]
     for name in ("mass", "damping", "stiffness", "connection"):
         one, other = (getattr(rig.model, name) for rig in rigs)
         np.testing.assert_array_equal(one, other)
     assert "from the cache" in (specimen / "run.log").read_text(encoding="utf-8")
     with pytest.raises(CaseError, match="missing; allowed: with a case of specimens, 1 or 2"):
-        rig_of(specimen, own)
+        rig_of(specimen, setting)
 
 
 def test_directions_and_shares(specimen):
@@ -192,10 +192,10 @@ def test_joints_that_move_alike_are_together_the_one_they_share(specimen, law):
     case = parse_case(SPECIMEN, str(specimen / "case.yaml"), [joint])
     forces = []
     for count in (1, 4):
-        own = JointModel.of(case, count).at(0.0)
-        path = 0.01 * np.array([1.0, -1.0, 0.5])[:, None, None] * np.ones(own.directions)
+        each = JointModel.of(case, count).at(0.0)
+        path = 0.01 * np.array([1.0, -1.0, 0.5])[:, None, None] * np.ones(each.directions)
         alike = np.repeat(path, count, axis=1)
-        followed = march_joints(own, own.rest(count), np.zeros(alike.shape[1:]), alike)
+        followed = march_joints(each, each.rest(count), np.zeros(alike.shape[1:]), alike)
         forces.append((followed.force.sum(axis=1), followed.dissipated.sum(axis=1)))
     assert forces[0][1].sum() > 0.1
     for one, four in zip(*forces, strict=True):
@@ -222,7 +222,7 @@ def test_a_stuck_body_is_linear(specimen, body):
 
     The amplitude is off by what the step leaves of the period, as in the lumped rig.
     """
-    found = run(specimen, SPECIMEN, "joint.friction=10", "excitation.steady=1e-8")["states"][0]
+    state = run(specimen, SPECIMEN, "joint.friction=10", "excitation.steady=1e-8")["states"][0]
     axis = np.array(["xyz".find(name[-1]) for name in body.names])
     pad = np.array([name.startswith("pad") for name in body.names])
     held = np.where(pad, np.array([KT, KT, KN])[axis] / PAD, np.array([1e3, 1e5, 1e5])[axis] / 4)
@@ -231,15 +231,15 @@ def test_a_stuck_body_is_linear(specimen, body):
     free = body.stiffness + np.diag(np.pad(np.where(pad, 0.0, held), (0, modes)))
     stuck = body.stiffness + np.diag(np.pad(held, (0, modes)))
     frequencies = np.sqrt(sl.eigh(stuck, mass, eigvals_only=True)) / (2.0 * np.pi)
-    assert found["stuck"] == pytest.approx(frequencies[:20], rel=1e-9)
+    assert state["stuck"] == pytest.approx(frequencies[:20], rel=1e-9)
     squares, shapes = sl.eigh(free, mass)
     damping = (mass @ shapes * (0.1 * np.sqrt(squares))) @ (mass @ shapes).T
     angular = 2.0 * np.pi * 400.0
     shape = np.pad(np.where(pad | (axis != 0), 0.0, 10.0 / 4), (0, modes))
     answer = np.linalg.solve(stuck - angular**2 * mass + 1j * angular * damping, shape)
     seen = abs(answer[: len(axis)][pad & (axis == 0)].mean())
-    assert found["amplitudes"] == pytest.approx([seen], rel=0.5 * (angular * 50e-6) ** 2)
-    assert found["energy_per_cycle"] == 0.0
+    assert state["amplitudes"] == pytest.approx([seen], rel=0.5 * (angular * 50e-6) ** 2)
+    assert state["energy_per_cycle"] == 0.0
 
 
 @pytest.mark.parametrize("direction", ["x", "z"])

@@ -56,7 +56,7 @@ def run(folder: Path, text: str, *overrides: str):
     """The summary of a run of a case."""
     folder.mkdir(exist_ok=True)
     (folder / "case.yaml").write_text(text, encoding="utf-8")
-    settings = [part for own in overrides for part in ("--set", own)]
+    settings = [part for override in overrides for part in ("--set", override)]
     ended = invoke("run", folder / "case.yaml", "--out", folder / "out", *settings, "--force")
     assert ended.exit_code == 0, ended.stderr
     return json.loads((folder / "out" / "summary.json").read_text(encoding="utf-8"))
@@ -65,7 +65,7 @@ def run(folder: Path, text: str, *overrides: str):
 def refused(folder: Path, text: str, *overrides: str) -> tuple[int, str]:
     """Exit code and message of a run that fails."""
     (folder / "case.yaml").write_text(text, encoding="utf-8")
-    settings = [part for own in overrides for part in ("--set", own)]
+    settings = [part for override in overrides for part in ("--set", override)]
     ended = invoke("run", folder / "case.yaml", "--out", folder / "out", *settings)
     return ended.exit_code, ended.stderr.splitlines()[-1]
 
@@ -157,8 +157,8 @@ def test_a_wrong_record_is_refused(tmp_path, rows, words):
 
 def test_parameters_follow_the_papers():
     """Fantetti 2019, table 4.2, at 2800 J, its kp per kJ; Li 2020, table 3, test 4, at 6 kJ."""
-    found = JointModel.of(load_case(CASES / "rig_bouc_wen.yaml")).parameters(2.8e6)
-    assert found == pytest.approx(
+    parameters = JointModel.of(load_case(CASES / "rig_bouc_wen.yaml")).parameters(2.8e6)
+    assert parameters == pytest.approx(
         {
             "friction": 0.11 * (1.0 + 0.26 * np.log(1.3e9 * 2800.0 + 1.0)),
             "stiffness": 27.3e3 * (1.0 + 1.32 * np.exp(-150.0 / 2800.0)),
@@ -167,9 +167,9 @@ def test_parameters_follow_the_papers():
         },
         rel=ROUNDING,
     )
-    found = JointModel.of(load_case(CASES / "bolted_joint_test4.yaml")).parameters(6e6)
+    parameters = JointModel.of(load_case(CASES / "bolted_joint_test4.yaml")).parameters(6e6)
     slow, fast = np.exp(-0.3 * 6.0), np.exp(-5.0 * 6.0)
-    assert found == pytest.approx(
+    assert parameters == pytest.approx(
         {
             "friction": 0.34 * (1.12 - 0.12 * (0.5 * slow + 0.5 * fast)),
             "stiffness": 115e3 * (1.31 - 0.31 * (0.8 * slow + 0.2 * fast)),
@@ -192,10 +192,10 @@ def test_a_table_of_loops_takes_the_place_of_friction_and_stiffness(tmp_path):
     rows = "energy [J],P [N],kt [N/mm],mu [1]\n0,60,1e4,0.2\n2,60,3e4,0.6\n"
     (tmp_path / "loops.csv").write_text(rows, encoding="utf-8")
     case = parse_case(JOINT, str(tmp_path / "case.yaml"), ["evolution={file: loops.csv}"])
-    found = JointModel.of(case).parameters(1e3)
-    assert found["friction"] == pytest.approx(0.4, rel=ROUNDING)
-    assert found["stiffness"] == pytest.approx(2e4, rel=ROUNDING)
-    assert found["normal_load"] == 100.0
+    parameters = JointModel.of(case).parameters(1e3)
+    assert parameters["friction"] == pytest.approx(0.4, rel=ROUNDING)
+    assert parameters["stiffness"] == pytest.approx(2e4, rel=ROUNDING)
+    assert parameters["normal_load"] == 100.0
 
 
 @pytest.mark.parametrize(
@@ -219,45 +219,45 @@ def test_a_table_that_is_not_of_a_whole_joint_is_refused_before_the_run(tmp_path
 def test_a_marched_loop_has_the_energy_of_its_law(law):
     """And encloses it: by trapezoids, of second order in 720 points a cycle."""
     more = ["joint.chi=-0.5", "joint.beta=1"] if law == "four_parameter_iwan" else []
-    own = JointModel.of(parse_case(JOINT, "case.yaml", [f"joint.law={law}", *more])).at(0.0)
-    displacement, force, dissipated = steady_loop(own, AMPLITUDE)
-    assert dissipated == pytest.approx(float(own.loop_energy(AMPLITUDE)), rel=1e-9)
+    law_of_case = JointModel.of(parse_case(JOINT, "case.yaml", [f"joint.law={law}", *more])).at(0.0)
+    displacement, force, dissipated = steady_loop(law_of_case, AMPLITUDE)
+    assert dissipated == pytest.approx(float(law_of_case.loop_energy(AMPLITUDE)), rel=1e-9)
     assert np.trapezoid(force, displacement) == pytest.approx(dissipated, rel=1e-4)
 
 
 def test_a_joint_ages_by_the_energy_of_its_loops(tmp_path):
     """Without evolution every cycle is like the first, 4 µN (A - µN/kt)."""
-    found = run(tmp_path, JOINT)
-    assert found["energy"] == pytest.approx(1000.0 * LOOP_ENERGY, rel=1e-9)
-    assert found["duration"] == pytest.approx(100.0)
-    (first, last) = found["states"]
+    summary = run(tmp_path, JOINT)
+    assert summary["energy"] == pytest.approx(1000.0 * LOOP_ENERGY, rel=1e-9)
+    assert summary["duration"] == pytest.approx(100.0)
+    (first, last) = summary["states"]
     assert (first["cycles"], last["cycles"]) == (0.0, pytest.approx(1000.0, rel=1e-9))
     assert last["energy_per_cycle"] == pytest.approx(LOOP_ENERGY, rel=ROUNDING)
     assert last["stroke"] == pytest.approx(2.0 * AMPLITUDE, rel=ROUNDING)
     assert last["extracted"]["friction"] == pytest.approx(0.5, rel=1e-9)
     assert last["extracted"]["stiffness"] == pytest.approx(STIFFNESS, rel=1e-9)
-    assert found["ageing"]["stretch"]["difference"] == pytest.approx(0.0, abs=1e-6)
+    assert summary["ageing"]["stretch"]["difference"] == pytest.approx(0.0, abs=1e-6)
 
 
 def test_ageing_by_energy_ends_there(tmp_path):
-    found = run(tmp_path, JOINT, "ageing={energy: 2 J}", "energies=[0 J, 1 J, 2 J]")
-    assert [state["energy"] for state in found["states"]] == [0.0, 1e3, 2e3]
-    assert found["cycles"] == pytest.approx(2e3 / LOOP_ENERGY, rel=1e-9)
+    summary = run(tmp_path, JOINT, "ageing={energy: 2 J}", "energies=[0 J, 1 J, 2 J]")
+    assert [state["energy"] for state in summary["states"]] == [0.0, 1e3, 2e3]
+    assert summary["cycles"] == pytest.approx(2e3 / LOOP_ENERGY, rel=1e-9)
 
 
 def test_energies_that_are_not_reached_are_told(tmp_path):
-    found = run(tmp_path, JOINT, "energies=[0 J, 1 kJ]")
-    assert len(found["states"]) == 2
-    assert "not reached" in found["warnings"][0]
+    summary = run(tmp_path, JOINT, "energies=[0 J, 1 kJ]")
+    assert len(summary["states"]) == 2
+    assert "not reached" in summary["warnings"][0]
 
 
 def test_a_joint_that_never_slides_cannot_be_aged_by_energy(tmp_path):
     code, message = refused(tmp_path, JOINT, "drive.stroke=1 um", "ageing={energy: 1 J}")
     assert code == 2
     assert "never reached" in message
-    found = run(tmp_path / "cycles", JOINT, "drive.stroke=1 um")
-    assert found["energy"] == 0.0
-    assert found["states"][-1]["energy_per_cycle"] == 0.0
+    summary = run(tmp_path / "cycles", JOINT, "drive.stroke=1 um")
+    assert summary["energy"] == 0.0
+    assert summary["states"][-1]["energy_per_cycle"] == 0.0
 
 
 def test_files_of_a_joint(tmp_path):
@@ -299,24 +299,24 @@ def test_reported_values_are_told_beside_the_computed(tmp_path):
         "reported=[{quantity: states.-1.energy_per_cycle, value: 3 mJ, source: a test}, "
         "{quantity: states.0.colour, value: 1, source: a test}]"
     )
-    found = run(tmp_path, JOINT, told)
-    assert found["reported"][0] == {
+    summary = run(tmp_path, JOINT, told)
+    assert summary["reported"][0] == {
         "quantity": "states.-1.energy_per_cycle",
         "reported": 3.0,
         "computed": pytest.approx(LOOP_ENERGY),
         "source": "a test",
     }
-    assert found["reported"][1]["computed"] is None
-    assert "no quantity states.0.colour" in found["warnings"][0]
+    assert summary["reported"][1]["computed"] is None
+    assert "no quantity states.0.colour" in summary["warnings"][0]
 
 
 def test_a_preload_worn_to_nothing_ends_the_wear(tmp_path):
     """N = N0 (1 - E/2 J): the energy goes towards 2 J, the last loops transmit nothing."""
     wear = "evolution.normal_load={kind: linear, slope: -0.5 1/J}"
-    found = run(tmp_path, JOINT, wear, "ageing.cycles=1e6", "energies=[0 J, 1 J]")
-    last = found["states"][-1]
-    assert found["energy"] == pytest.approx(2e3, rel=1e-6)
-    assert found["energy"] <= 2e3
+    summary = run(tmp_path, JOINT, wear, "ageing.cycles=1e6", "energies=[0 J, 1 J]")
+    last = summary["states"][-1]
+    assert summary["energy"] == pytest.approx(2e3, rel=1e-6)
+    assert summary["energy"] <= 2e3
     assert last["normal_load"] == pytest.approx(0.0, abs=1e-3)
     assert last["extracted"]["friction"] is None or last["force"] > 0.0
 
@@ -349,22 +349,22 @@ def test_a_stuck_rig_is_linear(tmp_path, step):
     """
     exact = 50.0 * np.abs(receptance(80.0, 1e4))
     settings = "joint.friction=10", f"integration.step={step}", "excitation.steady=1e-9"
-    found = run(tmp_path, RIG, *settings)["states"][0]
-    assert found["energy_per_cycle"] == 0.0
-    error = np.abs(np.array(found["amplitudes"]) / exact - 1.0).max()
+    state = run(tmp_path, RIG, *settings)["states"][0]
+    assert state["energy_per_cycle"] == 0.0
+    error = np.abs(np.array(state["amplitudes"]) / exact - 1.0).max()
     assert error < 0.25 * (2.0 * np.pi * 80.0 * step) ** 2
     squares = np.linalg.eigvals(np.linalg.solve(MASS, linear_rig(1e4)[0]))
-    assert found["stuck"] == pytest.approx(np.sort(np.sqrt(squares)) / (2.0 * np.pi), rel=1e-9)
+    assert state["stuck"] == pytest.approx(np.sort(np.sqrt(squares)) / (2.0 * np.pi), rel=1e-9)
 
 
 def test_a_sliding_rig_dissipates_what_its_loop_encloses(tmp_path):
-    found = run(tmp_path, RIG, "excitation.force=200 N")["states"][0]
-    amplitude = 0.5 * found["stroke"]
+    state = run(tmp_path, RIG, "excitation.force=200 N")["states"][0]
+    amplitude = 0.5 * state["stroke"]
     assert amplitude > 2.0 * LIMIT / STIFFNESS
-    assert found["energy_per_cycle"] == pytest.approx(
+    assert state["energy_per_cycle"] == pytest.approx(
         4.0 * LIMIT * (amplitude - LIMIT / STIFFNESS), rel=1e-3
     )
-    assert found["extracted"]["friction"] == pytest.approx(0.5, rel=1e-3)
+    assert state["extracted"]["friction"] == pytest.approx(0.5, rel=1e-3)
 
 
 def test_a_rig_without_steady_state_fails(tmp_path):
@@ -376,18 +376,18 @@ def test_a_rig_without_steady_state_fails(tmp_path):
 def test_a_rig_ages_in_steady_states(tmp_path):
     """Without evolution all steady states are the same: cycles are energy over that of one."""
     loud = "excitation.force=200 N"
-    found = run(tmp_path, RIG, loud, "ageing={energy: 1 J, tolerance: 1e-3}", "energies=[0 J]")
-    each = found["states"][0]["energy_per_cycle"]
-    assert found["cycles"] == pytest.approx(1e3 / each, rel=1e-3)
-    assert [state["energy"] for state in found["states"]] == [0.0, 1e3]
+    summary = run(tmp_path, RIG, loud, "ageing={energy: 1 J, tolerance: 1e-3}", "energies=[0 J]")
+    each = summary["states"][0]["energy_per_cycle"]
+    assert summary["cycles"] == pytest.approx(1e3 / each, rel=1e-3)
+    assert [state["energy"] for state in summary["states"]] == [0.0, 1e3]
 
 
 def test_a_blow_shows_the_frequency_response_of_a_stuck_rig(tmp_path):
     """Against the exact accelerance, but for the step: the peak lies within one line."""
-    found = run(tmp_path, RIG, HAMMER, "joint.friction=10", "integration.step=50 us")
-    state = found["states"][0]
+    summary = run(tmp_path, RIG, HAMMER, "joint.friction=10", "integration.step=50 us")
+    state = summary["states"][0]
     assert abs(state["first_frequency"] - state["stuck"][0]) <= state["resolution"]
-    assert "trend" not in found
+    assert "trend" not in summary
     with h5py.File(tmp_path / "out" / "results.h5") as file:
         group = file["states/00000/frequency_response"]
         frequency, magnitude = group["frequency"][()], group["magnitude"][()]
@@ -401,16 +401,16 @@ def test_a_blow_shows_the_frequency_response_of_a_stuck_rig(tmp_path):
     bottom = [-np.linalg.solve(MASS, stiffness), -np.linalg.solve(MASS, damping)]
     roots = np.linalg.eigvals(np.block([[np.zeros((2, 2)), np.eye(2)], bottom]))
     first = roots[np.argmin(np.abs(roots))]
-    own = state["ring_down"]["largest"]
-    assert own["damping_ratio"] == pytest.approx(-first.real / abs(first), rel=0.02)
-    assert own["frequency"] == pytest.approx(abs(first.imag) / (2.0 * np.pi), rel=2e-3)
+    largest = state["ring_down"]["largest"]
+    assert largest["damping_ratio"] == pytest.approx(-first.real / abs(first), rel=0.02)
+    assert largest["frequency"] == pytest.approx(abs(first.imag) / (2.0 * np.pi), rel=2e-3)
 
 
 @pytest.mark.slow
 def test_wear_changes_the_response_to_a_blow(tmp_path):
     """E is frozen in each record; figures of what there is are drawn."""
     evolution = "evolution.stiffness={kind: table, energy: [0 J, 1 J], factor: [1, 2]}"
-    found = run(
+    summary = run(
         tmp_path,
         RIG,
         HAMMER,
@@ -419,8 +419,8 @@ def test_wear_changes_the_response_to_a_blow(tmp_path):
         "integration.step=50 us",
         "output.figures=true",
     )
-    assert found["trend"]["first_frequency"] == 1.0
-    assert [state["stiffness"] for state in found["states"]] == [1e4, 2e4]
+    assert summary["trend"]["first_frequency"] == 1.0
+    assert [state["stiffness"] for state in summary["states"]] == [1e4, 2e4]
     names = {path.stem for path in (tmp_path / "out" / "figures").iterdir()}
     assert {"frequency_response", "ring_down", "evolution"} <= names
     assert (tmp_path / "out" / "ring_down_00001.csv").exists()
@@ -440,8 +440,8 @@ def test_a_recorded_blow_moves_the_rig_as_a_hammer_does(tmp_path):
     recorded = run(folder, RIG, "excitation={kind: recorded, file: force.csv}", step)
     hit = run(tmp_path / "hammer", RIG, HAMMER, step)
     motions = []
-    for own in ("recorded", "hammer"):
-        with h5py.File(tmp_path / own / "out" / "results.h5") as file:
+    for kind in ("recorded", "hammer"):
+        with h5py.File(tmp_path / kind / "out" / "results.h5") as file:
             motions.append(file["states/00000/motion/displacement"][:2000])
     largest = np.abs(motions[1]).max()
     np.testing.assert_allclose(motions[0], motions[1], atol=1e-3 * largest)
@@ -453,10 +453,10 @@ def test_a_recorded_blow_moves_the_rig_as_a_hammer_does(tmp_path):
 @pytest.mark.parametrize("kind", ["joint", slow("rig")])
 def test_what_new_writes_wears_without_a_warning(tmp_path, kind):
     """All energies that it asks for are reached, and friction has risen between them."""
-    found = run(tmp_path, template(kind), "output.figures=false")
-    assert found["warnings"] == []
-    assert [state["energy"] for state in found["states"]][:2] == [0.0, 1e6]
-    assert found["states"][1]["friction"] > 2.0 * found["states"][0]["friction"]
+    summary = run(tmp_path, template(kind), "output.figures=false")
+    assert summary["warnings"] == []
+    assert [state["energy"] for state in summary["states"]][:2] == [0.0, 1e6]
+    assert summary["states"][1]["friction"] > 2.0 * summary["states"][0]["friction"]
 
 
 # --- commands -----------------------------------------------------------------------------------

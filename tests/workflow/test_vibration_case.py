@@ -53,9 +53,9 @@ def curves(folder, number=0):
 @pytest.mark.parametrize(("friction", "held"), [(0.0, 0.0), (10.0, STIFFNESS)])
 def test_free_and_stuck_joints_leave_the_rig_linear(tmp_path, friction, held):
     summary = run(tmp_path, RIG, f"joint.friction={friction}", "forces=[2 N]")
-    found = curves(tmp_path)
+    curve = curves(tmp_path)
     for frequency, amplitude, phase in zip(
-        found["frequency"], found["amplitude"], found["phase"], strict=True
+        curve["frequency"], curve["amplitude"], curve["phase"], strict=True
     ):
         wanted = 2.0 * receptance(frequency, held)
         np.testing.assert_allclose(amplitude, np.abs(wanted), rtol=SAMPLED + SOLVED)
@@ -63,11 +63,11 @@ def test_free_and_stuck_joints_leave_the_rig_linear(tmp_path, friction, held):
     (response,) = summary["responses"]
     assert response["message"] == ""
     assert response["left_out"] < 1e-12
-    assert found["frequency"][[0, -1]].tolist() == [20.0, 300.0]
+    assert curve["frequency"][[0, -1]].tolist() == [20.0, 300.0]
     squares = np.linalg.eigvals(np.linalg.solve(MASS, linear_rig(held)[0]))
     natural = np.sqrt(np.sort(squares.real)) / (2.0 * np.pi)
     np.testing.assert_allclose(summary["stuck" if held else "free"], natural, rtol=1e-12)
-    assert found["slip"].max() == (0.0 if held else 1.0)
+    assert curve["slip"].max() == (0.0 if held else 1.0)
     # It lies between the points of the curve, higher than both.
     grid = np.linspace(0.99, 1.01, 2001) * response["resonance"]
     sizes = [abs(receptance(frequency, held)[-1]) for frequency in grid]
@@ -80,10 +80,10 @@ def test_single_harmonic_of_one_mass_is_the_closed_form(tmp_path):
     summary = run(tmp_path, ONE_MASS)
     law = Jenkins(1500.0, 0.5, 10.0, 30.0)
     damping = 2.0 * 0.02 * np.sqrt(800.0 * 2e-3)
-    found = curves(tmp_path)
-    amplitude = found["amplitude"][:, 0]
+    curve = curves(tmp_path)
+    amplitude = curve["amplitude"][:, 0]
     assert amplitude.max() > 3.0 * 5.0 / 1500.0
-    omega = 2.0 * np.pi * found["frequency"]
+    omega = 2.0 * np.pi * curve["frequency"]
     cosine, sine = law.first_harmonic(amplitude)
     force = np.abs(
         (800.0 - 2e-3 * omega**2 + 1j * damping * omega) * amplitude + cosine - 1j * sine
@@ -91,7 +91,7 @@ def test_single_harmonic_of_one_mass_is_the_closed_form(tmp_path):
     # Amplitudes are SAMPLED; the joint's force, of second order in 1/4096, adds less.
     np.testing.assert_allclose(force, 10.0, rtol=2e-5)
     np.testing.assert_allclose(
-        found["energy_per_cycle"], law.loop_energy(amplitude), rtol=2e-5, atol=1e-6
+        curve["energy_per_cycle"], law.loop_energy(amplitude), rtol=2e-5, atol=1e-6
     )
     assert summary["responses"][0]["sampling"] < 1e-5
 
@@ -106,9 +106,9 @@ def test_resonance_falls_from_stuck_to_free(tmp_path):
     assert last["resonance"] == pytest.approx(summary["free"][0], rel=1e-2)
     assert (first["slip"], last["slip"] > 0.9) == (0.0, True)
     assert len(middle["harmonics"]) > len(first["harmonics"]) - 1
-    for own in summary["responses"]:
-        assert max(own["left_out"], own["sampling"]) <= 0.01
-        assert own["amplitude"] == pytest.approx(own["receptance"] * own["force"])
+    for response in summary["responses"]:
+        assert max(response["left_out"], response["sampling"]) <= 0.01
+        assert response["amplitude"] == pytest.approx(response["receptance"] * response["force"])
     assert summary["warnings"] == []
 
 
@@ -132,13 +132,13 @@ def test_files_of_a_run(tmp_path):
     run(tmp_path, RIG, "output.figures=true")
     out = tmp_path / "out"
     assert (out / "figures" / "frequency_response.png").exists()
-    found = curves(tmp_path, 1)
+    curve = curves(tmp_path, 1)
     with (out / "frf_00001.csv").open(encoding="utf-8", newline="") as file:
         header, *rows = csv.reader(file)
     assert header[:4] == ["frequency [Hz]", "amplitude_1 [mm]", "amplitude_2 [mm]", "phase [rad]"]
     table = np.array(rows, dtype=float)
-    np.testing.assert_allclose(table[:, 0], found["frequency"], rtol=1e-8)
-    np.testing.assert_allclose(table[:, 1:3], found["amplitude"], rtol=1e-8)
+    np.testing.assert_allclose(table[:, 0], curve["frequency"], rtol=1e-8)
+    np.testing.assert_allclose(table[:, 1:3], curve["amplitude"], rtol=1e-8)
     with h5py.File(out / "results.h5") as file:
         free = file["linear/free"][()], file["linear/frequency"][()]
     wanted = [abs(receptance(frequency, 0.0)[-1]) for frequency in free[1][::200]]
@@ -208,13 +208,13 @@ def test_phase_resonance_follows_the_peaks(tmp_path):
     """Half of the way from peak to peak; force and answer 90 degrees apart at the driven mass."""
     summary = run(tmp_path, RIG, "forces=[2 N, 20 N, 60 N]", "backbone=true", "mass=2")
     with h5py.File(tmp_path / "out" / "results.h5") as file:
-        found = {name: file[f"backbone/{name}"][()] for name in file["backbone"]}
-    assert found["force"][[0, -1]].tolist() == [2.0, 60.0]
-    for own in summary["responses"][::2]:
-        place = int(np.abs(found["force"] - own["force"]).argmin())
+        curve = {name: file[f"backbone/{name}"][()] for name in file["backbone"]}
+    assert curve["force"][[0, -1]].tolist() == [2.0, 60.0]
+    for response in summary["responses"][::2]:
+        place = int(np.abs(curve["force"] - response["force"]).argmin())
         # Damping ratio 0.1: the peak of the amplitude lies a little below.
-        assert found["frequency"][place] == pytest.approx(own["resonance"], rel=0.06)
-        assert found["amplitude"][place] == pytest.approx(own["amplitude"], rel=0.02)
+        assert curve["frequency"][place] == pytest.approx(response["resonance"], rel=0.06)
+        assert curve["amplitude"][place] == pytest.approx(response["amplitude"], rel=0.02)
 
 
 def test_motions_along_the_force_leave_the_linear_limit_where_the_joint_slips(tmp_path):
@@ -223,17 +223,17 @@ def test_motions_along_the_force_leave_the_linear_limit_where_the_joint_slips(tm
     (sweep,) = summary["force_sweeps"]
     assert (sweep["frequency"], sweep["folds"], sweep["message"]) == (90.0, [], "")
     with h5py.File(tmp_path / "out" / "results.h5") as file:
-        found = {name: file[f"force_sweeps/00000/{name}"][()] for name in ("force", "amplitude")}
+        swept = {name: file[f"force_sweeps/00000/{name}"][()] for name in ("force", "amplitude")}
         slip = file["force_sweeps/00000/slip"][()]
         curve = {name: file[f"responses/00001/{name}"][()] for name in ("frequency", "amplitude")}
-    assert found["force"][[0, -1]].tolist() == [2.0, 60.0]
+    assert swept["force"][[0, -1]].tolist() == [2.0, 60.0]
     stuck = slip == 0.0
-    wanted = np.abs(receptance(90.0, STIFFNESS)[-1]) * found["force"]
+    wanted = np.abs(receptance(90.0, STIFFNESS)[-1]) * swept["force"]
     assert 1 < stuck.sum() < len(stuck)
-    np.testing.assert_allclose(found["amplitude"][stuck], wanted[stuck], rtol=SAMPLED + SOLVED)
-    assert np.all(np.abs(found["amplitude"] / wanted - 1.0)[~stuck][1:] > 1e-4)
+    np.testing.assert_allclose(swept["amplitude"][stuck], wanted[stuck], rtol=SAMPLED + SOLVED)
+    assert np.all(np.abs(swept["amplitude"] / wanted - 1.0)[~stuck][1:] > 1e-4)
     along = np.interp(90.0, curve["frequency"], curve["amplitude"][:, -1])
-    assert found["amplitude"][-1] == pytest.approx(along, rel=2e-2)
+    assert swept["amplitude"][-1] == pytest.approx(along, rel=2e-2)
     assert (tmp_path / "out" / "force_sweep_00000.csv").exists()
 
 

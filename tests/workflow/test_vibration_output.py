@@ -55,8 +55,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def summary(folder: Path) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
-    return found
+    summary: dict[str, Any] = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    return summary
 
 
 @pytest.fixture
@@ -135,10 +135,10 @@ def test_loops_can_be_measured_again(folder: Path, summary: dict[str, Any], tmp_
     """``fretscale loops`` finds in the table what the run has found in the loop."""
     result = invoke("loops", folder / "loop_00001.csv", "--out", tmp_path / "loops")
     assert result.exit_code == 0, result.output
-    found = table(tmp_path / "loops" / "loops.csv")
+    columns = table(tmp_path / "loops" / "loops.csv")
     finest = summary["responses"][1]["loops"][-1]
     energy, stiffness = (
-        next(values[0] for name, values in found.items() if name.startswith(word))
+        next(values[0] for name, values in columns.items() if name.startswith(word))
         for word in ("energy_per_loop", "kt")
     )
     # Of the loop the table has nine digits; its area is the part of the energy lost along x.
@@ -203,9 +203,9 @@ def test_responses_are_named_after_what_is_seen(
     (axis,) = vibration.frequency_response(results, CONTENTS).axes
     assert axis.get_ylabel() == "amplitude of block x / force [µm/N]"
     lines = {str(line.get_label()): line for line in axis.lines}
-    own = results["responses/00001"]
+    response = results["responses/00001"]
     label = f"25 N: {summary['responses'][1]['resonance']:.4g} Hz"
-    np.testing.assert_allclose(lines[label].get_ydata(), 1e3 * own["amplitude"][:, 1] / 25.0)
+    np.testing.assert_allclose(lines[label].get_ydata(), 1e3 * response["amplitude"][:, 1] / 25.0)
 
 
 def test_backbone_and_peaks_against_force(results: h5py.File, summary: dict[str, Any]) -> None:
@@ -214,7 +214,7 @@ def test_backbone_and_peaks_against_force(results: h5py.File, summary: dict[str,
     np.testing.assert_allclose(dashed.get_ydata(), 1e3 * results["backbone/amplitude"][()])
     for axis, name, factor in ((frequency, "resonance", 1.0), (damping, "damping", 1e2)):
         (dots,) = (line for line in axis.lines if line.get_label() == "largest amplitude")
-        wanted = [factor * own[name] for own in summary["responses"]]
+        wanted = [factor * response[name] for response in summary["responses"]]
         np.testing.assert_allclose(dots.get_ydata(), wanted)
         assert dots.get_xdata().tolist() == [2.0, 25.0]
 
@@ -226,7 +226,7 @@ def test_loops_and_their_branches(results: h5py.File, summary: dict[str, Any]) -
     assert len(left.lines) == 4
     assert left.get_title() == "100 Hz, 3 harmonics; dashed: the force in 1 alone"
     names = [text.get_text() for text in right.get_legend().get_texts()]
-    slopes = [1e-3 * own["loops"][-1]["stiffness"] for own in summary["responses"]]
+    slopes = [1e-3 * response["loops"][-1]["stiffness"] for response in summary["responses"]]
     assert names == [
         f"{force} N: {slope:.4g} N/µm" for force, slope in zip((2, 25), slopes, strict=True)
     ]
@@ -244,8 +244,8 @@ def test_states_have_the_symmetry_of_the_block(results: h5py.File) -> None:
     """Nodes at y and -y move alike; those at -x do so half a cycle later."""
     numbers = rows_and_columns(*places().T)
     assert numbers is not None
-    for own in results["responses"].values():
-        kinds = vibration_states._kinds(own)[:, numbers]
+    for response in results["responses"].values():
+        kinds = vibration_states._kinds(response)[:, numbers]
         np.testing.assert_array_equal(kinds, kinds[:, :, ::-1])
     # Without harmonics of even order nothing tells x from -x; one sample in two cycles may.
     assert (kinds != kinds[:, ::-1]).mean() < 0.02
@@ -253,8 +253,8 @@ def test_states_have_the_symmetry_of_the_block(results: h5py.File) -> None:
 
 def test_states_are_those_of_the_forces(results: h5py.File) -> None:
     """By Coulomb's law, from the forces of the cycle at resonance."""
-    for own in results["responses"].values():
-        force, state = own["resonance/force"][()], own["resonance/state"][()]
+    for response in results["responses"].values():
+        force, state = response["resonance/force"][()], response["resonance/state"][()]
         pressed, pulled = force[..., 2], np.hypot(force[..., 0], force[..., 1])
         np.testing.assert_array_equal(state == SEPARATED, pressed == 0.0)
         on_circle = (pressed > 0.0) & (pulled >= (1.0 - 1e-9) * FRICTION * pressed)
@@ -263,7 +263,7 @@ def test_states_are_those_of_the_forces(results: h5py.File) -> None:
 
 
 def test_low_forces_stick_and_high_ones_slip(results: h5py.File) -> None:
-    low, high = (vibration_states._kinds(own) for own in results["responses"].values())
+    low, high = (vibration_states._kinds(response) for response in results["responses"].values())
     open_kind, sticks = vibration_states.OPEN, vibration_states.STICKS
     # Far below resonance all that touches sticks under the small force.
     assert set(low[0].tolist()) == {open_kind, sticks}
@@ -283,8 +283,8 @@ def test_of_a_folded_curve_the_largest_motion_is_shown() -> None:
     frequency = np.array([1.0, 2.0, 3.0, 2.0, 1.5, 2.5, 4.0])
     amplitude = np.array([1.0, 4.0, 6.0, 3.0, 2.0, 1.0, 0.5])
     wanted = np.array([1.0, 1.7, 1.9, 2.6, 3.1, 4.0])
-    found = vibration_states.largest_at(frequency, amplitude, wanted)
-    assert found.tolist() == [0, 1, 1, 2, 5, 6]
+    places = vibration_states.largest_at(frequency, amplitude, wanted)
+    assert places.tolist() == [0, 1, 1, 2, 5, 6]
 
 
 def test_figures_without_data_are_left_out(changed: h5py.File, tmp_path: Path) -> None:
@@ -314,14 +314,14 @@ def series(folder: Path, number: int = 1) -> tuple[list[float], list[Any]]:
 
 def test_paraview_plays_a_cycle(folder: Path, results: h5py.File) -> None:
     times, meshes = series(folder)
-    own = results["responses/00001"]
-    steps = len(own["resonance/state"])
-    np.testing.assert_allclose(times, np.arange(steps) / steps / own.attrs["resonance"])
+    response = results["responses/00001"]
+    steps = len(response["resonance/state"])
+    np.testing.assert_allclose(times, np.arange(steps) / steps / response.attrs["resonance"])
     for step, mesh in enumerate(meshes):
         np.testing.assert_allclose(mesh.points[:, :2], places(), atol=1e-5)
         quads = mesh.cells_dict[pv.CellType.QUAD]
         assert quads.shape == ((ROWS - 1) ** 2, 4)
-        data, cycle = mesh.point_data, own["resonance"]
+        data, cycle = mesh.point_data, response["resonance"]
         np.testing.assert_array_equal(data["state"], cycle["state"][step])
         moved, pulled = cycle["displacement"][step], cycle["force"][step]
         np.testing.assert_allclose(data["displacement"], moved * [1, 1, -1], rtol=SINGLE)

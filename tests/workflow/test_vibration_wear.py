@@ -17,7 +17,7 @@ from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.rig.structure import Rig
 from workflow.analyses.vibration_wear.case import VibrationWearCase
 from workflow.analyses.vibration_wear.half_space_run import contact_case
-from workflow.analyses.vibration_wear.vibrating_contact import Shaking, VibratingContact
+from workflow.analyses.vibration_wear.vibrating_contact import VibratingContact
 from workflow.case.writing import dump_case
 from workflow.kinds import parse_case
 
@@ -65,7 +65,7 @@ BALANCED = 1e-9
 def run(folder, *settings, rig=RIG, wear=WEAR):
     (folder / "wear.yaml").write_text(wear, encoding="utf-8")
     (folder / "rig.yaml").write_text(rig, encoding="utf-8")
-    chosen = [part for own in settings for part in ("--set", own)]
+    chosen = [part for setting in settings for part in ("--set", setting)]
     return invoke("run", folder / "rig.yaml", "--out", folder / "out", *chosen)
 
 
@@ -79,7 +79,7 @@ def contact_in_rig(folder, force=75.0, frequency=100.0):
     (folder / "wear.yaml").write_text(WEAR, encoding="utf-8")
     rig = row_of_masses(Rig(kind="rig", masses=MASSES, springs=SPRINGS, damping_ratio=DAMPING))
     case = contact_case(str(folder / "wear.yaml"))
-    return rig, VibratingContact(case, rig, Shaking(force, frequency, RESOLUTION))
+    return rig, VibratingContact(case, rig, force, frequency, RESOLUTION)
 
 
 def worn(contact, cycles, tolerance=0.1):
@@ -113,8 +113,10 @@ def test_friction_that_grows_within_a_few_cycles_is_followed(tmp_path):
     assert ended.exit_code == 0, ended.output
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     rig = row_of_masses(Rig(kind="rig", masses=MASSES, springs=SPRINGS, damping_ratio=0.01))
-    shaking = Shaking(75.0, 100.0, Resolution((1, 3, 5), 64))
-    contact = VibratingContact(contact_case(str(tmp_path / "wear.yaml")), rig, shaking)
+    resolution = Resolution((1, 3, 5), 64)
+    contact = VibratingContact(
+        contact_case(str(tmp_path / "wear.yaml")), rig, 75.0, 100.0, resolution
+    )
     state = contact.unworn()
     for _ in range(20):
         # In so few cycles the form does not change.
@@ -127,41 +129,41 @@ def test_friction_that_grows_within_a_few_cycles_is_followed(tmp_path):
 
 def test_sliders_move_the_rig_as_so_many_joints_of_its_own_would(tmp_path):
     rig, contact = contact_in_rig(tmp_path, force=30.0, frequency=180.0)
-    rubbing = contact.at(contact.unworn())
-    count = len(rubbing.by_slider)
+    cycle = contact.at(contact.unworn())
+    count = len(cycle.by_slider)
     rows = np.repeat(rig.model.connection, count, axis=0)
     apart = HarmonicBalance(
         replace(rig.model, connection=rows),
-        PeriodicMarch(rubbing.sliders),
+        PeriodicMarch(cycle.sliders),
         PeriodicLoad({1: -1j * rig.driven}),
         RESOLUTION,
     ).solve(180.0, 30.0)
     assert apart.converged
     np.testing.assert_allclose(
-        rubbing.motion.motion, apart.motion, atol=1e-8 * np.abs(apart.motion).max()
+        cycle.motion.motion, apart.motion, atol=1e-8 * np.abs(apart.motion).max()
     )
     np.testing.assert_allclose(
-        rubbing.by_slider, apart.cycle.dissipated, atol=1e-8 * apart.cycle.dissipated.sum()
+        cycle.by_slider, apart.cycle.dissipated, atol=1e-8 * apart.cycle.dissipated.sum()
     )
 
 
 def test_cells_dissipate_exactly_what_harmonic_balance_does(tmp_path):
     _, contact = contact_in_rig(tmp_path)
     for state in (contact.unworn(), worn(contact, 1e4)):
-        rubbing = contact.at(state)
-        cells = float(rubbing.energy.sum()) * contact.grid.cell_area
-        assert cells == pytest.approx(float(rubbing.motion.cycle.dissipated.sum()), rel=BALANCED)
+        cycle = contact.at(state)
+        cells = float(cycle.energy.sum()) * contact.grid.cell_area
+        assert cells == pytest.approx(float(cycle.motion.cycle.dissipated.sum()), rel=BALANCED)
         # By itself the slip of the half-space says the same but for the stages.
-        assert rubbing.adjusted == pytest.approx(1.0, abs=1e-3)
+        assert cycle.adjusted == pytest.approx(1.0, abs=1e-3)
 
 
 def test_the_loop_is_that_of_the_whole_tangential_problem(tmp_path):
     _, contact = contact_in_rig(tmp_path)
-    rubbing = contact.at(worn(contact, 1e4))
-    for amplitude, allowed in ((0.5 * rubbing.stroke, 1e-3), (0.5 * rubbing.full_slip, 0.03)):
-        loop = contact.loop(rubbing, amplitude)
-        own = float(rubbing.sliders.loop_energy(amplitude).sum())
-        assert own == pytest.approx(loop.energy, rel=allowed)
+    cycle = contact.at(worn(contact, 1e4))
+    for amplitude, allowed in ((0.5 * cycle.stroke, 1e-3), (0.5 * cycle.full_slip, 0.03)):
+        loop = contact.loop(cycle, amplitude)
+        by_sliders = float(cycle.sliders.loop_energy(amplitude).sum())
+        assert by_sliders == pytest.approx(loop.energy, rel=allowed)
 
 
 # --- wear ---------------------------------------------------------------------------------------
@@ -198,7 +200,7 @@ def test_nothing_wears_where_nothing_slips(tmp_path):
 def test_a_larger_force_wears_more_and_a_small_one_in_a_ring(tmp_path):
     _, small = contact_in_rig(tmp_path, force=10.0)
     _, large = contact_in_rig(tmp_path, force=75.0)
-    slipping, sliding = (own.at(own.unworn()) for own in (small, large))
+    slipping, sliding = (contact.at(contact.unworn()) for contact in (small, large))
     assert slipping.stroke < 2.0 * slipping.full_slip < sliding.stroke
     pressed = slipping.slipping.normal.pressure > 0.0
     assert np.all(sliding.path[pressed] > 0.0)

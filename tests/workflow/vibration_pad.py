@@ -87,7 +87,7 @@ def run_block(folder: Path, *overrides: str, rig: RigModel | None = None) -> Res
     path = folder / "case.yaml"
     path.write_text(CASE, encoding="utf-8")
     (folder / "block.yaml").write_text("", encoding="utf-8")
-    settings = [part for own in overrides for part in ("--set", own)]
+    settings = [part for override in overrides for part in ("--set", override)]
 
     def stands_in(*_: Any) -> RigModel:
         return rig or block()

@@ -20,9 +20,9 @@ friction rises within tens of cycles, and so are kinks passed.
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.polynomial import Chebyshev, chebyshev
@@ -31,10 +31,7 @@ from scipy.optimize import brentq
 from sa_solver.errors import ConvergenceError, InputError
 from sa_solver.types import Array
 from wear.joints.evolution import JointEvolution
-from wear.joints.law import JointLaw
-
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
+from wear.joints.parameters import UniaxialLaw
 
 DEGREE = 16
 """Of the polynomials of a panel: friction that rises as ln E is then met to 1e-8 in panels whose
@@ -159,11 +156,7 @@ class LongTest:
         cycles = np.asarray(cycles, dtype=np.float64)
         if np.any((cycles < 0.0) | (cycles > self.total_cycles)):
             raise InputError(f"cycles outside a test of {self.total_cycles:g}; allowed: within it")
-        starts = [jump.cycles for jump in self.jumps]
-        places = np.searchsorted(starts, cycles, side="right") - 1
-        pairs = zip(places.ravel(), cycles.ravel(), strict=True)
-        energies = [self._energy(int(place), float(number)) for place, number in pairs]
-        return np.array(energies).reshape(cycles.shape)
+        return np.asarray(np.vectorize(self._energy, otypes=[float])(cycles))
 
     def cycles_at(self, energy: Array | float) -> Array:
         """Cycles after which the joint has dissipated ``energy`` [N mm], of its shape.
@@ -175,21 +168,20 @@ class LongTest:
             raise InputError(
                 f"energies below {self.energy_before:g} N mm, which were there before the test"
             )
-        starts = [jump.start for jump in self.jumps]
-        places = np.searchsorted(starts, energy, side="right") - 1
-        pairs = zip(places.ravel(), energy.ravel(), strict=True)
-        numbers = [self._cycles(int(place), float(value)) for place, value in pairs]
-        return np.array(numbers).reshape(energy.shape)
+        return np.asarray(np.vectorize(self._cycles, otypes=[float])(energy))
 
-    def _energy(self, place: int, cycles: float) -> float:
-        return self.jumps[place].energy_at(cycles) if self.jumps else self.energy_before
+    def _energy(self, cycles: float) -> float:
+        if not self.jumps:
+            return self.energy_before
+        place = bisect_right(self.jumps, cycles, key=lambda jump: jump.cycles) - 1
+        return self.jumps[place].energy_at(cycles)
 
-    def _cycles(self, place: int, energy: float) -> float:
+    def _cycles(self, energy: float) -> float:
         if not self.jumps:
             return 0.0 if energy == self.energy_before else np.nan
         if energy > self.final_energy * (1.0 + ROUNDING):
             return np.nan
-        jump = self.jumps[place]
+        jump = self.jumps[bisect_right(self.jumps, energy, key=lambda jump: jump.start) - 1]
         return min(jump.cycles + jump.since(energy), self.total_cycles)
 
 
@@ -225,31 +217,26 @@ def long_test(
         raise InputError("a test without end; allowed: a number of cycles or an energy that end it")
     if not SMALLEST_TOLERANCE <= tolerance < 1.0:
         raise InputError(f"tolerance {tolerance:g}; allowed: {SMALLEST_TOLERANCE:g} to 1")
-    return _Jumper(energy_per_cycle, (cycles, until), tolerance, sorted(breaks)).run(start)
+    return _Jumper(energy_per_cycle, cycles, until, tolerance, sorted(breaks)).run(start)
 
 
+@dataclass
 class _Jumper:
-    """A long test under way."""
+    """A long test under way, to a ``total`` of cycles or ``until`` an energy."""
 
-    def __init__(
-        self,
-        rate: EnergyPerCycle,
-        ends: tuple[float, float],
-        tolerance: float,
-        breaks: list[float],
-    ) -> None:
-        self._energy_per_cycle = rate
-        self._total, self._until = ends
-        self._tolerance = tolerance
-        self._breaks = breaks
-        self._jumps: list[Jump] = []
-        self._cycles = 0.0
-        self._evaluations = 0
+    energy_per_cycle: EnergyPerCycle
+    total: float
+    until: float
+    tolerance: float
+    breaks: list[float]
+    jumps: list[Jump] = field(default_factory=list)
+    cycles: float = 0.0
+    evaluations: int = 0
 
     def run(self, start: float) -> LongTest:
         """From ``start`` to the last cycle."""
         energy, width, block = start, 0.0, FEWEST
-        while self._cycles < self._total and energy < self._until:
+        while self.cycles < self.total and energy < self.until:
             rate = self._rate(energy)
             # Too little for the sum to change is nothing.
             if energy + rate == energy:
@@ -265,46 +252,46 @@ class _Jumper:
             energy, width, block = jump.end, GROWTH * (jump.end - jump.start), FEWEST
             if jump.end - jump.start == to_break:
                 energy = self._count(self._last_whole(energy), FEWEST)
-        return LongTest(start, self._end(energy), tuple(self._jumps), self._evaluations)
+        return LongTest(start, self._end(energy), tuple(self.jumps), self.evaluations)
 
     def _left(self, energy: float, rate: float) -> float:
         """Energy that a panel may have at most."""
-        return REACH * min((self._total - self._cycles) * rate, self._until - energy)
+        return REACH * min((self.total - self.cycles) * rate, self.until - energy)
 
     def _end(self, energy: float) -> float:
         """Cycles of the whole test, which has come to ``energy``."""
-        if energy >= self._until:
-            jump = next(jump for jump in reversed(self._jumps) if jump.start < self._until)
-            return min(self._total, jump.cycles + jump.since(self._until))
-        if self._total == np.inf:
+        if energy >= self.until:
+            jump = next(jump for jump in reversed(self.jumps) if jump.start < self.until)
+            return min(self.total, jump.cycles + jump.since(self.until))
+        if self.total == np.inf:
             raise NeverReachedError(
-                f"{self._until:g} N mm are never reached: after {self._cycles:.6g} cycles and "
+                f"{self.until:g} N mm are never reached: after {self.cycles:.6g} cycles and "
                 f"{energy:g} N mm a cycle dissipates nothing any more"
             )
-        return self._total
+        return self.total
 
     def _add(self, jump: Jump) -> None:
-        self._jumps.append(jump)
-        self._cycles += jump.length
+        self.jumps.append(jump)
+        self.cycles += jump.length
 
     def _last_whole(self, energy: float) -> float:
         """Go back from ``energy`` to the end of a cycle; the energy there.
 
         Which energies are ends of cycles matters at a kink, and counting is exact from them only.
         """
-        whole = float(np.floor(self._cycles))
-        if whole == self._cycles:
+        whole = float(np.floor(self.cycles))
+        if whole == self.cycles:
             return energy
-        last = self._jumps[-1]
-        self._jumps[-1] = replace(last, end=last.energy_at(whole))
-        self._cycles = whole
-        return self._jumps[-1].end
+        last = self.jumps[-1]
+        self.jumps[-1] = replace(last, end=last.energy_at(whole))
+        self.cycles = whole
+        return self.jumps[-1].end
 
     def _panel(self, energy: float, width: float, least: float) -> Jump | None:
         """The longest good panel from ``energy`` on, none if shorter than ``least`` [N mm]."""
         while width >= least:
             jump = self._attempt(energy, energy + width)
-            if jump is not None and jump.error <= self._tolerance * jump.length:
+            if jump is not None and jump.error <= self.tolerance * jump.length:
                 return jump
             width *= SHRINKAGE
         return None
@@ -322,27 +309,27 @@ class _Jumper:
         quadrature = float(np.abs(density.coef[-TAIL:]).max())
         counting = float(np.mean(np.abs(curvatures + slopes**2 / rates))) / 12.0
         error = (quadrature + counting) * (end - start)
-        return Jump(start, end, self._cycles, density.integ(lbnd=start), error)
+        return Jump(start, end, self.cycles, density.integ(lbnd=start), error)
 
     def _count(self, energy: float, cycles: int) -> float:
         """Count ``cycles``, no more than are left; the energy after them."""
         for _ in range(cycles):
             after = energy + self._rate(energy)
-            if after == energy or self._cycles >= self._total:
+            if after == energy or self.cycles >= self.total:
                 break
-            self._add(Jump(energy, after, self._cycles, None, 0.0))
+            self._add(Jump(energy, after, self.cycles, None, 0.0))
             energy = after
         return energy
 
     def _rate(self, energy: float) -> float:
-        self._evaluations += 1
-        if self._evaluations > MOST_EVALUATIONS:
+        self.evaluations += 1
+        if self.evaluations > MOST_EVALUATIONS:
             raise AgeingError(
-                f"{self._cycles:.6g} of {self._total:.6g} cycles after {MOST_EVALUATIONS} energies "
+                f"{self.cycles:.6g} of {self.total:.6g} cycles after {MOST_EVALUATIONS} energies "
                 "of a cycle: they are not smooth to the tolerance; allow a larger one, or name "
                 "the energies at which they have kinks"
             )
-        rate = float(self._energy_per_cycle(energy))
+        rate = float(self.energy_per_cycle(energy))
         if not 0.0 <= rate < np.inf:
             raise AgeingError(
                 f"a cycle dissipates {rate:g} N mm where {energy:g} were before; allowed: 0 or more"
@@ -350,8 +337,7 @@ class _Jumper:
         return rate
 
     def _to_break(self, energy: float) -> float:
-        place = int(np.searchsorted(self._breaks, energy, side="right"))
-        return self._breaks[place] - energy if place < len(self._breaks) else np.inf
+        return min((place - energy for place in self.breaks if place > energy), default=np.inf)
 
 
 def _through(values: Array, domain: tuple[float, float]) -> Chebyshev:
@@ -366,62 +352,36 @@ def _through(values: Array, domain: tuple[float, float]) -> Chebyshev:
 # --- a joint at a prescribed stroke -------------------------------------------------------------
 
 
-class LoopLaw(Protocol):
-    """A joint law whose steady loop has an energy in closed form."""
-
-    def loop_energy(self, amplitude: Array | float) -> Array | float:
-        """Energy of a steady cycle between ±``amplitude`` [mm] at constant parameters [N mm]."""
-        ...
-
-
-if TYPE_CHECKING:
-
-    class _EvolvingLoop(LoopLaw, DataclassInstance, Protocol): ...
-
-    class _EvolvingLaw(JointLaw, DataclassInstance, Protocol): ...
-
-    Loop = TypeVar("Loop", bound=_EvolvingLoop)
-
-
-def steady_stroke(law: Loop, evolution: JointEvolution, amplitude: float) -> EnergyPerCycle:
+def steady_stroke(law: UniaxialLaw, evolution: JointEvolution, amplitude: float) -> EnergyPerCycle:
     """Energy per cycle of one joint between ±``amplitude`` [mm], from its law's closed form."""
 
     def energy_per_cycle(energy: float) -> float:
-        return float(np.asarray(evolution.at(law, energy).loop_energy(amplitude)).item())
+        return float(evolution.at(law, energy).loop_energy(amplitude))
 
     return energy_per_cycle
 
 
-class MarchedStroke:
+def marched_stroke(
+    law: UniaxialLaw, evolution: JointEvolution, amplitude: float, start: float = 0.0
+) -> EnergyPerCycle:
     """The same, marched: cycle after cycle with the memory of the ones before.
 
-    One joint goes from +``amplitude`` [mm] to -``amplitude`` and back in ``increments`` each way
-    (one, where the law is exact along a straight path), with the parameters that belong to the
-    energy at the cycle's begin. It is brought to +``amplitude`` without counting what that takes.
+    One joint goes from +``amplitude`` [mm] to -``amplitude`` and back, with the parameters that
+    belong to the energy at the cycle's begin: laws are exact along a straight path. It is brought
+    to +``amplitude`` without counting what that takes, with the parameters of ``start`` [N mm].
     """
+    begun = evolution.at(law, start)
+    state = begun.respond(begun.rest(1), np.array([[amplitude]])).state
 
-    def __init__(
-        self,
-        law: _EvolvingLaw,
-        evolution: JointEvolution,
-        amplitude: float,
-        increments: int = 1,
-        start: float = 0.0,
-    ) -> None:
-        self._law, self._evolution = law, evolution
-        self._steps = np.full(increments, 2.0 * amplitude / increments)
-        begun = evolution.at(law, start)
-        response = begun.respond(begun.rest(1), np.array([[amplitude]]))
-        self._state = response.state
-
-    def __call__(self, energy: float) -> float:
-        """Energy of the next cycle [N mm] where ``energy`` [N mm] was dissipated before."""
-        law, total = self._evolution.at(self._law, energy), 0.0
-        for step in (*-self._steps, *self._steps):
-            response = law.respond(self._state, np.array([[step]]))
-            self._state = response.state
-            total += float(response.dissipated[0])
+    def energy_per_cycle(energy: float) -> float:
+        nonlocal state
+        worn, total = evolution.at(law, energy), 0.0
+        for step in (-2.0 * amplitude, 2.0 * amplitude):
+            response = worn.respond(state, np.array([[step]]))
+            state, total = response.state, total + float(response.dissipated[0])
         return total
+
+    return energy_per_cycle
 
 
 # --- checking -----------------------------------------------------------------------------------
@@ -431,12 +391,11 @@ class MarchedStroke:
 class IntegratedCycles:
     """Cycles of a long test integrated one after the other.
 
-    ``energy`` ``(k + 1,)`` [N mm] is that of ``k`` cycles from ``first`` on and ``jumped`` that of
-    the test after the same cycles; ``difference`` is that of their last, in cycles, and ``stated``
-    the one that the test allows for.
+    ``energy`` ``(k + 1,)`` [N mm] is that of ``k`` cycles and ``jumped`` that of the test after the
+    same cycles; ``difference`` is that of their last, in cycles, and ``stated`` the one that the
+    test allows for.
     """
 
-    first: float
     energy: Array
     jumped: Array
     difference: float
@@ -468,4 +427,4 @@ def integrate_cycles(
     ]
     # A jump errs by this at either end of these cycles.
     stated = 2.0 * sum(jump.error for jump in touched)
-    return IntegratedCycles(float(first), energy, jumped, difference, stated)
+    return IntegratedCycles(energy, jumped, difference, stated)

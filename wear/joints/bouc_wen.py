@@ -26,13 +26,13 @@ import numpy as np
 from numba import njit, vectorize
 
 from sa_solver.types import Array
-from wear.joints.law import JointResponse, JointState
+from wear.joints.law import JointState
 from wear.joints.parameters import (
     JointError,
     Parameter,
     UniaxialLaw,
-    kernel_response,
     parameter_columns,
+    require,
 )
 
 # Largest step n s of the fourth-order rule, and the largest as a share of |ξ| or, by ξ = 0, at all:
@@ -146,24 +146,13 @@ def advance_bouc_wen(
             xi = copysign(1.0, increment)
         return residual * displacement, residual, displacement, xi, 0.0
     if increment == 0.0:
-        slope = 1.0 - 0.5 * (1.0 - gain) * abs(xi) ** exponent
-        return (
-            limit * xi + residual * displacement,
-            residual + spring * slope,
-            displacement,
-            xi,
-            0.0,
-        )
-    sign = copysign(1.0, increment)
-    eta, lost = travel(sign * xi, spring * abs(increment) / limit, exponent, gain)
-    xi = sign * eta
-    return (
-        limit * xi + residual * displacement,
-        residual + spring * xi_rate(eta, exponent, gain),
-        displacement,
-        xi,
-        limit * (limit / spring) * max(lost, 0.0),
-    )
+        slope, lost = 1.0 - 0.5 * (1.0 - gain) * abs(xi) ** exponent, 0.0
+    else:
+        sign = copysign(1.0, increment)
+        eta, lost = travel(sign * xi, spring * abs(increment) / limit, exponent, gain)
+        xi, slope = sign * eta, xi_rate(eta, exponent, gain)
+    force, lost = limit * xi + residual * displacement, limit * (limit / spring) * max(lost, 0.0)
+    return force, residual + spring * slope, displacement, xi, lost
 
 
 @njit(cache=True)
@@ -221,6 +210,9 @@ class BoucWen(UniaxialLaw):
     the mean of the tangents forwards and backwards.
     """
 
+    columns = 2
+    kernel = staticmethod(_respond)
+
     sigma: Parameter = 0.5
     exponent: Parameter = 2.0
 
@@ -231,17 +223,11 @@ class BoucWen(UniaxialLaw):
                 f"residual_stiffness of a Bouc-Wen joint is {self.residual_stiffness}: it must be "
                 f"below its stiffness {self.stiffness}, which is the whole initial slope"
             )
-        if not np.all((np.asarray(self.sigma) >= 0.5) & (np.asarray(self.sigma) <= 1.0)):
-            raise JointError(
-                f"sigma of a joint is {self.sigma}: it must be from 0.5 (below, unloading would "
-                "create energy) to 1"
-            )
-        if not (
-            np.all(np.greater_equal(self.exponent, 1.0)) and np.all(np.isfinite(self.exponent))
-        ):
-            raise JointError(
-                f"exponent of a joint is {self.exponent}: it must be finite, 1 or more"
-            )
+        sigma, exponent = np.asarray(self.sigma), np.asarray(self.exponent)
+        range_text = "from 0.5 (below, unloading would create energy) to 1"
+        require("sigma", sigma, (sigma >= 0.5) & (sigma <= 1.0), range_text)
+        proper = (exponent >= 1.0) & (exponent < np.inf)
+        require("exponent", exponent, proper, "finite, 1 or more")
 
     @cached_property
     def _constants(self) -> tuple[Parameter, ...]:
@@ -249,14 +235,8 @@ class BoucWen(UniaxialLaw):
         return self.stiffness, self.residual_stiffness, self.limit, self.exponent, gain
 
     @cached_property
-    def _parameters(self) -> Array:
+    def parameters(self) -> Array:
         return parameter_columns(*self._constants)
-
-    def rest(self, joints: int) -> JointState:
-        return np.zeros((joints, 2))
-
-    def respond(self, state: JointState, increment: Array) -> JointResponse:
-        return kernel_response(_respond, self._parameters, state, increment)
 
     def loop_energy(self, amplitude: Parameter) -> Array:
         """Energy lost in a settled cycle between ± ``amplitude`` [mm], in [N mm].

@@ -23,8 +23,7 @@ Misprints, and what holds here:
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, replace
-from functools import cached_property
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Protocol, TypeVar
 
 import numpy as np
@@ -129,14 +128,10 @@ class TabulatedEvolution:
     values: tuple[float, ...]
 
     def __post_init__(self) -> None:
-        _ = self._table
+        EnergyTable(self.energies, self.values)  # refuses what is no table
 
     def __call__(self, energy: Array | float) -> Array:
-        return self._table.at(energy)
-
-    @cached_property
-    def _table(self) -> EnergyTable:
-        return EnergyTable(self.energies, self.values)
+        return np.asarray(np.interp(energy, self.energies, self.values))
 
 
 @dataclass(frozen=True)
@@ -169,26 +164,16 @@ class JointEvolution:
             initial = getattr(law, name, None)
             if initial is None:
                 raise InputError(f"{type(law).__name__} has no {name} that could evolve")
-            value = function(energy)
-            scale = (
-                np.ones_like(initial)
-                if isinstance(function, TabulatedEvolution)
-                else np.asarray(initial)
-            )
-            values[name] = np.maximum(value * scale, 0.0)
-        return {name: np.asarray(value) for name, value in values.items()}
+            scale = np.ones_like(initial) if isinstance(function, TabulatedEvolution) else initial
+            values[name] = np.asarray(np.maximum(function(energy) * scale, 0.0))
+        return values
 
     @property
     def breaks(self) -> tuple[float, ...]:
         """Energies at which a parameter has a kink: those of the tables, ascending [N mm]."""
-        energies: set[float] = set()
-        for _, function in self._functions():
-            if isinstance(function, TabulatedEvolution):
-                energies.update(function.energies)
-        return tuple(sorted(energies))
+        tables = [function for _, function in self._functions()]
+        energies = [t.energies for t in tables if isinstance(t, TabulatedEvolution)]
+        return tuple(sorted(set().union(*energies)))
 
     def _functions(self) -> Iterator[tuple[str, WearFunction]]:
-        for field in fields(self):
-            function = getattr(self, field.name)
-            if function is not None:
-                yield field.name, function
+        return ((name, function) for name, function in vars(self).items() if function is not None)

@@ -43,8 +43,8 @@ import numpy as np
 from numba import njit
 
 from sa_solver.types import Array
-from wear.joints.law import JointResponse, JointState
 from wear.joints.parameters import (
+    CompiledLaw,
     JointError,
     Parameter,
     parameter_columns,
@@ -384,23 +384,23 @@ def advance_contact(
 
 
 @njit(cache=True)
-def _advance_all(
-    parameters: Array, start: Array, increment: Array
+def _respond(
+    parameters: Array, state: Array, increment: Array
 ) -> tuple[Array, Array, Array, Array]:
-    """:func:`advance_contact` for every joint: forces, states, derivatives and energies lost."""
-    joints = len(start)
+    """:func:`advance_contact` for every joint: forces, tangents, states and energies lost."""
+    joints = len(state)
     force, end, jacobian = np.empty((joints, 3)), np.empty((joints, 3)), np.empty((joints, 3, 6))
     dissipated = np.empty(joints)
     for j in range(joints):
         joint = parameters[j % len(parameters)]
         dissipated[j] = advance_contact(
-            joint, start[j], increment[j], force[j], end[j], jacobian[j]
+            joint, state[j], increment[j], force[j], end[j], jacobian[j]
         )
-    return force, end, jacobian, dissipated
+    return force, jacobian[:, :, 3:], end, dissipated
 
 
 @dataclass(frozen=True)
-class FrictionContact:
+class FrictionContact(CompiledLaw):
     """Three-dimensional friction contact.
 
     Tangential ``stiffness`` kt and ``normal_stiffness`` kn [N/mm], Coulomb's ``friction`` µ,
@@ -414,6 +414,9 @@ class FrictionContact:
     smaller limit the slider slips at the beginning of the next increment, and the energy that frees
     is dissipated in it. An increment of zero has the tangent of sticking.
     """
+
+    directions = columns = 3
+    kernel = staticmethod(_respond)
 
     stiffness: Parameter
     normal_stiffness: Parameter
@@ -435,29 +438,9 @@ class FrictionContact:
                 " one of them must be 0"
             )
 
-    @property
-    def directions(self) -> int:
-        return 3
-
     @cached_property
     def parameters(self) -> Array:
         """What :func:`advance_contact` takes, ``(n, 5)``, or ``(1, 5)`` where all are numbers."""
         return parameter_columns(
             self.stiffness, self.normal_stiffness, self.friction, self.normal_load, self.gap
         )
-
-    def rest(self, joints: int) -> JointState:
-        return np.zeros((joints, 3))
-
-    def respond(self, state: JointState, increment: Array) -> JointResponse:
-        joints = len(state)
-        if increment.shape != (joints, 3):
-            raise JointError(f"the increment has shape {increment.shape}: it must be ({joints}, 3)")
-        if len(self.parameters) not in (1, joints):
-            raise JointError(
-                f"the law is that of {len(self.parameters)} joints, the state of {joints}"
-            )
-        force, end, jacobian, dissipated = _advance_all(
-            self.parameters, state, np.ascontiguousarray(increment, float)
-        )
-        return JointResponse(force, jacobian[:, :, 3:], end, dissipated)

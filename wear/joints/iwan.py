@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from wear.joints.masing import MasingLaw
-from wear.joints.parameters import JointError, Parameter, require_not_negative
+from wear.joints.parameters import Parameter, require, require_not_negative
 
 
 @dataclass(frozen=True)
@@ -39,8 +39,8 @@ class FourParameterIwan(MasingLaw):
     def __post_init__(self) -> None:
         super().__post_init__()
         require_not_negative(beta=self.beta)
-        if not (np.all(np.greater(self.chi, -1.0)) and np.all(np.isfinite(self.chi))):
-            raise JointError(f"chi of a joint is {self.chi}: it must be finite and above -1")
+        chi = np.asarray(self.chi)
+        require("chi", chi, (chi > -1.0) & (chi < np.inf), "finite and above -1")
 
     @property
     def spread(self) -> tuple[Parameter, Parameter]:

@@ -10,8 +10,8 @@ import numpy as np
 from numba import njit
 
 from sa_solver.types import Array
-from wear.joints.law import JointResponse, JointState
-from wear.joints.parameters import Parameter, UniaxialLaw, kernel_response, parameter_columns
+from wear.joints.law import JointState
+from wear.joints.parameters import Parameter, UniaxialLaw, parameter_columns
 
 
 @njit(cache=True)
@@ -70,15 +70,12 @@ class Jenkins(UniaxialLaw):
     At the limit the tangent is that of sliding on.
     """
 
+    columns = 2
+    kernel = staticmethod(_respond)
+
     @cached_property
-    def _parameters(self) -> Array:
+    def parameters(self) -> Array:
         return parameter_columns(self.stiffness, self.residual_stiffness, self.limit)
-
-    def rest(self, joints: int) -> JointState:
-        return np.zeros((joints, 2))
-
-    def respond(self, state: JointState, increment: Array) -> JointResponse:
-        return kernel_response(_respond, self._parameters, state, increment)
 
     def loop_energy(self, amplitude: Parameter) -> Array:
         """Energy lost in a cycle between ± ``amplitude`` [mm]: 4 µN (A - µN/kt) [N mm] or 0."""

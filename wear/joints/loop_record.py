@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 from scipy.signal import savgol_filter
@@ -62,8 +63,7 @@ class LoopBranch:
         return slice(self.begin, self.end + 1)
 
 
-@dataclass(frozen=True)
-class LoopRecord:
+class LoopRecord(NamedTuple):
     """Displacement [mm], resisting force [N] and normal load [N], each ``(t,)``.
 
     The samples are evenly spaced in time; a normal load that is not known is NaN.
@@ -120,8 +120,7 @@ def _evenly(record: LoopRecord, time: Array) -> LoopRecord:
     if not (np.diff(time) > 0.0).all():
         raise MeasuredLoopError("time does not grow from sample to sample; allowed: growing times")
     even = np.linspace(time[0], time[-1], len(time))
-    columns = (record.displacement, record.force, record.normal_load)
-    return LoopRecord(*(np.interp(even, time, column) for column in columns))
+    return LoopRecord(*(np.interp(even, time, column) for column in record))
 
 
 # --- reversals ----------------------------------------------------------------------------------
@@ -210,7 +209,8 @@ def complete_branches(record: LoopRecord) -> tuple[LoopRecord, tuple[LoopBranch,
             "closed period"
         )
     branches = branches[: len(branches) // 2 * 2]
-    return replace(record, displacement=_smoothed(record.displacement, branches)), tuple(branches)
+    smooth = _smoothed(record.displacement, branches)
+    return record._replace(displacement=smooth), tuple(branches)
 
 
 def _complete(record: LoopRecord, places: Indices) -> list[LoopBranch]:
@@ -228,20 +228,18 @@ def _complete(record: LoopRecord, places: Indices) -> list[LoopBranch]:
 
 def _closed(record: LoopRecord) -> bool:
     """Whether the record ends where it began."""
-    columns = (record.displacement, record.force)
-    return all(abs(column[-1] - column[0]) <= CLOSED * np.ptp(column) for column in columns)
+    return all(abs(column[-1] - column[0]) <= CLOSED * np.ptp(column) for column in record[:2])
 
 
 def _begun_at(record: LoopRecord, start: int) -> LoopRecord:
     """One closed period, begun at sample ``start``, which is repeated at the end."""
-    columns = (record.displacement, record.force, record.normal_load)
     # A period that repeats its first sample at its end already has it once too often.
     count = len(record.force)
     step = np.median(np.abs(np.diff(record.displacement)))
     if abs(record.displacement[-1] - record.displacement[0]) < 0.5 * step:
         count -= 1
     order = np.append(np.roll(np.arange(count), -start), start)
-    return LoopRecord(*(column[order] for column in columns))
+    return LoopRecord(*(column[order] for column in record))
 
 
 def _smoothed(motion: Array, branches: Sequence[LoopBranch]) -> Array:

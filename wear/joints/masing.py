@@ -23,7 +23,7 @@ c = 0 Jenkins's element.
 
 from __future__ import annotations
 
-from abc import ABC, abstractmethod
+from abc import abstractmethod
 from dataclasses import dataclass
 from functools import cached_property
 from math import copysign
@@ -32,8 +32,8 @@ import numpy as np
 from numba import njit, vectorize
 
 from sa_solver.types import Array
-from wear.joints.law import JointResponse, JointState
-from wear.joints.parameters import Parameter, UniaxialLaw, kernel_response, parameter_columns
+from wear.joints.law import JointState
+from wear.joints.parameters import Parameter, UniaxialLaw, parameter_columns
 
 SliderCurve = tuple[float, float, float, float]
 """K, limit, c, m."""
@@ -179,7 +179,7 @@ def _loop_energy(
 
 
 @dataclass(frozen=True)
-class MasingLaw(UniaxialLaw, ABC):
+class MasingLaw(UniaxialLaw):
     """A joint of spread sliders, whichever way they are spread.
 
     ``stiffness`` K [N/mm] when all of them stick, ``friction`` µ and ``normal_load`` N [N], whose
@@ -191,20 +191,17 @@ class MasingLaw(UniaxialLaw, ABC):
     open loops is remembered: each costs a call the copying of 16 bytes, and nothing else.
     """
 
+    columns = POINTS + 2 * FEWEST_POINTS
+    kernel = staticmethod(_respond)
+
     @property
     @abstractmethod
     def spread(self) -> tuple[Parameter, Parameter]:
         """Share c of the spread sliders in the stiffness, and exponent m of their spread."""
 
     @cached_property
-    def _parameters(self) -> Array:
+    def parameters(self) -> Array:
         return parameter_columns(self.stiffness, self.residual_stiffness, self.limit, *self.spread)
-
-    def rest(self, joints: int) -> JointState:
-        return np.zeros((joints, POINTS + 2 * FEWEST_POINTS))
-
-    def respond(self, state: JointState, increment: Array) -> JointResponse:
-        return kernel_response(_respond, self._parameters, state, increment)
 
     def loop_energy(self, amplitude: Parameter) -> Array:
         """Energy lost in a cycle between ± ``amplitude`` [mm]: 4 L(A) [N mm]."""

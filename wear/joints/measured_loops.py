@@ -43,14 +43,6 @@ from wear.joints.loop_record import (
     loop_record,
 )
 
-__all__ = [
-    "MeanEstimate",
-    "MeasuredLoopError",
-    "MeasuredLoops",
-    "mean_estimate",
-    "measure_loops",
-]
-
 WINDOW = 0.5
 """The stick slope is taken until the force has risen through this share of the loop's height:
 there a Bouc-Wen branch begins to bend, and a uniform Iwan branch is a parabola all along."""

@@ -8,29 +8,22 @@ dissipated energy.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from sa_solver.types import Array
 from wear.joints.jenkins import Jenkins
 from wear.joints.parameters import JointError
-from wear.joints.periodic import SLIP, STICK, PeriodicMarch
+from wear.joints.periodic import SLIP, STICK, PeriodicMarch, SettledCycle
 
 
 @dataclass(frozen=True)
-class SlidersCycle:
-    """The period of the joint: see :class:`wear.joints.periodic.SettledCycle`.
+class SlidersCycle(SettledCycle):
+    """The period of the joint.
 
     ``by_slider`` ``(n,)`` is the energy that each slider dissipates in it [N mm].
     """
 
-    force: Array
-    jacobian: Array
-    samples: Array
-    states: np.ndarray
-    dissipated: Array
-    change: Array
     by_slider: Array
 
 
@@ -47,10 +40,6 @@ class ParallelSliders:
     def directions(self) -> int:
         return self.law.directions
 
-    @cached_property
-    def _march(self) -> PeriodicMarch:
-        return PeriodicMarch(self.law)
-
     def settle(
         self, coefficients: Array, basis: Array, weights: Array, lead: Array | None = None
     ) -> SlidersCycle:
@@ -63,7 +52,7 @@ class ParallelSliders:
             raise JointError(f"coefficients of {len(coefficients)} joints for the sliders of one")
         stiffness = np.atleast_1d(self.law.stiffness)
         shared = np.repeat(coefficients, len(stiffness), axis=0)
-        cycle = self._march.settle(shared, basis, weights, lead)
+        cycle = PeriodicMarch(self.law).settle(shared, basis, weights, lead)
         held = np.where(cycle.states == STICK, stiffness, 0.0).sum(axis=1)
         return SlidersCycle(
             force=cycle.force.sum(axis=0, keepdims=True),

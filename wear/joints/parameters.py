@@ -1,4 +1,4 @@
-"""What the laws along one direction share: checked parameters, and a compiled kernel's response.
+"""What the joint laws share: checked parameters, and a compiled kernel's response.
 
 A kernel takes the parameters of ``n`` joints as one array ``(m, p)``, a row per joint or a single
 row for all of them, and loops over the joints: a call for a few of them then costs microseconds,
@@ -7,8 +7,9 @@ most of it in making the arrays it returns.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from abc import ABC, abstractmethod
 from dataclasses import dataclass, fields
+from typing import ClassVar
 
 import numpy as np
 
@@ -17,27 +18,30 @@ from sa_solver.types import Array
 from wear.joints.law import JointResponse, JointState
 
 Parameter = float | Array
-ResponseKernel = Callable[[Array, Array, Array], tuple[Array, Array, Array, Array]]
 
 
 class JointError(InputError):
     """Parameters that a joint law cannot have, or arrays that do not fit its joints."""
 
 
+def require(name: str, value: Parameter, proper: np.ndarray, range_text: str) -> None:
+    """Raise :class:`JointError` unless a parameter is ``proper`` throughout."""
+    if not np.all(proper):
+        raise JointError(f"{name} of a joint is {value}: it must be {range_text}")
+
+
 def require_positive(**values: Parameter) -> None:
     """Raise :class:`JointError` naming the first of ``values`` that is not above 0 throughout."""
     for name, value in values.items():
         given = np.asarray(value)
-        if not ((given > 0.0) & (given < np.inf)).all():
-            raise JointError(f"{name} of a joint is {value}: it must be finite and above 0")
+        require(name, value, (given > 0.0) & (given < np.inf), "finite and above 0")
 
 
 def require_not_negative(**values: Parameter) -> None:
     """Raise :class:`JointError` naming the first of ``values`` that is somewhere below 0."""
     for name, value in values.items():
         given = np.asarray(value)
-        if not ((given >= 0.0) & (given < np.inf)).all():
-            raise JointError(f"{name} of a joint is {value}: it must be finite and 0 or more")
+        require(name, value, (given >= 0.0) & (given < np.inf), "finite and 0 or more")
 
 
 def require_one_each(*values: Parameter) -> None:
@@ -58,29 +62,55 @@ def parameter_columns(*values: Parameter) -> Array:
     return columns
 
 
-def kernel_response(
-    kernel: ResponseKernel, parameters: Array, state: JointState, increment: Array
-) -> JointResponse:
-    """Advance the joints of ``state`` by ``increment`` ``(n, 1)`` [mm].
+class CompiledLaw(ABC):
+    """A law whose response is that of a compiled loop over its joints.
 
-    Raises :class:`JointError` where shapes differ: the kernel itself checks no bounds.
+    A state at rest has so many ``columns``.
     """
-    joints = len(state)
-    if increment.shape != (joints, 1):
-        raise JointError(f"the increment has shape {increment.shape}: it must be ({joints}, 1)")
-    if len(parameters) not in (1, joints):
-        raise JointError(f"the law is that of {len(parameters)} joints, the state of {joints}")
-    return JointResponse(*kernel(parameters, state, np.ascontiguousarray(increment, float)))
+
+    directions: ClassVar[int]
+    columns: ClassVar[int]
+
+    @staticmethod
+    @abstractmethod
+    def kernel(
+        parameters: Array, state: Array, increment: Array
+    ) -> tuple[Array, Array, Array, Array]:
+        """The loop: all that :class:`JointResponse` holds."""
+
+    @property
+    @abstractmethod
+    def parameters(self) -> Array:
+        """What compiled loops take, ``(n, p)``, or ``(1, p)`` where all are numbers."""
+
+    def rest(self, joints: int) -> JointState:
+        """State of ``joints`` joints that have never moved."""
+        return np.zeros((joints, self.columns))
+
+    def respond(self, state: JointState, increment: Array) -> JointResponse:
+        """Advance the joints of ``state`` by ``increment`` ``(n, d)`` [mm].
+
+        Raises :class:`JointError` where shapes differ: the kernel itself checks no bounds.
+        """
+        shape, laws = (len(state), self.directions), len(self.parameters)
+        if increment.shape != shape:
+            raise JointError(f"the increment has shape {increment.shape}: it must be {shape}")
+        if laws not in (1, len(state)):
+            raise JointError(f"the law is that of {laws} joints, the state of {len(state)}")
+        moved = np.ascontiguousarray(increment, float)
+        return JointResponse(*self.kernel(self.parameters, state, moved))
 
 
 @dataclass(frozen=True)
-class UniaxialLaw:
+class UniaxialLaw(CompiledLaw):
     """What the laws along one direction have in common: parameters, as numbers or ``(n,)``.
 
     ``stiffness`` [N/mm] of the stuck joint, ``friction`` µ, ``normal_load`` N [N] and
     ``residual_stiffness`` [N/mm], what is left of the slope when all of it slides. Raises
     :class:`JointError` for what they cannot be.
     """
+
+    directions = 1
 
     stiffness: Parameter
     friction: Parameter
@@ -96,9 +126,9 @@ class UniaxialLaw:
             residual_stiffness=self.residual_stiffness,
         )
 
-    @property
-    def directions(self) -> int:
-        return 1
+    @abstractmethod
+    def loop_energy(self, amplitude: Parameter) -> Array:
+        """Energy lost in a settled cycle between ± ``amplitude`` [mm], in [N mm]."""
 
     @property
     def limit(self) -> Array:

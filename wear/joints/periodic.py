@@ -29,15 +29,23 @@ from wear.joints.bouc_wen import BoucWen
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
 from wear.joints.masing import MasingLaw
-from wear.joints.parameters import JointError, parameter_columns
+from wear.joints.parameters import JointError
 from wear.joints.periodic_contact import settle_contacts
-from wear.joints.periodic_sliders import BOUC_WEN, JENKINS, settle_curves, settle_sliders
+from wear.joints.periodic_sliders import (
+    BOUC_WEN,
+    JENKINS,
+    DrivenJoints,
+    Period,
+    differences,
+    settle_curves,
+    settle_sliders,
+)
 
 STICK, SLIP, SEPARATED = 0, 1, 2
 """States of a joint at a sample. A spread or smooth joint slips where less than half of the
 stiffness that it may lose is left."""
 
-SettlingKernel = Callable[..., None]
+SettlingKernel = Callable[[Period, DrivenJoints], None]
 
 
 @dataclass(frozen=True)
@@ -85,39 +93,45 @@ class PeriodicMarch:
         lead = basis[:1] if lead is None else lead
         self._require(coefficients, basis, weights, lead)
         joints, size, directions = coefficients.shape
-        samples = len(basis)
         kernel, parameters = self._kernel
-        force, states = (
-            np.empty((joints, samples, directions)),
-            np.empty((joints, samples), np.int8),
-        )
-        projected, jacobian = (
-            np.empty((joints, size, directions)),
-            np.empty((joints, size, directions, size, directions)),
-        )
-        lost, change = np.empty(joints), np.empty(joints)
-        arrays = (
-            np.ascontiguousarray(basis @ coefficients),
-            np.ascontiguousarray(lead @ coefficients),
-            force,
-            states,
-            projected,
-            jacobian,
-            lost,
-            change,
-        )
         if len(parameters) < joints:
             parameters = np.repeat(parameters, joints, axis=0)
+        path, before = basis @ coefficients, lead @ coefficients
+        force, states = np.empty_like(path), np.empty(path.shape[:2], np.int8)
+        jacobian = np.empty((joints, size, directions, size, directions))
+        lost, change = np.empty((2, joints))
+        driven = DrivenJoints(parameters, path, before, force, states, jacobian, lost, change)
+        if directions == 1:
+            driven = driven._replace(
+                path=path[..., 0],
+                before=before[..., 0],
+                force=force[..., 0],
+                jacobian=jacobian[:, :, 0, :, 0],
+            )
+        period = Period(basis, weights, lead, differences(basis))
 
         def work(share: slice) -> None:
-            kernel(basis, weights, lead, parameters[share], *(part[share] for part in arrays))
+            kernel(period, DrivenJoints(*(part[share] for part in driven)))
 
         self._in_shares(joints, work)
-        return SettledCycle(projected, jacobian, force.transpose(1, 0, 2), states.T, lost, change)
+        return SettledCycle(
+            weights @ force, jacobian, force.transpose(1, 0, 2), states.T, lost, change
+        )
 
     @cached_property
     def _kernel(self) -> tuple[SettlingKernel, Array]:
-        return _kernel_of(self.law)
+        """The compiled march of the law, and its parameters ``(1 or j, p)``."""
+        law = self.law
+        if isinstance(law, FrictionContact):
+            return settle_contacts, law.parameters
+        if isinstance(law, MasingLaw):
+            return settle_curves, law.parameters
+        if isinstance(law, Jenkins):
+            return settle_sliders, np.insert(law.parameters, 0, JENKINS, axis=1)
+        parameters = np.insert(law.parameters, 0, BOUC_WEN, axis=1)
+        # Of its stiffness the spring has what is not residual.
+        parameters[:, 1] -= parameters[:, 2]
+        return settle_sliders, parameters
 
     def _in_shares(self, joints: int, work: Callable[[slice], None]) -> None:
         """Do the work for all joints, in a share per thread."""
@@ -143,25 +157,3 @@ class PeriodicMarch:
         laws = len(self._kernel[1])
         if laws not in (1, joints):
             raise JointError(f"the law is that of {laws} joints, the coefficients of {joints}")
-
-
-def _kernel_of(
-    law: Jenkins | BoucWen | MasingLaw | FrictionContact,
-) -> tuple[SettlingKernel, Array]:
-    """The compiled march of a law, and its parameters ``(1 or j, p)``."""
-    if isinstance(law, FrictionContact):
-        return settle_contacts, law.parameters
-    limit = np.multiply(law.friction, law.normal_load)
-    if isinstance(law, MasingLaw):
-        return settle_curves, parameter_columns(
-            law.stiffness, law.residual_stiffness, limit, *law.spread
-        )
-    if isinstance(law, Jenkins):
-        return settle_sliders, parameter_columns(
-            JENKINS, law.stiffness, law.residual_stiffness, limit, 1.0, 0.0
-        )
-    spring = np.subtract(law.stiffness, law.residual_stiffness)
-    gain = np.multiply(2.0, law.sigma) - 1.0
-    return settle_sliders, parameter_columns(
-        BOUC_WEN, spring, law.residual_stiffness, limit, law.exponent, gain
-    )

@@ -22,7 +22,10 @@ from wear.joints.periodic_sliders import (
     MAX_PERIODS,
     PLAIN_PERIODS,
     REPEATED,
-    differences,
+    DrivenJoints,
+    Period,
+    PeriodRecord,
+    relative_change,
 )
 
 # A force below the circle by no more than this share of it slips: rounding.
@@ -100,20 +103,11 @@ class Memory(NamedTuple):
     slopes: Array
 
 
-class PeriodRecord(NamedTuple):
-    """What is written of a period: ``gradient`` ``(t, 2, 3, m)`` of the stretch, and the rest."""
-
-    force: Array
-    states: Array
-    gradient: Array
-
-
 @njit(cache=True, nogil=True, error_model="numpy")
-def _move(joint: Array, memory: Memory, end: Array) -> float:
-    """One increment to the displacement ``end`` ``(3,)``; return the energy lost.
-
-    ``memory.increment`` has the tangential part of it already.
-    """
+def _move(joint: Array, memory: Memory, start: Array, end: Array) -> float:
+    """One increment between displacements ``(3,)``; return the energy lost."""
+    for direction in range(2):
+        memory.increment[direction] = end[direction] - start[direction]
     memory.increment[2] = end[2] - memory.state[2]
     lost: float = advance_contact(
         joint, memory.state, memory.increment, memory.force, memory.state, memory.slopes
@@ -126,13 +120,10 @@ def _move(joint: Array, memory: Memory, end: Array) -> float:
 def _lead_in(joint: Array, memory: Memory, before: Array, lead: Array) -> None:
     """Drive a contact from rest to the first sample."""
     memory.state[:], memory.derivative[:] = 0.0, 0.0
-    start, step = np.zeros(lead.shape[1]), np.empty(lead.shape[1])
+    here, start, step = np.zeros(3), np.zeros(lead.shape[1]), np.empty(lead.shape[1])
     for i in range(len(lead)):
-        there = before[i]
-        for direction in range(2):
-            here = before[i - 1, direction] if i > 0 else 0.0
-            memory.increment[direction] = there[direction] - here
-        _move(joint, memory, there)
+        _move(joint, memory, here, before[i])
+        here = before[i]
         step[:] = lead[i] - start
         _carry(memory.slopes, joint[0], start, step, memory.derivative)
         start[:] = lead[i]
@@ -143,8 +134,7 @@ def _round(
     joint: Array,
     memory: Memory,
     path: Array,
-    basis: Array,
-    steps: Array,
+    period: Period,
     record: PeriodRecord,
     total: Array,
 ) -> tuple[float, bool]:
@@ -152,15 +142,14 @@ def _round(
 
     ``total`` ``(2, 2)`` becomes the derivative of the stretch at its end by that at its start.
     """
+    basis, steps = period.basis, period.steps
     samples = len(basis)
     total[0, 0] = total[1, 1] = 1.0
     total[0, 1] = total[1, 0] = 0.0
     lost, sticks = 0.0, True
     for step in range(1, samples + 1):
         at = step if step < samples else 0
-        for direction in range(2):
-            memory.increment[direction] = path[at, direction] - path[step - 1, direction]
-        lost += _move(joint, memory, path[at])
+        lost += _move(joint, memory, path[step - 1], path[at])
         if not _carry(memory.slopes, joint[0], basis[step - 1], steps[at], memory.derivative):
             sticks = False
             _chain(memory.slopes, joint[0], total)
@@ -172,47 +161,39 @@ def _round(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _settle_contact(
-    joint: Array, memory: Memory, path: Array, basis: Array, steps: Array, record: PeriodRecord
+    joint: Array, memory: Memory, path: Array, period: Period, record: PeriodRecord
 ) -> tuple[float, float, bool]:
     """March until stretch and derivative repeat: energy lost, change of force, all stuck."""
     total, stretch, derivative = np.empty((2, 2)), np.empty(2), np.empty_like(memory.derivative)
     span = max(np.max(np.abs(path[:, 0])), np.max(np.abs(path[:, 1])))
     lost, change, sticks = 0.0, 0.0, True
-    for period in range(MAX_PERIODS):
+    for number in range(MAX_PERIODS):
         stretch[:], derivative[:] = memory.state[:2], memory.derivative
-        lost, sticks = _round(joint, memory, path, basis, steps, record, total)
+        lost, sticks = _round(joint, memory, path, period, record, total)
         x, y = memory.state[0] - stretch[0], memory.state[1] - stretch[1]
         change = max(abs(x), abs(y))
         turned = np.max(np.abs(memory.derivative - derivative))
         if change <= REPEATED * span and turned <= DERIVATIVE_REPEATED:
             break
-        if period < PLAIN_PERIODS:
+        if number < PLAIN_PERIODS:
             continue
         g, h, k, m = _to_the_limit(total)
         memory.state[0], memory.state[1] = stretch[0] + g * x + h * y, stretch[1] + k * x + m * y
-        memory.derivative[:] -= derivative
-        for direction in range(3):
-            for c in range(len(steps[0])):
-                x, y = memory.derivative[0, direction, c], memory.derivative[1, direction, c]
-                memory.derivative[0, direction, c] = g * x + h * y
-                memory.derivative[1, direction, c] = k * x + m * y
-        memory.derivative[:] += derivative
+        change_x, change_y = memory.derivative - derivative
+        memory.derivative[0] = derivative[0] + (g * change_x + h * change_y)
+        memory.derivative[1] = derivative[1] + (k * change_x + m * change_y)
     return lost, joint[0] * change, sticks
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _project_stuck(
-    stiffness: float,
-    basis: Array,
-    weights: Array,
-    shares: Array,
-    record: PeriodRecord,
-    jacobian: Array,
+    stiffness: float, period: Period, shares: Array, record: PeriodRecord, jacobian: Array
 ) -> None:
     """Tangential part of the derivative where all samples stick.
 
     The stretch at a sample is that at the first one and the displacement since.
     """
+    basis, weights = period.basis, period.weights
     size = basis.shape[1]
     first = record.gradient[0]
     for row in range(size):
@@ -231,70 +212,40 @@ def _project(stiffness: float, weights: Array, record: PeriodRecord, jacobian: A
     """Tangential part of the derivative."""
     size = weights.shape[0]
     flat = record.gradient.reshape(len(record.gradient), 6 * size)
-    slopes = np.dot(weights, flat)
-    for row in range(size):
-        for direction in range(2):
-            for by in range(3):
-                place = (3 * direction + by) * size
-                for c in range(size):
-                    jacobian[row, direction, c, by] = stiffness * slopes[row, place + c]
+    slopes = np.dot(weights, flat).reshape(size, 2, 3, size)
+    jacobian[:, :2] = stiffness * slopes.transpose(0, 1, 3, 2)
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _project_normal(
-    stiffness: float, basis: Array, weights: Array, shares: Array, states: Array, jacobian: Array
+    stiffness: float, period: Period, shares: Array, states: Array, jacobian: Array
 ) -> None:
     """Normal part of the derivative: kn as long as there is contact."""
-    size = basis.shape[1]
-    apart = np.count_nonzero(states == 2)
     pressed = shares
-    if apart > 0:
-        touching = np.zeros_like(basis)
-        for at in range(len(basis)):
-            if states[at] != 2:
-                touching[at] = basis[at]
-        pressed = np.dot(weights, touching)
-    for row in range(size):
-        for c in range(size):
-            jacobian[row, 2, c, 0] = jacobian[row, 2, c, 1] = 0.0
-            jacobian[row, 2, c, 2] = stiffness * pressed[row, c]
+    if np.any(states == 2):
+        touching = period.basis.copy()
+        touching[states == 2] = 0.0
+        pressed = np.dot(period.weights, touching)
+    jacobian[:, 2] = 0.0
+    jacobian[:, 2, :, 2] = stiffness * pressed
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def settle_contacts(
-    basis: Array,
-    weights: Array,
-    lead: Array,
-    parameters: Array,
-    path: Array,
-    before: Array,
-    force: Array,
-    states: Array,
-    projected: Array,
-    jacobian: Array,
-    dissipated: Array,
-    change: Array,
-) -> None:
-    """Settle contacts: ``parameters`` ``(j, 5)`` are those of the law.
-
-    ``path`` ``(j, t, 3)`` and ``before`` ``(j, p, 3)`` [mm] are the displacements, the last of
-    ``before`` being the first of ``path``. The others are written.
-    """
-    samples, size = basis.shape
-    gradient = np.empty((samples, 2, 3, size))
-    steps, shares = differences(basis), np.dot(weights, basis)
+def settle_contacts(period: Period, joints: DrivenJoints) -> None:
+    """Settle contacts; parameters are those of the law."""
+    samples, size = period.basis.shape
+    gradient, shares = np.empty((samples, 2, 3, size)), np.dot(period.weights, period.basis)
     memory = Memory(np.empty(3), np.empty((2, 3, size)), np.empty(3), np.empty(3), np.empty((3, 6)))
-    for j in range(len(parameters)):
-        joint, record = parameters[j], PeriodRecord(force[j], states[j], gradient)
-        _lead_in(joint, memory, before[j], lead)
-        dissipated[j], missing, sticks = _settle_contact(
-            joint, memory, path[j], basis, steps, record
+    for j in range(len(joints.parameters)):
+        joint, jacobian = joints.parameters[j], joints.jacobian[j]
+        record = PeriodRecord(joints.force[j], joints.states[j], gradient)
+        _lead_in(joint, memory, joints.before[j], period.lead)
+        joints.dissipated[j], missing, sticks = _settle_contact(
+            joint, memory, joints.path[j], period, record
         )
-        largest = np.max(np.abs(force[j]))
-        change[j] = missing / largest if largest > 0.0 else 0.0
-        projected[j] = np.dot(weights, force[j])
+        joints.change[j] = relative_change(missing, record.force)
         if sticks:
-            _project_stuck(joint[0], basis, weights, shares, record, jacobian[j])
+            _project_stuck(joint[0], period, shares, record, jacobian)
         else:
-            _project(joint[0], weights, record, jacobian[j])
-        _project_normal(joint[1], basis, weights, shares, states[j], jacobian[j])
+            _project(joint[0], period.weights, record, jacobian)
+        _project_normal(joint[1], period, shares, record.states, jacobian)

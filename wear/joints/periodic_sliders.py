@@ -9,6 +9,7 @@ beside the one of the law itself.
 from __future__ import annotations
 
 from math import copysign, exp
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -19,7 +20,8 @@ from wear.joints.jenkins import advance_jenkins
 from wear.joints.masing import DEPTH, DISPLACEMENT, POINTS, advance_masing, turns
 
 JENKINS, BOUC_WEN = 0.0, 1.0
-"""First parameter of a joint with one number of memory; K, kr, µN, n and 2 σ - 1 follow."""
+"""First parameter of a joint with one number of memory; K, kr, µN follow, of the latter n and
+2 σ - 1."""
 
 # Periods after which a joint that still changes is given up. Newton's steps on the memory double
 # its digits in each: more mean that it has no attractor.
@@ -41,11 +43,50 @@ LEFT_IN_SLIP = 0.5
 CURVE_PERIODS = 2
 
 
+class Period(NamedTuple):
+    """Functions of time: ``basis`` ``(t, m)``, ``weights`` ``(m, t)`` and ``lead`` ``(p, m)``.
+
+    ``steps`` ``(t, m)`` are the :func:`differences` of the basis.
+    """
+
+    basis: Array
+    weights: Array
+    lead: Array
+    steps: Array
+
+
+class PeriodRecord(NamedTuple):
+    """What is written of a joint in a period: ``gradient`` ``(t, ..., m)`` of the stretch, and the
+    rest."""
+
+    force: Array
+    states: np.ndarray
+    gradient: Array
+
+
+class DrivenJoints(NamedTuple):
+    """Joints driven through a period; the last two axes only where they have three directions.
+
+    ``parameters`` ``(j, k)`` of the law, displacements ``path`` ``(j, t, d)`` in the period and
+    ``before`` ``(j, p, d)`` on the way to it [mm], the last of which is the first of ``path``.
+    The others are written: see :class:`wear.joints.periodic.SettledCycle`.
+    """
+
+    parameters: Array
+    path: Array
+    before: Array
+    force: Array
+    states: np.ndarray
+    jacobian: Array
+    dissipated: Array
+    change: Array
+
+
 @njit(cache=True, nogil=True, error_model="numpy")
 def _move(joint: Array, stretch: float, increment: float) -> tuple[float, float, float, float]:
     """One increment: stretch at its end, derivatives by stretch and increment, energy lost."""
-    kind, spring, limit = joint[0], joint[1], joint[3]
-    if kind == JENKINS:
+    spring, limit = joint[1], joint[3]
+    if joint[0] == JENKINS:
         _, slope, _, end, lost = advance_jenkins(spring, 0.0, limit, 0.0, stretch, increment)
         held = 1.0 if slope > 0.0 else 0.0
         return end, held, held, lost
@@ -81,20 +122,14 @@ def _lead_in(joint: Array, before: Array, lead: Array, derivative: Array) -> flo
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _round(
-    joint: Array,
-    stretch: float,
-    path: Array,
-    steps: Array,
-    derivative: Array,
-    force: Array,
-    states: Array,
-    gradient: Array,
+    joint: Array, stretch: float, path: Array, steps: Array, derivative: Array, record: PeriodRecord
 ) -> tuple[float, float, float]:
     """One period: stretch at its end, its derivative by that at the start, energy lost.
 
-    ``steps`` ``(t, m)`` are the differences of the basis from the sample before; written are
-    forces K z and ``states`` ``(t,)`` and the ``gradient`` ``(t, m)`` of z.
+    ``steps`` ``(t, m)`` are the differences of the basis from the sample before; forces that are
+    written are K z.
     """
+    force, states, gradient = record
     samples, size = steps.shape
     total, lost = 1.0, 0.0
     for step in range(1, samples + 1):
@@ -112,46 +147,29 @@ def _round(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _settle_slider(
-    joint: Array,
-    stretch: float,
-    path: Array,
-    steps: Array,
-    derivative: Array,
-    force: Array,
-    states: Array,
-    gradient: Array,
+    joint: Array, stretch: float, path: Array, steps: Array, derivative: Array, record: PeriodRecord
 ) -> tuple[float, float]:
     """March until stretch and derivative repeat: energy lost, last change of the stretch."""
-    size = steps.shape[1]
-    before = np.empty(size)
+    before = np.empty_like(derivative)
     repeated = REPEATED * min(joint[3] / joint[1], np.max(np.abs(path)))
     lost, change = 0.0, 0.0
     for period in range(MAX_PERIODS):
         before[:] = derivative
-        end, total, lost = _round(joint, stretch, path, steps, derivative, force, states, gradient)
+        end, total, lost = _round(joint, stretch, path, steps, derivative, record)
         change = end - stretch
-        if abs(change) <= repeated and _furthest(derivative, before) <= DERIVATIVE_REPEATED:
+        turned = np.max(np.abs(derivative - before))
+        if abs(change) <= repeated and turned <= DERIVATIVE_REPEATED:
             break
         part = 1.0
         if period >= PLAIN_PERIODS and 1.0 - total > FORGETTING:
             part = 1.0 / (1.0 - total)
         stretch += part * change
-        for c in range(size):
-            derivative[c] = before[c] + part * (derivative[c] - before[c])
+        derivative[:] = before + part * (derivative - before)
     return lost, change
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _furthest(one: Array, other: Array) -> float:
-    """Largest distance of two arrays ``(m,)``."""
-    furthest = 0.0
-    for c in range(one.size):
-        furthest = max(furthest, abs(one[c] - other[c]))
-    return furthest
-
-
-@njit(cache=True, nogil=True, error_model="numpy")
-def _relative_change(change: float, force: Array) -> float:
+def relative_change(change: float, force: Array) -> float:
     """A change of force over the largest force."""
     largest = np.max(np.abs(force))
     return abs(change) / largest if largest > 0.0 else 0.0
@@ -161,74 +179,50 @@ def _relative_change(change: float, force: Array) -> float:
 def differences(basis: Array) -> Array:
     """Differences ``(t, m)`` of a basis from the sample before, round the period."""
     steps = np.empty_like(basis)
-    for at in range(len(basis)):
-        for c in range(basis.shape[1]):
-            steps[at, c] = basis[at, c] - basis[at - 1 if at > 0 else len(basis) - 1, c]
+    steps[0], steps[1:] = basis[0] - basis[-1], basis[1:] - basis[:-1]
     return steps
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def settle_sliders(
-    basis: Array,
-    weights: Array,
-    lead: Array,
-    parameters: Array,
-    path: Array,
-    before: Array,
-    force: Array,
-    states: Array,
-    projected: Array,
-    jacobian: Array,
-    dissipated: Array,
-    change: Array,
-) -> None:
-    """Settle Jenkins's and Bouc-Wen's joints.
-
-    ``parameters`` ``(j, 6)``: kind, K, kr, µN, n, 2 σ - 1. ``path`` ``(j, t, 1)`` and ``before``
-    ``(j, p, 1)`` [mm] are the displacements, the last of ``before`` being the first of ``path``.
-    The others are written.
-    """
-    samples, size = basis.shape
-    gradient, derivative, steps = np.empty((samples, size)), np.empty(size), differences(basis)
+def settle_sliders(period: Period, joints: DrivenJoints) -> None:
+    """Settle Jenkins's and Bouc-Wen's joints; parameters begin with their kind."""
+    samples, size = period.basis.shape
+    gradient, derivative = np.empty((samples, size)), np.empty(size)
     # Needed for residual stiffness only: for one joint as much work as all the rest.
-    beside = np.any(parameters[:, 2] != 0.0)
-    shares = np.dot(weights, basis) if beside else np.zeros((size, size))
-    joint_force, joint_path = np.empty(samples), np.empty(samples)
-    for j in range(len(parameters)):
-        joint = parameters[j]
-        joint_path[:] = path[j, :, 0]
-        start = _lead_in(joint, before[j, :, 0], lead, derivative)
-        dissipated[j], missing = _settle_slider(
-            joint, start, joint_path, steps, derivative, joint_force, states[j], gradient
+    beside = np.any(joints.parameters[:, 2] != 0.0)
+    shares = np.dot(period.weights, period.basis) if beside else np.zeros((size, size))
+    for j in range(len(joints.parameters)):
+        joint, path, force = joints.parameters[j], joints.path[j], joints.force[j]
+        record = PeriodRecord(force, joints.states[j], gradient)
+        stretch = _lead_in(joint, joints.before[j], period.lead, derivative)
+        joints.dissipated[j], missing = _settle_slider(
+            joint, stretch, path, period.steps, derivative, record
         )
-        change[j] = _relative_change(joint[1] * missing, joint_force)
-        slopes = np.dot(weights, gradient)
-        for at in range(samples):
-            joint_force[at] += joint[2] * joint_path[at]
-            force[j, at, 0] = joint_force[at]
-        projected[j, :, 0] = np.dot(weights, joint_force)
-        for row in range(size):
-            for c in range(size):
-                jacobian[j, row, 0, c, 0] = joint[1] * slopes[row, c] + joint[2] * shares[row, c]
+        joints.change[j] = relative_change(joint[1] * missing, force)
+        force += joint[2] * path
+        slopes = np.dot(period.weights, gradient)
+        joints.jacobian[j] = joint[1] * slopes + joint[2] * shares
+
+
+class OpenLoops(NamedTuple):
+    """The ``memory`` of a law, and the derivatives ``(depth, m)`` of displacement, ``places``, and
+    ``forces`` at its turning points."""
+
+    memory: Array
+    places: Array
+    forces: Array
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _follow_curve(
-    joint: Array,
-    memory: Array,
-    places: Array,
-    forces: Array,
-    here: Array,
-    there: Array,
-    end: float,
-    gradient: Array,
+    joint: Array, loops: OpenLoops, here: Array, there: Array, end: float, gradient: Array
 ) -> tuple[float, float, float]:
     """Drive a joint of spread sliders to ``end``: force, share of stiffness left, energy lost.
 
     ``here`` and ``there`` ``(m,)`` are the derivatives of displacement at both ends; ``gradient``
-    that of the force, read and written. ``places`` and ``forces`` ``(depth, m)`` are those of
-    displacement and force at the turning points.
+    that of the force, read and written.
     """
+    memory, places, forces = loops
     increment = end - memory[DISPLACEMENT]
     depth = int(memory[DEPTH])
     if increment != 0.0 and turns(memory, depth, memory[DISPLACEMENT] + increment):
@@ -247,65 +241,34 @@ def _follow_curve(
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def settle_curves(
-    basis: Array,
-    weights: Array,
-    lead: Array,
-    parameters: Array,
-    path: Array,
-    before: Array,
-    force: Array,
-    states: Array,
-    projected: Array,
-    jacobian: Array,
-    dissipated: Array,
-    change: Array,
-) -> None:
-    """Settle joints of spread sliders: ``parameters`` ``(j, 5)``, K, kr, µN, c and m.
-
-    The others as in :func:`settle_sliders`.
-    """
+def settle_curves(period: Period, joints: DrivenJoints) -> None:
+    """Settle joints of spread sliders; parameters are K, kr, µN, c and m."""
+    basis, lead = period.basis, period.lead
     samples, size = basis.shape
     # Turning points that may be open at once: those of the way in, and of a period and its first
     # samples again.
     depth = len(lead) + 2 * samples
     memory = np.empty(POINTS + 2 * depth)
-    places, forces = np.empty((depth, size)), np.empty((depth, size))
+    loops = OpenLoops(memory, np.empty((depth, size)), np.empty((depth, size)))
     gradients, gradient, nowhere = np.empty((samples, size)), np.empty(size), np.zeros(size)
-    shares = np.dot(weights, basis)
-    joint_force = np.empty(samples)
-    for j in range(len(parameters)):
-        joint = parameters[j]
+    shares = np.dot(period.weights, basis)
+    for j in range(len(joints.parameters)):
+        joint, path, force = joints.parameters[j], joints.path[j], joints.force[j]
         memory[:], gradient[:], here = 0.0, 0.0, nowhere
         for i in range(len(lead)):
-            end = before[j, i, 0]
-            joint_force[0], _, _ = _follow_curve(
-                joint, memory, places, forces, here, lead[i], end, gradient
+            force[0], _, _ = _follow_curve(
+                joint, loops, here, lead[i], joints.before[j, i], gradient
             )
             here = lead[i]
         for _ in range(CURVE_PERIODS):
-            start, dissipated[j] = joint_force[0], 0.0
+            start, joints.dissipated[j] = force[0], 0.0
             for step in range(1, samples + 1):
                 at = step if step < samples else 0
-                joint_force[at], left, lost = _follow_curve(
-                    joint,
-                    memory,
-                    places,
-                    forces,
-                    basis[step - 1],
-                    basis[at],
-                    path[j, at, 0],
-                    gradient,
-                )
+                here, there = basis[step - 1], basis[at]
+                force[at], left, lost = _follow_curve(joint, loops, here, there, path[at], gradient)
                 gradients[at] = gradient
-                dissipated[j] += lost
-                states[j, at] = 1 if left < LEFT_IN_SLIP else 0
-            change[j] = _relative_change(joint_force[0] - start, joint_force)
-        slopes = np.dot(weights, gradients)
-        for at in range(samples):
-            joint_force[at] += joint[1] * path[j, at, 0]
-            force[j, at, 0] = joint_force[at]
-        projected[j, :, 0] = np.dot(weights, joint_force)
-        for row in range(size):
-            for c in range(size):
-                jacobian[j, row, 0, c, 0] = slopes[row, c] + joint[1] * shares[row, c]
+                joints.dissipated[j] += lost
+                joints.states[j, at] = 1 if left < LEFT_IN_SLIP else 0
+            joints.change[j] = relative_change(force[0] - start, force)
+        force += joint[1] * path
+        joints.jacobian[j] = np.dot(period.weights, gradients) + joint[1] * shares

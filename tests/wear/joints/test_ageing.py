@@ -12,10 +12,10 @@ import wear.joints.ageing
 from tests.wear.joints.papers import BOLTED, KJ, RIG, RIG_AMPLITUDE, RIG_EVOLUTION, J
 from wear.joints.ageing import (
     AgeingError,
-    MarchedStroke,
     NeverReachedError,
     integrate_cycles,
     long_test,
+    marched_stroke,
     steady_stroke,
 )
 from wear.joints.bouc_wen import BoucWen
@@ -84,7 +84,7 @@ def test_error_is_below_what_is_stated(energy_per_cycle, start, cycles, exact, t
     test = long_test(energy_per_cycle, cycles, start=start, tolerance=tolerance)
     number = np.unique(np.round(np.geomspace(1.0, cycles, 300)))
     energy = test.energy_at(number)
-    per_cycle = np.array([energy_per_cycle(own) for own in energy.tolist()])
+    per_cycle = np.array([energy_per_cycle(dissipated) for dissipated in energy.tolist()])
     # A cycle adds to the energy a number that is rounded to the energy's last digit.
     rounding = 2.2e-16 * number * energy / per_cycle
     assert np.all(np.abs(energy - exact(number)) / per_cycle <= test.error + rounding)
@@ -225,8 +225,8 @@ def test_settled_bouc_wen_loop(energy, amplitude) -> None:
     """The derived energy, the law's, and that of its differential equation, integrated."""
     law = RIG_EVOLUTION.at(RIG, energy)
     expected = bouc_wen_energy(law, amplitude)
-    found = steady_stroke(RIG, RIG_EVOLUTION, amplitude)(energy)
-    assert found == pytest.approx(expected, rel=1e-9)
+    lost = steady_stroke(RIG, RIG_EVOLUTION, amplitude)(energy)
+    assert lost == pytest.approx(expected, rel=1e-9)
     limit, spring = law.friction * law.normal_load, law.stiffness - law.residual_stiffness
 
     def slopes(sense):
@@ -250,11 +250,11 @@ def test_settled_bouc_wen_loop(energy, amplitude) -> None:
 def test_settled_loops_are_those_of_a_march(energy) -> None:
     """At frozen parameters; a law of one straight increment per branch is exact."""
     for law, evolution, amplitude in (TEST_4, (RIG, RIG_EVOLUTION, RIG_AMPLITUDE)):
-        marched = MarchedStroke(law, evolution, amplitude, start=energy)
+        marched = marched_stroke(law, evolution, amplitude, start=energy)
         for _ in range(3):
-            found = marched(energy)
+            lost = marched(energy)
         expected = steady_stroke(law, evolution, amplitude)(energy)
-        assert found == pytest.approx(expected, rel=1e-9)
+        assert lost == pytest.approx(expected, rel=1e-9)
 
 
 # --- Fantetti's test 1 --------------------------------------------------------------------------
@@ -300,7 +300,7 @@ def test_rig_on_a_stretch(rig, first) -> None:
 def test_rig_on_a_marched_stretch(rig, first) -> None:
     """The law's own memory from cycle to cycle makes no difference: the joint slides fully."""
     start = float(rig.energy_at(first))
-    marched = MarchedStroke(RIG, RIG_EVOLUTION, RIG_AMPLITUDE, start=start)
+    marched = marched_stroke(RIG, RIG_EVOLUTION, RIG_AMPLITUDE, start=start)
     stretch = integrate_cycles(rig, marched, first, 1000)
     assert abs(stretch.difference) < 1e-4
 
@@ -338,9 +338,9 @@ def test_bolted_joint_counted_to_its_end(bolted) -> None:
         stiffness = 115e3 * (1.31 - 0.31 * (0.8 * slow + 0.2 * fast))
         limit = 0.34 * (1.12 - 0.12 * (0.5 * slow + 0.5 * fast)) * preload
         energy += 4.0 * limit * (amplitude - 4.0 * limit / (3.0 * stiffness))
-    found = bolted.cycles_at(np.array(list(marks.values())) - 1e-9)
+    reached = bolted.cycles_at(np.array(list(marks.values())) - 1e-9)
     # The sum of a million energies is rounded as often.
-    assert np.all(np.abs(found - np.array(list(marks))) <= bolted.error + 1e-5)
+    assert np.all(np.abs(reached - np.array(list(marks))) <= bolted.error + 1e-5)
     assert bolted.error < 1e-6 * 1.08e6
     assert iwan_energy(law, amplitude) == pytest.approx(steady_stroke(*TEST_4)(0.0), rel=1e-12)
 
@@ -348,7 +348,7 @@ def test_bolted_joint_counted_to_its_end(bolted) -> None:
 @pytest.mark.parametrize("first", [0.0, 245e3, 1e6])
 def test_bolted_joint_on_a_marched_stretch(bolted, first) -> None:
     law, evolution, amplitude = TEST_4
-    marched = MarchedStroke(law, evolution, amplitude, start=float(bolted.energy_at(first)))
+    marched = marched_stroke(law, evolution, amplitude, start=float(bolted.energy_at(first)))
     stretch = integrate_cycles(bolted, marched, first, 500)
     assert abs(stretch.difference) <= stretch.stated + 1e-7
 

@@ -126,7 +126,7 @@ def sliders(law, number):
 @pytest.mark.parametrize("law", LAWS.values(), ids=LAWS)
 def test_many_sliders_approach_the_law_at_second_order(law):
     path = np.random.default_rng(RNG_SEED).uniform(-1.2, 1.2, 60) * REACH
-    own = lead(law, path)
+    by_law = lead(law, path)
     errors = []
     for number in (250, 2000):
         stiffness, reach = sliders(law, number)
@@ -139,8 +139,8 @@ def test_many_sliders_approach_the_law_at_second_order(law):
         lost = history.dissipated.sum(axis=1)
         errors.append(
             (
-                np.abs(force - own.force[:, 0, 0]).max() / LIMIT,
-                np.abs(lost - own.dissipated[:, 0]).max() / (LIMIT * REACH),
+                np.abs(force - by_law.force[:, 0, 0]).max() / LIMIT,
+                np.abs(lost - by_law.dissipated[:, 0]).max() / (LIMIT * REACH),
             )
         )
     assert max(errors[1]) < 1e-5

@@ -15,8 +15,8 @@ from wear.joints.bouc_wen import BoucWen
 from wear.joints.iwan import UniformIwan
 from wear.joints.jenkins import Jenkins
 from wear.joints.law import march_joints
-from wear.joints.loop_record import reversals
-from wear.joints.measured_loops import MeasuredLoopError, mean_estimate, measure_loops
+from wear.joints.loop_record import MeasuredLoopError, reversals
+from wear.joints.measured_loops import mean_estimate, measure_loops
 
 STIFFNESS, RESIDUAL, FRICTION, LOAD = 60e3, 900.0, 0.9, 60.0
 LIMIT = FRICTION * LOAD
@@ -75,13 +75,13 @@ def loops(
 @pytest.mark.parametrize("name", LAWS)
 @pytest.mark.parametrize("motion", [harmonic, triangular])
 def test_clean_loops_give_the_parameters(name, motion):
-    found = loops(name, motion=motion, cycles=3)
+    measured = loops(name, motion=motion, cycles=3)
     # The windows end at samples, not where sticking does: of Iwan a bit of a parabola is left.
-    assert found.stick_stiffness == pytest.approx(STICK[name], rel=2e-3)
+    assert measured.stick_stiffness == pytest.approx(STICK[name], rel=2e-3)
     # Bouc-Wen's ξ only tends to 1.
-    assert found.friction == pytest.approx(FRICTION, rel=2e-3)
-    assert found.residual_stiffness == pytest.approx(RESIDUAL, rel=0.03)
-    assert found.stroke == pytest.approx(2.0 * AMPLITUDE, rel=1e-12)
+    assert measured.friction == pytest.approx(FRICTION, rel=2e-3)
+    assert measured.residual_stiffness == pytest.approx(RESIDUAL, rel=0.03)
+    assert measured.stroke == pytest.approx(2.0 * AMPLITUDE, rel=1e-12)
 
 
 # Cycles that bring the standard error of kt to a third of a percent: four times as many where the
@@ -99,15 +99,15 @@ CYCLES = {"jenkins": 30, "iwan": 120, "bouc_wen": 30}
     ],
 )
 def test_noisy_loops_give_friction_and_stiffness_within_a_percent(name, seed, noise, samples):
-    found = loops(name, seed, noise, samples=samples, cycles=CYCLES[name])
-    stick = found.stick_estimate
+    measured = loops(name, seed, noise, samples=samples, cycles=CYCLES[name])
+    stick = measured.stick_estimate
     assert stick.value == pytest.approx(STICK[name], rel=0.01)
     assert stick.error < 0.005 * stick.value
     assert abs(stick.value - STICK[name]) < 4.0 * stick.error
-    assert mean_estimate(found.friction).value == pytest.approx(FRICTION, rel=0.01)
+    assert mean_estimate(measured.friction).value == pytest.approx(FRICTION, rel=0.01)
     # Of the height of a loop, 1 % is what kr may be wrong by over the stroke.
     allowed = 0.01 * 2.0 * LIMIT / (2.0 * AMPLITUDE)
-    assert mean_estimate(found.residual_stiffness).value == pytest.approx(RESIDUAL, abs=allowed)
+    assert mean_estimate(measured.residual_stiffness).value == pytest.approx(RESIDUAL, abs=allowed)
 
 
 @pytest.mark.parametrize("name", LAWS)
@@ -124,16 +124,16 @@ def test_energy_is_that_dissipated(name):
     displacement = harmonic(AMPLITUDE, 4000, 3)
     law = LAWS[name]
     marched = march_joints(law, law.rest(1), np.zeros((1, 1)), displacement[:, None, None])
-    found = measure_loops(displacement, marched.force[:, 0, 0])
-    for energy, (begin, _, end) in zip(found.energy, found.reversals, strict=True):
+    measured = measure_loops(displacement, marched.force[:, 0, 0])
+    for energy, (begin, _, end) in zip(measured.energy, measured.reversals, strict=True):
         # Trapezoids of the step: second order, 4e-7 of a loop here, and more at Jenkins's corners.
         dissipated = marched.dissipated[begin + 1 : end + 1].sum()
         assert energy == pytest.approx(dissipated, rel=1e-5)
 
 
 def test_noise_does_not_bias_the_energy():
-    exact, found = loops("jenkins", cycles=3), loops("jenkins", 1, 0.01)
-    measured = mean_estimate(found.energy)
+    exact, noisy = loops("jenkins", cycles=3), loops("jenkins", 1, 0.01)
+    measured = mean_estimate(noisy.energy)
     assert measured.value == pytest.approx(exact.energy[0], abs=4.0 * measured.error)
     assert measured.error < 2e-3 * measured.value
 
@@ -151,9 +151,9 @@ def test_tangent_of_spheres():
     tangent = fall[1] / moved[1]
     force = np.concatenate([fall[-1] - 2.0 * fall, -fall[-1] + 2.0 * fall[1:]])
     path = np.concatenate([moved[-1] - 2.0 * moved, -moved[-1] + 2.0 * moved[1:]])
-    found = measure_loops(path, force, 400.0)
-    assert 1.003 < found.stick_stiffness[0] / tangent < 1.005
-    assert not found.slides
+    measured = measure_loops(path, force, 400.0)
+    assert 1.003 < measured.stick_stiffness[0] / tangent < 1.005
+    assert not measured.slides
 
 
 # --- what slides --------------------------------------------------------------------------------
@@ -164,29 +164,29 @@ def test_stuck_and_partly_slipping_loops_say_so():
     for share in (0.3, 0.6, 0.9, 1.0):
         amplitude = share * 2.0 * LIMIT / STIFFNESS
         for seed in (None, 0):
-            found = loops("iwan", seed, amplitude=amplitude, cycles=3 if seed is None else 30)
-            assert not found.slides, share
-            assert found.stick_estimate.value == pytest.approx(STICK["iwan"], rel=0.01)
-            assert np.isnan(found.friction_force).all()
+            measured = loops("iwan", seed, amplitude=amplitude, cycles=3 if seed is None else 30)
+            assert not measured.slides, share
+            assert measured.stick_estimate.value == pytest.approx(STICK["iwan"], rel=0.01)
+            assert np.isnan(measured.friction_force).all()
             with pytest.raises(MeasuredLoopError, match=r"lower bound of 0.* larger stroke"):
-                _ = found.friction
+                _ = measured.friction
             bound = (LIMIT * share * (2.0 - share) + RESIDUAL * amplitude) / LOAD
-            assert mean_estimate(found.mobilised).value == pytest.approx(bound, rel=0.01)
+            assert mean_estimate(measured.mobilised).value == pytest.approx(bound, rel=0.01)
 
 
 def test_barely_sliding_loops_are_found():
-    found = loops("jenkins", 0, amplitude=1.5 * LIMIT / STIFFNESS)
-    assert found.slides
-    assert mean_estimate(found.friction).value == pytest.approx(FRICTION, rel=0.01)
+    measured = loops("jenkins", 0, amplitude=1.5 * LIMIT / STIFFNESS)
+    assert measured.slides
+    assert mean_estimate(measured.friction).value == pytest.approx(FRICTION, rel=0.01)
 
 
 def test_normal_load_is_the_mean_of_each_cycle():
     displacement = harmonic(AMPLITUDE, 400, 4)
     force = forces(LAWS["jenkins"], displacement)
     loads = LOAD * (1.0 + 0.1 * np.arange(len(force)) / 400.0)
-    found = measure_loops(displacement, force, loads)
-    assert np.diff(found.normal_load) == pytest.approx(0.1 * LOAD, rel=1e-9)
-    assert found.friction * found.normal_load == pytest.approx(LIMIT, rel=1e-6)
+    measured = measure_loops(displacement, force, loads)
+    assert np.diff(measured.normal_load) == pytest.approx(0.1 * LOAD, rel=1e-9)
+    assert measured.friction * measured.normal_load == pytest.approx(LIMIT, rel=1e-6)
     assert np.isnan(measure_loops(displacement, force).normal_load).all()
     with pytest.raises(MeasuredLoopError, match="needs the normal load"):
         _ = measure_loops(displacement, force).friction
@@ -200,10 +200,10 @@ def test_normal_load_is_the_mean_of_each_cycle():
 def test_reversals_are_found_in_noise(motion, noise):
     generator = np.random.default_rng(5)
     displacement = noisy(motion(1.0, 500, 20), noise, generator)
-    found = reversals(displacement)[1:-1]
+    turns = reversals(displacement)[1:-1]
     # 2.5 % of a cycle is 1 % of the stroke, at its turn. The first of 42 may be no reversal.
-    assert len(found) in (40, 41)
-    away = found - 250 * np.arange(41 - len(found), 41) - 125
+    assert len(turns) in (40, 41)
+    away = turns - 250 * np.arange(41 - len(turns), 41) - 125
     assert np.abs(away).max() <= (12 if noise else 0)
 
 
@@ -213,29 +213,29 @@ def test_one_closed_period_may_begin_anywhere(start, repeated):
     long = harmonic(AMPLITUDE, 400, 4)
     begin = 800 + int(400 * start)
     period = slice(begin, begin + 400 + repeated)
-    found = measure_loops(long[period], forces(LAWS["jenkins"], long)[period], LOAD)
-    assert found.stick_stiffness == pytest.approx(STICK["jenkins"], rel=1e-6)
-    assert found.friction == pytest.approx(FRICTION, rel=1e-6)
-    assert found.energy == pytest.approx(4.0 * LIMIT * (AMPLITUDE - LIMIT / STIFFNESS), rel=1e-3)
-    assert np.isnan(found.stick_estimate.error)
+    measured = measure_loops(long[period], forces(LAWS["jenkins"], long)[period], LOAD)
+    assert measured.stick_stiffness == pytest.approx(STICK["jenkins"], rel=1e-6)
+    assert measured.friction == pytest.approx(FRICTION, rel=1e-6)
+    assert measured.energy == pytest.approx(4.0 * LIMIT * (AMPLITUDE - LIMIT / STIFFNESS), rel=1e-3)
+    assert np.isnan(measured.stick_estimate.error)
 
 
 def test_uneven_times_are_evened():
     time = np.cumsum(np.random.default_rng(3).uniform(0.5, 1.5, 4000)) / 400.0
     displacement = AMPLITUDE * np.sin(2.0 * np.pi * time)
-    found = measure_loops(displacement, forces(LAWS["iwan"], displacement), LOAD, time)
-    assert found.stick_estimate.value == pytest.approx(STICK["iwan"], rel=0.01)
-    assert mean_estimate(found.friction).value == pytest.approx(FRICTION, rel=1e-3)
+    measured = measure_loops(displacement, forces(LAWS["iwan"], displacement), LOAD, time)
+    assert measured.stick_estimate.value == pytest.approx(STICK["iwan"], rel=0.01)
+    assert mean_estimate(measured.friction).value == pytest.approx(FRICTION, rel=1e-3)
 
 
 def test_displacement_may_drift():
     """A vibrometer's displacement, an integral, drifts: half a stroke over the record."""
     displacement, force = clean("jenkins", harmonic, AMPLITUDE, 400, 30)
     drift = AMPLITUDE * np.linspace(0.0, 1.0, len(force))
-    found = measure_loops(displacement + drift, force, LOAD)
-    assert len(found.energy) >= 29
-    assert mean_estimate(found.friction).value == pytest.approx(FRICTION, rel=0.01)
-    assert found.stick_estimate.value == pytest.approx(STICK["jenkins"], rel=0.01)
+    measured = measure_loops(displacement + drift, force, LOAD)
+    assert len(measured.energy) >= 29
+    assert mean_estimate(measured.friction).value == pytest.approx(FRICTION, rel=0.01)
+    assert measured.stick_estimate.value == pytest.approx(STICK["jenkins"], rel=0.01)
 
 
 # --- nonsense -----------------------------------------------------------------------------------
@@ -269,6 +269,6 @@ def test_a_motion_that_is_not_harmonic_is_not_smoothed_away() -> None:
     moved = 0.012 * (np.cos(angle) + 0.003 * np.cos(25.0 * angle))
     settled = march_joints(law, law.rest(1), np.zeros((1, 1)), moved[:1000, None, None])
     cycles = march_joints(law, settled.state, moved[999:1000, None], moved[1000:, None, None])
-    found = measure_loops(moved[1000:], cycles.force[:, 0, 0], 60.0)
-    assert found.stick_estimate.value == pytest.approx(3e4, rel=1e-3)
-    assert np.mean(found.friction) == pytest.approx(0.1, rel=1e-3)
+    measured = measure_loops(moved[1000:], cycles.force[:, 0, 0], 60.0)
+    assert measured.stick_estimate.value == pytest.approx(3e4, rel=1e-3)
+    assert np.mean(measured.friction) == pytest.approx(0.1, rel=1e-3)

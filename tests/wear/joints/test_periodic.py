@@ -256,11 +256,11 @@ def test_slow_forgetting_is_not_waited_for():
 def test_joints_are_independent_and_may_share_threads():
     law = CONTACTS["preloaded"]
     motion, functions = random_motion(6, 7, (0, 1, 3), 3, REACH)
-    own = replace(law, friction=np.linspace(0.2, 0.8, 7))
-    together = PeriodicMarch(own).settle(motion, *functions)
-    shared = PeriodicMarch(own, threads=3).settle(motion, *functions)
+    unlike = replace(law, friction=np.linspace(0.2, 0.8, 7))
+    together = PeriodicMarch(unlike).settle(motion, *functions)
+    shared = PeriodicMarch(unlike, threads=3).settle(motion, *functions)
     for joint in range(7):
-        alone = PeriodicMarch(replace(law, friction=float(own.friction[joint]))).settle(
+        alone = PeriodicMarch(replace(law, friction=float(unlike.friction[joint]))).settle(
             motion[joint : joint + 1], *functions
         )
         np.testing.assert_array_equal(alone.force[0], together.force[joint])

@@ -324,10 +324,10 @@ BESIDE = 2e-5
 
 def family(orbit, share):
     """Orbits that grow, shift in time, move aside and are pressed with a parameter."""
-    own = ORBITS.get(orbit, SHORT)
-    turned = own[:, [0, 2, 1, 4, 3]] * [[0.0], [-1.0], [1.0], [-2.0], [2.0]]
+    path = ORBITS.get(orbit, SHORT)
+    turned = path[:, [0, 2, 1, 4, 3]] * [[0.0], [-1.0], [1.0], [-2.0], [2.0]]
     aside = motion_of((0.3 * REACH,), z=(0.2 * LIFT,))
-    return (0.7 + 0.5 * share) * (own + 0.2 * share * turned) + share * aside
+    return (0.7 + 0.5 * share) * (path + 0.2 * share * turned) + share * aside
 
 
 def switching(before, after, orbit):
@@ -336,11 +336,11 @@ def switching(before, after, orbit):
     def states(share):
         return settle(PRESSED, family(orbit, share), 48).states[:, 0]
 
-    found, shares = [], np.linspace(0.0, 1.0, 400)
+    pairs, shares = [], np.linspace(0.0, 1.0, 400)
     known = [states(share) for share in shares]
     for (low, one), (high, other) in pairwise(zip(shares, known, strict=True)):
         changed = np.flatnonzero(one != other)
-        if len(changed) != 1 or len(found) == 4:
+        if len(changed) != 1 or len(pairs) == 4:
             continue
         sample = changed[0]
         if (
@@ -348,8 +348,8 @@ def switching(before, after, orbit):
             and one[sample - 1] == before
             and one[(sample + 1) % 48] == after
         ):
-            found.append(bisected(lambda share, at=sample: states(share)[at], low, high))
-    return found
+            pairs.append(bisected(lambda share, at=sample: states(share)[at], low, high))
+    return pairs
 
 
 def bisected(state_at, low, high):

@@ -39,13 +39,19 @@ class Drive(Section):
     frequency: Frequency = entry("of the cycles [Hz]", "100 Hz")
 
 
-class Harmonic(Section):
-    """A force f sin(2π frequency t), until the response is periodic."""
+class ForceOnMass(Section):
+    """What all excitations of a rig have."""
 
-    kind: Literal["harmonic"] = entry("harmonic, hammer or recorded", "harmonic")
+    kind: str  # named first; each narrows it to its own name
     mass: MassNumber | None = entry(
         "of a row, that is driven, counted from the ground; without it the first", 1, default=None
     )
+
+
+class Harmonic(ForceOnMass):
+    """A force f sin(2π frequency t), until the response is periodic."""
+
+    kind: Literal["harmonic"] = entry("harmonic, hammer or recorded", "harmonic")
     force: DrivingForce = entry("amplitude [N]", "75 N")
     frequency: Frequency = entry("of the force [Hz]", "100 Hz")
     steady: Change = entry(
@@ -58,13 +64,10 @@ class Harmonic(Section):
     )
 
 
-class Hammer(Section):
+class Hammer(ForceOnMass):
     """A hammer blow: half a sine of force, and the response to it."""
 
     kind: Literal["hammer"] = entry("half a sine of force", "hammer")
-    mass: MassNumber | None = entry(
-        "of a row, that is hit, counted from the ground; without it the first", 1, default=None
-    )
     force: DrivingForce = entry("largest [N]", "100 N")
     duration: Time = entry("of the blow [s]", "0.4 ms")
     record: Time = entry("length of what is recorded [s]", "1 s")
@@ -95,13 +98,10 @@ class Hammer(Section):
         return self
 
 
-class Recorded(Section):
+class Recorded(ForceOnMass):
     """A force from a file."""
 
     kind: Literal["recorded"] = entry("a force from a file", "recorded")
-    mass: MassNumber | None = entry(
-        "of a row, that it acts on, counted from the ground; without it the first", 1, default=None
-    )
     file: Annotated[str, File((".csv",))] = entry(
         "columns time and force, with a unit in brackets or in s and N; linear between rows",
         "force.csv",

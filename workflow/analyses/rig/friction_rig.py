@@ -6,13 +6,9 @@ import numpy as np
 
 from fe_models.dynamics.friction_rig import friction_rig
 from fe_models.dynamics.rig import RigError, unit_force
-from fe_models.mesh import MeshError
+from workflow.analyses.rig.reduced_rig import reduced_specimens
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import FrictionRig
-from workflow.analyses.specimens.case import SpecimensCase
-from workflow.analyses.specimens.memory import memory
-from workflow.analyses.specimens.model import SpecimensModel
-from workflow.case.loading import load_named
 from workflow.errors import UserError
 from workflow.shell.reporter import Reporter
 
@@ -25,18 +21,11 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
 
     Raises UserError for a file that is no case of specimens, or one that cannot be meshed.
     """
-    specimens = load_named("structure.specimens", rig.specimens, [SpecimensCase], "specimens")
-    bodies = SpecimensModel(specimens, rig.target_distance)
+    with reporter.stage("reduction"):
+        key, file = "structure.specimens", rig.specimens
+        bodies = reduced_specimens(key, file, reporter, rig.target_distance)
     try:
-        with reporter.stage("reduction"):
-            memory(specimens, bodies.node_count()).check()
-            reduced = bodies.reduction.models
-    except MeshError as error:
-        raise UserError(f"structure.specimens: {rig.specimens}: {error}") from error
-    if bodies.from_cache:
-        reporter.log("reduction: from the cache")
-    try:
-        model = friction_rig(*reduced, rig.masses, rig.springs, rig.damping_ratio)
+        model = friction_rig(*bodies.reduction.models, rig.masses, rig.springs, rig.damping_ratio)
     except RigError as error:
         raise UserError(f"structure: {error}") from error
     face = bodies.face

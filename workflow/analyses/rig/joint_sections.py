@@ -75,22 +75,24 @@ class JenkinsJoint(RisingJoint):
     )
 
 
-class UniformIwanJoint(RisingJoint):
+class IwanJoint(RisingJoint):
+    """Iwan's sliders in parallel."""
+
+    stiffness: JointStiffness = entry(
+        "of all sliders stuck; the residual one is added [N/mm]", "115 N/um"
+    )
+
+
+class UniformIwanJoint(IwanJoint):
     """Iwan's sliders, their limits spread evenly from nothing."""
 
     law: Literal["uniform_iwan"] = entry("sliders with limits spread evenly", "uniform_iwan")
-    stiffness: JointStiffness = entry(
-        "of all sliders stuck; the residual one is added [N/mm]", "115 N/um"
-    )
 
 
-class FourParameterIwanJoint(RisingJoint):
+class FourParameterIwanJoint(IwanJoint):
     """Segalman's Iwan joint: sliders spread by a power law, and a rest that slips at once."""
 
     law: Literal["four_parameter_iwan"] = entry("Segalman 2005", "four_parameter_iwan")
-    stiffness: JointStiffness = entry(
-        "of all sliders stuck; the residual one is added [N/mm]", "115 N/um"
-    )
     chi: Annotated[float, Quantity("1", above=-1.0, at_most=10.0)] = entry(
         "energy of a small cycle goes with the amplitude to the power of chi + 3 [1]", -0.5
     )
@@ -117,12 +119,7 @@ class FrictionContactJoint(Joint):
         return self
 
 
-JointLaw = Annotated[
-    BoucWenJoint | JenkinsJoint | UniformIwanJoint | FourParameterIwanJoint,
-    Field(discriminator="law"),
-]
+UniaxialJoint = BoucWenJoint | JenkinsJoint | UniformIwanJoint | FourParameterIwanJoint
+JointLaw = Annotated[UniaxialJoint, Field(discriminator="law")]
 # Those of a structure that moves in three directions too.
-ContactLaw = Annotated[
-    BoucWenJoint | JenkinsJoint | UniformIwanJoint | FourParameterIwanJoint | FrictionContactJoint,
-    Field(discriminator="law"),
-]
+ContactLaw = Annotated[UniaxialJoint | FrictionContactJoint, Field(discriminator="law")]

@@ -81,16 +81,26 @@ def _reduced_body(body: ReducedBody, reporter: Reporter) -> ReducedModel:
             return load_reduced(Path(body.file))
         except (OSError, ValueError) as error:
             raise UserError(f"structure.file: {error}") from error
-    case = load_named("structure.file", body.file, [SpecimensCase], "specimens")
-    model = SpecimensModel(case)
+    return reduced_specimens("structure.file", body.file, reporter).reduction.models[body.body - 1]
+
+
+def reduced_specimens(
+    key: str, file: str, reporter: Reporter, target_distance: float | None = None
+) -> SpecimensModel:
+    """The specimens of the case in a ``file``, reduced.
+
+    Raises UserError for one that is no case of specimens, or that cannot be meshed.
+    """
+    case = load_named(key, file, [SpecimensCase], "specimens")
+    model = SpecimensModel(case, target_distance)
     try:
         memory(case, model.node_count()).check()
-        reduced = model.reduction.models[body.body - 1]
+        _ = model.reduction
     except MeshError as error:
-        raise UserError(f"structure.file: {body.file}: {error}") from error
+        raise UserError(f"{key}: {file}: {error}") from error
     if model.from_cache:
         reporter.log("reduction: from the cache")
-    return reduced
+    return model
 
 
 # --- its points ---------------------------------------------------------------------------------
@@ -136,11 +146,10 @@ class _Points:
                 f"structure.{key}.against: {len(opposites)} points for {len(points)}; allowed: as "
                 "many, or one"
             )
-        pairs = list(zip(points, opposites, strict=True))
-        for point, opposite in pairs:
+        for point, opposite in zip(points, opposites, strict=True):
             if point == opposite:
                 raise UserError(f"structure.{key}.against: {point} against itself; allowed: others")
-        return [(point, opposite) for point, opposite in pairs]
+        return list(zip(points, opposites, strict=True))
 
     def joints(self, places: JointPlaces, directions: int, key: str) -> Iterator[list[Link]]:
         """The links of every joint: that along its direction; three with it as the last."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
@@ -34,7 +34,7 @@ class RigModel:
     the load is the joints' own preload); ``stretch`` ``(n,)``, which takes displacements to the one
     that loops are drawn over, not the joints' mean; and of each joint its place ``places``
     ``(j, 2)`` on the contact plane [mm], the initial ``gap`` ``(j,)`` [mm] and ``area`` ``(j,)``
-    [mm²].
+    [mm²], empty elsewhere.
     """
 
     model: DynamicModel
@@ -46,9 +46,9 @@ class RigModel:
     in_a_row: bool = True
     pressing: Array | None = None
     stretch: Array | None = None
-    places: Array | None = None
-    gap: Array | None = None
-    area: Array | None = None
+    places: Array = field(default_factory=lambda: np.empty((0, 2)))
+    gap: Array = field(default_factory=lambda: np.empty(0))
+    area: Array = field(default_factory=lambda: np.empty(0))
 
     @property
     def joints(self) -> int:
@@ -78,10 +78,8 @@ class RigModel:
 
     def loop(self, motion: Motion) -> tuple[Array, Array]:
         """Mean displacement [mm] and force [N] of all joints ``(t,)``, along one direction."""
-        stretch, force = (
-            values[:, :, self.along] for values in (motion.joint_displacement, motion.joint_force)
-        )
-        return stretch.mean(axis=1), force.sum(axis=1)
+        stretch, force = motion.joint_displacement, motion.joint_force
+        return stretch[:, :, self.along].mean(axis=1), force[:, :, self.along].sum(axis=1)
 
     def looked_at(self, values: Array) -> Array:
         """Displacement or acceleration ``(t,)`` that is looked at, of all of them ``(t, n)``."""

@@ -157,3 +157,24 @@ class FrictionRig(Section):
         """The structure in a few words."""
         masses = " and ".join(f"{1e3 * mass:g} kg" for mass in self.masses)
         return f"specimens of {Path(self.specimens).name} in a rig of {masses}"
+
+
+def driven_place(structure: Section, mass: int | None) -> str:
+    """Where a force on a structure acts, in a few words."""
+    if isinstance(structure, ReducedBody):
+        return f"{structure.driven.points} along {structure.driven.direction}"
+    return f"mass {mass or 1}"
+
+
+def refuse_missing_mass(structure: Section, mass: int | None, key: str, otherwise: str) -> None:
+    """Refuse the number of a driven mass that a structure has not.
+
+    ``otherwise`` is said of a structure that is no row of masses.
+    """
+    if mass is None:
+        return
+    if not isinstance(structure, Rig):
+        raise disagreement(f"{mass}: given beside {otherwise}", key)
+    count = len(structure.masses)
+    if mass > count:
+        raise disagreement(f"{mass}: no such mass; allowed: 1 to {count}", key)

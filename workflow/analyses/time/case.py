@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from workflow.analyses.rig.excitation import Drive, Excitation, Hammer, Harmonic, Recorded, Time
 from workflow.analyses.rig.joint_evolution import JointEvolution
 from workflow.analyses.rig.joint_sections import ContactLaw, FrictionContactJoint, Joint, JointLaw
-from workflow.analyses.rig.structure import ReducedBody, Rig
+from workflow.analyses.rig.structure import ReducedBody, Rig, driven_place, refuse_missing_mass
 from workflow.analyses.wear.case.evolution import PositiveEnergy, TotalEnergy
 from workflow.analyses.wear.case.sections import Cycles
 from workflow.case.fields import Quantity
@@ -164,16 +164,8 @@ class RigCase(TimeCase):
 
     @model_validator(mode="after")
     def _drives_a_mass(self) -> RigCase:
-        mass = self.excitation.mass
-        if isinstance(self.structure, ReducedBody):
-            if mass is not None:
-                raise disagreement(
-                    f"{mass}: given beside a reduced body; allowed: structure.driven",
-                    "excitation.mass",
-                )
-        elif mass is not None and mass > len(self.structure.masses):
-            count = len(self.structure.masses)
-            raise disagreement(f"{mass}: no such mass; allowed: 1 to {count}", "excitation.mass")
+        otherwise = "a reduced body; allowed: structure.driven"
+        refuse_missing_mass(self.structure, self.excitation.mass, "excitation.mass", otherwise)
         return self
 
     @model_validator(mode="after")
@@ -275,10 +267,8 @@ def joint_outline(case: TimeCase) -> str:
 
 def excitation_outline(case: RigCase) -> str:
     """What drives a rig, in a line."""
-    excitation, structure = case.excitation, case.structure
-    place = f"mass {excitation.mass or 1}"
-    if isinstance(structure, ReducedBody):
-        place = f"{structure.driven.points} along {structure.driven.direction}"
+    excitation = case.excitation
+    place = driven_place(case.structure, excitation.mass)
     if isinstance(excitation, Harmonic):
         return f"{excitation.force:g} N at {excitation.frequency:g} Hz on {place}"
     if isinstance(excitation, Hammer):

@@ -148,11 +148,11 @@ def _ring_down(
     free = motion.times > hammer.duration
     step = float(motion.times[1] - motion.times[0])
     try:
-        found = ring_down(rig.looked_at(motion.acceleration)[free], step, hammer.band)
+        decay = ring_down(rig.looked_at(motion.acceleration)[free], step, hammer.band)
     except SignalError as error:
         reporter.warn(f"no ring-down at {joules(energy)}: {error}")
         return None
-    amplitude = found.amplitude / (2.0 * np.pi * found.frequency) ** 2
+    amplitude = decay.amplitude / (2.0 * np.pi * decay.frequency) ** 2
     if amplitude[0] < NOTHING_LEFT * np.abs(rig.looked_at(motion.displacement)).max():
         reporter.warn(f"no ring-down at {joules(energy)}: over before the filter has settled")
         return None
@@ -160,8 +160,8 @@ def _ring_down(
     size = "amplitude of what is looked at, in its first mode"
     return {
         "amplitude": Dataset(amplitude[kept], "mm", size),
-        "frequency": Dataset(found.frequency[kept], "Hz", "instantaneous frequency"),
-        "damping_ratio": Dataset(found.damping_ratio[kept], "1", "instantaneous damping ratio"),
+        "frequency": Dataset(decay.frequency[kept], "Hz", "instantaneous frequency"),
+        "damping_ratio": Dataset(decay.damping_ratio[kept], "1", "instantaneous damping ratio"),
     }
 
 
@@ -193,7 +193,7 @@ def _trend(states: Sequence[State]) -> dict[str, Any]:
 
 def _first_mode(state: State) -> dict[str, float]:
     numbers = state.numbers
-    found = {name: numbers[name] for name in ("first_frequency", "first_peak", "decay_time")}
+    mode = {name: numbers[name] for name in ("first_frequency", "first_peak", "decay_time")}
     if numbers["ring_down"] is not None:
-        found["damping_ratio"] = numbers["ring_down"]["largest"]["damping_ratio"]
-    return found
+        mode["damping_ratio"] = numbers["ring_down"]["largest"]["damping_ratio"]
+    return mode

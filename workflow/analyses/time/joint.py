@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator
 from typing import Any
 
 import numpy as np
@@ -11,18 +11,19 @@ from sa_solver.types import Array
 from wear.joints.ageing import (
     AgeingError,
     LongTest,
-    MarchedStroke,
     NeverReachedError,
     integrate_cycles,
     long_test,
+    marched_stroke,
     steady_stroke,
 )
 from wear.joints.law import march_joints
-from wear.joints.measured_loops import MeasuredLoopError, measure_loops
+from wear.joints.loop_record import MeasuredLoopError
+from wear.joints.measured_loops import measure_loops
 from workflow.analyses.rig.laws import Law
 from workflow.analyses.time.case import Ageing, JointCase, joules
 from workflow.analyses.time.joint_model import JointModel
-from workflow.analyses.time.outcome import LOOP, State, TimeOutcome, loop_curves
+from workflow.analyses.time.outcome import LOOP, PARAMETERS, State, TimeOutcome, loop_curves
 from workflow.errors import MethodFailed, UserError
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
@@ -93,7 +94,7 @@ def extracted(displacement: Array, force: Array, normal_load: float) -> dict[str
     """What the loop would tell one who measures it; None where it does not."""
     try:
         # Two periods: a cycle then begins and ends at a reversal for sure.
-        found = measure_loops(
+        loops = measure_loops(
             np.concatenate([displacement, displacement[1:], displacement[1:2]]),
             np.concatenate([force, force[1:], force[1:2]]),
             normal_load,
@@ -101,10 +102,10 @@ def extracted(displacement: Array, force: Array, normal_load: float) -> dict[str
     except MeasuredLoopError:
         return dict.fromkeys(("friction", "stiffness", "residual_stiffness", "energy"))
     return {
-        "friction": float(np.mean(found.friction)) if found.slides and normal_load else None,
-        "stiffness": float(np.mean(found.stick_stiffness)),
-        "residual_stiffness": float(np.mean(found.residual_stiffness)) if found.slides else None,
-        "energy": float(np.mean(found.energy)),
+        "friction": float(np.mean(loops.friction)) if loops.slides and normal_load else None,
+        "stiffness": float(np.mean(loops.stick_stiffness)),
+        "residual_stiffness": float(np.mean(loops.residual_stiffness)) if loops.slides else None,
+        "energy": float(np.mean(loops.energy)),
     }
 
 
@@ -160,27 +161,16 @@ def evolution_curve(
     if last > 0.0:
         even = np.linspace(0.0, last, CURVE_POINTS)
         energy = np.union1d(even, np.geomspace(CURVE_BEGIN * last, last, CURVE_POINTS)[:-1])
-    parameters = [model.parameters(float(own)) for own in energy]
+    parameters = [model.parameters(dissipated) for dissipated in energy.tolist()]
     curve = {"energy": Dataset(energy, "N mm", "energy dissipated so far in the joint")}
     if test is not None and rate is not None:
-        per_cycle = np.array([rate(float(own)) for own in energy])
+        per_cycle = np.array([rate(dissipated) for dissipated in energy.tolist()])
         curve |= {
             "cycles": Dataset(test.cycles_at(energy), "1", "cycles so far"),
             "energy_per_cycle": Dataset(per_cycle, "N mm", "energy dissipated in a cycle"),
         }
-    return curve | _parameter_columns(parameters)
-
-
-def _parameter_columns(parameters: Sequence[Mapping[str, float]]) -> dict[str, Dataset]:
-    """The parameters that the law has, ``(n,)`` each, by name."""
-    described = {
-        "friction": ("1", "coefficient of friction"),
-        "stiffness": ("N/mm", "slope of the stuck joint"),
-        "residual_stiffness": ("N/mm", "slope of the sliding joint"),
-        "normal_load": ("N", "normal load"),
-    }
-    return {
-        name: Dataset(np.array([own[name] for own in parameters]), *described[name])
+    return curve | {
+        name: Dataset(np.array([values[name] for values in parameters]), *PARAMETERS[name])
         for name in parameters[0]
     }
 
@@ -193,11 +183,11 @@ def _ageing_numbers(model: JointModel, test: LongTest, amplitude: float) -> dict
     if cycles < 1:
         return numbers
     begin = float(test.energy_at(first))
-    marched = MarchedStroke(model.line_law, model.evolution, amplitude, start=begin)
+    marched = marched_stroke(model.line_law, model.evolution, amplitude, start=begin)
     stretch = integrate_cycles(test, marched, first, cycles)
     return numbers | {
         "stretch": {
-            "first": stretch.first,
+            "first": float(first),
             "cycles": cycles,
             "difference": stretch.difference,
             "stated": stretch.stated,

@@ -80,7 +80,7 @@ def _function(factor: given.Factor, initial: float) -> WearFunction:
         return forms.ExponentialEvolution(
             factor.final, -factor.rate, factor.share, -factor.second_rate
         )
-    return forms.TabulatedEvolution(factor.energy, tuple(initial * own for own in factor.factor))
+    return forms.TabulatedEvolution(factor.energy, tuple(initial * f for f in factor.factor))
 
 
 def _measured(file: str, case: TimeCase) -> dict[str, WearFunction]:

@@ -11,7 +11,12 @@ from workflow.analyses.time.case import JointCase, RigCase
 from workflow.shell.dataset import Dataset, Datasets
 
 # The parameters of a joint that evolve, in the order in which they are told.
-PARAMETERS = ("friction", "stiffness", "residual_stiffness", "normal_load")
+PARAMETERS = {
+    "friction": ("1", "coefficient of friction"),
+    "stiffness": ("N/mm", "slope of the stuck joint"),
+    "residual_stiffness": ("N/mm", "slope of the sliding joint"),
+    "normal_load": ("N", "normal load"),
+}
 # Groups of curves of a state.
 LOOP, MOTION, RESPONSE, RING_DOWN = "loop", "motion", "frequency_response", "ring_down"
 

@@ -63,19 +63,19 @@ def _write_tables(outcome: TimeOutcome, folder: OutputFolder) -> None:
 
 def _summary(outcome: TimeOutcome, reporter: Reporter) -> dict[str, Any]:
     case = outcome.case
-    found: dict[str, Any] = {
+    summary: dict[str, Any] = {
         "law": case.joint.law,
         **outcome.numbers,
         "states": [_state_summary(state) for state in outcome.states],
     }
     reported = []
     for entry in case.reported:
-        computed = number_at(found, entry.quantity)
+        computed = number_at(summary, entry.quantity)
         if computed is None:
             reporter.warn(f"reported: no quantity {entry.quantity} in summary.json")
         told = {"quantity": entry.quantity, "reported": entry.value, "computed": computed}
         reported.append(told | {"source": entry.source})
-    return found | {"reported": reported}
+    return summary | {"reported": reported}
 
 
 def _state_summary(state: State) -> dict[str, Any]:

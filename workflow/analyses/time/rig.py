@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -17,7 +17,7 @@ from wear.joints.ageing import LongTest
 from workflow.analyses.rig import excitation as given
 from workflow.analyses.rig.building import rig_model
 from workflow.analyses.rig.rig_model import RigModel
-from workflow.analyses.time.case import Ageing, RigCase, joules
+from workflow.analyses.time.case import Ageing, Integration, RigCase, joules
 from workflow.analyses.time.hammer import run_hammer
 from workflow.analyses.time.joint import aged, energies_within, evolution_curve, extracted, test_end
 from workflow.analyses.time.joint_model import JointModel
@@ -67,12 +67,8 @@ def run_rig(case: RigCase, reporter: Reporter) -> TimeOutcome:
     rig = rig_model(case.structure, case.joint, case.excitation.mass, reporter)
     memory(case, len(rig.model.mass)).check()
     joint = JointModel.of(case, rig.joints)
-    if isinstance(case.excitation, given.Hammer):
-        outcome = run_hammer(case, rig, joint, reporter)
-    elif isinstance(case.excitation, given.Recorded):
-        outcome = _run_recorded(case, case.excitation, rig, joint, reporter)
-    else:
-        outcome = _run_harmonic(case, case.excitation, rig, joint, reporter)
+    runs = {"hammer": run_hammer, "recorded": _run_recorded, "harmonic": _run_harmonic}
+    outcome = runs[case.excitation.kind](case, rig, joint, reporter)
     numbers = {"free": rig.free(), **outcome.numbers}
     return replace(outcome, numbers=numbers, seen=rig.labels)
 
@@ -81,13 +77,10 @@ def run_rig(case: RigCase, reporter: Reporter) -> TimeOutcome:
 
 
 def _run_recorded(
-    case: RigCase,
-    excitation: given.Recorded,
-    rig: RigModel,
-    joint: JointModel,
-    reporter: Reporter,
+    case: RigCase, rig: RigModel, joint: JointModel, reporter: Reporter
 ) -> TimeOutcome:
-    times, samples = excitation.read()
+    assert isinstance(case.excitation, given.Recorded)
+    times, samples = case.excitation.read()
     force = RecordedForce(rig.driven, times, samples)
     control, begin = step_control(case), Start(time=float(times[0]))
     states = []
@@ -105,13 +98,10 @@ def _run_recorded(
 
 
 def _run_harmonic(
-    case: RigCase,
-    excitation: given.Harmonic,
-    rig: RigModel,
-    joint: JointModel,
-    reporter: Reporter,
+    case: RigCase, rig: RigModel, joint: JointModel, reporter: Reporter
 ) -> TimeOutcome:
-    steady = _SteadyStates(case, excitation, rig, joint)
+    assert isinstance(case.excitation, given.Harmonic)
+    steady = _SteadyStates(case.excitation, case.integration, rig, joint)
     energies, rate, test = list(case.energies), None, None
     cycles: list[float | None] = [None] * len(energies)
     numbers: dict[str, Any] = {}
@@ -151,40 +141,35 @@ def _steady_state(
     return State(energy, cycles, parameters, numbers, curves)
 
 
+@dataclass(frozen=True)
 class _SteadyStates:
-    """Steady states of a rig at any energy, each found once, from the one that is nearest."""
+    """Steady states of a rig at any energy, each settled once, from the one that is nearest."""
 
-    def __init__(
-        self,
-        case: RigCase,
-        excitation: given.Harmonic,
-        rig: RigModel,
-        joint: JointModel,
-    ) -> None:
-        self._excitation, self._rig, self._joint = excitation, rig, joint
-        self._steps = int(np.ceil(1.0 / (excitation.frequency * case.integration.step) - 1e-9))
-        self._tolerance = case.integration.tolerance
-        self._found: dict[float, SteadyCycle] = {}
+    excitation: given.Harmonic
+    integration: Integration
+    rig: RigModel
+    joint: JointModel
+    settled: dict[float, SteadyCycle] = field(default_factory=dict)
 
     def at(self, energy: float) -> SteadyCycle:
         """The steady cycle after so much dissipated ``energy`` [N mm]."""
-        if energy not in self._found:
-            near = min(self._found, key=lambda own: abs(own - energy), default=None)
-            start = None if near is None else self._found[near].end
-            self._found[energy] = self._settle(energy, start)
-        return self._found[energy]
+        if energy not in self.settled:
+            near = min(self.settled, key=lambda settled: abs(settled - energy), default=None)
+            start = None if near is None else self.settled[near].end
+            self.settled[energy] = self._settle(energy, start)
+        return self.settled[energy]
 
     def _settle(self, energy: float, start: Start | None) -> SteadyCycle:
-        excitation, rig = self._excitation, self._rig
-        period = 1.0 / excitation.frequency
+        excitation, rig, period = self.excitation, self.rig, 1.0 / self.excitation.frequency
         force = HarmonicForce(rig.driven, excitation.force, excitation.frequency)
-        control = TimeStepControl(period / self._steps, self._tolerance)
+        steps = int(np.ceil(1.0 / (excitation.frequency * self.integration.step) - 1e-9))
+        control = TimeStepControl(period / steps, self.integration.tolerance)
         if start is not None:
             # Where a period begins, whatever came before: times must not lose their digits.
             start = replace(start, time=0.0)
         before, in_a_row = np.full(2, np.inf), 0
         for periods in range(1, excitation.periods + 1):
-            motion = motion_of(rig, self._joint, energy, force, period, control, start)
+            motion = motion_of(rig, self.joint, energy, force, period, control, start)
             start = replace(motion.end, time=0.0)
             dissipated = float(motion.energies.joints[-1].sum())
             stretch, joint_force = rig.loop(motion)

@@ -12,7 +12,13 @@ from pydantic import Field, StrictBool, model_validator
 
 from workflow.analyses.rig.excitation import DrivingForce, Frequency, MassNumber
 from workflow.analyses.rig.joint_sections import ContactLaw, FrictionContactJoint
-from workflow.analyses.rig.structure import FrictionRig, ReducedBody, Rig
+from workflow.analyses.rig.structure import (
+    FrictionRig,
+    ReducedBody,
+    Rig,
+    driven_place,
+    refuse_missing_mass,
+)
 from workflow.case.fields import Entry, Quantity, Whole
 from workflow.case.sections import Case, Section, Title, disagreement, entry
 from workflow.case.source import Source
@@ -35,7 +41,7 @@ class HarmonicNumbers(Entry):
 
     def parse(self, value: object) -> tuple[int, ...]:
         if isinstance(value, list | tuple):
-            if not all(type(own) is int and 0 <= own <= HIGHEST for own in value):
+            if not all(type(number) is int and 0 <= number <= HIGHEST for number in value):
                 raise self.refusal(value, "not all of them harmonics")
             if any(after <= before for before, after in pairwise(value)):
                 raise self.refusal(value, "not ascending, each once")
@@ -186,21 +192,22 @@ class VibrationCaseBase(Case):
         """Forces, where they act, and their frequencies, for an outline."""
         forces = ", ".join(f"{force:g}" for force in self.forces)
         low, high = self.frequencies
-        return f"{forces} N on {self._driven}, {low:g} to {high:g} Hz"
+        place = driven_place(self.structure, self._driven_mass)
+        return f"{forces} N on {place}, {low:g} to {high:g} Hz"
 
     @property
     def resolved(self) -> str:
         """The resolution, for an outline."""
-        own, harmonics = self.resolution, self.harmonics
-        text = f"{len(harmonics)} harmonics to {harmonics[-1]}, {own.samples} samples"
-        if own.tolerance is not None:
-            text += f", growing to a tolerance of {own.tolerance:g}"
+        resolution, harmonics = self.resolution, self.harmonics
+        text = f"{len(harmonics)} harmonics to {harmonics[-1]}, {resolution.samples} samples"
+        if resolution.tolerance is not None:
+            text += f", growing to a tolerance of {resolution.tolerance:g}"
         return text
 
     @property
-    def _driven(self) -> str:
-        """Where the forces act, in a few words."""
-        return "mass 1"
+    def _driven_mass(self) -> int | None:
+        """The number of the mass that is driven, as far as it is given."""
+        return None
 
 
 def wears(source: Source) -> bool:
@@ -217,21 +224,13 @@ class DrivenMass(VibrationCaseBase):
 
     @model_validator(mode="after")
     def _drives_a_mass(self) -> DrivenMass:
-        if not isinstance(self.structure, Rig):
-            if self.mass is not None:
-                raise disagreement(
-                    f"{self.mass}: given beside {self.structure.kind}; allowed: for a rig", "mass"
-                )
-        elif self.mass is not None and self.mass > len(self.structure.masses):
-            count = len(self.structure.masses)
-            raise disagreement(f"{self.mass}: no such mass; allowed: 1 to {count}", "mass")
+        otherwise = f"{self.structure.kind}; allowed: for a rig"
+        refuse_missing_mass(self.structure, self.mass, "mass", otherwise)
         return self
 
     @property
-    def _driven(self) -> str:
-        if isinstance(self.structure, ReducedBody):
-            return f"{self.structure.driven.points} along {self.structure.driven.direction}"
-        return f"mass {self.mass or 1}"
+    def _driven_mass(self) -> int | None:
+        return self.mass
 
 
 class VibrationCase(DrivenMass):
@@ -280,10 +279,10 @@ class VibrationCase(DrivenMass):
                 "joint.law",
             )
         if isinstance(self.structure, FrictionRig):
-            self._rubs()
+            self._require_pad_contacts()
         return self
 
-    def _rubs(self) -> None:
+    def _require_pad_contacts(self) -> None:
         """Refuse joints that are not those of two pads."""
         joint = self.joint
         if not isinstance(joint, FrictionContactJoint):

@@ -8,6 +8,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+import scipy.linalg as sl
 
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
@@ -65,13 +66,13 @@ class VibrationModel:
     @cached_property
     def rest(self) -> HarmonicSolution:
         """The structure under its static load alone. Raises MethodFailed if it does not rest."""
-        found = self.problem.solve(1.0, 0.0)
-        if not found.converged:
+        rest = self.problem.solve(1.0, 0.0)
+        if not rest.converged:
             raise MethodFailed(
                 "the joints do not balance the static load; change joint.normal_load or "
-                f"joint.normal_stiffness ({found.message})"
+                f"joint.normal_stiffness ({rest.message})"
             )
-        return found
+        return rest
 
     @property
     def resting(self) -> Array | None:
@@ -105,10 +106,8 @@ class VibrationModel:
     def contact(self) -> dict[str, Dataset] | None:
         """Where joints are and how they rest, if they have places."""
         rig = self.rig
-        if rig.places is None:
+        if rig.pressing is None:
             return None
-        assert rig.gap is not None
-        assert rig.area is not None
         force, closing = self.rest.cycle.samples[0, :, 2], self.rest.coefficients[:, 0, 2]
         return {
             "x": Dataset(rig.places[:, 0], "mm", "of each joint on the contact plane"),
@@ -147,16 +146,11 @@ class VibrationModel:
         steady = receptance.at(2.0 * np.pi * frequency)
         force = self.rig.driven @ receptance.at_points
         moved = steady.respond(np.broadcast_to(force, (len(frequency), len(force))) + 0j)
-        tangents = self.rig.stuck(self.law, self.resting)
-        between = steady.between_joints()
-        by_joint = between.reshape(*between.shape[:2], len(tangents), -1)
-        product = np.einsum("fpjd,jde->fpje", by_joint, tangents).reshape(between.shape)
+        tangent = sl.block_diag(*self.rig.stuck(self.law, self.resting))
         free = moved @ receptance.at_joints.T
-        stuck = np.linalg.solve(np.eye(free.shape[1]) + product, free[..., None])[..., 0]
-        pulls = np.einsum(
-            "jde,fje->fjd", tangents, stuck.reshape(*free.shape[:1], *tangents.shape[:2])
-        )
-        held = moved - steady.respond(pulls.reshape(free.shape) @ receptance.at_joints)
+        coupled = np.eye(len(tangent)) + steady.between_joints() @ tangent
+        stuck = np.linalg.solve(coupled, free[..., None])[..., 0]
+        held = moved - steady.respond(stuck @ tangent.T @ receptance.at_joints)
         return np.abs(np.array([moved @ seen, held @ seen]))
 
 
@@ -169,8 +163,6 @@ def _law(case: VibrationCase, rig: RigModel) -> Law:
     whole: Law = LAWS[case.joint.law](**case.joint.model_dump(exclude={"law"}))
     if rig.pressing is None or not isinstance(whole, FrictionContact):
         return shared_out(whole, rig.joints)
-    assert rig.gap is not None
-    assert rig.area is not None
     assert isinstance(case.structure, FrictionRig)
     even = case.structure.sharing == "even"
     share = 1.0 / rig.joints if even else rig.area / rig.area.sum()

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -22,10 +23,12 @@ from fe_models.dynamics.forced_response import (
 from fe_models.dynamics.harmonic_balance import HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.phase_resonance import along_phase_resonance
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
-from wear.joints.measured_loops import MeasuredLoopError, MeasuredLoops, measure_loops
+from wear.joints.loop_record import MeasuredLoopError
+from wear.joints.measured_loops import measure_loops
 from wear.joints.periodic import SEPARATED, SLIP, STICK
 from wear.moving import LARGE_STROKE
 from workflow.analyses.vibration.case import VibrationCase
@@ -47,16 +50,16 @@ REPEATED = 3
 
 def step_control(case: VibrationCase) -> ContinuationControl:
     """How the case wants its curves followed."""
-    own = case.continuation
+    steps = case.continuation
     return ContinuationControl(
-        first=own.first_step,
-        least=own.shortest_step,
-        most=own.longest_step,
-        iterations=own.iterations,
-        max_iterations=own.most_iterations,
-        max_angle=float(np.degrees(own.largest_angle)),
-        max_points=own.most_points,
-        tolerance=own.tolerance,
+        first=steps.first_step,
+        least=steps.shortest_step,
+        most=steps.longest_step,
+        iterations=steps.iterations,
+        max_iterations=steps.most_iterations,
+        max_angle=float(np.degrees(steps.largest_angle)),
+        max_points=steps.most_points,
+        tolerance=steps.tolerance,
     )
 
 
@@ -101,8 +104,8 @@ def response_under(
         force,
         curves,
         _numbers(model, branch, curves, problem, resonance),
-        nodes=_nodes(branch) if model.rig.places is not None else None,
-        resonance=_cycle(resonance) if model.rig.places is not None else None,
+        nodes=_nodes(branch) if model.rig.pressing is not None else None,
+        resonance=_cycle(resonance) if model.rig.pressing is not None else None,
         loops=_loops(case, model, branch, reporter),
     )
     error = max(response.numbers["left_out"], response.numbers["sampling"])
@@ -135,13 +138,36 @@ def force_sweep(
     along = "amplitude of the force, in the order of the curve"
     datasets = {
         "force": Dataset(branch.forces, "N", along),
-        "amplitude": amplitude_column(curves["amplitude"].values[:, -1]),
+        "amplitude": _of_the_last(curves["amplitude"]),
         **{name: curves[name] for name in shared},
     }
     folds = [float(branch.curve.parameters[place]) for place in branch.curve.folds]
     points = len(branch.solutions)
     numbers = {"frequency": frequency, "points": points, "folds": folds, "message": branch.message}
     return Curves(datasets, numbers)
+
+
+def backbone_of(
+    case: VibrationCase, model: VibrationModel, branch: ResponseBranch, reporter: Reporter
+) -> Curves | None:
+    """The curve of phase resonance through all forces, from the motions under one of them."""
+    span = case.forces[0], case.forces[-1]
+    backbone = along_phase_resonance(
+        model.problem, branch, span, control=step_control(case), accuracy=accuracy_of(case)
+    )
+    if backbone.message:
+        reporter.warn(f"backbone: {backbone.message}")
+    if not backbone.solutions:
+        return None
+    columns = _motion_columns(model, backbone.problem, backbone.solutions)
+    resonance = "of phase resonance: what is driven lags the force by 90 degrees"
+    datasets = {
+        "force": Dataset(backbone.forces, "N", "amplitude of the force"),
+        "frequency": Dataset(backbone.frequencies, "Hz", resonance),
+        "amplitude": _of_the_last(columns["amplitude"]),
+        **{name: columns[name] for name in ("damping", "energy_per_cycle", "slip")},
+    }
+    return Curves(datasets, {"message": backbone.message})
 
 
 def _numbers(
@@ -153,7 +179,7 @@ def _numbers(
 ) -> dict[str, Any]:
     """What a force does, for the summary."""
     every = (*branch.solutions, resonance)
-    amplitudes, own = amplitudes_of(model, resonance), resonance.resolution
+    amplitudes, resolution = amplitudes_of(model, resonance), resonance.resolution
     return {
         "resonance": resonance.frequency,
         "amplitude": float(amplitudes[-1]),
@@ -167,52 +193,47 @@ def _numbers(
         "folds": [float(branch.curve.parameters[place]) for place in branch.curve.folds],
         "left_out": max(motion.left_out for motion in every),
         "sampling": max(motion.sampling for motion in every if motion.sampling is not None),
-        "harmonics": list(own.harmonics),
-        "samples": own.samples,
+        "harmonics": list(resolution.harmonics),
+        "samples": resolution.samples,
         "message": branch.message,
     }
 
 
 def _curves(model: VibrationModel, branch: ResponseBranch) -> dict[str, Dataset]:
-    motions, looked_at = branch.solutions, model.rig.seen[-1]
-    amplitudes = np.array([amplitudes_of(model, motion) for motion in motions])
-    phases = np.array([_phase(motion, looked_at) for motion in motions])
-    separated = np.array([share_of(model, motion, SEPARATED) for motion in motions])
-    left_out = np.array([motion.left_out for motion in motions])
     along = "frequency of the force, in the order of the curve"
-    seen = "half of the way to and fro of what is seen, the last looked at"
-    lag = "of harmonic 1 of what is looked at before the force"
-    beyond = "estimated share of the joints' vibration in harmonics left out"
-    return {
-        "frequency": Dataset(branch.frequencies, "Hz", along),
-        "amplitude": Dataset(amplitudes, "mm", seen),
-        "phase": Dataset(phases, "rad", lag),
-        **joint_columns(model, branch.problem, motions),
-        "separated": Dataset(separated, "1", "share of the cycle in which they are apart"),
-        "left_out": Dataset(left_out, "1", beyond),
-    }
+    frequency = Dataset(branch.frequencies, "Hz", along)
+    return {"frequency": frequency, **_motion_columns(model, branch.problem, branch.solutions)}
 
 
-def amplitude_column(amplitude: Array) -> Dataset:
-    """Amplitude ``(n,)`` of what is looked at, along a curve."""
-    return Dataset(amplitude, "mm", "half of the way to and fro of what is looked at")
+def _of_the_last(amplitudes: Dataset) -> Dataset:
+    """Amplitude ``(n,)`` of what is looked at, of all that is seen ``(n, k)``."""
+    last = amplitudes.values[:, -1]
+    return Dataset(last, "mm", "half of the way to and fro of what is looked at")
 
 
-def joint_columns(
+def _motion_columns(
     model: VibrationModel, problem: HarmonicBalance, motions: Sequence[HarmonicSolution]
 ) -> dict[str, Dataset]:
-    """What the joints do in motions along a curve, ``(n,)`` each."""
-    dissipated = np.array([motion.cycle.dissipated.sum() for motion in motions])
-    damping = np.array([damping_ratio(problem, motion) for motion in motions])
-    slips = "share of the cycle in which a joint slips, mean of those that touch at rest"
+    """What structure and joints do along a curve, ``(n,)`` each; amplitudes ``(n, k)``."""
+
+    def column(of: Callable[[HarmonicSolution], Array | float], unit: str, what: str) -> Dataset:
+        return Dataset(np.array([of(motion) for motion in motions]), unit, what)
+
+    seen = "half of the way to and fro of what is seen, the last looked at"
+    lag = "of harmonic 1 of what is looked at before the force"
     lost = "energy lost in a cycle over 4π times the largest kinetic energy"
-    slip = np.array([share_of(model, motion, SLIP) for motion in motions])
+    slips = "share of the cycle in which a joint slips, mean of those that touch at rest"
+    apart = "share of the cycle in which they are apart"
+    beyond = "estimated share of the joints' vibration in harmonics left out"
+    energy = "energy that the joints dissipate in a cycle"
     return {
-        "energy_per_cycle": Dataset(
-            dissipated, "N mm", "energy that the joints dissipate in a cycle"
-        ),
-        "damping": Dataset(damping, "1", lost),
-        "slip": Dataset(slip, "1", slips),
+        "amplitude": column(lambda motion: amplitudes_of(model, motion), "mm", seen),
+        "phase": column(lambda motion: _phase(motion, model.rig.seen[-1]), "rad", lag),
+        "energy_per_cycle": column(lambda motion: motion.cycle.dissipated.sum(), "N mm", energy),
+        "damping": column(lambda motion: damping_ratio(problem, motion), "1", lost),
+        "slip": column(lambda motion: share_of(model, motion, SLIP), "1", slips),
+        "separated": column(lambda motion: share_of(model, motion, SEPARATED), "1", apart),
+        "left_out": column(lambda motion: motion.left_out, "1", beyond),
     }
 
 
@@ -262,11 +283,13 @@ def _cycle(solution: HarmonicSolution) -> dict[str, Dataset]:
 
 def _warn_of_stroke(model: VibrationModel, motion: HarmonicSolution, reporter: Reporter) -> None:
     """Warn where contacts move further than contacts of fixed pairs of nodes may."""
-    places = model.rig.places
-    if places is None:
+    if model.rig.pressing is None:
         return
     moved = motion.resolution.basis @ motion.coefficients
-    stroke, width = float(np.ptp(moved[:, :, 0], axis=1).max()), float(np.ptp(places[:, 0]))
+    stroke, width = (
+        float(np.ptp(moved[:, :, 0], axis=1).max()),
+        float(np.ptp(model.rig.places[:, 0])),
+    )
     if stroke > LARGE_STROKE * width:
         reporter.warn(
             f"{motion.force:g} N: at resonance the pads slide over each other by {stroke:.3g} mm, "
@@ -291,11 +314,8 @@ def _resonance(model: VibrationModel, branch: ResponseBranch, curves: Datasets) 
     if not before < best.frequency < after:
         return best
 
-    def found(frequency: float) -> HarmonicSolution:
-        return branch.problem.solve(frequency, best.force, best)
-
     def lowness(frequency: float) -> float:
-        solution = found(frequency)
+        solution = branch.problem.solve(frequency, best.force, best)
         return -float(amplitudes_of(model, solution)[-1]) if solution.converged else 0.0
 
     search = minimize_scalar(
@@ -304,7 +324,7 @@ def _resonance(model: VibrationModel, branch: ResponseBranch, curves: Datasets) 
         method="bounded",
         options={"xatol": RESONANCE_TOLERANCE * best.frequency},
     )
-    top = found(float(search.x))
+    top = branch.problem.solve(float(search.x), best.force, best)
     return top if top.converged and -search.fun > sizes[place] else best
 
 
@@ -319,10 +339,10 @@ def _accurate(
         if finer is None:
             return problem, motion
         refined = problem.refined(finer)
-        found = refined.solve(motion.frequency, motion.force, motion)
-        if not found.converged:
+        more_accurate = refined.solve(motion.frequency, motion.force, motion)
+        if not more_accurate.converged:
             return problem, motion
-        problem, motion = refined, found
+        problem, motion = refined, more_accurate
 
 
 # --- loops --------------------------------------------------------------------------------------
@@ -370,6 +390,7 @@ def loop_of(case: VibrationCase, model: VibrationModel, motion: HarmonicSolution
             closed(expansion), "N", "the same in the harmonics of the motion alone"
         ),
     }
+    half = 0.5 * float(np.ptp(force))
     numbers = {
         "frequency": motion.frequency,
         "harmonics": list(motion.resolution.harmonics),
@@ -378,16 +399,11 @@ def loop_of(case: VibrationCase, model: VibrationModel, motion: HarmonicSolution
         "energy": float(motion.cycle.dissipated.sum()),
         "slip": share_of(model, motion, SLIP),
         "left_out": motion.left_out,
-        "deformation": _deformation(force, expansion),
+        # Largest force that the harmonics leave out, over half of the range of the force.
+        "deformation": float(np.abs(force - expansion).max()) / half if half > 0.0 else 0.0,
         **_slopes(model, motion, displacement, force, case.joint.normal_load),
     }
     return Curves(datasets, numbers)
-
-
-def _deformation(force: Array, expansion: Array) -> float:
-    """Largest force that the harmonics leave out, over half of the range of the force."""
-    half = 0.5 * float(np.ptp(force))
-    return float(np.abs(force - expansion).max()) / half if half > 0.0 else 0.0
 
 
 def closed(values: Array) -> Array:
@@ -399,14 +415,13 @@ def _slopes(
     model: VibrationModel, motion: HarmonicSolution, displacement: Array, force: Array, load: float
 ) -> dict[str, float | None]:
     """Stick slope and friction of a loop; no friction where it does not slide."""
-    found = _as_measured([np.tile(own, REPEATED) for own in (displacement, force)])
-    lossy = STUCK_LOOP * np.ptp(displacement) * np.ptp(force)
-    loop = found if found is not None and found.energy.mean() > lossy else None
-    slope = _stick_slope(model, motion, displacement, force)
-    if slope is None and loop is not None:
-        slope = float(loop.stick_stiffness.mean())
-    sliding = loop is not None and loop.sliding > 0.0 and load > 0.0
-    friction = float(loop.friction_force.mean()) / load if loop is not None and sliding else None
+    slope, friction = _stick_slope(model, motion, displacement, force), None
+    with suppress(MeasuredLoopError):
+        loop = measure_loops(np.tile(displacement, REPEATED), np.tile(force, REPEATED))
+        if loop.energy.mean() > STUCK_LOOP * np.ptp(displacement) * np.ptp(force):
+            slope = float(loop.stick_stiffness.mean()) if slope is None else slope
+            if loop.slides and load > 0.0:
+                friction = float(loop.friction_force.mean()) / load
     return {"stiffness": slope, "friction": friction}
 
 
@@ -421,13 +436,6 @@ def _stick_slope(
     sticks = (motion.cycle.states[:, model.touching] == STICK).all(axis=1)
     if not isinstance(model.law, FrictionContact | Jenkins) and not sticks.all():
         return None
-    moved, pulled = ((own - np.roll(own, 1))[sticks] for own in (displacement, force))
+    moved, pulled = ((curve - np.roll(curve, 1))[sticks] for curve in (displacement, force))
     square = float(moved @ moved)
     return float(moved @ pulled) / square if square > 0.0 else None
-
-
-def _as_measured(record: Sequence[Array]) -> MeasuredLoops | None:
-    try:
-        return measure_loops(*record)
-    except MeasuredLoopError:
-        return None

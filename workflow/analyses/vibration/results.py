@@ -92,24 +92,24 @@ def _write_tables(outcome: VibrationOutcome, folder: OutputFolder) -> None:
 
 
 def _summary(outcome: VibrationOutcome) -> dict[str, Any]:
-    found: dict[str, Any] = {
+    summary: dict[str, Any] = {
         "law": outcome.case.joint.law,
         **outcome.numbers,
-        "responses": [_response_summary(own) for own in outcome.responses],
+        "responses": [_response_summary(response) for response in outcome.responses],
     }
     if outcome.backbone is not None:
         points = len(outcome.backbone.datasets["force"].values)
-        found[BACKBONE] = {"points": points, **outcome.backbone.numbers}
+        summary[BACKBONE] = {"points": points, **outcome.backbone.numbers}
     if outcome.force_sweeps:
-        found[FORCE_SWEEPS] = [dict(sweep.numbers) for sweep in outcome.force_sweeps]
-    return found
+        summary[FORCE_SWEEPS] = [dict(sweep.numbers) for sweep in outcome.force_sweeps]
+    return summary
 
 
 def _response_summary(response: Response) -> dict[str, Any]:
-    found = {"force": response.force, **response.numbers}
+    summary = {"force": response.force, **response.numbers}
     if response.loops:
-        found[LOOPS] = [dict(loop.numbers) for loop in response.loops]
-    return found
+        summary[LOOPS] = [dict(loop.numbers) for loop in response.loops]
+    return summary
 
 
 def _lines(outcome: VibrationOutcome) -> Iterator[str]:
@@ -124,27 +124,27 @@ def _lines(outcome: VibrationOutcome) -> Iterator[str]:
 
 def _response_line(response: Response, label: str) -> str:
     """What a force does."""
-    own = response.numbers
+    numbers = response.numbers
     parts = [
-        f"{response.force:g} N: resonance {own['resonance']:.5g} Hz",
-        f"{label} moves {TO_MICRONS * own['amplitude']:.4g} um",
-        f"damping {own['damping']:.2%}",
-        f"slips {own['slip']:.0%} of the cycle",
-        f"{own['points']} points",
-        f"harmonics left out {own['left_out']:.1e}",
+        f"{response.force:g} N: resonance {numbers['resonance']:.5g} Hz",
+        f"{label} moves {TO_MICRONS * numbers['amplitude']:.4g} um",
+        f"damping {numbers['damping']:.2%}",
+        f"slips {numbers['slip']:.0%} of the cycle",
+        f"{numbers['points']} points",
+        f"harmonics left out {numbers['left_out']:.1e}",
     ]
-    return ", ".join(parts) + (f"; {len(own['folds'])} folds" if own["folds"] else "")
+    return ", ".join(parts) + (f"; {len(numbers['folds'])} folds" if numbers["folds"] else "")
 
 
 def _loop_line(loop: Curves) -> str:
-    own = loop.numbers
-    lost = f"{own['energy']:.4g} mJ" if own["slip"] > 0.0 else "no slip"
-    text = f"loop at {own['frequency']:g} Hz: {lost}"
-    if own["stiffness"] is not None:
-        text += f", sticks with {PER_MICRON * own['stiffness']:.4g} N/um"
-    if own["friction"] is not None:
-        text += f", friction {own['friction']:.3g}"
-    return f"{text}, harmonics left out {own['left_out']:.1e}"
+    numbers = loop.numbers
+    lost = f"{numbers['energy']:.4g} mJ" if numbers["slip"] > 0.0 else "no slip"
+    text = f"loop at {numbers['frequency']:g} Hz: {lost}"
+    if numbers["stiffness"] is not None:
+        text += f", sticks with {PER_MICRON * numbers['stiffness']:.4g} N/um"
+    if numbers["friction"] is not None:
+        text += f", friction {numbers['friction']:.3g}"
+    return f"{text}, harmonics left out {numbers['left_out']:.1e}"
 
 
 def _backbone_line(backbone: Curves) -> str:

@@ -62,6 +62,14 @@ class VibrationWearOutcome:
 
         Those by force are ``(k, forces)``.
         """
+        rows = [
+            {
+                **state.numbers,
+                "resonance": [response.numbers["resonance"] for response in state.responses],
+                "receptance": [response.numbers["receptance"] for response in state.responses],
+            }
+            for state in self.states
+        ]
         columns = {
             "cycles": ("1", "under the force that wears"),
             "energy": ("N mm", "dissipated so far"),
@@ -76,25 +84,14 @@ class VibrationWearOutcome:
             "stroke": ("mm", "of the joint from end to end, under the force that wears"),
             "energy_per_cycle": ("N mm", "under the force that wears"),
             "stuck": ("Hz", "natural frequencies with the contact stuck"),
-        }
-        by_force = {
             "resonance": ("Hz", "under each force"),
-            "receptance": (
-                "mm/N",
-                "largest amplitude of the last mass over the force, under each",
-            ),
+            "receptance": ("mm/N", "largest amplitude of the last mass over the force, under each"),
         }
         return {
-            name: Dataset(np.array([state.numbers[name] for state in self.states]), *described)
+            name: Dataset(np.array([row[name] for row in rows]), *described)
             for name, described in columns.items()
-            if name in self.states[0].numbers
-        } | {
-            name: Dataset(self._by_force(name), *described) for name, described in by_force.items()
+            if name in rows[0]
         }
-
-    def _by_force(self, name: str) -> Array:
-        """A number of every response, ``(k, forces)``."""
-        return np.array([[own.numbers[name] for own in state.responses] for state in self.states])
 
 
 def depth_fields(depth_1: Array, depth_2: Array) -> dict[str, Dataset]:

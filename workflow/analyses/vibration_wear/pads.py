@@ -7,7 +7,8 @@ depth, and rest and motion are found anew.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections import deque
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -28,8 +29,8 @@ KEPT = 2
 
 
 @dataclass(frozen=True)
-class RubbedPads:
-    """Pads of one shape, and their ``motion`` under the force that wears them.
+class PadCycle:
+    """Pads of one shape in a cycle of their ``motion`` under the force that wears them.
 
     ``model`` is the rig on them. For wear each node slides its path at one pressure, with which it
     dissipates what it does (:class:`wear.nodes.NodalCycle`).
@@ -46,7 +47,6 @@ class RubbedPads:
     @property
     def areas(self) -> Array:
         """Of each node ``(j,)`` [mm²]."""
-        assert self.model.rig.area is not None
         return self.model.rig.area
 
     @property
@@ -104,47 +104,44 @@ class RubbedPads:
         return 2.0 / fastest if fastest > 0.0 else np.inf
 
 
+@dataclass(frozen=True)
 class WearingPads:
     """Pads that wear under a ``force`` [N] at a ``frequency`` [Hz].
 
     ``unworn`` is the rig before, ``laws`` are those of body 1 and body 2.
     """
 
-    def __init__(
-        self,
-        unworn: VibrationModel,
-        laws: tuple[WearLaw, WearLaw],
-        force: float,
-        frequency: float,
-    ) -> None:
-        self.unworn, self.laws = unworn, laws
-        self._force, self._frequency = force, frequency
-        self._kept: list[tuple[Surfaces, RubbedPads]] = []
+    unworn: VibrationModel
+    laws: tuple[WearLaw, WearLaw]
+    force: float
+    frequency: float
+    _solved: deque[tuple[Surfaces, PadCycle]] = field(
+        init=False, default_factory=lambda: deque(maxlen=KEPT)
+    )
 
     def begin(self) -> NodalState:
         """The state before the first cycle."""
-        assert self.unworn.rig.gap is not None
         return NodalState.unworn(self.unworn.rig.gap)
 
-    def at(self, state: NodalState) -> RubbedPads:
-        """The pads in a state, their motion found from that which wore to it.
+    def at(self, state: NodalState) -> PadCycle:
+        """The cycle of the pads in a state, its motion solved for from that which wore to it.
 
         Raises :class:`wear.stepping.ContactFailure` where no motion is found.
         """
-        for surfaces, rubbed in self._kept:
+        for surfaces, cycle in self._solved:
             if surfaces is state.surfaces:
-                return rubbed
+                return cycle
         model = worn_model(self.unworn, state.surfaces.depth)
         start = state.start
         assert start is None or isinstance(start, HarmonicSolution)
-        motion = model.problem.solve(self._frequency, self._force, start)
+        motion = model.problem.solve(self.frequency, self.force, start)
         if not motion.converged:
             raise ContactFailure(
-                f"no motion under {self._force:g} N at {self._frequency:g} Hz: {motion.message}"
+                f"no motion under {self.force:g} N at {self.frequency:g} Hz: {motion.message}"
             )
-        found = RubbedPads(model, motion)
-        self._kept = [*self._kept[1 - KEPT :], (state.surfaces, found)]
-        return found
+        cycle = PadCycle(model, motion)
+        self._solved.append((state.surfaces, cycle))
+        return cycle
 
     def contact_at(self, state: NodalState) -> NodalContact:
         """The same as wear steps take it."""
@@ -156,7 +153,6 @@ def worn_model(unworn: VibrationModel, depth: Array) -> VibrationModel:
     rig, problem = unworn.rig, unworn.problem
     assert isinstance(unworn.law, FrictionContact)
     assert isinstance(problem.joints, PeriodicMarch)
-    assert rig.gap is not None
     gap = rig.gap + depth
     law = replace(unworn.law, gap=gap)
     worn = HarmonicBalance(

@@ -96,7 +96,7 @@ def _summary(outcome: VibrationWearOutcome) -> dict[str, Any]:
 
 
 def _of_state(state: WornState) -> dict[str, Any]:
-    responses = [{"force": own.force, **own.numbers} for own in state.responses]
+    responses = [{"force": response.force, **response.numbers} for response in state.responses]
     # JSON has no NaN.
     numbers = {name: value for name, value in state.numbers.items() if value == value}
     return {**numbers, RESPONSES: responses}
@@ -104,15 +104,15 @@ def _of_state(state: WornState) -> dict[str, Any]:
 
 def _line(state: WornState) -> str:
     """A state in a line."""
-    own = state.numbers
+    numbers = state.numbers
     resonances = ", ".join(
         f"{response.numbers['resonance']:.4g} Hz under {response.force:g} N"
         for response in state.responses
     )
-    stiffness = PER_MICRON * own["stiffness"]
+    stiffness = PER_MICRON * numbers["stiffness"]
     sticks = f"kt {stiffness:.4g} N/um, " if np.isfinite(stiffness) else ""
     return (
-        f"{state.cycles:g} cycles, {TO_JOULES * own['energy']:.4g} J: {sticks}depth "
-        f"{TO_MICRONS * own['depth']:.3g} um, stroke {TO_MICRONS * own['stroke']:.3g} um; "
+        f"{state.cycles:g} cycles, {TO_JOULES * numbers['energy']:.4g} J: {sticks}depth "
+        f"{TO_MICRONS * numbers['depth']:.3g} um, stroke {TO_MICRONS * numbers['stroke']:.3g} um; "
         f"resonance {resonances}"
     )

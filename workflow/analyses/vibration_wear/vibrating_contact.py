@@ -9,6 +9,7 @@ cell slips in a cycle. That slip, and the pressure that wear itself changes, wea
 
 from __future__ import annotations
 
+from collections import deque
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -39,17 +40,8 @@ LOOP_INCREMENTS = 12
 
 
 @dataclass(frozen=True)
-class Shaking:
-    """The force that wears: ``force`` [N] at ``frequency`` [Hz], found at a ``resolution``."""
-
-    force: float
-    frequency: float
-    resolution: Resolution
-
-
-@dataclass(frozen=True)
-class Rubbing:
-    """The contact in one state of its surfaces, and how the rig rubs it.
+class ContactCycle:
+    """The contact in one state of its surfaces, and how it moves in the rig.
 
     ``sliders`` are its law, ``motion`` that of the rig under the force that wears, in a
     cycle of which the sliders dissipate ``by_slider`` ``(n,)`` [N mm] and the cells slip by
@@ -70,14 +62,12 @@ class Rubbing:
     @property
     def energy(self) -> Array:
         """Energy of a cycle per area ``(nx, ny)`` [N/mm]."""
-        energy: Array = self.friction * self.slipping.normal.pressure * self.path
-        return energy
+        return np.asarray(self.friction * self.slipping.normal.pressure * self.path)
 
     @property
     def displacement(self) -> Array:
         """Of the joint through the cycle ``(t,)`` [mm]."""
-        moved: Array = self.motion.resolution.basis @ self.motion.coefficients[0, :, 0]
-        return moved
+        return np.asarray(self.motion.resolution.basis @ self.motion.coefficients[0, :, 0])
 
     @property
     def full_slip(self) -> float:
@@ -91,16 +81,28 @@ class Rubbing:
 
 
 class VibratingContact:
-    """The contact of a ``case`` in a ``rig`` whose joint it is."""
+    """The contact of a ``case`` in a ``rig`` whose joint it is.
 
-    def __init__(self, case: BodiesWearCase, rig: RigModel, shaking: Shaking) -> None:
-        self._case, self._rig, self._shaking = case, rig, shaking
+    It wears under a ``force`` [N] at a ``frequency`` [Hz], whose motion is found at a
+    ``resolution``.
+    """
+
+    def __init__(
+        self,
+        case: BodiesWearCase,
+        rig: RigModel,
+        force: float,
+        frequency: float,
+        resolution: Resolution,
+    ) -> None:
+        self._case, self.rig = case, rig
+        self._force, self._frequency, self._resolution = force, frequency, resolution
         self.grid = Grid.covering(case.contact.size, case.contact.grid)
         pair = ElasticPair(case.material(1), case.material(2))
         self._contact = NormalContact(HalfSpace(self.grid, pair))
         self._laws = case.wear_of(1).described(), case.wear_of(2).described()
         self._receptance = Receptance(rig.model)
-        self._kept: list[Rubbing] = []
+        self._solved: deque[ContactCycle] = deque(maxlen=KEPT)
 
     @property
     def load(self) -> float:
@@ -111,21 +113,20 @@ class VibratingContact:
         """The surfaces before the first cycle, pressed."""
         gap = gap_of(self._case.structure, self.grid)(self.grid.x, self.grid.y)
         unworn = WearState.unworn(np.ascontiguousarray(np.broadcast_to(gap, self.grid.shape)))
-        rubbing = self.at(unworn)
-        starts = {0: rubbing.slipping.normal.start}
-        result = rubbing.wearing.cycle(replace(unworn, starts=starts), rubbing.wearing.dissipating)
+        cycle = self.at(unworn)
+        starts = {0: cycle.slipping.normal.start}
+        result = cycle.wearing.cycle(replace(unworn, starts=starts), cycle.wearing.dissipating)
         depth_rate, volume_rate = result.per_cycle(self.grid.cell_area)
         return replace(unworn, starts=starts, depth_rate=depth_rate, volume_rate=volume_rate)
 
-    def at(self, state: WearState) -> Rubbing:
+    def at(self, state: WearState) -> ContactCycle:
         """The contact in a state. Raises ContactFailure where contact or motion are not found."""
-        for kept in self._kept:
-            same = kept.state.surfaces is state.surfaces
-            if same and kept.state.energy == state.energy:
-                return kept
-        found = self._found(state)
-        self._kept = [*self._kept[1 - KEPT :], found]
-        return found
+        for solved in self._solved:
+            same = solved.state.surfaces is state.surfaces
+            if same and solved.state.energy == state.energy:
+                return solved
+        self._solved.append(self._solve(state))
+        return self._solved[-1]
 
     def wearing(self, state: WearState) -> WearingContact:
         """The same for wear steps."""
@@ -136,11 +137,11 @@ class VibratingContact:
 
         A wear step takes the friction of its beginning.
         """
-        rubbing, cycles = self.at(state), most
-        per_cycle = float(rubbing.by_slider.sum())
+        cycle, cycles = self.at(state), most
+        per_cycle = float(cycle.by_slider.sum())
         while cycles > 1.0:
             friction = self._case.friction.at(state.energy + cycles * per_cycle)
-            if abs(friction - rubbing.friction) <= FRICTION_CHANGE * rubbing.friction:
+            if abs(friction - cycle.friction) <= FRICTION_CHANGE * cycle.friction:
                 return cycles
             cycles *= 0.5
         return min(1.0, most)
@@ -148,29 +149,29 @@ class VibratingContact:
     def problem(self, sliders: Jenkins, resolution: Resolution) -> HarmonicBalance:
         """The balance of the rig held by ``sliders``."""
         return HarmonicBalance(
-            self._rig.model,
+            self.rig.model,
             ParallelSliders(sliders),
             # The force is a sine: Re (-i) exp(iωt).
-            PeriodicLoad({1: -1j * self._rig.driven}),
+            PeriodicLoad({1: -1j * self.rig.driven}),
             resolution,
             self._receptance,
         )
 
-    def loop(self, rubbing: Rubbing, amplitude: float) -> TangentialLoop:
+    def loop(self, cycle: ContactCycle, amplitude: float) -> TangentialLoop:
         """The half-space's own loop of an amplitude [mm]: the whole tangential problem.
 
         Raises ContactFailure if it does not converge.
         """
         half_space, tolerance = self._contact.half_space, self._case.contact.tolerance
-        contact = FrictionalContact(half_space, rubbing.friction, tolerance)
+        contact = FrictionalContact(half_space, cycle.friction, tolerance)
         path = LoopPath(self.load, amplitude, increments=LOOP_INCREMENTS)
         try:
-            return march_loop(contact, rubbing.state.surfaces.gap, path)
+            return march_loop(contact, cycle.state.surfaces.gap, path)
         except LoopFailure as error:
             raise ContactFailure(f"tangential loop: {error}") from error
 
     # -- steps of at --------------------------------------------------------------------------
-    def _found(self, state: WearState) -> Rubbing:
+    def _solve(self, state: WearState) -> ContactCycle:
         tolerance = self._case.contact.tolerance
         start = state.starts.get(0)
         try:
@@ -182,24 +183,21 @@ class VibratingContact:
         friction = self._case.friction.at(state.energy)
         sliders = Jenkins(slipping.slider_stiffness, friction, slipping.slider_load)
         motion = self._motion(sliders)
-        own = motion.resolution
-        cycle = ParallelSliders(sliders).settle(
-            motion.coefficients, own.basis, own.weights, own.lead
-        )
+        at = motion.resolution
+        cycle = ParallelSliders(sliders).settle(motion.coefficients, at.basis, at.weights, at.lead)
         path, adjusted = self._path(slipping, sliders, cycle.by_slider)
         wearing = WearingContact(self._contact, self._laws, friction, self._cycle(path), tolerance)
-        return Rubbing(
+        return ContactCycle(
             state, friction, slipping, sliders, motion, cycle.by_slider, path, adjusted, wearing
         )
 
     def _motion(self, sliders: Jenkins) -> HarmonicSolution:
-        own = self._shaking
-        problem = self.problem(sliders, own.resolution)
-        start = self._kept[-1].motion if self._kept else None
-        motion = problem.solve(own.frequency, own.force, start)
+        start = self._solved[-1].motion if self._solved else None
+        problem = self.problem(sliders, self._resolution)
+        motion = problem.solve(self._frequency, self._force, start)
         if not motion.converged:
             raise ContactFailure(
-                f"no motion under {own.force:g} N at {own.frequency:g} Hz: {motion.message}"
+                f"no motion under {self._force:g} N at {self._frequency:g} Hz: {motion.message}"
             )
         return motion
 
@@ -208,11 +206,11 @@ class VibratingContact:
         limit = sliders.limit
         travel = np.divide(lost, limit, out=np.zeros_like(lost), where=limit > 0.0)
         path = slipping.travelled(travel)
-        found = float(np.vdot(slipping.normal.pressure, path)) * self.grid.cell_area
-        found *= float(sliders.friction)
-        if not found > 0.0:
+        by_cells = float(np.vdot(slipping.normal.pressure, path)) * self.grid.cell_area
+        by_cells *= float(sliders.friction)
+        if not by_cells > 0.0:
             return np.zeros(self.grid.shape), 1.0
-        factor = float(lost.sum()) / found
+        factor = float(lost.sum()) / by_cells
         return factor * path, factor
 
     def _cycle(self, path: Array) -> SlidingCycle:

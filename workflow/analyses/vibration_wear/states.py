@@ -1,0 +1,54 @@
+"""Motion, wear, motion: the states of a contact that wears in a rig, and the responses in each."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from wear.steppers import Contact, Stepper, advance_cycles
+from wear.worn import State
+from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.outcome import Response
+from workflow.analyses.vibration.response import response_under
+from workflow.analyses.vibration_wear.outcome import WornState
+from workflow.shell.reporter import Reporter
+
+
+def worn_states(
+    numbers: tuple[float, ...],
+    stepper: Stepper[State, Contact],
+    state: State,
+    contact_at: Callable[[State], Contact],
+    describe: Callable[[State, float, int, float], WornState],
+    reporter: Reporter,
+) -> tuple[WornState, ...]:
+    """The states after so many cycles each, the unworn one before them.
+
+    ``describe`` makes them, of a state, its cycles, the steps since the last one, and the largest
+    error of a step so far.
+    """
+    total, done, error = numbers[-1], 0.0, 0.0
+    states = [describe(state, done, 0, error)]
+    with reporter.jumps(total, 0.0) as progress:
+        for cycles in numbers:
+            with reporter.stage("wear"):
+                worn = advance_cycles(stepper, state, cycles - done, total - done, contact_at)
+            state, done, error = worn.state, cycles, max(error, worn.error)
+            states.append(describe(state, cycles, worn.spent.steps, error))
+            progress.update(cycles, len(states) - 1)
+    return tuple(states)
+
+
+def responses_to_all(
+    case: VibrationCase, model: VibrationModel, motion: HarmonicSolution, reporter: Reporter
+) -> tuple[Response, ...]:
+    """What a state does under each force; warns where the ``motion`` that wears is not accurate."""
+    tolerance = case.resolution.tolerance
+    if tolerance is not None and motion.left_out > tolerance:
+        reporter.warn(
+            f"the motion that wears leaves out harmonics of {motion.left_out:.1e}, above "
+            "resolution.tolerance: raise resolution.harmonics, those to begin with"
+        )
+    with reporter.stage("response"):
+        return tuple(response_under(case, model, force, reporter)[0] for force in case.forces)
