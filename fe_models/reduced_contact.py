@@ -55,8 +55,7 @@ class NormalSolution:
     @property
     def touching(self) -> Flags:
         """Nodes that carry force, ``(n,)``."""
-        touching: Flags = self.force > 0.0
-        return touching
+        return self.force > 0.0
 
 
 @dataclass(frozen=True)

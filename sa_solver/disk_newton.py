@@ -266,8 +266,7 @@ class _Search:
         """Slipping cells that a ``step`` from the last shear leaves slipping along with it."""
         slip = self._moved - self._bend.times(step)
         self._problem.modes.add_motion(slip, -self._rigid)
-        released: Mask = self._slipping & (dot(slip, self._shear + step) > 0.0)
-        return released
+        return self._slipping & (dot(slip, self._shear + step) > 0.0)
 
     def _hold(self) -> bool:
         """Take all cells on their circle to slip, at the old shear; False if they do already.

@@ -46,8 +46,7 @@ class Transfer:
 
 def _along_both(matrices: Any, field: Array) -> Array:
     along_x, along_y = matrices
-    result: Array = np.ascontiguousarray((along_y @ (along_x @ field).T).T)
-    return result
+    return np.ascontiguousarray((along_y @ (along_x @ field).T).T)
 
 
 def _averages(fine: int, coarse: int) -> Any:

@@ -288,8 +288,7 @@ def _separated(problem: NormalProblem) -> Array | None:
 def _with_wear(problem: NormalProblem, pressure: Array, elastic: Array) -> Array:
     if problem.compliance is None:
         return elastic
-    worn: Array = elastic + problem.compliance * pressure
-    return worn
+    return elastic + problem.compliance * pressure
 
 
 def _equivalents(work: Work, half_space: HalfSpace) -> int:

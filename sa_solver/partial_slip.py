@@ -88,14 +88,12 @@ class PartialSlip:
     @property
     def slider_stiffness(self) -> Array:
         """Springs ``(n,)`` [N/mm] of sliders in parallel that follow the curve."""
-        stiffness: Array = -np.diff(self._slopes)
-        return stiffness
+        return -np.diff(self._slopes)
 
     @property
     def slider_load(self) -> Array:
         """What presses each slider ``(n,)`` [N]; their sum is the load of the contact."""
-        load: Array = self.slider_stiffness * self.reach
-        return load
+        return self.slider_stiffness * self.reach
 
     def travelled(self, travel: Array) -> Array:
         """Path ``(nx, ny)`` [mm] of every cell while the sliders travel by ``travel`` ``(n,)``.
@@ -207,8 +205,7 @@ def _stiffness(half_space: HalfSpace, normal: NormalState) -> tuple[float, float
     def indented(pressure: Array) -> Array:
         field = np.zeros(pressed.shape)
         field[pressed] = pressure
-        displacement: Array = half_space.normal(field)[pressed]
-        return displacement
+        return half_space.normal(field)[pressed]
 
     count = int(np.count_nonzero(pressed))
     operator = LinearOperator((count, count), matvec=indented, dtype=np.float64)

@@ -174,8 +174,7 @@ class AndersonMemory:
         products = (remembered @ scaled).astype(np.float64)
         weights = _solve_gram(self._gram[:used, :used], products)
         correction = weights.astype(np.float32) @ self._images[:used]
-        accelerated: Array = image - self._unit * correction
-        return accelerated
+        return image - self._unit * correction
 
     def _keep(self, place: NDArray[np.float32], new: Array, last: Array) -> None:
         """The difference of ``new`` and ``last`` over the unit, into ``place``."""

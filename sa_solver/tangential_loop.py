@@ -268,8 +268,7 @@ def _balanced_modes(half_space: HalfSpace, pressed: Mask, tilting: bool) -> Arra
     columns = np.stack([mode[pressed] for mode in modes], axis=1)
     basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     # A single row of cells knows no moment about its own line.
-    held: Array = basis[:, sizes > np.finfo(float).eps * len(columns) * sizes[0]]
-    return held
+    return basis[:, sizes > np.finfo(float).eps * len(columns) * sizes[0]]
 
 
 def _press(contact: FrictionalContact, height: Array, path: LoopPath) -> ContactState:

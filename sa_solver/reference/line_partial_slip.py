@@ -210,8 +210,7 @@ def _shear(contact: HertzCylinder, friction: float, x: Array, stick: float, offs
     """µ p less its like on ``|x - offset| < stick``, ``(µ p0 / a) [sqrt(a² - x²) - ...]``."""
     sliding = np.sqrt(np.maximum(0.0, contact.half_width**2 - x**2))
     stuck = np.sqrt(np.maximum(0.0, stick**2 - (x - offset) ** 2))
-    shear: Array = friction * contact.peak_pressure / contact.half_width * (sliding - stuck)
-    return shear
+    return friction * contact.peak_pressure / contact.half_width * (sliding - stuck)
 
 
 def _reserve(tangential: float, sliding_force: float) -> float:

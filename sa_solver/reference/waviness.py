@@ -58,8 +58,7 @@ class WavySurface:
 
     def gap(self, x: Array) -> Array:
         """Gap before loading [mm], 0 at the crests."""
-        gap: Array = 2.0 * self.amplitude * np.sin(np.pi * x / self.wavelength) ** 2
-        return gap
+        return 2.0 * self.amplitude * np.sin(np.pi * x / self.wavelength) ** 2
 
     def pressure(self, x: Array) -> Array:
         """2 p* cos ψ sqrt(sin²ψa - sin²ψ) with ψ = π x / λ, 0 outside the contacts [MPa]."""
