@@ -12,7 +12,7 @@ import scipy.fft
 
 from sa_solver.errors import InputError
 from sa_solver.influence import X, Y, Z, rectangle_influence, strip_influence
-from sa_solver.transform import SpectralFilter, Transform, plan_transform
+from sa_solver.transform import SpectralFilter, Transform
 from sa_solver.types import Array, ElasticPair, Grid
 
 NORMAL = (Z,)
@@ -42,14 +42,12 @@ class HalfSpace:
     two (shear) or three.
     """
 
-    def __init__(
-        self, grid: Grid, pair: ElasticPair, threads: int = 1, datum: float | None = None
-    ) -> None:
+    def __init__(self, grid: Grid, pair: ElasticPair, datum: float | None = None) -> None:
         """``datum`` [mm] is for line grids: how far from a line force its displacement vanishes.
 
         Raises InputError for a datum shorter than the grid.
         """
-        self.grid, self.pair, self.threads = grid, pair, threads
+        self.grid, self.pair = grid, pair
         self.datum = DATUM * grid.size[0] if datum is None else datum
         if grid.line and not grid.size[0] <= self.datum < np.inf:
             raise InputError(
@@ -64,7 +62,7 @@ class HalfSpace:
 
     def on(self, grid: Grid) -> HalfSpace:
         """The same bodies under another ``grid``."""
-        return HalfSpace(grid, self.pair, self.threads, self.datum)
+        return HalfSpace(grid, self.pair, self.datum)
 
     def normal(self, pressure: Array) -> Array:
         """``u_z`` under ``pressure`` alone, both ``(nx, ny)`` [MPa] → [mm]."""
@@ -78,12 +76,6 @@ class HalfSpace:
     def displacement(self, traction: Array) -> Array:
         """``u`` under ``traction``, both ``(3, nx, ny)`` ordered x, y, z [MPa] → [mm]."""
         return self._convolve(traction, ALL, ALL)
-
-    def shear_under_pressure(self, pressure: Array) -> Array:
-        """``u_x, u_y`` ``(2, nx, ny)`` under ``pressure`` ``(nx, ny)``; 0 for similar bodies."""
-        if self.pair.similar:
-            return np.zeros((2, *pressure.shape))
-        return self._convolve(pressure[None], SHEAR, NORMAL)
 
     def normal_under_shear(self, shear: Array) -> Array:
         """``u_z`` ``(nx, ny)`` under ``shear`` ``(2, nx, ny)``; 0 for similar bodies."""
@@ -113,7 +105,7 @@ class HalfSpace:
         """A transform planned once for all who need this size."""
         key = (shape, padded, components)
         if key not in self._transforms:
-            self._transforms[key] = plan_transform(*key, self.threads)
+            self._transforms[key] = Transform(*key)
         return self._transforms[key]
 
     def _convolve(self, fields: Array, rows: Components, columns: Components) -> Array:

@@ -39,7 +39,7 @@ from sa_solver.subsurface_influence import (
     rectangle_stress,
     strip_stress,
 )
-from sa_solver.transform import SpectralFilter, plan_transform
+from sa_solver.transform import SpectralFilter, Transform
 from sa_solver.types import Array, Grid, Material
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "zx")
@@ -67,9 +67,7 @@ class SubsurfaceStress:
     components of stress inside and three at the surface. The symbols of the latest depth are kept.
     """
 
-    def __init__(
-        self, grid: Grid, material: Material, body: Literal[1, 2], threads: int = 1
-    ) -> None:
+    def __init__(self, grid: Grid, material: Material, body: Literal[1, 2]) -> None:
         """Plan for ``body``, of which only Poisson's ratio counts.
 
         Raises SubsurfaceError unless the body is 1 or 2 and the ratio from 0 to 0.5.
@@ -78,7 +76,7 @@ class SubsurfaceStress:
             raise SubsurfaceError(f"body {body}: there are bodies 1 and 2")
         if not 0.0 <= material.poisson <= 0.5:
             raise SubsurfaceError(f"Poisson's ratio {material.poisson:g}: must be from 0 to 0.5")
-        self.grid, self.poisson, self.body, self.threads = grid, material.poisson, body, threads
+        self.grid, self.poisson, self.body = grid, material.poisson, body
         self.count = 0
         self._mirror = MIRROR[body]
         self._padded = padded_shape(grid)
@@ -185,7 +183,7 @@ class SubsurfaceStress:
         kernels = self._influence(edges, depth)
         symbols = [[self._symbol(kernels[i, k], i, k) for k in range(3)] for i in rows]
         count = max(3, len(rows))
-        transform = plan_transform(self.grid.shape, self._padded, count, self.threads)
+        transform = Transform(self.grid.shape, self._padded, count)
         outputs = [place for place, i in enumerate(rows) if i in (YZ, ZX)]
         return SpectralFilter(transform, symbols, (SHEAR, outputs))
 
