@@ -12,7 +12,7 @@ Source: Spinu & Frunza 2015, J. Phys. Conf. Ser. (reversals).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -25,6 +25,7 @@ from sa_solver.rigid_modes import NORMAL, PLANAR
 from sa_solver.types import Array
 
 Method = Literal["full", "reversals", "ciavarella_jaeger"]
+Progress = Callable[[int, ContactState], None]
 
 STRAIGHT = 1e-9
 """How far two increments of the shear load may be from parallel: rounding of a straight leg."""
@@ -39,13 +40,12 @@ class ContactLoadPath:
     """Loads at the ends of n increments, from bodies apart.
 
     ``values`` ``(n, 6)``, ``motion`` (6,) and ``strain`` ``(n,)`` as in
-    :class:`~sa_solver.contact.ContactLoad`; ``energy`` ``(n, 2)`` or None.
+    :class:`~sa_solver.contact.ContactLoad`.
     """
 
     values: Array
     motion: tuple[bool, ...] = (False,) * 6
     strain: Array | None = None
-    energy: Array | None = None
 
     def __len__(self) -> int:
         return len(self.values)
@@ -53,8 +53,7 @@ class ContactLoadPath:
     def load(self, row: int) -> ContactLoad:
         """The load at the end of increment ``row``."""
         strain = 0.0 if self.strain is None else float(self.strain[row])
-        energy = None if self.energy is None else self.energy[row]
-        return ContactLoad(self.values[row], self.motion, strain, energy)
+        return ContactLoad(self.values[row], self.motion, strain)
 
     @property
     def shear(self) -> Array:
@@ -89,7 +88,7 @@ def march_history(
     history: Literal["auto", "full", "reversals"] = "auto",
     tolerance: float = 1e-8,
     estimate_error: bool = False,
-    progress: Callable[[int, ContactState], None] | None = None,
+    progress: Progress = lambda row, state: None,
 ) -> History:
     """Solve a history on surfaces that do not wear.
 
@@ -124,8 +123,6 @@ def _obstacle_to_legs(half_space: HalfSpace, path: ContactLoadPath) -> str:
     """Why a leg of the shear load may not be taken in one step; empty if it may."""
     if not half_space.pair.similar:
         return "the bodies are dissimilar"
-    if path.energy is not None:
-        return "sliding is given by its energy"
     sheared = np.flatnonzero(path.shear.any(axis=1))
     # The row before the shear begins has the pressure that must stay.
     pressed = path.values[max(sheared[0] - 1, 0) if len(sheared) else -1 :, list(NORMAL)]
@@ -156,30 +153,21 @@ def _proportional(shear: Array) -> bool:
     return bool(len(singular) < 2 or singular[1] <= STRAIGHT * singular[0])
 
 
-def _rows(
-    contact: FrictionalContact, height: Array, path: ContactLoadPath, rows: list[int]
-) -> Iterator[ContactState]:
-    """States at the given rows; ends with the first that has not converged."""
-    state = contact.apart(height)
-    for row in rows:
-        state = contact.advance(state, height, path.load(row))
-        yield state
-        if not state.converged:
-            return
-
-
 def _solve(
     contact: FrictionalContact,
     height: Array,
     path: ContactLoadPath,
     rows: list[int],
-    progress: Callable[[int, ContactState], None] | None,
+    progress: Progress = lambda row, state: None,
 ) -> list[ContactState]:
-    states = []
-    for row, state in zip(rows, _rows(contact, height, path, rows), strict=False):
+    """States at the given rows; ends with the first that has not converged."""
+    states, state = [], contact.apart(height)
+    for row in rows:
+        state = contact.advance(state, height, path.load(row))
         states.append(state)
-        if progress is not None:
-            progress(row, state)
+        progress(row, state)
+        if not state.converged:
+            break
     return states
 
 
@@ -189,7 +177,7 @@ def _full(
     path: ContactLoadPath,
     reason: str,
     estimate_error: bool,
-    progress: Callable[[int, ContactState], None] | None,
+    progress: Progress,
 ) -> History:
     rows = list(range(len(path)))
     states = _solve(contact, height, path, rows, progress)
@@ -197,7 +185,7 @@ def _full(
     if not (estimate_error and states[-1].converged):
         return history
     half = _every_second(path)
-    coarse = _solve(contact, height, path, half, None) if len(half) < len(rows) else []
+    coarse = _solve(contact, height, path, half) if len(half) < len(rows) else []
     if not (coarse and coarse[-1].converged):
         return history
     # Backward Euler: with twice the steps the error halves, so the difference is the finer's error.
@@ -209,7 +197,7 @@ def _reversals(
     contact: FrictionalContact,
     height: Array,
     path: ContactLoadPath,
-    progress: Callable[[int, ContactState], None] | None,
+    progress: Progress,
 ) -> History:
     rows = turning_points(path)
     states = _solve(contact, height, path, rows, progress)
