@@ -20,7 +20,7 @@ from typing import TypeVar
 import numpy as np
 
 from sa_solver.ciavarella_jaeger import first_loading
-from sa_solver.coupled import CoupledContact, CoupledStart, CoupledState
+from sa_solver.coupled import CoupledContact, CoupledState
 from sa_solver.errors import InputError
 from sa_solver.friction_limit import largest_share
 from sa_solver.gross_slip import SlidingRule, gross_slip, sliding_direction
@@ -98,7 +98,7 @@ class ContactState:
     message: str
     convolutions: int
     border_load: float
-    start: CoupledStart | None = None
+    start: Array | None = None
 
     @property
     def pressure(self) -> Array:

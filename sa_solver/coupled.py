@@ -89,13 +89,6 @@ class CoupledContactError(ContactProblemError):
 
 
 @dataclass(frozen=True)
-class CoupledStart:
-    """What a solve on the same grid can start from: the splitting's state, zero-padded."""
-
-    splitting: Array
-
-
-@dataclass(frozen=True)
 class CoupledState:
     """Solution of one increment.
 
@@ -104,7 +97,8 @@ class CoupledState:
     ``resultants`` are (P, Qx, Qy, Mx, My, Mz) [N, N mm] and ``rigid`` the motions (δz, δx, δy, φx,
     φy, φz) [mm, rad], those in the plane being of the increment. ``border_load`` is the share of P
     on the outermost cells: above 0, the grid is too small. ``message`` is empty when
-    ``converged``, else says what is wrong and what to try.
+    ``converged``, else says what is wrong and what to try. ``start``, the splitting's state
+    zero-padded, is what a solve on the same grid can start from.
     """
 
     traction: Array
@@ -119,7 +113,7 @@ class CoupledState:
     iterations: int
     convolutions: int
     border_load: float
-    start: CoupledStart
+    start: Array
 
     @property
     def pressure(self) -> Array:
@@ -167,7 +161,7 @@ class CoupledContact:
         motion: tuple[bool, ...] = ALL_FORCES,
         *,
         tolerance: float = TOLERANCE,
-        start: CoupledStart | None = None,
+        start: Array | None = None,
         compliance: Array | None = None,
     ) -> CoupledState:
         """Tractions and motions at the end of one increment.
@@ -191,12 +185,14 @@ class CoupledContact:
 
     # -- steps of solve -----------------------------------------------------------------------
     def _search(
-        self, problem: CoupledProblem, tolerance: float, start: CoupledStart | None
+        self, problem: CoupledProblem, tolerance: float, start: Array | None
     ) -> CoupledState:
         """Iterate the splitting until the residuals of its solution are met, or cannot be."""
+        if start is not None and start.shape != (3, *self._resolvent.padded_shape):
+            raise CoupledContactError("start belongs to another grid: start from a state on this")
         before = self.half_space.count
         splitting, free = self._splitting(problem), list(problem.free)
-        state = self._started(start) if start else self._touching(problem)
+        state = self._touching(problem) if start is None else start
         inner, iterations, message, begun_anew = tolerance, 0, "", False
         while True:
             result = douglas_rachford(
@@ -231,7 +227,7 @@ class CoupledContact:
             message=message,
             iterations=iterations,
             convolutions=self.half_space.count - before,
-            start=CoupledStart(state),
+            start=state,
         )
 
     def _splitting(self, problem: CoupledProblem) -> PaddedSplitting:
@@ -252,12 +248,6 @@ class CoupledContact:
             problem.offset,
             law,
         )
-
-    def _started(self, start: CoupledStart) -> Array:
-        """The splitting's state that ``start`` holds."""
-        if start.splitting.shape != (3, *self._resolvent.padded_shape):
-            raise CoupledContactError("start belongs to another grid: start from a state on this")
-        return start.splitting
 
     def _touching(self, problem: CoupledProblem) -> Array:
         """The splitting's state ``t + v/ρ`` of bodies that touch without load."""
@@ -312,7 +302,7 @@ class CoupledContact:
             iterations=0,
             convolutions=0,
             border_load=border_share(traction[Z]),
-            start=CoupledStart(np.empty(0)),
+            start=np.empty(0),
         )
 
     def _pressed(self, problem: CoupledProblem) -> Array:
@@ -360,7 +350,7 @@ class CoupledContact:
             residuals=CoupledResiduals(*[0.0] * 5),
             converged=True,
             border_load=0.0,
-            start=CoupledStart(self._resolvent.padded(traction)),
+            start=self._resolvent.padded(traction),
         )
 
     def _failure(self, problem: CoupledProblem, state: CoupledState, tolerance: float) -> str:

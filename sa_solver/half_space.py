@@ -123,11 +123,8 @@ class HalfSpace:
 
     def _compute_symbol(self, row: int, column: int, period: GridShape) -> Array:
         """DFT of a quarter of the kernel, continued by its parity along x and along y."""
-        edges = [
-            (np.arange(m // 2 + 2, dtype=np.float64) - 0.5) * pitch
-            for m, pitch in zip(period, self.grid.pitch, strict=True)
-        ]
-        kernel = self._influence(edges[0], edges[1], row, column)
+        edges_x, edges_y = map(quarter_edges, period, self.grid.pitch)
+        kernel = self._influence(edges_x, edges_y, row, column)
         for axis, m in enumerate(period):
             kernel = continued(kernel, axis, m, odd=(row == axis) != (column == axis))
         spectrum = scipy.fft.rfft2(kernel)
@@ -151,8 +148,17 @@ def _normal_places(components: Components) -> list[int]:
 
 def padded_shape(grid: Grid) -> GridShape:
     """The fast transform lengths that hold the linear convolution on ``grid``."""
-    nx, ny = (int(scipy.fft.next_fast_len(2 * n - 1, real=True)) for n in grid.shape)
-    return nx, ny
+    return fast_lengths(*(2 * n - 1 for n in grid.shape))
+
+
+def fast_lengths(nx: int, ny: int) -> GridShape:
+    """The next lengths that transform fast."""
+    return int(scipy.fft.next_fast_len(nx, real=True)), int(scipy.fft.next_fast_len(ny, real=True))
+
+
+def quarter_edges(period: int, pitch: float) -> Array:
+    """Edges about the distances 0 to period//2 [mm]."""
+    return (np.arange(period // 2 + 2, dtype=np.float64) - 0.5) * pitch
 
 
 def continued(kernel: Array, axis: int, period: int, odd: bool) -> Array:

@@ -44,14 +44,6 @@ class NestedSolution:
     method: str
 
 
-class _Stage:
-    """The half-space and its preconditioner on a box of cells."""
-
-    def __init__(self, half_space: HalfSpace) -> None:
-        self.half_space = half_space
-        self.preconditioner = NormalPreconditioner(half_space)
-
-
 class NestedSolver:
     """Solves normal contact problems on one grid; owns what was planned for it."""
 
@@ -104,14 +96,14 @@ class NestedSolver:
     ) -> tuple[Box, SearchResult]:
         """Solve with pressure in a box only, enlarged while the contact reaches its sides."""
         while True:
-            stage = self._stage(box)
-            inner = problem.cropped(box.window, stage.half_space)
-            stage.preconditioner.include(inner.compliance)
+            preconditioner = self._preconditioner(box)
+            inner = problem.cropped(box.window, preconditioner.half_space)
+            preconditioner.include(inner.compliance)
             inside = np.ascontiguousarray(pressure[box.window])
             moved = inner.displacement(inside) if displacement is None else displacement[box.window]
             result = bound_conjugate_gradients(
                 inner,
-                stage.preconditioner,
+                preconditioner,
                 inside,
                 moved,
                 tolerance,
@@ -139,11 +131,8 @@ class NestedSolver:
     @cached_property
     def _coarser(self) -> tuple[NestedSolver, Transfer] | None:
         """The solver on the next coarser grid, and how fields pass to and from it."""
-        half_space = self.half_space
-        grid = coarsened(half_space.grid)
-        if grid is None:
-            return None
-        return NestedSolver(half_space.on(grid)), Transfer(half_space.grid, grid)
+        coarser = coarsened(self.half_space)
+        return None if coarser is None else (NestedSolver(coarser[0]), coarser[1])
 
     def _from_coarser(self, problem: NormalProblem) -> Array | None:
         if self._coarser is None:
@@ -171,15 +160,17 @@ class NestedSolver:
         )
 
     # -- boxes --------------------------------------------------------------------------------
-    def _stage(self, box: Box) -> _Stage:
+    def _preconditioner(self, box: Box) -> NormalPreconditioner:
+        """That of the half-space on a box."""
         return self._whole if box.size == box.shape else self._boxed(box.size)
 
     @cached_property
-    def _whole(self) -> _Stage:
-        return _Stage(self.half_space)
+    def _whole(self) -> NormalPreconditioner:
+        return NormalPreconditioner(self.half_space)
 
-    def _plan(self, size: tuple[int, int]) -> _Stage:
-        return _Stage(self.half_space.on(replace(self.half_space.grid, shape=size)))
+    def _plan(self, size: tuple[int, int]) -> NormalPreconditioner:
+        grid = replace(self.half_space.grid, shape=size)
+        return NormalPreconditioner(self.half_space.on(grid))
 
 
 def _uniform(problem: NormalProblem) -> Array | None:

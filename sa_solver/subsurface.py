@@ -27,7 +27,7 @@ import numpy as np
 import scipy.fft
 
 from sa_solver.errors import InputError
-from sa_solver.half_space import continued, padded_shape
+from sa_solver.half_space import continued, padded_shape, quarter_edges
 from sa_solver.subsurface_influence import (
     INDICES,
     XX,
@@ -129,7 +129,7 @@ class SubsurfaceStress:
         period = self._padded[along]
         spectra = scipy.fft.rfft(felt[:, :, first : last + 1], period, axis=1)
         rows = np.arange(row - last, row - first + 2, dtype=np.float64) - 0.5
-        edges = [_quarter_edges(period, self.grid.pitch[along]), rows * self.grid.pitch[1 - along]]
+        edges = [quarter_edges(period, self.grid.pitch[along]), rows * self.grid.pitch[1 - along]]
         for column, depth in enumerate(depths):
             kernels = self._influence(edges if along == 0 else edges[::-1], float(depth))
             # Kernels run over point less source, so backwards over the sources.
@@ -177,9 +177,7 @@ class SubsurfaceStress:
     def _plan(self, depth: float) -> SpectralFilter:
         """Real symbols, with shear tractions and shear stress along z in units of i."""
         rows = self._convolved(depth)
-        edges = [
-            _quarter_edges(m, pitch) for m, pitch in zip(self._padded, self.grid.pitch, strict=True)
-        ]
+        edges = list(map(quarter_edges, self._padded, self.grid.pitch))
         kernels = self._influence(edges, depth)
         symbols = [[self._symbol(kernels[i, k], i, k) for k in range(3)] for i in rows]
         count = max(3, len(rows))
@@ -200,11 +198,6 @@ class SubsurfaceStress:
 def _odd(component: int, traction: int, axis: int) -> bool:
     """Whether a component of stress under a traction is odd along x or y."""
     return (*INDICES[component], traction).count(axis) % 2 == 1
-
-
-def _quarter_edges(period: int, pitch: float) -> Array:
-    """Edges about the distances 0 to period//2 [mm]."""
-    return (np.arange(period // 2 + 2, dtype=np.float64) - 0.5) * pitch
 
 
 def _along_rows(kernels: Array, spectra: Array, along: int, period: int) -> Array:
