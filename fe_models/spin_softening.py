@@ -13,11 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.elasticity import ElasticBody
+from fe_models.elasticity import ROTOR, ElasticBody
 from sa_solver.types import Array
-
-# The rotor axis, the global Y.
-ROTOR = np.array([0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True)
