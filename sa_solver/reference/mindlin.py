@@ -18,38 +18,22 @@ Mechanics*, sections 7.2 and 7.4.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
 from sa_solver.errors import InputError
-from sa_solver.reference.hertz import HertzSphere
+from sa_solver.reference.hertz import FrictionalSphere
 from sa_solver.reference.masing import superpose
-from sa_solver.types import Array, ElasticPair, Material
+from sa_solver.types import Array
 
 
-@dataclass(frozen=True)
-class ShearedSphere:
-    """Sphere of relative ``radius`` [mm] under a constant ``load`` [N], sheared along x.
+class ShearedSphere(FrictionalSphere):
+    """A sphere under a constant load, sheared along x.
 
-    ``friction`` is µ. Tangential forces are those on body 2, displacements those of body 1 relative
+    Tangential forces are those on body 2, displacements those of body 1 relative
     to body 2 far from the contact: they have the same sign on first loading. Methods raise
     ``InputError`` beyond |Q| = µP.
     """
-
-    load: float
-    radius: float
-    body_1: Material
-    body_2: Material
-    friction: float
-
-    @cached_property
-    def contact(self) -> HertzSphere:
-        """The normal contact, which shear does not change."""
-        return HertzSphere(
-            self.load, self.radius, ElasticPair(self.body_1, self.body_2).contact_modulus
-        )
 
     @property
     def sliding_force(self) -> float:
@@ -59,8 +43,7 @@ class ShearedSphere:
     @property
     def tangential_compliance(self) -> float:
         """dδx/dQ where nothing slips, ``Σ (2 - ν)/G / 8 a`` [mm/N]."""
-        bodies = (self.body_1, self.body_2)
-        compliance = sum((2.0 - m.poisson) / m.shear_modulus for m in bodies)
+        compliance = 2.0 * self.pair.shear - self.pair.poisson
         return compliance / (8.0 * self.contact.contact_radius)
 
     def stick_radius(self, tangential: float) -> float:
