@@ -20,6 +20,7 @@ from skfem import (
 from skfem.helpers import grad
 
 from fe_models.mesh import Body, in_space
+from sa_solver.subsurface_influence import INDICES
 from sa_solver.types import Array, Indices, Material
 
 # The rotor axis, the global Y, through the origin.
@@ -176,8 +177,7 @@ class ElasticBody:
         strain = 0.5 * (gradient + gradient.transpose(1, 0, 2))
         trace = strain[0, 0] + strain[1, 1] + strain[2, 2]
         lame, shear = self.material.lame, self.material.shear_modulus
-        pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
-        return np.array([lame * trace * (a == b) + 2.0 * shear * strain[a, b] for a, b in pairs])
+        return np.array([lame * trace * (a == b) + 2.0 * shear * strain[a, b] for a, b in INDICES])
 
     def at_vertices(self, element_values: Array) -> Array:
         """Volume-weighted means at the vertices of element values ``(..., elements)``."""

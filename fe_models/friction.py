@@ -16,7 +16,6 @@ import numpy as np
 
 from fe_models.joint import JointResolvent
 from fe_models.mesh import AXES, in_space
-from fe_models.symmetry import SplitMatrix
 from sa_solver.contact_law import coulomb
 from sa_solver.splitting import SplittingResult, douglas_rachford
 from sa_solver.types import Array
@@ -52,8 +51,7 @@ class FrictionalJoint:
     """A joint with friction coefficient µ, one or by node ``(n,)``, for any gaps and loads."""
 
     def __init__(self, joint: JointResolvent, friction: float | Array) -> None:
-        self._inverse, self._rho, self._loads = joint.inverse, joint.rho, joint.loads
-        self._friction = friction
+        self._joint, self._friction = joint, friction
 
     def march(
         self,
@@ -69,7 +67,7 @@ class FrictionalJoint:
         ``state`` of every increment of a similar path: they save iterations and change nothing
         else.
         """
-        loads = amplitudes @ self._loads.T
+        loads = amplitudes @ self._joint.loads.T
         floor = LOAD_FLOOR * np.linalg.norm(loads, axis=1).max()
         displacement = np.zeros((3, len(gap))) if previous is None else previous
         heaviest = loads[np.argmax(np.linalg.norm(loads, axis=1))]
@@ -90,7 +88,7 @@ class FrictionalJoint:
         self, load: Array, gap: Array, previous: Array, starts: list[Array], floor: float
     ) -> FrictionState:
         """One increment, its residual relative to the load, which counts as ``floor`` at least."""
-        problem = _Problem(self._inverse, self._rho, self._friction, load, gap, previous)
+        problem = _Problem(self._joint, self._friction, load, gap, previous)
         return problem.solve(starts, max(float(np.linalg.norm(load)), floor))
 
 
@@ -99,17 +97,16 @@ class _Problem:
 
     def __init__(
         self,
-        inverse: Array | SplitMatrix,
-        rho: float,
+        joint: JointResolvent,
         friction: float | Array,
         load: Array,
         gap: Array,
         previous: Array,
     ) -> None:
-        self._inverse, self._rho, self._friction = inverse, rho, friction
+        self._inverse, self._rho, self._friction = joint.inverse, joint.rho, friction
         self._gap, self._previous = gap, previous
         self._axes = AXES[len(load) // len(gap)]
-        self._offset = inverse @ load
+        self._offset = joint.inverse @ load
 
     def solve(self, starts: list[Array], scale: float) -> FrictionState:
         """Split from the most promising start, and from the others should it fail.

@@ -229,7 +229,5 @@ def _reduced_mass(
     kept_mass = mass[kept][:, kept].toarray() + half + half.T + static.T @ (inner_mass @ static)
     modal = shapes[inner]
     mixed = static.T @ (inner_mass @ modal) + coupling_mass.T @ modal
-    reduced = sl.block_diag(0.5 * (kept_mass + kept_mass.T), np.eye(modal.shape[1]))
-    reduced[: len(kept), len(kept) :] = mixed
-    reduced[len(kept) :, : len(kept)] = mixed.T
-    return reduced
+    symmetric = 0.5 * (kept_mass + kept_mass.T)
+    return np.block([[symmetric, mixed], [mixed.T, np.eye(modal.shape[1])]])

@@ -39,8 +39,8 @@ def spin_softening(
 
     ``speed`` [rad/s] is that about the direction ``axis`` ``(3,)``, a unit vector.
     """
-    own_axes = list(elastic.body.axes)
-    across = sp.csr_matrix((np.eye(3) - np.outer(axis, axis))[np.ix_(own_axes, own_axes)])
+    axes = elastic.body.axes
+    across = sp.csr_matrix((np.eye(3) - np.outer(axis, axis))[np.ix_(axes, axes)])
     mass = elastic.mass @ sp.kron(sp.identity(elastic.size // elastic.dimension), across)
     for body in carried:
         motion = carried_motion(elastic, body)

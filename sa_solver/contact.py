@@ -229,12 +229,9 @@ class FrictionalContact:
     ) -> TangentialState:
         names = ("Qx", "Qy", "Mz"), ("shift_x", "shift_y", "twist")
         imposed: dict[str, float] = {}
-        for place, k in enumerate(PLANAR):
+        for place, k in enumerate(PLANAR[:2] if self.grid.line else PLANAR):
             value = load.values[k] - (before.rigid[k] if load.motion[k] else 0.0)
             imposed[names[load.motion[k]][place]] = float(value)
-        if self.grid.line:
-            imposed.pop("Mz", None)
-            imposed.pop("twist", None)
         return self.tangential.solve(
             limit, offset, **imposed, tolerance=self.tolerance, start=before.shear
         )

@@ -108,12 +108,12 @@ class CoupledState:
     rigid: Array
     resultants: Array
     residuals: CoupledResiduals
-    converged: bool
-    message: str
-    iterations: int
-    convolutions: int
     border_load: float
-    start: Array
+    start: Array | None = None
+    converged: bool = False
+    message: str = ""
+    iterations: int = 0
+    convolutions: int = 0
 
     @property
     def pressure(self) -> Array:
@@ -231,7 +231,7 @@ class CoupledContact:
         )
 
     def _splitting(self, problem: CoupledProblem) -> PaddedSplitting:
-        free, modes, shift = list(problem.free), self._modes, self._resolvent.shift[Z]
+        shift = self._resolvent.shift[Z]
         yielding = shift / (shift + problem.compliance)
 
         def law(trial: Array) -> Array:
@@ -242,8 +242,7 @@ class CoupledContact:
 
         return PaddedSplitting(
             self._resolvent,
-            self._response.only([modes.present.index(k) for k in free]),
-            lambda traction: modes.sums(traction)[free],
+            self._response.only([self._modes.present.index(k) for k in problem.free]),
             problem.target,
             problem.offset,
             law,
@@ -297,12 +296,7 @@ class CoupledContact:
             rigid=(rigid + problem.imposed) / self._modes.lengths,
             resultants=self._modes.resultants(traction),
             residuals=coupled_residuals(problem, traction, displacement, relative),
-            converged=False,
-            message="",
-            iterations=0,
-            convolutions=0,
             border_load=border_share(traction[Z]),
-            start=np.empty(0),
         )
 
     def _pressed(self, problem: CoupledProblem) -> Array:

@@ -118,11 +118,10 @@ class _ActiveSet:
     def _on_set(self) -> tuple[Array, Array]:
         """Pressure and rigid motion with no gap on the set, whatever the signs."""
         count, modes = len(self.cells), len(self._shapes)
-        matrix = np.zeros((count + modes, count + modes))
-        unit = self._kernel[0, 0]
-        matrix[:count, :count] = self._compliance() / unit
-        matrix[:count, count:] = -self._shapes[:, self.cells].T
-        matrix[count:, :count] = self._shapes[:, self.cells]
+        unit, shapes = self._kernel[0, 0], self._shapes[:, self.cells]
+        matrix = np.block(
+            [[self._compliance() / unit, -shapes.T], [shapes, np.zeros((modes, modes))]]
+        )
         heights = -self._problem.height.ravel()[self.cells] / unit
         right = np.concatenate([heights, self._problem.target])
         solution = np.linalg.lstsq(matrix, right, rcond=None)[0]

@@ -7,6 +7,8 @@ the same holds for half-planes in plane strain.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import scipy.fft
 
@@ -58,7 +60,8 @@ class HalfSpace:
         self.count = 0
         self._filters: dict[tuple[Components, Components], SpectralFilter] = {}
         self._symbols: dict[tuple[int, int, GridShape], Array] = {}
-        self._transforms: dict[tuple[GridShape, GridShape, int], Transform] = {}
+        self.transform = cache(Transform)
+        """Transforms by shape, padded shape and components, planned once for all who need them."""
 
     def on(self, grid: Grid) -> HalfSpace:
         """The same bodies under another ``grid``."""
@@ -100,13 +103,6 @@ class HalfSpace:
         """Displacement at the centre of a cell under unit traction on it [mm/MPa]."""
         edges = [np.array([-0.5, 0.5]) * pitch for pitch in self.grid.pitch]
         return float(self._influence(edges[0], edges[1], component, component)[0, 0])
-
-    def transform(self, shape: GridShape, padded: GridShape, components: int) -> Transform:
-        """A transform planned once for all who need this size."""
-        key = (shape, padded, components)
-        if key not in self._transforms:
-            self._transforms[key] = Transform(*key)
-        return self._transforms[key]
 
     def _convolve(self, fields: Array, rows: Components, columns: Components) -> Array:
         self.count += 1

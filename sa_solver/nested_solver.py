@@ -21,10 +21,6 @@ from sa_solver.preconditioner import NormalPreconditioner
 from sa_solver.rigid_modes import APPROACH, TILT_X, TILT_Y, NormalModes
 from sa_solver.types import Array
 
-GRADIENT_ITERATIONS = 200
-"""Conjugate gradients took at most 20 on smooth contacts and 125 on the roughest; beyond this they
-are taken to circle between contact sets."""
-
 COARSE_TOLERANCE = 1e-3
 """Of residuals on coarser grids, whose pressure is off by more than that at the contact's edge."""
 
@@ -102,13 +98,7 @@ class NestedSolver:
             inside = np.ascontiguousarray(pressure[box.window])
             moved = inner.displacement(inside) if displacement is None else displacement[box.window]
             result = bound_conjugate_gradients(
-                inner,
-                preconditioner,
-                inside,
-                moved,
-                tolerance,
-                GRADIENT_ITERATIONS,
-                box.left_by,
+                inner, preconditioner, inside, moved, tolerance, box.left_by
             )
             if not result.left:
                 return box, result

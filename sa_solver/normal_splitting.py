@@ -25,17 +25,14 @@ def solve_by_splitting(
     """Solve ``problem`` from the pressure of ``start``: the last iterate and the iterations."""
     resolvent = HalfSpaceResolvent(problem.half_space, NORMAL)
     before = problem.half_space.count
-
-    def sums(pressure: Array) -> Array:
-        return problem.modes.sums(pressure[0])
-
-    response = RigidResponse.of(resolvent, problem.modes.fields()[:, None], sums)
+    response = RigidResponse.of(
+        resolvent, problem.modes.fields()[:, None], lambda pressure: problem.modes.sums(pressure[0])
+    )
     compliance = 0.0 if problem.compliance is None else problem.compliance
     yielding = resolvent.shift[0] / (resolvent.shift[0] + compliance)
     splitting = PaddedSplitting(
         resolvent,
         response,
-        sums,
         problem.target,
         problem.height[None],
         lambda trial: unilateral(trial) * yielding,

@@ -52,7 +52,7 @@ INSIDE = (XX, YY, ZZ, XY, YZ, ZX)
 AT_SURFACE = (XX, YY, XY)
 """Components that convolutions give: at the surface the others are the tractions."""
 
-MIRROR = {1: np.array([-1.0, -1.0, 1.0]), 2: np.ones(3)}
+MIRROR: dict[int, Array] = {1: np.array([-1.0, -1.0, 1.0]), 2: np.ones(3)}
 """Tractions on the half-space z > 0 that a body is or mirrors, over those on body 2."""
 
 
@@ -82,12 +82,8 @@ class SubsurfaceStress:
         self._padded = padded_shape(grid)
         self._kept: tuple[float, SpectralFilter] | None = None
 
-    def surface(self, traction: Array) -> Array:
-        """Stress at the surface ``(6, nx, ny)`` from ``traction`` ``(3, nx, ny)`` [MPa]."""
-        return self.at_depth(traction, 0.0)
-
     def at_depth(self, traction: Array, depth: float) -> Array:
-        """Stress ``(6, nx, ny)`` at ``depth`` >= 0 below the cells' centres [mm].
+        """Stress ``(6, nx, ny)`` at ``depth`` below the cells' centres, 0 at the surface [mm].
 
         ``traction`` ``(3, nx, ny)`` is ordered qx, qy, p, on body 2 whichever the body [MPa].
         Raises SubsurfaceError for another shape or a depth below 0.
@@ -157,8 +153,7 @@ class SubsurfaceStress:
 
     def _felt(self, traction: Array) -> Array:
         """Tractions on the half-space z > 0 that the body is or mirrors."""
-        felt: Array = traction * self._mirror[:, None, None]
-        return felt
+        return traction * self._mirror[:, None, None]
 
     @staticmethod
     def _convolved(depth: float) -> tuple[int, ...]:

@@ -166,11 +166,7 @@ class TangentialLoop:
     @property
     def residual_stiffness(self) -> float:
         """Mean slope of the last increments of both branches [N/mm]; 0 where it slides."""
-        slopes = [
-            (force[-1] - force[-2]) / (displacement[-1] - displacement[-2])
-            for displacement, force in self._branches
-        ]
-        return float(np.mean(slopes))
+        return self._mean_slope(-2)
 
     @property
     def reversal_stiffness(self) -> float:
@@ -178,8 +174,13 @@ class TangentialLoop:
 
         What one would measure; it tends to ``stiffness`` as the increments shrink.
         """
+        return self._mean_slope(0)
+
+    def _mean_slope(self, increment: int) -> float:
+        """Of both branches, from point ``increment`` on."""
         slopes = [
-            (force[1] - force[0]) / (displacement[1] - displacement[0])
+            (force[increment + 1] - force[increment])
+            / (displacement[increment + 1] - displacement[increment])
             for displacement, force in self._branches
         ]
         return float(np.mean(slopes))
@@ -275,9 +276,7 @@ def _press(contact: FrictionalContact, height: Array, path: LoopPath) -> Contact
     """The pressed state; dissimilar bodies slip meanwhile, so they are pressed in steps."""
     steps = 1 if contact.half_space.pair.similar else path.increments
     tilts = path.moments is None
-    motion = (False, False, False, tilts, tilts, False)
-    if contact.grid.line:
-        motion = (*motion[:3], False, tilts, False)
+    motion = (False, False, False, tilts and not contact.grid.line, tilts, False)
     Mx, My = path.moments or (0.0, 0.0)
     state = contact.apart(height)
     for step in range(1, steps + 1):

@@ -72,8 +72,8 @@ class ShearedCylinder:
     def shear(self, x: Array, tangential: float) -> Array:
         """q on first loading to ``tangential``, at ``x`` of any shape [mm] [MPa]."""
         stick = self.stick_half_width(tangential)
-        shear: Array = np.sign(tangential) * _shear(self.contact, self.friction, x, stick, 0.0)
-        return shear
+        sense = float(np.sign(tangential))
+        return sense * _shear(self.contact, self.friction, x, stick, 0.0)
 
     def displacement(self, tangential: float, datum: float) -> float:
         """δx [mm] on first loading, for the ``datum`` L [mm] of :meth:`HertzCylinder.approach`.
@@ -190,10 +190,8 @@ class BulkStressedCylinder:
     def reversed_shear(self, x: Array, tangential: float, bulk_stress: float) -> Array:
         """q [MPa] on the way back to ``tangential`` and ``bulk_stress``; see ``reversed_zone``."""
         stick, centre = self.reversed_zone(tangential, bulk_stress)
-        change = np.sign(tangential - self.tangential)
-        change *= 2.0 * _shear(self.contact, self.friction, x, stick, centre)
-        shear: Array = self.shear(x) + change
-        return shear
+        sense = float(np.sign(tangential - self.tangential))
+        return self.shear(x) + 2.0 * sense * _shear(self.contact, self.friction, x, stick, centre)
 
     def _mismatch(self, bulk_stress: float) -> float:
         """ε of a bulk stress."""

@@ -56,9 +56,8 @@ class ShearedSphere(FrictionalSphere):
         radius_squared = x**2 + y**2
         sliding = np.sqrt(np.maximum(0.0, a**2 - radius_squared))
         stuck = np.sqrt(np.maximum(0.0, c**2 - radius_squared))
-        scale = np.sign(tangential) * self.friction * self.contact.peak_pressure / a
-        shear: Array = scale * (sliding - stuck)
-        return shear
+        scale = float(np.sign(tangential)) * self.friction * self.contact.peak_pressure / a
+        return scale * (sliding - stuck)
 
     def displacement(self, tangential: float) -> float:
         """δx [mm] on first loading to ``tangential`` [N]."""

@@ -119,10 +119,9 @@ class TwistedSphere(FrictionalSphere):
         """q_θ inside the stuck circle; Π - K = (n/3) R_J(0, 1 - m, 1, 1 - n)."""
         a = self.contact.contact_radius
         within, depth = c**2 - r**2, a**2 - r**2
-        difference = (a**2 - c**2) / (3.0 * depth) * elliprj(0.0, (c / a) ** 2, 1.0, within / depth)
+        integral: Array = elliprj(0.0, (c / a) ** 2, 1.0, within / depth)
         scale = 2.0 * self.friction * self.contact.peak_pressure / (np.pi * a**2)
-        shear: Array = scale * r * np.sqrt(within) * difference
-        return shear
+        return scale * r * np.sqrt(within) * (a**2 - c**2) / (3.0 * depth) * integral
 
     def _twist(self, ratio: float) -> float:
         """φz at stick ratio c/a; K - E = (m/3) R_D(0, 1 - m, 1)."""
