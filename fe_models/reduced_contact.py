@@ -49,7 +49,6 @@ class NormalSolution:
     gap: Array
     approach: float
     area: float
-    iterations: int
     converged: bool
 
     @property
@@ -202,7 +201,6 @@ class ReducedPair:
             gap=contact.gap,
             approach=contact.level,
             area=float(self.areas[contact.force > 0.0].sum()),
-            iterations=contact.iterations,
             converged=contact.converged,
         )
 

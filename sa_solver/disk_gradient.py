@@ -31,9 +31,9 @@ def gradients_on_disks(
     everywhere = problem.pressed.astype(np.float64)
     momentum, displacement = 1.0, operator.displacement(shear)
     rigid, slipping = np.zeros(len(problem.target)), problem.on_circle(shear)
-    best = DiskSolution(shear, displacement, rigid, slipping, np.inf, 0, False)
+    best = DiskSolution(shear, displacement, rigid, slipping, np.inf, False)
     ahead, ahead_displacement = shear, displacement
-    for iteration in range(1, max_iterations + 1):
+    for _ in range(max_iterations):
         trial = ahead - stiffness * (ahead_displacement + problem.offset) * everywhere
         balance = problem.balance(trial, weight=everywhere)
         if balance is None:
@@ -48,9 +48,7 @@ def gradients_on_disks(
         residual = problem.residual(new, new_displacement, rigid)
         if residual < best.residual:
             slipping, converged = problem.on_circle(new), residual <= tolerance
-            best = DiskSolution(
-                new, new_displacement, rigid, slipping, residual, iteration, converged
-            )
+            best = DiskSolution(new, new_displacement, rigid, slipping, residual, converged)
         if best.converged:
             return best
         ahead = new + share * (new - shear)

@@ -52,7 +52,7 @@ ROUNDING = 1e-12
 class DiskSolution:
     """Shear [MPa], its displacement K q [mm], both ``(2, nx, ny)``, and the free rigid motions.
 
-    ``slipping`` marks cells on their circle; ``iterations`` counts conjugate directions.
+    ``slipping`` marks cells on their circle.
     """
 
     shear: Array
@@ -60,7 +60,6 @@ class DiskSolution:
     rigid: Array
     slipping: Mask
     residual: float
-    iterations: int
     converged: bool
 
 
@@ -132,7 +131,6 @@ class _Search:
             self._rigid,
             self._slipping,
             residual,
-            self.iterations,
             converged,
         )
 

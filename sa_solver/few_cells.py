@@ -37,20 +37,20 @@ DROPPED = 1e-12
 """A pressure below this share of the largest is rounding of the dense solve."""
 
 
-def solve_few_cells(problem: NormalProblem, tolerance: float) -> tuple[Iterate | None, int]:
-    """The solution of ``problem`` and the steps taken; None where it needs too many cells."""
+def solve_few_cells(problem: NormalProblem, tolerance: float) -> Iterate | None:
+    """The solution of ``problem``; None where it needs too many cells or steps."""
     if APPROACH in problem.modes.free:
         start = _rigid_contact(problem)
     else:
         start = None if problem.target.any() else (np.zeros(0, dtype=np.intp), np.zeros(0))
     if start is None:
-        return None, 0
+        return None
     search = _ActiveSet(problem, *start)
-    for step in range(STEPS):
+    for _ in range(STEPS):
         iterate = search.improve(tolerance)
         if iterate is not None or len(search.cells) > LARGEST:
-            return iterate, step + 1
-    return None, STEPS
+            return iterate
+    return None
 
 
 def _rigid_contact(problem: NormalProblem) -> tuple[Cells, Array] | None:

@@ -5,13 +5,13 @@ Both only save time: the answer is verified by a convolution on the whole grid.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 
 from sa_solver.active_box import Box
-from sa_solver.bound_cg import SearchResult, bound_conjugate_gradients
+from sa_solver.bound_cg import BoundConjugateGradients, SearchResult
 from sa_solver.few_cells import solve_few_cells
 from sa_solver.half_space import HalfSpace
 from sa_solver.nested_grids import Transfer, coarsened
@@ -29,15 +29,6 @@ ENOUGH = 3.0
 
 BOXES = 4
 """Boxes whose transforms are kept, the last used: a wear run needs two or three."""
-
-
-@dataclass(frozen=True)
-class NestedSolution:
-    """The last iterate on the whole grid, and how it was found."""
-
-    iterate: Iterate
-    iterations: int
-    method: str
 
 
 class NestedSolver:
@@ -61,24 +52,26 @@ class NestedSolver:
 
     def solve(
         self, problem: NormalProblem, pressure: Array, displacement: Array | None, tolerance: float
-    ) -> NestedSolution:
-        """Solve from a balanced ``pressure`` >= 0, whose ``displacement`` may be known."""
-        box, iterations = Box.around(pressure > 0.0), 0
+    ) -> tuple[Iterate, str]:
+        """Solve from a balanced ``pressure`` >= 0, whose ``displacement`` may be known.
+
+        The last iterate on the whole grid, and by which method it was found.
+        """
+        box = Box.around(pressure > 0.0)
         while True:
             box, result = self._search(problem, box, pressure, displacement, tolerance)
-            iterations += result.iterations
             iterate = result.iterate
             if not result.converged:
-                return self._rescue(problem, box.placed(iterate.pressure), iterations, tolerance)
+                return self._rescue(problem, box.placed(iterate.pressure), tolerance)
             if box.size == box.shape:
-                return NestedSolution(iterate, iterations, "conjugate gradients")
+                return iterate, "conjugate gradients"
             pressure = box.placed(iterate.pressure)
             displacement = problem.displacement(pressure)
             iterate = Iterate(pressure, displacement, iterate.rigid)
             missed = iterate.gap(problem) < -tolerance * displacement.max()
             missed[box.window] = False
             if not missed.any():
-                return NestedSolution(iterate, iterations, "conjugate gradients")
+                return iterate, "conjugate gradients"
             missed[box.window] = True
             box = Box.around(missed)
 
@@ -97,25 +90,23 @@ class NestedSolver:
             preconditioner.include(inner.compliance)
             inside = np.ascontiguousarray(pressure[box.window])
             moved = inner.displacement(inside) if displacement is None else displacement[box.window]
-            result = bound_conjugate_gradients(
-                inner, preconditioner, inside, moved, tolerance, box.left_by
-            )
+            search = BoundConjugateGradients(inner, preconditioner, inside, moved, box.left_by)
+            result = search.solve(tolerance)
             if not result.left:
                 return box, result
             pressure, displacement = box.placed(result.iterate.pressure), None
             box = box.grown()
 
     def _rescue(
-        self, problem: NormalProblem, pressure: Array, iterations: int, tolerance: float
-    ) -> NestedSolution:
+        self, problem: NormalProblem, pressure: Array, tolerance: float
+    ) -> tuple[Iterate, str]:
         """Solve on the whole grid by slower methods, from the last ``pressure`` of the search."""
-        few, steps = solve_few_cells(problem, tolerance)
+        few = solve_few_cells(problem, tolerance)
         if few is not None and normal_residuals(problem, few).largest <= tolerance:
-            return NestedSolution(few, iterations + steps, "active set")
+            return few, "active set"
         rigid = np.zeros(len(problem.modes.free))
         last = Iterate(pressure, problem.displacement(pressure), rigid)
-        iterate, more = solve_by_splitting(problem, last, tolerance)
-        return NestedSolution(iterate, iterations + steps + more, "splitting")
+        return solve_by_splitting(problem, last, tolerance), "splitting"
 
     # -- coarser grids ------------------------------------------------------------------------
     @cached_property

@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sa_solver.half_space import HalfSpace
-from sa_solver.nested_solver import NestedSolution, NestedSolver
+from sa_solver.nested_solver import NestedSolver
 from sa_solver.normal_control import NormalContactError as NormalContactError
 from sa_solver.normal_control import NormalControl
 from sa_solver.normal_problem import (
@@ -77,10 +77,9 @@ class NormalState:
     residuals: NormalResiduals
     converged: bool
     message: str
-    method: str
-    iterations: int
     convolutions: int
     border_load: float
+    method: str = ""
 
     @property
     def start(self) -> NormalStart:
@@ -143,14 +142,14 @@ class NormalContact:
         apart = _separated(problem)
         if apart is None:
             pressure, displacement = self._start(problem, start)
-            solution = self._solver.solve(problem, pressure, displacement, tolerance)
-            residuals = normal_residuals(problem, solution.iterate)
+            iterate, method = self._solver.solve(problem, pressure, displacement, tolerance)
+            residuals = normal_residuals(problem, iterate)
         else:
             zero = np.zeros(self.grid.shape)
-            solution = NestedSolution(Iterate(zero, zero.copy(), apart), 0, "no load")
+            iterate, method = Iterate(zero, zero.copy(), apart), "no load"
             residuals = NormalResiduals(0.0, 0.0, 0.0, 0.0)
-        state = self._state(problem, control, solution, residuals, tolerance)
-        return replace(state, approach=state.approach + lowest)
+        state = self._state(problem, control, iterate, residuals, tolerance)
+        return replace(state, approach=state.approach + lowest, method=method)
 
     # -- steps of solve -----------------------------------------------------------------------
     def _problem(
@@ -187,11 +186,10 @@ class NormalContact:
         self,
         problem: NormalProblem,
         control: NormalControl,
-        solution: NestedSolution,
+        iterate: Iterate,
         residuals: NormalResiduals,
         tolerance: float,
     ) -> NormalState:
-        iterate = solution.iterate
         converged = residuals.largest <= tolerance
         motions, free = control.motions, list(problem.modes.free)
         motions[free] = iterate.rigid / mode_lengths(self.grid)[free]
@@ -210,8 +208,6 @@ class NormalContact:
             residuals=residuals,
             converged=converged,
             message="" if converged else _failure(problem, iterate, residuals, tolerance),
-            method=solution.method,
-            iterations=solution.iterations,
             convolutions=_equivalents(problem.work, self.half_space),
             border_load=border_share(iterate.pressure),
         )

@@ -21,6 +21,7 @@ Source: Liu & Wang 2002, J. Tribol. 124, 36, doi:10.1115/1.1401017 (convolution 
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
@@ -80,7 +81,7 @@ class SubsurfaceStress:
         self.count = 0
         self._mirror = MIRROR[body]
         self._padded = padded_shape(grid)
-        self._kept: tuple[float, SpectralFilter] | None = None
+        self._filter = lru_cache(1)(self._plan)
 
     def at_depth(self, traction: Array, depth: float) -> Array:
         """Stress ``(6, nx, ny)`` at ``depth`` below the cells' centres, 0 at the surface [mm].
@@ -163,11 +164,6 @@ class SubsurfaceStress:
         if self.grid.line:
             return strip_stress(edges[0], depth, self.poisson)[..., None]
         return rectangle_stress(edges[0], edges[1], depth, self.poisson)
-
-    def _filter(self, depth: float) -> SpectralFilter:
-        if self._kept is None or self._kept[0] != depth:
-            self._kept = depth, self._plan(depth)
-        return self._kept[1]
 
     def _plan(self, depth: float) -> SpectralFilter:
         """Real symbols, with shear tractions and shear stress along z in units of i."""

@@ -108,7 +108,6 @@ class TangentialState:
     residuals: TangentialResiduals
     converged: bool
     message: str
-    iterations: int
     convolutions: int
 
 
@@ -167,8 +166,7 @@ class TangentialContact:
             raise self._beyond_friction(problem, forces)
         solution = newton_on_disks(problem, shear, tolerance, ITERATIONS)
         if not solution.converged:
-            fallback = gradients_on_disks(problem, solution.shear, tolerance, FALLBACK_ITERATIONS)
-            solution = replace(fallback, iterations=solution.iterations + fallback.iterations)
+            solution = gradients_on_disks(problem, solution.shear, tolerance, FALLBACK_ITERATIONS)
         rigid = imposed.copy()
         rigid[list(free)] = solution.rigid / problem.modes.lengths
         convolutions = level.half_space.count - before
@@ -253,7 +251,6 @@ class TangentialContact:
             residuals=residuals,
             converged=converged,
             message="" if converged else _failure(residuals, tolerance),
-            iterations=solution.iterations,
             convolutions=convolutions,
         )
 
@@ -285,7 +282,6 @@ class TangentialContact:
             residuals=TangentialResiduals(0.0, 0.0, 0.0),
             converged=True,
             message="",
-            iterations=0,
             convolutions=0,
         )
 
