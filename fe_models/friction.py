@@ -135,19 +135,18 @@ class _Problem:
 
     def _law(self, trial: Array) -> Array:
         nodal = self._nodal(trial)
-        admissible = nodal + self._force(nodal) / self._rho
+        admissible = nodal + coulomb(self._sticking_force(nodal), self._friction) / self._rho
         return admissible[self._axes, :].T.ravel()
 
     def _nodal(self, values: Array) -> Array:
         """Components x, y, z at each node ``(3, n)``."""
         return in_space(values.reshape(len(self._gap), -1)).T
 
-    def _force(self, trial: Array) -> Array:
-        """Force that brings a trial displacement ``(3, n)`` back to the law, at stiffness ρ."""
-        return coulomb(self._sticking_force(trial), self._friction)
-
     def _sticking_force(self, trial: Array) -> Array:
-        """Force ``(3, n)`` that would close the gap and undo the slip, whatever its size."""
+        """Force ``(3, n)`` that would close the gap and undo the slip, whatever its size.
+
+        Within the law it brings a trial displacement ``(3, n)`` back to it, at stiffness ρ.
+        """
         stick = self._rho * (self._previous - trial)
         stick[2] = -self._rho * (self._gap + trial[2])
         return stick

@@ -54,6 +54,10 @@ class Pressure:
     boundary: str
     pressure: float
 
+    def forces(self, elastic: ElasticBody) -> Array:
+        """Nodal forces ``(size,)``."""
+        return self.pressure * elastic.pressure_load(self.boundary)
+
 
 @dataclass(frozen=True)
 class BoundaryForce:
@@ -61,6 +65,13 @@ class BoundaryForce:
 
     boundary: str
     force: Array
+
+    def forces(self, elastic: ElasticBody) -> Array:
+        """Nodal forces ``(size,)``."""
+        area = elastic.boundary_integral(self.boundary, lambda x: np.ones_like(x[0]))
+        return elastic.traction_load(
+            self.boundary, lambda x: np.full_like(x[0], 1.0 / area), self.force
+        )
 
 
 @dataclass(frozen=True)
@@ -87,12 +98,21 @@ class Rotation:
         """Unit vector of the axis."""
         return self.axis / np.linalg.norm(self.axis)
 
+    def forces(self, elastic: ElasticBody) -> Array:
+        """Nodal forces ``(size,)``."""
+        return self.speed**2 * elastic.centrifugal_load(self.direction, self.through)
+
 
 @dataclass(frozen=True)
 class Acceleration:
     """Acceleration ``(3,)`` [mm/s²] of the frame of reference: bodies are pulled against it."""
 
     acceleration: Array
+
+    def forces(self, elastic: ElasticBody) -> Array:
+        """Nodal forces ``(size,)``."""
+        pull = -elastic.material.density * self.acceleration
+        return elastic.body_load(lambda x: np.broadcast_to(pull[:, None, None], x.shape))
 
 
 AppliedLoad = Pressure | BoundaryForce | Displacement | Rotation | Acceleration
@@ -317,7 +337,7 @@ def _supported(
                 moved.append(load)
                 imposed[:, case] = _impose(constraints, elastic, load)
         elif _boundary(load) is None or _boundary(load) in groups:
-            forces[:, case] = _forces(elastic, load)
+            forces[:, case] = load.forces(elastic)
     _check_against_supports(loads, imposed, supported_motions @ imposed[free])
     _check_against_each_other(elastic, moved)
     for interface in mesh.interfaces:
@@ -410,24 +430,6 @@ def _check_against_each_other(elastic: ElasticBody, imposed: Sequence[Displaceme
                     "imposed on both would add up; impose them on one boundary, or across each "
                     "other"
                 )
-
-
-def _forces(elastic: ElasticBody, load: AppliedLoad) -> Array:
-    """Nodal forces ``(size,)`` of a load."""
-    match load:
-        case Pressure():
-            return load.pressure * elastic.pressure_load(load.boundary)
-        case BoundaryForce():
-            area = elastic.boundary_integral(load.boundary, lambda x: np.ones_like(x[0]))
-            return elastic.traction_load(
-                load.boundary, lambda x: np.full_like(x[0], 1.0 / area), load.force
-            )
-        case Rotation():
-            return load.speed**2 * elastic.centrifugal_load(load.direction, load.through)
-        case Acceleration():
-            pull = -elastic.material.density * load.acceleration
-            return elastic.body_load(lambda x: np.broadcast_to(pull[:, None, None], x.shape))
-    raise AssertionError(load)
 
 
 def imported_softening(

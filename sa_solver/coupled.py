@@ -34,7 +34,7 @@ from sa_solver.normal_problem import border_share
 from sa_solver.padded_splitting import PaddedSplitting, RigidResponse
 from sa_solver.rigid_modes import PLANAR, RESULTANTS, RigidModes
 from sa_solver.splitting import douglas_rachford
-from sa_solver.tangential import UNCARRIED, FrictionLimitError
+from sa_solver.tangential import UNCARRIED, FrictionLimitError, listed
 from sa_solver.types import Array
 
 TOLERANCE = 1e-8
@@ -451,13 +451,8 @@ def _check_field(name: str, field: Array, shape: tuple[int, ...]) -> None:
 
 def _beyond_friction(modes: RigidModes, planar: list[int], target: Array, share: float) -> str:
     physical = target * (modes.lengths * modes.grid.cell_area)[planar]
-    given, largest = (
-        ", ".join(
-            f"{RESULTANTS[k]} = {scale * value:.6g} {'N mm' if k == PLANAR[2] else 'N'}"
-            for k, value in zip(planar, physical, strict=True)
-        )
-        for scale in (1.0, share)
-    )
+    places = [PLANAR.index(k) for k in planar]
+    given, largest = (listed(places, scale * physical) for scale in (1.0, share))
     return (
         f"friction cannot carry {given}; under the pressure found the largest in this direction is "
         f"{largest}: lower the force, or impose the sliding motion instead"

@@ -30,17 +30,15 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, cg
 
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalStart, NormalState
 from sa_solver.tangential_loop import (
-    STUCK_ITERATIONS,
-    STUCK_TOLERANCE,
     LoopFailure,
     LoopPath,
     stuck_stiffness,
+    tractions_of_motion,
 )
 from sa_solver.types import Array
 
@@ -201,20 +199,8 @@ def _stiffness(half_space: HalfSpace, normal: NormalState) -> tuple[float, float
     """Tangential stiffness of the pressed cells [N/mm], and κ, the normal one over it."""
     pressed = normal.pressure > 0.0
     tangential = stuck_stiffness(half_space, pressed, LoopPath(normal.P, 1.0))
-
-    def indented(pressure: Array) -> Array:
-        field = np.zeros(pressed.shape)
-        field[pressed] = pressure
-        return half_space.normal(field)[pressed]
-
-    count = int(np.count_nonzero(pressed))
-    operator = LinearOperator((count, count), matvec=indented, dtype=np.float64)
-    pressure, status = cg(operator, np.ones(count), rtol=STUCK_TOLERANCE, maxiter=STUCK_ITERATIONS)
-    if status != 0:
-        raise LoopFailure(
-            f"the pressed contact of {count} cells did not converge in {STUCK_ITERATIONS} "
-            "iterations: smooth or refine the heights"
-        )
+    unit = np.ones((1, np.count_nonzero(pressed)))
+    pressure = tractions_of_motion(lambda field: half_space.normal(field[0])[None], pressed, unit)
     return tangential, float(pressure.sum()) * half_space.grid.cell_area / tangential
 
 

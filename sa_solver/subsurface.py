@@ -77,7 +77,7 @@ class SubsurfaceStress:
             raise SubsurfaceError(f"body {body}: there are bodies 1 and 2")
         if not 0.0 <= material.poisson <= 0.5:
             raise SubsurfaceError(f"Poisson's ratio {material.poisson:g}: must be from 0 to 0.5")
-        self.grid, self.poisson, self.body = grid, material.poisson, body
+        self.grid, self.poisson = grid, material.poisson
         self.count = 0
         self._mirror = MIRROR[body]
         self._padded = padded_shape(grid)

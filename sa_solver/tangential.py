@@ -13,6 +13,7 @@ fall back on.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -289,10 +290,7 @@ class TangentialContact:
         pressed, free = problem.pressed, problem.modes.free
         shapes = problem.modes.fields()[:, :, pressed]
         share = largest_share(problem.limit[pressed], shapes, problem.target)
-        given, largest = (
-            ", ".join(f"{NAMES[k]} = {scale * forces[k]:.6g} {UNITS[k]}" for k in free)
-            for scale in (1.0, share)
-        )
+        given, largest = (listed(free, scale * forces[list(free)]) for scale in (1.0, share))
         return FrictionLimitError(
             share,
             f"friction cannot carry {given}; the largest in this direction is {largest}: lower the "
@@ -325,6 +323,12 @@ class TangentialContact:
             raise TangentialContactError(f"loads {given} must be finite: check the load history")
         if self.grid.line and (forces[2] != 0.0 or motions[2]):
             raise TangentialContactError("a line contact carries no Mz: give Qx and Qy only")
+
+
+def listed(places: Sequence[int], forces: Array) -> str:
+    """Shear forces and moment by their places, 0 to 2, for a message."""
+    pairs = zip(places, forces, strict=True)
+    return ", ".join(f"{NAMES[k]} = {force:.6g} {UNITS[k]}" for k, force in pairs)
 
 
 def _failure(residuals: TangentialResiduals, tolerance: float) -> str:

@@ -18,7 +18,7 @@ Source: Mindlin & Deresiewicz 1953, J. Appl. Mech. 20, 327, doi:10.1115/1.401070
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -240,22 +240,37 @@ def stuck_stiffness(half_space: HalfSpace, pressed: Mask, path: LoopPath) -> flo
             tractions[Z] -= kept @ (kept.T @ tractions[Z])
         return tractions.ravel()
 
-    def compliance(values: Array) -> Array:
-        field = np.zeros((components, *grid.shape))
-        field[:, pressed] = project(values).reshape(components, -1)
-        return project(apply(field)[:, pressed].ravel())
-
-    count = int(np.count_nonzero(pressed))
-    motion = np.zeros((components, count))
+    motion = np.zeros((components, np.count_nonzero(pressed)))
     motion[path.place - 1] = 1.0
-    size = components * count
-    operator = LinearOperator((size, size), matvec=compliance, dtype=np.float64)
+    traction = tractions_of_motion(apply, pressed, motion, project)
+    return float(motion.ravel() @ traction) * grid.cell_area
+
+
+def tractions_of_motion(
+    displace: Callable[[Array], Array],
+    pressed: Mask,
+    motion: Array,
+    project: Callable[[Array], Array] = np.ravel,
+) -> Array:
+    """Tractions ``(c m,)`` of the m cells ``pressed`` that move them by ``motion`` ``(c, m)``.
+
+    ``displace`` takes tractions ``(c, nx, ny)`` to displacements, ``project`` tractions of the
+    cells to such as are allowed. Raises LoopFailure where conjugate gradients stall.
+    """
+
+    def compliance(values: Array) -> Array:
+        field = np.zeros((len(motion), *pressed.shape))
+        field[:, pressed] = project(values).reshape(motion.shape)
+        return project(displace(field)[:, pressed].ravel())
+
+    operator = LinearOperator((motion.size,) * 2, matvec=compliance, dtype=np.float64)
     traction, status = cg(operator, motion.ravel(), rtol=STUCK_TOLERANCE, maxiter=STUCK_ITERATIONS)
     if status != 0:
         raise LoopFailure(
-            f"the stuck contact of {count} cells did not converge in {STUCK_ITERATIONS} iterations"
+            f"the stuck contact of {motion.shape[1]} cells did not converge in {STUCK_ITERATIONS} "
+            "iterations"
         )
-    return float(motion.ravel() @ traction) * grid.cell_area
+    return np.asarray(traction)
 
 
 def _balanced_modes(half_space: HalfSpace, pressed: Mask, tilting: bool) -> Array:
