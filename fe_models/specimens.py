@@ -99,19 +99,14 @@ def reduced_specimens(
         model = reduce_body(full.stiffness, mass, full.kept, modes)
         ring = specimen.ring(body)
         places = body.mesh.p.T[np.concatenate([pad, ring, target])]
-        names = _displacement_names({PAD: len(pad), RING: len(ring), TARGET: len(target)})
+        names = tuple(
+            f"{kind} {number} {axis}"
+            for kind, points in ((PAD, pad), (RING, ring), (TARGET, target))
+            for number in range(1, len(points) + 1)
+            for axis in "xyz"
+        )
         models.append(replace(model, names=names, places=np.repeat(places, 3, axis=0)))
     return models[0], models[1]
-
-
-def _displacement_names(counts: dict[str, int]) -> tuple[str, ...]:
-    """Names of the three displacements of so many points of each kind."""
-    return tuple(
-        f"{kind} {number} {axis}"
-        for kind, count in counts.items()
-        for number in range(1, count + 1)
-        for axis in "xyz"
-    )
 
 
 def pad_stiffness(model: ReducedModel, specimen: Specimen) -> Array:

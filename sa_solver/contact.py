@@ -90,14 +90,14 @@ class ContactState:
     sticking: Mask
     resultants: Array
     rigid: Array
-    strain: float
     energy: Array
-    sliding: bool
-    residual: float
     converged: bool
-    message: str
-    convolutions: int
-    border_load: float
+    strain: float = 0.0
+    sliding: bool = False
+    residual: float = 0.0
+    message: str = ""
+    convolutions: int = 0
+    border_load: float = 0.0
     start: Array | None = None
 
     @property
@@ -145,14 +145,8 @@ class FrictionalContact:
             sticking=np.zeros(self.grid.shape, dtype=bool),
             resultants=np.zeros(6),
             rigid=np.zeros(6),
-            strain=0.0,
             energy=np.zeros(2),
-            sliding=False,
-            residual=0.0,
             converged=True,
-            message="",
-            convolutions=0,
-            border_load=0.0,
         )
 
     def advance(self, before: ContactState, height: Array, load: ContactLoad) -> ContactState:

@@ -378,7 +378,15 @@ class CoupledContact:
             return ""
         shapes = np.array([self._modes.motion(np.eye(6)[k])[:Z] for k in planar])
         share = largest_share(limit.ravel(), shapes.reshape(len(planar), 2, -1), target)
-        return _beyond_friction(self._modes, planar, target, share) if share < least else ""
+        if share >= least:
+            return ""
+        forces = target * (self._modes.lengths * self.grid.cell_area)[planar]
+        places = [PLANAR.index(k) for k in planar]
+        given, largest = (listed(places, scale * forces) for scale in (1.0, share))
+        return (
+            f"friction cannot carry {given}; under the pressure found the largest in this "
+            f"direction is {largest}: lower the force, or impose the sliding motion instead"
+        )
 
     # -- what is refused ----------------------------------------------------------------------
     def _check(
@@ -447,13 +455,3 @@ def _check_field(name: str, field: Array, shape: tuple[int, ...]) -> None:
         raise CoupledContactError(f"{name} have shape {field.shape}: give {shape}")
     if not np.all(np.isfinite(field)):
         raise CoupledContactError(f"{name} hold NaN or infinity: fill or crop the missing points")
-
-
-def _beyond_friction(modes: RigidModes, planar: list[int], target: Array, share: float) -> str:
-    physical = target * (modes.lengths * modes.grid.cell_area)[planar]
-    places = [PLANAR.index(k) for k in planar]
-    given, largest = (listed(places, scale * physical) for scale in (1.0, share))
-    return (
-        f"friction cannot carry {given}; under the pressure found the largest in this direction is "
-        f"{largest}: lower the force, or impose the sliding motion instead"
-    )

@@ -126,12 +126,7 @@ class _Search:
 
     def solution(self, residual: float, converged: bool) -> DiskSolution:
         return DiskSolution(
-            self._shear,
-            self._displacement,
-            self._rigid,
-            self._slipping,
-            residual,
-            converged,
+            self._shear, self._displacement, self._rigid, self._slipping, residual, converged
         )
 
     def phase(self) -> bool:

@@ -135,11 +135,8 @@ def spectral_filter(
     """A filter with components ``rows`` out and ``columns`` in, from real symbols."""
     if rows == columns == NORMAL:
         return SpectralFilter(transform, symbols)
-    return SpectralFilter(transform, symbols, (_normal_places(columns), _normal_places(rows)))
-
-
-def _normal_places(components: Components) -> list[int]:
-    return [place for place, component in enumerate(components) if component == Z]
+    inputs, outputs = ([n for n, k in enumerate(part) if k == Z] for part in (columns, rows))
+    return SpectralFilter(transform, symbols, (inputs, outputs))
 
 
 def padded_shape(grid: Grid) -> GridShape:

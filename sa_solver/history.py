@@ -14,6 +14,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -115,7 +116,7 @@ def march_history(
 def turning_points(path: ContactLoadPath) -> list[int]:
     """Rows where a load, normal or shear, is about to begin or to leave its direction; the last."""
     changes = _changes(np.column_stack([path.values[:, list(NORMAL)], path.shear]))
-    rows = [row for row in range(len(path) - 1) if _turns(changes[row], changes[row + 1])]
+    rows = [row for row, pair in enumerate(pairwise(changes)) if _turns(*pair)]
     return [*rows, len(path) - 1]
 
 
@@ -222,9 +223,8 @@ def _one_leg(
     contact: FrictionalContact, states: list[ContactState], path: ContactLoadPath, rows: list[int]
 ) -> bool:
     """Whether the last leg is the first loading of a line contact."""
-    before = states[-2] if len(states) > 1 else states[-1]
     begun = len(states) == len(rows) > 1
-    return begun and contact.two_normal_problems(before, path.load(rows[-1]))
+    return begun and contact.two_normal_problems(states[-2], path.load(rows[-1]))
 
 
 def _with_midpoint(path: ContactLoadPath, first: int, last: int) -> ContactLoad:
@@ -236,15 +236,14 @@ def _with_midpoint(path: ContactLoadPath, first: int, last: int) -> ContactLoad:
 
 
 def _every_second(path: ContactLoadPath) -> list[int]:
-    """Every second row, with the last and those where the shear load turns back kept."""
+    """Every second row, with the last and those where the shear load turns back kept.
+
+    There it goes sideways or back, rather than on along a curve.
+    """
     changes = _changes(path.shear)
-    back = {row for row in range(len(path) - 1) if _turns_back(changes[row], changes[row + 1])}
+    pairs = enumerate(pairwise(changes))
+    back = {row for row, (now, then) in pairs if then.any() and now @ then <= 0.0}
     return sorted({*range(1, len(path), 2), *back, len(path) - 1})
-
-
-def _turns_back(change: Array, following: Array) -> bool:
-    """Whether the next increment goes sideways or back, rather than on along a curve."""
-    return bool(following.any()) and float(change @ following) <= 0.0
 
 
 def _shear_difference(contact: FrictionalContact, one: ContactState, other: ContactState) -> float:

@@ -195,6 +195,7 @@ class NormalContact:
         motions[free] = iterate.rigid / mode_lengths(self.grid)[free]
         force = iterate.pressure * self.grid.cell_area
         along_x, along_y = force.sum(axis=1), force.sum(axis=0)
+        transformed = sum(count * nx * ny for (nx, ny), count in problem.work.items())
         return NormalState(
             pressure=iterate.pressure,
             gap=iterate.gap(problem),
@@ -208,7 +209,7 @@ class NormalContact:
             residuals=residuals,
             converged=converged,
             message="" if converged else _failure(problem, iterate, residuals, tolerance),
-            convolutions=_equivalents(problem.work, self.half_space),
+            convolutions=int(np.ceil(transformed / np.prod(self.half_space.padded))),
             border_load=border_share(iterate.pressure),
         )
 
@@ -238,12 +239,6 @@ def _separated(problem: NormalProblem) -> Array | None:
     touching = np.zeros(len(problem.modes.free))
     touching[0] = problem.height.min()
     return touching
-
-
-def _equivalents(work: Work, half_space: HalfSpace) -> int:
-    """Convolutions on the whole grid that take as much work."""
-    cells = sum(count * shape[0] * shape[1] for shape, count in work.items())
-    return int(np.ceil(cells / (half_space.padded[0] * half_space.padded[1])))
 
 
 def _check_field(name: str, field: Array, shape: tuple[int, int]) -> None:

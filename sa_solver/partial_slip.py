@@ -34,12 +34,7 @@ import numpy as np
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalStart, NormalState
-from sa_solver.tangential_loop import (
-    LoopFailure,
-    LoopPath,
-    stuck_stiffness,
-    tractions_of_motion,
-)
+from sa_solver.tangential_loop import LoopFailure, LoopPath, stuck_stiffness, tractions_of_motion
 from sa_solver.types import Array
 
 STAGES = 24

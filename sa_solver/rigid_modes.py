@@ -101,8 +101,8 @@ class NormalModes:
 
     def fields(self) -> Array:
         """The modes themselves, ``(k, nx, ny)``."""
-        fields = [self.motion(unit) for unit in np.eye(len(self.free))]
-        return np.array(fields).reshape(-1, self.x.size, self.y.size)
+        units = np.eye(len(self.free))
+        return np.reshape([self.motion(unit) for unit in units], (-1, self.x.size, self.y.size))
 
     def products(self, weight: Array) -> Array:
         """Products ``(k, k)`` of the modes with one another, weighted by a field ``(nx, ny)``."""

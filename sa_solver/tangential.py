@@ -108,8 +108,8 @@ class TangentialState:
     Mz: float
     residuals: TangentialResiduals
     converged: bool
-    message: str
-    convolutions: int
+    message: str = ""
+    convolutions: int = 0
 
 
 class TangentialContact:
@@ -235,8 +235,8 @@ class TangentialContact:
         sticking = np.zeros(self.grid.shape, dtype=bool)
         sticking[window] = problem.pressed & ~solution.slipping
         motions = np.append(rigid, 0.0)
-        loads = self._modes.sums(shear) * self._modes.lengths * self.grid.cell_area
-        loads = np.append(loads, 0.0)
+        sums = self._modes.sums(shear) * self._modes.lengths
+        loads = np.append(sums * self.grid.cell_area, 0.0)
         whole = solution.shear.shape == shear.shape
         return TangentialState(
             shear=shear,
@@ -282,8 +282,6 @@ class TangentialContact:
             Mz=0.0,
             residuals=TangentialResiduals(0.0, 0.0, 0.0),
             converged=True,
-            message="",
-            convolutions=0,
         )
 
     def _beyond_friction(self, problem: TangentialProblem, forces: Array) -> FrictionLimitError:

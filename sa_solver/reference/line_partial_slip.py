@@ -42,10 +42,10 @@ def ciavarella_jaeger(
     then sheared, ``pressure`` being that of one tilt for all loads. Raises ``InputError`` beyond
     |Q| = µP.
     """
-    reserve = load * _reserve(tangential, friction * load)
+    left = load * reserve(tangential, friction * load)
     shear = friction * pressure(load)
-    if reserve > 0.0:
-        shear = shear - friction * pressure(reserve)
+    if left > 0.0:
+        shear = shear - friction * pressure(left)
     return np.asarray(np.sign(tangential) * shear, dtype=np.float64)
 
 
@@ -67,7 +67,7 @@ class ShearedCylinder:
 
     def stick_half_width(self, tangential: float) -> float:
         """c = a sqrt(1 - |Q| / µP) [mm] on first loading."""
-        return self.contact.half_width * float(np.sqrt(_reserve(tangential, self.sliding_force)))
+        return self.contact.half_width * float(np.sqrt(reserve(tangential, self.sliding_force)))
 
     def shear(self, x: Array, tangential: float) -> Array:
         """q on first loading to ``tangential``, at ``x`` of any shape [mm] [MPa]."""
@@ -80,9 +80,9 @@ class ShearedCylinder:
 
         (2 / π E*) {Q [ln(2 L/a) + 1/2] + (1/2)(µP - Q) ln(1 - Q/µP)}.
         """
-        reserve = _reserve(tangential, self.sliding_force)
+        left = reserve(tangential, self.sliding_force)
         linear = abs(tangential) * (float(np.log(2.0 * datum / self.contact.half_width)) + 0.5)
-        slipping = 0.5 * self.sliding_force * _x_log_x(reserve)
+        slipping = 0.5 * self.sliding_force * _x_log_x(left)
         scale = 2.0 / (np.pi * self.contact.contact_modulus)
         return float(np.sign(tangential)) * scale * (linear + slipping)
 
@@ -100,8 +100,8 @@ class ShearedCylinder:
         (4 µ²P² / π E*) [v ln v + (1 - v²)/2] with v = 1 - Q/µP: no datum is needed, since what it
         adds to δx is linear in Q. Follows from :meth:`displacement` and Masing's rule.
         """
-        reserve = _reserve(amplitude, self.sliding_force)
-        shape = _x_log_x(reserve) + 0.5 * (1.0 - reserve**2)
+        left = reserve(amplitude, self.sliding_force)
+        shape = _x_log_x(left) + 0.5 * (1.0 - left**2)
         return 4.0 * self.sliding_force**2 / (np.pi * self.contact.contact_modulus) * shape
 
 
@@ -211,12 +211,14 @@ def _shear(contact: HertzCylinder, friction: float, x: Array, stick: float, offs
     return friction * contact.peak_pressure / contact.half_width * (sliding - stuck)
 
 
-def _reserve(tangential: float, sliding_force: float) -> float:
-    """1 - |Q| / µP, what is left before sliding."""
-    reserve = 1.0 - abs(tangential) / sliding_force
-    if reserve < 0.0:
-        raise InputError(f"Q = {tangential} N/mm slides: it is beyond µP = {sliding_force} N/mm")
-    return reserve
+def reserve(tangential: float, sliding_force: float, unit: str = "N/mm") -> float:
+    """1 - |Q| / µP, what is left before sliding. Raises ``InputError`` beyond |Q| = µP."""
+    left = 1.0 - abs(tangential) / sliding_force
+    if left < 0.0:
+        raise InputError(
+            f"Q = {tangential} {unit} slides: it is beyond µP = {sliding_force} {unit}"
+        )
+    return left
 
 
 def _x_log_x(x: float) -> float:

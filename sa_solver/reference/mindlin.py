@@ -21,8 +21,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from sa_solver.errors import InputError
 from sa_solver.reference.hertz import FrictionalSphere
+from sa_solver.reference.line_partial_slip import reserve
 from sa_solver.reference.masing import superpose
 from sa_solver.types import Array
 
@@ -48,7 +48,9 @@ class ShearedSphere(FrictionalSphere):
 
     def stick_radius(self, tangential: float) -> float:
         """c [mm] on first loading to ``tangential`` [N]."""
-        return self.contact.contact_radius * float(np.cbrt(self._reserve(tangential)))
+        return self.contact.contact_radius * float(
+            np.cbrt(reserve(tangential, self.sliding_force, "N"))
+        )
 
     def shear(self, x: Array, y: Array, tangential: float) -> Array:
         """qx on first loading to ``tangential`` [N]; ``x`` and ``y`` broadcast [mm] [MPa]."""
@@ -61,7 +63,7 @@ class ShearedSphere(FrictionalSphere):
 
     def displacement(self, tangential: float) -> float:
         """δx [mm] on first loading to ``tangential`` [N]."""
-        spent = 1.0 - float(np.cbrt(self._reserve(tangential))) ** 2
+        spent = 1.0 - float(np.cbrt(reserve(tangential, self.sliding_force, "N"))) ** 2
         return float(np.sign(tangential)) * self._sliding_displacement * spent
 
     def shear_after(self, x: Array, y: Array, loads: Sequence[float]) -> Array:
@@ -82,19 +84,12 @@ class ShearedSphere(FrictionalSphere):
         4 µP δ1 [(6/5)(1 - v^(5/3)) - (Q/µP)(1 + v^(2/3))], with v = 1 - Q/µP and δ1 the
         displacement at the onset of sliding.
         """
-        reserve = self._reserve(amplitude)
-        power = float(np.cbrt(reserve)) ** 2
-        shape = 1.2 * (1.0 - reserve * power) - (1.0 - reserve) * (1.0 + power)
+        left = reserve(amplitude, self.sliding_force, "N")
+        power = float(np.cbrt(left)) ** 2
+        shape = 1.2 * (1.0 - left * power) - (1.0 - left) * (1.0 + power)
         return 4.0 * self.sliding_force * self._sliding_displacement * shape
 
     @property
     def _sliding_displacement(self) -> float:
         """δ1 [mm], at the onset of sliding: 3/2 of what no slip would give."""
         return 1.5 * self.sliding_force * self.tangential_compliance
-
-    def _reserve(self, tangential: float) -> float:
-        """1 - |Q| / µP, what is left before sliding."""
-        reserve = 1.0 - abs(tangential) / self.sliding_force
-        if reserve < 0.0:
-            raise InputError(f"Q = {tangential} N slides: it is beyond µP = {self.sliding_force} N")
-        return reserve
