@@ -27,7 +27,6 @@ class Complementary:
     force: Array
     gap: Array
     level: float
-    iterations: int
     converged: bool
 
 
@@ -58,7 +57,7 @@ def complementary(
             wrong = wrong[-1:]
         active[wrong] = ~active[wrong]
     forces, gaps = np.maximum(force, 0.0), np.maximum(gap, 0.0)
-    return Complementary(forces, gaps, level, iterations, len(wrong) == 0)
+    return Complementary(forces, gaps, level, len(wrong) == 0)
 
 
 def _wrong_nodes(force: Array, gap: Array, active: Flags, size: float) -> Indices:

@@ -27,7 +27,7 @@ class Constraints:
     def hold(self, nodes: Indices) -> None:
         """Set all displacements of the nodes to zero."""
         for dof in self._dofs(nodes):
-            self._eliminate(int(dof), np.empty(0, np.int64), np.empty(0))
+            self._eliminated.setdefault(int(dof), (np.empty(0, np.int64), np.empty(0)))
 
     def slide(self, nodes: Indices, normals: Array) -> None:
         """Let nodes move only across ``normals`` ``(n, dimension)``: u·n = 0."""
@@ -45,7 +45,7 @@ class Constraints:
             for dof, masters in zip(
                 self._dofs(node), self._dofs(row).reshape(-1, self._dimension).T, strict=True
             ):
-                self._eliminate(int(dof), masters, share)
+                self._eliminated.setdefault(int(dof), (masters, share))
 
     def _dofs(self, nodes: Indices) -> Indices:
         """Displacements of nodes, one node after the other."""
@@ -59,7 +59,8 @@ class Constraints:
         pivot = int(np.argmax(np.abs(shares)))
         others = np.flatnonzero(shares)
         others = others[others != pivot]
-        self._eliminate(int(free[pivot]), free[others], -shares[others] / shares[pivot])
+        entry = free[others], -shares[others] / shares[pivot]
+        self._eliminated.setdefault(int(free[pivot]), entry)
 
     def _in_free(self, dofs: Indices, coefficients: Array) -> tuple[Indices, Array]:
         """Σ c u in the displacements that are not constrained yet: so no chain is ever closed."""
@@ -74,9 +75,6 @@ class Constraints:
                 terms[dof] = terms.get(dof, 0.0) + share
         order = sorted(terms)
         return np.array(order, dtype=np.int64), np.array([terms[dof] for dof in order])
-
-    def _eliminate(self, dof: int, masters: Indices, coefficients: Array) -> None:
-        self._eliminated.setdefault(dof, (masters, coefficients))
 
     @property
     def free(self) -> Indices:

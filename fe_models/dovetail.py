@@ -13,7 +13,7 @@ from fe_models.geometry.dovetail import Dovetail
 from fe_models.mesh import StructureMesh
 from fe_models.spin_softening import CarriedMass, spin_softening
 from fe_models.structure import Structure
-from fe_models.supported_body import SupportedBody, interface_frames
+from fe_models.supported_body import SupportedBody, interface_nodes
 from sa_solver.types import Array, Material
 
 
@@ -61,8 +61,6 @@ def dovetail_structure(
     """
     elastic_1 = ElasticBody(mesh.body_1, disk, order)
     elastic_2 = ElasticBody(mesh.body_2, blade, order)
-    nodes_1 = np.concatenate([i.nodes_1 for i in mesh.interfaces])
-    nodes_2 = np.concatenate([i.nodes_2 for i in mesh.interfaces])
 
     held = Constraints(len(elastic_1.nodes), elastic_1.dimension)
     held.hold(elastic_1.boundary_nodes("inner"))
@@ -79,8 +77,8 @@ def dovetail_structure(
         for interface in mesh.interfaces:
             constraints.average(*elastic.midsides(interface.name))
 
-    frames_1 = interface_frames(mesh.interfaces, 1, mesh.body_1)
-    frames_2 = interface_frames(mesh.interfaces, 2, mesh.body_2)
+    nodes_1, frames_1 = interface_nodes(mesh.interfaces, 1, mesh.body_1)
+    nodes_2, frames_2 = interface_nodes(mesh.interfaces, 2, mesh.body_2)
     return Structure(
         mesh=mesh,
         body_1=SupportedBody(elastic_1, held, nodes_1, frames_1, loads_1),

@@ -20,8 +20,11 @@ from skfem import (
 from skfem.helpers import grad
 
 from fe_models.mesh import Body, in_space
+from sa_solver.subsurface_influence import INDICES
 from sa_solver.types import Array, Indices, Material
 
+# The rotor axis, the global Y, through the origin.
+ROTOR, ORIGIN = np.array([0.0, 1.0, 0.0]), np.zeros(3)
 # By dimension and order.
 ELEMENTS = {
     (3, 1): ElementTetP1,
@@ -99,10 +102,12 @@ class ElasticBody:
         ]
         return np.stack(forms, axis=1).ravel()
 
-    def centrifugal_load(self) -> Array:
-        """Forces ``(size,)`` of a rotation at 1 rad/s about the global Y axis [N s²]."""
-        radial = self.material.density * np.array([1.0, 0.0, 1.0])
-        return self.body_load(lambda x: radial[:, None, None] * x)
+    def centrifugal_load(self, axis: Array = ROTOR, through: Array = ORIGIN) -> Array:
+        """Forces ``(size,)`` of 1 rad/s about a unit ``axis`` ``through`` a point [N s²]."""
+        radial = self.material.density * (np.eye(3) - np.outer(axis, axis))
+        return self.body_load(
+            lambda x: np.einsum("ab,b...->a...", radial, x - through[:, None, None])
+        )
 
     def traction_load(
         self, boundary: str, traction: Callable[[Array], Array], direction: Array
@@ -118,12 +123,7 @@ class ElasticBody:
 
     def pressure_load(self, boundary: str) -> Array:
         """Forces ``(size,)`` of a pressure of 1 MPa on a named boundary, into the body."""
-        basis = self._facet_basis(boundary)
-        forms = [
-            LinearForm(lambda v, w, axis=axis: -w.n[axis] * v).assemble(basis)
-            for axis in range(self.dimension)
-        ]
-        return np.stack(forms, axis=1).ravel()
+        return -_normal_integrals(self._facet_basis(boundary)).ravel()
 
     def boundary_integral(self, boundary: str, integrand: Callable[[Array], Array]) -> float:
         """Integral over a named boundary of a function of points ``(3, ...)``."""
@@ -147,9 +147,7 @@ class ElasticBody:
         linear = ELEMENTS[self.dimension, 1]()
         basis = FacetBasis(mesh, linear, facets=mesh.boundaries[boundary])
         normals = np.zeros((len(self.nodes), self.dimension))
-        for axis in range(self.dimension):
-            form = LinearForm(lambda v, w, axis=axis: w.n[axis] * v)
-            normals[: mesh.nvertices, axis] = form.assemble(basis)
+        normals[: mesh.nvertices] = _normal_integrals(basis)
         middle, parents = self.midsides(boundary)
         normals[middle] = normals[parents].sum(axis=1)
         nodes = self.boundary_nodes(boundary)
@@ -179,8 +177,7 @@ class ElasticBody:
         strain = 0.5 * (gradient + gradient.transpose(1, 0, 2))
         trace = strain[0, 0] + strain[1, 1] + strain[2, 2]
         lame, shear = self.material.lame, self.material.shear_modulus
-        pairs = ((0, 0), (1, 1), (2, 2), (0, 1), (1, 2), (2, 0))
-        return np.array([lame * trace * (a == b) + 2.0 * shear * strain[a, b] for a, b in pairs])
+        return np.array([lame * trace * (a == b) + 2.0 * shear * strain[a, b] for a, b in INDICES])
 
     def at_vertices(self, element_values: Array) -> Array:
         """Volume-weighted means at the vertices of element values ``(..., elements)``."""
@@ -194,6 +191,15 @@ class ElasticBody:
     def _facet_basis(self, boundary: str) -> FacetBasis:
         mesh = self.body.mesh
         return FacetBasis(mesh, self._element(), facets=mesh.boundaries[boundary])
+
+
+def _normal_integrals(basis: FacetBasis) -> Array:
+    """∫ n φi dA ``(nodes, dimension)`` over the facets of a basis, n the outward normal."""
+    forms = [
+        LinearForm(lambda v, w, axis=axis: w.n[axis] * v).assemble(basis)
+        for axis in range(basis.mesh.dim())
+    ]
+    return np.stack(forms, axis=1)
 
 
 def _spatial(points: Array) -> Array:

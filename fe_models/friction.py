@@ -16,7 +16,6 @@ import numpy as np
 
 from fe_models.joint import JointResolvent
 from fe_models.mesh import AXES, in_space
-from fe_models.symmetry import SplitMatrix
 from sa_solver.contact_law import coulomb
 from sa_solver.splitting import SplittingResult, douglas_rachford
 from sa_solver.types import Array
@@ -52,8 +51,7 @@ class FrictionalJoint:
     """A joint with friction coefficient µ, one or by node ``(n,)``, for any gaps and loads."""
 
     def __init__(self, joint: JointResolvent, friction: float | Array) -> None:
-        self._inverse, self._rho, self._loads = joint.inverse, joint.rho, joint.loads
-        self._friction = friction
+        self._joint, self._friction = joint, friction
 
     def march(
         self,
@@ -69,7 +67,7 @@ class FrictionalJoint:
         ``state`` of every increment of a similar path: they save iterations and change nothing
         else.
         """
-        loads = amplitudes @ self._loads.T
+        loads = amplitudes @ self._joint.loads.T
         floor = LOAD_FLOOR * np.linalg.norm(loads, axis=1).max()
         displacement = np.zeros((3, len(gap))) if previous is None else previous
         heaviest = loads[np.argmax(np.linalg.norm(loads, axis=1))]
@@ -90,7 +88,7 @@ class FrictionalJoint:
         self, load: Array, gap: Array, previous: Array, starts: list[Array], floor: float
     ) -> FrictionState:
         """One increment, its residual relative to the load, which counts as ``floor`` at least."""
-        problem = _Problem(self._inverse, self._rho, self._friction, load, gap, previous)
+        problem = _Problem(self._joint, self._friction, load, gap, previous)
         return problem.solve(starts, max(float(np.linalg.norm(load)), floor))
 
 
@@ -99,17 +97,16 @@ class _Problem:
 
     def __init__(
         self,
-        inverse: Array | SplitMatrix,
-        rho: float,
+        joint: JointResolvent,
         friction: float | Array,
         load: Array,
         gap: Array,
         previous: Array,
     ) -> None:
-        self._inverse, self._rho, self._friction = inverse, rho, friction
+        self._inverse, self._rho, self._friction = joint.inverse, joint.rho, friction
         self._gap, self._previous = gap, previous
         self._axes = AXES[len(load) // len(gap)]
-        self._offset = inverse @ load
+        self._offset = joint.inverse @ load
 
     def solve(self, starts: list[Array], scale: float) -> FrictionState:
         """Split from the most promising start, and from the others should it fail.
@@ -138,19 +135,18 @@ class _Problem:
 
     def _law(self, trial: Array) -> Array:
         nodal = self._nodal(trial)
-        admissible = nodal + self._force(nodal) / self._rho
+        admissible = nodal + coulomb(self._sticking_force(nodal), self._friction) / self._rho
         return admissible[self._axes, :].T.ravel()
 
     def _nodal(self, values: Array) -> Array:
         """Components x, y, z at each node ``(3, n)``."""
         return in_space(values.reshape(len(self._gap), -1)).T
 
-    def _force(self, trial: Array) -> Array:
-        """Force that brings a trial displacement ``(3, n)`` back to the law, at stiffness ρ."""
-        return coulomb(self._sticking_force(trial), self._friction)
-
     def _sticking_force(self, trial: Array) -> Array:
-        """Force ``(3, n)`` that would close the gap and undo the slip, whatever its size."""
+        """Force ``(3, n)`` that would close the gap and undo the slip, whatever its size.
+
+        Within the law it brings a trial displacement ``(3, n)`` back to it, at stiffness ρ.
+        """
         stick = self._rho * (self._previous - trial)
         stick[2] = -self._rho * (self._gap + trial[2])
         return stick

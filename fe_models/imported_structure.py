@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 import scipy.sparse as sp
@@ -16,7 +17,7 @@ from fe_models.mesh import Body, MatchError, MeshError, StructureMesh, matched_i
 from fe_models.mortar import frame_of_faces, mortar_interface
 from fe_models.spin_softening import spin_softening
 from fe_models.structure import Structure
-from fe_models.supported_body import SupportedBody, interface_frames
+from fe_models.supported_body import SupportedBody, interface_nodes
 from sa_solver.types import Array, Indices, Material
 
 AXIS_NAMES = "xyz"
@@ -53,6 +54,10 @@ class Pressure:
     boundary: str
     pressure: float
 
+    def forces(self, elastic: ElasticBody) -> Array:
+        """Nodal forces ``(size,)``."""
+        return self.pressure * elastic.pressure_load(self.boundary)
+
 
 @dataclass(frozen=True)
 class BoundaryForce:
@@ -60,6 +65,13 @@ class BoundaryForce:
 
     boundary: str
     force: Array
+
+    def forces(self, elastic: ElasticBody) -> Array:
+        """Nodal forces ``(size,)``."""
+        area = elastic.boundary_integral(self.boundary, lambda x: np.ones_like(x[0]))
+        return elastic.traction_load(
+            self.boundary, lambda x: np.full_like(x[0], 1.0 / area), self.force
+        )
 
 
 @dataclass(frozen=True)
@@ -81,12 +93,26 @@ class Rotation:
     through: Array
     speed: float
 
+    @property
+    def direction(self) -> Array:
+        """Unit vector of the axis."""
+        return self.axis / np.linalg.norm(self.axis)
+
+    def forces(self, elastic: ElasticBody) -> Array:
+        """Nodal forces ``(size,)``."""
+        return self.speed**2 * elastic.centrifugal_load(self.direction, self.through)
+
 
 @dataclass(frozen=True)
 class Acceleration:
     """Acceleration ``(3,)`` [mm/s²] of the frame of reference: bodies are pulled against it."""
 
     acceleration: Array
+
+    def forces(self, elastic: ElasticBody) -> Array:
+        """Nodal forces ``(size,)``."""
+        pull = -elastic.material.density * self.acceleration
+        return elastic.body_load(lambda x: np.broadcast_to(pull[:, None, None], x.shape))
 
 
 AppliedLoad = Pressure | BoundaryForce | Displacement | Rotation | Acceleration
@@ -219,12 +245,13 @@ def _check_held(structure: Structure) -> None:
     """
     body_1, body_2 = structure.body_1, structure.body_2
     d = body_1.elastic.dimension
-    ends_1 = np.cumsum([len(i.face(1)) for i in structure.mesh.interfaces])
-    ends_2 = np.cumsum([len(i) for i in structure.mesh.interfaces])
-    held_1 = np.split(body_1.held.reshape(-1, d), ends_1[:-1])
-    held_2 = np.split(body_2.held.reshape(-1, d), ends_2[:-1])
-    for interface, one, two in zip(structure.mesh.interfaces, held_1, held_2, strict=True):
-        name_1, name_2 = body_1.elastic.body.name, body_2.elastic.body.name
+    name_1, name_2 = body_1.elastic.body.name, body_2.elastic.body.name
+    interfaces = structure.mesh.interfaces
+    held_1, held_2 = (
+        np.split(body.held.reshape(-1, d), np.cumsum([len(i.nodes(k)) for i in interfaces])[:-1])
+        for k, body in enumerate(structure.bodies, start=1)
+    )
+    for interface, one, two in zip(interfaces, held_1, held_2, strict=True):
         if two[:, -1].any():
             raise MeshError(
                 f"nodes of {interface.name} on body {name_2} are held along the contact's normal: "
@@ -310,18 +337,16 @@ def _supported(
                 moved.append(load)
                 imposed[:, case] = _impose(constraints, elastic, load)
         elif _boundary(load) is None or _boundary(load) in groups:
-            forces[:, case] = _forces(elastic, load)
+            forces[:, case] = load.forces(elastic)
     _check_against_supports(loads, imposed, supported_motions @ imposed[free])
     _check_against_each_other(elastic, moved)
     for interface in mesh.interfaces:
         constraints.average(*elastic.midsides(interface.name))
-    nodes = _interface_nodes(mesh, number)
-    frames = interface_frames(mesh.interfaces, number, body)
+    _check_separate(mesh, number)
+    placed = interface_nodes(mesh.interfaces, number, body)
+    moving = imposed if imposed.any() else None
     try:
-        supported = SupportedBody(
-            elastic, constraints, nodes, frames, forces,
-            imposed if imposed.any() else None,
-        )  # fmt: skip
+        supported = SupportedBody(elastic, constraints, *placed, forces, moving)
     except ValueError as error:
         raise MeshError(f"body {body.name}: {error}") from error
     if len(constraints.free) <= np.sum(~supported.held):
@@ -331,19 +356,15 @@ def _supported(
     return supported
 
 
-def _interface_nodes(mesh: StructureMesh, number: int) -> Indices:
-    """Nodes of all contact faces of body ``number``, no node on two of them."""
-    nodes: list[Indices] = []
-    for index, interface in enumerate(mesh.interfaces):
-        nodes.append(interface.nodes(number))
-        for earlier, before in zip(mesh.interfaces[:index], nodes, strict=False):
-            if len(np.intersect1d(nodes[-1], before)):
-                raise MeshError(
-                    f"contacts {earlier.name} and {interface.name} share nodes of body "
-                    f"{(mesh.body_1, mesh.body_2)[number - 1].name}; divide the face between them, "
-                    "or make them one contact"
-                )
-    return np.concatenate(nodes)
+def _check_separate(mesh: StructureMesh, number: int) -> None:
+    """Raise if a node of body ``number`` is on two of its contact faces."""
+    for one, other in combinations(mesh.interfaces, 2):
+        if len(np.intersect1d(one.nodes(number), other.nodes(number))):
+            raise MeshError(
+                f"contacts {one.name} and {other.name} share nodes of body "
+                f"{(mesh.body_1, mesh.body_2)[number - 1].name}; divide the face between them, or "
+                "make them one contact"
+            )
 
 
 def _hold(
@@ -411,46 +432,16 @@ def _check_against_each_other(elastic: ElasticBody, imposed: Sequence[Displaceme
                 )
 
 
-def _forces(elastic: ElasticBody, load: AppliedLoad) -> Array:
-    """Nodal forces ``(size,)`` of a load."""
-    density = elastic.material.density
-    match load:
-        case Pressure():
-            return load.pressure * elastic.pressure_load(load.boundary)
-        case BoundaryForce():
-            area = elastic.boundary_integral(load.boundary, lambda x: np.ones_like(x[0]))
-            return elastic.traction_load(
-                load.boundary, lambda x: np.full_like(x[0], 1.0 / area), load.force
-            )
-        case Rotation():
-            return elastic.body_load(_centrifugal(load, density))
-        case Acceleration():
-            pull = -density * load.acceleration
-            return elastic.body_load(lambda x: np.broadcast_to(pull[:, None, None], x.shape))
-    raise AssertionError(load)
-
-
-def _centrifugal(load: Rotation, density: float) -> Callable[[Array], Array]:
-    axis = load.axis / np.linalg.norm(load.axis)
-
-    def force(points: Array) -> Array:
-        arm = points - load.through[:, None, None]
-        radial = arm - axis[:, None, None] * np.einsum("a,a...->...", axis, arm)
-        return density * load.speed**2 * radial
-
-    return force
-
-
 def imported_softening(
     structure: Structure, loads: Sequence[AppliedLoad], amplitudes: Array
 ) -> tuple[sp.csr_matrix, sp.csr_matrix]:
     """Spin softening of both bodies ``(size, size)`` [N/mm] at ``amplitudes`` of the loads."""
     softening = []
-    for body in (structure.body_1.elastic, structure.body_2.elastic):
-        total = sp.csr_matrix((body.size, body.size))
+    for body in structure.bodies:
+        total = sp.csr_matrix(body.elastic.stiffness.shape)
         for load, amplitude in zip(loads, amplitudes, strict=True):
             if isinstance(load, Rotation):
-                axis = load.axis / np.linalg.norm(load.axis)
-                total = total + amplitude * spin_softening(body, load.speed, axis=axis)
+                one = spin_softening(body.elastic, load.speed, axis=load.direction)
+                total = total + amplitude * one
         softening.append(total.tocsr())
     return softening[0], softening[1]

@@ -24,7 +24,7 @@ from numpy.typing import NDArray
 from scipy.sparse.linalg import LinearOperator, eigsh
 
 from fe_models.symmetry import Mirror, SplitMatrix
-from sa_solver.types import Array, Indices
+from sa_solver.types import Array
 
 # Eigenvalues below this share of the largest are rigid motions; elastic ones start near 1e-3.
 RIGID_LIMIT = 1e-7
@@ -68,8 +68,10 @@ class JointStiffness:
         loads = self.loads
         if self.held is not None and self.held.any():
             free = np.flatnonzero(~self.held)
-            inverse = _spread(_spread(inverse, free, len(self.held)).T, free, len(self.held)).T
-            loads = _spread(loads, free, len(self.held))
+            every = np.zeros((len(self.held),) * 2)
+            every[np.ix_(free, free)] = inverse
+            inverse, loads = every, np.zeros((len(every), loads.shape[1]))
+            loads[free] = self.loads
         return JointResolvent(inverse, rho, loads, self.rigid_modes)
 
 
@@ -148,13 +150,6 @@ def _shifted_inverse(stiffness: Array, rho: float) -> Array:
     factor = sl.cholesky(shifted, lower=True, overwrite_a=True, check_finite=False)
     inverse, _ = sl.lapack.dpotri(factor, lower=1, overwrite_c=1)
     return np.asarray(np.tril(inverse) + np.tril(inverse, -1).T)
-
-
-def _spread(rows: Array, places: Indices, count: int) -> Array:
-    """Rows at their places among ``count``, the others zero."""
-    spread = np.zeros((count, *rows.shape[1:]))
-    spread[places] = rows
-    return spread
 
 
 def _spectrum(stiffness: Array) -> tuple[int, float, float]:

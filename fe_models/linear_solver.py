@@ -8,9 +8,9 @@ system whose factors do not fit: conjugate gradients with multigrid.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
 from math import inf
-from typing import Any, Literal, Protocol
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
@@ -29,6 +29,12 @@ GROWTH_LIMIT = 1e12
 # Right-hand sides solved at once, where there may be thousands: enough to amortise, little memory.
 COLUMNS_AT_ONCE = 256
 BYTES = 8
+# Residual over the load at which iterations end, and how many of them are an error.
+ITERATED = 1e-10
+MOST_ITERATIONS = 500
+
+# A factorised matrix: call it with right-hand sides ``(n,)`` or ``(n, m)``.
+Factorisation = Callable[[Array], Array]
 
 SINGULAR = (
     "the stiffness matrix is close to singular: a body is not held, or the mesh has a "
@@ -55,31 +61,6 @@ class FactorMemoryError(SolverError, MemoryError):
         self.needed, self.available = needed, available
 
 
-class Factorisation(Protocol):
-    """A factorised matrix: call it with right-hand sides ``(n,)`` or ``(n, m)``."""
-
-    def __call__(self, rhs: Array) -> Array: ...
-
-
-@dataclass(frozen=True)
-class LinearSolver:
-    """How a system with a few right-hand sides is solved.
-
-    ``kind`` "direct" factorises, "iterative" runs conjugate gradients with multigrid, "auto"
-    factorises if the factors fit into ``memory`` [bytes], by default all that is free, and
-    iterates if not. Iterations end at a residual of ``tolerance`` times the load; more than
-    ``iterations`` are an error.
-    """
-
-    kind: Literal["auto", "direct", "iterative"] = "auto"
-    memory: float | None = None
-    tolerance: float = 1e-10
-    iterations: int = 500
-
-
-DEFAULT = LinearSolver()
-
-
 def factorise(matrix: sp.csr_matrix, memory: float | None = None) -> Factorisation:
     """Factorise a sparse symmetric positive definite matrix.
 
@@ -95,24 +76,21 @@ def factorise(matrix: sp.csr_matrix, memory: float | None = None) -> Factorisati
 
 
 def prepare(
-    matrix: sp.csr_matrix,
-    near_nullspace: Array | None = None,
-    choice: LinearSolver = DEFAULT,
+    matrix: sp.csr_matrix, near_nullspace: Array | None = None, memory: float | None = None
 ) -> Factorisation:
     """Solver of a sparse symmetric positive definite matrix for a few right-hand sides.
 
+    It is factorised where the factors fit into ``memory`` [bytes], all that is free unless given,
+    and iterated by conjugate gradients with multigrid elsewhere.
     ``near_nullspace`` ``(n, k)`` are motions of little energy, for the iterative solver: those of
     :func:`fe_models.rigid_motions.rigid_body_modes` if the matrix is an elastic body's. Raises
     :class:`SolverError`, here if the matrix is singular, or when called if the iterations do not
-    converge; and :class:`FactorMemoryError` if ``choice`` is direct and does not fit.
+    converge.
     """
-    if choice.kind != "iterative":
-        try:
-            return factorise(matrix, choice.memory)
-        except FactorMemoryError:
-            if choice.kind == "direct":
-                raise
-    return _Iterative(matrix, near_nullspace, choice)
+    try:
+        return factorise(matrix, memory)
+    except FactorMemoryError:
+        return _Iterative(matrix, near_nullspace)
 
 
 def condense(
@@ -138,20 +116,18 @@ def condense(
 class _Iterative:
     """Conjugate gradients whose end is looked at."""
 
-    def __init__(
-        self, matrix: sp.csr_matrix, near_nullspace: Array | None, choice: LinearSolver
-    ) -> None:
+    def __init__(self, matrix: sp.csr_matrix, near_nullspace: Array | None) -> None:
         soft = np.ones((matrix.shape[0], 1)) if near_nullspace is None else near_nullspace
         if not softness(matrix, soft) * GROWTH_LIMIT > 1.0:
             raise SolverError(SINGULAR)
-        self._grids, self._choice = MultigridSolver(matrix, soft), choice
+        self._grids = MultigridSolver(matrix, soft)
 
     def __call__(self, rhs: Array) -> Array:
         columns = rhs.reshape(len(rhs), -1).T
         return np.stack([self._column(column) for column in columns], axis=1).reshape(rhs.shape)
 
     def _column(self, rhs: Array) -> Array:
-        result = self._grids.solve(rhs, self._choice.tolerance, self._choice.iterations)
+        result = self._grids.solve(rhs, ITERATED, MOST_ITERATIONS)
         if not result.converged:
             raise SolverError(
                 f"conjugate gradients did not converge: residual {result.residual:.1e} of the load "

@@ -56,6 +56,19 @@ class Body:
         """Vertices of the triangles (in the plane: edges) of a named boundary, ``(n, dim)``."""
         return self.mesh.facets[:, self.mesh.boundaries[boundary]].T
 
+    def outward(self, boundary: str) -> Array:
+        """Outward normals ``(n, 3)`` of the facets of a boundary, as long as the facet is large.
+
+        In the plane a facet goes on along Y for 1 mm.
+        """
+        corners = self.points[self.facets(boundary)]
+        edge = corners[:, 1] - corners[:, 0]
+        other = 0.5 * (corners[:, 2] - corners[:, 0]) if corners.shape[1] == 3 else [0.0, 1.0, 0.0]
+        normals = np.cross(edge, other)
+        cells = self.mesh.t[:, self.mesh.f2t[0, self.mesh.boundaries[boundary]]].T
+        out = corners.mean(axis=1) - self.points[cells].mean(axis=1)
+        return normals * np.sign(np.einsum("ma,ma->m", normals, out))[:, None]
+
     def vertices(self, boundary: str) -> Indices:
         """Vertices on a named boundary, sorted, ``(n,)``."""
         return np.unique(self.facets(boundary))

@@ -126,7 +126,7 @@ def frame_of_faces(
     normal of body 1; x the direction ``(3,)`` given, turned into the plane. Raises
     :class:`MeshError` if the direction is normal to the face, or a facet faces backwards.
     """
-    normals_1, normals_2 = _outward(body_1, boundary_1), _outward(body_2, boundary_2)
+    normals_1, normals_2 = body_1.outward(boundary_1), body_2.outward(boundary_2)
     z = _unit(normals_1.sum(axis=0))
     given = np.zeros(3)
     given[list(body_1.axes)] = x_direction[list(body_1.axes)]
@@ -331,19 +331,6 @@ def _face(body: Body, boundary: str, frame: Frame) -> tuple[Indices, Array, Indi
     nodes = body.vertices(boundary)
     points = frame.coordinates(body.points[nodes])
     return nodes, points, np.searchsorted(nodes, body.facets(boundary))
-
-
-def _outward(body: Body, boundary: str) -> Array:
-    """Outward normals ``(m, 3)`` of the facets of a boundary, as long as the facet is large."""
-    mesh = body.mesh
-    corners = body.points[body.facets(boundary)]
-    edge = corners[:, 1] - corners[:, 0]
-    # In the plane a facet goes on along Y for 1 mm.
-    other = 0.5 * (corners[:, 2] - corners[:, 0]) if corners.shape[1] == 3 else [0.0, 1.0, 0.0]
-    normals = np.cross(edge, other)
-    cells = mesh.t[:, mesh.f2t[0, mesh.boundaries[boundary]]].T
-    out = corners.mean(axis=1) - body.points[cells].mean(axis=1)
-    return normals * np.sign(np.einsum("ma,ma->m", normals, out))[:, None]
 
 
 def _unit(vectors: Array) -> Array:

@@ -81,24 +81,26 @@ def check_nonlinearity(
     that load (:mod:`fe_models.spin_softening`). Raises ValueError if there is no load.
     """
     (linear,) = FrictionalJoint(like, friction).march(amplitudes[None], gap)
-    newton = _newton(structure, linear, like, friction, amplitudes, gap, softening)
-    first, last = (structure.interface_resultants(s) for s in (linear, newton.state))
-    finite = [TotalLagrangian(body.elastic) for body in (structure.body_1, structure.body_2)]
-    pairs = list(zip(finite, newton.displacements, strict=True))
+    state, displacements, iterations, residual = _newton(
+        structure, linear, like, friction, amplitudes, gap, softening
+    )
+    first, last = (structure.interface_resultants(s) for s in (linear, state))
+    finite = [TotalLagrangian(body.elastic) for body in structure.bodies]
+    pairs = list(zip(finite, displacements, strict=True))
     return NonlinearCheck(
         linear=first,
         nonlinear=last,
         change=resultant_change(last, first, face_sizes(structure)),
-        slip=newton.state.slip,
-        slip_change=slip_change(newton.state.slip, linear.slip),
-        slide=_slide(structure, newton.state.slip),
-        displacements=newton.displacements,
+        slip=state.slip,
+        slip_change=slip_change(state.slip, linear.slip),
+        slide=_slide(structure, state.slip),
+        displacements=displacements,
         largest_strain=max(body.largest_strain(u) for body, u in pairs),
         largest_rotation=max(body.largest_rotation(u) for body, u in pairs),
-        face_rotation=_turn(structure, structure, newton.displacements),
-        iterations=newton.iterations,
-        residual=newton.residual,
-        converged=linear.converged and newton.converged,
+        face_rotation=_turn(structure, structure, displacements),
+        iterations=iterations,
+        residual=residual,
+        converged=linear.converged and state.converged and residual < TOLERANCE,
     )
 
 
@@ -122,17 +124,6 @@ def _slide(structure: Structure, slip: Array) -> float:
     return max(float(part.max() / width) for part, width in zip(parts, widths, strict=True))
 
 
-@dataclass(frozen=True)
-class _Newton:
-    """Where Newton's method ended."""
-
-    state: FrictionState
-    displacements: Displacements
-    iterations: int
-    residual: float
-    converged: bool
-
-
 def _newton(
     structure: Structure,
     linear: FrictionState,
@@ -141,28 +132,26 @@ def _newton(
     amplitudes: Array,
     gap: Array,
     softening: Softening,
-) -> _Newton:
-    """Re-linearise and solve the contact until the next linear structure would be the same."""
-    state, displacements = (
-        linear,
-        deformation(structure, linear.force, linear.displacement, amplitudes),
-    )
-    iterations, converged = 0, False
-    while not converged and iterations < MAX_ITERATIONS:
+) -> tuple[FrictionState, Displacements, int, float]:
+    """Re-linearise and solve the contact until the next linear structure would be the same.
+
+    Its state, the displacements of both bodies, the iterations and the residual at the end.
+    """
+    state = linear
+    displacements = deformation(structure, linear.force, linear.displacement, amplitudes)
+    iterations, residual = 0, np.inf
+    while not (state.converged and residual < TOLERANCE) and iterations < MAX_ITERATIONS:
         iterations += 1
         tangent = relinearised(structure, displacements, amplitudes, softening)
         joint = FrictionalJoint(tangent.condense(like).resolvent(), friction)
         (state,) = joint.march(amplitudes[None], gap, guess=[state.state])
-        before, displacements = (
-            displacements,
-            deformation(tangent, state.force, state.displacement, amplitudes),
-        )
+        before = displacements
+        displacements = deformation(tangent, state.force, state.displacement, amplitudes)
         residual = max(
             _remainder(tangent, before, displacements, softening),
             _turn(structure, tangent, displacements),
         )
-        converged = state.converged and residual < TOLERANCE
-    return _Newton(state, displacements, iterations, residual, converged)
+    return state, displacements, iterations, residual
 
 
 def _remainder(
@@ -170,8 +159,7 @@ def _remainder(
 ) -> float:
     """Nodal forces that a linear step from ``before`` to ``after`` leaves out, by all of them."""
     shares = []
-    bodies = tangent.body_1, tangent.body_2
-    for body, u, v, soft in zip(bodies, before, after, softening, strict=True):
+    for body, u, v, soft in zip(tangent.bodies, before, after, softening, strict=True):
         finite = TotalLagrangian(body.elastic)
         force = finite.internal_force(v)
         step = (body.elastic.stiffness + soft) @ (v - u)

@@ -21,7 +21,7 @@ from sa_solver.types import Array, Indices
 
 ANALYSE, FACTORISE, SOLVE, RELEASE = 11, 22, 33, -1
 # Places in PARDISO's table of parameters, counted from zero; the last three are answers.
-OWN_VALUES, ORDERING, ZERO_BASED, SCHUR = 0, 1, 34, 35
+NO_DEFAULTS, ORDERING, ZERO_BASED, SCHUR = 0, 1, 34, 35
 ANALYSIS_PEAK, ANALYSIS_KEPT, FACTORS = 14, 15, 16
 NESTED_DISSECTION = 2
 # MKL's mode of reproducible results with its fastest kernels: two solutions with two threads
@@ -67,7 +67,7 @@ class Pardiso:
         self._pointers, self._columns = upper.indptr.astype("i4"), upper.indices.astype("i4")
         self._marked = np.zeros(self._size, np.int32)
         parameters = np.zeros(64, np.int32)
-        parameters[[OWN_VALUES, ORDERING, ZERO_BASED]] = 1, NESTED_DISSECTION, 1
+        parameters[[NO_DEFAULTS, ORDERING, ZERO_BASED]] = 1, NESTED_DISSECTION, 1
         if kept is not None:
             parameters[SCHUR] = 1
             self._marked[kept] = 1

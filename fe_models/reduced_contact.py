@@ -49,19 +49,17 @@ class NormalSolution:
     gap: Array
     approach: float
     area: float
-    iterations: int
     converged: bool
 
     @property
     def touching(self) -> Flags:
         """Nodes that carry force, ``(n,)``."""
-        touching: Flags = self.force > 0.0
-        return touching
+        return self.force > 0.0
 
 
 @dataclass(frozen=True)
 class TangentialSolution:
-    """First loading: body 2's ring moved by ``displacement`` along an axis [mm].
+    """First loading: body 2's ring moved by ``displacement`` along x [mm].
 
     ``shear`` ``(n,)`` is the force on each node of body 2 along it [N], against the motion;
     ``slip`` ``(n,)`` that of body 2 over body 1 [mm], never against it; ``force`` what moves the
@@ -203,20 +201,19 @@ class ReducedPair:
             gap=contact.gap,
             approach=contact.level,
             area=float(self.areas[contact.force > 0.0].sum()),
-            iterations=contact.iterations,
             converged=contact.converged,
         )
 
     def tangential(
-        self, normal: NormalSolution, displacement: float, friction: float, axis: int = X
+        self, normal: NormalSolution, displacement: float, friction: float
     ) -> TangentialSolution:
-        """Move body 2's ring from rest by ``displacement`` >= 0 [mm] along x (0) or y (1)."""
+        """Move body 2's ring from rest by ``displacement`` >= 0 [mm] along x."""
         if displacement < 0.0:
             raise ValueError(
                 f"first loading to {displacement:g} mm: give a displacement of 0 or more"
             )
         touching = np.flatnonzero(normal.touching)
-        A = self.block(axis)
+        A = self.block(X)
         limit = friction * normal.force[touching]
         # Unknown is how far each node's shear stays below its limit; slip is what it meets.
         offset = displacement - A[np.ix_(touching, touching)] @ limit
@@ -243,16 +240,16 @@ class ReducedPair:
         return float(ones @ sl.solve(A, ones, assume_a="pos"))
 
     def virgin_curve(
-        self, normal: NormalSolution, displacements: Array, friction: float, axis: int = X
+        self, normal: NormalSolution, displacements: Array, friction: float
     ) -> VirginCurve:
         """First loading at rising ``displacements`` ``(k,)`` [mm]; give 0 for the origin."""
-        states = tuple(self.tangential(normal, d, friction, axis) for d in displacements)
+        states = tuple(self.tangential(normal, d, friction) for d in displacements)
         force = np.array([state.force for state in states])
         return VirginCurve(
             displacement=np.asarray(displacements, dtype=np.float64),
             force=force,
             states=states,
-            stick_stiffness=self.stick_stiffness(normal, axis),
+            stick_stiffness=self.stick_stiffness(normal),
             friction=float(force[-1] / normal.force.sum()),
         )
 

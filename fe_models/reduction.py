@@ -117,7 +117,7 @@ def reduce_body(
         reduced_mass = _reduced_mass(stiffness, mass, kept, inner, shapes, solve)
     return ReducedModel(
         kept=kept,
-        stiffness=_block_diagonal(static, np.diag(values)),
+        stiffness=sl.block_diag(static, np.diag(values)),
         mass=reduced_mass,
         loads=np.concatenate([static_loads, shapes.T @ full_loads]),
         mode_shapes=shapes,
@@ -229,14 +229,5 @@ def _reduced_mass(
     kept_mass = mass[kept][:, kept].toarray() + half + half.T + static.T @ (inner_mass @ static)
     modal = shapes[inner]
     mixed = static.T @ (inner_mass @ modal) + coupling_mass.T @ modal
-    reduced = _block_diagonal(0.5 * (kept_mass + kept_mass.T), np.eye(modal.shape[1]))
-    reduced[: len(kept), len(kept) :] = mixed
-    reduced[len(kept) :, : len(kept)] = mixed.T
-    return reduced
-
-
-def _block_diagonal(first: Array, second: Array) -> Array:
-    size = len(first)
-    both = np.zeros((size + len(second),) * 2)
-    both[:size, :size], both[size:, size:] = first, second
-    return both
+    symmetric = 0.5 * (kept_mass + kept_mass.T)
+    return np.block([[symmetric, mixed], [mixed.T, np.eye(modal.shape[1])]])

@@ -17,10 +17,10 @@ import scipy.sparse as sp
 
 from fe_models.friction import FrictionState
 from fe_models.joint import JointResolvent
-from fe_models.mesh import Body, Interface, in_space
+from fe_models.mesh import Body, Interface, StructureMesh, in_space
 from fe_models.rigid_motions import rigid_motions
 from fe_models.structure import Structure
-from fe_models.supported_body import SupportedBody, interface_frames
+from fe_models.supported_body import SupportedBody, interface_nodes
 from fe_models.total_lagrangian import TotalLagrangian
 from sa_solver.types import Array, Frame
 
@@ -105,13 +105,13 @@ def stress_stiffened(
     has the second-order effect of the stress on displacements across it, and leaves out what the
     displacements themselves change, which :func:`relinearised` does not.
     """
-    share = _share(structure, amplitudes)
-    bodies = []
-    pairs = zip((structure.body_1, structure.body_2), displacements, softening, strict=True)
-    for number, (body, displacement, soft) in enumerate(pairs, start=1):
-        stiffness = TotalLagrangian(body.elastic).stress_stiffened(displacement) - soft
-        bodies.append(_changed(body, number, structure.mesh.interfaces, stiffness, body.loads))
-    return PrestressedStructure(structure.mesh, bodies[0], bodies[1], displacements, share)
+    changes = [
+        (TotalLagrangian(body.elastic).stress_stiffened(displacement) - soft, body.loads)
+        for body, displacement, soft in zip(structure.bodies, displacements, softening, strict=True)
+    ]
+    return _prestressed(
+        structure, structure.mesh, displacements, _share(structure, amplitudes), changes
+    )
 
 
 def relinearised(
@@ -129,16 +129,14 @@ def relinearised(
         turned_interface(i, body_1, displacements[0]) for i in structure.mesh.interfaces
     )
     share = _share(structure, amplitudes)
-    bodies = []
-    pairs = zip((structure.body_1, structure.body_2), displacements, softening, strict=True)
-    for number, (body, displacement, soft) in enumerate(pairs, start=1):
+    changes = []
+    for body, displacement, soft in zip(structure.bodies, displacements, softening, strict=True):
         finite = TotalLagrangian(body.elastic)
         tangent = finite.tangent(displacement)
         offset = tangent @ displacement - finite.internal_force(displacement)
-        loads = body.loads + np.outer(offset, share)
-        bodies.append(_changed(body, number, interfaces, tangent - soft, loads))
+        changes.append((tangent - soft, body.loads + np.outer(offset, share)))
     mesh = replace(structure.mesh, interfaces=interfaces)
-    return PrestressedStructure(mesh, bodies[0], bodies[1], displacements, share)
+    return _prestressed(structure, mesh, displacements, share, changes)
 
 
 def turned_interface(interface: Interface, body_1: Body, displacement: Array) -> Interface:
@@ -187,23 +185,27 @@ def _share(structure: Structure, amplitudes: Array) -> Array:
     The projection of the cases' nodal forces on those of that load: one at it, falling with it, and
     whatever the order and the units of the cases.
     """
-    forces = np.concatenate([b.nodal_loads() for b in (structure.body_1, structure.body_2)])
+    forces = np.concatenate([b.nodal_loads() for b in structure.bodies])
     load = forces @ amplitudes
     if not load.any():
         raise ValueError("a structure is re-linearised at a load: its amplitudes are all zero")
     return np.asarray((load @ forces) / (load @ load))
 
 
-def _changed(
-    body: SupportedBody,
-    number: int,
-    interfaces: tuple[Interface, ...],
-    stiffness: sp.csr_matrix,
-    loads: Array,
-) -> SupportedBody:
-    """Body ``number``, supported as it is, with another stiffness, other loads and frames."""
-    elastic = copy(body.elastic)
-    elastic.stiffness = stiffness
-    nodes = np.concatenate([i.nodes(number) for i in interfaces])
-    frames = interface_frames(interfaces, number, elastic.body)
-    return SupportedBody(elastic, body.constraints, nodes, frames, loads, body.imposed)
+def _prestressed(
+    structure: Structure,
+    mesh: StructureMesh,
+    displacements: Displacements,
+    share: Array,
+    changes: Sequence[tuple[sp.csr_matrix, Array]],
+) -> PrestressedStructure:
+    """Bodies supported as they are, with another stiffness, other loads and the mesh's frames."""
+    bodies = []
+    for number, (body, (stiffness, loads)) in enumerate(
+        zip(structure.bodies, changes, strict=True), start=1
+    ):
+        elastic = copy(body.elastic)
+        elastic.stiffness = stiffness
+        placed = interface_nodes(mesh.interfaces, number, elastic.body)
+        bodies.append(SupportedBody(elastic, body.constraints, *placed, loads, body.imposed))
+    return PrestressedStructure(mesh, bodies[0], bodies[1], displacements, share)

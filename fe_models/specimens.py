@@ -26,7 +26,7 @@ NONE: Indices = np.empty(0, dtype=np.int64)
 
 @dataclass(frozen=True)
 class SpecimenMatrices:
-    """The free specimen with a linear trace on its pad, and on its ring if that is tied.
+    """The free specimen with a linear trace on its pad and on its ring.
 
     ``stiffness`` and ``mass`` ``(n, n)`` on the displacements that are left, ``transformation``
     ``(all, n)`` to those of all nodes; ``kept`` are the three displacements of each pad node, in
@@ -45,26 +45,25 @@ def specimen_matrices(
     pad: Indices,
     material: Material,
     order: int = 2,
-    tied_ring: bool = True,
-    further: Indices | None = None,
+    further: Indices = NONE,
 ) -> SpecimenMatrices:
     """Matrices of one free specimen, ``pad`` its vertices in the interface's order.
 
     ``further`` vertices are kept beside pad and ring.
 
-    With ``tied_ring`` the circumference moves linearly from each ring node to the next, so that
-    held ring nodes hold a line. Held points would give way the more the finer the mesh is: 90, 86
-    and 84 N/µm for the pair with elements of 1.5, 1 and 0.6 mm, against 98.1, 97.2 and 96.7.
+    The circumference moves linearly from each ring node to the next, so that held ring nodes hold a
+    line. Held points would give way the more the finer the mesh is: 90, 86 and 84 N/µm for the pair
+    with elements of 1.5, 1 and 0.6 mm, against 98.1, 97.2 and 96.7.
     """
     elastic = ElasticBody(body, material, order)
     ring = specimen.ring(body)
     constraints = Constraints(len(elastic.nodes))
     constraints.average(*elastic.midsides(CONTACT))
-    if tied_ring and order == 2:
+    if order == 2:
         edges = np.stack([ring, np.roll(ring, -1)], axis=1)
         middle = elastic.nodes[edges].mean(axis=1)
         constraints.average(cKDTree(elastic.nodes).query(middle)[1].astype(np.int64), edges)
-    nodes = np.concatenate([pad, ring, NONE if further is None else further])
+    nodes = np.concatenate([pad, ring, further])
     t = constraints.transformation()
     return SpecimenMatrices(
         stiffness=(t.T @ elastic.stiffness @ t).tocsr(),
@@ -79,7 +78,6 @@ def reduced_specimens(
     mesh: StructureMesh,
     materials: tuple[Material, Material],
     order: int = 2,
-    tied_ring: bool = True,
     modes: int = MODES,
     target_distance: float | None = None,
 ) -> tuple[ReducedModel, ReducedModel]:
@@ -96,24 +94,19 @@ def reduced_specimens(
         (mesh.body_1, mesh.body_2), (face.nodes_1, face.nodes_2), materials, strict=True
     ):
         target = NONE if target_distance is None else specimen.target(body, target_distance)
-        full = specimen_matrices(specimen, body, pad, material, order, tied_ring, target)
+        full = specimen_matrices(specimen, body, pad, material, order, target)
         mass = full.mass if modes > 0 else None
         model = reduce_body(full.stiffness, mass, full.kept, modes)
         ring = specimen.ring(body)
         places = body.mesh.p.T[np.concatenate([pad, ring, target])]
-        names = _displacement_names({PAD: len(pad), RING: len(ring), TARGET: len(target)})
+        names = tuple(
+            f"{kind} {number} {axis}"
+            for kind, points in ((PAD, pad), (RING, ring), (TARGET, target))
+            for number in range(1, len(points) + 1)
+            for axis in "xyz"
+        )
         models.append(replace(model, names=names, places=np.repeat(places, 3, axis=0)))
     return models[0], models[1]
-
-
-def _displacement_names(counts: dict[str, int]) -> tuple[str, ...]:
-    """Names of the three displacements of so many points of each kind."""
-    return tuple(
-        f"{kind} {number} {axis}"
-        for kind, count in counts.items()
-        for number in range(1, count + 1)
-        for axis in "xyz"
-    )
 
 
 def pad_stiffness(model: ReducedModel, specimen: Specimen) -> Array:

@@ -13,11 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 import scipy.sparse as sp
 
-from fe_models.elasticity import ElasticBody
+from fe_models.elasticity import ROTOR, ElasticBody
 from sa_solver.types import Array
-
-# The rotor axis, the global Y.
-ROTOR = np.array([0.0, 1.0, 0.0])
 
 
 @dataclass(frozen=True)
@@ -42,8 +39,8 @@ def spin_softening(
 
     ``speed`` [rad/s] is that about the direction ``axis`` ``(3,)``, a unit vector.
     """
-    own_axes = list(elastic.body.axes)
-    across = sp.csr_matrix((np.eye(3) - np.outer(axis, axis))[np.ix_(own_axes, own_axes)])
+    axes = elastic.body.axes
+    across = sp.csr_matrix((np.eye(3) - np.outer(axis, axis))[np.ix_(axes, axes)])
     mass = elastic.mass @ sp.kron(sp.identity(elastic.size // elastic.dimension), across)
     for body in carried:
         motion = carried_motion(elastic, body)

@@ -31,7 +31,7 @@ def stress_state(
     """
     displacements = deformation(structure, force, relative, amplitudes)
     fields = []
-    for body, displacement in zip((structure.body_1, structure.body_2), displacements, strict=True):
+    for body, displacement in zip(structure.bodies, displacements, strict=True):
         stress = body.elastic.at_vertices(body.elastic.stress(displacement))
         nodal = displacement.reshape(-1, body.elastic.dimension)
         vertices = in_space(nodal[: body.elastic.body.mesh.nvertices])

@@ -88,6 +88,11 @@ class Structure:
     body_1: SupportedBody
     body_2: SupportedBody
 
+    @property
+    def bodies(self) -> tuple[SupportedBody, SupportedBody]:
+        """Body 1 and body 2."""
+        return self.body_1, self.body_2
+
     def condense(self, like: JointResolvent | None = None) -> JointStiffness:
         """Stiffness and loads of the joint on its interface displacements.
 

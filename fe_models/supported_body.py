@@ -118,7 +118,7 @@ class SupportedBody:
         """
         interface_displacement = interface_displacement[self._free]
         stiffness, loads = self._reduced()
-        inner = self._inner(stiffness)
+        inner = np.setdiff1d(np.arange(stiffness.shape[0]), self._interface)
         rhs = loads[inner] @ amplitudes
         rhs -= stiffness[inner][:, self._interface] @ interface_displacement
         displacement = np.empty(stiffness.shape[0])
@@ -140,7 +140,8 @@ class SupportedBody:
     def load_resultants(self, amplitudes: Array, about: Array) -> Array:
         """Force and moment ``(2, 3)`` of the applied loads about a point."""
         forces = np.zeros((len(self.elastic.nodes), 3))
-        forces[:, self.elastic.body.axes] = self._nodal(self.loads @ amplitudes)
+        applied = self.loads @ amplitudes
+        forces[:, self.elastic.body.axes] = applied.reshape(-1, self.elastic.dimension)
         arms = self.elastic.nodes - about
         return np.array([forces.sum(axis=0), np.cross(arms, forces).sum(axis=0)])
 
@@ -184,24 +185,20 @@ class SupportedBody:
         displacement = self._transformation @ free
         return displacement if self.imposed is None else displacement + self.imposed @ amplitudes
 
-    def _nodal(self, values: Array) -> Array:
-        return values.reshape(-1, self.elastic.dimension)
-
     def _dofs(self, nodes: Indices) -> Indices:
         """Displacements of nodes, one node after the other."""
         d = self.elastic.dimension
         return np.asarray((d * nodes[:, None] + np.arange(d)).ravel())
 
-    def _inner(self, stiffness: sp.csr_matrix) -> Indices:
-        return np.setdiff1d(np.arange(stiffness.shape[0]), self._interface)
 
-
-def interface_frames(interfaces: tuple[Interface, ...], number: int, body: Body) -> Array:
-    """Axes at every interface node of body ``number``, ``(n, d, d)``, interface after interface."""
+def interface_nodes(
+    interfaces: Sequence[Interface], number: int, body: Body
+) -> tuple[Indices, Array]:
+    """Nodes ``(n,)`` of body ``number``, interface by interface, and their axes ``(n, d, d)``."""
     axes = np.ix_(body.axes, body.axes)
-    return np.concatenate(
-        [np.tile(i.frame.axes[axes], (len(i.face(number)), 1, 1)) for i in interfaces]
-    )
+    nodes = [interface.nodes(number) for interface in interfaces]
+    frames = [np.tile(i.frame.axes[axes], (len(i.nodes(number)), 1, 1)) for i in interfaces]
+    return np.concatenate(nodes), np.concatenate(frames)
 
 
 def _interface_displacements(

@@ -96,14 +96,14 @@ class TotalLagrangian:
         lame, shear = self._material.lame, self._material.shear_modulus
         pushed = np.einsum("abeq,beiq->aeiq", deformation, self._gradients)
         left = _product(deformation, deformation.swapaxes(0, 1))
-        geometric = self._gradient_products(stress)
+        geometric = self._gradient_products(np.einsum("abeq,beiq->aeiq", stress, self._gradients))
         rows, columns, places = self._pattern
         blocks = np.empty((len(rows), self._dimension, self._dimension))
         for a in range(self._dimension):
             for b in range(a, self._dimension):
                 pair = self._products(pushed[a], pushed[b])
                 block = lame * pair + shear * pair.swapaxes(1, 2)
-                block += shear * self._gradient_products(left[a, b] * _unit(self._dimension))
+                block += shear * self._gradient_products(left[a, b][:, None] * self._gradients)
                 if a == b:
                     block += geometric
                 blocks[:, a, b] = np.bincount(places, block.ravel())
@@ -112,16 +112,10 @@ class TotalLagrangian:
         size = self._dimension * self._nodes
         return sp.bsr_matrix((blocks, columns, starts), shape=(size, size)).tocsr()
 
-    def _gradient_products(self, tensor: Array) -> Array:
-        """∫ ∇φi·A ∇φj of a symmetric A ``(d, d, elements, points)``, by element."""
-        mapped = np.einsum("abeq,beiq->aeiq", tensor, self._gradients)
-        return np.sum(
-            [
-                self._products(left, right)
-                for left, right in zip(mapped, self._gradients, strict=True)
-            ],
-            axis=0,
-        )
+    def _gradient_products(self, vectors: Array) -> Array:
+        """∫ v_i·∇φj of vectors ``(d, elements, element nodes, points)``, by element."""
+        pairs = zip(vectors, self._gradients, strict=True)
+        return np.sum([self._products(left, right) for left, right in pairs], axis=0)
 
     def _products(self, left: Array, right: Array) -> Array:
         """∫ f_i g_j of functions ``(elements, element nodes, points)``, by element."""
@@ -153,10 +147,6 @@ def rotation_angle(rotations: Array) -> Array:
 
 def _identity(like: Array) -> Array:
     return np.eye(len(like)).reshape(len(like), -1, *(1,) * (like.ndim - 2))
-
-
-def _unit(dimension: int) -> Array:
-    return np.eye(dimension)[:, :, None, None]
 
 
 def _product(left: Array, right: Array) -> Array:

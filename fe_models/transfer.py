@@ -63,7 +63,7 @@ class FaceTransfer:
 
 def _shared_lengths(face: Face, grid: Grid) -> sp.csr_matrix:
     """Integrals of the nodes' shape functions over the strips of a line contact, exact."""
-    borders = np.append(grid.x.ravel() - 0.5 * grid.pitch[0], grid.x.max() + 0.5 * grid.pitch[0])
+    borders = _borders(grid)[0]
     shared = np.zeros((grid.shape[0], len(face)))
     for first, second in face.facets:
         start, end = face.coordinates[[first, second], 0]
@@ -82,14 +82,19 @@ def _shared_areas(face: Face, grid: Grid) -> sp.csr_matrix:
     and y are sums over its edges of what lies under each (Green's theorem); those over cells are
     their differences.
     """
-    borders = [
-        np.append(c.ravel() - 0.5 * d, c.max() + 0.5 * d)
-        for c, d in zip((grid.x, grid.y), grid.pitch, strict=True)
-    ]
+    borders = _borders(grid)
     parts = [_triangle(face, triangle, borders, grid.shape[1]) for triangle in face.facets]
     values, cells, nodes = (np.concatenate(part) for part in zip(*parts, strict=True))
     shape = grid.shape[0] * grid.shape[1], len(face)
     return sp.csr_matrix((values, (cells, nodes)), shape=shape)
+
+
+def _borders(grid: Grid) -> list[Array]:
+    """Borders of the cells along x and along y [mm]."""
+    return [
+        np.append(c.ravel() - 0.5 * d, c.max() + 0.5 * d)
+        for c, d in zip((grid.x, grid.y), grid.pitch, strict=True)
+    ]
 
 
 def _triangle(

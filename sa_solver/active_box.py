@@ -26,35 +26,32 @@ SIZES = (8, 10, 12, 15)
 
 @dataclass(frozen=True)
 class Box:
-    """Cells ``start`` to ``stop`` along x and y of a grid of ``shape``."""
+    """The cells of a grid of ``shape`` that the slices ``window`` cut out of a field."""
 
-    start: tuple[int, int]
-    stop: tuple[int, int]
+    window: Window
     shape: tuple[int, int]
 
     @classmethod
     def whole(cls, shape: tuple[int, int]) -> Box:
         """All cells."""
-        return cls((0, 0), shape, shape)
+        return cls((slice(0, shape[0]), slice(0, shape[1])), shape)
 
     @classmethod
     def around(cls, cells: Mask) -> Box:
         """A box with a rim around ``cells`` ``(nx, ny)``, or all where that is not much larger."""
         shape = (cells.shape[0], cells.shape[1])
-        sides = [_side(np.flatnonzero(cells.any(axis=1 - axis)), shape[axis]) for axis in (0, 1)]
-        box = cls((sides[0][0], sides[1][0]), (sides[0][1], sides[1][1]), shape)
+        along_x, along_y = (
+            _side(np.flatnonzero(cells.any(axis=1 - axis)), shape[axis]) for axis in (0, 1)
+        )
+        box = cls((along_x, along_y), shape)
         small = np.prod(box.size) <= LARGEST_SHARE * np.prod(shape)
         return box if small else cls.whole(shape)
 
     @property
     def size(self) -> tuple[int, int]:
         """Cells along x and y."""
-        return self.stop[0] - self.start[0], self.stop[1] - self.start[1]
-
-    @property
-    def window(self) -> Window:
-        """Slices that cut the box out of a field."""
-        return slice(self.start[0], self.stop[0]), slice(self.start[1], self.stop[1])
+        along_x, along_y = self.window
+        return along_x.stop - along_x.start, along_y.stop - along_y.start
 
     def grown(self) -> Box:
         """A larger box around this one."""
@@ -70,23 +67,21 @@ class Box:
 
     def left_by(self, cells: Mask) -> bool:
         """Whether ``cells`` of the box reach a side of it that is not a border of the grid."""
-        for axis, lines in enumerate((cells, cells.T)):
-            if self.start[axis] > 0 and lines[0].any():
-                return True
-            if self.stop[axis] < self.shape[axis] and lines[-1].any():
-                return True
-        return False
+        return any(
+            (side.start > 0 and lines[0].any()) or (side.stop < count and lines[-1].any())
+            for side, count, lines in zip(self.window, self.shape, (cells, cells.T), strict=True)
+        )
 
 
-def _side(pressed: NDArray[np.intp], count: int) -> tuple[int, int]:
-    """First cell and end of the box along an axis of ``count`` cells."""
+def _side(pressed: NDArray[np.intp], count: int) -> slice:
+    """Cells of the box along an axis of ``count`` cells."""
     if len(pressed) == 0:
-        return 0, count
+        return slice(0, count)
     first, end = int(pressed[0]), int(pressed[-1]) + 1
     margin = max(LEAST_MARGIN, int(np.ceil(MARGIN * (end - first))))
     size = min(_fast(end - first + 2 * margin), count)
     start = min(max((first + end - size) // 2, 0), count - size)
-    return start, start + size
+    return slice(start, start + size)
 
 
 def _fast(count: int) -> int:

@@ -23,6 +23,10 @@ from sa_solver.preconditioner import NormalPreconditioner
 from sa_solver.rigid_modes import RANK_CUTOFF
 from sa_solver.types import Array, Mask
 
+ITERATIONS = 200
+"""Directions took at most 20 on smooth contacts and 125 on the roughest; beyond this they are taken
+to circle between contact sets."""
+
 SETTLED = 0.4
 """The contact set is revised once the preconditioned residual on it has fallen by this factor.
 From 0.3 up smooth contacts take the same count; at 0.1 a third more, spent on wrong sets."""
@@ -49,44 +53,18 @@ hand, cut to the set, does as well: 0 and 0.05 take the same count within one.""
 
 @dataclass(frozen=True)
 class SearchResult:
-    """The last feasible iterate, how many directions were searched, and whether it converged.
+    """The last feasible iterate, and whether it converged.
 
     ``left`` says that the search ended because the contact set left its bounds.
     """
 
     iterate: Iterate
-    iterations: int
     converged: bool
     left: bool
 
 
-def bound_conjugate_gradients(
-    problem: NormalProblem,
-    preconditioner: NormalPreconditioner,
-    pressure: Array,
-    displacement: Array,
-    tolerance: float,
-    max_iterations: int,
-    leaves: Callable[[Mask], bool],
-) -> SearchResult:
-    """Solve ``problem`` from a balanced ``pressure`` >= 0 and its ``displacement`` (K + D) p.
-
-    Arrays are ``(nx, ny)`` [MPa], [mm]. Stops when penetration and complementarity are within
-    ``tolerance``; the resultants are met throughout. Stops, too, when ``leaves`` is true of a trial
-    contact set. May fail to converge, since no step is forced to lower the energy: the result then
-    holds the last pressure that did not pull.
-    """
-    search = _Search(problem, preconditioner, pressure, displacement, leaves)
-    iteration = 0
-    while not search.converged(tolerance):
-        if iteration == max_iterations or not search.advance():
-            return SearchResult(search.feasible, iteration, False, search.left)
-        iteration += 1
-    return SearchResult(search.iterate(), iteration, True, False)
-
-
-class _Search:
-    """State of the search. Between revisions of the contact set the pressure on it may pull.
+class BoundConjugateGradients:
+    """State of a search. Between revisions of the contact set the pressure on it may pull.
 
     ``lifted`` is the height plus the displacement: the gap but for the rigid motion. ``punch`` is a
     pressure field on the set close to that of a flat punch; times 1, y and -x it stands for the
@@ -102,9 +80,13 @@ class _Search:
         displacement: Array,
         leaves: Callable[[Mask], bool],
     ) -> None:
+        """From a balanced ``pressure`` >= 0 [MPa] and its ``displacement`` (K + D) p [mm].
+
+        Both are ``(nx, ny)``. The search ends when ``leaves`` is true of a trial contact set.
+        """
         self._problem, self._preconditioner = problem, preconditioner
         self._modes, self._leaves = problem.modes, leaves
-        self.left = False
+        self._left = False
         self._pressure, self._lifted = pressure.copy(), problem.height + displacement
         self._gap, self._scratch = np.empty_like(pressure), np.empty_like(pressure)
         self._direction, self._residual = np.zeros_like(pressure), np.zeros_like(pressure)
@@ -113,25 +95,38 @@ class _Search:
         self._take(pressure > 0.0)
         self._keep()
 
-    def converged(self, tolerance: float) -> bool:
+    def solve(self, tolerance: float) -> SearchResult:
+        """Search until penetration and complementarity are within ``tolerance``.
+
+        The resultants are met throughout. May fail to converge, since no step is forced to lower
+        the energy: the result then holds the last pressure that did not pull.
+        """
+        directions = 0
+        while not self._converged(tolerance):
+            if directions == ITERATIONS or not self._advance():
+                return SearchResult(self._feasible, False, self._left)
+            directions += 1
+        return SearchResult(self._iterate(), True, False)
+
+    def _converged(self, tolerance: float) -> bool:
         """Penetration and complementarity within ``tolerance`` and no cell pulling."""
         # The displacement of the last revision is near enough to rule out most iterates.
         if self._pressure.min() < 0.0 or -self._gap.min() > 2.0 * tolerance * self._scale:
             return False
-        return normal_residuals(self._problem, self.iterate()).largest <= tolerance
+        return normal_residuals(self._problem, self._iterate()).largest <= tolerance
 
-    def iterate(self) -> Iterate:
+    def _iterate(self) -> Iterate:
         """The present pressure, displacement and rigid motion."""
         return Iterate(self._pressure.copy(), self._displacement(), self._rigid)
 
-    def advance(self) -> bool:
+    def _advance(self) -> bool:
         """Search one direction; False where none is left."""
         residual, gradient, energy = self._gradient()
         revised = False
         if (energy <= self._settled or self._pulls()) and self._needs_revision():
             self._revise()
             if self._leaves(self._contact):
-                self.left = True
+                self._left = True
                 return False
             residual, gradient, energy = self._gradient()
             revised = True
@@ -144,8 +139,8 @@ class _Search:
 
     def _keep(self) -> None:
         """Remember this pressure, which nowhere pulls."""
-        self.feasible = self.iterate()
-        self._scale = float(self.feasible.displacement.max())
+        self._feasible = self._iterate()
+        self._scale = float(self._feasible.displacement.max())
 
     def _gradient(self) -> tuple[Array, Array, float]:
         """Gap on the set, the pressure field it asks for, and their product (an energy)."""
@@ -197,7 +192,7 @@ class _Search:
 
     def _truncate(self) -> None:
         """Cut off all cells that pull or, if the rest cannot carry the load, the first to do so."""
-        problem, last = self._problem, self.feasible
+        problem, last = self._problem, self._feasible
         change = self._pressure - last.pressure
         for part in PARTS:
             cut = unilateral(last.pressure + part * change)

@@ -67,6 +67,5 @@ def first_loading(
         ),
         converged=stuck.converged,
         message=stuck.message,
-        iterations=stuck.iterations,
         convolutions=stuck.convolutions,
     )

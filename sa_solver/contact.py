@@ -11,6 +11,7 @@ eqs 6-8.
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -19,16 +20,10 @@ from typing import TypeVar
 import numpy as np
 
 from sa_solver.ciavarella_jaeger import first_loading
-from sa_solver.coupled import CoupledContact, CoupledStart, CoupledState
+from sa_solver.coupled import CoupledContact, CoupledState
 from sa_solver.errors import InputError
 from sa_solver.friction_limit import largest_share
-from sa_solver.gross_slip import (
-    GrossSlip,
-    SlidingRule,
-    SlidingTrial,
-    gross_slip,
-    sliding_direction,
-)
+from sa_solver.gross_slip import SlidingRule, gross_slip, sliding_direction
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalStart, NormalState
 from sa_solver.rigid_modes import NORMAL, PLANAR, PlanarModes
@@ -52,7 +47,7 @@ SHARE_CHECKED = 0.5
 """Share of µP or of its moment from which the largest force is computed."""
 
 
-_State = TypeVar("_State")
+_State = TypeVar("_State", TangentialState, CoupledState)
 
 
 class FrictionError(InputError):
@@ -95,15 +90,15 @@ class ContactState:
     sticking: Mask
     resultants: Array
     rigid: Array
-    strain: float
     energy: Array
-    sliding: bool
-    residual: float
     converged: bool
-    message: str
-    convolutions: int
-    border_load: float
-    start: CoupledStart | None = None
+    strain: float = 0.0
+    sliding: bool = False
+    residual: float = 0.0
+    message: str = ""
+    convolutions: int = 0
+    border_load: float = 0.0
+    start: Array | None = None
 
     @property
     def pressure(self) -> Array:
@@ -150,14 +145,8 @@ class FrictionalContact:
             sticking=np.zeros(self.grid.shape, dtype=bool),
             resultants=np.zeros(6),
             rigid=np.zeros(6),
-            strain=0.0,
             energy=np.zeros(2),
-            sliding=False,
-            residual=0.0,
             converged=True,
-            message="",
-            convolutions=0,
-            border_load=0.0,
         )
 
     def advance(self, before: ContactState, height: Array, load: ContactLoad) -> ContactState:
@@ -234,12 +223,9 @@ class FrictionalContact:
     ) -> TangentialState:
         names = ("Qx", "Qy", "Mz"), ("shift_x", "shift_y", "twist")
         imposed: dict[str, float] = {}
-        for place, k in enumerate(PLANAR):
+        for place, k in enumerate(PLANAR[:2] if self.grid.line else PLANAR):
             value = load.values[k] - (before.rigid[k] if load.motion[k] else 0.0)
             imposed[names[load.motion[k]][place]] = float(value)
-        if self.grid.line:
-            imposed.pop("Mz", None)
-            imposed.pop("twist", None)
         return self.tangential.solve(
             limit, offset, **imposed, tolerance=self.tolerance, start=before.shear
         )
@@ -261,46 +247,51 @@ class FrictionalContact:
     def _slide(
         self, limit: Array, offset: Array, load: ContactLoad
     ) -> tuple[TangentialState, bool]:
-        """Gross slip by the energy of ``load``, and whether it creeps: see :class:`GrossSlip`."""
-        area = self.grid.cell_area
-        start = limit * sliding_direction(load.values[1:3])[:, None, None]
-        moved = self.half_space.shear(start) + offset
+        """Gross slip by the energy of ``load``, and whether it creeps."""
+        shear = limit * sliding_direction(load.values[1:3])[:, None, None]
         twist = {} if self.grid.line else {"twist": 0.0}
-        spent = 0
 
-        def slide(shift: Array, tolerance: float) -> SlidingTrial[TangentialState]:
-            nonlocal start, spent
+        def solve(shift: Array, tolerance: float, last: TangentialState | None) -> TangentialState:
             x, y = map(float, shift)
-            state = self.tangential.solve(
+            start = shear if last is None else last.shear
+            return self.tangential.solve(
                 limit, offset, shift_x=x, shift_y=y, **twist, tolerance=tolerance, start=start
             )
-            start, spent = state.shear, spent + state.convolutions
-            energy = self._dissipated(state.shear, state.slip)
-            return SlidingTrial(state, np.array([state.Qx, state.Qy]), energy)
 
-        stored = float(np.vdot(start, moved))
-        solution = self._by_energy(slide, float(limit.sum()) * area, load, stored)
-        state, message = solution.state, solution.state.message or solution.message
-        state = replace(state, convolutions=spent, converged=not message, message=message)
-        return state, solution.creeps
+        carried = float(limit.sum()) * self.grid.cell_area
+        return self._by_energy(solve, carried, shear, offset, load)
 
     def _by_energy(
         self,
-        slide: Callable[[Array, float], SlidingTrial[_State]],
+        solve: Callable[[Array, float, _State | None], _State],
         carried: float,
+        shear: Array,
+        offset: Array,
         load: ContactLoad,
-        stored: float,
-    ) -> GrossSlip[_State]:
+    ) -> tuple[_State, bool]:
+        """Gross slip by the energy of ``load``, and whether it creeps.
+
+        ``solve`` finds the state for a motion (Δδx, Δδy), to a tolerance, from the last one;
+        ``shear`` ``(2, nx, ny)`` is about that of sliding, ``carried`` µP [N].
+        """
         assert load.energy is not None
-        return gross_slip(
-            slide,
-            carried,
-            load.energy,
-            load.values[1:3],
-            self.tolerance,
-            self._sliding,
-            stored * self.grid.cell_area,
-        )
+        last: deque[_State] = deque(maxlen=1)
+        spent = 0
+
+        def slide(shift: Array, tolerance: float) -> tuple[Array, Array]:
+            nonlocal spent
+            state = solve(shift, tolerance, last[0] if last else None)
+            last.append(state)
+            spent += state.convolutions
+            force = state.shear.sum(axis=(1, 2)) * self.grid.cell_area
+            return force, self._dissipated(state.shear, state.slip)
+
+        stored = float(np.vdot(shear, self.half_space.shear(shear) + offset)) * self.grid.cell_area
+        force = load.values[1:3]
+        slip = gross_slip(slide, carried, load.energy, force, self.tolerance, self._sliding, stored)
+        message = last[0].message or slip.message
+        state = replace(last[0], convolutions=spent, converged=not message, message=message)
+        return state, slip.creeps
 
     def _slides(self, limit: Array, load: ContactLoad) -> bool:
         """Whether the energy is known and forces are within 1 % of the largest friction carries."""
@@ -412,25 +403,17 @@ class FrictionalContact:
         self, before: ContactState, height: Array, offset: Array, load: ContactLoad, limit: Array
     ) -> CoupledState:
         """Gross slip by the energy of ``load``."""
-        values, start = load.values.copy(), before.start
+        values = load.values.copy()
         values[5] = 0.0
         motion = (load.motion[0], True, True, load.motion[3], load.motion[4], not self.grid.line)
         shear = limit * sliding_direction(load.values[1:3])[:, None, None]
-        moved = self.half_space.shear(shear) + offset
 
-        spent = 0
-
-        def slide(shift: Array, tolerance: float) -> SlidingTrial[CoupledState]:
-            nonlocal start, spent
+        def solve(shift: Array, tolerance: float, last: CoupledState | None) -> CoupledState:
             values[1:3] = shift
-            state = self._coupled.solve(
+            start = (last or before).start
+            return self._coupled.solve(
                 height, offset, values, motion, tolerance=tolerance, start=start
             )
-            start, spent = state.start, spent + state.convolutions
-            energy = self._dissipated(state.shear, state.slip)
-            return SlidingTrial(state, state.resultants[1:3], energy)
 
         carried = self.friction * float(load.values[0])
-        solution = self._by_energy(slide, carried, load, float(np.vdot(shear, moved)))
-        state, message = solution.state, solution.state.message or solution.message
-        return replace(state, convolutions=spent, converged=not message, message=message)
+        return self._by_energy(solve, carried, shear, offset, load)[0]

@@ -25,9 +25,10 @@ def project_on_disk(shear: Array, limit: Array) -> Array:
     magnitude = np.hypot(shear[0], shear[1])
     radius = np.maximum(limit, 0.0)
     # Where nothing exceeds the limit the factor is exactly 1, so stuck cells stay bit for bit.
-    factor = np.divide(radius, magnitude, out=np.ones_like(magnitude), where=magnitude > radius)
-    projected: Array = shear * factor
-    return projected
+    factor: Array = np.divide(
+        radius, magnitude, out=np.ones_like(magnitude), where=magnitude > radius
+    )
+    return shear * factor
 
 
 def coulomb(traction: Array, friction: float | Array) -> Array:

@@ -34,7 +34,7 @@ from sa_solver.normal_problem import border_share
 from sa_solver.padded_splitting import PaddedSplitting, RigidResponse
 from sa_solver.rigid_modes import PLANAR, RESULTANTS, RigidModes
 from sa_solver.splitting import douglas_rachford
-from sa_solver.tangential import UNCARRIED, FrictionLimitError
+from sa_solver.tangential import UNCARRIED, FrictionLimitError, listed
 from sa_solver.types import Array
 
 TOLERANCE = 1e-8
@@ -89,13 +89,6 @@ class CoupledContactError(ContactProblemError):
 
 
 @dataclass(frozen=True)
-class CoupledStart:
-    """What a solve on the same grid can start from: the splitting's state, zero-padded."""
-
-    splitting: Array
-
-
-@dataclass(frozen=True)
 class CoupledState:
     """Solution of one increment.
 
@@ -104,7 +97,8 @@ class CoupledState:
     ``resultants`` are (P, Qx, Qy, Mx, My, Mz) [N, N mm] and ``rigid`` the motions (δz, δx, δy, φx,
     φy, φz) [mm, rad], those in the plane being of the increment. ``border_load`` is the share of P
     on the outermost cells: above 0, the grid is too small. ``message`` is empty when
-    ``converged``, else says what is wrong and what to try.
+    ``converged``, else says what is wrong and what to try. ``start``, the splitting's state
+    zero-padded, is what a solve on the same grid can start from.
     """
 
     traction: Array
@@ -114,12 +108,12 @@ class CoupledState:
     rigid: Array
     resultants: Array
     residuals: CoupledResiduals
-    converged: bool
-    message: str
-    iterations: int
-    convolutions: int
     border_load: float
-    start: CoupledStart
+    start: Array | None = None
+    converged: bool = False
+    message: str = ""
+    iterations: int = 0
+    convolutions: int = 0
 
     @property
     def pressure(self) -> Array:
@@ -167,7 +161,7 @@ class CoupledContact:
         motion: tuple[bool, ...] = ALL_FORCES,
         *,
         tolerance: float = TOLERANCE,
-        start: CoupledStart | None = None,
+        start: Array | None = None,
         compliance: Array | None = None,
     ) -> CoupledState:
         """Tractions and motions at the end of one increment.
@@ -191,12 +185,14 @@ class CoupledContact:
 
     # -- steps of solve -----------------------------------------------------------------------
     def _search(
-        self, problem: CoupledProblem, tolerance: float, start: CoupledStart | None
+        self, problem: CoupledProblem, tolerance: float, start: Array | None
     ) -> CoupledState:
         """Iterate the splitting until the residuals of its solution are met, or cannot be."""
+        if start is not None and start.shape != (3, *self._resolvent.padded_shape):
+            raise CoupledContactError("start belongs to another grid: start from a state on this")
         before = self.half_space.count
         splitting, free = self._splitting(problem), list(problem.free)
-        state = self._started(start) if start else self._touching(problem)
+        state = self._touching(problem) if start is None else start
         inner, iterations, message, begun_anew = tolerance, 0, "", False
         while True:
             result = douglas_rachford(
@@ -231,11 +227,11 @@ class CoupledContact:
             message=message,
             iterations=iterations,
             convolutions=self.half_space.count - before,
-            start=CoupledStart(state),
+            start=state,
         )
 
     def _splitting(self, problem: CoupledProblem) -> PaddedSplitting:
-        free, modes, shift = list(problem.free), self._modes, self._resolvent.shift[Z]
+        shift = self._resolvent.shift[Z]
         yielding = shift / (shift + problem.compliance)
 
         def law(trial: Array) -> Array:
@@ -246,18 +242,11 @@ class CoupledContact:
 
         return PaddedSplitting(
             self._resolvent,
-            self._response.only([modes.present.index(k) for k in free]),
-            lambda traction: modes.sums(traction)[free],
+            self._response.only([self._modes.present.index(k) for k in problem.free]),
             problem.target,
             problem.offset,
             law,
         )
-
-    def _started(self, start: CoupledStart) -> Array:
-        """The splitting's state that ``start`` holds."""
-        if start.splitting.shape != (3, *self._resolvent.padded_shape):
-            raise CoupledContactError("start belongs to another grid: start from a state on this")
-        return start.splitting
 
     def _touching(self, problem: CoupledProblem) -> Array:
         """The splitting's state ``t + v/ρ`` of bodies that touch without load."""
@@ -307,12 +296,7 @@ class CoupledContact:
             rigid=(rigid + problem.imposed) / self._modes.lengths,
             resultants=self._modes.resultants(traction),
             residuals=coupled_residuals(problem, traction, displacement, relative),
-            converged=False,
-            message="",
-            iterations=0,
-            convolutions=0,
             border_load=border_share(traction[Z]),
-            start=CoupledStart(np.empty(0)),
         )
 
     def _pressed(self, problem: CoupledProblem) -> Array:
@@ -360,7 +344,7 @@ class CoupledContact:
             residuals=CoupledResiduals(*[0.0] * 5),
             converged=True,
             border_load=0.0,
-            start=CoupledStart(self._resolvent.padded(traction)),
+            start=self._resolvent.padded(traction),
         )
 
     def _failure(self, problem: CoupledProblem, state: CoupledState, tolerance: float) -> str:
@@ -394,7 +378,15 @@ class CoupledContact:
             return ""
         shapes = np.array([self._modes.motion(np.eye(6)[k])[:Z] for k in planar])
         share = largest_share(limit.ravel(), shapes.reshape(len(planar), 2, -1), target)
-        return _beyond_friction(self._modes, planar, target, share) if share < least else ""
+        if share >= least:
+            return ""
+        forces = target * (self._modes.lengths * self.grid.cell_area)[planar]
+        places = [PLANAR.index(k) for k in planar]
+        given, largest = (listed(places, scale * forces) for scale in (1.0, share))
+        return (
+            f"friction cannot carry {given}; under the pressure found the largest in this "
+            f"direction is {largest}: lower the force, or impose the sliding motion instead"
+        )
 
     # -- what is refused ----------------------------------------------------------------------
     def _check(
@@ -463,18 +455,3 @@ def _check_field(name: str, field: Array, shape: tuple[int, ...]) -> None:
         raise CoupledContactError(f"{name} have shape {field.shape}: give {shape}")
     if not np.all(np.isfinite(field)):
         raise CoupledContactError(f"{name} hold NaN or infinity: fill or crop the missing points")
-
-
-def _beyond_friction(modes: RigidModes, planar: list[int], target: Array, share: float) -> str:
-    physical = target * (modes.lengths * modes.grid.cell_area)[planar]
-    given, largest = (
-        ", ".join(
-            f"{RESULTANTS[k]} = {scale * value:.6g} {'N mm' if k == PLANAR[2] else 'N'}"
-            for k, value in zip(planar, physical, strict=True)
-        )
-        for scale in (1.0, share)
-    )
-    return (
-        f"friction cannot carry {given}; under the pressure found the largest in this direction is "
-        f"{largest}: lower the force, or impose the sliding motion instead"
-    )

@@ -29,11 +29,11 @@ def gradients_on_disks(
     operator = problem.operator
     stiffness = 1.0 / operator.largest_eigenvalue
     everywhere = problem.pressed.astype(np.float64)
-    best, momentum = np.inf, 1.0
-    displacement = operator.displacement(shear)
-    solution = _solution(problem, shear, displacement, np.zeros(len(problem.target)), np.inf, 0)
+    momentum, displacement = 1.0, operator.displacement(shear)
+    rigid, slipping = np.zeros(len(problem.target)), problem.on_circle(shear)
+    best = DiskSolution(shear, displacement, rigid, slipping, np.inf, False)
     ahead, ahead_displacement = shear, displacement
-    for iteration in range(1, max_iterations + 1):
+    for _ in range(max_iterations):
         trial = ahead - stiffness * (ahead_displacement + problem.offset) * everywhere
         balance = problem.balance(trial, weight=everywhere)
         if balance is None:
@@ -46,25 +46,12 @@ def gradients_on_disks(
         new_displacement = operator.displacement(new)
         rigid = coefficients / stiffness
         residual = problem.residual(new, new_displacement, rigid)
-        if residual < best:
-            best = residual
-            solution = _solution(problem, new, new_displacement, rigid, residual, iteration)
-        if residual <= tolerance:
-            return _solution(problem, new, new_displacement, rigid, residual, iteration, True)
+        if residual < best.residual:
+            slipping, converged = problem.on_circle(new), residual <= tolerance
+            best = DiskSolution(new, new_displacement, rigid, slipping, residual, converged)
+        if best.converged:
+            return best
         ahead = new + share * (new - shear)
         ahead_displacement = new_displacement + share * (new_displacement - displacement)
         shear, displacement, momentum = new, new_displacement, following
-    return solution
-
-
-def _solution(
-    problem: TangentialProblem,
-    shear: Array,
-    displacement: Array,
-    rigid: Array,
-    residual: float,
-    iterations: int,
-    converged: bool = False,
-) -> DiskSolution:
-    slipping = problem.on_circle(shear)
-    return DiskSolution(shear, displacement, rigid, slipping, residual, iterations, converged)
+    return best

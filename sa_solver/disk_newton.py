@@ -52,7 +52,7 @@ ROUNDING = 1e-12
 class DiskSolution:
     """Shear [MPa], its displacement K q [mm], both ``(2, nx, ny)``, and the free rigid motions.
 
-    ``slipping`` marks cells on their circle; ``iterations`` counts conjugate directions.
+    ``slipping`` marks cells on their circle.
     """
 
     shear: Array
@@ -60,7 +60,6 @@ class DiskSolution:
     rigid: Array
     slipping: Mask
     residual: float
-    iterations: int
     converged: bool
 
 
@@ -127,13 +126,7 @@ class _Search:
 
     def solution(self, residual: float, converged: bool) -> DiskSolution:
         return DiskSolution(
-            self._shear,
-            self._displacement,
-            self._rigid,
-            self._slipping,
-            residual,
-            self.iterations,
-            converged,
+            self._shear, self._displacement, self._rigid, self._slipping, residual, converged
         )
 
     def phase(self) -> bool:
@@ -266,8 +259,7 @@ class _Search:
         """Slipping cells that a ``step`` from the last shear leaves slipping along with it."""
         slip = self._moved - self._bend.times(step)
         self._problem.modes.add_motion(slip, -self._rigid)
-        released: Mask = self._slipping & (dot(slip, self._shear + step) > 0.0)
-        return released
+        return self._slipping & (dot(slip, self._shear + step) > 0.0)
 
     def _hold(self) -> bool:
         """Take all cells on their circle to slip, at the old shear; False if they do already.

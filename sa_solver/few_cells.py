@@ -37,20 +37,20 @@ DROPPED = 1e-12
 """A pressure below this share of the largest is rounding of the dense solve."""
 
 
-def solve_few_cells(problem: NormalProblem, tolerance: float) -> tuple[Iterate | None, int]:
-    """The solution of ``problem`` and the steps taken; None where it needs too many cells."""
+def solve_few_cells(problem: NormalProblem, tolerance: float) -> Iterate | None:
+    """The solution of ``problem``; None where it needs too many cells or steps."""
     if APPROACH in problem.modes.free:
         start = _rigid_contact(problem)
     else:
         start = None if problem.target.any() else (np.zeros(0, dtype=np.intp), np.zeros(0))
     if start is None:
-        return None, 0
+        return None
     search = _ActiveSet(problem, *start)
-    for step in range(STEPS):
+    for _ in range(STEPS):
         iterate = search.improve(tolerance)
         if iterate is not None or len(search.cells) > LARGEST:
-            return iterate, step + 1
-    return None, STEPS
+            return iterate
+    return None
 
 
 def _rigid_contact(problem: NormalProblem) -> tuple[Cells, Array] | None:
@@ -118,11 +118,10 @@ class _ActiveSet:
     def _on_set(self) -> tuple[Array, Array]:
         """Pressure and rigid motion with no gap on the set, whatever the signs."""
         count, modes = len(self.cells), len(self._shapes)
-        matrix = np.zeros((count + modes, count + modes))
-        unit = self._kernel[0, 0]
-        matrix[:count, :count] = self._compliance() / unit
-        matrix[:count, count:] = -self._shapes[:, self.cells].T
-        matrix[count:, :count] = self._shapes[:, self.cells]
+        unit, shapes = self._kernel[0, 0], self._shapes[:, self.cells]
+        matrix = np.block(
+            [[self._compliance() / unit, -shapes.T], [shapes, np.zeros((modes, modes))]]
+        )
         heights = -self._problem.height.ravel()[self.cells] / unit
         right = np.concatenate([heights, self._problem.target])
         solution = np.linalg.lstsq(matrix, right, rcond=None)[0]

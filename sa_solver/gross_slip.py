@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Generic, Literal, TypeVar
+from typing import Literal
 
 import numpy as np
 
@@ -32,21 +32,10 @@ LOOSER = 0.01
 ITERATIONS = 30
 """Contact problems solved; 3 to 8 are usual."""
 
-_State = TypeVar("_State")
-
 
 @dataclass(frozen=True)
-class SlidingTrial(Generic[_State]):
-    """A state under imposed motion, its shear force (Qx, Qy) [N] and energy (Edx, Edy) [N mm]."""
-
-    state: _State
-    force: Array
-    energy: Array
-
-
-@dataclass(frozen=True)
-class GrossSlip(Generic[_State]):
-    """State of the sliding contact, and its error: see :data:`ACCURACY`.
+class GrossSlip:
+    """How near the last contact problem solved is to sliding as given: see :data:`ACCURACY`.
 
     ``missing`` is the error of the energy alone. Shear is coupled by Poisson's ratio, so no
     direction of sliding spares x or y all energy: then the error of ``energies`` in direction
@@ -54,7 +43,6 @@ class GrossSlip(Generic[_State]):
     than given: its force is then below what sliding takes, and to be believed.
     """
 
-    state: _State
     error: float
     missing: float
     creeps: bool
@@ -71,17 +59,18 @@ class GrossSlip(Generic[_State]):
 
 
 def gross_slip(
-    slide: Callable[[Array, float], SlidingTrial[_State]],
+    slide: Callable[[Array, float], tuple[Array, Array]],
     carried: float,
     energy: Array,
     force: Array,
     tolerance: float,
     direction: SlidingRule = "force",
     stored: float = 0.0,
-) -> GrossSlip[_State]:
-    """State of a sliding contact that dissipates ``energy`` (Edx, Edy) [N mm], their sum above 0.
+) -> GrossSlip:
+    """Slide a contact until it dissipates ``energy`` (Edx, Edy) [N mm], their sum above 0.
 
-    ``slide`` solves the contact for a motion (Δδx, Δδy) [mm] to a tolerance, ``carried`` is µP [N]
+    ``slide`` solves it for a motion (Δδx, Δδy) [mm] to a tolerance and gives its shear force (Qx,
+    Qy) [N] and energy (Edx, Edy) [N mm]: its last state is the one sought. ``carried`` is µP [N]
     and ``force`` the given (Qx, Qy) [N]. ``stored`` [N mm] is the work that the shear of sliding
     does on its own displacement, about: it makes the first guess a good one.
 
@@ -93,9 +82,9 @@ def gross_slip(
     length = max(0.0, total + stored) / carried
     inner = LOOSEST
     for _ in range(ITERATIONS):
-        trial = slide(length * sliding_direction(force, angle), max(inner, tolerance))
-        measured = _angle(trial.force if direction == "force" else np.sqrt(trial.energy.clip(0.0)))
-        missing = total - float(trial.energy.sum())
+        shear, spent = slide(length * sliding_direction(force, angle), max(inner, tolerance))
+        measured = _angle(shear if direction == "force" else np.sqrt(spent.clip(0.0)))
+        missing = total - float(spent.sum())
         turned = float(np.clip(angle + wanted - measured, 0.0, 0.5 * np.pi))
         change = max(abs(missing) / total, abs(turned - angle))
         if change <= ACCURACY and inner <= tolerance:
@@ -105,7 +94,7 @@ def gross_slip(
         angle = turned
     lacking = abs(missing) / total
     creeps = length == 0.0 and missing < -ACCURACY * total
-    return GrossSlip(trial.state, max(lacking, abs(wanted - measured)), lacking, creeps)
+    return GrossSlip(max(lacking, abs(wanted - measured)), lacking, creeps)
 
 
 def sliding_direction(force: Array, angle: float | None = None) -> Array:

@@ -7,12 +7,14 @@ the same holds for half-planes in plane strain.
 
 from __future__ import annotations
 
+from functools import cache
+
 import numpy as np
 import scipy.fft
 
 from sa_solver.errors import InputError
 from sa_solver.influence import X, Y, Z, rectangle_influence, strip_influence
-from sa_solver.transform import SpectralFilter, Transform, plan_transform
+from sa_solver.transform import SpectralFilter, Transform
 from sa_solver.types import Array, ElasticPair, Grid
 
 NORMAL = (Z,)
@@ -42,14 +44,12 @@ class HalfSpace:
     two (shear) or three.
     """
 
-    def __init__(
-        self, grid: Grid, pair: ElasticPair, threads: int = 1, datum: float | None = None
-    ) -> None:
+    def __init__(self, grid: Grid, pair: ElasticPair, datum: float | None = None) -> None:
         """``datum`` [mm] is for line grids: how far from a line force its displacement vanishes.
 
         Raises InputError for a datum shorter than the grid.
         """
-        self.grid, self.pair, self.threads = grid, pair, threads
+        self.grid, self.pair = grid, pair
         self.datum = DATUM * grid.size[0] if datum is None else datum
         if grid.line and not grid.size[0] <= self.datum < np.inf:
             raise InputError(
@@ -60,11 +60,12 @@ class HalfSpace:
         self.count = 0
         self._filters: dict[tuple[Components, Components], SpectralFilter] = {}
         self._symbols: dict[tuple[int, int, GridShape], Array] = {}
-        self._transforms: dict[tuple[GridShape, GridShape, int], Transform] = {}
+        self.transform = cache(Transform)
+        """Transforms by shape, padded shape and components, planned once for all who need them."""
 
     def on(self, grid: Grid) -> HalfSpace:
         """The same bodies under another ``grid``."""
-        return HalfSpace(grid, self.pair, self.threads, self.datum)
+        return HalfSpace(grid, self.pair, self.datum)
 
     def normal(self, pressure: Array) -> Array:
         """``u_z`` under ``pressure`` alone, both ``(nx, ny)`` [MPa] → [mm]."""
@@ -78,12 +79,6 @@ class HalfSpace:
     def displacement(self, traction: Array) -> Array:
         """``u`` under ``traction``, both ``(3, nx, ny)`` ordered x, y, z [MPa] → [mm]."""
         return self._convolve(traction, ALL, ALL)
-
-    def shear_under_pressure(self, pressure: Array) -> Array:
-        """``u_x, u_y`` ``(2, nx, ny)`` under ``pressure`` ``(nx, ny)``; 0 for similar bodies."""
-        if self.pair.similar:
-            return np.zeros((2, *pressure.shape))
-        return self._convolve(pressure[None], SHEAR, NORMAL)
 
     def normal_under_shear(self, shear: Array) -> Array:
         """``u_z`` ``(nx, ny)`` under ``shear`` ``(2, nx, ny)``; 0 for similar bodies."""
@@ -109,13 +104,6 @@ class HalfSpace:
         edges = [np.array([-0.5, 0.5]) * pitch for pitch in self.grid.pitch]
         return float(self._influence(edges[0], edges[1], component, component)[0, 0])
 
-    def transform(self, shape: GridShape, padded: GridShape, components: int) -> Transform:
-        """A transform planned once for all who need this size."""
-        key = (shape, padded, components)
-        if key not in self._transforms:
-            self._transforms[key] = plan_transform(*key, self.threads)
-        return self._transforms[key]
-
     def _convolve(self, fields: Array, rows: Components, columns: Components) -> Array:
         self.count += 1
         if (rows, columns) not in self._filters:
@@ -131,11 +119,8 @@ class HalfSpace:
 
     def _compute_symbol(self, row: int, column: int, period: GridShape) -> Array:
         """DFT of a quarter of the kernel, continued by its parity along x and along y."""
-        edges = [
-            (np.arange(m // 2 + 2, dtype=np.float64) - 0.5) * pitch
-            for m, pitch in zip(period, self.grid.pitch, strict=True)
-        ]
-        kernel = self._influence(edges[0], edges[1], row, column)
+        edges_x, edges_y = map(quarter_edges, period, self.grid.pitch)
+        kernel = self._influence(edges_x, edges_y, row, column)
         for axis, m in enumerate(period):
             kernel = continued(kernel, axis, m, odd=(row == axis) != (column == axis))
         spectrum = scipy.fft.rfft2(kernel)
@@ -150,17 +135,23 @@ def spectral_filter(
     """A filter with components ``rows`` out and ``columns`` in, from real symbols."""
     if rows == columns == NORMAL:
         return SpectralFilter(transform, symbols)
-    return SpectralFilter(transform, symbols, (_normal_places(columns), _normal_places(rows)))
-
-
-def _normal_places(components: Components) -> list[int]:
-    return [place for place, component in enumerate(components) if component == Z]
+    inputs, outputs = ([n for n, k in enumerate(part) if k == Z] for part in (columns, rows))
+    return SpectralFilter(transform, symbols, (inputs, outputs))
 
 
 def padded_shape(grid: Grid) -> GridShape:
     """The fast transform lengths that hold the linear convolution on ``grid``."""
-    nx, ny = (int(scipy.fft.next_fast_len(2 * n - 1, real=True)) for n in grid.shape)
-    return nx, ny
+    return fast_lengths(*(2 * n - 1 for n in grid.shape))
+
+
+def fast_lengths(nx: int, ny: int) -> GridShape:
+    """The next lengths that transform fast."""
+    return int(scipy.fft.next_fast_len(nx, real=True)), int(scipy.fft.next_fast_len(ny, real=True))
+
+
+def quarter_edges(period: int, pitch: float) -> Array:
+    """Edges about the distances 0 to period//2 [mm]."""
+    return (np.arange(period // 2 + 2, dtype=np.float64) - 0.5) * pitch
 
 
 def continued(kernel: Array, axis: int, period: int, odd: bool) -> Array:

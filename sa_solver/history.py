@@ -12,8 +12,9 @@ Source: Spinu & Frunza 2015, J. Phys. Conf. Ser. (reversals).
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -25,6 +26,7 @@ from sa_solver.rigid_modes import NORMAL, PLANAR
 from sa_solver.types import Array
 
 Method = Literal["full", "reversals", "ciavarella_jaeger"]
+Progress = Callable[[int, ContactState], None]
 
 STRAIGHT = 1e-9
 """How far two increments of the shear load may be from parallel: rounding of a straight leg."""
@@ -39,13 +41,12 @@ class ContactLoadPath:
     """Loads at the ends of n increments, from bodies apart.
 
     ``values`` ``(n, 6)``, ``motion`` (6,) and ``strain`` ``(n,)`` as in
-    :class:`~sa_solver.contact.ContactLoad`; ``energy`` ``(n, 2)`` or None.
+    :class:`~sa_solver.contact.ContactLoad`.
     """
 
     values: Array
     motion: tuple[bool, ...] = (False,) * 6
     strain: Array | None = None
-    energy: Array | None = None
 
     def __len__(self) -> int:
         return len(self.values)
@@ -53,8 +54,7 @@ class ContactLoadPath:
     def load(self, row: int) -> ContactLoad:
         """The load at the end of increment ``row``."""
         strain = 0.0 if self.strain is None else float(self.strain[row])
-        energy = None if self.energy is None else self.energy[row]
-        return ContactLoad(self.values[row], self.motion, strain, energy)
+        return ContactLoad(self.values[row], self.motion, strain)
 
     @property
     def shear(self) -> Array:
@@ -89,7 +89,7 @@ def march_history(
     history: Literal["auto", "full", "reversals"] = "auto",
     tolerance: float = 1e-8,
     estimate_error: bool = False,
-    progress: Callable[[int, ContactState], None] | None = None,
+    progress: Progress = lambda row, state: None,
 ) -> History:
     """Solve a history on surfaces that do not wear.
 
@@ -116,7 +116,7 @@ def march_history(
 def turning_points(path: ContactLoadPath) -> list[int]:
     """Rows where a load, normal or shear, is about to begin or to leave its direction; the last."""
     changes = _changes(np.column_stack([path.values[:, list(NORMAL)], path.shear]))
-    rows = [row for row in range(len(path) - 1) if _turns(changes[row], changes[row + 1])]
+    rows = [row for row, pair in enumerate(pairwise(changes)) if _turns(*pair)]
     return [*rows, len(path) - 1]
 
 
@@ -124,8 +124,6 @@ def _obstacle_to_legs(half_space: HalfSpace, path: ContactLoadPath) -> str:
     """Why a leg of the shear load may not be taken in one step; empty if it may."""
     if not half_space.pair.similar:
         return "the bodies are dissimilar"
-    if path.energy is not None:
-        return "sliding is given by its energy"
     sheared = np.flatnonzero(path.shear.any(axis=1))
     # The row before the shear begins has the pressure that must stay.
     pressed = path.values[max(sheared[0] - 1, 0) if len(sheared) else -1 :, list(NORMAL)]
@@ -156,30 +154,21 @@ def _proportional(shear: Array) -> bool:
     return bool(len(singular) < 2 or singular[1] <= STRAIGHT * singular[0])
 
 
-def _rows(
-    contact: FrictionalContact, height: Array, path: ContactLoadPath, rows: list[int]
-) -> Iterator[ContactState]:
-    """States at the given rows; ends with the first that has not converged."""
-    state = contact.apart(height)
-    for row in rows:
-        state = contact.advance(state, height, path.load(row))
-        yield state
-        if not state.converged:
-            return
-
-
 def _solve(
     contact: FrictionalContact,
     height: Array,
     path: ContactLoadPath,
     rows: list[int],
-    progress: Callable[[int, ContactState], None] | None,
+    progress: Progress = lambda row, state: None,
 ) -> list[ContactState]:
-    states = []
-    for row, state in zip(rows, _rows(contact, height, path, rows), strict=False):
+    """States at the given rows; ends with the first that has not converged."""
+    states, state = [], contact.apart(height)
+    for row in rows:
+        state = contact.advance(state, height, path.load(row))
         states.append(state)
-        if progress is not None:
-            progress(row, state)
+        progress(row, state)
+        if not state.converged:
+            break
     return states
 
 
@@ -189,7 +178,7 @@ def _full(
     path: ContactLoadPath,
     reason: str,
     estimate_error: bool,
-    progress: Callable[[int, ContactState], None] | None,
+    progress: Progress,
 ) -> History:
     rows = list(range(len(path)))
     states = _solve(contact, height, path, rows, progress)
@@ -197,7 +186,7 @@ def _full(
     if not (estimate_error and states[-1].converged):
         return history
     half = _every_second(path)
-    coarse = _solve(contact, height, path, half, None) if len(half) < len(rows) else []
+    coarse = _solve(contact, height, path, half) if len(half) < len(rows) else []
     if not (coarse and coarse[-1].converged):
         return history
     # Backward Euler: with twice the steps the error halves, so the difference is the finer's error.
@@ -209,7 +198,7 @@ def _reversals(
     contact: FrictionalContact,
     height: Array,
     path: ContactLoadPath,
-    progress: Callable[[int, ContactState], None] | None,
+    progress: Progress,
 ) -> History:
     rows = turning_points(path)
     states = _solve(contact, height, path, rows, progress)
@@ -234,9 +223,8 @@ def _one_leg(
     contact: FrictionalContact, states: list[ContactState], path: ContactLoadPath, rows: list[int]
 ) -> bool:
     """Whether the last leg is the first loading of a line contact."""
-    before = states[-2] if len(states) > 1 else states[-1]
     begun = len(states) == len(rows) > 1
-    return begun and contact.two_normal_problems(before, path.load(rows[-1]))
+    return begun and contact.two_normal_problems(states[-2], path.load(rows[-1]))
 
 
 def _with_midpoint(path: ContactLoadPath, first: int, last: int) -> ContactLoad:
@@ -248,15 +236,14 @@ def _with_midpoint(path: ContactLoadPath, first: int, last: int) -> ContactLoad:
 
 
 def _every_second(path: ContactLoadPath) -> list[int]:
-    """Every second row, with the last and those where the shear load turns back kept."""
+    """Every second row, with the last and those where the shear load turns back kept.
+
+    There it goes sideways or back, rather than on along a curve.
+    """
     changes = _changes(path.shear)
-    back = {row for row in range(len(path) - 1) if _turns_back(changes[row], changes[row + 1])}
+    pairs = enumerate(pairwise(changes))
+    back = {row for row, (now, then) in pairs if then.any() and now @ then <= 0.0}
     return sorted({*range(1, len(path), 2), *back, len(path) - 1})
-
-
-def _turns_back(change: Array, following: Array) -> bool:
-    """Whether the next increment goes sideways or back, rather than on along a curve."""
-    return bool(following.any()) and float(change @ following) <= 0.0
 
 
 def _shear_difference(contact: FrictionalContact, one: ContactState, other: ContactState) -> float:

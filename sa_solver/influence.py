@@ -41,8 +41,7 @@ def rectangle_influence(
     """
     x, y = np.asarray(edges_x)[:, None], np.asarray(edges_y)[None, :]
     corner = _corner_function(x, y, pair, row, column)
-    coefficients: Array = np.diff(np.diff(corner, axis=0), axis=1) / (2.0 * np.pi)
-    return coefficients
+    return np.diff(np.diff(corner, axis=0), axis=1) / (2.0 * np.pi)
 
 
 def strip_influence(edges: Array, pair: ElasticPair, row: int, column: int, datum: float) -> Array:

@@ -7,30 +7,30 @@ from typing import Any
 import numpy as np
 import scipy.sparse
 
+from sa_solver.half_space import HalfSpace
 from sa_solver.types import Array, Grid
 
 COARSEST = 32
 """Cells across below which a grid is not coarsened: there a solve costs less than its set-up."""
 
 
-def coarsened(grid: Grid) -> Grid | None:
-    """A grid over the same area with half as many cells along each side of more than 32.
+def coarsened(fine: HalfSpace) -> tuple[HalfSpace, Transfer] | None:
+    """The same bodies on half as many cells along each side of more than 32, and the transfer.
 
     None where no side is that long. Any number of cells will do: an odd one is rounded up.
     """
-    counts = tuple((n + 1) // 2 if n > COARSEST else n for n in grid.shape)
-    if counts == grid.shape:
+    nx, ny = ((n + 1) // 2 if n > COARSEST else n for n in fine.grid.shape)
+    if (nx, ny) == fine.grid.shape:
         return None
-    if grid.line:
-        return Grid.strips(grid.size[0], counts[0])
-    return Grid.covering(grid.size, (counts[0], counts[1]))
+    grid = Grid.over(fine.grid.size, (nx, ny), fine.grid.line)
+    return fine.on(grid), Transfer(fine.grid, grid)
 
 
 class Transfer:
     """Passes fields between a ``fine`` and a ``coarse`` grid over the same area."""
 
     def __init__(self, fine: Grid, coarse: Grid) -> None:
-        self.fine, self.coarse = fine, coarse
+        self.fine = fine
         pairs = list(zip(fine.shape, coarse.shape, strict=True))
         self._averages = [_averages(n, m) for n, m in pairs]
         self._interpolation = [_interpolation(n, m) for n, m in pairs]
@@ -46,8 +46,7 @@ class Transfer:
 
 def _along_both(matrices: Any, field: Array) -> Array:
     along_x, along_y = matrices
-    result: Array = np.ascontiguousarray((along_y @ (along_x @ field).T).T)
-    return result
+    return np.ascontiguousarray((along_y @ (along_x @ field).T).T)
 
 
 def _averages(fine: int, coarse: int) -> Any:

@@ -5,13 +5,13 @@ Both only save time: the answer is verified by a convolution on the whole grid.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property, lru_cache
 
 import numpy as np
 
 from sa_solver.active_box import Box
-from sa_solver.bound_cg import SearchResult, bound_conjugate_gradients
+from sa_solver.bound_cg import BoundConjugateGradients, SearchResult
 from sa_solver.few_cells import solve_few_cells
 from sa_solver.half_space import HalfSpace
 from sa_solver.nested_grids import Transfer, coarsened
@@ -21,10 +21,6 @@ from sa_solver.preconditioner import NormalPreconditioner
 from sa_solver.rigid_modes import APPROACH, TILT_X, TILT_Y, NormalModes
 from sa_solver.types import Array
 
-GRADIENT_ITERATIONS = 200
-"""Conjugate gradients took at most 20 on smooth contacts and 125 on the roughest; beyond this they
-are taken to circle between contact sets."""
-
 COARSE_TOLERANCE = 1e-3
 """Of residuals on coarser grids, whose pressure is off by more than that at the contact's edge."""
 
@@ -33,23 +29,6 @@ ENOUGH = 3.0
 
 BOXES = 4
 """Boxes whose transforms are kept, the last used: a wear run needs two or three."""
-
-
-@dataclass(frozen=True)
-class NestedSolution:
-    """The last iterate on the whole grid, and how it was found."""
-
-    iterate: Iterate
-    iterations: int
-    method: str
-
-
-class _Stage:
-    """The half-space and its preconditioner on a box of cells."""
-
-    def __init__(self, half_space: HalfSpace) -> None:
-        self.half_space = half_space
-        self.preconditioner = NormalPreconditioner(half_space)
 
 
 class NestedSolver:
@@ -73,24 +52,26 @@ class NestedSolver:
 
     def solve(
         self, problem: NormalProblem, pressure: Array, displacement: Array | None, tolerance: float
-    ) -> NestedSolution:
-        """Solve from a balanced ``pressure`` >= 0, whose ``displacement`` may be known."""
-        box, iterations = Box.around(pressure > 0.0), 0
+    ) -> tuple[Iterate, str]:
+        """Solve from a balanced ``pressure`` >= 0, whose ``displacement`` may be known.
+
+        The last iterate on the whole grid, and by which method it was found.
+        """
+        box = Box.around(pressure > 0.0)
         while True:
             box, result = self._search(problem, box, pressure, displacement, tolerance)
-            iterations += result.iterations
             iterate = result.iterate
             if not result.converged:
-                return self._rescue(problem, box.placed(iterate.pressure), iterations, tolerance)
+                return self._rescue(problem, box.placed(iterate.pressure), tolerance)
             if box.size == box.shape:
-                return NestedSolution(iterate, iterations, "conjugate gradients")
+                return iterate, "conjugate gradients"
             pressure = box.placed(iterate.pressure)
             displacement = problem.displacement(pressure)
             iterate = Iterate(pressure, displacement, iterate.rigid)
             missed = iterate.gap(problem) < -tolerance * displacement.max()
             missed[box.window] = False
             if not missed.any():
-                return NestedSolution(iterate, iterations, "conjugate gradients")
+                return iterate, "conjugate gradients"
             missed[box.window] = True
             box = Box.around(missed)
 
@@ -104,46 +85,35 @@ class NestedSolver:
     ) -> tuple[Box, SearchResult]:
         """Solve with pressure in a box only, enlarged while the contact reaches its sides."""
         while True:
-            stage = self._stage(box)
-            inner = problem.cropped(box.window, stage.half_space)
-            stage.preconditioner.include(inner.compliance)
+            preconditioner = self._preconditioner(box)
+            inner = problem.cropped(box.window, preconditioner.half_space)
+            preconditioner.include(inner.compliance)
             inside = np.ascontiguousarray(pressure[box.window])
             moved = inner.displacement(inside) if displacement is None else displacement[box.window]
-            result = bound_conjugate_gradients(
-                inner,
-                stage.preconditioner,
-                inside,
-                moved,
-                tolerance,
-                GRADIENT_ITERATIONS,
-                box.left_by,
-            )
+            search = BoundConjugateGradients(inner, preconditioner, inside, moved, box.left_by)
+            result = search.solve(tolerance)
             if not result.left:
                 return box, result
             pressure, displacement = box.placed(result.iterate.pressure), None
             box = box.grown()
 
     def _rescue(
-        self, problem: NormalProblem, pressure: Array, iterations: int, tolerance: float
-    ) -> NestedSolution:
+        self, problem: NormalProblem, pressure: Array, tolerance: float
+    ) -> tuple[Iterate, str]:
         """Solve on the whole grid by slower methods, from the last ``pressure`` of the search."""
-        few, steps = solve_few_cells(problem, tolerance)
+        few = solve_few_cells(problem, tolerance)
         if few is not None and normal_residuals(problem, few).largest <= tolerance:
-            return NestedSolution(few, iterations + steps, "active set")
+            return few, "active set"
         rigid = np.zeros(len(problem.modes.free))
         last = Iterate(pressure, problem.displacement(pressure), rigid)
-        iterate, more = solve_by_splitting(problem, last, tolerance)
-        return NestedSolution(iterate, iterations + steps + more, "splitting")
+        return solve_by_splitting(problem, last, tolerance), "splitting"
 
     # -- coarser grids ------------------------------------------------------------------------
     @cached_property
     def _coarser(self) -> tuple[NestedSolver, Transfer] | None:
         """The solver on the next coarser grid, and how fields pass to and from it."""
-        half_space = self.half_space
-        grid = coarsened(half_space.grid)
-        if grid is None:
-            return None
-        return NestedSolver(half_space.on(grid)), Transfer(half_space.grid, grid)
+        coarser = coarsened(self.half_space)
+        return None if coarser is None else (NestedSolver(coarser[0]), coarser[1])
 
     def _from_coarser(self, problem: NormalProblem) -> Array | None:
         if self._coarser is None:
@@ -171,15 +141,17 @@ class NestedSolver:
         )
 
     # -- boxes --------------------------------------------------------------------------------
-    def _stage(self, box: Box) -> _Stage:
+    def _preconditioner(self, box: Box) -> NormalPreconditioner:
+        """That of the half-space on a box."""
         return self._whole if box.size == box.shape else self._boxed(box.size)
 
     @cached_property
-    def _whole(self) -> _Stage:
-        return _Stage(self.half_space)
+    def _whole(self) -> NormalPreconditioner:
+        return NormalPreconditioner(self.half_space)
 
-    def _plan(self, size: tuple[int, int]) -> _Stage:
-        return _Stage(self.half_space.on(replace(self.half_space.grid, shape=size)))
+    def _plan(self, size: tuple[int, int]) -> NormalPreconditioner:
+        grid = replace(self.half_space.grid, shape=size)
+        return NormalPreconditioner(self.half_space.on(grid))
 
 
 def _uniform(problem: NormalProblem) -> Array | None:

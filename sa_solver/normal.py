@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from sa_solver.half_space import HalfSpace
-from sa_solver.nested_solver import NestedSolution, NestedSolver
+from sa_solver.nested_solver import NestedSolver
 from sa_solver.normal_control import NormalContactError as NormalContactError
 from sa_solver.normal_control import NormalControl
 from sa_solver.normal_problem import (
@@ -58,9 +58,9 @@ class NormalState:
     [N mm] the resultants of the pressure (per mm on a line grid). A tilt that the pressed cells
     cannot feel (they lie on one line or point) is the smallest that fits.
 
-    ``work`` counts the convolutions by the shape of their transforms, and ``convolutions`` is their
-    sum in units of one on the whole grid, by size, rounded up. (Each iteration also transforms an
-    unpadded field, a quarter of a convolution.) ``border_load`` is the share of P carried by the
+    ``convolutions`` are in units of one on the whole grid, by the size of their transforms, rounded
+    up. (Each iteration also transforms an unpadded field, a quarter of a convolution.)
+    ``border_load`` is the share of P carried by the
     outermost cells: above 0, the grid is too small. ``message`` is empty when ``converged``, else
     says what is wrong and what to try.
     """
@@ -77,11 +77,9 @@ class NormalState:
     residuals: NormalResiduals
     converged: bool
     message: str
-    method: str
-    iterations: int
     convolutions: int
-    work: Work
     border_load: float
+    method: str = ""
 
     @property
     def start(self) -> NormalStart:
@@ -144,11 +142,14 @@ class NormalContact:
         apart = _separated(problem)
         if apart is None:
             pressure, displacement = self._start(problem, start)
-            solution = self._solver.solve(problem, pressure, displacement, tolerance)
-            state = self._state(problem, control, solution, tolerance)
+            iterate, method = self._solver.solve(problem, pressure, displacement, tolerance)
+            residuals = normal_residuals(problem, iterate)
         else:
-            state = self._unpressed(problem, control, apart)
-        return replace(state, approach=state.approach + lowest)
+            zero = np.zeros(self.grid.shape)
+            iterate, method = Iterate(zero, zero.copy(), apart), "no load"
+            residuals = NormalResiduals(0.0, 0.0, 0.0, 0.0)
+        state = self._state(problem, control, iterate, residuals, tolerance)
+        return replace(state, approach=state.approach + lowest, method=method)
 
     # -- steps of solve -----------------------------------------------------------------------
     def _problem(
@@ -172,7 +173,7 @@ class NormalContact:
                 change = np.abs(pressure - start.pressure).max()
                 if change <= BALANCED * start.pressure.max():
                     kept = start.pressure
-                    return kept, _with_wear(problem, kept, start.displacement)
+                    return kept, start.displacement + problem.yielded(kept)
                 return pressure, None
         cold = self._solver.cold_start(problem)
         if cold is None:
@@ -185,77 +186,32 @@ class NormalContact:
         self,
         problem: NormalProblem,
         control: NormalControl,
-        solution: NestedSolution,
+        iterate: Iterate,
+        residuals: NormalResiduals,
         tolerance: float,
     ) -> NormalState:
-        iterate = solution.iterate
-        measured = normal_residuals(problem, iterate)
-        converged = measured.largest <= tolerance
-        elastic = iterate.displacement
-        if problem.compliance is not None:
-            elastic = elastic - problem.compliance * iterate.pressure
-        approach, tilt_x, tilt_y = self._motions(problem, control, iterate.rigid)
-        P, Mx, My = self._resultants(iterate.pressure)
+        converged = residuals.largest <= tolerance
+        motions, free = control.motions, list(problem.modes.free)
+        motions[free] = iterate.rigid / mode_lengths(self.grid)[free]
+        force = iterate.pressure * self.grid.cell_area
+        along_x, along_y = force.sum(axis=1), force.sum(axis=0)
+        transformed = sum(count * nx * ny for (nx, ny), count in problem.work.items())
         return NormalState(
             pressure=iterate.pressure,
             gap=iterate.gap(problem),
-            displacement=elastic,
-            approach=approach,
-            tilt_x=tilt_x,
-            tilt_y=tilt_y,
-            P=P,
-            Mx=Mx,
-            My=My,
-            residuals=measured,
+            displacement=iterate.displacement - problem.yielded(iterate.pressure),
+            approach=float(motions[0]),
+            tilt_x=float(motions[1]),
+            tilt_y=float(motions[2]),
+            P=float(along_x.sum()),
+            Mx=float(along_y @ self.grid.y[0]),
+            My=float(along_x @ -self.grid.x[:, 0]),
+            residuals=residuals,
             converged=converged,
-            message="" if converged else _failure(problem, iterate, measured, tolerance),
-            method=solution.method,
-            iterations=solution.iterations,
-            convolutions=_equivalents(problem.work, self.half_space),
-            work=problem.work,
+            message="" if converged else _failure(problem, iterate, residuals, tolerance),
+            convolutions=int(np.ceil(transformed / np.prod(self.half_space.padded))),
             border_load=border_share(iterate.pressure),
         )
-
-    def _unpressed(
-        self, problem: NormalProblem, control: NormalControl, rigid: Array
-    ) -> NormalState:
-        """Bodies apart, or just touching, at the free motions ``rigid`` ``(k,)``."""
-        zero = np.zeros(self.grid.shape)
-        approach, tilt_x, tilt_y = self._motions(problem, control, rigid)
-        return NormalState(
-            pressure=zero,
-            gap=problem.height - problem.modes.motion(rigid),
-            displacement=zero.copy(),
-            approach=approach,
-            tilt_x=tilt_x,
-            tilt_y=tilt_y,
-            P=0.0,
-            Mx=0.0,
-            My=0.0,
-            residuals=NormalResiduals(0.0, 0.0, 0.0, 0.0),
-            converged=True,
-            message="",
-            method="no load",
-            iterations=0,
-            convolutions=0,
-            work=problem.work,
-            border_load=0.0,
-        )
-
-    def _motions(
-        self, problem: NormalProblem, control: NormalControl, rigid: Array
-    ) -> tuple[float, float, float]:
-        """δz, φx, φy: those imposed and those found."""
-        motions = control.motions
-        free = list(problem.modes.free)
-        motions[free] = rigid / mode_lengths(self.grid)[free]
-        return float(motions[0]), float(motions[1]), float(motions[2])
-
-    def _resultants(self, pressure: Array) -> tuple[float, float, float]:
-        force = pressure * self.grid.cell_area
-        along_x, along_y = force.sum(axis=1), force.sum(axis=0)
-        Mx, My = along_y @ self.grid.y[0], -(along_x @ self.grid.x[:, 0])
-        return float(along_x.sum()), float(Mx), float(My)
 
     def _check_fields(
         self, height: Array, start: NormalStart | None, compliance: Array | None
@@ -283,19 +239,6 @@ def _separated(problem: NormalProblem) -> Array | None:
     touching = np.zeros(len(problem.modes.free))
     touching[0] = problem.height.min()
     return touching
-
-
-def _with_wear(problem: NormalProblem, pressure: Array, elastic: Array) -> Array:
-    if problem.compliance is None:
-        return elastic
-    worn: Array = elastic + problem.compliance * pressure
-    return worn
-
-
-def _equivalents(work: Work, half_space: HalfSpace) -> int:
-    """Convolutions on the whole grid that take as much work."""
-    cells = sum(count * shape[0] * shape[1] for shape, count in work.items())
-    return int(np.ceil(cells / (half_space.padded[0] * half_space.padded[1])))
 
 
 def _check_field(name: str, field: Array, shape: tuple[int, int]) -> None:

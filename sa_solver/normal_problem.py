@@ -37,6 +37,10 @@ class NormalProblem:
         elastic = self.half_space.normal(pressure)
         return elastic if self.compliance is None else elastic + self.compliance * pressure
 
+    def yielded(self, pressure: Array) -> Array | float:
+        """``D p`` [mm]."""
+        return 0.0 if self.compliance is None else self.compliance * pressure
+
     def cropped(self, window: Window, half_space: HalfSpace) -> NormalProblem:
         """The problem with pressure only on the cells of ``window``."""
         return replace(

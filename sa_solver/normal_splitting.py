@@ -19,30 +19,25 @@ SPLITTING_STAGES = 4
 times, until the independent residuals are met."""
 
 
-def solve_by_splitting(
-    problem: NormalProblem, start: Iterate, tolerance: float
-) -> tuple[Iterate, int]:
-    """Solve ``problem`` from the pressure of ``start``: the last iterate and the iterations."""
+def solve_by_splitting(problem: NormalProblem, start: Iterate, tolerance: float) -> Iterate:
+    """Solve ``problem`` from the pressure of ``start``: the last iterate."""
     resolvent = HalfSpaceResolvent(problem.half_space, NORMAL)
     before = problem.half_space.count
-
-    def sums(pressure: Array) -> Array:
-        return problem.modes.sums(pressure[0])
-
-    response = RigidResponse.of(resolvent, problem.modes.fields()[:, None], sums)
+    response = RigidResponse.of(
+        resolvent, problem.modes.fields()[:, None], lambda pressure: problem.modes.sums(pressure[0])
+    )
     compliance = 0.0 if problem.compliance is None else problem.compliance
     yielding = resolvent.shift[0] / (resolvent.shift[0] + compliance)
     splitting = PaddedSplitting(
         resolvent,
         response,
-        sums,
         problem.target,
         problem.height[None],
         lambda trial: unilateral(trial) * yielding,
     )
     problem.work[resolvent.padded_shape] += problem.half_space.count - before
     state = resolvent.padded(start.pressure[None])
-    iterate, iterations, inner = start, 0, tolerance
+    iterate, inner = start, tolerance
     for _ in range(SPLITTING_STAGES):
         result = douglas_rachford(
             splitting.elastic_step,
@@ -52,12 +47,11 @@ def solve_by_splitting(
             max_iterations=SPLITTING_ITERATIONS,
         )
         state, inner = result.state, 0.1 * inner
-        iterations += result.iterations
         problem.work[resolvent.padded_shape] += result.iterations
         iterate = _balanced(problem, resolvent.on_grid(result.solution)[0]) or iterate
         if normal_residuals(problem, iterate).largest <= tolerance or not result.converged:
             break
-    return iterate, iterations
+    return iterate
 
 
 def _balanced(problem: NormalProblem, pressure: Array) -> Iterate | None:

@@ -24,11 +24,13 @@ Sums = Callable[[Array], Array]
 class RigidResponse:
     """Tractions ``(k, c, mx, my)`` in answer to unit motions, and their products ``(k, k)``.
 
-    Row i of ``products`` are those of the traction in answer to motion i with all k modes.
+    Row i of ``products`` are those of the traction in answer to motion i with all k modes, which
+    ``sums`` gives of any traction.
     """
 
     tractions: Array
     products: Array
+    sums: Sums
 
     @classmethod
     def of(cls, resolvent: HalfSpaceResolvent, motions: Array, sums: Sums) -> RigidResponse:
@@ -37,11 +39,12 @@ class RigidResponse:
         tractions = np.array([resolvent.solve(resolvent.padded(motion)) for motion in motions])
         products = [sums(resolvent.on_grid(traction)) for traction in tractions]
         count = len(motions)
-        return cls(tractions.reshape(count, *shape), np.reshape(products, (count, count)))
+        return cls(tractions.reshape(count, *shape), np.reshape(products, (count, count)), sums)
 
     def only(self, places: list[int]) -> RigidResponse:
         """That to some of the motions."""
-        return RigidResponse(self.tractions[places], self.products[np.ix_(places, places)])
+        products = self.products[np.ix_(places, places)]
+        return RigidResponse(self.tractions[places], products, lambda t: self.sums(t)[places])
 
 
 class PaddedSplitting:
@@ -51,7 +54,6 @@ class PaddedSplitting:
         self,
         resolvent: HalfSpaceResolvent,
         response: RigidResponse,
-        sums: Sums,
         target: Array,
         offset: Array,
         law: Callable[[Array], Array],
@@ -61,7 +63,7 @@ class PaddedSplitting:
         ``law`` takes a traction ``(c, nx, ny)`` on the grid to one that obeys the contact law.
         """
         self._resolvent, self._response = resolvent, response
-        self._sums, self._target, self._law = sums, target, law
+        self._target, self._law = target, law
         self._offset = resolvent.padded(offset)
         self._gain = np.linalg.pinv(response.products.T)
         self.rigid = np.zeros(len(target))
@@ -71,7 +73,7 @@ class PaddedSplitting:
         """``(K + ρ)⁻¹ (ρ s - offset + R c)`` with the motions c that meet the resultants."""
         resolvent = self._resolvent
         traction = resolvent.solve(resolvent.shift * state - self._offset)
-        missing = self._target - self._sums(resolvent.on_grid(traction))
+        missing = self._target - self._response.sums(resolvent.on_grid(traction))
         self.rigid = self._gain @ missing
         traction += np.tensordot(self.rigid, self._response.tractions, 1)
         return traction

@@ -30,18 +30,11 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse.linalg import LinearOperator, cg
 
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalStart, NormalState
-from sa_solver.tangential_loop import (
-    STUCK_ITERATIONS,
-    STUCK_TOLERANCE,
-    LoopFailure,
-    LoopPath,
-    stuck_stiffness,
-)
+from sa_solver.tangential_loop import LoopFailure, LoopPath, stuck_stiffness, tractions_of_motion
 from sa_solver.types import Array
 
 STAGES = 24
@@ -88,14 +81,12 @@ class PartialSlip:
     @property
     def slider_stiffness(self) -> Array:
         """Springs ``(n,)`` [N/mm] of sliders in parallel that follow the curve."""
-        stiffness: Array = -np.diff(self._slopes)
-        return stiffness
+        return -np.diff(self._slopes)
 
     @property
     def slider_load(self) -> Array:
         """What presses each slider ``(n,)`` [N]; their sum is the load of the contact."""
-        load: Array = self.slider_stiffness * self.reach
-        return load
+        return self.slider_stiffness * self.reach
 
     def travelled(self, travel: Array) -> Array:
         """Path ``(nx, ny)`` [mm] of every cell while the sliders travel by ``travel`` ``(n,)``.
@@ -203,21 +194,8 @@ def _stiffness(half_space: HalfSpace, normal: NormalState) -> tuple[float, float
     """Tangential stiffness of the pressed cells [N/mm], and κ, the normal one over it."""
     pressed = normal.pressure > 0.0
     tangential = stuck_stiffness(half_space, pressed, LoopPath(normal.P, 1.0))
-
-    def indented(pressure: Array) -> Array:
-        field = np.zeros(pressed.shape)
-        field[pressed] = pressure
-        displacement: Array = half_space.normal(field)[pressed]
-        return displacement
-
-    count = int(np.count_nonzero(pressed))
-    operator = LinearOperator((count, count), matvec=indented, dtype=np.float64)
-    pressure, status = cg(operator, np.ones(count), rtol=STUCK_TOLERANCE, maxiter=STUCK_ITERATIONS)
-    if status != 0:
-        raise LoopFailure(
-            f"the pressed contact of {count} cells did not converge in {STUCK_ITERATIONS} "
-            "iterations: smooth or refine the heights"
-        )
+    unit = np.ones((1, np.count_nonzero(pressed)))
+    pressure = tractions_of_motion(lambda field: half_space.normal(field[0])[None], pressed, unit)
     return tangential, float(pressure.sum()) * half_space.grid.cell_area / tangential
 
 

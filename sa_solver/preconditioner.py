@@ -8,9 +8,8 @@ Source: Vollebregt 2014, J. Comput. Phys. 257, 333, doi:10.1016/j.jcp.2013.10.00
 from __future__ import annotations
 
 import numpy as np
-import scipy.fft
 
-from sa_solver.half_space import NORMAL, HalfSpace, spectral_filter
+from sa_solver.half_space import NORMAL, HalfSpace, fast_lengths, spectral_filter
 from sa_solver.influence import Z
 from sa_solver.transform import SpectralFilter
 from sa_solver.types import Array
@@ -31,6 +30,7 @@ class NormalPreconditioner:
 
     def __init__(self, half_space: HalfSpace) -> None:
         """Plan for ``half_space``."""
+        self.half_space = half_space
         shape = half_space.grid.shape
         period = fast_lengths(*shape)
         self._transform = half_space.transform(shape, period, 1)
@@ -66,11 +66,6 @@ class NormalPreconditioner:
 
     def _inverse(self, level: float) -> SpectralFilter:
         return spectral_filter(self._transform, [[1.0 / (self._symbol + level)]], NORMAL, NORMAL)
-
-
-def fast_lengths(nx: int, ny: int) -> tuple[int, int]:
-    """The next lengths that transform fast."""
-    return int(scipy.fft.next_fast_len(nx, real=True)), int(scipy.fft.next_fast_len(ny, real=True))
 
 
 def _compliance_levels(compliance: Array, stiffest: float) -> tuple[Array, list[Array | None]]:

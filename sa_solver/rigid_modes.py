@@ -81,8 +81,7 @@ class NormalModes:
     def motion(self, coefficients: Array) -> Array:
         """Rigid displacement field ``(nx, ny)``."""
         along_x, along_y = self._profiles(coefficients)
-        field: Array = along_x[:, None] + along_y
-        return field
+        return along_x[:, None] + along_y
 
     def subtract(self, field: Array, coefficients: Array, out: Array) -> None:
         """``field - motion(coefficients)`` into ``out``, all ``(nx, ny)``."""
@@ -102,8 +101,8 @@ class NormalModes:
 
     def fields(self) -> Array:
         """The modes themselves, ``(k, nx, ny)``."""
-        fields = [self.motion(unit) for unit in np.eye(len(self.free))]
-        return np.array(fields).reshape(-1, self.x.size, self.y.size)
+        units = np.eye(len(self.free))
+        return np.reshape([self.motion(unit) for unit in units], (-1, self.x.size, self.y.size))
 
     def products(self, weight: Array) -> Array:
         """Products ``(k, k)`` of the modes with one another, weighted by a field ``(nx, ny)``."""
@@ -162,8 +161,7 @@ class NormalModes:
         along_x, along_y = (np.exp(part) for part in self._all_profiles(exponent))
         powers = np.arange(3)
         rows = weight @ (self.y[:, None] ** powers * along_y[:, None])
-        moments: Array = (self.x[:, None] ** powers * along_x[:, None]).T @ rows
-        return moments
+        return (self.x[:, None] ** powers * along_x[:, None]).T @ rows
 
     def _first(self, m: Array) -> Array:
         return np.array([m[0, 0], m[0, 1], -m[1, 0]])[list(self.free)]
@@ -312,5 +310,4 @@ class RigidModes:
 
     def resultants(self, traction: Array) -> Array:
         """``(P, Qx, Qy, Mx, My, Mz)`` [N, N mm] of ``traction`` ``(3, nx, ny)`` [MPa]."""
-        physical: Array = self.sums(traction) * self.lengths * self.grid.cell_area
-        return physical
+        return self.sums(traction) * self.lengths * self.grid.cell_area

@@ -82,19 +82,17 @@ def douglas_rachford(
     scale: float | None = None,
     tolerance: float = 1e-8,
     max_iterations: int = 1000,
-    relaxation: float = OVER_RELAXATION,
-    depth: int = ANDERSON_DEPTH,
     returning: bool = False,
 ) -> SplittingResult:
     """Iterate the two steps from ``start`` until ``|t2 - t1| <= tolerance scale``.
 
     ``scale`` is the size to measure the residual against, max(|t1|, |t2|) unless it is given.
     ``elastic_step`` and ``local_law`` map an array of any shape to one of the same shape and must
-    not modify it. ``depth = 0`` turns the acceleration off; ``returning`` takes back extrapolations
-    that made things much worse. A result that has not converged after ``max_iterations`` says so.
+    not modify it. ``returning`` takes back extrapolations that made things much worse. A result
+    that has not converged after ``max_iterations`` says so.
     """
     state = np.array(start, dtype=np.float64)
-    memory = AndersonMemory(state.size, depth, returning)
+    memory = AndersonMemory(state.size, returning)
     elastic = solution = state
     residual, iterations = np.inf, 0
     while iterations < max_iterations:
@@ -110,27 +108,28 @@ def douglas_rachford(
             residual = np.inf
         if residual <= tolerance or not np.isfinite(residual):
             break
-        state = memory.next_state(state.ravel(), relaxation * step.ravel()).reshape(state.shape)
+        state = memory.next_state(state.ravel(), OVER_RELAXATION * step.ravel()).reshape(
+            state.shape
+        )
     return SplittingResult(state, solution, elastic, residual, iterations, residual <= tolerance)
 
 
 class AndersonMemory:
     """Anderson acceleration (type II) of a fixed-point iteration ``s ← s + f(s)``.
 
-    Holds the last ``depth`` differences of images and of residuals, and the Gram matrix of the
-    latter, of which each iteration renews one row and column. Differences are kept in single
-    precision, over the first residual's size: they only correct an image that is exact, take the
-    same number of iterations as in double precision, and reading them is most of the work.
+    Holds the last :data:`ANDERSON_DEPTH` differences of images and of residuals, and the Gram
+    matrix of the latter, of which each iteration renews one row and column. Differences are kept in
+    single precision, over the first residual's size: they only correct an image that is exact, take
+    the same number of iterations as in double precision, and reading them is most of the work.
     """
 
-    def __init__(self, size: int, depth: int, returning: bool = False) -> None:
+    def __init__(self, size: int, returning: bool) -> None:
         """Memory for vectors of ``size`` values."""
         self._returning = returning
-        self._images = np.empty((depth, size), dtype=np.float32)
-        self._residuals = np.empty((depth, size), dtype=np.float32)
+        self._images = np.empty((ANDERSON_DEPTH, size), dtype=np.float32)
+        self._residuals = np.empty((ANDERSON_DEPTH, size), dtype=np.float32)
         self._unit = 1.0
-        self._gram = np.zeros((depth, depth))
-        self._depth = depth
+        self._gram = np.zeros((ANDERSON_DEPTH, ANDERSON_DEPTH))
         self._last_image = self._last_residual = np.empty(0)
         self._last_norm = 0.0
         self._least_norm, self._least_image = np.inf, np.empty(0)
@@ -141,8 +140,6 @@ class AndersonMemory:
         """The next state from this ``state`` and its ``residual`` f(s), both ``(size,)``."""
         image = state + residual
         norm = float(np.linalg.norm(residual))
-        if self._depth == 0:
-            return image
         if self._seen == 0:
             self._unit = max(norm, TINY)
         if norm < self._least_norm:
@@ -160,8 +157,8 @@ class AndersonMemory:
 
     def _accelerate(self, image: Array, residual: Array) -> Array:
         """Combine the remembered images so that the combined residual is least."""
-        slot = (self._seen - 1) % self._depth
-        used = min(self._seen, self._depth)
+        slot = (self._seen - 1) % ANDERSON_DEPTH
+        used = min(self._seen, ANDERSON_DEPTH)
         self._keep(self._residuals[slot], residual, self._last_residual)
         self._keep(self._images[slot], image, self._last_image)
         remembered = self._residuals[:used]
@@ -174,8 +171,7 @@ class AndersonMemory:
         products = (remembered @ scaled).astype(np.float64)
         weights = _solve_gram(self._gram[:used, :used], products)
         correction = weights.astype(np.float32) @ self._images[:used]
-        accelerated: Array = image - self._unit * correction
-        return accelerated
+        return image - self._unit * correction
 
     def _keep(self, place: NDArray[np.float32], new: Array, last: Array) -> None:
         """The difference of ``new`` and ``last`` over the unit, into ``place``."""

@@ -21,13 +21,14 @@ Source: Liu & Wang 2002, J. Tribol. 124, 36, doi:10.1115/1.1401017 (convolution 
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Literal
 
 import numpy as np
 import scipy.fft
 
 from sa_solver.errors import InputError
-from sa_solver.half_space import continued, padded_shape
+from sa_solver.half_space import continued, padded_shape, quarter_edges
 from sa_solver.subsurface_influence import (
     INDICES,
     XX,
@@ -39,7 +40,7 @@ from sa_solver.subsurface_influence import (
     rectangle_stress,
     strip_stress,
 )
-from sa_solver.transform import SpectralFilter, plan_transform
+from sa_solver.transform import SpectralFilter, Transform
 from sa_solver.types import Array, Grid, Material
 
 COMPONENTS = ("xx", "yy", "zz", "xy", "yz", "zx")
@@ -52,7 +53,7 @@ INSIDE = (XX, YY, ZZ, XY, YZ, ZX)
 AT_SURFACE = (XX, YY, XY)
 """Components that convolutions give: at the surface the others are the tractions."""
 
-MIRROR = {1: np.array([-1.0, -1.0, 1.0]), 2: np.ones(3)}
+MIRROR: dict[int, Array] = {1: np.array([-1.0, -1.0, 1.0]), 2: np.ones(3)}
 """Tractions on the half-space z > 0 that a body is or mirrors, over those on body 2."""
 
 
@@ -67,9 +68,7 @@ class SubsurfaceStress:
     components of stress inside and three at the surface. The symbols of the latest depth are kept.
     """
 
-    def __init__(
-        self, grid: Grid, material: Material, body: Literal[1, 2], threads: int = 1
-    ) -> None:
+    def __init__(self, grid: Grid, material: Material, body: Literal[1, 2]) -> None:
         """Plan for ``body``, of which only Poisson's ratio counts.
 
         Raises SubsurfaceError unless the body is 1 or 2 and the ratio from 0 to 0.5.
@@ -78,18 +77,14 @@ class SubsurfaceStress:
             raise SubsurfaceError(f"body {body}: there are bodies 1 and 2")
         if not 0.0 <= material.poisson <= 0.5:
             raise SubsurfaceError(f"Poisson's ratio {material.poisson:g}: must be from 0 to 0.5")
-        self.grid, self.poisson, self.body, self.threads = grid, material.poisson, body, threads
+        self.grid, self.poisson = grid, material.poisson
         self.count = 0
         self._mirror = MIRROR[body]
         self._padded = padded_shape(grid)
-        self._kept: tuple[float, SpectralFilter] | None = None
-
-    def surface(self, traction: Array) -> Array:
-        """Stress at the surface ``(6, nx, ny)`` from ``traction`` ``(3, nx, ny)`` [MPa]."""
-        return self.at_depth(traction, 0.0)
+        self._filter = lru_cache(1)(self._plan)
 
     def at_depth(self, traction: Array, depth: float) -> Array:
-        """Stress ``(6, nx, ny)`` at ``depth`` >= 0 below the cells' centres [mm].
+        """Stress ``(6, nx, ny)`` at ``depth`` below the cells' centres, 0 at the surface [mm].
 
         ``traction`` ``(3, nx, ny)`` is ordered qx, qy, p, on body 2 whichever the body [MPa].
         Raises SubsurfaceError for another shape or a depth below 0.
@@ -131,7 +126,7 @@ class SubsurfaceStress:
         period = self._padded[along]
         spectra = scipy.fft.rfft(felt[:, :, first : last + 1], period, axis=1)
         rows = np.arange(row - last, row - first + 2, dtype=np.float64) - 0.5
-        edges = [_quarter_edges(period, self.grid.pitch[along]), rows * self.grid.pitch[1 - along]]
+        edges = [quarter_edges(period, self.grid.pitch[along]), rows * self.grid.pitch[1 - along]]
         for column, depth in enumerate(depths):
             kernels = self._influence(edges if along == 0 else edges[::-1], float(depth))
             # Kernels run over point less source, so backwards over the sources.
@@ -159,8 +154,7 @@ class SubsurfaceStress:
 
     def _felt(self, traction: Array) -> Array:
         """Tractions on the half-space z > 0 that the body is or mirrors."""
-        felt: Array = traction * self._mirror[:, None, None]
-        return felt
+        return traction * self._mirror[:, None, None]
 
     @staticmethod
     def _convolved(depth: float) -> tuple[int, ...]:
@@ -171,21 +165,14 @@ class SubsurfaceStress:
             return strip_stress(edges[0], depth, self.poisson)[..., None]
         return rectangle_stress(edges[0], edges[1], depth, self.poisson)
 
-    def _filter(self, depth: float) -> SpectralFilter:
-        if self._kept is None or self._kept[0] != depth:
-            self._kept = depth, self._plan(depth)
-        return self._kept[1]
-
     def _plan(self, depth: float) -> SpectralFilter:
         """Real symbols, with shear tractions and shear stress along z in units of i."""
         rows = self._convolved(depth)
-        edges = [
-            _quarter_edges(m, pitch) for m, pitch in zip(self._padded, self.grid.pitch, strict=True)
-        ]
+        edges = list(map(quarter_edges, self._padded, self.grid.pitch))
         kernels = self._influence(edges, depth)
         symbols = [[self._symbol(kernels[i, k], i, k) for k in range(3)] for i in rows]
         count = max(3, len(rows))
-        transform = plan_transform(self.grid.shape, self._padded, count, self.threads)
+        transform = Transform(self.grid.shape, self._padded, count)
         outputs = [place for place, i in enumerate(rows) if i in (YZ, ZX)]
         return SpectralFilter(transform, symbols, (SHEAR, outputs))
 
@@ -202,11 +189,6 @@ class SubsurfaceStress:
 def _odd(component: int, traction: int, axis: int) -> bool:
     """Whether a component of stress under a traction is odd along x or y."""
     return (*INDICES[component], traction).count(axis) % 2 == 1
-
-
-def _quarter_edges(period: int, pitch: float) -> Array:
-    """Edges about the distances 0 to period//2 [mm]."""
-    return (np.arange(period // 2 + 2, dtype=np.float64) - 0.5) * pitch
 
 
 def _along_rows(kernels: Array, spectra: Array, along: int, period: int) -> Array:

@@ -54,8 +54,7 @@ def rectangle_stress(edges_x: Array, edges_y: Array, depth: float, poisson: floa
         ],
         axis=1,
     )
-    coefficients: Array = np.diff(np.diff(corner, axis=2), axis=3) / (2.0 * np.pi)
-    return coefficients
+    return np.diff(np.diff(corner, axis=2), axis=3) / (2.0 * np.pi)
 
 
 def strip_stress(edges: Array, depth: float, poisson: float) -> Array:
@@ -74,8 +73,7 @@ def strip_stress(edges: Array, depth: float, poisson: float) -> Array:
     corner[XY, 1] = v_x
     corner[YZ, 1] = v_z
     corner[ZX] = v_z - z_v_xx, 0.0 * x, -z_v_xz
-    coefficients: Array = np.diff(corner, axis=2) / (2.0 * np.pi)
-    return coefficients
+    return np.diff(corner, axis=2) / (2.0 * np.pi)
 
 
 def _pressed(x: Array, y: Array, z: float, poisson: float) -> Array:

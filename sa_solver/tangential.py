@@ -13,6 +13,7 @@ fall back on.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -107,9 +108,8 @@ class TangentialState:
     Mz: float
     residuals: TangentialResiduals
     converged: bool
-    message: str
-    iterations: int
-    convolutions: int
+    message: str = ""
+    convolutions: int = 0
 
 
 class TangentialContact:
@@ -167,8 +167,7 @@ class TangentialContact:
             raise self._beyond_friction(problem, forces)
         solution = newton_on_disks(problem, shear, tolerance, ITERATIONS)
         if not solution.converged:
-            fallback = gradients_on_disks(problem, solution.shear, tolerance, FALLBACK_ITERATIONS)
-            solution = replace(fallback, iterations=solution.iterations + fallback.iterations)
+            solution = gradients_on_disks(problem, solution.shear, tolerance, FALLBACK_ITERATIONS)
         rigid = imposed.copy()
         rigid[list(free)] = solution.rigid / problem.modes.lengths
         convolutions = level.half_space.count - before
@@ -236,8 +235,8 @@ class TangentialContact:
         sticking = np.zeros(self.grid.shape, dtype=bool)
         sticking[window] = problem.pressed & ~solution.slipping
         motions = np.append(rigid, 0.0)
-        loads = self._modes.sums(shear) * self._modes.lengths * self.grid.cell_area
-        loads = np.append(loads, 0.0)
+        sums = self._modes.sums(shear) * self._modes.lengths
+        loads = np.append(sums * self.grid.cell_area, 0.0)
         whole = solution.shear.shape == shear.shape
         return TangentialState(
             shear=shear,
@@ -253,7 +252,6 @@ class TangentialContact:
             residuals=residuals,
             converged=converged,
             message="" if converged else _failure(residuals, tolerance),
-            iterations=solution.iterations,
             convolutions=convolutions,
         )
 
@@ -284,19 +282,13 @@ class TangentialContact:
             Mz=0.0,
             residuals=TangentialResiduals(0.0, 0.0, 0.0),
             converged=True,
-            message="",
-            iterations=0,
-            convolutions=0,
         )
 
     def _beyond_friction(self, problem: TangentialProblem, forces: Array) -> FrictionLimitError:
         pressed, free = problem.pressed, problem.modes.free
         shapes = problem.modes.fields()[:, :, pressed]
         share = largest_share(problem.limit[pressed], shapes, problem.target)
-        given, largest = (
-            ", ".join(f"{NAMES[k]} = {scale * forces[k]:.6g} {UNITS[k]}" for k in free)
-            for scale in (1.0, share)
-        )
+        given, largest = (listed(free, scale * forces[list(free)]) for scale in (1.0, share))
         return FrictionLimitError(
             share,
             f"friction cannot carry {given}; the largest in this direction is {largest}: lower the "
@@ -329,6 +321,12 @@ class TangentialContact:
             raise TangentialContactError(f"loads {given} must be finite: check the load history")
         if self.grid.line and (forces[2] != 0.0 or motions[2]):
             raise TangentialContactError("a line contact carries no Mz: give Qx and Qy only")
+
+
+def listed(places: Sequence[int], forces: Array) -> str:
+    """Shear forces and moment by their places, 0 to 2, for a message."""
+    pairs = zip(places, forces, strict=True)
+    return ", ".join(f"{NAMES[k]} = {force:.6g} {UNITS[k]}" for k, force in pairs)
 
 
 def _failure(residuals: TangentialResiduals, tolerance: float) -> str:

@@ -71,8 +71,5 @@ class ShearLevel:
 
     @cached_property
     def _coarser(self) -> tuple[ShearLevel, Transfer] | None:
-        fine = self.half_space
-        grid = coarsened(fine.grid)
-        if grid is None:
-            return None
-        return ShearLevel(fine.on(grid)), Transfer(fine.grid, grid)
+        coarser = coarsened(self.half_space)
+        return None if coarser is None else (ShearLevel(coarser[0]), coarser[1])

@@ -18,7 +18,7 @@ Source: Mindlin & Deresiewicz 1953, J. Appl. Mech. 20, 327, doi:10.1115/1.401070
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -166,11 +166,7 @@ class TangentialLoop:
     @property
     def residual_stiffness(self) -> float:
         """Mean slope of the last increments of both branches [N/mm]; 0 where it slides."""
-        slopes = [
-            (force[-1] - force[-2]) / (displacement[-1] - displacement[-2])
-            for displacement, force in self._branches
-        ]
-        return float(np.mean(slopes))
+        return self._mean_slope(-2)
 
     @property
     def reversal_stiffness(self) -> float:
@@ -178,8 +174,13 @@ class TangentialLoop:
 
         What one would measure; it tends to ``stiffness`` as the increments shrink.
         """
+        return self._mean_slope(0)
+
+    def _mean_slope(self, increment: int) -> float:
+        """Of both branches, from point ``increment`` on."""
         slopes = [
-            (force[1] - force[0]) / (displacement[1] - displacement[0])
+            (force[increment + 1] - force[increment])
+            / (displacement[increment + 1] - displacement[increment])
             for displacement, force in self._branches
         ]
         return float(np.mean(slopes))
@@ -239,22 +240,37 @@ def stuck_stiffness(half_space: HalfSpace, pressed: Mask, path: LoopPath) -> flo
             tractions[Z] -= kept @ (kept.T @ tractions[Z])
         return tractions.ravel()
 
-    def compliance(values: Array) -> Array:
-        field = np.zeros((components, *grid.shape))
-        field[:, pressed] = project(values).reshape(components, -1)
-        return project(apply(field)[:, pressed].ravel())
-
-    count = int(np.count_nonzero(pressed))
-    motion = np.zeros((components, count))
+    motion = np.zeros((components, np.count_nonzero(pressed)))
     motion[path.place - 1] = 1.0
-    size = components * count
-    operator = LinearOperator((size, size), matvec=compliance, dtype=np.float64)
+    traction = tractions_of_motion(apply, pressed, motion, project)
+    return float(motion.ravel() @ traction) * grid.cell_area
+
+
+def tractions_of_motion(
+    displace: Callable[[Array], Array],
+    pressed: Mask,
+    motion: Array,
+    project: Callable[[Array], Array] = np.ravel,
+) -> Array:
+    """Tractions ``(c m,)`` of the m cells ``pressed`` that move them by ``motion`` ``(c, m)``.
+
+    ``displace`` takes tractions ``(c, nx, ny)`` to displacements, ``project`` tractions of the
+    cells to such as are allowed. Raises LoopFailure where conjugate gradients stall.
+    """
+
+    def compliance(values: Array) -> Array:
+        field = np.zeros((len(motion), *pressed.shape))
+        field[:, pressed] = project(values).reshape(motion.shape)
+        return project(displace(field)[:, pressed].ravel())
+
+    operator = LinearOperator((motion.size,) * 2, matvec=compliance, dtype=np.float64)
     traction, status = cg(operator, motion.ravel(), rtol=STUCK_TOLERANCE, maxiter=STUCK_ITERATIONS)
     if status != 0:
         raise LoopFailure(
-            f"the stuck contact of {count} cells did not converge in {STUCK_ITERATIONS} iterations"
+            f"the stuck contact of {motion.shape[1]} cells did not converge in {STUCK_ITERATIONS} "
+            "iterations"
         )
-    return float(motion.ravel() @ traction) * grid.cell_area
+    return np.asarray(traction)
 
 
 def _balanced_modes(half_space: HalfSpace, pressed: Mask, tilting: bool) -> Array:
@@ -268,17 +284,14 @@ def _balanced_modes(half_space: HalfSpace, pressed: Mask, tilting: bool) -> Arra
     columns = np.stack([mode[pressed] for mode in modes], axis=1)
     basis, sizes, _ = np.linalg.svd(columns, full_matrices=False)
     # A single row of cells knows no moment about its own line.
-    held: Array = basis[:, sizes > np.finfo(float).eps * len(columns) * sizes[0]]
-    return held
+    return basis[:, sizes > np.finfo(float).eps * len(columns) * sizes[0]]
 
 
 def _press(contact: FrictionalContact, height: Array, path: LoopPath) -> ContactState:
     """The pressed state; dissimilar bodies slip meanwhile, so they are pressed in steps."""
     steps = 1 if contact.half_space.pair.similar else path.increments
     tilts = path.moments is None
-    motion = (False, False, False, tilts, tilts, False)
-    if contact.grid.line:
-        motion = (*motion[:3], False, tilts, False)
+    motion = (False, False, False, tilts and not contact.grid.line, tilts, False)
     Mx, My = path.moments or (0.0, 0.0)
     state = contact.apart(height)
     for step in range(1, steps + 1):

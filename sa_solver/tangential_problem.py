@@ -96,8 +96,7 @@ class TangentialProblem:
     @cached_property
     def pressed(self) -> Mask:
         """Cells that can carry shear."""
-        pressed: Mask = self.limit > 0.0
-        return pressed
+        return self.limit > 0.0
 
     @cached_property
     def largest(self) -> float:

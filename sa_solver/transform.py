@@ -6,10 +6,9 @@ The DFT is unnormalised forwards and carries ``1/N`` backwards.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, Protocol
+from functools import partial
 
 import numpy as np
-import scipy.fft
 from numpy.typing import NDArray
 
 from sa_solver.types import Array
@@ -25,85 +24,44 @@ SPARE_COLUMNS = 4
 multiple of a memory page that the pass along columns takes 1.6 to 2 times as long from 1024 up."""
 
 
-class Transform(Protocol):
-    """Real DFT of ``(nx, ny)`` fields zero-padded to ``padded``, and back.
+class Transform:
+    """Real DFT of ``(nx, ny)`` fields zero-padded to ``padded``, and back, planned once with FFTW.
 
     ``spectra`` holds one spectrum ``(mx, my//2 + 1)`` per component; a backward transform uses its
     component's up.
-    """
-
-    shape: tuple[int, int]
-    padded: tuple[int, int]
-    spectra: list[Spectrum]
-
-    def forward(self, field: Array, component: int) -> None:
-        """Transform ``field`` ``(nx, ny)`` into the spectrum of ``component``."""
-        ...
-
-    def backward(self, component: int, out: Array | None = None) -> Array:
-        """The first ``(nx, ny)`` values of the field whose spectrum ``component`` holds."""
-        ...
-
-
-def plan_transform(
-    shape: tuple[int, int], padded: tuple[int, int], components: int = 1, threads: int = 1
-) -> Transform:
-    """The fastest transform installed: FFTW where pyfftw can be imported, else scipy's."""
-    try:
-        return FftwTransform(shape, padded, components, threads)
-    except ImportError:
-        return ScipyTransform(shape, padded, components, threads)
-
-
-class FftwTransform:
-    """Real DFT planned once with FFTW.
 
     Plans are estimated, not measured: measuring picks another algorithm, and with it another
     rounding, from one run to the next. Rows of padding are zero, so their pass along y is skipped.
     """
 
     def __init__(
-        self,
-        shape: tuple[int, int],
-        padded: tuple[int, int],
-        components: int = 1,
-        threads: int = 1,
+        self, shape: tuple[int, int], padded: tuple[int, int], components: int = 1
     ) -> None:
-        """Plan; raises ImportError without pyfftw (1.2 s to import, hence here)."""
+        """Plan for fields of ``shape`` ``(nx, ny)``."""
+        # A second to import: where it is used.
         import pyfftw
 
-        def plan(source: Any, target: Any, axis: int, direction: str) -> Any:
-            return pyfftw.FFTW(
-                source,
-                target,
-                axes=(axis,),
-                direction=direction,
-                flags=("FFTW_ESTIMATE", "FFTW_DESTROY_INPUT"),
-                threads=threads,
-            )
-
+        forwards = partial(pyfftw.FFTW, flags=("FFTW_ESTIMATE", "FFTW_DESTROY_INPUT"))
+        backwards = partial(forwards, direction="FFTW_BACKWARD")
         self.shape, self.padded = shape, padded
         rows, columns = shape[0], padded[1] // 2 + 1
         self._field = pyfftw.zeros_aligned((rows, padded[1]), dtype=np.float64)
-        self.spectra = [
-            pyfftw.zeros_aligned((padded[0], columns + SPARE_COLUMNS), dtype=np.complex128)[
-                :, :columns
-            ]
+        stored = (padded[0], columns + SPARE_COLUMNS)
+        self.spectra: list[Spectrum] = [
+            pyfftw.zeros_aligned(stored, dtype=np.complex128)[:, :columns]
             for _ in range(components)
         ]
         self._forward, self._backward = [], []
         for spectrum in self.spectra:
+            along_x, along_y = {"axes": (0,)}, {"axes": (1,)}
             filled = spectrum[:rows]
             self._forward.append(
-                (
-                    plan(self._field, filled, 1, "FFTW_FORWARD"),
-                    plan(spectrum, spectrum, 0, "FFTW_FORWARD"),
-                )
+                (forwards(self._field, filled, **along_y), forwards(spectrum, spectrum, **along_x))
             )
             self._backward.append(
                 (
-                    plan(spectrum, spectrum, 0, "FFTW_BACKWARD"),
-                    plan(filled, self._field, 1, "FFTW_BACKWARD"),
+                    backwards(spectrum, spectrum, **along_x),
+                    backwards(filled, self._field, **along_y),
                 )
             )
 
@@ -117,42 +75,13 @@ class FftwTransform:
         self.spectra[component][rows:] = 0.0
         along_x.execute()
 
-    def backward(self, component: int, out: Array | None = None) -> Array:
+    def backward(self, component: int, out: Array) -> None:
         """The first ``(nx, ny)`` values of the field whose spectrum ``component`` holds."""
         for pass_ in self._backward[component]:
             pass_.execute()
         # execute() leaves the inverse transform unnormalised.
         size = self.padded[0] * self.padded[1]
-        field: Array = np.multiply(self._field[:, : self.shape[1]], 1.0 / size, out=out)
-        return field
-
-
-class ScipyTransform:
-    """The same with scipy.fft: no planning, about three times slower."""
-
-    def __init__(
-        self,
-        shape: tuple[int, int],
-        padded: tuple[int, int],
-        components: int = 1,
-        threads: int = 1,
-    ) -> None:
-        self.shape, self.padded, self._threads = shape, padded, threads
-        half = padded[0], padded[1] // 2 + 1
-        self.spectra = [np.zeros(half, dtype=np.complex128) for _ in range(components)]
-
-    def forward(self, field: Array, component: int) -> None:
-        """Transform ``field`` ``(nx, ny)`` into the spectrum of ``component``."""
-        self.spectra[component][:] = scipy.fft.rfft2(field, self.padded, workers=self._threads)
-
-    def backward(self, component: int, out: Array | None = None) -> Array:
-        """The first ``(nx, ny)`` values of the field whose spectrum ``component`` holds."""
-        field: Array = scipy.fft.irfft2(self.spectra[component], self.padded, workers=self._threads)
-        field = field[: self.shape[0], : self.shape[1]]
-        if out is None:
-            return field
-        out[:] = field
-        return out
+        np.multiply(self._field[:, : self.shape[1]], 1.0 / size, out=out)
 
 
 class SpectralFilter:

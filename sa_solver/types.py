@@ -195,8 +195,7 @@ class Frame:
 
     def to_global(self, components: Array) -> Array:
         """Global vectors of local ``components`` ``(..., 3)``."""
-        vectors: Array = components @ self.axes
-        return vectors
+        return components @ self.axes
 
 
 def resultants(forces: Array, x: Array, y: Array) -> Array:

@@ -31,6 +31,7 @@ from fe_models.geometry.grouped import (
     FACES,
     Blocks,
     GroupedMesh,
+    nodes_of,
     piece_blocks,
     pieces,
 )
@@ -127,17 +128,18 @@ class _Flattened:
 
     def surfaces(self) -> dict[str, Blocks]:
         """Facets of the element surfaces."""
-        surfaces = {}
-        for name, scope, card in self._named("surfaces"):
-            if not _is_node_surface(card):
-                surfaces[name] = self._faces(scope, card)
-        return surfaces
+        return {
+            name: self._faces(scope, card)
+            for name, scope, card in self._named("surfaces")
+            if not _is_node_surface(card)
+        }
 
     def node_sets(self) -> dict[str, Indices]:
         """Rows of the nodes of node sets and node surfaces."""
-        sets = {}
-        for name, scope, members in self._named("node_sets"):
-            sets[name] = self._rows(name, scope, members)
+        sets = {
+            name: self._rows(name, scope, members)
+            for name, scope, members in self._named("node_sets")
+        }
         for name, scope, card in self._named("surfaces"):
             if _is_node_surface(card):
                 if name in sets:
@@ -245,10 +247,7 @@ class _Flat(_Flattened):
         return _united(super().surfaces(), self._sets_of_level(1))
 
     def node_sets(self) -> dict[str, Indices]:
-        edges = {
-            name: np.unique(np.concatenate([cells.ravel() for _, cells in blocks]))
-            for name, blocks in self._sets_of_level(2).items()
-        }
+        edges = {name: nodes_of(blocks) for name, blocks in self._sets_of_level(2).items()}
         return _united(super().node_sets(), edges)
 
     def _check_facets(self, numbers: list[int]) -> None:

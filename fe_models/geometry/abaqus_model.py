@@ -92,23 +92,12 @@ class Element:
     place: SourceLine
 
 
-@dataclass(frozen=True)
-class Placing:
-    """Where an instance is: translated first, then turned about an axis through ``centre``."""
-
-    translation: Array = field(default_factory=lambda: np.zeros(3))
-    centre: Array = field(default_factory=lambda: np.zeros(3))
-    rotation: Rotation = field(default_factory=Rotation.identity)
-
-    def __call__(self, points: Array) -> Array:
-        return self.rotation.apply(points + self.translation - self.centre) + self.centre
-
-
 @dataclass
 class Scope:
     """A part, an instance, the assembly, or a flat file: nodes, elements, sets and surfaces.
 
-    ``blocks`` are the element sets named on an ``*Element`` line only, as programs name them.
+    ``blocks`` are the element sets named on an ``*Element`` line only, as programs name them;
+    ``placing`` takes points ``(n, 3)`` to where an instance has them.
     """
 
     name: str
@@ -119,7 +108,7 @@ class Scope:
     element_sets: Names[Members] = field(default_factory=Names)
     surfaces: Names[Card] = field(default_factory=Names)
     blocks: set[str] = field(default_factory=set)
-    placing: Placing = field(default_factory=Placing)
+    placing: Callable[[Array], Array] = lambda points: points
 
     def instance(self, card: Card) -> Scope:
         """An instance of this part."""
@@ -367,10 +356,13 @@ def _element_rows(card: Card, count: int) -> Iterator[tuple[SourceLine, list[int
         )
 
 
-def _placing(rows: list[DataLine]) -> Placing:
-    """Translation, and axis (two points on it) and angle [°] of the rotation, of an instance."""
+def _placing(rows: list[DataLine]) -> Callable[[Array], Array]:
+    """Where an instance has its points: translated, then turned about an axis by an angle [°].
+
+    Two points on the axis are given.
+    """
     if not rows:
-        return Placing()
+        return lambda points: points
     values = [[real(row.place, text) for text in row.fields] for row in rows]
     if [len(line) for line in values] not in ([2], [3], [2, 7], [3, 7]):
         raise MeshError(
@@ -379,10 +371,10 @@ def _placing(rows: list[DataLine]) -> Placing:
         )
     translation = np.array([*values[0], 0.0][:3])
     if len(values) == 1:
-        return Placing(translation)
+        return lambda points: points + translation
     start, end, angle = np.array(values[1][:3]), np.array(values[1][3:6]), values[1][6]
     length = np.linalg.norm(end - start)
     if length == 0.0:
         raise MeshError(f"{rows[1].place}: the axis of rotation has no length")
     turn = Rotation.from_rotvec(angle * (end - start) / length, degrees=True)
-    return Placing(translation, start, turn)
+    return lambda points: turn.apply(points + translation - start) + start

@@ -73,7 +73,7 @@ def _check_filling(body: Body) -> None:
     facets = points[mesh.facets[:, shared].T]
     sides = [
         np.linalg.det(
-            np.concatenate([facets[:, 1:], points[opposite(body, shared, side)][:, None]], axis=1)
+            np.concatenate([facets[:, 1:], points[_opposite(body, shared, side)][:, None]], axis=1)
             - facets[:, :1]
         )
         for side in (0, 1)
@@ -87,7 +87,7 @@ def _check_filling(body: Body) -> None:
         )
 
 
-def opposite(body: Body, facets: Indices, side: int) -> Indices:
+def _opposite(body: Body, facets: Indices, side: int) -> Indices:
     """Vertex off the facet of the element on side 0 or 1 of each facet ``(n,)``."""
     mesh = body.mesh
     return mesh.t[:, mesh.f2t[side, facets]].sum(axis=0) - mesh.facets[:, facets].sum(axis=0)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.geometry.grouped import Blocks, GroupedMesh, split_blocks
+from fe_models.geometry.grouped import Blocks, GroupedMesh, nodes_of, split_blocks
 from fe_models.gmsh_session import gmsh_model
 from fe_models.mesh import MeshError
 from sa_solver.types import Array, Indices
@@ -76,7 +76,7 @@ def grouped_entities(gmsh: Any, groups: list[EntityGroup]) -> GroupedMesh:
         bodies=named[top],
         surfaces=named[top - 1] if top > 0 else {},
         node_sets={
-            name: np.unique(np.concatenate([cells.ravel() for _, cells in blocks]))
+            name: nodes_of(blocks)
             for lower in named[: max(top - 1, 0)]
             for name, blocks in lower.items()
         },

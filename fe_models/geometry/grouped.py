@@ -6,7 +6,6 @@ diagonals of the quadrilaterals between them, whatever they are split from.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,6 +78,11 @@ def split_blocks(blocks: Blocks) -> Indices:
     return np.concatenate([simplices(shape, cells) for shape, cells in blocks])
 
 
+def nodes_of(blocks: Blocks) -> Indices:
+    """Nodes of the elements of all blocks, sorted, each once."""
+    return np.unique(np.concatenate([cells.ravel() for _, cells in blocks]))
+
+
 def _halved(quads: Indices) -> Indices:
     """Two triangles of each quadrilateral, beside the diagonal from its lowest node."""
     cyclic = (np.argmin(quads, axis=1)[:, None] + np.arange(4)) % 4
@@ -107,19 +111,14 @@ def pieces(blocks: Blocks) -> list[Indices]:
     from scipy.sparse.csgraph import connected_components
 
     count = 1 + max(int(cells.max()) for _, cells in blocks)
-    links = np.concatenate([edge for _, cells in blocks for edge in _links(cells)])
+    # Every element's corners with its first.
+    links = np.concatenate([cells[:, [0, k]] for _, cells in blocks for k in range(cells.shape[1])])
     graph = sp.coo_matrix((np.ones(len(links)), links.T), shape=(count, count))
     _, label = connected_components(graph, directed=False)
     labels = np.concatenate([label[cells[:, 0]] for _, cells in blocks])
     _, first, piece = np.unique(labels, return_index=True, return_inverse=True)
     ordered = np.argsort(np.argsort(first))[piece]
     return np.split(ordered, np.cumsum([len(cells) for _, cells in blocks])[:-1])
-
-
-def _links(cells: Indices) -> Iterator[Indices]:
-    """Pairs of nodes that connect every element's corners with its first."""
-    for corner in range(cells.shape[1]):
-        yield cells[:, [0, corner]]
 
 
 def piece_blocks(blocks: Blocks) -> list[Blocks]:

@@ -10,11 +10,11 @@ import numpy as np
 
 from fe_models.geometry.abaqus import read_abaqus
 from fe_models.geometry.cad import BEGINNINGS, read_cad
-from fe_models.geometry.checked import checked_body, opposite, vector
+from fe_models.geometry.checked import checked_body, vector
 from fe_models.geometry.gmsh_file import read_msh
-from fe_models.geometry.grouped import DIMENSION, Blocks, GroupedMesh, split_blocks
+from fe_models.geometry.grouped import DIMENSION, Blocks, GroupedMesh, nodes_of, split_blocks
 from fe_models.geometry.meshio_file import read_meshio
-from fe_models.mesh import Body, MeshError, in_space
+from fe_models.mesh import Body, MeshError
 from fe_models.remesh import element_volumes
 from sa_solver.types import Array, Indices
 
@@ -124,23 +124,14 @@ def describe_bodies(imported: ImportedMesh) -> list[str]:
 
 def patch(body: Body, boundary: str) -> Patch:
     """Area, centroid and mean outward normal of a named boundary."""
-    mesh = body.mesh
-    index = mesh.boundaries[boundary]
-    corners = mesh.p.T[mesh.facets[:, index].T]
-    edges = corners[:, 1:] - corners[:, :1]
-    if mesh.dim() == 3:
-        normals = 0.5 * np.cross(edges[:, 0], edges[:, 1])
-    else:
-        normals = np.column_stack([edges[:, 0, 1], -edges[:, 0, 0]])
-    inside = mesh.p.T[opposite(body, index, 0)] - corners[:, 0]
-    normals *= -np.sign(np.sum(normals * inside, axis=1))[:, None]
+    normals = body.outward(boundary)
     areas = np.linalg.norm(normals, axis=1)
     area, total = float(areas.sum()), normals.sum(axis=0)
     length = np.linalg.norm(total)
     return Patch(
         area=area,
-        centroid=in_space(areas @ corners.mean(axis=1) / area),
-        normal=in_space(total / length if length > CLOSED * area else np.zeros_like(total)),
+        centroid=areas @ body.points[body.facets(boundary)].mean(axis=1) / area,
+        normal=total / length if length > CLOSED * area else np.zeros(3),
     )
 
 
@@ -182,9 +173,7 @@ def _coordinates(grouped: GroupedMesh) -> Array:
             if not dimensions or dimensions & {0, 1}
             else "mixes solid and plane bodies; allowed: either"
         )
-    used = np.unique(
-        np.concatenate([cells.ravel() for blocks in grouped.bodies.values() for _, cells in blocks])
-    )
+    used = nodes_of([block for blocks in grouped.bodies.values() for block in blocks])
     if not np.all(np.isfinite(grouped.points[used])):
         raise MeshError("has nodes whose coordinates are no numbers")
     if dimensions == {3}:

@@ -24,7 +24,7 @@ ZERO_IS_NO_GROUP = ("gmsh:physical", "cell_tags")
 CellGroups = dict[str, Indices]
 
 
-def read_meshio(path: Path, file_format: str | None = None) -> GroupedMesh:
+def read_meshio(path: Path) -> GroupedMesh:
     """Read a mesh through meshio.
 
     Groups are the file's cell sets, or the values of one field of integers on its cells, by their
@@ -32,7 +32,7 @@ def read_meshio(path: Path, file_format: str | None = None) -> GroupedMesh:
     ... with no boundaries. Nodes are numbered from zero as they stand in the file. Raises
     :class:`MeshError`.
     """
-    mesh = _read(path, file_format)
+    mesh = _read(path)
     shapes = [_shape(path, block.type) for block in mesh.cells]
     cells = [
         np.asarray(block.data, dtype=np.int64)[:, : CORNERS[shape]]
@@ -65,14 +65,14 @@ def read_meshio(path: Path, file_format: str | None = None) -> GroupedMesh:
     )
 
 
-def _read(path: Path, file_format: str | None) -> Any:
+def _read(path: Path) -> Any:
     """The file as meshio sees it; what meshio says meanwhile becomes the error or a warning."""
     import meshio
 
     output = io.StringIO()
     try:
         with redirect_stdout(output), redirect_stderr(output):
-            mesh = meshio.read(path, file_format)
+            mesh = meshio.read(path)
     # Its readers let anything through, and its dispatch ends the process.
     except (Exception, SystemExit) as error:
         reason = output.getvalue() if isinstance(error, SystemExit) else str(error)

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import elliprd, elliprf
 
-from sa_solver.types import Array
+from sa_solver.types import Array, ElasticPair, Material
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,27 @@ class HertzSphere:
         """p0 sqrt(1 - r²/a²), 0 outside the contact [MPa]; ``x`` and ``y`` broadcast [mm]."""
         inside = np.maximum(0.0, 1.0 - (x**2 + y**2) / self.contact_radius**2)
         return self.peak_pressure * np.sqrt(inside)
+
+
+@dataclass(frozen=True)
+class FrictionalSphere:
+    """Sphere of relative ``radius`` [mm] under a constant ``load`` [N], with ``friction`` µ."""
+
+    load: float
+    radius: float
+    body_1: Material
+    body_2: Material
+    friction: float
+
+    @cached_property
+    def pair(self) -> ElasticPair:
+        """Both bodies."""
+        return ElasticPair(self.body_1, self.body_2)
+
+    @cached_property
+    def contact(self) -> HertzSphere:
+        """The normal contact, which neither shear nor twist changes."""
+        return HertzSphere(self.load, self.radius, self.pair.contact_modulus)
 
 
 @dataclass(frozen=True)

@@ -42,10 +42,10 @@ def ciavarella_jaeger(
     then sheared, ``pressure`` being that of one tilt for all loads. Raises ``InputError`` beyond
     |Q| = µP.
     """
-    reserve = load * _reserve(tangential, friction * load)
+    left = load * reserve(tangential, friction * load)
     shear = friction * pressure(load)
-    if reserve > 0.0:
-        shear = shear - friction * pressure(reserve)
+    if left > 0.0:
+        shear = shear - friction * pressure(left)
     return np.asarray(np.sign(tangential) * shear, dtype=np.float64)
 
 
@@ -67,22 +67,22 @@ class ShearedCylinder:
 
     def stick_half_width(self, tangential: float) -> float:
         """c = a sqrt(1 - |Q| / µP) [mm] on first loading."""
-        return self.contact.half_width * float(np.sqrt(_reserve(tangential, self.sliding_force)))
+        return self.contact.half_width * float(np.sqrt(reserve(tangential, self.sliding_force)))
 
     def shear(self, x: Array, tangential: float) -> Array:
         """q on first loading to ``tangential``, at ``x`` of any shape [mm] [MPa]."""
         stick = self.stick_half_width(tangential)
-        shear: Array = np.sign(tangential) * _shear(self.contact, self.friction, x, stick, 0.0)
-        return shear
+        sense = float(np.sign(tangential))
+        return sense * _shear(self.contact, self.friction, x, stick, 0.0)
 
     def displacement(self, tangential: float, datum: float) -> float:
         """δx [mm] on first loading, for the ``datum`` L [mm] of :meth:`HertzCylinder.approach`.
 
         (2 / π E*) {Q [ln(2 L/a) + 1/2] + (1/2)(µP - Q) ln(1 - Q/µP)}.
         """
-        reserve = _reserve(tangential, self.sliding_force)
+        left = reserve(tangential, self.sliding_force)
         linear = abs(tangential) * (float(np.log(2.0 * datum / self.contact.half_width)) + 0.5)
-        slipping = 0.5 * self.sliding_force * _x_log_x(reserve)
+        slipping = 0.5 * self.sliding_force * _x_log_x(left)
         scale = 2.0 / (np.pi * self.contact.contact_modulus)
         return float(np.sign(tangential)) * scale * (linear + slipping)
 
@@ -100,8 +100,8 @@ class ShearedCylinder:
         (4 µ²P² / π E*) [v ln v + (1 - v²)/2] with v = 1 - Q/µP: no datum is needed, since what it
         adds to δx is linear in Q. Follows from :meth:`displacement` and Masing's rule.
         """
-        reserve = _reserve(amplitude, self.sliding_force)
-        shape = _x_log_x(reserve) + 0.5 * (1.0 - reserve**2)
+        left = reserve(amplitude, self.sliding_force)
+        shape = _x_log_x(left) + 0.5 * (1.0 - left**2)
         return 4.0 * self.sliding_force**2 / (np.pi * self.contact.contact_modulus) * shape
 
 
@@ -190,10 +190,8 @@ class BulkStressedCylinder:
     def reversed_shear(self, x: Array, tangential: float, bulk_stress: float) -> Array:
         """q [MPa] on the way back to ``tangential`` and ``bulk_stress``; see ``reversed_zone``."""
         stick, centre = self.reversed_zone(tangential, bulk_stress)
-        change = np.sign(tangential - self.tangential)
-        change *= 2.0 * _shear(self.contact, self.friction, x, stick, centre)
-        shear: Array = self.shear(x) + change
-        return shear
+        sense = float(np.sign(tangential - self.tangential))
+        return self.shear(x) + 2.0 * sense * _shear(self.contact, self.friction, x, stick, centre)
 
     def _mismatch(self, bulk_stress: float) -> float:
         """ε of a bulk stress."""
@@ -210,16 +208,17 @@ def _shear(contact: HertzCylinder, friction: float, x: Array, stick: float, offs
     """µ p less its like on ``|x - offset| < stick``, ``(µ p0 / a) [sqrt(a² - x²) - ...]``."""
     sliding = np.sqrt(np.maximum(0.0, contact.half_width**2 - x**2))
     stuck = np.sqrt(np.maximum(0.0, stick**2 - (x - offset) ** 2))
-    shear: Array = friction * contact.peak_pressure / contact.half_width * (sliding - stuck)
-    return shear
+    return friction * contact.peak_pressure / contact.half_width * (sliding - stuck)
 
 
-def _reserve(tangential: float, sliding_force: float) -> float:
-    """1 - |Q| / µP, what is left before sliding."""
-    reserve = 1.0 - abs(tangential) / sliding_force
-    if reserve < 0.0:
-        raise InputError(f"Q = {tangential} N/mm slides: it is beyond µP = {sliding_force} N/mm")
-    return reserve
+def reserve(tangential: float, sliding_force: float, unit: str = "N/mm") -> float:
+    """1 - |Q| / µP, what is left before sliding. Raises ``InputError`` beyond |Q| = µP."""
+    left = 1.0 - abs(tangential) / sliding_force
+    if left < 0.0:
+        raise InputError(
+            f"Q = {tangential} {unit} slides: it is beyond µP = {sliding_force} {unit}"
+        )
+    return left
 
 
 def _x_log_x(x: float) -> float:

@@ -18,38 +18,22 @@ Mechanics*, sections 7.2 and 7.4.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 
-from sa_solver.errors import InputError
-from sa_solver.reference.hertz import HertzSphere
+from sa_solver.reference.hertz import FrictionalSphere
+from sa_solver.reference.line_partial_slip import reserve
 from sa_solver.reference.masing import superpose
-from sa_solver.types import Array, ElasticPair, Material
+from sa_solver.types import Array
 
 
-@dataclass(frozen=True)
-class ShearedSphere:
-    """Sphere of relative ``radius`` [mm] under a constant ``load`` [N], sheared along x.
+class ShearedSphere(FrictionalSphere):
+    """A sphere under a constant load, sheared along x.
 
-    ``friction`` is µ. Tangential forces are those on body 2, displacements those of body 1 relative
+    Tangential forces are those on body 2, displacements those of body 1 relative
     to body 2 far from the contact: they have the same sign on first loading. Methods raise
     ``InputError`` beyond |Q| = µP.
     """
-
-    load: float
-    radius: float
-    body_1: Material
-    body_2: Material
-    friction: float
-
-    @cached_property
-    def contact(self) -> HertzSphere:
-        """The normal contact, which shear does not change."""
-        return HertzSphere(
-            self.load, self.radius, ElasticPair(self.body_1, self.body_2).contact_modulus
-        )
 
     @property
     def sliding_force(self) -> float:
@@ -59,13 +43,14 @@ class ShearedSphere:
     @property
     def tangential_compliance(self) -> float:
         """dδx/dQ where nothing slips, ``Σ (2 - ν)/G / 8 a`` [mm/N]."""
-        bodies = (self.body_1, self.body_2)
-        compliance = sum((2.0 - m.poisson) / m.shear_modulus for m in bodies)
+        compliance = 2.0 * self.pair.shear - self.pair.poisson
         return compliance / (8.0 * self.contact.contact_radius)
 
     def stick_radius(self, tangential: float) -> float:
         """c [mm] on first loading to ``tangential`` [N]."""
-        return self.contact.contact_radius * float(np.cbrt(self._reserve(tangential)))
+        return self.contact.contact_radius * float(
+            np.cbrt(reserve(tangential, self.sliding_force, "N"))
+        )
 
     def shear(self, x: Array, y: Array, tangential: float) -> Array:
         """qx on first loading to ``tangential`` [N]; ``x`` and ``y`` broadcast [mm] [MPa]."""
@@ -73,13 +58,12 @@ class ShearedSphere:
         radius_squared = x**2 + y**2
         sliding = np.sqrt(np.maximum(0.0, a**2 - radius_squared))
         stuck = np.sqrt(np.maximum(0.0, c**2 - radius_squared))
-        scale = np.sign(tangential) * self.friction * self.contact.peak_pressure / a
-        shear: Array = scale * (sliding - stuck)
-        return shear
+        scale = float(np.sign(tangential)) * self.friction * self.contact.peak_pressure / a
+        return scale * (sliding - stuck)
 
     def displacement(self, tangential: float) -> float:
         """δx [mm] on first loading to ``tangential`` [N]."""
-        spent = 1.0 - float(np.cbrt(self._reserve(tangential))) ** 2
+        spent = 1.0 - float(np.cbrt(reserve(tangential, self.sliding_force, "N"))) ** 2
         return float(np.sign(tangential)) * self._sliding_displacement * spent
 
     def shear_after(self, x: Array, y: Array, loads: Sequence[float]) -> Array:
@@ -100,19 +84,12 @@ class ShearedSphere:
         4 µP δ1 [(6/5)(1 - v^(5/3)) - (Q/µP)(1 + v^(2/3))], with v = 1 - Q/µP and δ1 the
         displacement at the onset of sliding.
         """
-        reserve = self._reserve(amplitude)
-        power = float(np.cbrt(reserve)) ** 2
-        shape = 1.2 * (1.0 - reserve * power) - (1.0 - reserve) * (1.0 + power)
+        left = reserve(amplitude, self.sliding_force, "N")
+        power = float(np.cbrt(left)) ** 2
+        shape = 1.2 * (1.0 - left * power) - (1.0 - left) * (1.0 + power)
         return 4.0 * self.sliding_force * self._sliding_displacement * shape
 
     @property
     def _sliding_displacement(self) -> float:
         """δ1 [mm], at the onset of sliding: 3/2 of what no slip would give."""
         return 1.5 * self.sliding_force * self.tangential_compliance
-
-    def _reserve(self, tangential: float) -> float:
-        """1 - |Q| / µP, what is left before sliding."""
-        reserve = 1.0 - abs(tangential) / self.sliding_force
-        if reserve < 0.0:
-            raise InputError(f"Q = {tangential} N slides: it is beyond µP = {self.sliding_force} N")
-        return reserve

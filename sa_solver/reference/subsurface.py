@@ -13,10 +13,8 @@ from __future__ import annotations
 import numpy as np
 
 from sa_solver.reference.hertz import HertzCylinder, HertzSphere
+from sa_solver.subsurface_influence import EXCHANGED
 from sa_solver.types import Array
-
-EXCHANGED = [1, 0, 2, 3, 5, 4]
-"""Components of stress when x and y change places."""
 
 
 def point_force_stress(x: Array, y: Array, z: Array, poisson: float) -> Array:

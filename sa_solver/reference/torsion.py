@@ -24,8 +24,6 @@ Source: Lubkin 1951, J. Appl. Mech. 18, 183, whose solution this is, by another 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from scipy.integrate import quad
@@ -33,34 +31,20 @@ from scipy.optimize import brentq
 from scipy.special import ellipe, elliprd, elliprj
 
 from sa_solver.errors import InputError
-from sa_solver.reference.hertz import HertzSphere
+from sa_solver.reference.hertz import FrictionalSphere
 from sa_solver.reference.masing import superpose
-from sa_solver.types import Array, ElasticPair, Material
+from sa_solver.types import Array
 
 ROUNDING = 1e-12
 """Moments this close to sliding, relative to it, slide: the quadrature is not better than that."""
 
 
-@dataclass(frozen=True)
-class TwistedSphere:
-    """Sphere of relative ``radius`` [mm] under a constant ``load`` [N], twisted about its normal.
+class TwistedSphere(FrictionalSphere):
+    """A sphere under a constant load, twisted about its normal.
 
-    ``friction`` is µ. Moments are those on body 2, twists those of body 1 relative to body 2: they
+    Moments are those on body 2, twists those of body 1 relative to body 2: they
     have the same sign on first loading. Methods raise ``InputError`` beyond the sliding moment.
     """
-
-    load: float
-    radius: float
-    body_1: Material
-    body_2: Material
-    friction: float
-
-    @cached_property
-    def contact(self) -> HertzSphere:
-        """The normal contact, which twist does not change."""
-        return HertzSphere(
-            self.load, self.radius, ElasticPair(self.body_1, self.body_2).contact_modulus
-        )
 
     @property
     def sliding_moment(self) -> float:
@@ -70,7 +54,7 @@ class TwistedSphere:
     @property
     def torsional_stiffness(self) -> float:
         """dMz/dφz where nothing slips, ``(16/3) a³ / (1/G1 + 1/G2)`` [N mm]."""
-        return 16.0 * self.contact.contact_radius**3 / (3.0 * self._shear_compliance)
+        return 16.0 * self.contact.contact_radius**3 / (3.0 * self.pair.shear)
 
     def no_slip_shear(self, radius: Array, moment: float) -> Array:
         """q_θ = 3 Mz r / (4 π a³ sqrt(a² - r²)) if friction were infinite, 0 outside [MPa]."""
@@ -135,15 +119,9 @@ class TwistedSphere:
         """q_θ inside the stuck circle; Π - K = (n/3) R_J(0, 1 - m, 1, 1 - n)."""
         a = self.contact.contact_radius
         within, depth = c**2 - r**2, a**2 - r**2
-        difference = (a**2 - c**2) / (3.0 * depth) * elliprj(0.0, (c / a) ** 2, 1.0, within / depth)
+        integral: Array = elliprj(0.0, (c / a) ** 2, 1.0, within / depth)
         scale = 2.0 * self.friction * self.contact.peak_pressure / (np.pi * a**2)
-        shear: Array = scale * r * np.sqrt(within) * difference
-        return shear
-
-    @property
-    def _shear_compliance(self) -> float:
-        """1/G1 + 1/G2 [1/MPa]."""
-        return 1.0 / self.body_1.shear_modulus + 1.0 / self.body_2.shear_modulus
+        return scale * r * np.sqrt(within) * (a**2 - c**2) / (3.0 * depth) * integral
 
     def _twist(self, ratio: float) -> float:
         """φz at stick ratio c/a; K - E = (m/3) R_D(0, 1 - m, 1)."""
@@ -151,7 +129,7 @@ class TwistedSphere:
             return float(np.inf)
         difference = (1.0 - ratio**2) / 3.0 * float(elliprd(0.0, ratio**2, 1.0))
         traction = self.friction * self.contact.peak_pressure
-        return 0.5 * traction * self._shear_compliance * difference
+        return 0.5 * traction * self.pair.shear * difference
 
     def _moment_rate(self, ratio: float) -> float:
         """-dMz/d(c/a) [N mm]."""

@@ -58,8 +58,7 @@ class WavySurface:
 
     def gap(self, x: Array) -> Array:
         """Gap before loading [mm], 0 at the crests."""
-        gap: Array = 2.0 * self.amplitude * np.sin(np.pi * x / self.wavelength) ** 2
-        return gap
+        return 2.0 * self.amplitude * np.sin(np.pi * x / self.wavelength) ** 2
 
     def pressure(self, x: Array) -> Array:
         """2 p* cos ψ sqrt(sin²ψa - sin²ψ) with ψ = π x / λ, 0 outside the contacts [MPa]."""
@@ -111,9 +110,8 @@ class ChebyshevPunch:
     def pressure(self, x: Array) -> Array:
         """Pressure, 0 outside the contact [MPa]."""
         t = np.clip(x / self.half_width, -1.0, 1.0)
-        waves = 1.0 + self.waviness * eval_chebyu(self.order, t)
-        pressure: Array = self.mean_peak_pressure * np.sqrt(1.0 - t**2) * waves
-        return pressure
+        waves: Array = 1.0 + self.waviness * eval_chebyu(self.order, t)
+        return self.mean_peak_pressure * np.sqrt(1.0 - t**2) * waves
 
     def gap(self, x: Array) -> Array:
         """Gap before loading, 0 at x = 0 and negative where a wave stands higher [mm]."""
@@ -127,8 +125,7 @@ class ChebyshevPunch:
     def _potential(self, t: Array) -> Array:
         """(2 p0 a / π E*) ∫ sqrt(1-s²) [1 + ε U_n(s)] ln|t-s| ds, as a polynomial in t."""
         n = self.order
-        even = 0.5 * eval_chebyt(2, t) - np.log(2.0)
-        waves = eval_chebyt(n + 2, t) / (n + 2) - eval_chebyt(n, t) / n
+        even: Array = 0.5 * eval_chebyt(2, t) - np.log(2.0)
+        waves: Array = eval_chebyt(n + 2, t) / (n + 2) - eval_chebyt(n, t) / n
         scale = self.mean_peak_pressure * self.half_width / self.contact_modulus
-        potential: Array = scale * (even + self.waviness * waves)
-        return potential
+        return scale * (even + self.waviness * waves)

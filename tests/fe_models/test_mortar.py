@@ -16,7 +16,7 @@ from fe_models.friction import FrictionalJoint
 from fe_models.joint import join
 from fe_models.mesh import AXES, Body, MeshError
 from fe_models.mortar import frame_of_faces, mortar_interface, mortar_projection
-from fe_models.supported_body import SupportedBody, interface_frames
+from fe_models.supported_body import SupportedBody, interface_nodes
 from sa_solver.types import Frame, Material
 
 LINE, SURFACE = 2, 3
@@ -297,14 +297,13 @@ class Pressed:
         bodies = [elastic.body for elastic in self.elastic]
         self.interface = mortar_interface("joint", bodies[0], "z1", bodies[1], "z0", frame)
         self.projection = sp.kron(self.interface.projection, sp.identity(dimension), format="csr")
-        nodes = self.interface.nodes_1, self.interface.nodes_2
         constraints = isostatic(self.elastic[0]), Constraints(self.count(1), dimension)
         self.bodies = []
         for k, elastic in enumerate(self.elastic):
             constraints[k].average(*elastic.midsides(contact[k]))
-            frames = interface_frames((self.interface,), k + 1, elastic.body)
+            placed = interface_nodes([self.interface], k + 1, elastic.body)
             load = boundary_load(elastic, stress, contact[k])[:, None]
-            self.bodies.append(SupportedBody(elastic, constraints[k], nodes[k], frames, load))
+            self.bodies.append(SupportedBody(elastic, constraints[k], *placed, load))
         self.joint = join(*(body.condense() for body in self.bodies), self.projection)
 
     def count(self, number):
@@ -516,13 +515,11 @@ def rub(elastics, held, face, load, friction):
     """Press body 2, in the plane and free but for the contact: the state, and the load's work."""
     supports = held, Constraints(len(elastics[1].nodes), LINE)
     loads = np.zeros((elastics[0].size, 1)), load[:, None]
-    nodes = face.nodes_1, face.nodes_2
     bodies = [
         SupportedBody(
             elastics[k],
             supports[k],
-            nodes[k],
-            interface_frames((face,), k + 1, elastics[k].body),
+            *interface_nodes([face], k + 1, elastics[k].body),
             loads[k],
         )
         for k in range(2)

@@ -79,7 +79,7 @@ class AlternatingContact:
             if not (self.half_space.grid.line and name in ("Mx", "Mz") and value == 0.0)
         }
         fixed = np.zeros((2, *height.shape)) if offset is None else offset
-        lift = np.zeros(height.shape)
+        lift = none = np.zeros(height.shape)
         pressed: NormalState | None = None
         sheared: TangentialState | None = None
         changes: list[float] = []
@@ -87,7 +87,7 @@ class AlternatingContact:
         settled = False
         while not settled and len(changes) < max_rounds:
             pressed = self._press(height + lift, loads, INNER * tolerance, pressed)
-            drag = self.half_space.shear_under_pressure(pressed.pressure)
+            drag = self.half_space.displacement(np.stack([none, none, pressed.pressure]))[:2]
             sheared = self._shear(pressed, fixed + drag, loads, INNER * tolerance, sheared)
             lift, last = self.half_space.normal_under_shear(sheared.shear), lift
             convolutions += pressed.convolutions + sheared.convolutions + CROSS_TERMS

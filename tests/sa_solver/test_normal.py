@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sa_solver import few_cells, nested_solver, normal_splitting
+from sa_solver import bound_cg, few_cells, normal_splitting
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalContactError
 from sa_solver.reference.flat_rounded import FlatRoundedPunch
@@ -207,7 +207,7 @@ def test_the_fallbacks_agree_with_conjugate_gradients(monkeypatch, wear, method,
     compliance = wear * (np.abs(grid.x) > 2.0) * np.ones(grid.shape)
     contact = NormalContact(HalfSpace(grid, PAIR))
     expected = contact.solve(height, 9e4, Mx=9e4, My=9e3, compliance=compliance)
-    monkeypatch.setattr(nested_solver, "GRADIENT_ITERATIONS", 0)
+    monkeypatch.setattr(bound_cg, "ITERATIONS", 0)
     monkeypatch.setattr(few_cells, "LARGEST", largest)
     state = contact.solve(height, 9e4, Mx=9e4, My=9e3, compliance=compliance)
     assert expected.method == "conjugate gradients"
@@ -218,7 +218,7 @@ def test_the_fallbacks_agree_with_conjugate_gradients(monkeypatch, wear, method,
 
 
 def test_failure_is_a_value_with_a_remedy(monkeypatch):
-    monkeypatch.setattr(nested_solver, "GRADIENT_ITERATIONS", 1)
+    monkeypatch.setattr(bound_cg, "ITERATIONS", 1)
     monkeypatch.setattr(few_cells, "STEPS", 1)
     monkeypatch.setattr(normal_splitting, "SPLITTING_ITERATIONS", 2)
     grid, height = flat((16, 16))

@@ -178,7 +178,9 @@ def test_the_trailing_edge_is_in_tension(body, side, sense):
     values = []
     for count in (256, 1024):
         grid = Grid.strips(4.0 * a, count)
-        stress = SubsurfaceStress(grid, STEEL, body).surface(sheared(cell_means(grid), sense * 0.4))
+        stress = SubsurfaceStress(grid, STEEL, body).at_depth(
+            sheared(cell_means(grid), sense * 0.4), 0.0
+        )
         edge = int(np.argmax(stress[XX]))
         assert grid.x[edge, 0] == pytest.approx(side * sense * a, abs=grid.pitch[0])
         values.append(1.0 - stress[XX, edge, 0] / (2.0 * FRICTION * p0))
@@ -217,7 +219,7 @@ def test_yield_starts_below_the_sphere():
 def surface_error(count):
     """Mean error at the surface over p0, inside the contact."""
     grid, pressure = sphere_grid(count)
-    found = SubsurfaceStress(grid, STEEL, 2).surface(sheared(pressure))
+    found = SubsurfaceStress(grid, STEEL, 2).at_depth(sheared(pressure), 0.0)
     expected = sphere_surface_stress(SPHERE, FRICTION, grid.x, grid.y, STEEL.poisson)
     inside = np.hypot(grid.x, grid.y) < SPHERE.contact_radius
     return np.abs(found - expected)[:, inside].mean(axis=1) / SPHERE.peak_pressure
@@ -245,7 +247,7 @@ def test_pressure_pulls_radially_at_the_edge():
 def edge_error(count):
     """Largest relative error of the radial stress outside the contact, in one row."""
     grid, pressure = sphere_grid(count + 1)
-    stress = SubsurfaceStress(grid, STEEL, 2).surface(sheared(pressure, 0.0))
+    stress = SubsurfaceStress(grid, STEEL, 2).at_depth(sheared(pressure, 0.0), 0.0)
     r = np.abs(grid.x[:, 0]) / SPHERE.contact_radius
     expected = 0.4 / 3.0 * SPHERE.peak_pressure
     return np.abs(stress[XX, :, count // 2] * r**2 / expected - 1.0)[r > 1.0].max()
@@ -356,7 +358,7 @@ def test_exchange_of_the_axes():
 def test_the_surface_carries_the_tractions(body):
     grid = Grid((12, 17), (0.2, 0.15))
     traction = random_traction(grid)
-    surface = SubsurfaceStress(grid, STEEL, body).surface(traction)
+    surface = SubsurfaceStress(grid, STEEL, body).at_depth(traction, 0.0)
     np.testing.assert_array_equal(surface[[ZX, YZ, ZZ]], -traction)
     below = SubsurfaceStress(grid, STEEL, body).at_depth(traction, 1e-12)
     np.testing.assert_allclose(below, surface, rtol=0, atol=1e-9)
@@ -379,6 +381,6 @@ def test_what_does_not_fit_is_refused():
     with pytest.raises(SubsurfaceError, match="grid ends"):
         SubsurfaceStress(plane, STEEL, 1).section(np.ones((3, 4, 5)), "x", 0.3, np.ones(1))
     with pytest.raises(SubsurfaceError, match="shape"):
-        SubsurfaceStress(plane, STEEL, 1).surface(np.ones((3, 5, 4)))
+        SubsurfaceStress(plane, STEEL, 1).at_depth(np.ones((3, 5, 4)), 0.0)
     with pytest.raises(SubsurfaceError, match="depth"):
         SubsurfaceStress(plane, STEEL, 1).at_depth(np.ones((3, 4, 5)), -0.1)
