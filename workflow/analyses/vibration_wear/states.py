@@ -36,7 +36,7 @@ def worn_states(
                 worn = advance_cycles(stepper, state, cycles - done, total - done, contact_at)
             state, done, error = worn.state, cycles, max(error, worn.error)
             states.append(describe(state, cycles, worn.spent.steps, error))
-            progress.update(cycles, len(states) - 1)
+            progress(cycles, len(states) - 1)
     return tuple(states)
 
 
