@@ -63,7 +63,7 @@ class Motions:
 class ResponseBranch(Motions):
     """Motions in the order in which they were found, the first one included.
 
-    ``message`` is empty if the branch reached an end of its span. ``points`` are those of the
+    ``message`` is empty if the branch reached the far end of its span. ``points`` are those of the
     curve, and ``problem`` is what it ended with, to go on from its last point.
     """
 
@@ -87,8 +87,9 @@ def along_frequency(
 ) -> ResponseBranch:
     """Motions under a force for the frequencies of ``span`` [Hz], folds included.
 
-    From its lower end upward or from its upper end downward; from a ``start`` if there is one: a
-    solution as a first guess, or a branch, to go on from its last point. Without ``accuracy`` the
+    From its lower end upward or from its upper end downward: a branch that does not get to the
+    other end says why. From a ``start`` if there is one: a solution as a first guess; or a branch,
+    to go on from its last point to either end. Without ``accuracy`` the
     resolution is that of the problem.
     """
     return _branch(problem, _Along("frequency", force), span, start, upward, control, accuracy)
@@ -193,8 +194,11 @@ def _branch(
             "above 0 if they are frequencies"
         )
     control = control or ContinuationControl()
+    end: float | None = span[1] if upward else span[0]
     if isinstance(start, ResponseBranch):
         record, point = _Recorder(start.problem, along, accuracy), start.curve.points[-1]
+        # Which way it leads is in its last point.
+        end = None
     else:
         record = _Recorder(problem, along, accuracy)
         first = _first(record, along, span[0 if upward else 1], start, upward, control)
@@ -211,6 +215,7 @@ def _branch(
         record,
         rest,
         record.problem.rounding,
+        end=end,
     )
     return ResponseBranch(tuple(record.solutions), curve, record.problem)
 

@@ -195,23 +195,18 @@ class HarmonicBalance:
                 f"raised: {unforced.message}, or give a load that does not pull all joints apart",
             )
         point = first_point(unforced, 0.0, force > 0.0, control.first)
-        # A curve that comes back to no force has turned back, or is closed.
-        span = min(force, 0.0), max(force, 0.0)
         curve = follow(
-            rising, point, span, control, origin=self.guess(None), rounding=self.rounding
+            rising,
+            point,
+            (min(force, 0.0), max(force, 0.0)),
+            control,
+            origin=self.guess(None),
+            rounding=self.rounding,
+            end=force,
         )
         if curve.message:
             return replace(direct, message=f"raising the force from 0, {curve.message}")
-        last = curve.points[-1]
-        if last.parameter != force:
-            reached = np.max(np.sign(force) * curve.parameters)
-            return replace(
-                direct,
-                message=f"raising the force from 0, the curve turns back at {reached:.6g} and "
-                f"does not reach {abs(force):g}: give more harmonics and samples, or start from a "
-                "solution nearby",
-            )
-        return solve(self.by_frequency(force), last.unknowns, frequency, newton)
+        return solve(self.by_frequency(force), curve.points[-1].unknowns, frequency, newton)
 
     def describe(
         self, unknowns: Array, at: Balance, frequency: float, force: float, *, check: bool = False

@@ -345,10 +345,8 @@ def _half(
     point = first_point(first.resonance, force, upward, control.first)
     # Steps are shares of the vibration, as those of forced responses.
     rest = np.append(problem.guess(None), 0.0)
-    curve = follow(first.equations, point, forces, control, record, rest)
+    curve = follow(first.equations, point, forces, control, record, rest, end=forces[upward])
     message = curve.message
-    if not message and curve.points[-1].parameter != forces[upward]:
-        message = f"the curve turns back to {curve.points[-1].parameter:g} N: give closer forces"
     if message:
         message = f"{'upward' if upward else 'downward'} in force, {message}"
     return _Half(tuple(record.solutions), message, record.equations.problem)

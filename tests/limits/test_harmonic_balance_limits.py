@@ -381,7 +381,7 @@ def test_a_branch_that_starts_on_a_fold(folded):
         np.testing.assert_allclose(solution.motion, wanted, atol=SOLVED * scale)
     # Nothing is above the fold: the branch leaves a span that begins there where it began.
     above = along_frequency(problem, 1.0, (start.frequency, 200.0), start)
-    assert above.message == ""
+    assert "does not reach 200" in above.message
     assert above.frequencies[-1] == start.frequency
 
 
