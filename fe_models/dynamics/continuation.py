@@ -365,7 +365,7 @@ def _turned_back(start: CurvePoint, points: list[CurvePoint], end: float | None)
     farthest = min((point.parameter for point in (start, *points)), key=lambda at: abs(at - end))
     return (
         f"the curve turns back at {farthest:.6g} and leaves at {last:.6g}, it does not reach "
-        f"{end:.6g}: give more harmonics and samples, shorter steps, or start from a solution nearby"
+        f"{end:.6g}: give more harmonics or samples, shorter steps, or start from a solution nearby"
     )
 
 
