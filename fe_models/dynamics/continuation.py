@@ -372,21 +372,24 @@ def _turned_back(start: CurvePoint, points: list[CurvePoint], end: float | None)
 def _refound(
     equations: Equations[L], point: CurvePoint, scaling: Scaling, control: ContinuationControl
 ) -> CurvePoint:
-    """A point near a curve brought onto it across its tangent or at its λ; itself if that fails.
+    """A point near a curve brought onto it at its λ, or nearby across its tangent where none is.
 
-    It keeps the orientation: where equations that differ a little have a fold elsewhere, its
-    tangent may be the opposite of the one it came with.
+    Itself if that fails. It keeps the orientation: where equations that differ a little have a peak
+    or a fold elsewhere, its tangent may be the opposite of the one it came with.
     """
     scaling.adapt(point)
+    solution = solve(equations, point.unknowns, point.parameter, NewtonControl(control.tolerance))
+    if solution.converged:
+        upward = bool(point.tangent[-1] > 0.0)
+        beside = first_point(solution, point.parameter, upward, point.step)
+        return _oriented(beside, point.orientation)
     step = control.least * scaling.direction(point)
     across = _correct(equations, point, step, scaling, control)
-    if across is not None:
-        return _oriented(across[0], point.orientation)
-    solution = solve(equations, point.unknowns, point.parameter, NewtonControl(control.tolerance))
-    if not solution.converged:
+    if across is None:
         return point
-    upward = bool(point.tangent[-1] > 0.0)
-    return _oriented(first_point(solution, point.parameter, upward, point.step), point.orientation)
+    way = scaling.scaled(across[0].coordinates - point.coordinates)
+    near = float(np.linalg.norm(way)) <= control.most
+    return _oriented(across[0], point.orientation) if near else point
 
 
 def _oriented(point: CurvePoint, orientation: int) -> CurvePoint:

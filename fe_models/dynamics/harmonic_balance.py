@@ -40,7 +40,7 @@ from sa_solver.types import Array
 # Unknowns up to which a matrix is assembled and factorised; beyond, products with it are cheaper.
 DENSE = 400
 # Harmonics left out are looked for up to this multiple of the highest, and at least to this one.
-LOOK_BEYOND, LOOK_AT_LEAST = 4, 63
+LOOK_BEYOND, LOOK_AT_LEAST = 2, 63
 # Samples per period of the highest harmonic, at least: a corner of a joint's force is then seen.
 SAMPLES_PER_PERIOD = 8
 # A vibration below this share of what balances in the mean is rounding: there is none.
