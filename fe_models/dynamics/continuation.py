@@ -93,7 +93,7 @@ class CurvePoint:
 
 @dataclass(frozen=True)
 class SolutionCurve:
-    """Points in their order; ``message`` is empty if the curve reached an end of its span."""
+    """Points in their order; ``message`` is empty if the curve reached the end that it was to."""
 
     points: tuple[CurvePoint, ...]
     message: str
@@ -206,8 +206,9 @@ def _try_steps(
             new, at, tangent = corrected
             cosine = min(max(float(tangent @ direction), -1.0), 1.0)
             angle = float(np.degrees(np.arccos(cosine)))
+            smooth = angle <= control.max_angle
             same = new.orientation * point.orientation >= 0
-            if (same and (angle <= control.max_angle or step <= CORNER)) or step <= CROSSING:
+            if (same and (smooth or step <= CORNER)) or (smooth and step <= CROSSING):
                 return replace(new, step=_adapted(step, new.iterations, angle, control)), at
         step *= 0.5
     return None
@@ -309,7 +310,6 @@ class Refinement(Generic[L]):
             point,
             unknowns=self.lift(point.unknowns),
             tangent=np.append(self.lift(point.tangent[:-1]), point.tangent[-1]),
-            orientation=0,
         )
 
 
@@ -321,9 +321,11 @@ def follow(
     on_point: Callable[[CurvePoint, L], Refinement[L] | None] | None = None,
     origin: Array | None = None,
     rounding: float = 0.0,
+    end: float | None = None,
 ) -> SolutionCurve:
     """Follow a curve from a point until λ leaves the ``span``; its last point lies on the end.
 
+    ``end`` is the one of its two ends that the curve is to reach; without it either will do.
     ``on_point`` is called with every new point; where it answers with finer equations, the point is
     forgotten, and found again with these. Steps are shares of what the unknowns differ from an
     ``origin``, zero unless given; below a norm of ``rounding`` they do not differ. The start is not
@@ -342,11 +344,11 @@ def follow(
         if finer is not None:
             equations = finer.equations
             scaling.origin = None if scaling.origin is None else finer.lift(scaling.origin)
-            point = _corrected(equations, finer.lifted(point), scaling, control)
+            point = _refound(equations, finer.lifted(point), scaling, control)
             continue
         points.append(new)
         if new.parameter in span:
-            return SolutionCurve(tuple(points), "")
+            return SolutionCurve(tuple(points), _turned_back(start, points, end))
         point = new
     message = (
         f"the curve has {control.max_points} points and is at {point.parameter:.6g}: go on from "
@@ -355,17 +357,46 @@ def follow(
     return SolutionCurve(tuple(points), message)
 
 
-def _corrected(
+def _turned_back(start: CurvePoint, points: list[CurvePoint], end: float | None) -> str:
+    """Message of a curve that left its span by the other end, empty if it did not."""
+    last = points[-1].parameter
+    if end is None or last == end:
+        return ""
+    farthest = min((point.parameter for point in (start, *points)), key=lambda at: abs(at - end))
+    return (
+        f"the curve turns back at {farthest:.6g} and leaves at {last:.6g}, it does not reach "
+        f"{end:.6g}: give more harmonics or samples, shorter steps, or start from a solution nearby"
+    )
+
+
+def _refound(
     equations: Equations[L], point: CurvePoint, scaling: Scaling, control: ContinuationControl
 ) -> CurvePoint:
-    """A point near a curve brought onto it across its tangent or at its λ; itself if that fails."""
+    """A point near a curve brought onto it at its λ, or nearby across its tangent where none is.
+
+    Itself if that fails. It keeps the orientation: where equations that differ a little have a peak
+    or a fold elsewhere, its tangent may be the opposite of the one it came with.
+    """
     scaling.adapt(point)
+    solution = solve(equations, point.unknowns, point.parameter, NewtonControl(control.tolerance))
+    if solution.converged:
+        upward = bool(point.tangent[-1] > 0.0)
+        beside = first_point(solution, point.parameter, upward, point.step)
+        return _oriented(beside, point.orientation)
     step = control.least * scaling.direction(point)
     across = _correct(equations, point, step, scaling, control)
-    if across is not None:
-        return across[0]
-    solution = solve(equations, point.unknowns, point.parameter, NewtonControl(control.tolerance))
-    return replace(point, unknowns=solution.unknowns) if solution.converged else point
+    if across is None:
+        return point
+    way = scaling.scaled(across[0].coordinates - point.coordinates)
+    near = float(np.linalg.norm(way)) <= control.most
+    return _oriented(across[0], point.orientation) if near else point
+
+
+def _oriented(point: CurvePoint, orientation: int) -> CurvePoint:
+    """A point with the tangent in the sense that has this orientation; as it is where 0."""
+    if point.orientation * orientation >= 0:
+        return point
+    return replace(point, tangent=-point.tangent, orientation=orientation)
 
 
 def _next_within(

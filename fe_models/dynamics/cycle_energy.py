@@ -12,6 +12,8 @@ which is that of an oscillator on a dashpot wherever its own resonance is driven
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from scipy.optimize import minimize_scalar
 
@@ -33,11 +35,18 @@ def energy_lost(problem: HarmonicBalance, solution: HarmonicSolution) -> float:
     What joints take is summed along their path from sample to sample, so that its balance with the
     work of the forces is as good as the samples.
     """
-    motion = solution.motion
-    orders = np.array(solution.resolution.harmonics, dtype=float)
+    joints = float(np.sum(solution.cycle.dissipated))
+    harmonics = solution.resolution.harmonics
+    return joints + energy_damped(problem, solution.motion, harmonics, solution.frequency)
+
+
+def energy_damped(
+    problem: HarmonicBalance, motion: ComplexArray, harmonics: Sequence[int], frequency: float
+) -> float:
+    """What the structure's own damping takes of a motion ``(k, n)`` in a period [N mm]."""
+    orders = np.array(harmonics, dtype=float)
     of_harmonics = (motion.conj() * _times(motion, problem.model.damping)).real.sum(axis=1)
-    damped = np.pi * 2.0 * np.pi * solution.frequency * float(orders**2 @ of_harmonics)
-    return damped + float(np.sum(solution.cycle.dissipated))
+    return 2.0 * np.pi**2 * frequency * float(orders**2 @ of_harmonics)
 
 
 def largest_kinetic_energy(problem: HarmonicBalance, solution: HarmonicSolution) -> float:

@@ -15,21 +15,24 @@ from fe_models.dynamics.continuation import (
     first_point,
     follow,
 )
-from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance
+from fe_models.dynamics.harmonic_balance import (
+    SAMPLES_PER_PERIOD,
+    Balance,
+    HarmonicBalance,
+)
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.newton import Equations, solve
+from fe_models.dynamics.resolution_error import resolution_error
 from sa_solver.types import Array
 
-# A harmonic left out is added where it has this share of the tolerance: many may sum up.
-ADDED = 0.2
-# Samples per period of the highest harmonic, at least: a corner of a joint's force is then seen.
-SAMPLES_PER_PERIOD = 8
+# Of the tolerance, what harmonics that stay left out may have of the error, and samples.
+HARMONICS_LEAVE, SAMPLES_LEAVE = 0.3, 0.5
 
 
 @dataclass(frozen=True)
 class Accuracy:
-    """How accurate motions are to be: ``tolerance`` of ``left_out`` and ``sampling`` each.
+    """How accurate motions are to be: ``tolerance`` of their ``error``, vibration and energy.
 
     Harmonics and samples grow as needed up to the ``highest`` harmonic and ``most_samples``; what
     then is left is in the solutions.
@@ -63,7 +66,7 @@ class Motions:
 class ResponseBranch(Motions):
     """Motions in the order in which they were found, the first one included.
 
-    ``message`` is empty if the branch reached an end of its span. ``points`` are those of the
+    ``message`` is empty if the branch reached the far end of its span. ``points`` are those of the
     curve, and ``problem`` is what it ended with, to go on from its last point.
     """
 
@@ -87,8 +90,9 @@ def along_frequency(
 ) -> ResponseBranch:
     """Motions under a force for the frequencies of ``span`` [Hz], folds included.
 
-    From its lower end upward or from its upper end downward; from a ``start`` if there is one: a
-    solution as a first guess, or a branch, to go on from its last point. Without ``accuracy`` the
+    From its lower end upward or from its upper end downward: a branch that does not get to the
+    other end says why. From a ``start`` if there is one: a solution as a first guess; or a branch,
+    to go on from its last point to either end. Without ``accuracy`` the
     resolution is that of the problem.
     """
     return _branch(problem, _Along("frequency", force), span, start, upward, control, accuracy)
@@ -134,14 +138,12 @@ class _Recorder:
     def __call__(self, point: CurvePoint, at: Balance) -> Refinement[Balance] | None:
         solution = replace(
             self.problem.describe(
-                point.unknowns,
-                at,
-                *self._along.frequency_and_force(point.parameter),
-                check=self._accuracy is not None,
+                point.unknowns, at, *self._along.frequency_and_force(point.parameter)
             ),
             iterations=point.iterations,
         )
         if self._accuracy is not None:
+            solution = replace(solution, error=resolution_error(self.problem, solution))
             finer = finer_resolution(self.problem, solution, self._accuracy)
             if finer is not None:
                 return self._refine(finer)
@@ -161,16 +163,22 @@ class _Recorder:
 def finer_resolution(
     problem: HarmonicBalance, solution: HarmonicSolution, accuracy: Accuracy
 ) -> Resolution | None:
-    """The resolution that a solution asks for, None if its own will do or is the finest allowed."""
-    present, tolerance = problem.resolution, accuracy.tolerance
+    """The resolution that a solution asks for, None if its own will do or is the finest allowed.
+
+    The solution knows its error. The harmonics that cause most of it are added.
+    """
+    present, tolerance, error = problem.resolution, accuracy.tolerance, solution.error
+    assert error is not None
     harmonics, samples = present.harmonics, present.samples
-    if solution.left_out > tolerance:
-        shares = problem.left_out(solution.coefficients, solution.cycle, solution.frequency)
-        missing = np.flatnonzero(shares > ADDED * tolerance)
-        added = set(missing[missing <= accuracy.highest].tolist())
-        harmonics = tuple(sorted(added.union(harmonics)))
-    if solution.sampling is not None and solution.sampling > tolerance:
-        samples *= 2
+    if error.largest > tolerance:
+        parts = error.harmonics[: accuracy.highest + 1]
+        order = np.argsort(parts)
+        # What is left out if the harmonics up to this one, in the order of their parts, are.
+        left = np.sqrt(np.cumsum(parts[order] ** 2))
+        added = order[left > HARMONICS_LEAVE * tolerance]
+        harmonics = tuple(sorted({*harmonics, *added.tolist()}))
+        if error.sampling > SAMPLES_LEAVE * tolerance:
+            samples *= 2
     while samples < SAMPLES_PER_PERIOD * harmonics[-1]:
         samples *= 2
     finer = Resolution(harmonics, min(samples, max(accuracy.most_samples, present.samples)))
@@ -193,8 +201,11 @@ def _branch(
             "above 0 if they are frequencies"
         )
     control = control or ContinuationControl()
+    end: float | None = span[1] if upward else span[0]
     if isinstance(start, ResponseBranch):
         record, point = _Recorder(start.problem, along, accuracy), start.curve.points[-1]
+        # Which way it leads is in its last point.
+        end = None
     else:
         record = _Recorder(problem, along, accuracy)
         first = _first(record, along, span[0 if upward else 1], start, upward, control)
@@ -211,6 +222,7 @@ def _branch(
         record,
         rest,
         record.problem.rounding,
+        end=end,
     )
     return ResponseBranch(tuple(record.solutions), curve, record.problem)
 

@@ -21,7 +21,7 @@ from functools import cached_property
 
 import numpy as np
 
-from fe_models.dynamics.bordered import LinearMap, solve_alone
+from fe_models.dynamics.bordered import LinearMap
 from fe_models.dynamics.continuation import ContinuationControl, first_point, follow
 from fe_models.dynamics.harmonic_jacobian import HarmonicJacobian, HarmonicTransfer
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
@@ -40,7 +40,9 @@ from sa_solver.types import Array
 # Unknowns up to which a matrix is assembled and factorised; beyond, products with it are cheaper.
 DENSE = 400
 # Harmonics left out are looked for up to this multiple of the highest, and at least to this one.
-LOOK_BEYOND, LOOK_AT_LEAST = 4, 9
+LOOK_BEYOND, LOOK_AT_LEAST = 2, 63
+# Samples per period of the highest harmonic, at least: a corner of a joint's force is then seen.
+SAMPLES_PER_PERIOD = 8
 # A vibration below this share of what balances in the mean is rounding: there is none.
 NO_VIBRATION = 1e-12
 
@@ -132,6 +134,7 @@ class HarmonicBalance:
             self._constant[0] = load.static @ self.receptance.at_points
         self.rest = rest or Rest(model, self.receptance, joints, self._constant[0].real)
         self._neglected = _neglected(resolution)
+        self._richer: HarmonicBalance | None = None
 
     @property
     def size(self) -> int:
@@ -195,28 +198,23 @@ class HarmonicBalance:
                 f"raised: {unforced.message}, or give a load that does not pull all joints apart",
             )
         point = first_point(unforced, 0.0, force > 0.0, control.first)
-        # A curve that comes back to no force has turned back, or is closed.
-        span = min(force, 0.0), max(force, 0.0)
         curve = follow(
-            rising, point, span, control, origin=self.guess(None), rounding=self.rounding
+            rising,
+            point,
+            (min(force, 0.0), max(force, 0.0)),
+            control,
+            origin=self.guess(None),
+            rounding=self.rounding,
+            end=force,
         )
         if curve.message:
             return replace(direct, message=f"raising the force from 0, {curve.message}")
-        last = curve.points[-1]
-        if last.parameter != force:
-            reached = np.max(np.sign(force) * curve.parameters)
-            return replace(
-                direct,
-                message=f"raising the force from 0, the curve turns back at {reached:.6g} and "
-                f"does not reach {abs(force):g}: give more harmonics and samples, or start from a "
-                "solution nearby",
-            )
-        return solve(self.by_frequency(force), last.unknowns, frequency, newton)
+        return solve(self.by_frequency(force), curve.points[-1].unknowns, frequency, newton)
 
     def describe(
-        self, unknowns: Array, at: Balance, frequency: float, force: float, *, check: bool = False
+        self, unknowns: Array, at: Balance, frequency: float, force: float
     ) -> HarmonicSolution:
-        """The motion with these unknowns; ``check`` it with twice the samples."""
+        """The motion with these unknowns."""
         coefficients, record = self.transfer.shaped(unknowns), CycleRecord.of(at.cycle)
         shares = self.left_out(coefficients, record, frequency)
         return HarmonicSolution(
@@ -229,7 +227,7 @@ class HarmonicBalance:
             iterations=0,
             residual=at.relative,
             left_out=float(np.linalg.norm(shares)),
-            sampling=self.sampling(unknowns, frequency, force) if check else None,
+            error=None,
             message="",
         )
 
@@ -239,7 +237,7 @@ class HarmonicBalance:
         The larger of what the joints' forces there cause with joints free, and as stiff as at rest:
         a harmonic may meet a mode of either.
         """
-        neglected, vibration = self._neglected, self._vibration(coefficients)
+        neglected, vibration = self._neglected, self.vibration(coefficients)
         harmonics = np.array(neglected.harmonics)
         shares = np.zeros(harmonics[-1] + 1)
         if vibration == 0.0:
@@ -255,40 +253,41 @@ class HarmonicBalance:
         shares[list(self.resolution.harmonics)] = 0.0
         return shares / vibration
 
-    def sampling(self, unknowns: Array, frequency: float, force: float) -> float:
-        """Change of the joints' vibration by twice the samples, to first order and relative."""
-        vibration = self._vibration(self.transfer.shaped(unknowns))
-        if vibration == 0.0:
-            return 0.0
-        at = self._at_twice_the_samples.evaluate(unknowns, frequency, force, "frequency")
-        change = solve_alone(at.jacobian, at.residual)
-        return self._without_mean(self.transfer.shaped(change)) / vibration
-
     @cached_property
     def rounding(self) -> float:
         """Norm of unknowns that only rounding leaves of what balances in the mean [mm]."""
         rest, loaded = self.rest.displacement, self.rest.loaded
         return NO_VIBRATION * float(np.linalg.norm(rest) + np.linalg.norm(loaded))
 
-    def _without_mean(self, coefficients: Array) -> float:
-        """Norm of coefficients ``(j, m, d)`` without the mean."""
-        return float(np.linalg.norm(coefficients[:, int(self.resolution.harmonics[0] == 0) :]))
+    def vibrating(self, unknowns: Array) -> Array:
+        """Unknowns without those of the mean, in one row."""
+        first = int(self.resolution.harmonics[0] == 0)
+        return self.transfer.shaped(unknowns)[:, first:].ravel()
 
-    def _vibration(self, coefficients: Array) -> float:
-        """The same, 0 where it is rounding."""
-        norm = self._without_mean(coefficients)
+    def vibration(self, coefficients: Array) -> float:
+        """Norm of coefficients ``(j, m, d)`` without the mean [mm], 0 where it is rounding."""
+        norm = float(np.linalg.norm(self.vibrating(coefficients)))
         return norm if norm > self.rounding else 0.0
-
-    @cached_property
-    def _at_twice_the_samples(self) -> HarmonicBalance:
-        """The same problem with twice the samples."""
-        return self.refined(Resolution(self.resolution.harmonics, 2 * self.resolution.samples))
 
     def refined(self, resolution: Resolution) -> HarmonicBalance:
         """The same problem at another resolution."""
         return HarmonicBalance(
             self.model, self.joints, self.load, resolution, self.receptance, self.rest
         )
+
+    def richer(self, harmonics: set[int]) -> HarmonicBalance:
+        """The same problem with these harmonics too, and at least twice the samples.
+
+        It is kept, and grows with what is asked for.
+        """
+        known = () if self._richer is None else self._richer.resolution.harmonics
+        if self._richer is None or not harmonics <= set(known):
+            every = tuple(sorted({*self.resolution.harmonics, *known, *harmonics}))
+            samples = 2 * self.resolution.samples
+            while samples < SAMPLES_PER_PERIOD * every[-1]:
+                samples *= 2
+            self._richer = self.refined(Resolution(every, samples))
+        return self._richer
 
     def evaluate(self, unknowns: Array, frequency: float, force: float, over: str) -> Balance:
         """The equations; ``over`` is what varies in their derivatives, frequency or force."""

@@ -12,6 +12,26 @@ from sa_solver.types import Array
 
 
 @dataclass(frozen=True)
+class ResolutionError:
+    """By how much a richer resolution would change a motion, to first order.
+
+    ``vibration`` of the joints, as a share of itself, and ``energy`` that the joints take in a
+    cycle, as a share of all that is lost. ``harmonics`` ``(k + 1,)`` is the part of the larger of
+    them that each harmonic 0, 1, 2, ... left out has, and ``sampling`` that of the samples.
+    """
+
+    vibration: float
+    energy: float
+    harmonics: Array
+    sampling: float
+
+    @property
+    def largest(self) -> float:
+        """The larger of the two."""
+        return max(self.vibration, self.energy)
+
+
+@dataclass(frozen=True)
 class HarmonicSolution:
     """A periodic motion.
 
@@ -20,9 +40,9 @@ class HarmonicSolution:
     ``cycle`` what the joints do, ``iterations`` and ``residual`` of Newton's method. ``message`` is
     empty, or says why this is not a solution.
 
-    ``left_out`` estimates the share of the joints' vibration that is in other harmonics than those
-    of the ``resolution``: what the joints' forces there would cause. ``sampling`` is by how much
-    the vibration would change with twice the samples, relative to it; None if not asked for.
+    ``left_out`` is the share of the joints' vibration that their forces would cause in other
+    harmonics than those of the ``resolution``, as if those would not change for it; ``error``, what
+    a richer resolution would change, is None if not asked for.
     """
 
     frequency: float
@@ -34,7 +54,7 @@ class HarmonicSolution:
     iterations: int
     residual: float
     left_out: float
-    sampling: float | None
+    error: ResolutionError | None
     message: str
 
     @property

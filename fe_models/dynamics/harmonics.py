@@ -74,10 +74,11 @@ class Resolution:
     def functions(self, samples: int) -> Array:
         """The functions of time ``(t, m)`` at equal times in a period, from its beginning on."""
         values = np.empty((samples, self.size))
-        turns = np.outer(np.arange(samples), self.harmonics) % samples * (2.0 * np.pi / samples)
+        times = np.outer(np.arange(samples), self.harmonics) % samples
+        turns = np.arange(samples) * (2.0 * np.pi / samples)
         cosine, sine = self.places
-        values[:, cosine] = np.cos(turns)
-        values[:, sine[sine >= 0]] = np.sin(turns[:, sine >= 0])
+        values[:, cosine] = np.cos(turns)[times]
+        values[:, sine[sine >= 0]] = np.sin(turns)[times[:, sine >= 0]]
         return values
 
     @cached_property

@@ -38,6 +38,7 @@ from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import ComplexArray, HarmonicBalanceError, Resolution
 from fe_models.dynamics.newton import NewtonControl, NewtonSolution, solve
 from fe_models.dynamics.receptance import SteadyMotion
+from fe_models.dynamics.resolution_error import resolution_error
 from sa_solver.types import Array
 
 # Frequencies are looked for up to this factor from the start's: Newton's method that goes farther
@@ -269,11 +270,10 @@ class _Recorder:
         self.solutions: list[HarmonicSolution] = []
 
     def __call__(self, point: CurvePoint, at: PhaseBalance) -> Refinement[PhaseBalance] | None:
-        problem, check = self.equations.problem, self._accuracy is not None
-        solution = problem.describe(
-            point.unknowns[:-1], at.balance, at.frequency, point.parameter, check=check
-        )
+        problem = self.equations.problem
+        solution = problem.describe(point.unknowns[:-1], at.balance, at.frequency, point.parameter)
         if self._accuracy is not None:
+            solution = replace(solution, error=resolution_error(problem, solution))
             finer = finer_resolution(problem, solution, self._accuracy)
             if finer is not None:
                 return self._refine(finer)
@@ -345,10 +345,8 @@ def _half(
     point = first_point(first.resonance, force, upward, control.first)
     # Steps are shares of the vibration, as those of forced responses.
     rest = np.append(problem.guess(None), 0.0)
-    curve = follow(first.equations, point, forces, control, record, rest)
+    curve = follow(first.equations, point, forces, control, record, rest, end=forces[upward])
     message = curve.message
-    if not message and curve.points[-1].parameter != forces[upward]:
-        message = f"the curve turns back to {curve.points[-1].parameter:g} N: give closer forces"
     if message:
         message = f"{'upward' if upward else 'downward'} in force, {message}"
     return _Half(tuple(record.solutions), message, record.equations.problem)

@@ -28,6 +28,13 @@ class Linearised:
         return relative_norm(self.residual, self.size)
 
 
+@dataclass(frozen=True)
+class Marked(Linearised):
+    """The same, with the place of its peak."""
+
+    peak: float
+
+
 def scalar(value, by_unknown, by_parameter):
     """One equation in one unknown."""
 
@@ -185,6 +192,51 @@ def test_a_curve_that_ends_says_where():
     assert "the curve ends at " in curve.message
     assert "go on from another point" in curve.message
     assert curve.parameters.max() == pytest.approx(1.0, abs=1e-2)
+
+
+def peak(place):
+    """A resonance: a peak of 100 at λ = ``place``, and no fold."""
+    return scalar(
+        lambda u, p: u - 1.0 / ((p - place) ** 2 + 0.01),
+        lambda u, p: 1.0,
+        lambda u, p: 2.0 * (p - place) / ((p - place) ** 2 + 0.01) ** 2,
+    )
+
+
+@pytest.mark.parametrize("place", [5.1, 5.3, 5.6])
+@pytest.mark.parametrize("refined", [5.02, 5.1, 5.2])
+def test_finer_equations_with_their_peak_elsewhere_do_not_turn_the_curve_round(place, refined):
+    """Beyond the coarse peak the unknown falls, where finer equations still have it rise."""
+
+    def on_point(point, at):
+        if at.peak == 5.0 and point.parameter > refined:
+            return Refinement(marked(place), lambda unknowns: unknowns)
+        return None
+
+    def marked(place):
+        def equations(unknowns, parameter):
+            at = peak(place)(unknowns, parameter)
+            return Marked(at.residual, at.jacobian, at.slope, at.size, place)
+
+        return equations
+
+    curve = follow(marked(5.0), start(marked(5.0), 0.1, 1.0), (1.0, 9.0), None, on_point, end=9.0)
+    assert curve.message == ""
+    assert curve.points[-1].parameter == 9.0
+    assert curve.folds == ()
+    assert max(point.unknowns[0] for point in curve.points) > 80.0
+
+
+@pytest.mark.parametrize("end", [0.5, 9.5])
+def test_a_curve_that_leaves_by_the_wrong_end_says_so(end):
+    """λ = 3 + u² comes down to its fold at 3, and goes up again."""
+    parabola = scalar(lambda u, p: u * u + 3.0 - p, lambda u, p: 2.0 * u, lambda u, p: -1.0)
+    first = start(parabola, 2.0, 7.0, upward=False)
+    curve = follow(parabola, first, (0.5, 9.5), end=end)
+    assert curve.points[-1].parameter == 9.5
+    told = "turns back at 3" in curve.message and "does not reach 0.5" in curve.message
+    assert told == (end == 0.5)
+    assert (curve.message == "") == (end == 9.5)
 
 
 def test_finer_equations_take_over_on_the_way():

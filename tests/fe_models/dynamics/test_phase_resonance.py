@@ -386,7 +386,7 @@ def test_harmonics_and_samples_grow_to_a_tolerance():
     start = peak(problem, 40.0, (20.0, 400.0))
     backbone = along_phase_resonance(problem, start, (10.0, 50.0), accuracy=Accuracy(3e-3))
     assert backbone.message == ""
-    assert all(max(s.left_out, s.sampling) <= 3e-3 for s in backbone.solutions)
+    assert all(s.error.largest <= 3e-3 for s in backbone.solutions)
     fine = on_rig(tuple(range(1, 42, 2)), 2048, 0.02)
     for solution in (backbone.solutions[0], backbone.solutions[-1]):
         exact = along_phase_resonance(fine, solution, (solution.force, 50.0)).solutions[0]

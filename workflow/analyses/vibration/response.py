@@ -13,17 +13,17 @@ from scipy.optimize import minimize_scalar
 from fe_models.dynamics.continuation import ContinuationControl
 from fe_models.dynamics.cycle_energy import damping_ratio
 from fe_models.dynamics.forced_response import (
-    SAMPLES_PER_PERIOD,
     Accuracy,
     ResponseBranch,
     along_force,
     along_frequency,
     finer_resolution,
 )
-from fe_models.dynamics.harmonic_balance import HarmonicBalance
+from fe_models.dynamics.harmonic_balance import SAMPLES_PER_PERIOD, HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.phase_resonance import along_phase_resonance
+from fe_models.dynamics.resolution_error import resolution_error
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
@@ -108,7 +108,7 @@ def response_under(
         resonance=_cycle(resonance) if model.rig.pressing is not None else None,
         loops=_loops(case, model, branch, reporter),
     )
-    error = max(response.numbers["left_out"], response.numbers["sampling"])
+    error = response.numbers["error"]
     if accuracy is not None and error > accuracy.tolerance:
         reporter.warn(
             f"{force:g} N: the finest resolution leaves an error of {error:.1e}, above "
@@ -192,7 +192,7 @@ def _numbers(
         "points": len(branch.solutions),
         "folds": [float(branch.curve.parameters[place]) for place in branch.curve.folds],
         "left_out": max(motion.left_out for motion in every),
-        "sampling": max(motion.sampling for motion in every if motion.sampling is not None),
+        "error": max(motion.error.largest for motion in every if motion.error is not None),
         "harmonics": list(resolution.harmonics),
         "samples": resolution.samples,
         "message": branch.message,
@@ -333,8 +333,7 @@ def _accurate(
 ) -> tuple[HarmonicBalance, HarmonicSolution]:
     """The motion with its error by sampling; as accurate as asked for, if that is asked for."""
     while True:
-        sampling = problem.sampling(motion.coefficients.ravel(), motion.frequency, motion.force)
-        motion = replace(motion, sampling=sampling)
+        motion = replace(motion, error=resolution_error(problem, motion))
         finer = finer_resolution(problem, motion, accuracy) if accuracy is not None else None
         if finer is None:
             return problem, motion
