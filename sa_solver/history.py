@@ -41,12 +41,13 @@ class ContactLoadPath:
     """Loads at the ends of n increments, from bodies apart.
 
     ``values`` ``(n, 6)``, ``motion`` (6,) and ``strain`` ``(n,)`` as in
-    :class:`~sa_solver.contact.ContactLoad`.
+    :class:`~sa_solver.contact.ContactLoad`; ``energy`` ``(n, 2)`` or None.
     """
 
     values: Array
     motion: tuple[bool, ...] = (False,) * 6
     strain: Array | None = None
+    energy: Array | None = None
 
     def __len__(self) -> int:
         return len(self.values)
@@ -54,7 +55,8 @@ class ContactLoadPath:
     def load(self, row: int) -> ContactLoad:
         """The load at the end of increment ``row``."""
         strain = 0.0 if self.strain is None else float(self.strain[row])
-        return ContactLoad(self.values[row], self.motion, strain)
+        energy = None if self.energy is None else self.energy[row]
+        return ContactLoad(self.values[row], self.motion, strain, energy)
 
     @property
     def shear(self) -> Array:
@@ -124,6 +126,8 @@ def _obstacle_to_legs(half_space: HalfSpace, path: ContactLoadPath) -> str:
     """Why a leg of the shear load may not be taken in one step; empty if it may."""
     if not half_space.pair.similar:
         return "the bodies are dissimilar"
+    if path.energy is not None:
+        return "sliding is given by its energy"
     sheared = np.flatnonzero(path.shear.any(axis=1))
     # The row before the shear begins has the pressure that must stay.
     pressed = path.values[max(sheared[0] - 1, 0) if len(sheared) else -1 :, list(NORMAL)]

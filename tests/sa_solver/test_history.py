@@ -101,6 +101,7 @@ def test_bulk_stress_in_proportion_is_a_leg_too():
     ("change", "reason"),
     [
         ("pressure", "the normal load changes while shear is on"),
+        ("energy", "sliding is given by its energy"),
         ("direction", "the shear load changes direction"),
         ("dissimilar", "the bodies are dissimilar"),
     ],
@@ -108,14 +109,17 @@ def test_bulk_stress_in_proportion_is_a_leg_too():
 def test_auto_says_why_it_takes_every_increment(change, reason):
     half_space, height = cylinder(32)
     loading = path([0.2, 0.4, 0.1])
+    energy = None
     if change == "pressure":
         loading.values[-1, 0] *= 1.1
     if change == "direction":
         loading.values[-1, 2] = 3.0
+    if change == "energy":
+        energy = np.zeros((len(loading), 2))
     if change == "dissimilar":
         pair = ElasticPair(Material(115e3, 0.3), Material(70e3, 0.3))
         half_space = HalfSpace(half_space.grid, pair)
-    loading = ContactLoadPath(loading.values)
+    loading = ContactLoadPath(loading.values, energy=energy)
     found = march_history(half_space, height, loading, FRICTION)
     assert found.method == "full"
     assert found.reason == reason
