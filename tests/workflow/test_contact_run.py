@@ -235,7 +235,7 @@ from pathlib import Path
 from workflow.kinds import load_case
 from workflow.runs.run import run_case
 run_case(load_case({str(small)!r}), Path({str(tmp_path / "out")!r}), False)
-assert not {{"gmsh", "skfem", "fe_models.mesh"}} & set(sys.modules)
+assert not {{"gmsh", "skfem", "meshio"}} & set(sys.modules)
 """
     subprocess.run([sys.executable, "-c", code], check=True, capture_output=True)
 

@@ -44,6 +44,8 @@ TIMES = 1024
 RESONANCE_TOLERANCE = 1e-6
 # A loop is that of stuck joints where it loses less than this share of stroke times force range.
 STUCK_LOOP = 1e-4
+# Error of a motion by its harmonics and samples that is warned of where no tolerance is given.
+LARGEST_ERROR = 0.05
 # Times that a loop is repeated: the record then holds whole cycles wherever it begins.
 REPEATED = 3
 
@@ -108,13 +110,23 @@ def response_under(
         resonance=_cycle(resonance) if model.rig.pressing is not None else None,
         loops=_loops(case, model, branch, reporter),
     )
-    error = response.numbers["error"]
-    if accuracy is not None and error > accuracy.tolerance:
-        reporter.warn(
-            f"{force:g} N: the finest resolution leaves an error of {error:.1e}, above "
-            f"resolution.tolerance {accuracy.tolerance:g}"
-        )
+    warn_of_error(f"{force:g} N: the motion", response.numbers["error"], case, reporter)
     return response, branch
+
+
+def warn_of_error(motion: str, error: float, case: VibrationCase, reporter: Reporter) -> None:
+    """Warn of a motion that is less accurate than the case wants, or than any should be."""
+    tolerance = case.resolution.tolerance
+    if tolerance is None and error > LARGEST_ERROR:
+        reporter.warn(
+            f"{motion} has an error of {error:.1e}: give a resolution.tolerance, or more "
+            "resolution.harmonics and resolution.samples"
+        )
+    if tolerance is not None and error > tolerance:
+        reporter.warn(
+            f"{motion} has an error of {error:.1e} at the finest resolution, above "
+            f"resolution.tolerance {tolerance:g}"
+        )
 
 
 def force_sweep(
@@ -191,7 +203,6 @@ def _numbers(
         "separated": share_of(model, resonance, SEPARATED),
         "points": len(branch.solutions),
         "folds": [float(branch.curve.parameters[place]) for place in branch.curve.folds],
-        "left_out": max(motion.left_out for motion in every),
         "error": max(motion.error.largest for motion in every if motion.error is not None),
         "harmonics": list(resolution.harmonics),
         "samples": resolution.samples,
@@ -331,7 +342,7 @@ def _resonance(model: VibrationModel, branch: ResponseBranch, curves: Datasets) 
 def _accurate(
     problem: HarmonicBalance, motion: HarmonicSolution, accuracy: Accuracy | None
 ) -> tuple[HarmonicBalance, HarmonicSolution]:
-    """The motion with its error by sampling; as accurate as asked for, if that is asked for."""
+    """The motion with its error; as accurate as asked for, if that is asked for."""
     while True:
         motion = replace(motion, error=resolution_error(problem, motion))
         finer = finer_resolution(problem, motion, accuracy) if accuracy is not None else None
@@ -364,6 +375,7 @@ def _loops(
         if not motion.converged:
             reporter.warn(f"{start.force:g} N: no loop at {frequency:g} Hz: {motion.message}")
             continue
+        motion = replace(motion, error=resolution_error(problem, motion))
         loops.append(loop_of(case, model, motion))
         start = motion
     return tuple(loops)
@@ -397,7 +409,7 @@ def loop_of(case: VibrationCase, model: VibrationModel, motion: HarmonicSolution
         "force_range": float(np.ptp(force)),
         "energy": float(motion.cycle.dissipated.sum()),
         "slip": share_of(model, motion, SLIP),
-        "left_out": motion.left_out,
+        "error": None if motion.error is None else motion.error.largest,
         # Largest force that the harmonics leave out, over half of the range of the force.
         "deformation": float(np.abs(force - expansion).max()) / half if half > 0.0 else 0.0,
         **_slopes(model, motion, displacement, force, case.joint.normal_load),

@@ -131,7 +131,7 @@ def _response_line(response: Response, label: str) -> str:
         f"damping {numbers['damping']:.2%}",
         f"slips {numbers['slip']:.0%} of the cycle",
         f"{numbers['points']} points",
-        f"harmonics left out {numbers['left_out']:.1e}",
+        f"error {numbers['error']:.1e}",
     ]
     return ", ".join(parts) + (f"; {len(numbers['folds'])} folds" if numbers["folds"] else "")
 
@@ -144,7 +144,7 @@ def _loop_line(loop: Curves) -> str:
         text += f", sticks with {PER_MICRON * numbers['stiffness']:.4g} N/um"
     if numbers["friction"] is not None:
         text += f", friction {numbers['friction']:.3g}"
-    return f"{text}, harmonics left out {numbers['left_out']:.1e}"
+    return f"{text}, error {numbers['error']:.1e}"
 
 
 def _backbone_line(backbone: Curves) -> str:

@@ -71,7 +71,7 @@ def _worn_state(
     """The pads in a state, ``reached`` by so many cycles in all and steps since the last."""
     cycles, steps = reached
     loop = loop_of(case, cycle.model, cycle.motion)
-    responses = responses_to_all(case, cycle.model, cycle.motion, reporter)
+    error, responses = responses_to_all(case, cycle.model, cycle.motion, reporter)
     depth, slope = state.surfaces.depth, loop.numbers["stiffness"]
     numbers: dict[str, Any] = {
         "cycles": cycles,
@@ -84,7 +84,7 @@ def _worn_state(
         "stiffness": np.nan if slope is None else slope,
         "stroke": loop.numbers["stroke"],
         "energy_per_cycle": float(cycle.energy.sum()),
-        "left_out": cycle.motion.left_out,
+        "error": error,
         **cycle.model.numbers(),
     }
     reporter.log(

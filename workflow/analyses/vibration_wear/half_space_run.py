@@ -102,23 +102,23 @@ class _Description:
         numbers["loop_error"] = _energy_error(cycle, loop)
         numbers["partial_loop_error"] = _energy_error(cycle, partial)
         self._warn(cycle)
-        responses, linear = self._responses(cycle)
+        numbers["error"], responses, linear = self._responses(cycle)
         self.reporter.log(
             f"{cycles:g} cycles: {steps} steps, stiffness {numbers['stiffness']:.5g} N/mm, "
             f"stroke {numbers['stroke']:.4g} mm"
         )
         return WornState(cycles, numbers | linear, _fields(cycle, loop), responses)
 
-    def _responses(self, cycle: ContactCycle) -> tuple[tuple[Response, ...], dict[str, Any]]:
-        """The responses to all forces, and natural frequencies."""
+    def _responses(self, cycle: ContactCycle) -> tuple[float, tuple[Response, ...], dict[str, Any]]:
+        """The error of the cycle's motion, the responses to all forces, natural frequencies."""
         load, friction, rig = self.contact.load, cycle.friction, self.contact.rig
         stiffness = cycle.slipping.stiffness
         case = self.case.with_joint(load, friction, stiffness)
         resolution = Resolution(case.harmonics, case.resolution.samples)
         problem = self.contact.problem(cycle.sliders, resolution)
         model = VibrationModel(rig, Jenkins(stiffness, friction, load), problem)
-        responses = responses_to_all(case, model, cycle.motion, self.reporter)
-        return responses, {"free": rig.free(), **rig.modes(model.law)}
+        error, responses = responses_to_all(case, model, cycle.motion, self.reporter)
+        return error, responses, {"free": rig.free(), **rig.modes(model.law)}
 
     def _numbers(self, cycle: ContactCycle) -> dict[str, Any]:
         surfaces, normal = cycle.state.surfaces, cycle.slipping.normal
@@ -136,7 +136,6 @@ class _Description:
             "energy_per_cycle": float(cycle.by_slider.sum()),
             "sliders": len(cycle.by_slider),
             "adjusted": cycle.adjusted,
-            "left_out": cycle.motion.left_out,
         }
 
     def _warn(self, cycle: ContactCycle) -> None:

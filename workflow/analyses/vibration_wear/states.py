@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable
 
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.resolution_error import resolution_error
 from wear.steppers import Contact, Stepper, advance_cycles
 from wear.worn import State
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Response
-from workflow.analyses.vibration.response import response_under
+from workflow.analyses.vibration.response import response_under, warn_of_error
 from workflow.analyses.vibration_wear.outcome import WornState
 from workflow.shell.reporter import Reporter
 
@@ -42,13 +43,10 @@ def worn_states(
 
 def responses_to_all(
     case: VibrationCase, model: VibrationModel, motion: HarmonicSolution, reporter: Reporter
-) -> tuple[Response, ...]:
-    """What a state does under each force; warns where the ``motion`` that wears is not accurate."""
-    tolerance = case.resolution.tolerance
-    if tolerance is not None and motion.left_out > tolerance:
-        reporter.warn(
-            f"the motion that wears leaves out harmonics of {motion.left_out:.1e}, above "
-            "resolution.tolerance: raise resolution.harmonics, those to begin with"
-        )
+) -> tuple[float, tuple[Response, ...]]:
+    """The error of the ``motion`` that wears, and what its state does under each force."""
+    error = resolution_error(model.problem.refined(motion.resolution), motion).largest
+    warn_of_error("the motion that wears", error, case, reporter)
     with reporter.stage("response"):
-        return tuple(response_under(case, model, force, reporter)[0] for force in case.forces)
+        responses = [response_under(case, model, force, reporter)[0] for force in case.forces]
+    return error, tuple(responses)
