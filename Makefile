@@ -20,10 +20,10 @@ run: $(INSTALLED)
 test: $(TESTABLE)
 	@echo 'fretscale: style, types and layers, then the tests: 4 to 6 minutes on two cores.'
 	@$(MAKE) --no-print-directory lint
-	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2
+	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 --dist worksteal
 
 test-full: lint
-	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 -m "slow or not slow"
+	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 --dist worksteal -m "slow or not slow"
 
 lint: $(TESTABLE)
 	$(BIN)/ruff check .
