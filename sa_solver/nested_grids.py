@@ -14,7 +14,7 @@ COARSEST = 32
 """Cells across below which a grid is not coarsened: there a solve costs less than its set-up."""
 
 
-def coarsened(fine: HalfSpace) -> tuple[HalfSpace, Transfer] | None:
+def coarsened(fine: HalfSpace) -> tuple[HalfSpace, GridTransfer] | None:
     """The same bodies on half as many cells along each side of more than 32, and the transfer.
 
     None where no side is that long. Any number of cells will do: an odd one is rounded up.
@@ -23,10 +23,10 @@ def coarsened(fine: HalfSpace) -> tuple[HalfSpace, Transfer] | None:
     if (nx, ny) == fine.grid.shape:
         return None
     grid = Grid.over(fine.grid.size, (nx, ny), fine.grid.line)
-    return fine.on(grid), Transfer(fine.grid, grid)
+    return fine.on(grid), GridTransfer(fine.grid, grid)
 
 
-class Transfer:
+class GridTransfer:
     """Passes fields between a ``fine`` and a ``coarse`` grid over the same area."""
 
     def __init__(self, fine: Grid, coarse: Grid) -> None:

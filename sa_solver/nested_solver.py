@@ -14,7 +14,7 @@ from sa_solver.active_box import Box
 from sa_solver.bound_cg import BoundConjugateGradients, SearchResult
 from sa_solver.few_cells import solve_few_cells
 from sa_solver.half_space import HalfSpace
-from sa_solver.nested_grids import Transfer, coarsened
+from sa_solver.nested_grids import GridTransfer, coarsened
 from sa_solver.normal_problem import Iterate, NormalProblem, normal_residuals
 from sa_solver.normal_splitting import solve_by_splitting
 from sa_solver.preconditioner import NormalPreconditioner
@@ -110,7 +110,7 @@ class NestedSolver:
 
     # -- coarser grids ------------------------------------------------------------------------
     @cached_property
-    def _coarser(self) -> tuple[NestedSolver, Transfer] | None:
+    def _coarser(self) -> tuple[NestedSolver, GridTransfer] | None:
         """The solver on the next coarser grid, and how fields pass to and from it."""
         coarser = coarsened(self.half_space)
         return None if coarser is None else (NestedSolver(coarser[0]), coarser[1])
@@ -128,7 +128,7 @@ class NestedSolver:
         pressure = transfer.interpolated(box.placed(result.iterate.pressure))
         return problem.modes.balance(pressure, problem.target)
 
-    def _coarse(self, problem: NormalProblem, transfer: Transfer) -> NormalProblem:
+    def _coarse(self, problem: NormalProblem, transfer: GridTransfer) -> NormalProblem:
         """``problem`` with heights and compliances averaged over this solver's larger cells."""
         grid, compliance = self.half_space.grid, problem.compliance
         return replace(

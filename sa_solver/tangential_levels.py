@@ -9,7 +9,7 @@ import numpy as np
 
 from sa_solver.disk_newton import newton_on_disks
 from sa_solver.half_space import HalfSpace
-from sa_solver.nested_grids import Transfer, coarsened
+from sa_solver.nested_grids import GridTransfer, coarsened
 from sa_solver.tangential_problem import BoxOperator, TangentialProblem
 from sa_solver.types import Array
 
@@ -53,7 +53,7 @@ class ShearLevel:
         slipping = transfer.interpolated(solution.slipping.astype(np.float64)) > 0.5
         return problem.balanced((shear + change) * problem.pressed, slipping & problem.pressed)
 
-    def restricted(self, fine: TangentialProblem, transfer: Transfer) -> TangentialProblem:
+    def restricted(self, fine: TangentialProblem, transfer: GridTransfer) -> TangentialProblem:
         """The problem on this level that is the mean of one on the next finer grid."""
         grid = self.half_space.grid
         length = fine.modes.length
@@ -70,6 +70,6 @@ class ShearLevel:
         )
 
     @cached_property
-    def _coarser(self) -> tuple[ShearLevel, Transfer] | None:
+    def _coarser(self) -> tuple[ShearLevel, GridTransfer] | None:
         coarser = coarsened(self.half_space)
         return None if coarser is None else (ShearLevel(coarser[0]), coarser[1])

@@ -89,7 +89,7 @@ def _state_of(joint: Array, force: Array) -> int:
     return 1 if force[0] ** 2 + force[1] ** 2 >= limit * limit else 0
 
 
-class Memory(NamedTuple):
+class ContactMemory(NamedTuple):
     """A contact on its path, changed in place.
 
     ``state`` ``(3,)`` is that of the law, ``derivative`` ``(2, 3, m)`` that of its stretch; the
@@ -104,7 +104,7 @@ class Memory(NamedTuple):
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _move(joint: Array, memory: Memory, start: Array, end: Array) -> float:
+def _move(joint: Array, memory: ContactMemory, start: Array, end: Array) -> float:
     """One increment between displacements ``(3,)``; return the energy lost."""
     for direction in range(2):
         memory.increment[direction] = end[direction] - start[direction]
@@ -117,7 +117,7 @@ def _move(joint: Array, memory: Memory, start: Array, end: Array) -> float:
 
 
 @njit(cache=True, nogil=True, error_model="numpy")
-def _lead_in(joint: Array, memory: Memory, before: Array, lead: Array) -> None:
+def _lead_in(joint: Array, memory: ContactMemory, before: Array, lead: Array) -> None:
     """Drive a contact from rest to the first sample."""
     memory.state[:], memory.derivative[:] = 0.0, 0.0
     here, start, step = np.zeros(3), np.zeros(lead.shape[1]), np.empty(lead.shape[1])
@@ -132,7 +132,7 @@ def _lead_in(joint: Array, memory: Memory, before: Array, lead: Array) -> None:
 @njit(cache=True, nogil=True, error_model="numpy")
 def _round(
     joint: Array,
-    memory: Memory,
+    memory: ContactMemory,
     path: Array,
     period: Period,
     record: PeriodRecord,
@@ -161,7 +161,7 @@ def _round(
 
 @njit(cache=True, nogil=True, error_model="numpy")
 def _settle_contact(
-    joint: Array, memory: Memory, path: Array, period: Period, record: PeriodRecord
+    joint: Array, memory: ContactMemory, path: Array, period: Period, record: PeriodRecord
 ) -> tuple[float, float, bool]:
     """March until stretch and derivative repeat: energy lost, change of force, all stuck."""
     total, stretch, derivative = np.empty((2, 2)), np.empty(2), np.empty_like(memory.derivative)
@@ -235,7 +235,9 @@ def settle_contacts(period: Period, joints: DrivenJoints) -> None:
     """Settle contacts; parameters are those of the law."""
     samples, size = period.basis.shape
     gradient, shares = np.empty((samples, 2, 3, size)), np.dot(period.weights, period.basis)
-    memory = Memory(np.empty(3), np.empty((2, 3, size)), np.empty(3), np.empty(3), np.empty((3, 6)))
+    memory = ContactMemory(
+        np.empty(3), np.empty((2, 3, size)), np.empty(3), np.empty(3), np.empty((3, 6))
+    )
     for j in range(len(joints.parameters)):
         joint, jacobian = joints.parameters[j], joints.jacobian[j]
         record = PeriodRecord(joints.force[j], joints.states[j], gradient)

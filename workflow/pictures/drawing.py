@@ -37,14 +37,14 @@ def write_pictures(
 
     ``contents`` is what the results hold, as ``pictures`` are told it.
     """
-    told = pictures, contents, folder.results
+    drawn = pictures, contents, folder.results
     jobs: list[tuple[Callable[..., Any], tuple[Any, ...]]] = []
     if output.paraview:
-        jobs.append((write_paraview, (*told, folder.reserve("paraview", "files for ParaView"))))
+        jobs.append((write_paraview, (*drawn, folder.reserve("paraview", "files for ParaView"))))
     if output.figures:
         parts = max(processes, 1)
         figures = folder.reserve("figures", "figures of the results")
-        jobs += [(write_figures, (*told, figures, part, parts)) for part in range(parts)]
+        jobs += [(write_figures, (*drawn, figures, part, parts)) for part in range(parts)]
     if processes:
         side_by_side(jobs)
         return

@@ -73,8 +73,8 @@ def _summary(outcome: TimeOutcome, reporter: Reporter) -> dict[str, Any]:
         computed = number_at(summary, entry.quantity)
         if computed is None:
             reporter.warn(f"reported: no quantity {entry.quantity} in summary.json")
-        told = {"quantity": entry.quantity, "reported": entry.value, "computed": computed}
-        reported.append(told | {"source": entry.source})
+        comparison = {"quantity": entry.quantity, "reported": entry.value, "computed": computed}
+        reported.append(comparison | {"source": entry.source})
     return summary | {"reported": reported}
 
 

@@ -13,7 +13,7 @@ from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.contact_workers import ContactProcesses, contact_workers
-from workflow.analyses.wear.fidelity.choosing import say
+from workflow.analyses.wear.fidelity.choosing import report_choice
 from workflow.analyses.wear.load_source import ContactFace, LoadSource
 from workflow.analyses.wear.recording import Recorder, RunLog
 from workflow.analyses.wear.results import InterfaceOutcome, Outcome, write_output
@@ -32,7 +32,7 @@ RECORDS = 10
 def run_wear(run: Run[WearCase]) -> None:
     """Run a wear case to its end, from its last whole jump if it is to resume."""
     folder = run.folder
-    say(run.choice, run.reporter)
+    report_choice(run.choice, run.reporter)
     try:
         write_output(_compute(run), run)
     except (ContactFailure, NormalContactError, MethodFailed) as error:

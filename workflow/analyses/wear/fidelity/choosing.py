@@ -65,7 +65,7 @@ def _since(begin: float) -> float:
     return round(time.perf_counter() - begin, 2)
 
 
-def say(record: Mapping[str, Any] | None, reporter: Reporter) -> None:
+def report_choice(record: Mapping[str, Any] | None, reporter: Reporter) -> None:
     """What was chosen and why, a line for each axis, and whether all of it is accurate enough."""
     if record is None:
         return
