@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from fe_models.dynamics import harmonic_balance
+from fe_models.dynamics.cycle_energy import energy_lost
 from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
@@ -373,6 +374,48 @@ def test_harmonics_and_samples_grow_to_a_tolerance():
     last = branch.solutions[-1]
     exact = fine.solve(last.frequency, 60.0, last)
     assert abs(last.amplitude(1)) == pytest.approx(abs(exact.amplitude(1)), rel=1e-2)
+
+
+def reaches_the_end(force, tolerance):
+    """The branch of the rig, which has no folds, up to the far end of its span."""
+    span = (20.0, 400.0)
+    branch = along_frequency(balance(rig()), force, span, accuracy=Accuracy(tolerance))
+    assert branch.message == ""
+    assert branch.frequencies[[0, -1]].tolist() == list(span)
+    return branch
+
+
+def test_resolution_that_grows_on_the_way_does_not_turn_a_branch_round():
+    """Near 50 N harmonics are added on the way, and the peak moves."""
+    branch = reaches_the_end(50.0, 0.1)
+    assert branch.curve.folds == ()
+    assert len(branch.problem.resolution.harmonics) > len(ODD)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tolerance", [0.1, 0.03])
+@pytest.mark.parametrize("force", [1, 10, 20, 30, 40, 45, 50, 52, 55, 60, 70, 80, 90])
+def test_branches_of_all_forces_reach_the_far_end(force, tolerance):
+    reaches_the_end(float(force), tolerance)
+
+
+def test_the_error_of_motions_is_told_within_a_factor_of_three():
+    """Vibration and energy against many harmonics, at nineteen of twenty motions of a branch."""
+    branch = along_frequency(balance(rig()), 30.0, (60.0, 300.0), accuracy=Accuracy(0.05))
+    fine = balance(rig(), harmonics=tuple(range(1, 128, 2)), samples=4096)
+    ratios = []
+    for motion in branch.solutions[::4]:
+        exact = fine.solve(motion.frequency, 30.0, motion)
+        coefficients = fine.resolution.adopt(motion.coefficients, motion.resolution)
+        vibration = np.linalg.norm(coefficients - exact.coefficients)
+        vibration /= np.linalg.norm(exact.coefficients)
+        energy = abs(motion.cycle.dissipated.sum() - exact.cycle.dissipated.sum())
+        true = max(vibration, energy / energy_lost(fine, exact))
+        assert true <= 0.1
+        if true > 1e-5:
+            ratios.append(motion.error.largest / true)
+    assert len(ratios) > 20
+    assert np.mean((np.array(ratios) > 1.0 / 3.0) & (np.array(ratios) < 3.0)) >= 0.95
 
 
 def test_resonance_falls_from_stuck_to_sliding_as_the_force_grows():
