@@ -179,12 +179,14 @@ def sweep(file: Path, out: Path, processes: int | None, dask: str | None, force:
 @click.argument("case")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
 def check(case: str, overrides: tuple[str, ...]) -> None:
-    """Read CASE and say what it would run."""
-    from workflow.kinds import load_case
+    """Read CASE and say what it would run, if the memory of this machine is enough."""
+    from workflow.kinds import analysis_of, load_case
 
     loaded = load_case(case, overrides)
+    memory = analysis_of(loaded).memory(loaded)
+    memory.check()
     click.echo(f"OK {case}: {loaded.title}")
-    for name, text in loaded.outline():
+    for name, text in [*loaded.outline(), ("memory", f"up to {memory.required / 1e9:.1f} GB")]:
         click.echo(f"  {name:<10} {text}")
 
 

@@ -77,6 +77,14 @@ def test_check_says_what_would_run(dovetail_path):
     assert len(rows) < 8
 
 
+def test_check_refuses_what_the_memory_cannot_hold_as_run_does(dovetail_path):
+    """Both flanks condensed onto 90,000 degrees of freedom: 400 GB of dense matrices."""
+    result = invoke("check", dovetail_path, "--set", "mesh.flank_nodes=[100, 150]")
+    assert result.exit_code == 4
+    assert "mesh.flank_nodes" in result.stderr
+    assert "OK" not in result.stdout
+
+
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
