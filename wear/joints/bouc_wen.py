@@ -23,9 +23,10 @@ from functools import cached_property
 from math import atan, copysign, exp, expm1, log1p, sqrt, tan, tanh
 
 import numpy as np
-from numba import njit, vectorize
+from numba import vectorize
 
 from sa_solver.types import Array
+from wear.joints.compiled import compiled
 from wear.joints.law import JointState
 from wear.joints.parameters import (
     JointError,
@@ -46,14 +47,14 @@ NO_FRICTION = 1e-300
 SERIES_BELOW = 1e-2
 
 
-@njit(cache=True)
+@compiled()
 def xi_rate(eta: float, exponent: float, gain: float) -> float:
     """dη/ds."""
     power: float = abs(eta) ** exponent
     return 1.0 - power if eta > 0.0 else 1.0 + gain * power
 
 
-@njit(cache=True)
+@compiled()
 def _load(eta: float, s: float, exponent: float) -> tuple[float, float]:
     """From η >= 0 over s, for n = 1 or 2: η there, and the loss over (µN)²/K."""
     if exponent == 1.0:
@@ -66,7 +67,7 @@ def _load(eta: float, s: float, exponent: float) -> tuple[float, float]:
     return min(end, 1.0), work - 0.5 * (end * end - eta * eta)
 
 
-@njit(cache=True)
+@compiled()
 def _excess(z: float) -> float:
     """z²/2 - z + ln(1 + z)."""
     if z < SERIES_BELOW:
@@ -74,7 +75,7 @@ def _excess(z: float) -> float:
     return 0.5 * z * z - z + log1p(z)
 
 
-@njit(cache=True)
+@compiled()
 def _unload(u: float, s: float, exponent: float, gain: float) -> tuple[float, float, float]:
     """From η = -u over s or until ξ = 0, for n = 1 or 2 or no gain: u, rest of s, loss."""
     if gain == 0.0:
@@ -91,7 +92,7 @@ def _unload(u: float, s: float, exponent: float, gain: float) -> tuple[float, fl
     return end, max(s - to_zero, 0.0), lost
 
 
-@njit(cache=True)
+@compiled()
 def _step_finely(eta: float, s: float, exponent: float, gain: float) -> tuple[float, float]:
     """From η over s by the fourth-order rule: η there, and the loss."""
     lost = 0.0
@@ -113,7 +114,7 @@ def _step_finely(eta: float, s: float, exponent: float, gain: float) -> tuple[fl
     return eta, lost + max(s, 0.0)
 
 
-@njit(cache=True)
+@compiled()
 def travel(eta: float, s: float, exponent: float, gain: float) -> tuple[float, float]:
     """From η over s >= 0 in the direction of motion: η there, and the loss over (µN)²/K."""
     lost = 0.0
@@ -127,7 +128,7 @@ def travel(eta: float, s: float, exponent: float, gain: float) -> tuple[float, f
     return eta, lost + more
 
 
-@njit(cache=True)
+@compiled()
 def advance_bouc_wen(
     stiffness: float,
     residual: float,
@@ -155,7 +156,7 @@ def advance_bouc_wen(
     return force, residual + spring * slope, displacement, xi, lost
 
 
-@njit(cache=True)
+@compiled()
 def _respond(
     parameters: Array, state: JointState, increment: Array
 ) -> tuple[Array, Array, Array, Array]:

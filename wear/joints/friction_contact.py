@@ -40,9 +40,9 @@ from math import ceil, exp, expm1, hypot, log, sqrt
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from sa_solver.types import Array
+from wear.joints.compiled import compiled
 from wear.joints.parameters import (
     CompiledLaw,
     JointError,
@@ -101,7 +101,7 @@ class Slip(NamedTuple):
     decay: float
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _held(path: ForcePath) -> float:
     """Fraction of a path on which the slider holds: first root of |t0 + k s| = R(s), or 1."""
     (x, y), (px, py), limit = path[:2], path[2:4], path.start
@@ -120,7 +120,7 @@ def _held(path: ForcePath) -> float:
     return 1.0  # the circle grows at least as fast as the force
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _inverse_mean(a: float, b: float) -> float:
     """ln(b/a)/(b - a): the mean of 1/R over a limit that changes linearly from a to b."""
     x = (b - a) / (a + b)
@@ -132,7 +132,7 @@ def _inverse_mean(a: float, b: float) -> float:
     return 2.0 * total / (a + b)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _inverse_mean_slopes(a: float, b: float) -> tuple[float, float]:
     """Derivatives of :func:`_inverse_mean` with respect to a and b."""
     x, mean = (b - a) / (a + b), _inverse_mean(a, b)
@@ -145,7 +145,7 @@ def _inverse_mean_slopes(a: float, b: float) -> tuple[float, float]:
     return -mean / (a + b) - b * slope, -mean / (a + b) + a * slope
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _slip(path: ForcePath, held: float) -> Slip:
     """Slip that begins at the fraction ``held`` of a path and lasts to its end."""
     limit = path.start + held * (path.end - path.start)
@@ -170,7 +170,7 @@ def _slip(path: ForcePath, held: float) -> Slip:
     return Slip(held, limit, ex, ey, pull, px, py, toward, away, sine, rate, length, decay)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _direction(slip: Slip) -> tuple[float, float]:
     """Direction of the force at the end of a slip."""
     away = slip.away * slip.decay * slip.decay
@@ -181,7 +181,7 @@ def _direction(slip: Slip) -> tuple[float, float]:
     return x, y
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _turning(path: ForcePath, slip: Slip) -> tuple[float, float, float, float, float, float]:
     """Derivative of the angle of the force at the end of a slip.
 
@@ -212,7 +212,7 @@ def _turning(path: ForcePath, slip: Slip) -> tuple[float, float, float, float, f
     )
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _lost_in_slip(path: ForcePath, slip: Slip) -> float:
     """kt times the energy lost in a slip, ∫ R (k·e - R') ds [N²].
 
@@ -245,7 +245,7 @@ def _lost_in_slip(path: ForcePath, slip: Slip) -> float:
     return max(straight - turned, 0.0)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _follow(path: ForcePath, jacobian: Array) -> tuple[float, float, float]:
     """Tangential force at the end of a path in contact, and kt times the energy lost.
 
@@ -265,7 +265,7 @@ def _follow(path: ForcePath, jacobian: Array) -> tuple[float, float, float]:
     return path.end * x, path.end * y, _lost_in_slip(path, slip)
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _lost_in_lift_off(path: ForcePath, contact: float) -> float:
     """kt times the energy lost on a path that lifts off after the fraction ``contact``."""
     share = contact * (1.0 - LAST)
@@ -281,7 +281,7 @@ def _lost_in_lift_off(path: ForcePath, contact: float) -> float:
     return _lost_in_slip(last, _slip(last, held)) if held < 1.0 else 0.0
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _pulled_back(x: float, y: float, limit: float, jacobian: Array) -> None:
     """Chain the derivative with that of the return of a force (x, y) onto the circle."""
     force = hypot(x, y)
@@ -293,7 +293,7 @@ def _pulled_back(x: float, y: float, limit: float, jacobian: Array) -> None:
         jacobian[row, 2] += radial
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _in_displacements(stiffness: float, limit_slope: float, jacobian: Array) -> None:
     """Chain the derivative from forces and limits to elongation, approach and increment."""
     for row in range(2):
@@ -303,7 +303,7 @@ def _in_displacements(stiffness: float, limit_slope: float, jacobian: Array) -> 
         jacobian[row, 5] *= limit_slope
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _touching(entry: float, pull_x: float, pull_y: float, change: float, jacobian: Array) -> None:
     """Chain the derivative with that of the touch after the fraction ``entry`` of an increment.
 
@@ -319,7 +319,7 @@ def _touching(entry: float, pull_x: float, pull_y: float, change: float, jacobia
         jacobian[row, 5] += missed * entry
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def _tangential(path: ForcePath, jacobian: Array) -> tuple[float, float, float]:
     """Tangential force at the end of an increment, and kt times the energy lost.
 
@@ -347,7 +347,7 @@ def _tangential(path: ForcePath, jacobian: Array) -> tuple[float, float, float]:
     return end_x, end_y, lost + slipped
 
 
-@njit(cache=True, error_model="numpy")
+@compiled(error_model="numpy")
 def advance_contact(
     parameters: Array, start: Array, increment: Array, force: Array, end: Array, jacobian: Array
 ) -> float:
@@ -383,7 +383,7 @@ def advance_contact(
     return energy
 
 
-@njit(cache=True)
+@compiled()
 def _respond(
     parameters: Array, state: Array, increment: Array
 ) -> tuple[Array, Array, Array, Array]:

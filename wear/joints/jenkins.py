@@ -7,14 +7,14 @@ from functools import cached_property
 from math import copysign
 
 import numpy as np
-from numba import njit
 
 from sa_solver.types import Array
+from wear.joints.compiled import compiled
 from wear.joints.law import JointState
 from wear.joints.parameters import Parameter, UniaxialLaw, parameter_columns
 
 
-@njit(cache=True)
+@compiled()
 def advance_jenkins(
     stiffness: float,
     residual: float,
@@ -41,7 +41,7 @@ def advance_jenkins(
     return stiffness * stretch + residual * displacement, slope, displacement, stretch, lost
 
 
-@njit(cache=True)
+@compiled()
 def _respond(
     parameters: Array, state: JointState, increment: Array
 ) -> tuple[Array, Array, Array, Array]:

@@ -29,9 +29,10 @@ from functools import cached_property
 from math import copysign
 
 import numpy as np
-from numba import njit, vectorize
+from numba import vectorize
 
 from sa_solver.types import Array
+from wear.joints.compiled import compiled
 from wear.joints.law import JointState
 from wear.joints.parameters import Parameter, UniaxialLaw, parameter_columns
 
@@ -45,7 +46,7 @@ DISPLACEMENT, DEPTH, CURVE, POINTS = 0, 1, 2, 6
 FEWEST_POINTS = 4
 
 
-@njit(cache=True)
+@compiled()
 def first_curve(curve: SliderCurve, distance: float) -> tuple[float, float, float]:
     """T, T' and L at ``distance`` >= 0 of the curve (K, limit, c, m)."""
     stiffness, limit, share, exponent = curve
@@ -63,7 +64,7 @@ def first_curve(curve: SliderCurve, distance: float) -> tuple[float, float, floa
     return limit, 0.0, lost + limit * beyond
 
 
-@njit(cache=True)
+@compiled()
 def _on_curve(
     curve: SliderCurve, memory: Array, depth: int, displacement: float
 ) -> tuple[float, float, float]:
@@ -77,7 +78,7 @@ def _on_curve(
     return memory[place + 1] + copysign(2.0 * force, distance), slope, 2.0 * lost
 
 
-@njit(cache=True)
+@compiled()
 def _renew(curve: SliderCurve, memory: Array) -> None:
     """Compute the forces at the turning points anew where they belong to other parameters."""
     if (memory[CURVE], memory[CURVE + 1], memory[CURVE + 2], memory[CURVE + 3]) == curve:
@@ -89,7 +90,7 @@ def _renew(curve: SliderCurve, memory: Array) -> None:
         memory[CURVE + i] = curve[i]
 
 
-@njit(cache=True)
+@compiled()
 def turns(memory: Array, depth: int, end: float) -> bool:
     """Whether going to ``end`` leaves the present curve backwards."""
     start: float = memory[DISPLACEMENT]
@@ -97,14 +98,14 @@ def turns(memory: Array, depth: int, end: float) -> bool:
     return start != origin and (end > start) != (start > origin)
 
 
-@njit(cache=True)
+@compiled()
 def _closing(memory: Array, depth: int) -> float:
     """Where the present curve, the last of ``depth``, joins the one that it will go on as."""
     closing: float = -memory[POINTS] if depth == 1 else memory[POINTS + 2 * (depth - 2)]
     return closing
 
 
-@njit(cache=True)
+@compiled()
 def advance_masing(
     curve: SliderCurve, residual: float, memory: Array, increment: float
 ) -> tuple[float, float, float]:
@@ -139,7 +140,7 @@ def advance_masing(
     return force + residual * end, slope + residual, max(lost, 0.0)
 
 
-@njit(cache=True)
+@compiled()
 def _columns_for(state: JointState) -> int:
     """Columns with room for a turning point more: doubled when full, halved when mostly empty."""
     needed = 0
@@ -153,7 +154,7 @@ def _columns_for(state: JointState) -> int:
     return columns
 
 
-@njit(cache=True)
+@compiled()
 def _respond(
     parameters: Array, state: JointState, increment: Array
 ) -> tuple[Array, Array, Array, Array]:

@@ -12,9 +12,9 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from sa_solver.types import Array
+from wear.joints.compiled import compiled
 from wear.joints.friction_contact import advance_contact
 from wear.joints.periodic_sliders import (
     DERIVATIVE_REPEATED,
@@ -32,7 +32,7 @@ from wear.joints.periodic_sliders import (
 ON_CIRCLE = 1e-12
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _to_the_limit(a: Array) -> tuple[float, float, float, float]:
     """1 + A + A² + ... = (1 - A)⁻¹ by rows, A ``(2, 2)``; 1 where a period forgets nothing."""
     p, q, r, s = 1.0 - a[0, 0], -a[0, 1], -a[1, 0], 1.0 - a[1, 1]
@@ -42,7 +42,7 @@ def _to_the_limit(a: Array) -> tuple[float, float, float, float]:
     return s / determinant, -q / determinant, -r / determinant, p / determinant
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _carry(slopes: Array, stiffness: float, start: Array, step: Array, derivative: Array) -> bool:
     """Carry the derivative ``(2, 3, m)`` of the stretch along one increment: whether it sticks.
 
@@ -71,7 +71,7 @@ def _carry(slopes: Array, stiffness: float, start: Array, step: Array, derivativ
     return False
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _chain(slopes: Array, stiffness: float, total: Array) -> None:
     """Multiply the derivative ``(2, 2)`` of a stretch by that of one increment."""
     for c in range(2):
@@ -80,7 +80,7 @@ def _chain(slopes: Array, stiffness: float, total: Array) -> None:
         total[1, c] = slopes[1, 0] * x + slopes[1, 1] * y
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _state_of(joint: Array, force: Array) -> int:
     """0 stick, 1 slip, 2 separated."""
     if force[2] <= 0.0:
@@ -103,7 +103,7 @@ class ContactMemory(NamedTuple):
     slopes: Array
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _move(joint: Array, memory: ContactMemory, start: Array, end: Array) -> float:
     """One increment between displacements ``(3,)``; return the energy lost."""
     for direction in range(2):
@@ -116,7 +116,7 @@ def _move(joint: Array, memory: ContactMemory, start: Array, end: Array) -> floa
     return lost
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _lead_in(joint: Array, memory: ContactMemory, before: Array, lead: Array) -> None:
     """Drive a contact from rest to the first sample."""
     memory.state[:], memory.derivative[:] = 0.0, 0.0
@@ -129,7 +129,7 @@ def _lead_in(joint: Array, memory: ContactMemory, before: Array, lead: Array) ->
         start[:] = lead[i]
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _round(
     joint: Array,
     memory: ContactMemory,
@@ -159,7 +159,7 @@ def _round(
     return lost, sticks
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _settle_contact(
     joint: Array, memory: ContactMemory, path: Array, period: Period, record: PeriodRecord
 ) -> tuple[float, float, bool]:
@@ -185,7 +185,7 @@ def _settle_contact(
     return lost, joint[0] * change, sticks
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _project_stuck(
     stiffness: float, period: Period, shares: Array, record: PeriodRecord, jacobian: Array
 ) -> None:
@@ -207,7 +207,7 @@ def _project_stuck(
                     jacobian[row, direction, c, by] = stiffness * slope
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _project(stiffness: float, weights: Array, record: PeriodRecord, jacobian: Array) -> None:
     """Tangential part of the derivative."""
     size = weights.shape[0]
@@ -216,7 +216,7 @@ def _project(stiffness: float, weights: Array, record: PeriodRecord, jacobian: A
     jacobian[:, :2] = stiffness * slopes.transpose(0, 1, 3, 2)
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _project_normal(
     stiffness: float, period: Period, shares: Array, states: Array, jacobian: Array
 ) -> None:
@@ -230,7 +230,7 @@ def _project_normal(
     jacobian[:, 2, :, 2] = stiffness * pressed
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def settle_contacts(period: Period, joints: DrivenJoints) -> None:
     """Settle contacts; parameters are those of the law."""
     samples, size = period.basis.shape

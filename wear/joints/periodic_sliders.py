@@ -12,10 +12,10 @@ from math import copysign, exp
 from typing import NamedTuple
 
 import numpy as np
-from numba import njit
 
 from sa_solver.types import Array
 from wear.joints.bouc_wen import NO_FRICTION, advance_bouc_wen, xi_rate
+from wear.joints.compiled import compiled
 from wear.joints.jenkins import advance_jenkins
 from wear.joints.masing import DEPTH, DISPLACEMENT, POINTS, advance_masing, turns
 
@@ -82,7 +82,7 @@ class DrivenJoints(NamedTuple):
     change: Array
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _move(joint: Array, stretch: float, increment: float) -> tuple[float, float, float, float]:
     """One increment: stretch at its end, derivatives by stretch and increment, energy lost."""
     spring, limit = joint[1], joint[3]
@@ -105,7 +105,7 @@ def _move(joint: Array, stretch: float, increment: float) -> tuple[float, float,
     return end * limit / spring, kept, slope / spring, lost
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _lead_in(joint: Array, before: Array, lead: Array, derivative: Array) -> float:
     """Stretch at the first sample, to which it is driven from rest; ``derivative`` is written."""
     stretch, here = 0.0, 0.0
@@ -120,7 +120,7 @@ def _lead_in(joint: Array, before: Array, lead: Array, derivative: Array) -> flo
     return stretch
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _round(
     joint: Array, stretch: float, path: Array, steps: Array, derivative: Array, record: PeriodRecord
 ) -> tuple[float, float, float]:
@@ -145,7 +145,7 @@ def _round(
     return stretch, total, lost
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _settle_slider(
     joint: Array, stretch: float, path: Array, steps: Array, derivative: Array, record: PeriodRecord
 ) -> tuple[float, float]:
@@ -168,14 +168,14 @@ def _settle_slider(
     return lost, change
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def relative_change(change: float, force: Array) -> float:
     """A change of force over the largest force."""
     largest = np.max(np.abs(force))
     return abs(change) / largest if largest > 0.0 else 0.0
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def differences(basis: Array) -> Array:
     """Differences ``(t, m)`` of a basis from the sample before, round the period."""
     steps = np.empty_like(basis)
@@ -183,7 +183,7 @@ def differences(basis: Array) -> Array:
     return steps
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def settle_sliders(period: Period, joints: DrivenJoints) -> None:
     """Settle Jenkins's and Bouc-Wen's joints; parameters begin with their kind."""
     samples, size = period.basis.shape
@@ -213,7 +213,7 @@ class OpenLoops(NamedTuple):
     forces: Array
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def _follow_curve(
     joint: Array, loops: OpenLoops, here: Array, there: Array, end: float, gradient: Array
 ) -> tuple[float, float, float]:
@@ -240,7 +240,7 @@ def _follow_curve(
     return force, slope / joint[0], lost
 
 
-@njit(cache=True, nogil=True, error_model="numpy")
+@compiled(nogil=True, error_model="numpy")
 def settle_curves(period: Period, joints: DrivenJoints) -> None:
     """Settle joints of spread sliders; parameters are K, kr, µN, c and m."""
     basis, lead = period.basis, period.lead

@@ -1,0 +1,52 @@
+"""Compiled functions that are kept notice what they call."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from wear.joints import compiled
+from wear.joints.jenkins import advance_jenkins
+
+SLOPE = """
+from kernels.compiled import compiled
+
+@compiled()
+def slope():
+    return {value}
+"""
+DOUBLED = """
+from kernels.compiled import compiled
+from kernels.slope import slope
+
+@compiled(nogil=True)
+def doubled():
+    return 2.0 * slope()
+"""
+ASKED = "from kernels.doubled import doubled; print(doubled())"
+
+
+@pytest.mark.slow
+def test_a_changed_function_is_compiled_into_those_that_call_it(tmp_path):
+    """The file of the caller stays as it is, and numba alone would take what it kept."""
+    package = tmp_path / "kernels"
+    package.mkdir()
+    (package / "__init__.py").touch()
+    shutil.copy(compiled.__file__, package)
+    (package / "doubled.py").write_text(DOUBLED, encoding="utf-8")
+    for value in (3.0, 3.0, 5.0):
+        (package / "slope.py").write_text(SLOPE.format(value=value), encoding="utf-8")
+        ended = subprocess.run(
+            [sys.executable, "-c", ASKED], cwd=tmp_path, capture_output=True, text=True, check=True
+        )
+        assert float(ended.stdout) == 2.0 * value
+    assert len(list((package / "__pycache__").glob("numba-*"))) == 2
+
+
+def test_kernels_of_joints_are_kept_by_the_version_of_their_package():
+    assert compiled.KEPT.name.endswith(compiled.version_of(Path(compiled.__file__).parent))
+    assert advance_jenkins.stats.cache_path.startswith(str(compiled.KEPT))
