@@ -45,14 +45,14 @@ SLACK = 0.15
 
 def tensor_mesh(steps, dimension):
     """A box of cells: ``steps`` along X, Y (one cell, in space alone) and Z, faces by name."""
-    own = steps if dimension == 3 else [steps[0], steps[2]]
+    axis_steps = steps if dimension == 3 else [steps[0], steps[2]]
     names = "xyz" if dimension == 3 else "xz"
     faces = {
         f"{name}{end}": (lambda x, axis=axis, value=value: np.isclose(x[axis], value))
-        for axis, (name, values) in enumerate(zip(names, own, strict=True))
+        for axis, (name, values) in enumerate(zip(names, axis_steps, strict=True))
         for end, value in enumerate((values[0], values[-1]))
     }
-    mesh = (MeshTet if dimension == 3 else MeshTri).init_tensor(*own)
+    mesh = (MeshTet if dimension == 3 else MeshTri).init_tensor(*axis_steps)
     return mesh.with_boundaries(faces)
 
 
@@ -99,9 +99,9 @@ def held_still(elastic, face, floats=False):
 
     ``floats``: those along it alone. In the plane it is two corners across and one along.
     """
-    own = list(elastic.body.axes)
+    axes = list(elastic.body.axes)
     normal = "xyz".index(face[0])
-    across = [axis for axis in own if axis != normal]
+    across = [axis for axis in axes if axis != normal]
     nodes = elastic.boundary_nodes(face)
     signs = np.where(np.eye(len(across) + 1, len(across), -1) > 0.0, 1.0, -1.0)
     corners = nodes[np.argmax(elastic.nodes[nodes][:, across] @ signs.T, axis=0)]
@@ -109,7 +109,7 @@ def held_still(elastic, face, floats=False):
     held = [] if floats else [(corners, normal)]
     held += [(corners[: len(across) - k], axis) for k, axis in enumerate(reversed(across))]
     for some, axis in held:
-        constraints.slide(some, np.tile(AXES[axis][own], (len(some), 1)))
+        constraints.slide(some, np.tile(AXES[axis][axes], (len(some), 1)))
     return constraints
 
 
@@ -135,18 +135,18 @@ def errors(elastic, u, displacement, stress, free=False):
 
     ``free``: but for rigid motions.
     """
-    dimension, own = elastic.dimension, list(elastic.body.axes)
+    dimension, axes = elastic.dimension, list(elastic.body.axes)
     basis = Basis(
         elastic.body.mesh, ELEMENTS[dimension, elastic.order](), intorder=INTEGRATION_ORDER
     )
     points = np.zeros((3, *basis.dx.shape))
-    points[own] = np.asarray(basis.global_coordinates())
+    points[axes] = np.asarray(basis.global_coordinates())
     fields = [basis.interpolate(np.ascontiguousarray(c)) for c in u.reshape(-1, dimension).T]
-    found, gradient = np.zeros_like(points), np.zeros((3, *points.shape))
-    for axis, field in zip(own, fields, strict=True):
-        found[axis], gradient[axis, own] = np.asarray(field), np.asarray(field.grad)
+    computed, gradient = np.zeros_like(points), np.zeros((3, *points.shape))
+    for axis, field in zip(axes, fields, strict=True):
+        computed[axis], gradient[axis, axes] = np.asarray(field), np.asarray(field.grad)
     exact, exact_stress = displacement(points), stress(points)
-    difference = found - exact
+    difference = computed - exact
     if free:
         difference = without_rigid_motion(difference, points, basis.dx, dimension)
     strain = strain_of(exact_stress, elastic.material)
@@ -222,8 +222,8 @@ def test_constant_stress_by_tractions(dimension, order, component):
     load = traction_forces(elastic, constant, normals)
     u = solved(elastic, held_still(elastic, "x0"), load)
     expected = unit[[0, 1, 2, 0, 1, 2], [0, 1, 2, 1, 2, 0]]
-    found = elastic.stress(u)
-    np.testing.assert_allclose(found, np.tile(expected[:, None], found.shape[1]), atol=1e-10)
+    stress = elastic.stress(u)
+    np.testing.assert_allclose(stress, np.tile(expected[:, None], stress.shape[1]), atol=1e-10)
     strain = strain_of(unit, MATERIAL)
     worst = errors(elastic, u, lambda x: np.einsum("ab,b...->a...", strain, x), constant, free=True)
     assert max(worst.displacement, worst.energy, worst.mean_stress) < 1e-10
@@ -282,11 +282,11 @@ class Cantilever:
     @classmethod
     def stress(cls, x):
         inertia = 2.0 * cls.HALF**3 / 3.0
-        found = np.zeros((3, *x.shape))
-        found[0, 0] = -cls.FORCE * x[0] * x[2] / inertia
-        found[1, 1] = MATERIAL.poisson * found[0, 0]
-        found[0, 2] = found[2, 0] = -0.5 * cls.FORCE * (cls.HALF**2 - x[2] ** 2) / inertia
-        return found
+        stress = np.zeros((3, *x.shape))
+        stress[0, 0] = -cls.FORCE * x[0] * x[2] / inertia
+        stress[1, 1] = MATERIAL.poisson * stress[0, 0]
+        stress[0, 2] = stress[2, 0] = -0.5 * cls.FORCE * (cls.HALF**2 - x[2] ** 2) / inertia
+        return stress
 
     @classmethod
     def displacement(cls, x):
@@ -294,21 +294,21 @@ class Cantilever:
         nu = MATERIAL.poisson / (1.0 - MATERIAL.poisson)
         bending = MATERIAL.young / (1.0 - MATERIAL.poisson**2) * 2.0 * cls.HALF**3 / 3.0
         shearing = MATERIAL.shear_modulus * 2.0 * cls.HALF**3 / 3.0
-        found = np.zeros_like(x)
+        displacement = np.zeros_like(x)
         along, across = x[0], x[2]
-        found[0] = cls.FORCE * (
+        displacement[0] = cls.FORCE * (
             -(along**2) * across / (2.0 * bending)
             - nu * across**3 / (6.0 * bending)
             + across**3 / (6.0 * shearing)
             + (cls.LENGTH**2 / (2.0 * bending) - cls.HALF**2 / (2.0 * shearing)) * across
         )
-        found[2] = cls.FORCE * (
+        displacement[2] = cls.FORCE * (
             nu * along * across**2 / (2.0 * bending)
             + along**3 / (6.0 * bending)
             - cls.LENGTH**2 * along / (2.0 * bending)
             + cls.LENGTH**3 / (3.0 * bending)
         )
-        return found
+        return displacement
 
     @classmethod
     def errors(cls, dimension, order, cells):
@@ -321,13 +321,13 @@ class Cantilever:
         elastic = ElasticBody(Body("beam", tensor_mesh(steps, dimension)), MATERIAL, order)
         constraints = plane_strain(elastic)
         nodes, weights = elastic.boundary_weights("x1")
-        own = list(elastic.body.axes)
+        axes = list(elastic.body.axes)
         for weight, direction in (
             (weights, AXES[0]),
             (weights, AXES[2]),
             (weights * elastic.nodes[nodes, 2], AXES[0]),
         ):
-            constraints.zero_mean(nodes, weight, direction[own])
+            constraints.zero_mean(nodes, weight, direction[axes])
         ends = {name: OUTWARD[name] for name in ("x0", "x1")}
         u = solved(elastic, constraints, traction_forces(elastic, cls.stress, ends))
         return errors(elastic, u, cls.displacement, cls.stress, free=True)
@@ -368,9 +368,9 @@ class Cylinder:
     def displacement(cls, x):
         square = x[0] ** 2 + x[2] ** 2
         scale = cls.SIZE * (1.0 + MATERIAL.poisson) / MATERIAL.young
-        found = scale * (1.0 - 2.0 * MATERIAL.poisson + cls.OUTER**2 / square) * x
-        found[1] = 0.0
-        return found
+        displacement = scale * (1.0 - 2.0 * MATERIAL.poisson + cls.OUTER**2 / square) * x
+        displacement[1] = 0.0
+        return displacement
 
     @classmethod
     def errors(cls, dimension, order, cells):
@@ -422,9 +422,9 @@ def test_convergence(case, expected, dimension, order):
 def test_convergence_goes_on(case, expected, order):
     """In the plane, eight times as fine; and no faster than it should where the rate is sharp."""
     coarse, fine = (case.errors(2, order, 8 * cells) for cells in CELLS[order])
-    found = rates(coarse, fine)
-    assert np.all(found > np.array(expected[order]) - 0.05)
-    assert found[0] < expected[order][0] + 0.05
+    measured = rates(coarse, fine)
+    assert np.all(measured > np.array(expected[order]) - 0.05)
+    assert measured[0] < expected[order][0] + 0.05
 
 
 # --- Hertz ---------------------------------------------------------------------------------------
@@ -523,8 +523,8 @@ class HertzPair:
     def solve(self):
         """Relative errors of approach, half-width, peak pressure, and of the pressure in L2."""
         supported = []
-        own = self.lower.dimension
-        frames = np.tile(np.eye(own), (len(self.nodes), 1, 1))
+        dimension = self.lower.dimension
+        frames = np.tile(np.eye(dimension), (len(self.nodes), 1, 1))
         for elastic, side in ((self.lower, -1.0), (self.upper, 1.0)):
             constraints = held_still(elastic, "z0", floats=side > 0.0)
             constraints.average(*elastic.midsides("contact"))
@@ -556,7 +556,7 @@ class HertzPair:
         exact = self.exact.pressure(x) if self.dimension == 2 else self.exact.pressure(x, y)
         pressure = force / areas
         middle = int(np.argmin(square))
-        found = np.array(
+        deviations = np.array(
             [
                 (ends[0] - ends[1]) / self.shortening() - 1.0,
                 width - 1.0,
@@ -564,7 +564,7 @@ class HertzPair:
                 np.sqrt(areas @ (pressure - exact) ** 2 / (areas @ exact**2)),
             ]
         )
-        return np.abs(found)
+        return np.abs(deviations)
 
     def _far_end(self, elastic, u):
         """u_z of the node on the axis, on the far face."""
@@ -594,10 +594,10 @@ def check_hertz(dimension, cells):
     for order in ORDERS:
         for count in cells[order]:
             pair = HertzPair(dimension, order, count)
-            found = pair.solve()
+            deviations = pair.solve()
             limit = np.array(HERTZ_BOUNDS[dimension]) * pair.cell ** np.array(HERTZ_RATES)
-            assert np.all(found < limit), (order, count, found, limit)
-            approach[order, count] = found[0]
+            assert np.all(deviations < limit), (order, count, deviations, limit)
+            approach[order, count] = deviations[0]
     for count in set(cells[1]) & set(cells[2]):
         assert approach[2, count] < 0.5 * approach[1, count]
 
