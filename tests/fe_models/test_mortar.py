@@ -66,8 +66,8 @@ def test_linear_fields_and_integrals_pass(dimension, seed):
     np.testing.assert_allclose(mortar.covered, 1.0, atol=1e-12)
     np.testing.assert_allclose(mortar.projection @ linear(master[0]), linear(slave[0]), atol=1e-12)
     # What a unit pressure gives the master's nodes is what its own face gives them.
-    own = mortar_projection(*master, *master)
-    np.testing.assert_allclose(mortar.projection.T @ mortar.areas, own.areas, atol=1e-12)
+    matching = mortar_projection(*master, *master)
+    np.testing.assert_allclose(mortar.projection.T @ mortar.areas, matching.areas, atol=1e-12)
     assert mortar.areas.sum() == pytest.approx(measure(dimension), rel=1e-12)
 
 
@@ -117,8 +117,8 @@ def test_master_that_covers_a_part(dimension, seed):
     np.testing.assert_allclose(integrals, size * np.append(1.0, centre), rtol=1e-12)
 
     kept = mortar.kept
-    found = (mortar.projection @ linear(master[0]))[kept]
-    np.testing.assert_allclose(found, linear(slave[0])[kept], atol=1e-10)
+    projected = (mortar.projection @ linear(master[0]))[kept]
+    np.testing.assert_allclose(projected, linear(slave[0])[kept], atol=1e-10)
     inside = np.all((slave[0] > [*low, -1.0]) & (slave[0] < [*end, 1.0]), axis=1)
     if dimension == LINE:
         inside = (slave[0][:, 0] > low[0]) & (slave[0][:, 0] < end[0])
@@ -136,8 +136,8 @@ def test_slivers_of_any_width(dimension, shift):
     moved = points + shift * np.array([1.0, 0.3, 0.0]) * (np.arange(3) < dimension - 1)
     mortar = mortar_projection(points, facets, moved, facets)
     assert mortar.covered[mortar.kept].min() > 0.5
-    found = mortar.projection @ linear(moved)
-    np.testing.assert_allclose(found[mortar.kept], linear(points)[mortar.kept], atol=1e-10)
+    projected = mortar.projection @ linear(moved)
+    np.testing.assert_allclose(projected[mortar.kept], linear(points)[mortar.kept], atol=1e-10)
     identity = np.eye(len(points))[mortar.kept]
     change = np.abs(mortar.projection.toarray()[mortar.kept] - identity)
     corners = points[facets]
@@ -155,8 +155,8 @@ def test_master_that_ends_just_inside_a_facet(dimension, width):
     points, facets = tensor_face(dimension, 5)
     points[:, :2] *= 0.5 + width
     mortar = mortar_projection(*slave, points, facets)
-    found = (mortar.projection @ linear(points))[mortar.kept]
-    np.testing.assert_allclose(found, linear(slave[0])[mortar.kept], atol=1e-9)
+    projected = (mortar.projection @ linear(points))[mortar.kept]
+    np.testing.assert_allclose(projected, linear(slave[0])[mortar.kept], atol=1e-9)
     assert np.abs(mortar.projection).sum(axis=1).max() < 10.0
     area = (0.5 + width) ** (dimension - 1)
     # Slivers are left out.
@@ -468,14 +468,16 @@ def bending_errors(dimension, cells):
 @pytest.mark.parametrize(("dimension", "levels"), [(LINE, (4, 8, 16)), (SURFACE, (2, 4))])
 def test_bending_converges(dimension, levels):
     """At the rate of linear elements, the coarser body 1's; no worse than where meshes match."""
-    found, matched = [], []
+    unmatched, matched = [], []
     for level in levels:
         two, three = (2 * level, level, level), (3 * level, level + 1, level)
-        found.append(bending_errors(dimension, (two, three)))
+        unmatched.append(bending_errors(dimension, (two, three)))
         matched.append(bending_errors(dimension, (two, two)))
-    (stress, pressure), (own_stress, own_pressure) = np.transpose([found, matched], (0, 2, 1))
-    assert np.all(stress < own_stress)
-    assert np.all(pressure < 1.6 * own_pressure)
+    (stress, pressure), (matched_stress, matched_pressure) = np.transpose(
+        [unmatched, matched], (0, 2, 1)
+    )
+    assert np.all(stress < matched_stress)
+    assert np.all(pressure < 1.6 * matched_pressure)
     # On the way to 1, and to 1.5 for the pressure.
     rate = 0.9 if dimension == LINE else 0.7
     assert np.log2(stress[-2] / stress[-1]) > rate
@@ -688,11 +690,12 @@ def test_dovetail_of_two_meshes_does_what_that_of_one_does(
     friction = 0.4
     disk = dovetail.mesh((9, 12), 8.0).body_1
     faces = []
-    for own in coarse_mesh.interfaces:
-        face = mortar_interface(own.name, disk, own.name, coarse_mesh.body_2, own.name, own.frame)
-        np.testing.assert_array_equal(face.nodes_2, own.nodes_2)
+    for interface in coarse_mesh.interfaces:
+        name, frame = interface.name, interface.frame
+        face = mortar_interface(name, disk, name, coarse_mesh.body_2, name, frame)
+        np.testing.assert_array_equal(face.nodes_2, interface.nodes_2)
         np.testing.assert_allclose(face.gap, 0.0, atol=1e-9)
-        faces.append(replace(face, gap=own.gap))
+        faces.append(replace(face, gap=interface.gap))
     mesh = replace(coarse_mesh, body_1=disk, interfaces=tuple(faces))
     structure = dovetail_structure(dovetail, mesh, titanium, titanium, mission, 1)
     joint = structure.condense()
@@ -701,9 +704,9 @@ def test_dovetail_of_two_meshes_does_what_that_of_one_does(
     cycle = structure.solve_cycle(frictional, mission.amplitudes(), structure.gap(), friction)
     assert cycle.converged
     assert cycle.equilibrium.max() < SOLVER
-    for found, expected in zip(cycle.histories, solved(friction, mission).histories, strict=True):
+    for history, expected in zip(cycle.histories, solved(friction, mission).histories, strict=True):
         peak = expected.loads.P.max()
         for name in ("P", "Qx", "Qy"):
             np.testing.assert_allclose(
-                getattr(found.loads, name), getattr(expected.loads, name), atol=5e-3 * peak
+                getattr(history.loads, name), getattr(expected.loads, name), atol=5e-3 * peak
             )
