@@ -140,7 +140,9 @@ def test_two_runs_are_bitwise_equal(start, whole, tmp_path):
 
 @pytest.mark.slow
 def test_pictures_are_written(start, separate_processes, tmp_path):
-    run = start(tmp_path / "out", "output.paraview=true", "output.figures=true", *QUICK)
+    drawn = "output.paraview=true", "output.figures=true"
+    stressed = "stress.section=x", "stress.life.parameter=ruiz"
+    run = start(tmp_path / "out", *QUICK, *drawn, *stressed)
     assert run.ending.exit_code == 0, run.ending.stderr
     assert len(list((run.folder / "figures").glob("*.png"))) == 8
     assert (run.folder / "paraview" / "structure.pvd").exists()
