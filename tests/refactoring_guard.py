@@ -89,8 +89,8 @@ class Recorder:
         self.program = [sys.executable, "-c", f"from {module} import {function}; {function}()"]
         threads = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
         self.environment = os.environ | dict.fromkeys(threads, "1")
-        own = {"PYTHONPATH": str(self.checkout), "FRETSCALE_CACHE": str(self.folder / "cache")}
-        self.environment |= own
+        paths = {"PYTHONPATH": str(self.checkout), "FRETSCALE_CACHE": str(self.folder / "cache")}
+        self.environment |= paths
         self.inputs = self.folder / "inputs"
         if not self.inputs.exists():
             self.write_inputs()
@@ -122,17 +122,17 @@ class Recorder:
 
     def run(self, name: str) -> None:
         """Run a case into ``NAME/out``, with its ``NAME/exit_code``, unless that is there."""
-        own = self.folder / name
-        if (own / "exit_code").exists():
+        folder = self.folder / name
+        if (folder / "exit_code").exists():
             return
-        own.mkdir(exist_ok=True)
+        folder.mkdir(exist_ok=True)
         begin = time.monotonic()
-        words = [*RUNS[name]["command"].split(), "--out", str(own / "out")]
+        words = [*RUNS[name]["command"].split(), "--out", str(folder / "out")]
         for entry, value in RUNS[name].get("set", {}).items():
             words += ["--set", f"{entry}={json.dumps(value)}"]
         done = self.fretscale(*(word.replace("{inputs}", str(self.inputs)) for word in words))
-        (own / "output.txt").write_text(done.stdout + done.stderr, encoding="utf-8")
-        (own / "exit_code").write_text(str(done.returncode), encoding="utf-8")
+        (folder / "output.txt").write_text(done.stdout + done.stderr, encoding="utf-8")
+        (folder / "exit_code").write_text(str(done.returncode), encoding="utf-8")
         ending = f", exit code {done.returncode}: {done.stderr}" if done.returncode else ""
         print(f"{name}: {time.monotonic() - begin:.1f} s{ending.rstrip()}", flush=True)
 
@@ -172,19 +172,19 @@ Value = np.ndarray | str
 def fields(folder: Path, name: str) -> dict[str, Value]:
     """All that the run ``name`` left that is compared, by "run/file > field"."""
     places = (folder / PLACES).read_text("utf-8").split()
-    found: dict[str, Value] = {
+    values: dict[str, Value] = {
         f"{name} > exit code": (folder / name / "exit_code").read_text("utf-8")
     }
     out = folder / name / "out"
-    for path in sorted(own for own in out.rglob("*") if own.is_file()):
+    for path in sorted(path for path in out.rglob("*") if path.is_file()):
         file = f"{name}/{path.relative_to(out)}"
-        found[file] = "a file"
+        values[file] = "a file"
         for key, value in read(path):
             if isinstance(value, str):
                 for place in places:
                     value = value.replace(place, "")
-            found[f"{file} > {key}"] = value
-    return {key: value for key, value in found.items() if not UNCOMPARED.search(key)}
+            values[f"{file} > {key}"] = value
+    return {key: value for key, value in values.items() if not UNCOMPARED.search(key)}
 
 
 def read(path: Path) -> Iterator[tuple[str, Value]]:
@@ -208,8 +208,8 @@ def flat(value: Any, name: str = "") -> Iterator[tuple[str, Value]]:
     """Entries of nested dictionaries and lists; lists of numbers are one entry."""
     if isinstance(value, dict) or (isinstance(value, list) and not is_numeric(value)):
         items = value.items() if isinstance(value, dict) else enumerate(value)
-        for key, own in items:
-            yield from flat(own, f"{name}.{key}" if name else str(key))
+        for key, entry in items:
+            yield from flat(entry, f"{name}.{key}" if name else str(key))
     else:
         yield name, as_value(value)
 
@@ -235,7 +235,9 @@ def read_h5(path: Path) -> Iterator[tuple[str, Value]]:
         items: list[tuple[str, Any]] = [("", file)]
         file.visititems(lambda name, item: items.append((name, item)))
         for name, item in items:
-            yield from ((f"{name}@{key}", as_value(own)) for key, own in item.attrs.items())
+            yield from (
+                (f"{name}@{key}", as_value(attribute)) for key, attribute in item.attrs.items()
+            )
             if isinstance(item, h5py.Dataset):
                 yield name, as_value(item.asstr()[()] if item.dtype.kind == "O" else item[()])
 
@@ -265,8 +267,8 @@ def read_vtk(path: Path) -> Iterator[tuple[str, Value]]:
     mesh = pv.read(path)
     yield "points", np.asarray(mesh.points)
     for kind in ("point_data", "cell_data", "field_data"):
-        for name, own in getattr(mesh, kind).items():
-            yield f"{kind} {name}", as_value(np.asarray(own))
+        for name, values in getattr(mesh, kind).items():
+            yield f"{kind} {name}", as_value(np.asarray(values))
 
 
 READERS = {
@@ -309,15 +311,15 @@ def compare_run(
         lines.append(f"failed on the later side, as its {name}/output.txt says")
     largest, told = (0.0, ""), []
     for key in before.keys() & after.keys():
-        found = deviation(key, before[key], after[key])
-        if isinstance(found, str):
-            lines.append(f"{found}: {key}")
+        difference = deviation(key, before[key], after[key])
+        if isinstance(difference, str):
+            lines.append(f"{difference}: {key}")
             continue
-        largest = max(largest, (found, key))
-        if found > tolerance:
-            lines.append(f"deviates by {found:.1e}: {key}")
-        elif every and found:
-            told.append(f"deviates by {found:.1e}, rounding: {key}")
+        largest = max(largest, (difference, key))
+        if difference > tolerance:
+            lines.append(f"deviates by {difference:.1e}: {key}")
+        elif every and difference:
+            told.append(f"deviates by {difference:.1e}, rounding: {key}")
     ending = f"largest deviation {largest[0]:.1e}" + (f" in {largest[1]}" if largest[0] else "")
     print(f"{name}: {len(after)} fields {'DIFFER' if lines else 'agree'}, {ending}")
     for line in (*sorted(lines), *sorted(told)):
@@ -378,14 +380,16 @@ def main() -> int:
     raw = argparse.RawDescriptionHelpFormatter
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=raw)
     add = parser.add_subparsers(dest="command", required=True).add_parser
-    own = add("record", parents=[common, running], help="run the cases")
-    own.add_argument("folder", type=Path, help="to write; a record in it is continued")
-    own.add_argument("--checkout", type=Path, default=ROOT, help="another one than the script's")
-    own = add("compare", parents=[common, comparing], help="compare two records")
-    own.add_argument("earlier", type=Path, help="folder of a record")
-    own.add_argument("later", type=Path, help="folder of another")
-    own = add("against", parents=[common, running, comparing], help="record both, then compare")
-    own.add_argument("revision", help="of git, to compare this checkout with")
+    command = add("record", parents=[common, running], help="run the cases")
+    command.add_argument("folder", type=Path, help="to write; a record in it is continued")
+    command.add_argument(
+        "--checkout", type=Path, default=ROOT, help="another one than the script's"
+    )
+    command = add("compare", parents=[common, comparing], help="compare two records")
+    command.add_argument("earlier", type=Path, help="folder of a record")
+    command.add_argument("later", type=Path, help="folder of another")
+    command = add("against", parents=[common, running, comparing], help="record both, then compare")
+    command.add_argument("revision", help="of git, to compare this checkout with")
     given = parser.parse_args()
     if unknown := set(given.only or ()) - set(RUNS):
         parser.error(f"no case {', '.join(sorted(unknown))}; there are {', '.join(RUNS)}")

@@ -76,9 +76,9 @@ def test_large_body(make: Callable[[], Body], record: dict[str, float]) -> None:
     record[f"{name}: factors [s]"] = factors
     record[f"{name}: coarse grids [s]"] = shortest(lambda: MultigridSolver(matrix, modes))
     record[f"{name}: multigrid [s]"] = shortest(lambda: solve(load))
-    found = MultigridSolver(matrix, modes).solve(load, 1e-10, 500)
-    record[f"{name}: multigrid iterations"] = found.iterations
-    np.testing.assert_allclose(found.solution, exact, atol=1e-6 * np.abs(exact).max())
+    solution = MultigridSolver(matrix, modes).solve(load, 1e-10, 500)
+    record[f"{name}: multigrid iterations"] = solution.iterations
+    np.testing.assert_allclose(solution.solution, exact, atol=1e-6 * np.abs(exact).max())
     assert 3 * body.mesh.nvertices > 100_000
     assert assembly + factors < ASSEMBLY_AND_FACTORS
 

@@ -170,13 +170,13 @@ def by_pyharm(folder: Path) -> dict[str, Any]:
 
 def amplitudes_at(problem: HarmonicBalance, frequencies: Array) -> Array:
     """Harmonic 1 of both masses at these frequencies ``(s, 2)``, from the closest motion."""
-    branch, found = response(problem), []
+    branch, amplitudes = response(problem), []
     for frequency in frequencies:
         closest = int(np.argmin(abs(branch.frequencies - frequency)))
         motion = problem.solve(frequency, FORCE, branch.solutions[closest])
         assert motion.converged
-        found.append(motion.motion[0])
-    return np.array(found)
+        amplitudes.append(motion.motion[0])
+    return np.array(amplitudes)
 
 
 def test_rig_by_pyharm(problem: HarmonicBalance, record: dict[str, float], tmp_path: Path) -> None:
@@ -185,9 +185,9 @@ def test_rig_by_pyharm(problem: HarmonicBalance, record: dict[str, float], tmp_p
     frequencies = np.array(theirs["frequency"])
     inside = (frequencies >= SPAN[0]) & (frequencies <= SPAN[1])
     wanted = (np.array(theirs["real"]) + 1j * np.array(theirs["imag"]))[inside]
-    found = amplitudes_at(problem, frequencies[inside])
+    amplitudes = amplitudes_at(problem, frequencies[inside])
     points = len(response(problem).solutions)
-    assert abs(found - wanted).max() <= AGREEMENT * abs(found).max()
+    assert abs(amplitudes - wanted).max() <= AGREEMENT * abs(amplitudes).max()
     assert 0.7 <= len(frequencies) / points <= 1.4
     each = 1e3 * theirs["seconds"] / len(frequencies)
     record["rig, 8 harmonics, pyHarm: ms per point"] = each

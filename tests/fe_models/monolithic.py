@@ -119,11 +119,13 @@ class Monolith:
         first, second = (self._selection(p, frames) for p in parts)
         self.jump = sp.hstack([-first, second], format="csr")
         self.friction = friction
-        own = float(np.median(abs(self.jump) @ self.stiffness.diagonal()))
+        typical_stiffness = float(np.median(abs(self.jump) @ self.stiffness.diagonal()))
         # Any positive number will do; some times the contact's own stiffness is quick.
-        self.augmentation = 10.0 * own
+        self.augmentation = 10.0 * typical_stiffness
         # Equations in displacements are multiplied to weigh as much as those in forces.
-        self.equations = own * sp.block_diag([p.equations for p in parts], format="csr")
+        self.equations = typical_stiffness * sp.block_diag(
+            [p.equations for p in parts], format="csr"
+        )
 
     @staticmethod
     def _selection(part: Part, frames: Array) -> sp.csr_matrix:
@@ -190,8 +192,8 @@ class _Increment:
         self._factorise(guess, bound)
         for renewal in range(1, MAX_RENEWALS + 1):
             enough = max(BALANCED * residual, 0.5 * self.tolerance)
-            found = self._minimise(guess, bound, enough)
-            guess = replace(found, force=law(self._trial(found), bound))
+            balanced = self._minimise(guess, bound, enough)
+            guess = replace(balanced, force=law(self._trial(balanced), bound))
             bound = self._bound(guess)
             residual = self._residual(guess)
             if residual <= self.tolerance:

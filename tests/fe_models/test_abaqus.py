@@ -147,10 +147,10 @@ def test_surfaces_of_a_part_are_named_by_instance(assembled):
     ],
 )
 def test_surfaces_are_where_they_should_be(assembled, body, boundary, area, centroid, normal):
-    found = patch(assembled.bodies[body], boundary)
-    assert found.area == pytest.approx(area, rel=1e-12)
-    np.testing.assert_allclose(found.centroid, centroid, atol=1e-12)
-    np.testing.assert_allclose(found.normal, normal, atol=1e-12)
+    surface = patch(assembled.bodies[body], boundary)
+    assert surface.area == pytest.approx(area, rel=1e-12)
+    np.testing.assert_allclose(surface.centroid, centroid, atol=1e-12)
+    np.testing.assert_allclose(surface.normal, normal, atol=1e-12)
 
 
 def test_node_sets_are_those_of_each_body(assembled):
@@ -180,8 +180,8 @@ def test_node_set_of_an_element_set_and_node_surface(tmp_path):
         ("Block-1", "Block-1.Contact"),
         ("Block-2", "Seven"),
     ):
-        found = imported.node_numbers[body][imported.points[body][name]]
-        assert found.tolist() == expected
+        numbers = imported.node_numbers[body][imported.points[body][name]]
+        assert numbers.tolist() == expected
 
 
 def test_independent_instance_has_its_own_mesh(tmp_path):
@@ -192,8 +192,8 @@ def test_independent_instance_has_its_own_mesh(tmp_path):
         f" 0., 0., 4.\n{body}*End Instance\n*End Assembly\n"
     )
     imported = read(tmp_path, text)
-    found = patch(imported.bodies["B"], "Top")
-    np.testing.assert_allclose(found.centroid, [1.0, 0.5, 5.0], atol=1e-12)
+    surface = patch(imported.bodies["B"], "Top")
+    np.testing.assert_allclose(surface.centroid, [1.0, 0.5, 5.0], atol=1e-12)
 
 
 def test_names_of_one_instance_need_no_prefix(tmp_path):
@@ -284,10 +284,10 @@ def check_flat(imported, names):
     assert set(imported.bodies) == {one, two}
     for body, boundary, size, x in ((one, left, 1.0, 0.0), (two, right, 2.0, 2.0)):
         assert volume(imported.bodies[body]) == pytest.approx(size, rel=1e-12)
-        found = patch(imported.bodies[body], boundary)
-        assert found.area == pytest.approx(1.0, rel=1e-12)
-        np.testing.assert_allclose(found.centroid, [x, 0.5, 0.5], atol=1e-12)
-        np.testing.assert_allclose(found.normal, [-1.0, 0.0, 0.0], atol=1e-12)
+        surface = patch(imported.bodies[body], boundary)
+        assert surface.area == pytest.approx(1.0, rel=1e-12)
+        np.testing.assert_allclose(surface.centroid, [x, 0.5, 0.5], atol=1e-12)
+        np.testing.assert_allclose(surface.normal, [-1.0, 0.0, 0.0], atol=1e-12)
 
 
 def test_flat_file_of_meshio(tmp_path):
@@ -296,8 +296,11 @@ def test_flat_file_of_meshio(tmp_path):
     names = ["disk", "blade", "foot", "root"]
     none = np.array([], dtype=int)
     sets = {
-        name: [np.arange(len(block)) if k == own else none for k, (_, block) in enumerate(blocks)]
-        for own, name in enumerate(names)
+        name: [
+            np.arange(len(block)) if k == block_number else none
+            for k, (_, block) in enumerate(blocks)
+        ]
+        for block_number, name in enumerate(names)
     }
     path = tmp_path / "flat.inp"
     meshio.Mesh(points, blocks, cell_sets=sets).write(path)
@@ -352,8 +355,8 @@ def test_flat_file_without_sets(tmp_path):
 def test_edges_beside_solids_are_a_node_set(tmp_path):
     text = CUBES + "*Element, type=T3D2, elset=Edge\n20, 11, 12\n21, 12, 13\n"
     imported = read(tmp_path, text)
-    found = imported.node_numbers["body_1"][imported.points["body_1"]["Edge"]]
-    assert found.tolist() == [11, 12, 13]
+    numbers = imported.node_numbers["body_1"][imported.points["body_1"]["Edge"]]
+    assert numbers.tolist() == [11, 12, 13]
 
 
 def test_plane_part(tmp_path):

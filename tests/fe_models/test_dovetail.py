@@ -226,9 +226,9 @@ def test_load_history_of_one_node(coarse_mesh):
     loads = load_history(face, force, slip, 0.5)
     x, y = face.coordinates[node]
     assert isinstance(loads, LoadHistory)
-    found = [getattr(loads, name)[0] for name in ("P", "Qx", "Qy", "Mx", "My", "Mz")]
+    resultants = [getattr(loads, name)[0] for name in ("P", "Qx", "Qy", "Mx", "My", "Mz")]
     expected = [10.0, -4.0, 3.0, 10.0 * y, -10.0 * x, 3.0 * x + 4.0 * y]
-    np.testing.assert_allclose(found, expected)
+    np.testing.assert_allclose(resultants, expected)
     np.testing.assert_allclose([loads.Edx[0], loads.Edy[0]], [3.2e-3, 1.8e-3])
     assert loads.sliding.tolist() == [True, False]
     assert not load_history(face, force, slip, 0.6).sliding[0]

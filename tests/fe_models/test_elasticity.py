@@ -222,8 +222,8 @@ def manufactured_error(box, order, cells):
 def test_convergence_rate(box, order, cells, rate):
     """Linear elements converge as h², quadratic ones as h³ in the L2 norm."""
     errors = [manufactured_error(box, order, n) for n in cells]
-    found = np.log2(errors[0] / errors[1])
-    assert rate - 0.35 < found < rate + 0.5
+    measured = np.log2(errors[0] / errors[1])
+    assert rate - 0.35 < measured < rate + 0.5
 
 
 def tensor_components(tensor):

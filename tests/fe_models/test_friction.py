@@ -101,14 +101,14 @@ def gauss_seidel(joint, mu, gap, previous, sweeps=4000):
     for _ in range(sweeps):
         before = force.copy()
         for node in range(len(gap)):
-            own = slice(3 * node, 3 * node + 3)
-            step = 0.7 / np.linalg.eigvalsh(compliance[own, own])[-1]
-            w = compliance[own] @ (force - load)
-            force[own.start + 2] = max(0.0, force[own.start + 2] - step * (w[2] + gap[node]))
-            shear = force[own][:2] - step * (w[:2] - previous[:2, node])
-            limit = mu * force[own.start + 2]
+            dofs = slice(3 * node, 3 * node + 3)
+            step = 0.7 / np.linalg.eigvalsh(compliance[dofs, dofs])[-1]
+            w = compliance[dofs] @ (force - load)
+            force[dofs.start + 2] = max(0.0, force[dofs.start + 2] - step * (w[2] + gap[node]))
+            shear = force[dofs][:2] - step * (w[:2] - previous[:2, node])
+            limit = mu * force[dofs.start + 2]
             size = np.linalg.norm(shear)
-            force[own.start : own.start + 2] = shear * min(1.0, limit / max(size, 1e-300))
+            force[dofs.start : dofs.start + 2] = shear * min(1.0, limit / max(size, 1e-300))
         if np.abs(force - before).max() < 1e-13:
             return force.reshape(-1, 3)
     raise AssertionError("Gauss-Seidel did not converge")

@@ -186,16 +186,16 @@ def perturbed(values, rng):
 def test_whole_bodies_are_solved_whatever_the_rounding():
     """An oracle that converges by luck is none: the same forces from perturbed data, thrice."""
     joint = BlockOnPlate(1)
-    found = []
+    forces = []
     for seed in range(3):
         rng, monolith = np.random.default_rng(seed), joint.monolith()
         monolith.stiffness.data = perturbed(monolith.stiffness.data, rng)
         monolith.stiffness = (monolith.stiffness + monolith.stiffness.T) / 2.0
         monolith.loads = perturbed(monolith.loads, rng)
         states = monolith.march(PATH[: TURN + 1], perturbed(joint.gap, rng))
-        found.append([state.force for state in states])
-    apart = np.ptp(found, axis=0).max()
-    assert 0.0 < apart < 1e4 * ROUNDING * np.abs(found).max()
+        forces.append([state.force for state in states])
+    apart = np.ptp(forces, axis=0).max()
+    assert 0.0 < apart < 1e4 * ROUNDING * np.abs(forces).max()
 
 
 def test_path_sees_every_status(pair):
@@ -220,19 +220,19 @@ def test_forces_and_slips_are_those_of_the_whole_bodies(pair):
 def test_resultants_and_energies_are_those_of_the_whole_bodies(pair):
     """P, Qx, Qy, Mx, My, Mz and the energy of each direction at every increment."""
     joint, _, _, split, whole = pair
-    found, expected = (
+    reduced, expected = (
         np.array([resultants(s.force, joint.x, joint.y) for s in states])
         for states in (split, whole)
     )
     for column in range(6):
         scale = np.abs(expected[:, column]).max()
-        np.testing.assert_allclose(found[:, column], expected[:, column], atol=AGREEMENT * scale)
-    found, expected = (
+        np.testing.assert_allclose(reduced[:, column], expected[:, column], atol=AGREEMENT * scale)
+    reduced, expected = (
         np.array([-np.sum(s.force[:2] * s.slip, axis=1) for s in states])
         for states in (split, whole)
     )
     assert expected.sum() > 0.0
-    np.testing.assert_allclose(found, expected, atol=AGREEMENT * expected.max())
+    np.testing.assert_allclose(reduced, expected, atol=AGREEMENT * expected.max())
 
 
 def test_load_and_contact_balance(pair):
@@ -241,8 +241,8 @@ def test_load_and_contact_balance(pair):
     area, height = LENGTH * WIDTH, 2.0
     second = WIDTH * LENGTH**3 / 12.0
     pressure, shear, tilt, twist = PATH.T
-    found = np.array([resultants(s.force, joint.x, joint.y) for s in split]).T
-    across = found[2]
+    computed = np.array([resultants(s.force, joint.x, joint.y) for s in split]).T
+    across = computed[2]
     assert np.abs(across).max() > 1.0
     expected = [
         pressure * area,
@@ -252,16 +252,18 @@ def test_load_and_contact_balance(pair):
         tilt * second - shear * area * height,
         -twist * second,
     ]
-    np.testing.assert_allclose(found, expected, atol=1e-8 * 30.0 * area)
+    np.testing.assert_allclose(computed, expected, atol=1e-8 * 30.0 * area)
 
 
 def whole_displacements(supported, states, amplitudes):
     """All displacements of the upper body in each of the states."""
-    found = []
+    displacements = []
     for state, amplitude in zip(states, amplitudes, strict=True):
         _, interface = supported[0].respond(-state.force.T.ravel(), amplitude)
-        found.append(supported[1].recover(interface + state.displacement.T.ravel(), amplitude))
-    return found
+        displacements.append(
+            supported[1].recover(interface + state.displacement.T.ravel(), amplitude)
+        )
+    return displacements
 
 
 def test_slope_of_the_stuck_branch_is_that_of_a_tied_joint(pair):
@@ -401,7 +403,7 @@ def test_dovetail_is_that_of_the_whole_bodies(small_dovetail):
     assert np.all(seen.max(axis=0) >= 20)
     force = max(np.abs(state.force).max() for state in whole)
     slip = max(np.abs(state.slip).max() for state in whole)
-    found, expected = (
+    reduced, expected = (
         np.array([structure.interface_resultants(s) for s in states]) for states in (split, whole)
     )
     for one, two in zip(split, whole, strict=True):
@@ -410,7 +412,7 @@ def test_dovetail_is_that_of_the_whole_bodies(small_dovetail):
     for column in range(6):
         scale = np.abs(expected[..., column]).max()
         np.testing.assert_allclose(
-            found[..., column], expected[..., column], atol=AGREEMENT * scale
+            reduced[..., column], expected[..., column], atol=AGREEMENT * scale
         )
 
 
@@ -433,9 +435,9 @@ def test_stuck_branch_of_the_dovetail_is_that_of_a_tied_one(small_dovetail):
         assert stuck >= 20
         force, _ = monolith.tied(step, closed)
         tied = structure.interface_resultants(replace(after, force=force))
-        found = structure.interface_resultants(after) - structure.interface_resultants(before)
+        change = structure.interface_resultants(after) - structure.interface_resultants(before)
         allowed = 1e-3 if creeps else AGREEMENT
-        np.testing.assert_allclose(found[:, :2], tied[:, :2], rtol=allowed)
+        np.testing.assert_allclose(change[:, :2], tied[:, :2], rtol=allowed)
         if not creeps:
             scale = np.abs(force).max()
             np.testing.assert_allclose(after.force - before.force, force, atol=allowed * scale)

@@ -68,10 +68,10 @@ def check_two_boxes(imported, names):
     assert volume(imported.bodies[upper]) == pytest.approx(0.5, rel=1e-12)
     for body, boundary, area, normal in ((lower, top, 2.0, 1.0), (upper, bottom, 1.0, -1.0)):
         assert list(imported.bodies[body].mesh.boundaries) == [boundary]
-        found = patch(imported.bodies[body], boundary)
-        assert found.area == pytest.approx(area, rel=1e-12)
-        np.testing.assert_allclose(found.normal, [0.0, 0.0, normal], atol=1e-12)
-        np.testing.assert_allclose(found.centroid, [1.0, 0.5, 1.0], atol=1e-12)
+        surface = patch(imported.bodies[body], boundary)
+        assert surface.area == pytest.approx(area, rel=1e-12)
+        np.testing.assert_allclose(surface.normal, [0.0, 0.0, normal], atol=1e-12)
+        np.testing.assert_allclose(surface.centroid, [1.0, 0.5, 1.0], atol=1e-12)
 
 
 @pytest.mark.parametrize("file_format", ["gmsh", "gmsh22"])
@@ -271,10 +271,10 @@ def test_plane_mesh(tmp_path, kind, plane):
         assert volume(body) == pytest.approx(area, rel=1e-12)
         assert body.mesh.nelements == 8
     for body, boundary, sign in (("lower", "lower_top", 1.0), ("upper", "upper_bottom", -1.0)):
-        found = patch(imported.bodies[body], boundary)
-        assert found.area == pytest.approx(AREA[boundary], rel=1e-12)
-        np.testing.assert_allclose(found.normal, [0.0, 0.0, sign], atol=1e-12)
-        np.testing.assert_allclose(found.centroid, [1.0, 0.0, 1.0], atol=1e-12)
+        surface = patch(imported.bodies[body], boundary)
+        assert surface.area == pytest.approx(AREA[boundary], rel=1e-12)
+        np.testing.assert_allclose(surface.normal, [0.0, 0.0, sign], atol=1e-12)
+        np.testing.assert_allclose(surface.centroid, [1.0, 0.0, 1.0], atol=1e-12)
 
 
 @pytest.mark.parametrize("suffix", [".vtu", ".bdf"])

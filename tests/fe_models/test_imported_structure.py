@@ -114,34 +114,34 @@ def test_half_model_equals_the_full_one(order, match, precise):
     one, two = solved(half, shares, mu=0.35), solved(full, PATH, mu=0.35)
     assert one.converged
     assert two.converged
-    (own,), (whole,) = one.histories, two.histories
+    (part,), (whole,) = one.histories, two.histories
     load = whole.loads.P.max()
     work = load * np.abs(whole.displacement).max()
     for name, scale in (("P", load), ("Qx", load), ("Edx", work)):
-        values = getattr(own.loads, name), getattr(whole.loads, name)
+        values = getattr(part.loads, name), getattr(whole.loads, name)
         np.testing.assert_allclose(2.0 * values[0], values[1], atol=1e-8 * scale)
     assert whole.loads.Edx.sum() > 1e-6 * work
-    places = half.mesh.body_2.points[own.interface.nodes_2]
+    places = half.mesh.body_2.points[part.interface.nodes_2]
     there = full.mesh.body_2.points[whole.interface.nodes_2]
     match_of = [int(np.argmin(np.linalg.norm(there - place, axis=1))) for place in places]
     twice = np.where(np.isclose(places[:, 1], 0.0), 2.0, 1.0)
     largest = whole.force.max()
-    np.testing.assert_allclose(twice * own.force, whole.force[..., match_of], atol=1e-8 * largest)
-    assert not own.force[:, 1][:, twice > 1.0].any()
-    assert not own.displacement[:, 1][:, twice > 1.0].any()
+    np.testing.assert_allclose(twice * part.force, whole.force[..., match_of], atol=1e-8 * largest)
+    assert not part.force[:, 1][:, twice > 1.0].any()
+    assert not part.displacement[:, 1][:, twice > 1.0].any()
     assert max(one.equilibrium.max(), two.equilibrium.max()) < 1e-9
     # Displacements and stresses of both bodies, recovered from the interface.
     fields = [
         stress_state(s, h.force[1], h.displacement[1], a)
-        for s, h, a in ((half, own, shares[1]), (full, whole, PATH[1]))
+        for s, h, a in ((half, part, shares[1]), (full, whole, PATH[1]))
     ]
     for body, mine, theirs in zip((1, 2), *fields, strict=True):
         places = getattr(half.mesh, f"body_{body}").points
         there = getattr(full.mesh, f"body_{body}").points
-        found = [int(np.argmin(np.linalg.norm(there - place, axis=1))) for place in places]
+        twins = [int(np.argmin(np.linalg.norm(there - place, axis=1))) for place in places]
         largest = np.abs(theirs.displacement).max()
         np.testing.assert_allclose(
-            mine.displacement, theirs.displacement[found], atol=1e-7 * largest
+            mine.displacement, theirs.displacement[twins], atol=1e-7 * largest
         )
 
 
@@ -163,11 +163,11 @@ def test_half_section_equals_the_full_one(precise):
     half = built(plane_block_and_pad(False), [base, plane], loads)
     full = built(plane_block_and_pad(True), [base], loads)
     one, two = solved(half, path, mu=0.1), solved(full, path, mu=0.1)
-    (own,), (whole,) = one.histories, two.histories
-    np.testing.assert_allclose(2.0 * own.loads.P, whole.loads.P, rtol=1e-8)
-    assert own.loads.Edx.sum() > 0.0
+    (part,), (whole,) = one.histories, two.histories
+    np.testing.assert_allclose(2.0 * part.loads.P, whole.loads.P, rtol=1e-8)
+    assert part.loads.Edx.sum() > 0.0
     np.testing.assert_allclose(
-        2.0 * own.loads.Edx, whole.loads.Edx, atol=1e-8 * whole.loads.Edx.max()
+        2.0 * part.loads.Edx, whole.loads.Edx, atol=1e-8 * whole.loads.Edx.max()
     )
 
 
@@ -199,14 +199,14 @@ def test_slice_in_plane_strain(precise):
     flat = built(section, [Support("base", "xz")], loads)
     (plane,) = solved(flat, path).histories
     moved = [
-        own_lid(s, stress_state(s, h.force[1], h.displacement[1], path[1])[1].displacement)
+        lid_motion(s, stress_state(s, h.force[1], h.displacement[1], path[1])[1].displacement)
         for s, h in ((joined, history), (flat, plane))
     ]
     # Slice and section differ in the diagonals of their meshes, which are as fine.
     np.testing.assert_allclose(moved[0], moved[1], atol=0.03 * np.abs(moved[1]).max())
 
 
-def own_lid(joined, displacement):
+def lid_motion(joined, displacement):
     """Mean displacement of body 2 at its top, along x and z."""
     top = joined.mesh.body_2.points[:, 2] == 1.0
     return displacement[top][:, [0, 2]].mean(axis=0)
@@ -404,11 +404,11 @@ def test_bar_in_two_pieces_is_strained(order, precise):
 # --- meshes that do not match, and cycles that close slowly ---------------------------------------
 
 
-def rounded_pad(cells, own):
-    """A plane pad with a cylindrical foot on a block, of the block's nodes or its ``own``."""
+def rounded_pad(cells, unmatched):
+    """A plane pad with a cylindrical foot on a block, of fewer nodes than it if ``unmatched``."""
     x = along((-2, -1, 2), (-1, 1, cells), (1, 2, 2))
     lower = MeshTri.init_tensor(x, along((-2, 0, cells)))
-    count = cells if not own else 3 * cells // 4
+    count = cells if not unmatched else 3 * cells // 4
     upper = MeshTri.init_tensor(along((-1, 1, count)), along((0, 1, cells // 2)))
     points = upper.p.copy()
     points[1] += (1.0 - upper.p[1]) * upper.p[0] ** 2 / 400.0
@@ -417,13 +417,13 @@ def rounded_pad(cells, own):
     return imported(with_faces(lower, {"base": (1, -2.0), "top": (1, 0.0)}), upper)
 
 
-def rubbed(cells, own):
+def rubbed(cells, unmatched):
     """Partial slip over most of the foot; it settles slowly, by about 0.8 in each cycle."""
     loads = [Pressure("lid", 20.0), Displacement("lid", np.array([2e-3, 0.0, 0.0]))]
     preload = np.array([[0.5, 0.0], [1.0, 0.0], [1.0, 0.5], [1.0, 1.0]])
     shift = np.array([0.5, 0.0, -0.5, -1.0, -0.5, 0.0, 0.5, 1.0])
     path = np.stack([np.ones(8), shift], axis=1)
-    joined = built(rounded_pad(cells, own), [Support("base", "xz")], loads)
+    joined = built(rounded_pad(cells, unmatched), [Support("base", "xz")], loads)
     return solved(joined, path, preload)
 
 
@@ -432,9 +432,9 @@ def test_meshes_that_do_not_match_agree_with_those_that_do():
     """Q and energy of a partial slip, to discretisation; P is equilibrium."""
     differences = []
     for cells in (16, 32):
-        one, two = (rubbed(cells, own).histories[0].loads for own in (False, True))
+        one, two = (rubbed(cells, unmatched).histories[0].loads for unmatched in (False, True))
         np.testing.assert_allclose(two.P, one.P, rtol=1e-6)
-        energies = [own.Edx.sum() for own in (one, two)]
+        energies = [loads.Edx.sum() for loads in (one, two)]
         force = np.abs(two.Qx - one.Qx).max() / np.abs(one.Qx).max()
         differences.append((force, abs(energies[1] / energies[0] - 1.0)))
     # Better than first order in the size of elements.

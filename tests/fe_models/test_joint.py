@@ -111,8 +111,8 @@ def test_joint_is_the_direct_solution(stacked, apart):
 
     lower, interface = stacked.bodies[0].respond(-force, amplitudes)
     upper = stacked.bodies[1].recover(interface + relative.ravel(), amplitudes)
-    for found, exact in zip((lower, upper), displacements, strict=True):
-        np.testing.assert_allclose(found, exact, atol=1e-9 * np.abs(exact).max())
+    for displacement, exact in zip((lower, upper), displacements, strict=True):
+        np.testing.assert_allclose(displacement, exact, atol=1e-9 * np.abs(exact).max())
 
 
 def condensed(rng, size, rank):
@@ -138,8 +138,8 @@ def test_projected_joint_is_the_direct_solution():
     )
     right = np.concatenate([first[1] @ amplitudes, second[1] @ amplitudes, relative])
     expected = np.linalg.solve(system, right)[-24:]
-    found = joint.stiffness @ relative + joint.loads @ amplitudes
-    np.testing.assert_allclose(found, expected, atol=1e-9 * np.abs(expected).max())
+    force = joint.stiffness @ relative + joint.loads @ amplitudes
+    np.testing.assert_allclose(force, expected, atol=1e-9 * np.abs(expected).max())
     assert joint.rigid_modes == 6
 
 

@@ -313,10 +313,10 @@ def test_iterations_hardly_grow_with_rigid_motions(box, titanium):
     for cells in (4, 6, 9):
         matrix, modes, load = held_box(box, titanium, (cells, cells, 3 * cells), (1, 1, 3))
         for counts, soft in ((with_motions, modes), (without, None)):
-            found = MultigridSolver(matrix, soft).solve(load, 1e-10, 500)
-            assert found.converged
-            assert found.residual < 1e-9
-            counts.append(found.iterations)
+            solution = MultigridSolver(matrix, soft).solve(load, 1e-10, 500)
+            assert solution.converged
+            assert solution.residual < 1e-9
+            counts.append(solution.iterations)
     assert max(with_motions) <= 20
     assert max(with_motions) - min(with_motions) <= 3
     assert without[-1] > 1.5 * without[0]

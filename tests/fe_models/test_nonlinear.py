@@ -166,9 +166,9 @@ def test_load_in_gross_slip(coarse, dovetail, symmetric):
     growth = (peak.softening[1] @ check.displacements[1]).reshape(-1, 3)[:, 2].sum() / pull
     theta = dovetail.flank_angle
     slope = (np.cos(theta) - MU * np.sin(theta)) / (np.sin(theta) + MU * np.cos(theta))
-    found = check.nonlinear[:, 0] / check.linear[:, 0] - 1.0
-    np.testing.assert_allclose(found, growth + slope * check.face_rotation, rtol=0.02)
-    np.testing.assert_allclose(found, check.change[:, 0])
+    change = check.nonlinear[:, 0] / check.linear[:, 0] - 1.0
+    np.testing.assert_allclose(change, growth + slope * check.face_rotation, rtol=0.02)
+    np.testing.assert_allclose(change, check.change[:, 0])
 
 
 def test_small_strains_small_changes(check):
@@ -245,9 +245,9 @@ def test_supported_body_keeps_its_stiffness(peak, tangent, monkeypatch):
 def test_path_goes_through_the_peak(peak, check, tangent):
     """Rigid motions as loads or as stiffness: the same at the load that both are exact for."""
     model, state = tangent
-    (found,) = peak.march(model.condense_path(peak.like))
+    (reached,) = peak.march(model.condense_path(peak.like))
     scale = np.abs(state.force).max()
-    np.testing.assert_allclose(found.force, state.force, atol=1e-6 * scale)
+    np.testing.assert_allclose(reached.force, state.force, atol=1e-6 * scale)
 
 
 @pytest.mark.slow
@@ -261,8 +261,8 @@ def test_half_the_load(peak, check, tangent, coarse, dovetail, mission):
     np.testing.assert_allclose(exact.change[:, 0], 0.5 * check.change[:, 0], rtol=0.05)
     (state,) = half.march(tangent[0].condense_path(peak.like))
     resultants = tangent[0].interface_resultants(state)
-    found = resultant_change(resultants, exact.linear, face_sizes(half.structure))[:, 0]
-    np.testing.assert_allclose(found, check.change[:, 0], rtol=0.05)
+    change = resultant_change(resultants, exact.linear, face_sizes(half.structure))[:, 0]
+    np.testing.assert_allclose(change, check.change[:, 0], rtol=0.05)
 
 
 def test_order_and_units_of_load_cases_do_not_matter(peak):
@@ -288,9 +288,9 @@ def test_plane_dovetail(dovetail, titanium, mission, check):
     """The section in plane strain: what it says of P is what the slot's length says."""
     mesh = dovetail.mesh((12, 2), 6.0, 2)
     structure = dovetail_structure(dovetail, mesh, titanium, titanium, mission, 2)
-    found = Peak(structure, structure.condense(), dovetail, mission).check()
-    assert found.converged
-    np.testing.assert_allclose(found.change[:, 0], check.change[:, 0], rtol=0.3)
+    section = Peak(structure, structure.condense(), dovetail, mission).check()
+    assert section.converged
+    np.testing.assert_allclose(section.change[:, 0], check.change[:, 0], rtol=0.3)
 
 
 @pytest.mark.parametrize("dimension", [2, 3])
@@ -302,13 +302,13 @@ def test_mean_rotation(dimension):
     rotation = Rotation.from_rotvec([0.0, 0.0, 0.4] if dimension == 2 else [0.3, 0.2, -0.5])
     matrix = rotation.as_matrix()[:dimension, :dimension]
     weights = rng.random(30)
-    found = mean_rotation(points, points @ matrix.T + 2.0, weights)
-    np.testing.assert_allclose(found, matrix, atol=1e-12)
+    mean = mean_rotation(points, points @ matrix.T + 2.0, weights)
+    np.testing.assert_allclose(mean, matrix, atol=1e-12)
     blurred = points @ matrix.T + 1e-3 * rng.standard_normal(points.shape)
-    found = mean_rotation(points, blurred, weights)
-    np.testing.assert_allclose(found, matrix, atol=3e-3)
-    np.testing.assert_allclose(found @ found.T, np.eye(dimension), atol=1e-12)
-    assert np.linalg.det(found) == pytest.approx(1.0)
+    mean = mean_rotation(points, blurred, weights)
+    np.testing.assert_allclose(mean, matrix, atol=3e-3)
+    np.testing.assert_allclose(mean @ mean.T, np.eye(dimension), atol=1e-12)
+    assert np.linalg.det(mean) == pytest.approx(1.0)
 
 
 def test_open_face_is_measured_by_the_loaded_one(coarse):

@@ -69,9 +69,9 @@ def pair(request, titanium):
 @pytest.mark.parametrize("matrix", ["stiffness", "mass"])
 def test_plane_is_a_slice_that_cannot_lengthen(pair, matrix):
     plane, solid, motion = pair
-    own, other = (getattr(elastic, matrix).toarray() for elastic in (plane, solid))
+    in_plane, other = (getattr(elastic, matrix).toarray() for elastic in (plane, solid))
     restricted = motion.T @ other @ motion
-    np.testing.assert_allclose(DEPTH * own, restricted, atol=1e-12 * np.abs(restricted).max())
+    np.testing.assert_allclose(DEPTH * in_plane, restricted, atol=1e-12 * np.abs(restricted).max())
 
 
 def test_loads_are_those_of_the_slice_per_length(pair):
@@ -81,9 +81,11 @@ def test_loads_are_those_of_the_slice_per_length(pair):
         (elastic.centrifugal_load(), elastic.traction_load("top", size, sense))
         for elastic in (plane, solid)
     ]
-    for own, other in zip(*loads, strict=True):
+    for in_plane, other in zip(*loads, strict=True):
         restricted = motion.T @ other
-        np.testing.assert_allclose(DEPTH * own, restricted, atol=1e-12 * np.abs(restricted).max())
+        np.testing.assert_allclose(
+            DEPTH * in_plane, restricted, atol=1e-12 * np.abs(restricted).max()
+        )
 
 
 def test_stress_is_that_of_the_slice(pair, titanium):
@@ -159,11 +161,13 @@ def pull(structure, amplitudes):
 def test_pull_is_that_of_the_whole_blade_per_length(dovetail, structure_of, plane_cycle, mission):
     """F = Ω² (ρ A Z + m R / L): a section carries its share of the airfoil and of the moment."""
     structure, _ = plane_cycle(mission)
-    own = structure.body_2.load_resultants(mission.amplitudes()[PEAK], np.zeros(3))
+    per_length = structure.body_2.load_resultants(mission.amplitudes()[PEAK], np.zeros(3))
     # Sections of the same size along the flank, whatever the mesh: fillets differ a little.
     whole = structure_of()[0].body_2.load_resultants(mission.amplitudes()[PEAK], np.zeros(3))
-    assert dovetail.slot_length * own[0, 2] == pytest.approx(whole[0, 2], rel=1e-4)
-    np.testing.assert_allclose(dovetail.slot_length * own[1], whole[1], atol=1e-9 * whole[0, 2])
+    assert dovetail.slot_length * per_length[0, 2] == pytest.approx(whole[0, 2], rel=1e-4)
+    np.testing.assert_allclose(
+        dovetail.slot_length * per_length[1], whole[1], atol=1e-9 * whole[0, 2]
+    )
 
 
 @pytest.mark.parametrize("order", ORDERS)
@@ -182,10 +186,10 @@ def test_flanks_carry_the_pull(plane_cycle, symmetric, angle, mu):
     structure, cycle = plane_cycle(symmetric, mu, flank_angle=theta)
     force = pull(structure, symmetric.amplitudes())
     one, two = (history.loads for history in cycle.histories)
-    for own in (one, two):
-        carried = 2.0 * (own.P * np.sin(theta) - own.Qx * np.cos(theta))
+    for loads in (one, two):
+        carried = 2.0 * (loads.P * np.sin(theta) - loads.Qx * np.cos(theta))
         np.testing.assert_allclose(carried, force, atol=1e-6 * force.max())
-        assert not np.any([own.Qy, own.Mx, own.Mz, own.Edy])
+        assert not np.any([loads.Qy, loads.Mx, loads.Mz, loads.Edy])
     for name in ("P", "Qx", "My"):
         scale = np.abs(getattr(one, name)).max()
         np.testing.assert_allclose(getattr(one, name), getattr(two, name), atol=1e-5 * scale)
@@ -242,11 +246,11 @@ def rows_in_middle(history):
     """P and Qx per length at peak load and slip over the cycle, at the nodes next to y = 0."""
     y = history.interface.coordinates[:, 1]
     levels = np.unique(np.round(y, 6))
-    own = np.abs(y - levels[len(levels) // 2]) < 1e-6
+    middle = np.abs(y - levels[len(levels) // 2]) < 1e-6
     spacing = levels[1] - levels[0]
-    force = history.force[PEAK][:, own].sum(axis=1) / spacing
-    slip = np.abs(history.slip[:, 0, own]).sum(axis=0)
-    order = np.argsort(history.interface.coordinates[own, 0])
+    force = history.force[PEAK][:, middle].sum(axis=1) / spacing
+    slip = np.abs(history.slip[:, 0, middle]).sum(axis=0)
+    order = np.argsort(history.interface.coordinates[middle, 0])
     return force[2], force[0], slip[order]
 
 
@@ -267,20 +271,20 @@ def test_space_tends_to_the_plane_without_poisson_and_roundings(dovetail, missio
         return structure.solve_cycle(joint, mission.amplitudes(), structure.gap(), 0.4).histories
 
     plane = solve((7, 2), 2)
-    found = []
+    differences = []
     for rows in (5, 17):
-        for own, other in zip(plane, solve((7, rows), 3), strict=True):
+        for history, other in zip(plane, solve((7, rows), 3), strict=True):
             pressed, sheared, slip = rows_in_middle(other)
-            order = np.argsort(own.interface.coordinates[:, 0])
-            expected = np.abs(own.slip[:, 0]).sum(axis=0)[order]
-            found.append(
+            order = np.argsort(history.interface.coordinates[:, 0])
+            expected = np.abs(history.slip[:, 0]).sum(axis=0)[order]
+            differences.append(
                 [
-                    abs(pressed / own.loads.P[PEAK] - 1.0),
-                    abs(sheared / own.loads.Qx[PEAK] - 1.0),
+                    abs(pressed / history.loads.P[PEAK] - 1.0),
+                    abs(sheared / history.loads.Qx[PEAK] - 1.0),
                     np.abs(slip - expected).max() / expected.max(),
                 ]
             )
-    coarse, fine = np.max(found[:2], axis=0), np.max(found[2:], axis=0)
+    coarse, fine = np.max(differences[:2], axis=0), np.max(differences[2:], axis=0)
     assert np.all(fine < 0.25 * coarse)
     assert np.all(fine < 1e-3)
 

@@ -73,10 +73,10 @@ class TestComplementary:
         compliance, offset = root @ root.T + 0.1 * np.eye(30), rng.standard_normal(30)
         factor = sl.cholesky(compliance, lower=True)
         expected, _ = nnls(factor.T, -sl.solve_triangular(factor, offset, lower=True))
-        found = complementary(compliance, offset)
-        assert found.converged
-        np.testing.assert_allclose(found.force, expected, atol=1e-8 * expected.max())
-        np.testing.assert_allclose(found.gap * found.force, 0.0, atol=1e-12)
+        solution = complementary(compliance, offset)
+        assert solution.converged
+        np.testing.assert_allclose(solution.force, expected, atol=1e-8 * expected.max())
+        np.testing.assert_allclose(solution.gap * solution.force, 0.0, atol=1e-12)
 
     @pytest.mark.parametrize("first", [0, 7, 29])
     def test_start_does_not_matter(self, first):
@@ -160,8 +160,8 @@ class TestPair:
         # u_2 - u_1 = w, S_1 u_1 = -f, S_2 u_2 = f.
         lower = np.linalg.solve(first + second, -second @ relative)
         force = second @ (lower + relative)
-        found = pair.compliance.reshape(first.shape) @ force
-        np.testing.assert_allclose(found, relative, atol=1e-8)
+        apart = pair.compliance.reshape(first.shape) @ force
+        np.testing.assert_allclose(apart, relative, atol=1e-8)
 
     def test_x_and_y_are_alike(self, pair):
         points = pair.face.coordinates

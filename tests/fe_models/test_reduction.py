@@ -84,10 +84,10 @@ class TestFreeFrequencies:
         roots = np.array([4.73004074, 7.85320462, 10.9956078])
         inertia = np.sqrt(STEEL.young * 0.25 * 4.0**2 / STEEL.density)
         exact = roots**2 * inertia / (2.0 * np.pi * 33.0**2)
-        found = free_frequencies(*beam(40), 5)
-        assert found[1] < 1e-5 * found[2]
+        frequencies = free_frequencies(*beam(40), 5)
+        assert frequencies[1] < 1e-5 * frequencies[2]
         # Cubic elements: error of order (root/elements)^4.
-        np.testing.assert_allclose(found[2:], exact, rtol=1e-5)
+        np.testing.assert_allclose(frequencies[2:], exact, rtol=1e-5)
 
     def test_dense_and_sparse_agree(self, matrices):
         stiffness, mass, _ = matrices
@@ -99,8 +99,8 @@ class TestFreeFrequencies:
         stiffness, mass, kept = matrices
         model = reduce_body(stiffness, mass, kept, 4)
         for pair in ((stiffness, mass), (model.stiffness, model.mass)):
-            found = free_frequencies(*pair, 7)
-            assert found[:6].max() < 1e-5 * found[6]
+            frequencies = free_frequencies(*pair, 7)
+            assert frequencies[:6].max() < 1e-5 * frequencies[6]
 
     def test_more_than_there_are(self):
         with pytest.raises(ValueError, match="take 1 to fewer"):
@@ -135,8 +135,8 @@ class TestReduction:
         places = np.append(shuffled, len(kept) + np.arange(2))
         for name in ("stiffness", "mass"):
             expected = getattr(straight, name)[np.ix_(places, places)]
-            found = getattr(turned, name)
-            np.testing.assert_allclose(found, expected, atol=1e-11 * np.abs(expected).max())
+            matrix = getattr(turned, name)
+            np.testing.assert_allclose(matrix, expected, atol=1e-11 * np.abs(expected).max())
 
     def test_fixed_interface_modes(self, matrices):
         stiffness, mass, kept = matrices

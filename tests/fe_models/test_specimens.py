@@ -148,11 +148,11 @@ class TestModels:
         points = np.concatenate(
             [pair.body_2.points[face.nodes_2], pair.body_2.points[COARSE.ring(pair.body_2)]]
         )
-        own = np.concatenate(
+        kept = np.concatenate(
             [pair.body_1.points[face.nodes_1], pair.body_1.points[COARSE.ring(pair.body_1)]]
         )
-        image = cKDTree(own).query(points @ turn)[1]
-        blocks = first.stiffness.reshape(len(own), 3, len(own), 3)[image][:, :, image]
+        image = cKDTree(kept).query(points @ turn)[1]
+        blocks = first.stiffness.reshape(len(kept), 3, len(kept), 3)[image][:, :, image]
         turned = np.einsum("ab,nbmc,dc->namd", turn, blocks, turn).reshape(first.stiffness.shape)
         size = np.abs(turned).max()
         np.testing.assert_allclose(second.stiffness, turned, atol=1e-9 * size)
@@ -163,9 +163,9 @@ class TestModels:
         full = specimen_matrices(COARSE, pair.body_1, face.nodes_1, STEEL, order)
         model = reduce_body(full.stiffness, full.mass, full.kept, 20)
         exact = free_frequencies(full.stiffness, full.mass, 12)
-        found = free_frequencies(model.stiffness, model.mass, 12)
-        np.testing.assert_allclose(found[6:], exact[6:], rtol=6e-3)
-        assert max(exact[:6].max(), found[:6].max()) < 1e-5 * exact[6]
+        reduced = free_frequencies(model.stiffness, model.mass, 12)
+        np.testing.assert_allclose(reduced[6:], exact[6:], rtol=6e-3)
+        assert max(exact[:6].max(), reduced[:6].max()) < 1e-5 * exact[6]
 
     def test_tied_ring_moves_linearly(self, pair):
         """A displacement that is linear in each element is left as it is."""
@@ -188,6 +188,6 @@ class TestModels:
         np.testing.assert_allclose(exact[6:], PRINTED, rtol=0.02)
         assert exact[:6].max() < 1e-5 * exact[6]
         model = reduce_body(full.stiffness, full.mass, full.kept, 20)
-        found = free_frequencies(model.stiffness, model.mass, 12)
-        np.testing.assert_allclose(found[6:], exact[6:], rtol=6e-3)
-        assert found[:6].max() < 1e-5 * found[6]
+        reduced = free_frequencies(model.stiffness, model.mass, 12)
+        np.testing.assert_allclose(reduced[6:], exact[6:], rtol=6e-3)
+        assert reduced[:6].max() < 1e-5 * reduced[6]

@@ -48,8 +48,8 @@ def test_contact_forces_are_recovered(structure, peak):
         for face in structure.mesh.interfaces:
             nodes = (face.nodes_1, face.nodes_2)[number]
             expected = (-1.0, 1.0)[number] * force[:, start : start + len(face)].T
-            found = face.frame.components(residual[nodes])
-            np.testing.assert_allclose(found, expected, atol=2e-6 * np.abs(force).max())
+            recovered = face.frame.components(residual[nodes])
+            np.testing.assert_allclose(recovered, expected, atol=2e-6 * np.abs(force).max())
             start += len(face)
             faces.append(nodes)
         touched = [elastic.boundary_nodes(name) for name in supports[number]]
@@ -63,9 +63,9 @@ def test_relative_displacements_are_those_given(structure, peak):
     start = 0
     for face in structure.mesh.interfaces:
         apart = blade.displacement[face.nodes_2] - disk.displacement[face.nodes_1]
-        found = face.frame.components(apart)
+        recovered = face.frame.components(apart)
         expected = relative[:, start : start + len(face)].T
-        np.testing.assert_allclose(found, expected, atol=1e-9)
+        np.testing.assert_allclose(recovered, expected, atol=1e-9)
         start += len(face)
 
 
@@ -122,5 +122,5 @@ def test_neck_stress_is_pull_over_area(structure, dovetail, peak):
     # Airfoil, and on average half of the slice's own mass above it.
     airfoil = amplitudes[0] * 0.8e-3 * 400.0
     mass = 4.43e-9 * volume[inside].sum()
-    own = 0.5 * amplitudes[0] * mass * 0.5 * (low + high)
-    assert mean == pytest.approx((airfoil + own) / area, rel=2e-2)
+    shank = 0.5 * amplitudes[0] * mass * 0.5 * (low + high)
+    assert mean == pytest.approx((airfoil + shank) / area, rel=2e-2)

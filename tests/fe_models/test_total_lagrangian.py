@@ -54,7 +54,7 @@ def equilibrium(finite, load, t, start):
     raise AssertionError("Newton's method did not converge")
 
 
-@pytest.fixture(params=[(3, 1), (3, 2), (2, 1), (2, 2)], ids=lambda own: f"{own[0]}D-P{own[1]}")
+@pytest.fixture(params=[(3, 1), (3, 2), (2, 1), (2, 2)], ids=lambda spec: f"{spec[0]}D-P{spec[1]}")
 def elastic(request, box, titanium):
     dimension, order = request.param
     if dimension == 3:
@@ -231,10 +231,10 @@ def test_pulled_cantilever():
     linear = solved(elastic.stiffness, pull + push, t)
     stressed = solved(finite.stress_stiffened(linear), pull + push, t)
     nonlinear = equilibrium(finite, pull + push, t, linear)
-    plain, found, exact = (tip(elastic, u)[1] for u in (linear, stressed, nonlinear))
+    plain, stiffened, exact = (tip(elastic, u)[1] for u in (linear, stressed, nonlinear))
     closed = across / (k**2 * bending) * (length - np.tanh(3.0) / k)
     assert exact == pytest.approx(closed, rel=3e-3)
-    assert found == pytest.approx(exact, rel=1e-3)
+    assert stiffened == pytest.approx(exact, rel=1e-3)
     assert plain > 3.0 * exact
 
 

@@ -110,13 +110,13 @@ def test_resultants_survive(covered, solved, mission):
     history = next(h for h in solved(0.4, mission).histories if h.interface.name == face.name)
     tractions = history.force[7] / face.nodal_areas
     cells = transfer.to_cells(tractions) * grid.cell_area
-    found = resultants(cells, grid.x, grid.y)
+    on_cells = resultants(cells, grid.x, grid.y)
     loads = history.loads
     expected = [getattr(loads, name)[7] for name in ("P", "Qx", "Qy", "Mx", "My", "Mz")]
-    np.testing.assert_allclose(found[:3], expected[:3], atol=1e-10 * loads.P[7])
+    np.testing.assert_allclose(on_cells[:3], expected[:3], atol=1e-10 * loads.P[7])
     # Nodal forces act at the nodes, the linear field between them: 1 % of an element as arm.
     element = 60.0 / 9.0
-    np.testing.assert_allclose(found[3:], expected[3:], atol=1e-2 * loads.P[7] * element)
+    np.testing.assert_allclose(on_cells[3:], expected[3:], atol=1e-2 * loads.P[7] * element)
 
 
 def test_many_fields_at_once(covered):

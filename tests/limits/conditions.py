@@ -11,7 +11,7 @@ SMALLEST = 1e-4
 
 def love_matrix(grid, contact_modulus):
     """Normal displacement of every cell under unit pressure on every other, by Love's formula."""
-    x, y = (own.ravel() for own in np.broadcast_arrays(grid.x, grid.y))
+    x, y = (coordinate.ravel() for coordinate in np.broadcast_arrays(grid.x, grid.y))
     half = 0.5 * grid.pitch[0], 0.5 * grid.pitch[1]
     return love_displacement(
         np.subtract.outer(x, x), np.subtract.outer(y, y), half, contact_modulus

@@ -24,16 +24,16 @@ def pair(beta):
 
 
 def sphere(beta):
-    own = pair(beta)
-    radius = (0.75 * P * RADIUS / own.contact_modulus) ** (1 / 3)
+    bodies = pair(beta)
+    radius = (0.75 * P * RADIUS / bodies.contact_modulus) ** (1 / 3)
     grid = Grid.covering((3 * radius, 3 * radius), (24, 24))
-    return HalfSpace(grid, own), (grid.x**2 + grid.y**2) / (2 * RADIUS)
+    return HalfSpace(grid, bodies), (grid.x**2 + grid.y**2) / (2 * RADIUS)
 
 
 def cylinder(beta):
-    own = pair(beta)
-    grid = Grid.strips(3 * np.sqrt(4 * P * RADIUS / (np.pi * own.contact_modulus)), 96)
-    return HalfSpace(grid, own), grid.x**2 / (2 * RADIUS)
+    bodies = pair(beta)
+    grid = Grid.strips(3 * np.sqrt(4 * P * RADIUS / (np.pi * bodies.contact_modulus)), 96)
+    return HalfSpace(grid, bodies), grid.x**2 / (2 * RADIUS)
 
 
 def rounded_punch(beta):

@@ -82,13 +82,13 @@ def test_heights_far_from_zero_are_those_near_it(kind, offset, load):
     far = ball(grid) + offset
     near = far - offset
     contact = FrictionalContact(HalfSpace(grid, PAIRS[kind]), 0.5)
-    found = []
+    states = []
     for height in (near, far):
         pressed = contact.advance(contact.apart(height), height, force(load))
         sheared = contact.advance(pressed, height, force(load, 0.2 * load))
         assert sheared.converged, sheared.message
-        found.append(sheared)
-    one, other = found
+        states.append(sheared)
+    one, other = states
     np.testing.assert_allclose(other.traction, one.traction, atol=1e-5 * one.pressure.max())
     assert other.rigid[0] == pytest.approx(one.rigid[0] + offset, rel=1e-15)
     assert other.gap.min() >= -3.0 * SOLVED * one.displacement[2].max()
@@ -99,7 +99,7 @@ def test_a_slope_of_the_heights_is_a_tilt(slope):
     """However steep: without moments a body lies as its partner does."""
     grid = Grid.covering((1.0, 1.0), (24, 24))
     contact = NormalContact(HalfSpace(grid, PAIRS["alike"]))
-    level, tilted = (contact.solve(ball(grid) + own * grid.x, P) for own in (0.0, slope))
+    level, tilted = (contact.solve(ball(grid) + rise * grid.x, P) for rise in (0.0, slope))
     assert tilted.converged
     # Rounding of heights of slope/2 over the displacement of 13 µm.
     atol = max(1e-5, 10.0 * np.spacing(0.5 * slope) / 13e-3) * level.pressure.max()

@@ -106,8 +106,8 @@ def test_nearly_conforming_bodies_tend_to_flat_ones(kind, radius):
     contact = FrictionalContact(HalfSpace(grid, pair), 0.3)
     height = (grid.x**2 + grid.y**2) / (2.0 * radius)
     flat, round_ = (
-        contact.advance(contact.apart(own), own, force(100.0))
-        for own in (np.zeros(grid.shape), height)
+        contact.advance(contact.apart(gap), gap, force(100.0))
+        for gap in (np.zeros(grid.shape), height)
     )
     assert flat.converged
     assert round_.converged
@@ -129,29 +129,29 @@ def ball(kind):
     height = (grid.x**2 + grid.y**2) / 20.0
     matrix = love_matrix(grid, pair.contact_modulus)
     middle = 10 * 21 + 10
-    own, next_to, diagonal, across = (matrix[middle, middle + k] for k in (0, 1, 22, 2))
-    limit = height[11, 10] / (own - next_to)
-    return grid, height, pair, limit * grid.cell_area, (own, next_to, diagonal, across)
+    itself, next_to, diagonal, across = (matrix[middle, middle + k] for k in (0, 1, 22, 2))
+    limit = height[11, 10] / (itself - next_to)
+    return grid, height, pair, limit * grid.cell_area, (itself, next_to, diagonal, across)
 
 
 @BOTH
 def test_a_load_on_one_cell_then_on_five(kind):
     """Just above, pressures p0 and four times p1 from the two gaps: a system of two equations."""
-    grid, height, pair, limit, (own, next_to, diagonal, across) = ball(kind)
+    grid, height, pair, limit, (itself, next_to, diagonal, across) = ball(kind)
     contact = FrictionalContact(HalfSpace(grid, pair), 0.3)
     start = contact.apart(height)
     one = contact.advance(start, height, force(0.99 * limit))
     assert one.converged, one.message
     assert np.count_nonzero(one.pressure) == 1
     assert one.pressure[10, 10] * grid.cell_area == pytest.approx(0.99 * limit, rel=SOLVED)
-    assert one.rigid[0] == pytest.approx(own * one.pressure[10, 10], rel=1e-6)
+    assert one.rigid[0] == pytest.approx(itself * one.pressure[10, 10], rel=1e-6)
     if kind == "unlike":
         return
     five = contact.advance(start, height, force(1.02 * limit))
     assert np.count_nonzero(five.pressure) == 5
     # Unknown p0, p1, δ: δ = K00 p0 + 4 K01 p1, δ = h1 + K01 p0 + (K00 + 2 K11 + K02) p1, P.
-    second = own + 2.0 * diagonal + across
-    matrix = [[own, 4.0 * next_to, -1.0], [next_to, second, -1.0], [1.0, 4.0, 0.0]]
+    second = itself + 2.0 * diagonal + across
+    matrix = [[itself, 4.0 * next_to, -1.0], [next_to, second, -1.0], [1.0, 4.0, 0.0]]
     exact = np.linalg.solve(matrix, [0.0, -height[11, 10], 1.02 * limit / grid.cell_area])
     assert five.pressure[10, 10] == pytest.approx(exact[0], rel=1e-6)
     assert five.pressure[11, 10] == pytest.approx(exact[1], rel=1e-4)
@@ -168,8 +168,8 @@ def test_one_cell_carries_shear_up_to_friction_and_no_moment(kind):
     state = contact.advance(pressed, height, force(P, Qx=0.999 * 0.3 * P))
     assert state.converged, state.message
     assert np.count_nonzero(state.sticking) == 1
-    own = contact.half_space.self_compliance(0)
-    assert state.rigid[1] == pytest.approx(own * state.shear[0, 10, 10], rel=1e-6)
+    compliance = contact.half_space.self_compliance(0)
+    assert state.rigid[1] == pytest.approx(compliance * state.shear[0, 10, 10], rel=1e-6)
     with pytest.raises(FrictionLimitError, match="cannot carry"):
         contact.advance(pressed, height, force(P, Qx=1.001 * 0.3 * P))
     try:
@@ -207,12 +207,12 @@ def test_rounding_hides_tiny_loads_on_unlike_bodies_and_it_is_said(P):
     """
     grid, height, pair, _, _ = ball("unlike")
     contact, values = CoupledContact(HalfSpace(grid, pair), 0.3), [P, 0, 0, 0, 0, 0]
-    found = contact.solve(height, None, values)
-    if not found.converged:
-        assert "stopped at a residual" in found.message
+    tight = contact.solve(height, None, values)
+    if not tight.converged:
+        assert "stopped at a residual" in tight.message
         assert P < 2e-6
     loose = contact.solve(height, None, values, tolerance=1e-12 / P)
-    for state in [loose] + [found] * found.converged:
+    for state in [loose] + [tight] * tight.converged:
         assert state.converged
         assert state.resultants[0] == pytest.approx(P, rel=2e-12 / P)
         assert np.count_nonzero(state.pressure) == 1

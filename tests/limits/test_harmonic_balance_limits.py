@@ -97,8 +97,8 @@ def error_of(solution, resolved):
 
 def distance(solution, resolved):
     """Of motions, over the largest displacement."""
-    found, wanted = solution.displacement(256), resolved.displacement(256)
-    return np.abs(found - wanted).max() / np.abs(wanted).max()
+    motion, wanted = solution.displacement(256), resolved.displacement(256)
+    return np.abs(motion - wanted).max() / np.abs(wanted).max()
 
 
 @pytest.mark.parametrize(("highest", "least"), [(1, 0.05), (2, 5e-3), (5, 5e-4)])
@@ -335,7 +335,7 @@ def test_motions_that_coexist_are_those_that_time_integration_ends_in(folded):
     motions = [stopped(15, 512).solve(106.0, 1.0, folded.solutions[at]) for at in crossings]
     assert all(solution.converged for solution in motions)
     sizes = sorted(abs(solution.amplitude(2)) for solution in motions)
-    model, found = stopped().model, []
+    model, amplitudes = stopped().model, []
     for speed in (0.0, 20.0):
         motion = integrate(
             model,
@@ -348,9 +348,9 @@ def test_motions_that_coexist_are_those_that_time_integration_ends_in(folded):
         last = motion.displacement[-129:-1, 2]
         assert np.abs(last - motion.displacement[-257:-129, 2]).max() < 1e-5
         turns = np.exp(-2j * np.pi * np.arange(128) / 128)
-        found.append(2.0 * abs((last * turns).mean()))
+        amplitudes.append(2.0 * abs((last * turns).mean()))
     # 128 steps per period leave 2e-3 of the frequency's distance from resonance.
-    assert found == pytest.approx([sizes[0], sizes[2]], rel=5e-3)
+    assert amplitudes == pytest.approx([sizes[0], sizes[2]], rel=5e-3)
     assert sizes[1] > 1.5 * sizes[0]
 
 
@@ -361,11 +361,11 @@ def highest_point(folded):
     control = newton.NewtonControl(max_iterations=8, max_shortened=1)
     while above - below > 1e-9 * below:
         middle = 0.5 * (below + above)
-        found = newton.solve(problem.by_frequency(1.0), unknowns, middle, control)
+        solution = newton.solve(problem.by_frequency(1.0), unknowns, middle, control)
         # Beyond the fold Newton's method ends nowhere, or far away in the small motion.
-        far = np.linalg.norm(found.unknowns - unknowns) > 0.2 * np.linalg.norm(unknowns)
-        if found.converged and not far:
-            unknowns, below = found.unknowns, middle
+        far = np.linalg.norm(solution.unknowns - unknowns) > 0.2 * np.linalg.norm(unknowns)
+        if solution.converged and not far:
+            unknowns, below = solution.unknowns, middle
         else:
             above = middle
     return replace(last, frequency=below, coefficients=unknowns.reshape(last.coefficients.shape))
@@ -374,10 +374,10 @@ def highest_point(folded):
 def test_a_branch_that_starts_on_a_fold(folded):
     """The frequency does not tell the two ways apart there; each is found, one on either side."""
     start, problem = highest_point(folded), stopped()
-    found = problem.find(start.frequency, 1.0, start.coefficients.ravel())
+    at_fold = problem.find(start.frequency, 1.0, start.coefficients.ravel())
     ends = {}
     for upward in (True, False):
-        point = continuation.first_point(found, start.frequency, upward, 0.02)
+        point = continuation.first_point(at_fold, start.frequency, upward, 0.02)
         assert np.all(np.isfinite(point.tangent))
         begun = replace(folded, curve=continuation.SolutionCurve((point,), ""))
         branch = along_frequency(problem, 1.0, (60.0, 200.0), begun)

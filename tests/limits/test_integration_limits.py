@@ -132,11 +132,11 @@ def test_a_contact_that_lifts_off_and_slides_is_followed():
     )
     contact = FrictionContact(2000.0, 2600.0, 0.5, gap=1e-3)
     start = Start(np.array([0.03, 0.0, -0.02]), np.array([0.0, 8.0, 0.0]))
-    found = [
+    motions = [
         integrate(rig, contact, None, 0.02, TimeStepControl(1e-4 / n, every=n), start)
         for n in (1, 5, 10, 40)
     ]
-    for motion in found:
+    for motion in motions:
         assert motion.converged
         pressing = motion.joint_force[:, 0, 2]
         assert 0.2 < np.mean(pressing == 0.0) < 0.9
@@ -144,7 +144,9 @@ def test_a_contact_that_lifts_off_and_slides_is_followed():
         first = energies.kinetic[0] + energies.elastic[0]
         np.testing.assert_allclose(energies.missing, 0.0, atol=SOLVED * first)
         assert 0.0 < energies.joints[-1, 0] < first
-    errors = [np.abs(motion.displacement - found[-1].displacement).max() for motion in found[:3]]
+    errors = [
+        np.abs(motion.displacement - motions[-1].displacement).max() for motion in motions[:3]
+    ]
     assert errors[2] < 0.35 * errors[1] < 0.03 * errors[0]
 
 

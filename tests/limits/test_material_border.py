@@ -16,18 +16,18 @@ POISSON = [0.0, 0.3, 0.499, 0.5]
 
 def sphere(pair, cells=48, friction=FRICTION):
     """A contact over two thirds of the grid, and its states under P, then also under Qx = µP/2."""
-    own = HertzSphere(P, RADIUS, pair.contact_modulus)
-    size = 3.0 * own.contact_radius
+    hertz = HertzSphere(P, RADIUS, pair.contact_modulus)
+    size = 3.0 * hertz.contact_radius
     grid = Grid.covering((size, size), (cells, cells))
     contact = FrictionalContact(HalfSpace(grid, pair), friction, SOLVED)
-    height = own.gap(grid.x, grid.y)
+    height = hertz.gap(grid.x, grid.y)
     loads = [ContactLoad(np.array([P, Q, 0.0, 0.0, 0.0, 0.0])) for Q in (0.0, 0.5 * friction * P)]
     states = [contact.apart(height)]
     for load in loads:
         states.append(contact.advance(states[-1], height, load))
         assert states[-1].converged, states[-1].message
         assert frictional_error(contact, states[-2], height, states[-1], load) < 3.0 * SOLVED
-    return own, contact, states[1:]
+    return hertz, contact, states[1:]
 
 
 @pytest.mark.parametrize("poisson", POISSON)
@@ -39,11 +39,11 @@ def test_poissons_ratio_scales_a_contact_of_equal_bodies(poisson):
     """
     body = Material(70e3, poisson)
     friction, Q = 1e4, 1.0
-    own, contact, (pressed, _) = sphere(ElasticPair(body, body), friction=friction)
-    assert pressed.rigid[0] == pytest.approx(own.approach, rel=1e-3)
-    height = own.gap(contact.grid.x, contact.grid.y)
+    hertz, contact, (pressed, _) = sphere(ElasticPair(body, body), friction=friction)
+    assert pressed.rigid[0] == pytest.approx(hertz.approach, rel=1e-3)
+    height = hertz.gap(contact.grid.x, contact.grid.y)
     state = contact.advance(pressed, height, ContactLoad(np.array([P, Q, 0.0, 0.0, 0.0, 0.0])))
-    compliance = 2.0 * (2.0 - poisson) / body.shear_modulus / (8.0 * own.contact_radius)
+    compliance = 2.0 * (2.0 - poisson) / body.shear_modulus / (8.0 * hertz.contact_radius)
     assert state.rigid[1] == pytest.approx(compliance * Q, rel=0.01)
 
 
@@ -54,11 +54,11 @@ def test_a_rigid_ball_couples_less_the_less_compressible_its_partner(poisson):
     pair = ElasticPair(Material(np.inf, 0.3), body)
     assert pair.dundurs_beta == pytest.approx((1 - 2 * poisson) / (2 - 2 * poisson))
     assert pair.similar == (poisson == 0.5)
-    own, _, (pressed, _) = sphere(pair, cells=24)
+    hertz, _, (pressed, _) = sphere(pair, cells=24)
     if poisson == 0.5:
         assert not pressed.shear.any()
     # Coupled or not, friction is too little to move the approach by more than a few per cent.
-    assert pressed.rigid[0] == pytest.approx(own.approach, rel=0.1)
+    assert pressed.rigid[0] == pytest.approx(hertz.approach, rel=0.1)
 
 
 def test_nearly_incompressible_is_close_to_incompressible():
@@ -80,11 +80,11 @@ def test_a_thousand_times_stiffer_is_almost_rigid(stiffer):
         bodies = [Material(70e3, 0.2), Material(young, 0.3)]
         pair = ElasticPair(*(bodies if stiffer == 2 else bodies[::-1]))
         # The same grid for all: that of the rigid pair.
-        own = HertzSphere(P, RADIUS, 70e3 / (1 - 0.2**2))
-        size = 3.0 * own.contact_radius
+        hertz = HertzSphere(P, RADIUS, 70e3 / (1 - 0.2**2))
+        size = 3.0 * hertz.contact_radius
         grid = Grid.covering((size, size), (24, 24))
         contact = FrictionalContact(HalfSpace(grid, pair), FRICTION, 1e-10)
-        height = own.gap(grid.x, grid.y)
+        height = hertz.gap(grid.x, grid.y)
         state = contact.apart(height)
         for Q in (0.0, 0.5 * FRICTION * P):
             before, load = state, ContactLoad(np.array([P, Q, 0.0, 0.0, 0.0, 0.0]))

@@ -39,20 +39,20 @@ def punch(grid: Grid) -> WearingContact:
     return WearingContact(contact, (EnergyLaw(1e-8), EnergyLaw(2e-8)), FRICTION, cycle, 1e-12)
 
 
-def unevenness(own: WearingContact, kind: str, limits: float, steps: int) -> Array:
+def unevenness(contact: WearingContact, kind: str, limits: float, steps: int) -> Array:
     """How far the pressure of a rough punch is from uniform after each step ``(steps,)`` [MPa].
 
     Its shape under uniform pressure has worn in already: it would wear on evenly for ever. On it
     lies a roughness of 0.01 nm.
     """
-    grid = own.contact.grid
+    grid = contact.contact.grid
     rough = 1e-8 * np.random.default_rng(RNG_SEED).standard_normal(grid.shape)
-    dished = -own.contact.half_space.normal(np.full(grid.shape, MEAN_PRESSURE))
+    dished = -contact.contact.half_space.normal(np.full(grid.shape, MEAN_PRESSURE))
     state, sizes = WearState.unworn(dished + rough), []
-    cycles = limits * own.stable_cycles(state)
+    cycles = limits * contact.stable_cycles(state)
     for _ in range(steps):
-        state = getattr(own, f"{kind}_step")(state, cycles).state
-        pressure = own.solve(state.surfaces, 0, None).pressure
+        state = getattr(contact, f"{kind}_step")(state, cycles).state
+        pressure = contact.solve(state.surfaces, 0, None).pressure
         assert pressure.min() > 0.0
         sizes.append(np.abs(pressure - MEAN_PRESSURE).max())
     return np.array(sizes)
@@ -61,9 +61,9 @@ def unevenness(own: WearingContact, kind: str, limits: float, steps: int) -> Arr
 @pytest.mark.parametrize("name", GRIDS)
 def test_explicit_steps_are_stable_just_below_their_limit_and_unstable_just_above(name) -> None:
     """Per step |1 - 2 · 0.9| = 0.8 and |1 - 2 · 1.1| = 1.2 on an endless grid, less at its ends."""
-    own = punch(GRIDS[name])
+    contact = punch(GRIDS[name])
     for limits, least, most in ((0.9, 0.0, 0.98), (1.1, 1.08, 1.2)):
-        sizes = unevenness(own, "explicit", limits, 24)
+        sizes = unevenness(contact, "explicit", limits, 24)
         growth = (sizes[-1] / sizes[-9]) ** (1.0 / 8.0)
         assert least < growth < most, (limits, growth)
 
@@ -80,13 +80,13 @@ def test_other_steps_do_not_grow_at_a_hundred_times_that_limit(name, kind) -> No
 def test_no_checkerboard_and_no_growth_back(kind) -> None:
     """A ball worn by 100 times the limit a step: alternate cells do not part."""
     grid = Grid.covering((4.0, 4.0), (32, 32))
-    own = punch(grid)
+    contact = punch(grid)
     ball = (grid.x**2 + grid.y**2) / 80.0
     state = WearState.unworn(ball)
-    cycles = 100.0 * own.stable_cycles(state)
+    cycles = 100.0 * contact.stable_cycles(state)
     signs = (-1.0) ** np.add.outer(np.arange(32), np.arange(32))
     for _ in range(3):
-        before, state = state, getattr(own, f"{kind}_step")(state, cycles).state
+        before, state = state, getattr(contact, f"{kind}_step")(state, cycles).state
         for name in ("depth_1", "depth_2"):
             assert np.all(getattr(state.surfaces, name) >= getattr(before.surfaces, name))
     depth = state.surfaces.depth
@@ -100,10 +100,10 @@ def test_no_checkerboard_and_no_growth_back(kind) -> None:
 def test_a_symmetric_problem_stays_symmetric_over_100_jumps(kind, limits) -> None:
     """The sphere's four reflections, to 1e-8 of the depth."""
     grid = Grid.covering((4.0, 4.0), (16, 16))
-    own, state = punch(grid), WearState.unworn((grid.x**2 + grid.y**2) / 80.0)
-    cycles = limits * own.stable_cycles(state) / 10.0
+    contact, state = punch(grid), WearState.unworn((grid.x**2 + grid.y**2) / 80.0)
+    cycles = limits * contact.stable_cycles(state) / 10.0
     for _ in range(100):
-        state = getattr(own, f"{kind}_step")(state, cycles).state
+        state = getattr(contact, f"{kind}_step")(state, cycles).state
     depth = state.surfaces.depth
     for mirrored in (depth[::-1], depth[:, ::-1], depth.T):
         np.testing.assert_allclose(mirrored, depth, atol=1e-8 * depth.max())

@@ -100,7 +100,7 @@ def test_a_contact_that_does_not_slip_wears_nothing_and_ends(tmp_path):
     """Pressing alike bodies moves no point along the surface: no energy, no depth, no rates."""
     step = "wear.step={kind: implicit, depth: 1 um}"
     summary = run(tmp_path, STICKS, f"wear.stop.depth={REACHED}", step)
-    own = summary["interface"]
+    interface = summary["interface"]
     assert summary["cycles"] == pytest.approx(6e4)
-    assert own["depth_1"] == own["depth_2"] == 0.0
-    assert own["volume_1"] == own["energy"] == 0.0
+    assert interface["depth_1"] == interface["depth_2"] == 0.0
+    assert interface["volume_1"] == interface["energy"] == 0.0

@@ -28,8 +28,8 @@ def rate(errors):
     return np.log2(errors[0] / errors[-1]) / (len(errors) - 1)
 
 
-def mean_square(found, expected):
-    return np.linalg.norm(found - expected) / np.linalg.norm(expected)
+def mean_square(computed, expected):
+    return np.linalg.norm(computed - expected) / np.linalg.norm(expected)
 
 
 def test_elliptical_contact():

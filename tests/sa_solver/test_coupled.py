@@ -76,8 +76,8 @@ def stick_share(state, friction):
     return sticking(state, friction).sum() / (state.pressure > 0).sum()
 
 
-def assert_same(found, expected, accuracy):
-    np.testing.assert_allclose(found, expected, rtol=0, atol=accuracy * np.abs(expected).max())
+def assert_same(computed, expected, accuracy):
+    np.testing.assert_allclose(computed, expected, rtol=0, atol=accuracy * np.abs(expected).max())
 
 
 def assert_solves(contact, height, offset, state):
@@ -118,9 +118,9 @@ def test_every_condition_is_met(build, beta, friction):
         assert not state.touches_border
         np.testing.assert_allclose(state.resultants, values, atol=1e-7 * P)
         x, y = contact.grid.x, contact.grid.y
-        own = resultants(state.traction * contact.grid.cell_area, x, y)
+        carried = resultants(state.traction * contact.grid.cell_area, x, y)
         if build is sphere:
-            np.testing.assert_allclose(state.resultants, own, atol=1e-12 * P)
+            np.testing.assert_allclose(state.resultants, carried, atol=1e-12 * P)
         assert_solves(contact, height, None, state)
 
 

@@ -64,11 +64,11 @@ def test_combined_loads_against_a_search(seed):
     lowest = min(
         minimize(dissipation, start, method="Nelder-Mead", options=options).fun for start in starts
     )
-    found = share(limit, loads, grid)
-    assert found <= lowest * (1.0 + 1e-8)
-    assert found == pytest.approx(lowest, rel=1e-5)
-    assert share(limit, -loads, grid) == pytest.approx(found, rel=1e-8)
-    assert share(3.0 * limit, loads, grid) == pytest.approx(3.0 * found, rel=1e-8)
+    used = share(limit, loads, grid)
+    assert used <= lowest * (1.0 + 1e-8)
+    assert used == pytest.approx(lowest, rel=1e-5)
+    assert share(limit, -loads, grid) == pytest.approx(used, rel=1e-8)
+    assert share(3.0 * limit, loads, grid) == pytest.approx(3.0 * used, rel=1e-8)
 
 
 def test_the_limit_surface_is_convex():

@@ -43,14 +43,14 @@ def energies(state):
 @pytest.mark.parametrize("signs", [(1, 1), (-1, 1), (1, -1), (-1, -1)])
 def test_energies_and_signs_are_met(signs):
     wanted = np.array([5.0, 2.0])
-    found = slide(BALL, wanted, 100.0 * np.array(signs))
-    assert found.error < 1e-5
-    np.testing.assert_allclose(energies(found.state), wanted, rtol=1e-5)
-    assert np.sign(found.state.Qx) == signs[0]
-    assert np.sign(found.state.Qy) == signs[1]
-    assert np.sign(found.state.shift_x) == signs[0]
-    assert np.sign(found.state.shift_y) == signs[1]
-    assert found.state.twist == 0.0
+    slid = slide(BALL, wanted, 100.0 * np.array(signs))
+    assert slid.error < 1e-5
+    np.testing.assert_allclose(energies(slid.state), wanted, rtol=1e-5)
+    assert np.sign(slid.state.Qx) == signs[0]
+    assert np.sign(slid.state.Qy) == signs[1]
+    assert np.sign(slid.state.shift_x) == signs[0]
+    assert np.sign(slid.state.shift_y) == signs[1]
+    assert slid.state.twist == 0.0
 
 
 def test_the_implied_force_is_all_that_friction_carries():
@@ -82,18 +82,18 @@ def test_from_a_state_that_slid_the_other_way():
 
 def test_a_share_that_no_direction_has_is_reported():
     """Poisson's ratio couples x and y: some energy goes across even if none is asked for."""
-    found = slide(BALL, (2.0, 0.0), (1.0, 1.0))
-    assert energies(found.state).sum() == pytest.approx(2.0, rel=1e-5)
-    assert 1e-5 < found.error < 0.2
+    slid = slide(BALL, (2.0, 0.0), (1.0, 1.0))
+    assert energies(slid.state).sum() == pytest.approx(2.0, rel=1e-5)
+    assert 1e-5 < slid.error < 0.2
 
 
 def test_a_line_contact():
     grid = Grid.strips(2.0, 64)
     limit = 300.0 * np.sqrt(np.maximum(0.0, 1.0 - grid.x**2 / 0.8))
     half_space = HalfSpace(grid, HALF_SPACE.pair)
-    found = slide(limit, (3.0, 0.0), (-1.0, 0.0), np.zeros((2, 64, 1)), "force", half_space)
-    assert found.error < 1e-5
-    assert found.state.Qx == pytest.approx(-limit.sum() * grid.cell_area, rel=1e-6)
+    slid = slide(limit, (3.0, 0.0), (-1.0, 0.0), np.zeros((2, 64, 1)), "force", half_space)
+    assert slid.error < 1e-5
+    assert slid.state.Qx == pytest.approx(-limit.sum() * grid.cell_area, rel=1e-6)
 
 
 def test_solves_stay_few(monkeypatch):

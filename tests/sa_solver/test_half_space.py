@@ -45,9 +45,9 @@ def tractions(grid, count=1, seed=0):
     return np.random.default_rng(seed).standard_normal((count, 3, *grid.shape))
 
 
-def assert_same(found, expected, accuracy=ROUNDING):
+def assert_same(computed, expected, accuracy=ROUNDING):
     """Equal to ``accuracy`` of the largest value."""
-    np.testing.assert_allclose(found, expected, rtol=0, atol=accuracy * np.abs(expected).max())
+    np.testing.assert_allclose(computed, expected, rtol=0, atol=accuracy * np.abs(expected).max())
 
 
 def kernel(grid, pair, distances, datum):
@@ -224,9 +224,9 @@ def test_shear_of_hertzian_shape(cells, accuracy):
     inside = grid.x**2 + grid.y**2 < 1.0
     u_x = np.pi / 32.0 * (4 * (2 * s - v) - (4 * s - 3 * v) * grid.x**2 - (4 * s - v) * grid.y**2)
     u_y = np.pi / 32.0 * 2.0 * v * grid.x * grid.y
-    found = HalfSpace(grid, pair).shear(np.array([profile, 0.0 * profile]))
-    assert np.abs(found[X] - u_x)[inside].max() < accuracy * u_x.max()
-    assert np.abs(found[Y] - u_y)[inside].max() < accuracy * u_x.max()
+    displacement = HalfSpace(grid, pair).shear(np.array([profile, 0.0 * profile]))
+    assert np.abs(displacement[X] - u_x)[inside].max() < accuracy * u_x.max()
+    assert np.abs(displacement[Y] - u_y)[inside].max() < accuracy * u_x.max()
 
 
 @pytest.mark.parametrize(("cells", "accuracy"), [(32, 4e-3), (128, 5e-4)])
@@ -241,11 +241,11 @@ def test_pressure_of_hertzian_shape_pulls_the_softer_surface_inwards(cells, accu
     half_space = HalfSpace(grid, pair)
     scale = accuracy * u_z.max()
     assert np.abs(half_space.normal(profile) - u_z)[inside].max() < scale
-    found = half_space.displacement(np.stack([0.0 * profile, 0.0 * profile, profile]))
+    displacement = half_space.displacement(np.stack([0.0 * profile, 0.0 * profile, profile]))
     assert pair.body_2.shear_modulus < pair.body_1.shear_modulus
-    assert found[X][-cells // 4, cells // 2] < 0.0  # where x > 0
+    assert displacement[X][-cells // 4, cells // 2] < 0.0  # where x > 0
     for component, coordinate in ((X, grid.x), (Y, grid.y)):
-        assert np.abs(found[component] - radial * coordinate)[inside].max() < scale
+        assert np.abs(displacement[component] - radial * coordinate)[inside].max() < scale
 
 
 @pytest.mark.parametrize(("cells", "accuracy"), [(50, 4e-3), (400, 1.8e-4)])
@@ -332,8 +332,8 @@ def test_circulant_is_the_half_space_on_the_grid(grid):
     traction = np.zeros((3, *half_space.padded))
     nx, ny = grid.shape
     traction[:, :nx, :ny] = tractions(grid)[0]
-    found = circulant(half_space, traction)[:, :nx, :ny]
-    assert_same(found, half_space.displacement(traction[:, :nx, :ny]))
+    displacement = circulant(half_space, traction)[:, :nx, :ny]
+    assert_same(displacement, half_space.displacement(traction[:, :nx, :ny]))
 
 
 @every_grid

@@ -120,10 +120,10 @@ def test_auto_says_why_it_takes_every_increment(change, reason):
         pair = ElasticPair(Material(115e3, 0.3), Material(70e3, 0.3))
         half_space = HalfSpace(half_space.grid, pair)
     loading = ContactLoadPath(loading.values, energy=energy)
-    found = march_history(half_space, height, loading, FRICTION)
-    assert found.method == "full"
-    assert found.reason == reason
-    assert found.indices == list(range(6))
+    history = march_history(half_space, height, loading, FRICTION)
+    assert history.method == "full"
+    assert history.reason == reason
+    assert history.indices == list(range(6))
     if change != "direction":
         with pytest.raises(HistoryError, match="use full or auto"):
             march_history(half_space, height, loading, FRICTION, history="reversals")
@@ -133,7 +133,7 @@ def test_auto_says_why_it_takes_every_increment(change, reason):
 def test_the_error_of_a_full_path_falls_with_its_increments():
     """Load that turns in the plane: backward steps are of first order, and so is their estimate."""
     half_space, height = ball(0.3, 24)
-    found = []
+    histories = []
     for steps in (8, 16, 32):
         angle = np.linspace(0.0, 0.5 * np.pi, steps + 1)[1:]
         values = np.zeros((steps + 2, 6))
@@ -141,15 +141,15 @@ def test_the_error_of_a_full_path_falls_with_its_increments():
         values[1:, 1] = 0.8 * SLIDING
         values[2:, 1] = 0.8 * SLIDING * np.cos(angle)
         values[2:, 2] = 0.8 * SLIDING * np.sin(angle)
-        found.append(
+        histories.append(
             march_history(
                 half_space, height, ContactLoadPath(values), FRICTION, estimate_error=True
             )
         )
-    errors = [own.error for own in found]
-    scale = FRICTION * found[0].states[-1].pressure.max()
-    true = np.abs(found[1].states[-1].shear - found[2].states[-1].shear).max() / scale
-    assert found[0].error_of == "the same path with half the increments"
+    errors = [history.error for history in histories]
+    scale = FRICTION * histories[0].states[-1].pressure.max()
+    true = np.abs(histories[1].states[-1].shear - histories[2].states[-1].shear).max() / scale
+    assert histories[0].error_of == "the same path with half the increments"
     assert 1.4 < errors[0] / errors[1] < 3.0
     assert 1.4 < errors[1] / errors[2] < 3.0
     assert 0.3 * true < errors[1] < 4.0 * true
@@ -158,8 +158,10 @@ def test_the_error_of_a_full_path_falls_with_its_increments():
 def test_no_error_where_every_increment_turns_back():
     half_space, height = cylinder(32)
     zigzag = path([0.5, -0.5, 0.5, -0.5], press=1)
-    found = march_history(half_space, height, zigzag, FRICTION, history="full", estimate_error=True)
-    assert found.error is None
+    history = march_history(
+        half_space, height, zigzag, FRICTION, history="full", estimate_error=True
+    )
+    assert history.error is None
 
 
 def test_first_loading_of_a_line_contact_is_two_normal_problems(monkeypatch):
@@ -169,9 +171,9 @@ def test_first_loading_of_a_line_contact_is_two_normal_problems(monkeypatch):
     height = np.maximum(np.abs(grid.x) - 0.4, 0.0) ** 2 / 20.0
     for sign in (1.0, -1.0):
         loading = path(sign * np.asarray(legs(0.7)))
-        found = march_history(half_space, height, loading, FRICTION, tolerance=1e-10)
-        assert found.method == "ciavarella_jaeger"
-        two = found.states[-1]
+        history = march_history(half_space, height, loading, FRICTION, tolerance=1e-10)
+        assert history.method == "ciavarella_jaeger"
+        two = history.states[-1]
         with monkeypatch.context() as patch:
             patch.setattr(FrictionalContact, "two_normal_problems", lambda *_: False)
             newton = march_history(half_space, height, loading, FRICTION, tolerance=1e-10)

@@ -136,8 +136,8 @@ def test_outside_the_rectangle_gauss_points_find_the_same(place):
     kernel = relative(point_kernel, DISSIMILAR, *np.meshgrid(*sources, indexing="ij"))
     expected = 0.25 * np.prod(SIZE) * np.einsum("ijxy,x,y->ij", kernel, w, w)
     accuracy = 1e-9 * np.abs(expected).max()
-    found = rectangle(POINTS[place], DISSIMILAR)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=accuracy)
+    coefficients = rectangle(POINTS[place], DISSIMILAR)
+    np.testing.assert_allclose(coefficients, expected, rtol=0, atol=accuracy)
 
 
 def test_centre_of_a_square():
@@ -146,15 +146,15 @@ def test_centre_of_a_square():
     integral = 4.0 * np.log(1.0 + np.sqrt(2.0)) * 0.6
     tangential = (pair.shear - 0.5 * pair.poisson) * integral / (2.0 * np.pi)
     expected = np.diag([tangential, tangential, integral / (np.pi * pair.contact_modulus)])
-    found = rectangle((0.0, 0.0), pair, (0.6, 0.6))
-    np.testing.assert_allclose(found, expected, rtol=1e-14, atol=1e-15 * pair.normal)
+    coefficients = rectangle((0.0, 0.0), pair, (0.6, 0.6))
+    np.testing.assert_allclose(coefficients, expected, rtol=1e-14, atol=1e-15 * pair.normal)
 
 
 def test_far_away_it_is_a_point_force():
     """The rectangle differs by O((size / r)²) of the largest coefficient."""
-    found = rectangle((30.0, -40.0), DISSIMILAR, (0.1, 0.2))
+    coefficients = rectangle((30.0, -40.0), DISSIMILAR, (0.1, 0.2))
     expected = 0.02 * relative(point_kernel, DISSIMILAR, 30.0, -40.0)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
+    np.testing.assert_allclose(coefficients, expected, rtol=0, atol=1e-5 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("place", POINTS)

@@ -34,8 +34,8 @@ def moved(case, cells=CELLS, height=None, **settings):
     grid = grid_of(case, cells)
     half_space = HalfSpace(grid, ElasticPair(case.body_1, case.body_2))
     gap = case.contact.gap(grid.x, grid.y) if height is None else height(grid)
-    found = partial_slip_curve(NormalContact(half_space), gap, LOAD, tolerance=1e-9, **settings)
-    return found, half_space, gap
+    curve = partial_slip_curve(NormalContact(half_space), gap, LOAD, tolerance=1e-9, **settings)
+    return curve, half_space, gap
 
 
 def dented(grid):
@@ -46,7 +46,7 @@ def dented(grid):
 
 def travel_of(curve, *amplitudes):
     """Travel of the sliders in loops of these amplitudes, for a coefficient of 1."""
-    return sum(4.0 * np.maximum(own - curve.reach, 0.0) for own in amplitudes)
+    return sum(4.0 * np.maximum(amplitude - curve.reach, 0.0) for amplitude in amplitudes)
 
 
 # --- against Mindlin ----------------------------------------------------------------------------
@@ -58,7 +58,7 @@ def test_a_sphere_follows_mindlins_curve(material):
     curve, _, _ = moved(case)
     assert curve.stiffness == pytest.approx(1.0 / case.tangential_compliance, rel=GRID_ERROR)
     share = curve.force / LOAD
-    wanted = [case.displacement(FRICTION * LOAD * own) for own in share]
+    wanted = [case.displacement(FRICTION * LOAD * ratio) for ratio in share]
     np.testing.assert_allclose(
         FRICTION * curve.shift, wanted, atol=GRID_ERROR * wanted[-1], rtol=0.0
     )

@@ -64,8 +64,8 @@ def test_on_a_periodic_half_space_it_is_the_inverse(compliance):
     if compliance is not None:
         preconditioner.include(np.full(grid.shape, compliance))
         periodic = periodic + compliance * pressure
-    found = preconditioner.apply(periodic)
-    np.testing.assert_allclose(found, pressure, rtol=0, atol=1e-11)
+    recovered = preconditioner.apply(periodic)
+    np.testing.assert_allclose(recovered, pressure, rtol=0, atol=1e-11)
 
 
 def test_where_compliance_dominates_it_is_nearly_its_inverse():

@@ -201,11 +201,11 @@ def test_a_held_stress_limits_the_way_back():
 
 def test_ciavarella_jaeger_of_a_cylinder_is_cattaneo_mindlin():
     x = np.linspace(-1.1 * A, 1.1 * A, 101)
-    found = ciavarella_jaeger(
+    shear = ciavarella_jaeger(
         lambda load: HertzCylinder(load, 30.0, MODULUS).pressure(x), 200.0, -70.0, FRICTION
     )
     expected = ShearedCylinder(LINE, FRICTION).shear(x, -70.0)
-    np.testing.assert_allclose(found, expected, atol=1e-10)
+    np.testing.assert_allclose(shear, expected, atol=1e-10)
 
 
 def test_ciavarella_jaeger_sticks_a_rounded_flat():

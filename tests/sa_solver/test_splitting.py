@@ -111,10 +111,10 @@ def test_failure_is_said():
 def test_free_motion_is_no_solution():
     """A residual that stays the same moves the state on, and is never taken for small."""
     push = np.full(5, 1e-3)
-    found = douglas_rachford(lambda s: s - push, lambda trial: trial + 1.3 * push, np.zeros(5))
-    assert not found.converged
-    assert found.residual > 0.0
-    assert np.abs(found.state).max() < 1.0
+    result = douglas_rachford(lambda s: s - push, lambda trial: trial + 1.3 * push, np.zeros(5))
+    assert not result.converged
+    assert result.residual > 0.0
+    assert np.abs(result.state).max() < 1.0
 
 
 def test_what_is_thrown_far_off_has_not_converged():

@@ -52,8 +52,8 @@ def rectangle(x, y, z, poisson, size=SIZE):
 def as_tensor(stress):
     """(6, ...) → (3, 3, ...)."""
     tensor = np.empty((3, 3, *stress.shape[1:]))
-    for own, (i, j) in zip(stress, INDICES, strict=True):
-        tensor[i, j] = tensor[j, i] = own
+    for component, (i, j) in zip(stress, INDICES, strict=True):
+        tensor[i, j] = tensor[j, i] = component
     return tensor
 
 
@@ -99,8 +99,8 @@ def test_a_rectangle_is_in_equilibrium_and_compatible(point):
 
 def test_an_endless_rectangle_carries_its_traction_everywhere():
     """Equilibrium: the sum of zz, yz and zx over any plane is minus the load (Betti)."""
-    found = rectangle(0.0, 0.0, 3.0, 0.3, (1e9, 1e9))
-    np.testing.assert_allclose(found[[ZX, YZ, ZZ]], -np.eye(3), atol=1e-7)
+    stress = rectangle(0.0, 0.0, 3.0, 0.3, (1e9, 1e9))
+    np.testing.assert_allclose(stress[[ZX, YZ, ZZ]], -np.eye(3), atol=1e-7)
 
 
 @pytest.mark.parametrize("place", [(0.01, 0.01), (0.4 - 1e-9, 0.25 - 1e-9), (0.4 + 1e-9, 0.1)])
@@ -119,9 +119,9 @@ def test_below_a_corner_nothing_is_infinite():
 def test_far_below_rounding_stays_small():
     """Differences between corners of a cell 1000 cells away against a point force."""
     depth = 10.0
-    found = rectangle(3.0, -2.0, depth, 0.3, (0.01, 0.01))
+    stress = rectangle(3.0, -2.0, depth, 0.3, (0.01, 0.01))
     expected = 1e-4 * point_force_stress(3.0, -2.0, depth, 0.3)
-    np.testing.assert_allclose(found, expected, atol=1e-5 * np.abs(expected).max())
+    np.testing.assert_allclose(stress, expected, atol=1e-5 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("depth", [0.0, 0.2])
@@ -143,9 +143,9 @@ def cylinder_error(count, depths):
     """Largest error of a section over p0, at each depth."""
     grid = Grid.strips(4.0 * CYLINDER.half_width, count)
     traction = sheared(cell_means(grid))
-    found = SubsurfaceStress(grid, STEEL, 2).section(traction, "x", 0.0, depths)
+    stress = SubsurfaceStress(grid, STEEL, 2).section(traction, "x", 0.0, depths)
     expected = cylinder_stress(CYLINDER, FRICTION, grid.x, depths, STEEL.poisson)
-    return np.abs(found - expected).max(axis=(0, 1)) / CYLINDER.peak_pressure
+    return np.abs(stress - expected).max(axis=(0, 1)) / CYLINDER.peak_pressure
 
 
 def cell_means(grid):
@@ -200,9 +200,9 @@ def test_sphere_on_its_axis(poisson):
     grid, pressure = sphere_grid(95)
     depths = np.linspace(0.2, 2.0, 10) * SPHERE.contact_radius
     solver = SubsurfaceStress(grid, Material(1.0, poisson), 2)
-    found = solver.section(sheared(pressure, 0.0), "x", 0.0, depths)[:, 47]
+    stress = solver.section(sheared(pressure, 0.0), "x", 0.0, depths)[:, 47]
     expected = sphere_axis_stress(SPHERE, depths, poisson)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-3 * SPHERE.peak_pressure)
+    np.testing.assert_allclose(stress, expected, rtol=0, atol=1e-3 * SPHERE.peak_pressure)
 
 
 def test_yield_starts_below_the_sphere():
@@ -219,10 +219,10 @@ def test_yield_starts_below_the_sphere():
 def surface_error(count):
     """Mean error at the surface over p0, inside the contact."""
     grid, pressure = sphere_grid(count)
-    found = SubsurfaceStress(grid, STEEL, 2).at_depth(sheared(pressure), 0.0)
+    stress = SubsurfaceStress(grid, STEEL, 2).at_depth(sheared(pressure), 0.0)
     expected = sphere_surface_stress(SPHERE, FRICTION, grid.x, grid.y, STEEL.poisson)
     inside = np.hypot(grid.x, grid.y) < SPHERE.contact_radius
-    return np.abs(found - expected)[:, inside].mean(axis=1) / SPHERE.peak_pressure
+    return np.abs(stress - expected)[:, inside].mean(axis=1) / SPHERE.peak_pressure
 
 
 def test_surface_of_a_sliding_sphere():
@@ -277,8 +277,8 @@ def test_convolution_is_the_sum_over_cells(body, depth, shape):
             one = rectangle(*offset, depth, 0.3, grid.pitch)
             expected[:, i, j] += one @ felt[:, k, m]
     expected[[YZ, ZX]] *= sign
-    found = SubsurfaceStress(grid, STEEL, body).at_depth(traction, depth)
-    np.testing.assert_allclose(found, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
+    stress = SubsurfaceStress(grid, STEEL, body).at_depth(traction, depth)
+    np.testing.assert_allclose(stress, expected, rtol=0, atol=1e-13 * np.abs(expected).max())
 
 
 @pytest.mark.parametrize("body", [1, 2])
@@ -287,12 +287,12 @@ def test_a_section_is_cut_from_planes(body, axis):
     grid = Grid((12, 17), (0.2, 0.15))
     traction, depths = random_traction(grid), np.array([0.0, 0.05, 0.4])
     solver = SubsurfaceStress(grid, STEEL, body)
-    found = solver.section(traction, axis, 0.33, depths)
+    section = solver.section(traction, axis, 0.33, depths)
     for column, depth in enumerate(depths):
         plane = solver.at_depth(traction, depth)
         row = np.argmin(np.abs((grid.y[0] if axis == "x" else grid.x[:, 0]) - 0.33))
         expected = plane[:, :, row] if axis == "x" else plane[:, row]
-        np.testing.assert_allclose(found[:, :, column], expected, rtol=0, atol=1e-12)
+        np.testing.assert_allclose(section[:, :, column], expected, rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("body", [1, 2])
@@ -317,7 +317,7 @@ def divergence(body, count):
         (here[1, :, inner, 2:] - here[1, :, inner, :-2]) / (2.0 * h),
         down * (below[2] - above[2])[:, inner, inner] / (2.0 * h),
     ]
-    return np.abs(sum(gradient)).max() / max(np.abs(own).max() for own in gradient)
+    return np.abs(sum(gradient)).max() / max(np.abs(part).max() for part in gradient)
 
 
 def test_a_plane_below_carries_the_load():
@@ -349,9 +349,9 @@ def test_exchange_of_the_axes():
     grid, other = Grid((12, 17), (0.2, 0.15)), Grid((17, 12), (0.15, 0.2))
     traction = random_traction(grid)
     exchanged = traction[[1, 0, 2]].swapaxes(1, 2)
-    found = SubsurfaceStress(grid, STEEL, 2).at_depth(traction, 0.2)
+    stress = SubsurfaceStress(grid, STEEL, 2).at_depth(traction, 0.2)
     expected = SubsurfaceStress(other, STEEL, 2).at_depth(exchanged, 0.2).swapaxes(1, 2)
-    np.testing.assert_allclose(found, expected[[YY, XX, ZZ, XY, ZX, YZ]], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(stress, expected[[YY, XX, ZZ, XY, ZX, YZ]], rtol=0, atol=1e-12)
 
 
 @pytest.mark.parametrize("body", [1, 2])

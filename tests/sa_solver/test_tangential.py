@@ -201,7 +201,7 @@ def test_energy_of_every_increment():
     solver, limit, _ = sphere(40)
     q = u = np.zeros((2, 40, 40))
     for scale in (0.5, 1.0, 0.2, -0.7, 0.1):
-        loads = {name: scale * own for name, own in COMBINED.items()}
+        loads = {name: scale * load for name, load in COMBINED.items()}
         state = solver.solve(limit, -u, **loads, start=q)
         motions = np.array([state.shift_x, state.shift_y, state.twist])
         work = resultants(solver.grid, state.shear) @ motions
@@ -246,7 +246,7 @@ def test_shear_turns_with_the_load():
 def test_the_sign_of_the_load_is_that_of_the_shear():
     solver, limit, _ = sphere(32)
     plus = solver.solve(limit, **COMBINED)
-    minus = solver.solve(limit, **{name: -own for name, own in COMBINED.items()})
+    minus = solver.solve(limit, **{name: -load for name, load in COMBINED.items()})
     np.testing.assert_allclose(minus.shear, -plus.shear, atol=1e-12 * limit.max())
     assert minus.twist == pytest.approx(-plus.twist, rel=1e-10)
 
@@ -280,8 +280,8 @@ def test_motions_instead_of_forces(imposed):
         loads[motion] = getattr(forced, motion)
     moved = solver.solve(limit, offset, **loads, tolerance=1e-11)
     np.testing.assert_allclose(moved.shear, forced.shear, atol=1e-7 * limit.max())
-    found = [moved.Qx, moved.Qy, moved.Mz]
-    np.testing.assert_allclose(found, list(COMBINED.values()), rtol=1e-7)
+    forces = [moved.Qx, moved.Qy, moved.Mz]
+    np.testing.assert_allclose(forces, list(COMBINED.values()), rtol=1e-7)
     assert moved.twist == pytest.approx(forced.twist, rel=1e-7)
 
 

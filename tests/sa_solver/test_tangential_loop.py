@@ -84,9 +84,9 @@ def test_sliding_share_is_that_of_the_annulus(partial):
 @pytest.mark.parametrize("material", [PLAIN, TITANIUM])
 def test_stiffness_is_mindlins(material):
     """1/kt = Σ (2-ν)/G / 8a, for ν > 0 too as nothing slips."""
-    found = run(sphere(material), LoopPath(LOAD, 0.1 * SLIDING, "force", increments=2))
+    loop = run(sphere(material), LoopPath(LOAD, 0.1 * SLIDING, "force", increments=2))
     expected = 1.0 / sphere(material).tangential_compliance
-    assert found.stiffness == pytest.approx(expected, rel=GRID_ERROR)
+    assert loop.stiffness == pytest.approx(expected, rel=GRID_ERROR)
 
 
 def test_branches_are_first_loading_doubled(partial):
@@ -102,13 +102,13 @@ def test_branches_are_first_loading_doubled(partial):
 @pytest.mark.slow
 def test_energy_does_not_depend_on_the_increments_and_the_area_does_by_their_square():
     """ν = 0: cells slip only at |q| = µp, so slip's energy is exact; trapezoids cut the corners."""
-    found = {
+    by_count = {
         count: run(sphere(PLAIN), LoopPath(LOAD, 0.75 * SLIDING, "force", count), cells=32)
         for count in (6, 12, 24)
     }
-    energies = [own.energy for own in found.values()]
+    energies = [loop.energy for loop in by_count.values()]
     np.testing.assert_allclose(energies, energies[0], rtol=1e-6)
-    missing = np.array([own.energy - own.work for own in found.values()])
+    missing = np.array([loop.energy - loop.work for loop in by_count.values()])
     assert np.all(missing > 0.0)
     np.testing.assert_allclose(missing[:-1] / missing[1:], 4.0, rtol=0.15)
     assert missing[-1] < 3e-3 * energies[0]
@@ -119,15 +119,15 @@ def test_slope_after_a_reversal_tends_to_the_stuck_stiffness():
     case, amplitude = sphere(PLAIN), 0.75 * SLIDING
     secants = []
     for count in (3, 6):
-        found = run(case, LoopPath(LOAD, amplitude, "force", count))
+        loop = run(case, LoopPath(LOAD, amplitude, "force", count))
         step = 2.0 * amplitude / count
         expected = step / (2.0 * case.displacement(0.5 * step))
-        assert found.reversal_stiffness == pytest.approx(expected, rel=2.0 * GRID_ERROR)
-        secants.append(found.reversal_stiffness)
+        assert loop.reversal_stiffness == pytest.approx(expected, rel=2.0 * GRID_ERROR)
+        secants.append(loop.reversal_stiffness)
     # It falls in proportion to the increment, to first order.
     extrapolated = 2.0 * secants[1] - secants[0]
-    assert secants[0] < secants[1] < found.stiffness
-    assert extrapolated == pytest.approx(found.stiffness, rel=0.01)
+    assert secants[0] < secants[1] < loop.stiffness
+    assert extrapolated == pytest.approx(loop.stiffness, rel=0.01)
 
 
 def test_both_axes_are_alike_for_a_sphere():
@@ -146,15 +146,15 @@ def test_line_contact():
     grid = Grid.strips(2.2 * line.contact.half_width, 128)
     contact = FrictionalContact(HalfSpace(grid, pair), FRICTION)
     height = line.contact.gap(grid.x)
-    found = march_loop(contact, height, LoopPath(LOAD, 0.75 * SLIDING, "force", 6))
+    loop = march_loop(contact, height, LoopPath(LOAD, 0.75 * SLIDING, "force", 6))
     datum = contact.half_space.datum
     expected = line.displacement(0.75 * SLIDING, datum)
-    assert found.energy == pytest.approx(line.loop_energy(0.75 * SLIDING), rel=GRID_ERROR)
-    assert found.amplitude == pytest.approx(expected, rel=GRID_ERROR)
+    assert loop.energy == pytest.approx(line.loop_energy(0.75 * SLIDING), rel=GRID_ERROR)
+    assert loop.amplitude == pytest.approx(expected, rel=GRID_ERROR)
     # Stuck: q = Q/π sqrt(a²-x²) moves it by (2Q/πE*) ln(2L/a); its singular ends cost 1/cells.
     logarithm = np.log(2.0 * datum / line.contact.half_width)
     stuck = 0.5 * np.pi * pair.contact_modulus / logarithm
-    assert found.stiffness == pytest.approx(stuck, rel=1.0 / 128)
+    assert loop.stiffness == pytest.approx(stuck, rel=1.0 / 128)
 
 
 # --- sliding ------------------------------------------------------------------------------------
@@ -177,16 +177,16 @@ def test_flat_punch_is_a_jenkins_element():
     Energy 4 µP (A - µP/kt), to the solver's tolerance on any grid, and so is the opening.
     """
     pair = ElasticPair(TITANIUM, TITANIUM)
-    found = press_flat(pair, 32, LoopPath(LOAD, 0.02))
-    assert found.amplitude == pytest.approx(0.02, rel=1e-12)
-    expected = 4.0 * SLIDING * (0.02 - SLIDING / found.stiffness)
-    assert found.energy == pytest.approx(expected, rel=1e-6)
-    assert found.friction == pytest.approx(FRICTION, rel=1e-8)
-    assert found.area == pytest.approx(2.0)
-    assert found.border_load > 0.0
-    elastic = found.loading[1] < 0.99 * SLIDING
-    displacement, force = (own[elastic] for own in found.loading)
-    np.testing.assert_allclose(force, found.stiffness * displacement, atol=1e-6 * SLIDING)
+    loop = press_flat(pair, 32, LoopPath(LOAD, 0.02))
+    assert loop.amplitude == pytest.approx(0.02, rel=1e-12)
+    expected = 4.0 * SLIDING * (0.02 - SLIDING / loop.stiffness)
+    assert loop.energy == pytest.approx(expected, rel=1e-6)
+    assert loop.friction == pytest.approx(FRICTION, rel=1e-8)
+    assert loop.area == pytest.approx(2.0)
+    assert loop.border_load > 0.0
+    elastic = loop.loading[1] < 0.99 * SLIDING
+    displacement, force = (column[elastic] for column in loop.loading)
+    np.testing.assert_allclose(force, loop.stiffness * displacement, atol=1e-6 * SLIDING)
 
 
 # --- stiffness of the stuck contact -------------------------------------------------------------
@@ -199,8 +199,8 @@ def test_stuck_stiffness_agrees_with_friction_without_limit():
     limit = np.where(pressed, 1e9, 0.0)
     motion = {"shift_x": 0.0, "shift_y": 1e-3, "twist": 0.0}
     state = TangentialContact(half_space).solve(limit, **motion, tolerance=1e-11)
-    found = loops.stuck_stiffness(half_space, pressed, LoopPath(1.0, 1.0, axis="y"))
-    assert found == pytest.approx(state.Qy / 1e-3, rel=1e-9)
+    stiffness = loops.stuck_stiffness(half_space, pressed, LoopPath(1.0, 1.0, axis="y"))
+    assert stiffness == pytest.approx(state.Qy / 1e-3, rel=1e-9)
 
 
 def test_stuck_dissimilar_bodies_are_softer_where_pressure_is_free():
@@ -211,9 +211,9 @@ def test_stuck_dissimilar_bodies_are_softer_where_pressure_is_free():
     units = np.eye(3 * count).reshape(-1, 3, *grid.shape)
     compliance = np.stack([half_space.displacement(unit).ravel() for unit in units], axis=1)
     one, zero = np.ones(count), np.zeros(count)
-    x, y = (np.broadcast_to(own, grid.shape).ravel() for own in (grid.x, grid.y))
+    x, y = (np.broadcast_to(coordinate, grid.shape).ravel() for coordinate in (grid.x, grid.y))
     motion = np.concatenate([one, zero, zero])
-    found = {}
+    stiffness = {}
     for moments, modes in ((None, [one]), ((0.0, 0.0), [one, x, y])):
         held = np.stack([np.concatenate([zero, zero, mode]) for mode in modes], axis=1)
         size = 3 * count + held.shape[1]
@@ -225,9 +225,9 @@ def test_stuck_dissimilar_bodies_are_softer_where_pressure_is_free():
         expected = float(motion @ traction[: 3 * count]) * grid.cell_area
         path = LoopPath(1.0, 1.0, moments=moments)
         pressed = np.ones(grid.shape, dtype=bool)
-        found[moments] = loops.stuck_stiffness(half_space, pressed, path)
-        assert found[moments] == pytest.approx(expected, rel=1e-9)
-    assert found[0.0, 0.0] < found[None]
+        stiffness[moments] = loops.stuck_stiffness(half_space, pressed, path)
+        assert stiffness[moments] == pytest.approx(expected, rel=1e-9)
+    assert stiffness[0.0, 0.0] < stiffness[None]
 
 
 # --- dissimilar bodies --------------------------------------------------------------------------
@@ -237,23 +237,23 @@ def test_dissimilar_bodies_slide_alike_and_close():
     """β 0.35. Mindlin's formulas leave out β: stiffness and energy within 2 %."""
     case = sphere(STEEL, SOFT)
     onset = case.displacement(SLIDING)
-    found = run(case, LoopPath(LOAD, 2.5 * onset, increments=8), cells=16)
-    assert found.closure <= loops.CLOSED
-    assert found.slides
-    assert found.friction == pytest.approx(FRICTION, rel=1e-6)
-    assert found.energy == pytest.approx(4.0 * SLIDING * (2.5 - 0.8) * onset, rel=0.02)
-    assert found.work == pytest.approx(found.energy, rel=0.02)
-    assert found.stiffness == pytest.approx(1.0 / case.tangential_compliance, rel=0.02)
+    loop = run(case, LoopPath(LOAD, 2.5 * onset, increments=8), cells=16)
+    assert loop.closure <= loops.CLOSED
+    assert loop.slides
+    assert loop.friction == pytest.approx(FRICTION, rel=1e-6)
+    assert loop.energy == pytest.approx(4.0 * SLIDING * (2.5 - 0.8) * onset, rel=0.02)
+    assert loop.work == pytest.approx(loop.energy, rel=0.02)
+    assert loop.stiffness == pytest.approx(1.0 / case.tangential_compliance, rel=0.02)
 
 
 def test_dissimilar_bodies_in_partial_slip_are_marched_until_they_close():
     """Pressing has left slip of its own, which takes cycles to forget."""
     path = LoopPath(LOAD, 0.4 * SLIDING, "force", 6)
-    found = run(sphere(STEEL, SOFT), path, cells=12)
-    assert found.closure <= loops.CLOSED
-    assert len(found.force) > 1 + 3 * 6
-    assert len(found.cycle[0]) == 1 + 2 * 6
-    assert found.work == pytest.approx(found.energy, rel=0.05)
+    loop = run(sphere(STEEL, SOFT), path, cells=12)
+    assert loop.closure <= loops.CLOSED
+    assert len(loop.force) > 1 + 3 * 6
+    assert len(loop.cycle[0]) == 1 + 2 * 6
+    assert loop.work == pytest.approx(loop.energy, rel=0.05)
 
 
 # --- what is imposed ----------------------------------------------------------------------------
@@ -271,8 +271,8 @@ def test_moments_and_tilts():
     assert pressed[0.0, -40.0].resultants[4] == pytest.approx(-40.0, rel=1e-8)
     assert pressed[0.0, -40.0].rigid[4] != 0.0
     np.testing.assert_allclose(pressed[None].traction, pressed[0.0, 0.0].traction, atol=1e-3)
-    found = march_loop(contact, height, LoopPath(LOAD, 1e-4, moments=(0.0, -40.0)))
-    assert found.amplitude == pytest.approx(1e-4, rel=1e-9)
+    loop = march_loop(contact, height, LoopPath(LOAD, 1e-4, moments=(0.0, -40.0)))
+    assert loop.amplitude == pytest.approx(1e-4, rel=1e-9)
 
 
 @pytest.mark.parametrize(

@@ -234,10 +234,10 @@ class MovingMarch:
         out = np.linspace(-0.5 * stroke, 0.5 * stroke, each_way + 1)
         x = np.concatenate([out, out[-2::-1]])
         path = np.stack([x, np.zeros_like(x)], axis=1)
-        count, own = 2 * each_way, passages(grid, np.stack([path[:-1], path[1:]], axis=1))
+        count, passed = 2 * each_way, passages(grid, np.stack([path[:-1], path[1:]], axis=1))
         slip = np.full((count, *grid.shape), stroke / each_way)
         laws = EnergyLaw(share * COEFFICIENT), EnergyLaw((1.0 - share) * COEFFICIENT)
-        cycle = SlidingCycle(cycle_of(load, count), slip, passages=own)
+        cycle = SlidingCycle(cycle_of(load, count), slip, passages=passed)
         contact = NormalContact(HalfSpace(grid, PAIR))
         self._wearing = WearingContact(contact, laws, FRICTION, cycle, TOLERANCE)
         self._state = unworn(grid, form)
@@ -286,10 +286,10 @@ def test_over_a_long_stroke_the_slider_wears_alone_and_the_flat_evenly(stroke: f
     march.to_volume(2.0 * volume, 12)
     b, depth, _ = worn_cylinder(load, volume, RADIUS, MODULUS)
     tolerance = (b / stroke) ** 2
-    for own in (march.depth_1, march.depth_2):
-        assert own.sum() * grid.cell_area == pytest.approx(volume, rel=1e-9)
+    for worn in (march.depth_1, march.depth_2):
+        assert worn.sum() * grid.cell_area == pytest.approx(volume, rel=1e-9)
     assert march.depth_2.max() == pytest.approx(depth, rel=tolerance)
-    half = [0.5 * np.count_nonzero(own) * grid.pitch[0] for own in (march.depth_1, march.depth_2)]
+    half = [0.5 * np.count_nonzero(worn) * grid.pitch[0] for worn in (march.depth_1, march.depth_2)]
     assert half[1] == pytest.approx(b, abs=grid.pitch[0])
     assert half[0] == pytest.approx(half[1] + 0.5 * stroke, abs=1.01 * grid.pitch[0])
     middle = march.depth_1[np.abs(grid.x) < 0.2]

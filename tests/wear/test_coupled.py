@@ -75,7 +75,7 @@ def interface(grid: Grid, gap: Array, **settings) -> InterfaceSettings:
             "gap": np.ascontiguousarray(gap),
             "transfer": CellNodes(grid),
             "pair": PAIR,
-            "laws": tuple(EnergyLaw(own) for own in COEFFICIENTS),
+            "laws": tuple(EnergyLaw(coefficient) for coefficient in COEFFICIENTS),
             "friction": lambda energy: FRICTION,
             "stepper": ImplicitStepper(),
             "follow": False,
@@ -141,7 +141,7 @@ def run_constant(
 
 
 def in_turn(contacts: list[InterfaceSettings]) -> Contacts:
-    return Contacts([InterfaceContact(own) for own in contacts])
+    return Contacts([InterfaceContact(settings) for settings in contacts])
 
 
 # --- against closed forms -------------------------------------------------------------------------
@@ -191,8 +191,8 @@ def exact_volume(cycles: float) -> float:
     def rate(_: float, volume: Array) -> Array:
         return PER_LOAD * LOAD * (1.0 - volume / (AREA * FALL))
 
-    found = solve_ivp(rate, (0.0, cycles), [0.0], rtol=1e-10, atol=1e-14)
-    return float(found.y[0, -1])
+    solution = solve_ivp(rate, (0.0, cycles), [0.0], rtol=1e-10, atol=1e-14)
+    return float(solution.y[0, -1])
 
 
 def test_loads_that_fall_with_wear_follow_their_differential_equation() -> None:
@@ -229,7 +229,7 @@ def test_drift_asks_for_as_many_solutions_as_it_should(drift: float) -> None:
             solved.append(now)
     assert 1 < len(solved) < jumps or drift == 0.02
     assert states[-1].solutions == 1 + len(solved)
-    np.testing.assert_allclose([own for (own,) in source.solved], solved, rtol=1e-7)
+    np.testing.assert_allclose([asked for (asked,) in source.solved], solved, rtol=1e-7)
     np.testing.assert_allclose(states[-1].drift, drifts, rtol=1e-6, atol=1e-9)
     assert source.probed == 1 + jumps
     assert states[-1].volume == pytest.approx(volume, rel=1e-8)
@@ -355,16 +355,16 @@ def test_an_observer_may_be_anything() -> None:
 
 def numbers(state: InterfaceState) -> dict[str, object]:
     """All that a state is, by name."""
-    found: dict[str, object] = {}
+    parts: dict[str, object] = {}
     for name, value in vars(state).items():
         if name in ("surfaces", "loads"):
-            found |= {f"{name}.{part}": own for part, own in vars(value).items()}
+            parts |= {f"{name}.{part}": field for part, field in vars(value).items()}
         elif name == "starts":
             for t, start in value.items():
-                found |= {f"{name}.{t}.{part}": own for part, own in vars(start).items()}
+                parts |= {f"{name}.{t}.{part}": field for part, field in vars(start).items()}
         else:
-            found[name] = value
-    return found
+            parts[name] = value
+    return parts
 
 
 def same(one: InterfaceState, other: InterfaceState) -> None:

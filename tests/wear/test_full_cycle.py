@@ -93,15 +93,15 @@ def test_no_load_no_slip():
 
 
 def test_an_increment_that_fails_is_named(monkeypatch):
-    own = contact(ElasticPair(TITANIUM, TITANIUM))
-    advance = own.advance
+    failing = contact(ElasticPair(TITANIUM, TITANIUM))
+    advance = failing.advance
 
     def fails(*arguments):
         return replace(advance(*arguments), converged=False, message="circles; refine the grid")
 
-    monkeypatch.setattr(own, "advance", fails)
+    monkeypatch.setattr(failing, "advance", fails)
     with pytest.raises(ContactFailure, match=r"increment 1: .*refine the grid"):
-        march_cycle(own, GAP, mission())
+        march_cycle(failing, GAP, mission())
 
 
 @pytest.mark.parametrize("first", [TITANIUM, STEEL], ids=["alike", "unlike"])

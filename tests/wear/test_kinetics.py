@@ -49,7 +49,7 @@ def jumps(kind: str, cycles: float) -> Array:
     return np.sort(np.append(inside, [0.0, cycles]))
 
 
-def found(cycles: Array, values: Array) -> LinearRegime:
+def regime_of(cycles: Array, values: Array) -> LinearRegime:
     regime = linear_regime(cycles, values)
     assert regime is not None
     return regime
@@ -59,7 +59,7 @@ def found(cycles: Array, values: Array) -> LinearRegime:
 
 
 def test_line_is_linear_from_the_start() -> None:
-    regime = found(CYCLES, 3e-9 * CYCLES)
+    regime = regime_of(CYCLES, 3e-9 * CYCLES)
     assert regime.start == 0.0
     assert regime.rate == pytest.approx(3e-9, rel=1e-12)
     assert regime.uncertainty(np.array([1e6])) == pytest.approx(0.0, abs=1e-12)
@@ -69,7 +69,7 @@ def test_line_is_linear_from_the_start() -> None:
 def test_regime_begins_at_the_bend(bend: int) -> None:
     """Fast running-in up to the bend, then a line."""
     values = 3e-9 * CYCLES + 5e-9 * np.minimum(CYCLES, CYCLES[bend])
-    regime = found(CYCLES, values)
+    regime = regime_of(CYCLES, values)
     assert regime.start == CYCLES[bend]
     assert regime.rate == pytest.approx(3e-9, rel=1e-9)
 
@@ -79,7 +79,7 @@ def test_regime_begins_where_running_in_has_died_away() -> None:
     cycles = np.linspace(0.0, 3e5, 61)
     rate, excess, decay = 1e-9, 2e-9, 1.5e4
     values = rate * cycles + excess * decay * (1.0 - np.exp(-cycles / decay))
-    regime = found(cycles, values)
+    regime = regime_of(cycles, values)
     begin = decay * np.log(excess / (0.02 * rate))  # 6.9e4 cycles
     assert regime.start == pytest.approx(begin, abs=1.5e4)
     assert regime.rate == pytest.approx(rate, rel=0.02)
@@ -118,7 +118,7 @@ def test_too_few_jumps_or_no_wear_are_no_regime() -> None:
 @pytest.mark.parametrize("kind", ["growing", "random"])
 def test_uneven_jumps_count_by_their_slope(kind: str) -> None:
     cycles = jumps(kind, 1e5)
-    regime = found(cycles, 3e-9 * cycles)
+    regime = regime_of(cycles, 3e-9 * cycles)
     assert regime.start == 0.0
     assert regime.rate == pytest.approx(3e-9, rel=1e-12)
 
@@ -127,7 +127,7 @@ def test_noise_of_the_solver_does_not_count_in_a_jump_of_one_cycle() -> None:
     """Its slope is all noise: 1e-6 of the depth in 1e-5 of the cycles."""
     noise = 3e-4 * 1e-6 * np.random.default_rng(2).standard_normal(13)
     cycles = np.append(CYCLES, [1e5 + 1.0, 1e5 + 2.0])
-    regime = found(cycles, 3e-9 * cycles + noise)
+    regime = regime_of(cycles, 3e-9 * cycles + noise)
     assert regime.start == 0.0
     assert regime.rate == pytest.approx(3e-9, rel=1e-5)
 
@@ -139,7 +139,7 @@ def test_extrapolation_goes_on_from_the_last_value() -> None:
     values = 3e-9 * CYCLES + 5e-9 * np.minimum(CYCLES, 2e4)
     beyond = np.array([1e5, 2e5, 1e6])
     expected = 3e-9 * beyond + 1e-4
-    np.testing.assert_allclose(found(CYCLES, values).extrapolate(beyond), expected, rtol=1e-12)
+    np.testing.assert_allclose(regime_of(CYCLES, values).extrapolate(beyond), expected, rtol=1e-12)
 
 
 def test_bound_of_a_rate_that_drifts_evenly_is_exact() -> None:
@@ -148,7 +148,7 @@ def test_bound_of_a_rate_that_drifts_evenly_is_exact() -> None:
     for kind in ("equal", "growing", "random"):
         cycles = jumps(kind, 1e5)
         values, expected = (1e-9 * n * (1.0 - 1e-7 * n) for n in (cycles, beyond))
-        regime = found(cycles, values)
+        regime = regime_of(cycles, values)
         missed = regime.extrapolate(beyond) - expected
         np.testing.assert_allclose(regime.uncertainty(beyond), missed, rtol=1e-9, atol=1e-18)
 
@@ -156,7 +156,7 @@ def test_bound_of_a_rate_that_drifts_evenly_is_exact() -> None:
 @pytest.mark.parametrize("power", [0.96, 0.99, 1.01, 1.04])
 def test_bound_covers_curves_that_pass_for_linear(power: float) -> None:
     cycles, beyond = jumps("equal", 1e5), np.linspace(1e5, 1e6, 10)[1:]
-    regime = found(cycles, 1e-9 * cycles**power)
+    regime = regime_of(cycles, 1e-9 * cycles**power)
     missed = np.abs(1e-9 * beyond**power - regime.extrapolate(beyond))
     assert np.all(missed <= regime.uncertainty(beyond))
 
@@ -182,7 +182,7 @@ def test_extrapolation_agrees_with_the_computed_continuation(kind: str) -> None:
     further = np.linspace(4e6, 12e6, 41)[1:]
     depths = depths_of_pad(np.append(cycles, further))
     computed, continued = depths[: len(cycles)], depths[len(cycles) :]
-    regime = found(cycles, computed)
+    regime = regime_of(cycles, computed)
     assert 0.0 < regime.start <= LATEST_START * 4e6
     assert regime.rate == pytest.approx(WEAR * LOAD / WIDTH, rel=0.01)
     missed = np.abs(regime.extrapolate(further) - continued)

@@ -34,8 +34,8 @@ def history(**components):
 def as_tensor(stress):
     """(t, 6) → (t, 3, 3)."""
     tensor = np.empty((len(stress), 3, 3))
-    for own, (i, j) in zip(stress.T, INDICES, strict=True):
-        tensor[:, i, j] = tensor[:, j, i] = own
+    for component, (i, j) in zip(stress.T, INDICES, strict=True):
+        tensor[:, i, j] = tensor[:, j, i] = component
     return tensor
 
 
@@ -92,22 +92,24 @@ def test_smallest_circle_of_many_points_on_one():
 @pytest.mark.parametrize(("low", "high"), [(-200.0, 200.0), (0.0, 300.0), (-300.0, 100.0)])
 def test_findley_uniaxial(low, high, k):
     """[k σ_max + sqrt(σ_a² + k² σ_max²)] / 2, on planes where tan 2θ = σ_a / k σ_max."""
-    found = findley(history(xx=np.array([low, high])), k, FINE)
+    parameter = findley(history(xx=np.array([low, high])), k, FINE)
     amplitude = 0.5 * (high - low)
     expected = 0.5 * (k * high + np.hypot(amplitude, k * high))
-    assert found.value == pytest.approx(expected, rel=1e-6)
+    assert parameter.value == pytest.approx(expected, rel=1e-6)
     # The value is flat at its maximum: angles are found to the square root of its accuracy.
     double = np.arctan2(amplitude, k * high)
-    assert abs(found.normal[0]) == pytest.approx(np.cos(0.5 * double), abs=2e-3)
-    assert found.amplitude == pytest.approx(0.5 * amplitude * np.sin(double), rel=4e-3)
-    assert found.amplitude + k * found.normal_stress == pytest.approx(found.value, rel=1e-12)
+    assert abs(parameter.normal[0]) == pytest.approx(np.cos(0.5 * double), abs=2e-3)
+    assert parameter.amplitude == pytest.approx(0.5 * amplitude * np.sin(double), rel=4e-3)
+    assert parameter.amplitude + k * parameter.normal_stress == pytest.approx(
+        parameter.value, rel=1e-12
+    )
 
 
 @pytest.mark.parametrize("k", [0.0, 0.3])
 def test_findley_torsion(k):
     """T sqrt(1 + k²)."""
-    found = findley(history(xy=np.array([-150.0, 150.0])), k, FINE)
-    assert found.value == pytest.approx(150.0 * np.sqrt(1.0 + k**2), rel=1e-6)
+    parameter = findley(history(xy=np.array([-150.0, 150.0])), k, FINE)
+    assert parameter.value == pytest.approx(150.0 * np.sqrt(1.0 + k**2), rel=1e-6)
 
 
 @pytest.mark.parametrize("ratio", [0.2, 0.5, 2.0])
@@ -115,10 +117,10 @@ def test_findley_proportional_tension_torsion(ratio):
     """Mohr's circle of centre σ/2 and radius r, reversed: k σ/2 + r sqrt(1 + k²)."""
     tension, torsion = 200.0, 200.0 * ratio
     cycle = np.sin(2.0 * np.pi * np.arange(8) / 8)
-    found = findley(history(xx=tension * cycle, xy=torsion * cycle), SENSITIVITY, FINE)
+    parameter = findley(history(xx=tension * cycle, xy=torsion * cycle), SENSITIVITY, FINE)
     radius = np.hypot(0.5 * tension, torsion)
     expected = SENSITIVITY * 0.5 * tension + radius * np.sqrt(1.0 + SENSITIVITY**2)
-    assert found.value == pytest.approx(expected, rel=1e-6)
+    assert parameter.value == pytest.approx(expected, rel=1e-6)
 
 
 def by_brute_force(stress_amplitudes, k):
@@ -159,14 +161,14 @@ def test_findley_by_dense_planes_on_random_histories():
     The circle is between half the longest chord and 2/sqrt(3) of that (Jung).
     """
     stress = np.random.default_rng(4).standard_normal((6, 6, 3))
-    found = findley(stress, 0.0, FINE)
+    parameter = findley(stress, 0.0, FINE)
     normal = PlaneSearch(5000, 0).normals
     for point in range(3):
         vector = np.einsum("tij,pj->tpi", as_tensor(stress[..., point]), normal)
         shear = vector - normal * np.einsum("tpi,pi->tp", vector, normal)[..., None]
         chords = np.linalg.norm(shear[:, None] - shear[None], axis=-1).max(axis=(0, 1))
         half = 0.5 * chords.max()
-        assert half * (1.0 - 1e-3) <= found.value[point] <= half * 2.0 / np.sqrt(3.0)
+        assert half * (1.0 - 1e-3) <= parameter.value[point] <= half * 2.0 / np.sqrt(3.0)
 
 
 # --- Smith, Watson and Topper
@@ -175,25 +177,25 @@ def test_findley_by_dense_planes_on_random_histories():
 @pytest.mark.parametrize(("low", "high"), [(-200.0, 200.0), (0.0, 300.0), (-300.0, 100.0)])
 def test_swt_uniaxial(low, high):
     """σ_max σ_a / E on the plane across."""
-    found = smith_watson_topper(history(xx=np.array([low, high])), STEEL, FINE)
-    assert found.value == pytest.approx(high * 0.5 * (high - low) / STEEL.young, rel=1e-6)
-    assert abs(found.normal[0]) == pytest.approx(1.0, abs=1e-5)
-    assert found.normal_stress == pytest.approx(high, rel=1e-5)
+    parameter = smith_watson_topper(history(xx=np.array([low, high])), STEEL, FINE)
+    assert parameter.value == pytest.approx(high * 0.5 * (high - low) / STEEL.young, rel=1e-6)
+    assert abs(parameter.normal[0]) == pytest.approx(1.0, abs=1e-5)
+    assert parameter.normal_stress == pytest.approx(high, rel=1e-5)
 
 
 def test_swt_torsion():
     """T² (1+ν) / E at 45°."""
-    found = smith_watson_topper(history(xy=np.array([-150.0, 150.0])), STEEL, FINE)
-    assert found.value == pytest.approx(150.0**2 * 1.3 / STEEL.young, rel=1e-6)
+    parameter = smith_watson_topper(history(xy=np.array([-150.0, 150.0])), STEEL, FINE)
+    assert parameter.value == pytest.approx(150.0**2 * 1.3 / STEEL.young, rel=1e-6)
 
 
 def test_swt_proportional_tension_torsion():
     """σ1 (σ1 - ν σ2) / E of the principal stresses of the reversed state."""
-    found = smith_watson_topper(
+    parameter = smith_watson_topper(
         history(xx=np.array([-200.0, 200.0]), xy=np.array([-80.0, 80.0])), STEEL, FINE
     )
     first, second = 100.0 + np.hypot(100.0, 80.0), 100.0 - np.hypot(100.0, 80.0)
-    assert found.value == pytest.approx(first * (first - 0.3 * second) / STEEL.young, rel=1e-6)
+    assert parameter.value == pytest.approx(first * (first - 0.3 * second) / STEEL.young, rel=1e-6)
 
 
 def test_swt_is_0_where_nothing_is_pulled():
@@ -232,16 +234,16 @@ def test_constant_stress_has_no_amplitude(parameter):
 
 def test_constant_stress_is_worth_its_largest_principal_to_findley():
     stress = 100.0 * np.random.default_rng(1).standard_normal((1, 6))
-    found = findley(stress, SENSITIVITY, FINE)
+    parameter = findley(stress, SENSITIVITY, FINE)
     largest = np.linalg.eigvalsh(as_tensor(stress)[0])[-1]
-    assert found.value == pytest.approx(SENSITIVITY * largest, rel=1e-5)
+    assert parameter.value == pytest.approx(SENSITIVITY * largest, rel=1e-5)
 
 
 @pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=PARAMETERS)
 def test_order_of_states_does_not_matter(parameter):
     stress = np.random.default_rng(2).standard_normal((8, 6, 4))
-    found, other = parameter(stress, PlaneSearch()), parameter(stress[::-1], PlaneSearch())
-    np.testing.assert_allclose(found.value, other.value, rtol=1e-9)
+    forward, other = parameter(stress, PlaneSearch()), parameter(stress[::-1], PlaneSearch())
+    np.testing.assert_allclose(forward.value, other.value, rtol=1e-9)
 
 
 @pytest.mark.parametrize("parameter", PARAMETERS.values(), ids=PARAMETERS)
@@ -249,12 +251,12 @@ def test_maps_are_their_points(parameter):
     """More points than are searched at once, in any shape."""
     stress = np.random.default_rng(3).standard_normal((3, 6, 70, 61))
     search = PlaneSearch(10, 1)
-    found = parameter(stress, search)
-    assert found.value.shape == (70, 61)
-    assert found.normal.shape == (3, 70, 61)
+    maps = parameter(stress, search)
+    assert maps.value.shape == (70, 61)
+    assert maps.normal.shape == (3, 70, 61)
     alone = parameter(stress[:, :, 69, 60], search)
-    assert found.value[69, 60] == pytest.approx(float(alone.value), rel=1e-12)
-    np.testing.assert_allclose(np.linalg.norm(found.normal, axis=0), 1.0, rtol=1e-12)
+    assert maps.value[69, 60] == pytest.approx(float(alone.value), rel=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(maps.normal, axis=0), 1.0, rtol=1e-12)
 
 
 @pytest.mark.parametrize("parameter", [slow(PARAMETERS["findley"]), PARAMETERS["swt"]])
@@ -280,10 +282,10 @@ def test_ruiz_by_hand():
     slip, shear = np.zeros((2, 2, 1, 1)), np.zeros((2, 2, 1, 1))
     slip[:, 0, 0, 0], shear[:, 0, 0, 0] = (0.04, -0.04), (-80.0, 80.0)
     stress = history(xx=np.array([300.0, -200.0]), zz=np.array([-900.0, 0.0]))[..., None, None]
-    found = ruiz(stress, shear, slip)
-    assert found.work.item() == pytest.approx(6.4, rel=1e-12)
-    assert found.friction_parameter.item() == pytest.approx(1.6, rel=1e-12)
-    assert found.cracking_parameter.item() == pytest.approx(480.0, rel=1e-12)
+    parameters = ruiz(stress, shear, slip)
+    assert parameters.work.item() == pytest.approx(6.4, rel=1e-12)
+    assert parameters.friction_parameter.item() == pytest.approx(1.6, rel=1e-12)
+    assert parameters.cracking_parameter.item() == pytest.approx(480.0, rel=1e-12)
 
 
 def test_ruiz_does_not_depend_on_axes_in_the_surface():
@@ -298,9 +300,9 @@ def test_ruiz_does_not_depend_on_axes_in_the_surface():
 
 def test_nothing_pulled_no_cracks():
     stress = history(xx=np.array([-300.0, -10.0]), yy=np.array([-20.0, -5.0]))
-    found = ruiz(stress, -np.ones((2, 2)), np.ones((2, 2)))
-    assert found.friction_parameter > 0.0
-    assert found.cracking_parameter == 0.0
+    parameters = ruiz(stress, -np.ones((2, 2)), np.ones((2, 2)))
+    assert parameters.friction_parameter > 0.0
+    assert parameters.cracking_parameter == 0.0
 
 
 def test_what_has_no_meaning_is_refused():

@@ -49,16 +49,16 @@ def wearing(
     return WearingContact(contact, laws, FRICTION, SlidingCycle(loads, slip), 1e-12)
 
 
-def march(own: WearingContact, kind: str, cycles: float, steps: int = 1) -> WearState:
+def march(contact: WearingContact, kind: str, cycles: float, steps: int = 1) -> WearState:
     state = WearState.unworn(BALL)
     for _ in range(steps):
-        state = getattr(own, f"{kind}_step")(state, cycles / steps).state
+        state = getattr(contact, f"{kind}_step")(state, cycles / steps).state
     return state
 
 
-def limit(own: WearingContact) -> float:
+def limit(contact: WearingContact) -> float:
     """Longest stable explicit step."""
-    return own.stable_cycles(WearState.unworn(BALL))
+    return contact.stable_cycles(WearState.unworn(BALL))
 
 
 def assert_same(one: WearState, two: WearState, tolerance: float) -> None:
@@ -71,21 +71,21 @@ def assert_same(one: WearState, two: WearState, tolerance: float) -> None:
 @pytest.mark.parametrize("share", [0.0, 0.3, 0.5, 1.0])
 def test_equal_cycles_wear_as_the_one(share: float) -> None:
     """To rounding where all increments see the same surfaces: in explicit steps."""
-    own = wearing(HEAVY)
+    single = wearing(HEAVY)
     mixed = wearing(HEAVY, HEAVY, shares=(share, 1.0 - share))
-    cycles = 2.0 * limit(own)
-    assert limit(mixed) == pytest.approx(limit(own), rel=1e-12)
-    assert_same(march(mixed, "explicit", cycles, 4), march(own, "explicit", cycles, 4), 1e-12)
+    cycles = 2.0 * limit(single)
+    assert limit(mixed) == pytest.approx(limit(single), rel=1e-12)
+    assert_same(march(mixed, "explicit", cycles, 4), march(single, "explicit", cycles, 4), 1e-12)
 
 
 @pytest.mark.parametrize(("kind", "order"), [("implicit", 1), slow("second_order", 2)])
 def test_equal_cycles_wear_as_the_one_to_the_order_of_the_step(kind: str, order: int) -> None:
-    own, mixed = wearing(HEAVY), wearing(HEAVY, HEAVY, shares=(0.6, 0.4))
-    cycles = 2.0 * limit(own)
+    single, mixed = wearing(HEAVY), wearing(HEAVY, HEAVY, shares=(0.6, 0.4))
+    cycles = 2.0 * limit(single)
     change = [
         np.abs(
             march(mixed, kind, cycles, steps).surfaces.depth
-            - march(own, kind, cycles, steps).surfaces.depth
+            - march(single, kind, cycles, steps).surfaces.depth
         ).sum()
         for steps in (4, 8)
     ]
@@ -94,9 +94,9 @@ def test_equal_cycles_wear_as_the_one_to_the_order_of_the_step(kind: str, order:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_cycle_that_never_happens_changes_nothing(kind: str) -> None:
-    own, mixed = wearing(HEAVY), wearing(HEAVY, LIGHT, shares=(1.0, 0.0))
-    cycles = limit(own)
-    assert_same(march(mixed, kind, cycles, 3), march(own, kind, cycles, 3), 1e-12)
+    single, mixed = wearing(HEAVY), wearing(HEAVY, LIGHT, shares=(1.0, 0.0))
+    cycles = limit(single)
+    assert_same(march(mixed, kind, cycles, 3), march(single, kind, cycles, 3), 1e-12)
 
 
 @pytest.mark.parametrize("kind", KINDS)
@@ -119,11 +119,11 @@ def test_depth_is_the_mean_of_the_cycles_by_their_shares() -> None:
     """In one explicit step, with laws linear and not in the slip of a cycle."""
     for law in (EnergyLaw(ALPHA), EnergyAmplitudeLaw(ALPHA, 0.03)):
         laws = law, law
-        parts = [wearing(own, laws=laws) for own in (HEAVY, LIGHT)]
+        parts = [wearing(block, laws=laws) for block in (HEAVY, LIGHT)]
         mixed = wearing(HEAVY, LIGHT, shares=(0.7, 0.3), laws=laws)
-        alone = [march(own, "explicit", 1000.0).surfaces.depth_1 for own in parts]
-        found = march(mixed, "explicit", 1000.0).surfaces.depth_1
-        np.testing.assert_allclose(found, 0.7 * alone[0] + 0.3 * alone[1], rtol=1e-12, atol=1e-18)
+        alone = [march(contact, "explicit", 1000.0).surfaces.depth_1 for contact in parts]
+        depth = march(mixed, "explicit", 1000.0).surfaces.depth_1
+        np.testing.assert_allclose(depth, 0.7 * alone[0] + 0.3 * alone[1], rtol=1e-12, atol=1e-18)
 
 
 @pytest.mark.slow
@@ -135,7 +135,9 @@ def test_order_of_cycles_matters_to_first_order_in_the_step() -> None:
     cycles = 2.0 * limit(one)
     change = []
     for steps in (4, 8, 16):
-        depths = [march(own, "implicit", cycles, steps).surfaces.depth for own in (one, two)]
+        depths = [
+            march(contact, "implicit", cycles, steps).surfaces.depth for contact in (one, two)
+        ]
         change.append(np.abs(depths[0] - depths[1]).sum() / depths[1].sum())
     rates = np.log2(np.array(change[:-1]) / change[1:])
     assert np.all(rates > 0.8), rates
@@ -151,7 +153,7 @@ def test_evolving_coefficients_follow_the_energy_of_the_mix() -> None:
     )
     mixed = wearing(HEAVY, LIGHT, shares=(0.7, 0.3), laws=laws)
     state = WearState.unworn(BALL)
-    starts = {t: own.start for t, own in mixed.cycle(state, mixed.dissipating).states.items()}
+    starts = {t: solved.start for t, solved in mixed.cycle(state, mixed.dissipating).states.items()}
     after = mixed.explicit_step(replace(state, starts=starts), 1500.0).state
     volume = after.surfaces.depth_1.sum() * GRID.cell_area
     assert after.energy > 3e4
@@ -175,7 +177,7 @@ def test_each_cycle_of_a_mix_is_closed_by_itself(last: float) -> None:
     contact = FrictionalContact(HALF_SPACE, FRICTION, 1e-8)
     cycles = [sheared(1.0, last), sheared(0.6, last), sheared(1.0, last)]
     mixed = march_cycle(contact, BALL, LoadHistory.mix(cycles, (0.5, 0.3, 0.2)))
-    alone = [state for own in cycles for state in march_cycle(contact, BALL, own)]
+    alone = [state for history in cycles for state in march_cycle(contact, BALL, history)]
     assert len(mixed) == len(alone) == 15
     for one, two in zip(mixed, alone, strict=True):
         np.testing.assert_array_equal(one.shear, two.shear)
@@ -196,7 +198,7 @@ def test_a_history_is_one_cycle_unless_mixed() -> None:
 
 
 def test_mean_energy_is_by_shares() -> None:
-    spent = [replace(own, Edx=own.P, Edy=0.5 * own.P) for own in (HEAVY[0], LIGHT[0])]
+    spent = [replace(loads, Edx=loads.P, Edy=0.5 * loads.P) for loads in (HEAVY[0], LIGHT[0])]
     mixed = LoadHistory.mix(spent, (0.25, 0.75))
     expected = 0.25 * spent[0].mean_energy + 0.75 * spent[1].mean_energy
     assert mixed.mean_energy == pytest.approx(expected, rel=1e-14)

@@ -257,9 +257,9 @@ PRESSURE = np.broadcast_to(np.where(np.abs(GRID.x) < 0.5, 100.0, 0.0), GRID.shap
 
 
 def test_passages_follow_the_offsets() -> None:
-    found = passages(GRID, followed(GRID, sliding(0.3, 0.5, -0.8), PRESSURE))
-    assert found is not None
-    along = [(own.before[0], own.after[0]) for own in found]
+    passes = passages(GRID, followed(GRID, sliding(0.3, 0.5, -0.8), PRESSURE))
+    assert passes is not None
+    along = [(passage.before[0], passage.after[0]) for passage in passes]
     np.testing.assert_allclose(along, [(-0.4, -0.1), (-0.1, 0.4), (0.4, -0.4)], atol=1e-14)
 
 
@@ -273,7 +273,7 @@ def test_small_strokes_are_not_followed_unless_forced() -> None:
 def test_each_block_of_a_mix_closes_by_itself() -> None:
     """Where one counts all are followed, each about its own middle."""
     slip = sliding(0.02, -0.02, 0.4, -0.4)
-    found = followed(GRID, slip, PRESSURE, [slice(0, 2), slice(2, 4)])
-    np.testing.assert_allclose(found[:, 0, 0], [-0.01, 0.01, -0.2, 0.2], atol=1e-14)
-    np.testing.assert_allclose(found[:, 1, 0], [0.01, -0.01, 0.2, -0.2], atol=1e-14)
-    assert not found[..., 1].any()
+    places = followed(GRID, slip, PRESSURE, [slice(0, 2), slice(2, 4)])
+    np.testing.assert_allclose(places[:, 0, 0], [-0.01, 0.01, -0.2, 0.2], atol=1e-14)
+    np.testing.assert_allclose(places[:, 1, 0], [0.01, -0.01, 0.2, -0.2], atol=1e-14)
+    assert not places[..., 1].any()

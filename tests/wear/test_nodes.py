@@ -140,12 +140,12 @@ def test_order_of_convergence(stepper, order) -> None:
     cycles, errors = float(SCALES.min()), []
     for count in (8, 16, 32):
         length = cycles / count
-        own = (
+        method = (
             ExplicitStepper(cycles=length) if stepper == "explicit" else HeunStepper(np.inf, np.inf)
         )
         state = unworn()
         for _ in range(count):
-            state = own.step(state, length, cycles, springs).state
+            state = method.step(state, length, cycles, springs).state
         errors.append(np.abs(state.surfaces.depth - exact(cycles)).max())
     rates = np.log2(np.divide(errors[:-1], errors[1:]))
     np.testing.assert_allclose(rates, order, atol=0.15)
@@ -194,7 +194,7 @@ def test_given_steps_beyond_the_limit_are_refused() -> None:
 def test_an_energy_threshold_is_passed_without_an_error(stepper) -> None:
     """V = α (ΣEd - Ed_th), exactly; before, any step is stable."""
     threshold = 0.02
-    laws = tuple(EvolvingLaw(own, EnergyTable(threshold=threshold), "global") for own in LAWS)
+    laws = tuple(EvolvingLaw(law, EnergyTable(threshold=threshold), "global") for law in LAWS)
 
     def contact_at(state: NodalState) -> NodalContact:
         return springs(state, laws)

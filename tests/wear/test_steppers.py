@@ -128,7 +128,7 @@ def automatic(stepper, cycles: float) -> WearStep:
     """A run whose steps choose their own length."""
     state = rounded()
     first = CONSTANT.cycle(state, CONSTANT.dissipating)
-    starts = {t: own.start for t, own in first.states.items()}
+    starts = {t: solved.start for t, solved in first.states.items()}
     limit = CONSTANT.stable_cycles(state)
     state = replace(state, starts=starts, next_cycles=4.0 * limit)
     end = advance_cycles(stepper, state, cycles, cycles, unchanging)
@@ -167,7 +167,7 @@ def test_automatic_steps_take_a_tenth_of_the_explicit_ones() -> None:
     explicit = automatic(ExplicitStepper(fraction=1.0), cycles)
     implicit = automatic(ImplicitStepper(ErrorControl(0.01)), cycles)
     assert implicit.spent.contact_solves <= 0.1 * explicit.spent.contact_solves
-    depth, other = (own.state.surfaces.depth for own in (implicit, explicit))
+    depth, other = (end.state.surfaces.depth for end in (implicit, explicit))
     assert depth.max() == pytest.approx(other.max(), rel=0.01)
     assert depth.sum() == pytest.approx(other.sum(), rel=0.01)
 

@@ -50,15 +50,15 @@ def unworn(gap: Array = BALL) -> WearState:
     return WearState.unworn(gap)
 
 
-def step(own: WearingContact, kind: str, state: WearState, cycles: float) -> WearStep:
-    return getattr(own, f"{kind}_step")(state, cycles)
+def step(contact: WearingContact, kind: str, state: WearState, cycles: float) -> WearStep:
+    return getattr(contact, f"{kind}_step")(state, cycles)
 
 
-def march(own: WearingContact, kind: str, cycles: float, jumps: int) -> WearState:
+def march(contact: WearingContact, kind: str, cycles: float, jumps: int) -> WearState:
     """State after ``cycles`` in so many equal jumps."""
     state = unworn()
     for _ in range(jumps):
-        state = step(own, kind, state, cycles / jumps).state
+        state = step(contact, kind, state, cycles / jumps).state
     return state
 
 
@@ -71,10 +71,10 @@ def test_worn_volume_is_coefficient_times_energy(kind: str) -> None:
     laws = EnergyLaw(1e-8), EnergyLaw(3.7e-8)
     history = loads(500.0, 2000.0, 1200.0)
     slip = SLIP * np.random.default_rng(0).random((3, *GRID.shape))
-    own, state = wearing(laws, history, slip), unworn()
-    cycles = 0.4 * own.stable_cycles(state)
+    contact, state = wearing(laws, history, slip), unworn()
+    cycles = 0.4 * contact.stable_cycles(state)
     for _ in range(4):
-        before, state = state, step(own, kind, state, cycles).state
+        before, state = state, step(contact, kind, state, cycles).state
         for name in ("depth_1", "depth_2"):
             assert np.all(getattr(state.surfaces, name) >= getattr(before.surfaces, name))
     surfaces = state.surfaces
@@ -131,21 +131,21 @@ def test_equal_bodies_wear_equally_and_surfaces_add_up() -> None:
 
 
 def test_uniform_wear_of_both_bodies_changes_no_pressure() -> None:
-    own, surfaces = wearing(), Surfaces.unworn(BALL)
+    contact, surfaces = wearing(), Surfaces.unworn(BALL)
     layer = np.full(GRID.shape, 0.01)
-    before = own.solve(surfaces, 0, None)
-    after = own.solve(surfaces.worn(layer, 2.0 * layer), 0, None)
+    before = contact.solve(surfaces, 0, None)
+    after = contact.solve(surfaces.worn(layer, 2.0 * layer), 0, None)
     np.testing.assert_allclose(after.pressure, before.pressure, atol=1e-6 * before.pressure.max())
     assert after.approach - before.approach == pytest.approx(0.03, rel=1e-6)
 
 
 def test_a_law_without_coefficient_wears_nothing() -> None:
-    own = wearing((EnergyLaw(0.0), EnergyLaw(0.0)))
+    contact = wearing((EnergyLaw(0.0), EnergyLaw(0.0)))
     for kind in KINDS:
-        state = step(own, kind, unworn(), 1e6).state
+        state = step(contact, kind, unworn(), 1e6).state
         assert not state.surfaces.depth.any()
         assert state.energy > 0.0
-    assert own.stable_cycles(unworn()) == np.inf
+    assert contact.stable_cycles(unworn()) == np.inf
 
 
 # --- what a cycle consists of -------------------------------------------------------------------
@@ -160,30 +160,30 @@ def test_working_increments_end_with_the_heaviest() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_stuck_cycle_wears_nothing(kind: str) -> None:
-    own = wearing(slip=np.zeros((1, *GRID.shape)))
-    state = step(own, kind, unworn(), 1e6).state
-    assert own.dissipating == []
+    contact = wearing(slip=np.zeros((1, *GRID.shape)))
+    state = step(contact, kind, unworn(), 1e6).state
+    assert contact.dissipating == []
     assert not state.surfaces.depth.any()
     assert state.energy == 0.0
-    assert own.stable_cycles(state) == np.inf
+    assert contact.stable_cycles(state) == np.inf
 
 
 def test_unsolvable_contact_is_a_failure_that_names_its_increment() -> None:
-    own = replace(wearing(), tolerance=1e-300)
+    contact = replace(wearing(), tolerance=1e-300)
     with pytest.raises(ContactFailure, match="increment 1: "):
-        own.solve(Surfaces.unworn(BALL), 0, None)
+        contact.solve(Surfaces.unworn(BALL), 0, None)
 
 
 # --- physics ------------------------------------------------------------------------------------
 
 
 def test_wear_of_a_ball_flattens_the_peak_and_widens_the_contact() -> None:
-    own = wearing()
-    limit = own.stable_cycles(unworn())
+    contact = wearing()
+    limit = contact.stable_cycles(unworn())
     peaks, areas = [], []
     for jumps in range(6):
-        state = march(own, "implicit", jumps * limit, jumps) if jumps else unworn()
-        pressure = own.solve(state.surfaces, 0, None).pressure
+        state = march(contact, "implicit", jumps * limit, jumps) if jumps else unworn()
+        pressure = contact.solve(state.surfaces, 0, None).pressure
         assert pressure.sum() * GRID.cell_area == pytest.approx(LOAD, rel=1e-9)
         peaks.append(pressure.max())
         areas.append(np.count_nonzero(pressure))
@@ -196,11 +196,11 @@ def test_wear_of_a_ball_flattens_the_peak_and_widens_the_contact() -> None:
 def test_nothing_wears_where_nothing_slips(kind: str) -> None:
     """A stick zone in the middle keeps its surface to the last bit, and takes over the load."""
     slip = np.where(GRID.x**2 + GRID.y**2 < 0.2**2, 0.0, SLIP)[None]
-    own = wearing(slip=slip)
-    state = march(own, kind, 100.0 * own.stable_cycles(unworn()), 4)
+    contact = wearing(slip=slip)
+    state = march(contact, kind, 100.0 * contact.stable_cycles(unworn()), 4)
     assert not state.surfaces.depth[slip[0] == 0.0].any()
     before, after = (
-        own.solve(surfaces, 0, None).pressure[slip[0] == 0.0].sum()
+        contact.solve(surfaces, 0, None).pressure[slip[0] == 0.0].sum()
         for surfaces in (Surfaces.unworn(BALL), state.surfaces)
     )
     assert after > 1.5 * before
@@ -212,10 +212,10 @@ def test_nothing_wears_where_nothing_slips(kind: str) -> None:
 @pytest.mark.parametrize("laws", [EQUAL, slow((EnergyAmplitudeLaw(4e-8, 0.02),) * 2)])
 def test_explicit_and_implicit_meet_at_first_order(laws: tuple[WearLaw, WearLaw]) -> None:
     """Their difference halves as jumps double, and both extrapolate to one depth."""
-    own = wearing(laws, loads(1000.0, LOAD))
-    cycles = 3.0 * own.stable_cycles(unworn())
+    contact = wearing(laws, loads(1000.0, LOAD))
+    cycles = 3.0 * contact.stable_cycles(unworn())
     depth = {
-        (kind, jumps): march(own, kind, cycles, jumps).surfaces.depth_1
+        (kind, jumps): march(contact, kind, cycles, jumps).surfaces.depth_1
         for kind in ("explicit", "implicit")
         for jumps in (8, 16, 32)
     }

@@ -48,7 +48,8 @@ class InThisProcess:
     def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
         shares = sent(list(zip(*arguments, strict=True)))
         return [
-            sent(own(method, *share)) for own, share in zip(self._answering, shares, strict=True)
+            sent(answer(method, *share))
+            for answer, share in zip(self._answering, shares, strict=True)
         ]
 
 
@@ -56,7 +57,7 @@ class InThisProcess:
 def _workers(
     make: Callable[[Any], Callable[..., Any]], settings: Sequence[Any]
 ) -> Iterator[InThisProcess]:
-    yield InThisProcess([make(sent(own)) for own in settings])
+    yield InThisProcess([make(sent(setting)) for setting in settings])
 
 
 def _one_by_one(jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]]) -> None:

@@ -245,12 +245,14 @@ class Run:
 
     def heights(self) -> dict[str, Array]:
         """All surfaces of ``results.h5`` by interface, jump and body."""
-        found = {}
+        heights = {}
         with h5py.File(self.folder / "results.h5") as file:
             file["surfaces"].visititems(
-                lambda name, item: found.update({name: item[()]} if hasattr(item, "shape") else {})
+                lambda name, item: heights.update(
+                    {name: item[()]} if hasattr(item, "shape") else {}
+                )
             )
-        return found
+        return heights
 
 
 Runner = Callable[..., Run]
@@ -308,7 +310,7 @@ def _all_here() -> Iterator[None]:
 
 
 @pytest.fixture
-def own_processes(monkeypatch: pytest.MonkeyPatch) -> None:
+def separate_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Contacts and pictures have processes of their own, as where there is no test."""
     monkeypatch.setattr(contact_workers, "workers", processes.workers)
     monkeypatch.setattr(drawing, "side_by_side", processes.side_by_side)

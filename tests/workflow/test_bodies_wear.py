@@ -186,12 +186,12 @@ def test_following_the_motion_can_be_forced() -> None:
     overrides = "wear.cycles=200", "load_path.P=20 N"
     for stroke, automatic in (("0.2 mm", "follow"), ("4 um", "neglect")):
         given = [*overrides, f"load_path.stroke={stroke}"]
-        found = {
+        depths = {
             chosen: worn(area(*given, f"wear.motion={chosen}"))[1].surfaces.depth_1
             for chosen in ("auto", "follow", "neglect")
         }
-        np.testing.assert_array_equal(found["auto"], found[automatic])
-        assert np.abs(found["follow"] - found["neglect"]).max() > 0.0
+        np.testing.assert_array_equal(depths["auto"], depths[automatic])
+        assert np.abs(depths["follow"] - depths["neglect"]).max() > 0.0
 
 
 def test_the_flat_wears_as_the_punch_passes_over_it() -> None:
@@ -260,11 +260,11 @@ def test_a_run_writes_what_every_wear_run_does(tmp_path: Path) -> None:
         *("wear.cycles=1e5", "wear.step.cycles=5e4", "contact.grid=[64, 1]"),
         "stress={section: x, life: {parameter: ruiz}}",
     )
-    own = summary["interface"]
+    interface = summary["interface"]
     assert summary["per_length"] is True
     # µ P 2s = 0.5 N mm/mm a cycle.
-    assert own["volume_1"] == pytest.approx(5e-9 * 0.5 * 1e5, rel=1e-9)
-    assert own["energy_per_cycle"]["half_space"] == pytest.approx(0.5, rel=1e-9)
+    assert interface["volume_1"] == pytest.approx(5e-9 * 0.5 * 1e5, rel=1e-9)
+    assert interface["energy_per_cycle"]["half_space"] == pytest.approx(0.5, rel=1e-9)
     assert {"results.h5", "case.yaml", "run.log"} <= {p.name for p in (tmp_path / "out").iterdir()}
 
 

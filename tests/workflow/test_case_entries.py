@@ -52,7 +52,7 @@ EVOLUTIONS = {
 
 def laws(lengths, *bodies):
     """The laws and evolutions that the templates do not have, for bodies of these names."""
-    own = {
+    by_law = {
         "archard": {"law": "archard", **lengths, **dict.fromkeys(bodies, ARCHARD_BODY)},
         "energy_amplitude": {
             "law": "energy_amplitude",
@@ -61,7 +61,7 @@ def laws(lengths, *bodies):
             **dict.fromkeys(bodies, ENERGY_BODY),
         },
     }
-    return {"wear": own} | {f"wear.{body}.evolution": EVOLUTIONS for body in bodies}
+    return {"wear": by_law} | {f"wear.{body}.evolution": EVOLUTIONS for body in bodies}
 
 
 def wear(*bodies):
@@ -222,16 +222,16 @@ class Leaf:
     @property
     def needed(self) -> list[str]:
         """Overrides that make the template have it."""
-        found = []
+        overrides = []
         for section, given in ({"expect": {ALWAYS: EXPECT}} | GIVEN.get(self.kind, {})).items():
             if self.key.startswith(f"{section}."):
                 chosen = [given[tag] for tag in (*self.tags, ALWAYS) if tag in given]
-                found += [f"{section}={value}" for value in chosen[:1]]
+                overrides += [f"{section}={value}" for value in chosen[:1]]
         if "friction_contact" in self.tags:
-            found.append(f"structure={REDUCED}")
+            overrides.append(f"structure={REDUCED}")
         if "friction_rig" in self.tags:
-            found.append(f"joint={CONTACT | {'normal_load': 60}}")
-        return found
+            overrides.append(f"joint={CONTACT | {'normal_load': 60}}")
+        return overrides
 
     @property
     def is_list(self) -> bool:
@@ -334,11 +334,11 @@ def refused(leaf, folders, value):
 
 
 def test_walk_finds_the_leaves():
-    found = {leaf.key for leaf in PLACES}
-    assert {"wear.blade.hardness", "wear.reference_amplitude", "expect.0.tolerance"} <= found
-    assert {"load_path.legs.0.approach", "structure.radius_y", "contact.datum"} <= found
-    assert {"structure.contacts.0.gap.file", "structure.loads.0.speed"} <= found
-    assert {"wear.reported.0.steady", "structure.form.across", "nonlinearity.check"} <= found
+    keys = {leaf.key for leaf in PLACES}
+    assert {"wear.blade.hardness", "wear.reference_amplitude", "expect.0.tolerance"} <= keys
+    assert {"load_path.legs.0.approach", "structure.radius_y", "contact.datum"} <= keys
+    assert {"structure.contacts.0.gap.file", "structure.loads.0.speed"} <= keys
+    assert {"wear.reported.0.steady", "structure.form.across", "nonlinearity.check"} <= keys
     assert len(set(map(str, PLACES))) == len(PLACES) > 1000
     assert len(set(map(str, LEAVES))) == len(LEAVES) > 350
 

@@ -84,9 +84,9 @@ def test_template_has_every_entry(kind):
 def uncommented(text, *sections):
     """``text`` with the optional ``sections`` filled in, each with the lines below it."""
     for section in sections:
-        found = re.search(rf"^( *)# {section}:.*\n(?:\1#   .*\n)*", text, re.MULTILINE)
-        opened = re.sub(rf"^{found[1]}# ", found[1], found[0], flags=re.MULTILINE)
-        text = text[: found.start()] + opened + text[found.end() :]
+        block = re.search(rf"^( *)# {section}:.*\n(?:\1#   .*\n)*", text, re.MULTILINE)
+        opened = re.sub(rf"^{block[1]}# ", block[1], block[0], flags=re.MULTILINE)
+        text = text[: block.start()] + opened + text[block.end() :]
     return text
 
 

@@ -56,12 +56,12 @@ def test_cheapest_combination_is_that_of_an_exhaustive_search():
     for accuracy in (0.02, 0.03, 0.05):
         met = [c for c in everything if sum(option.error for option in c) <= accuracy]
         best = min(np.prod([option.ratio for option in c]) for c in met)
-        found = cheapest(axes, accuracy)
-        assert found is not None
-        assert found.seconds_ratio == pytest.approx(best, rel=1e-12)
-        assert found.error <= accuracy
-        assert all(rung.startswith(axis) for axis, rung in found.rungs.items())
-        assert list(found.rungs) == list("abcd")
+        choice = cheapest(axes, accuracy)
+        assert choice is not None
+        assert choice.seconds_ratio == pytest.approx(best, rel=1e-12)
+        assert choice.error <= accuracy
+        assert all(rung.startswith(axis) for axis, rung in choice.rungs.items())
+        assert list(choice.rungs) == list("abcd")
     assert cheapest(axes, 1e-6) is None
 
 
@@ -72,35 +72,35 @@ def test_cheapest_combination_is_that_of_an_exhaustive_search():
 @pytest.mark.parametrize("order", [0.5, 1.0, 2.0])
 def test_richardson_finds_order_and_limit_of_a_power(steps: tuple[float, ...], order: float):
     values = [3.0 - 0.7 * h**order for h in steps]
-    found = richardson(values, steps, order=2.0)
-    assert found.order == pytest.approx(order, rel=1e-9)
-    assert found.error == pytest.approx(3.0 - values[-1], rel=1e-9)
+    convergence = richardson(values, steps, order=2.0)
+    assert convergence.order == pytest.approx(order, rel=1e-9)
+    assert convergence.error == pytest.approx(3.0 - values[-1], rel=1e-9)
 
 
 def test_an_order_above_what_is_believed_is_not_used():
     values = [1.0 + h**4 for h in (4.0, 2.0, 1.0)]
-    found = richardson(values, (4.0, 2.0, 1.0), order=2.0)
-    assert found.order == pytest.approx(4.0)
-    assert found.error == pytest.approx((values[1] - values[2]) / 3.0)
-    assert found.error > abs(values[-1] - 1.0)
+    convergence = richardson(values, (4.0, 2.0, 1.0), order=2.0)
+    assert convergence.order == pytest.approx(4.0)
+    assert convergence.error == pytest.approx((values[1] - values[2]) / 3.0)
+    assert convergence.error > abs(values[-1] - 1.0)
 
 
 def test_values_that_swing_to_a_limit_have_it_between_the_last_two():
-    found = richardson([1.4, 0.8, 1.1], (4.0, 2.0, 1.0), order=2.0)
-    assert found.order is None
-    assert found.error == pytest.approx(0.3)
+    convergence = richardson([1.4, 0.8, 1.1], (4.0, 2.0, 1.0), order=2.0)
+    assert convergence.order is None
+    assert convergence.error == pytest.approx(0.3)
 
 
 def test_values_that_do_not_settle_are_known_to_their_spread():
-    found = richardson([1.0, 1.1, 0.7], (4.0, 2.0, 1.0), order=2.0)
-    assert found.order is None
-    assert found.error == pytest.approx(0.4)
+    convergence = richardson([1.0, 1.1, 0.7], (4.0, 2.0, 1.0), order=2.0)
+    assert convergence.order is None
+    assert convergence.error == pytest.approx(0.4)
 
 
 def test_rounding_is_no_convergence():
-    found = richardson([1.0, 1.0 + 2e-16, 1.0], (4.0, 2.0, 1.0), order=2.0, noise=1e-12)
-    assert found.order is None
-    assert found.error < 1e-12
+    convergence = richardson([1.0, 1.0 + 2e-16, 1.0], (4.0, 2.0, 1.0), order=2.0, noise=1e-12)
+    assert convergence.order is None
+    assert convergence.error < 1e-12
 
 
 def test_few_rungs_say_little():
@@ -134,14 +134,14 @@ def test_the_last_rung_is_the_reference_and_known_to_its_estimated_error():
     assert ladder.references["depth"].floor == pytest.approx(0.01 / 1.01)
     assert ladder.references["volume"].order == pytest.approx(1.0)
     assert ladder.floor == pytest.approx(0.1 / 2.1)
-    coarse, own, fine = ladder.rungs
+    coarse, middle, fine = ladder.rungs
     assert coarse.error == pytest.approx(0.15 / 1.01)
     assert coarse.worst == "depth"
     assert (fine.error, fine.unresolved) == (0.0, True)
     assert fine.bound == pytest.approx(ladder.floor)
     # 0.1 / 2.1 apart from a value that is known no better than that.
-    assert own.error == pytest.approx(0.1 / 2.1)
-    assert own.bound >= (2.2 - 2.0) / 2.1
+    assert middle.error == pytest.approx(0.1 / 2.1)
+    assert middle.bound >= (2.2 - 2.0) / 2.1
     assert [rung.by_seconds for rung in ladder.rungs] == [True, True, True]
 
 
@@ -241,16 +241,16 @@ LOG = """\
 
 
 def test_seconds_of_the_log_by_stage():
-    found = stage_seconds(LOG.format(condensation="8.00", unworn="3.00"))
-    assert found["wear"] == [1.0, 1.25]
-    assert found["structural friction"] == [3.0, 2.5]
-    assert not any(name.startswith("run") for name in found)
+    seconds = stage_seconds(LOG.format(condensation="8.00", unworn="3.00"))
+    assert seconds["wear"] == [1.0, 1.25]
+    assert seconds["structural friction"] == [3.0, 2.5]
+    assert not any(name.startswith("run") for name in seconds)
 
 
 def test_what_is_found_in_the_cache_costs_what_it_took_to_compute(tmp_path: Path, small_path: Path):
     """The second run shares everything structural, the third the condensation alone."""
     overrides = ((), ("contact.grid=[16, 32]",), ("load_path.increments=24", "load_path.peak_at=9"))
-    cases = [load_case(small_path, own) for own in overrides]
+    cases = [load_case(small_path, entries) for entries in overrides]
     logged = ("8.00", "3.00"), ("0.10", "0.20"), ("0.10", "6.00")
     folders = [tmp_path / str(number) for number in range(3)]
     for folder, (condensation, unworn) in zip(folders, logged, strict=True):
@@ -310,11 +310,11 @@ QUICK = "dovetail_2d", "sphere_fretting", "specimens_coarse", "rig_two_dof", "ri
     ids=[path.stem for path in CHARTED],
 )
 def test_every_rung_of_every_case_is_another_case_and_finer(path: Path):
-    own = dump_case(load_case(path))
+    written = dump_case(load_case(path))
     for axis, settings in axes_of(path, (), ()).items():
         texts = [setting.text for setting in settings]
         assert len(set(texts)) == len(texts) > 1
-        assert own in texts
+        assert written in texts
         names = [setting.rung.name for setting in settings]
         assert len(set(names)) == len(names)
         _check_steps(axis, settings)
@@ -357,8 +357,8 @@ def test_axes_that_do_not_apply_are_refused():
         axes_of(path, (), ("grid", "mesh"))
     with pytest.raises(UserError, match="--axis gird: no such axis; allowed: grid, tolerance"):
         axes_of(path, (), ("gird",))
-    (found,) = axes_of(path, (), ("grid",))
-    assert found.name == "grid"
+    (axis,) = axes_of(path, (), ("grid",))
+    assert axis.name == "grid"
 
 
 def test_a_skewed_slot_has_no_section():

@@ -175,10 +175,10 @@ class MadeUp:
             "paraview and figures": 50.0,
         }
         self._condensed.add(key)
-        log = "".join(f"10:00:00 {name}: {own:.2f} s\n" for name, own in seconds.items())
+        log = "".join(f"10:00:00 {name}: {spent:.2f} s\n" for name, spent in seconds.items())
         (folder / "run.log").write_text(log, encoding="utf-8")
         length = 1.0 if case.structure.dimension == 2 else case.structure.slot_length
-        own = {
+        wear = {
             "depth_1": depth,
             "depth_2": 0.0,
             "volume_1": 10.0 * depth * length,
@@ -187,7 +187,7 @@ class MadeUp:
             "explicit_limit": self._limit,
         }
         work = {"convolutions": case.contact.grid[0], "contact_solves": 7}
-        summary = {"intrados": own, "work": work, "seconds": seconds}
+        summary = {"intrados": wear, "work": work, "seconds": seconds}
         (folder / "summary.json").write_text(json.dumps(summary), encoding="utf-8")
         line = case.structure.dimension == 2
         shape, pitch = ((8, 1), (1.25, 1.0)) if line else ((8, 6), (1.25, 10.0))
@@ -210,8 +210,8 @@ def made_up(
     """The ladders of made-up runs, by axis."""
     runs = MadeUp(limit)
     monkeypatch.setattr(workflow.chart.run, "run_jobs", in_process(runs))
-    found = chart_case(case, out, **settings)
-    return runs, {ladder.axis.name: ladder for ladder in found.ladders}
+    charted = chart_case(case, out, **settings)
+    return runs, {ladder.axis.name: ladder for ladder in charted.ladders}
 
 
 def test_every_different_case_runs_once_and_the_own_one_first(
@@ -301,8 +301,8 @@ def test_steppers_of_a_line_contact(tmp_path: Path, monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr(axes, "EXPLICIT", ())
     run = in_process(lambda job, folder: run_case(job.load(), folder, force=True))
     monkeypatch.setattr(workflow.chart.run, "run_jobs", run)
-    found = chart_case(tmp_path / "line.yaml", tmp_path / "out", axes=("stepper",))
-    (ladder,) = found.ladders
+    charted = chart_case(tmp_path / "line.yaml", tmp_path / "out", axes=("stepper",))
+    (ladder,) = charted.ladders
     errors = {rung.name: rung.error for rung in ladder.rungs}
     first = [errors[f"implicit, {count} jumps"] for count in (10, 20, 40)]
     for coarse, fine in pairwise(first):

@@ -194,9 +194,9 @@ def test_results_have_the_loops_of_their_jumps(written, sphere):
         assert group["00002"].attrs["cycles"] == 200.0
         assert {name: group["00002"].attrs[name] for name in MEASURED} == sphere.values
         assert all(
-            dataset.attrs[own]
+            dataset.attrs[attribute]
             for dataset in group["00002"].values()
-            for own in ("unit", "description")
+            for attribute in ("unit", "description")
         )
 
 
@@ -223,7 +223,7 @@ def test_kinetics_show_area_and_the_band_of_the_extrapolation(results, tmp_path)
         rate = group.attrs["depth_rate"]
         last = group["depth_1"][-1] + group["depth_2"][-1]
     panel, areas = figure.axes[1], figure.axes[5]
-    (band,) = [own for own in panel.collections if own.get_label() == "its uncertainty"]
+    (band,) = [area for area in panel.collections if area.get_label() == "its uncertainty"]
     corners = band.get_paths()[0].vertices
     at_end = corners[np.isclose(corners[:, 0], 2e5), 1]
     # Half a regime of 6e4 cycles before, 1e5 ahead: |trend| (3e4 + 5e4) 1e5 + scatter 1e5.
@@ -238,10 +238,10 @@ def test_kinetics_show_area_and_the_band_of_the_extrapolation(results, tmp_path)
 def test_warning_of_a_contact_that_outgrows_its_grid():
     said = []
     reporter = SimpleNamespace(warn=said.append)
-    found = {"face": {"unworn": {"border_load": 0.0}, "worn": {"border_load": 0.02}}}
-    warn_of_border(found, Loops(amplitude=5e-3), reporter)  # then the run has said so
+    loops = {"face": {"unworn": {"border_load": 0.0}, "worn": {"border_load": 0.02}}}
+    warn_of_border(loops, Loops(amplitude=5e-3), reporter)  # then the run has said so
     assert not said
-    warn_of_border(found, Loops(amplitude=5e-3, normal_force=1e4), reporter)
+    warn_of_border(loops, Loops(amplitude=5e-3, normal_force=1e4), reporter)
     assert len(said) == 1
     assert "face: in the tangential loops" in said[0]
     assert "2.0%" in said[0]

@@ -175,27 +175,27 @@ def loop(outcome, **changes):
 
 def test_loop_is_the_last_closed_cycle(outcome):
     """Trapezoids between 12 points from end to end: the area within 2 %."""
-    found = loop(outcome)
-    assert (found["from_increment"], found["to_increment"]) == (1 + STEPS, 1 + 3 * STEPS)
-    assert (found["force"], found["motion"]) == ("Qx", "shift_x")
-    assert found["amplitude"] == pytest.approx(MINDLIN.displacement(TANGENTIAL), rel=1e-12)
-    assert found["force_amplitude"] == TANGENTIAL
-    assert found["area"] == pytest.approx(MINDLIN.loop_energy(TANGENTIAL), rel=2e-2)
-    assert found["energy"] == pytest.approx(0.01 * 2 * STEPS)
-    assert found["closure"] < 1e-12
+    summary = loop(outcome)
+    assert (summary["from_increment"], summary["to_increment"]) == (1 + STEPS, 1 + 3 * STEPS)
+    assert (summary["force"], summary["motion"]) == ("Qx", "shift_x")
+    assert summary["amplitude"] == pytest.approx(MINDLIN.displacement(TANGENTIAL), rel=1e-12)
+    assert summary["force_amplitude"] == TANGENTIAL
+    assert summary["area"] == pytest.approx(MINDLIN.loop_energy(TANGENTIAL), rel=2e-2)
+    assert summary["energy"] == pytest.approx(0.01 * 2 * STEPS)
+    assert summary["closure"] < 1e-12
 
 
 def test_loop_of_turning_points_has_no_area(outcome):
     indices = [0, STEPS, 2 * STEPS, 3 * STEPS]
-    found = loop(
+    summary = loop(
         outcome,
         states=[outcome.history.states[index] for index in indices],
         indices=indices,
         method="reversals",
     )
-    assert (found["from_increment"], found["to_increment"]) == (1 + STEPS, 1 + 3 * STEPS)
-    assert found["amplitude"] == pytest.approx(MINDLIN.displacement(TANGENTIAL), rel=1e-12)
-    assert "area" not in found
+    assert (summary["from_increment"], summary["to_increment"]) == (1 + STEPS, 1 + 3 * STEPS)
+    assert summary["amplitude"] == pytest.approx(MINDLIN.displacement(TANGENTIAL), rel=1e-12)
+    assert "area" not in summary
 
 
 def test_path_that_does_not_come_back_has_no_loop(outcome):
@@ -218,11 +218,11 @@ def test_bulk_strain_does_work_on_the_shear_it_stretches():
         for k in senses
     ]  # fmt: skip
     table = LoadTable({"P": np.full(6, LOAD), "bulk_stress_2": strain * 1e5})
-    found = loop_summary(GRID, FRICTION, table, history(states), strain)
-    assert (found["from_increment"], found["to_increment"]) == (2, 6)
+    summary = loop_summary(GRID, FRICTION, table, history(states), strain)
+    assert (summary["from_increment"], summary["to_increment"]) == (2, 6)
     stretching = FRICTION * np.sum(pressure * np.abs(GRID.x)) * GRID.cell_area
     # The rectangle of the loop, less its two corners that the trapezoids cut.
-    assert found["area"] == pytest.approx(2.0 * 1e-3 * stretching)
+    assert summary["area"] == pytest.approx(2.0 * 1e-3 * stretching)
 
 
 # --- files --------------------------------------------------------------------------------------
@@ -303,8 +303,8 @@ def test_paraview_steps_through_the_increments(outcome, folder, tmp_path):
     reader.set_active_time_value(reader.time_values[-1])
     (image,) = reader.read()
     last = outcome.history.states[-1]
-    found = image.cell_data["pressure"].reshape(GRID.shape, order="F")
-    np.testing.assert_allclose(found, last.traction[2], rtol=2e-7)
+    pressure = image.cell_data["pressure"].reshape(GRID.shape, order="F")
+    np.testing.assert_allclose(pressure, last.traction[2], rtol=2e-7)
     np.testing.assert_allclose(
         image.cell_data["shear"][:, 0], last.traction[0].ravel(order="F"), rtol=2e-7
     )

@@ -68,11 +68,11 @@ def both(value):
 def test_estimate_finds_limit_and_order(order):
     """f(h) = 1 + 0.3 h^p: errors of all rungs, and of those that were not computed."""
     steps = 0.4, 0.2, 0.1
-    found = estimate([both(1.0 + 0.3 * h**order) for h in steps], steps, 2.0)
+    estimated = estimate([both(1.0 + 0.3 * h**order) for h in steps], steps, 2.0)
     scale = 1.0 + 0.3 * steps[-1] ** order
-    assert found.errors == pytest.approx([0.3 * h**order / scale for h in steps], rel=1e-9)
-    assert found.beyond(8.0) == pytest.approx(found.errors[-1] / 8.0**order, rel=1e-9)
-    assert found.beyond(found.refinement(1e-4)) == pytest.approx(1e-4, rel=1e-9)
+    assert estimated.errors == pytest.approx([0.3 * h**order / scale for h in steps], rel=1e-9)
+    assert estimated.beyond(8.0) == pytest.approx(estimated.errors[-1] / 8.0**order, rel=1e-9)
+    assert estimated.beyond(estimated.refinement(1e-4)) == pytest.approx(1e-4, rel=1e-9)
 
 
 def test_a_rung_near_the_last_by_chance_is_no_better_than_it():
@@ -93,8 +93,8 @@ def test_a_flank_that_hardly_wears_is_measured_by_a_share_of_the_other():
 def test_peak_stays_at_its_place(case, count, peak):
     path = changed(case, {"load_path.increments": count, "load_path.peak_at": peak})
     for least in (2, 10, 100, 333):
-        found = increments(path, least)
-        n, at = found["load_path.increments"], found["load_path.peak_at"]
+        entries = increments(path, least)
+        n, at = entries["load_path.increments"], entries["load_path.peak_at"]
         assert n >= least
         assert n * peak == at * count
 
@@ -102,7 +102,7 @@ def test_peak_stays_at_its_place(case, count, peak):
 @pytest.mark.parametrize(("allowed", "more"), [(0.05, False), (0.02, True), (0.002, True)])
 def test_increments_follow_their_share(case, monkeypatch, allowed, more):
     """Of a first-order error of 1 over the number, as many as it takes, in whole peaks."""
-    monkeypatch.setattr(axes, "life", lambda own: both(1.0 + 1.0 / own.load_path.increments))
+    monkeypatch.setattr(axes, "life", lambda case: both(1.0 + 1.0 / case.load_path.increments))
     decision = axes.choose_increments(case, allowed)
     scale = 1.0 + 1.0 / decision.probe["increments"][-1]
     assert decision.value == 11 * ceil(1.0 / (allowed * scale) / 11)
@@ -113,7 +113,7 @@ def test_increments_follow_their_share(case, monkeypatch, allowed, more):
 
 
 def test_increments_end_somewhere_and_say_so(case, monkeypatch):
-    monkeypatch.setattr(axes, "life", lambda own: both(1.0 + 1.0 / own.load_path.increments))
+    monkeypatch.setattr(axes, "life", lambda case: both(1.0 + 1.0 / case.load_path.increments))
     decision = axes.choose_increments(case, 1e-5)
     assert decision.value == 11 * ceil(axes.MOST_INCREMENTS / 11)
     assert not decision.met
@@ -127,8 +127,8 @@ def test_lives_of_increments_are_first_order(case):
     counts, values = decision.probe["increments"], decision.probe["values"]
     assert counts == [11, 22, 44]
     finer = life(changed(plane_section(case), increments(case, 88)))
-    for flank, own in finer.items():
-        for name, value in own.items():
+    for flank, quantities in finer.items():
+        for name, value in quantities.items():
             last, before = values[-1][flank][name], values[-2][flank][name]
             assert value - last == pytest.approx(0.5 * (last - before), rel=0.2)
 
@@ -136,8 +136,8 @@ def test_lives_of_increments_are_first_order(case):
 # --- meshes and grids -----------------------------------------------------------------------------
 
 
-def by_nodes(own):
-    return both(1.0 + 1.0 / (own.mesh.flank_nodes[0] - 1))
+def by_nodes(case):
+    return both(1.0 + 1.0 / (case.mesh.flank_nodes[0] - 1))
 
 
 @pytest.mark.parametrize(("allowed", "nodes"), [(0.2, 9), (0.04, 33), (0.01, 129)])
@@ -161,8 +161,8 @@ def test_mesh_in_space_is_never_finer_than_written(case, monkeypatch):
     assert "the finest that is offered" in decision.why
 
 
-def by_strips(own):
-    return both(1.0 + 5.0 / own.contact.grid[0] ** 2)
+def by_strips(case):
+    return both(1.0 + 5.0 / case.contact.grid[0] ** 2)
 
 
 def test_grid_in_the_plane_has_strips_only(case, monkeypatch):
@@ -173,7 +173,7 @@ def test_grid_in_the_plane_has_strips_only(case, monkeypatch):
 
 def test_grid_in_space_shares_between_its_directions(case, monkeypatch):
     monkeypatch.setattr(axes, "life", by_strips)
-    monkeypatch.setattr(axes, "end_life", lambda own, cells: both(1.0 + 50.0 / cells**2))
+    monkeypatch.setattr(axes, "end_life", lambda case, cells: both(1.0 + 50.0 / cells**2))
     decision = axes.choose_grid(in_space(case), 0.03)
     assert decision.value == (32, 64)
     assert decision.met
@@ -192,8 +192,8 @@ def test_the_profile_along_the_slot_wears_most_at_its_ends(case):
     energy = FRICTION * history.loads.P @ slip * section.structure.slot_length
     both_bodies = 2.0 * section.wear.blade.coefficient
     volume = both_bodies * energy * section.wear.cycles / section.structure.face_width
-    for own in (coarse, fine):
-        assert own["volume"] == pytest.approx(volume, rel=1e-6)
+    for profile in (coarse, fine):
+        assert profile["volume"] == pytest.approx(volume, rel=1e-6)
     assert fine["depth"] > coarse["depth"]
     assert fine["depth"] > 1.5 * volume / section.structure.slot_length
 
@@ -219,8 +219,8 @@ def test_steps_leave_no_more_than_their_tolerance(plane_path, tmp_path):
     limit = worn(summary_of(fine, tmp_path / "fine"))
     for tolerance in (0.1, 0.01, 0.001):
         steps = axes.choose_steps(case, tolerance)
-        own = worn(summary_of(changed(case, steps.chosen), tmp_path / f"{tolerance}"))
-        assert np.max(np.abs(own / limit - 1.0)) <= steps.error == tolerance
+        reached = worn(summary_of(changed(case, steps.chosen), tmp_path / f"{tolerance}"))
+        assert np.max(np.abs(reached / limit - 1.0)) <= steps.error == tolerance
 
 
 @pytest.mark.parametrize("tolerance", [1e-3, 2e-4])
@@ -230,8 +230,8 @@ def test_tolerance_leaves_half_of_itself(case, tolerance):
     section = plane_section(case)
     loose, tight = (life(changed(section, {"contact.tolerance": t})) for t in (tolerance, 1e-9))
     assert axes.choose_tolerance(case, tolerance).value == tolerance
-    for flank, own in tight.items():
-        for name, value in own.items():
+    for flank, quantities in tight.items():
+        for name, value in quantities.items():
             assert loose[flank][name] == pytest.approx(value, rel=0.5 * tolerance)
 
 
@@ -261,17 +261,17 @@ def test_constant_resultants_stay_so(case):
 def cheap_probes(monkeypatch):
     """Lives whose errors are known, instead of computed ones."""
 
-    def known(own):
-        mesh, grid = own.mesh.flank_nodes[0], own.contact.grid[0]
-        return both(1.0 + 1.0 / own.load_path.increments + 0.5 / mesh**2 + 2.0 / grid**2)
+    def known(case):
+        mesh, grid = case.mesh.flank_nodes[0], case.contact.grid[0]
+        return both(1.0 + 1.0 / case.load_path.increments + 0.5 / mesh**2 + 2.0 / grid**2)
 
     def plane(case):
         return Decision("structure.dimension", 2, "as in a probe", error=0.043)
 
     monkeypatch.setattr(choosing, "choose_dimension", plane)
     monkeypatch.setattr(axes, "life", known)
-    monkeypatch.setattr(axes, "end_life", lambda own, cells: both(1.0 + 5.0 / cells**2))
-    monkeypatch.setattr(axes, "coupled_life", lambda own: (both(1.05), 0.02))
+    monkeypatch.setattr(axes, "end_life", lambda case, cells: both(1.0 + 5.0 / cells**2))
+    monkeypatch.setattr(axes, "coupled_life", lambda case: (both(1.05), 0.02))
 
 
 @pytest.mark.usefixtures("cheap_probes")
@@ -282,11 +282,11 @@ def test_shares_add_up_to_the_accuracy(plane_path):
         case = load_case(plane_path, ["fidelity=auto", f"accuracy={accuracy}", *COARSE])
         chosen, record = ANALYSIS.choose(case)
         two, *others = record["decisions"]
-        used = two["error"] + sum(own["allowed"] for own in others)
+        used = two["error"] + sum(decision["allowed"] for decision in others)
         assert used == pytest.approx(accuracy, rel=1e-9)
         assert record["met"]
         assert record["estimated_error"] <= accuracy * (1.0 + 1e-9)
-        assert set(record["budget"]) == {own["entry"] for own in record["decisions"]}
+        assert set(record["budget"]) == {decision["entry"] for decision in record["decisions"]}
         costs.append((chosen.load_path.increments, chosen.mesh.flank_nodes, chosen.contact.grid))
     assert costs[0] < costs[1]
 
@@ -307,7 +307,7 @@ def test_record_makes_the_case(plane_path, tmp_path):
 
 @pytest.mark.usefixtures("cheap_probes")
 def test_a_probe_that_fails_leaves_the_setting_and_says_so(plane_path, monkeypatch):
-    def fail(own):
+    def fail(case):
         raise MethodFailed("no convergence")
 
     monkeypatch.setattr(axes, "life", fail)
@@ -317,7 +317,7 @@ def test_a_probe_that_fails_leaves_the_setting_and_says_so(plane_path, monkeypat
     assert chosen.mesh == case.mesh
     assert chosen.contact.grid == case.contact.grid
     assert chosen.coupling == case.coupling
-    failed = [own for own in record["decisions"] if "no convergence" in own["why"]]
+    failed = [decision for decision in record["decisions"] if "no convergence" in decision["why"]]
     assert len(failed) == 4
     assert not record["met"]
 
@@ -384,10 +384,10 @@ def test_accuracy_is_met_at_half_the_cost_or_less(name, dovetail_path, tmp_path)
     chosen = []
     for accuracy in (0.05, 0.01):
         case = load_case(path, (*settings, "fidelity=auto", f"accuracy={accuracy}"))
-        own = summary_of(case, tmp_path / f"{accuracy}")
-        assert np.max(np.abs(worn(own) / limit - 1.0)) <= accuracy
-        assert own["work"]["convolutions"] <= 0.5 * cost
-        chosen.append(own["fidelity"]["chosen"])
+        summary = summary_of(case, tmp_path / f"{accuracy}")
+        assert np.max(np.abs(worn(summary) / limit - 1.0)) <= accuracy
+        assert summary["work"]["convolutions"] <= 0.5 * cost
+        chosen.append(summary["fidelity"]["chosen"])
     looser, tighter = chosen
     assert looser["structure.dimension"] == tighter["structure.dimension"]
     assert looser["structure.dimension"] == plain.structure.dimension

@@ -22,12 +22,12 @@ MOST_FLAT_FILES = 6
 @cache
 def modules(package: str) -> dict[str, ast.Module]:
     """The modules of a package by their dotted names."""
-    found = {}
+    parsed = {}
     for path in sorted((ROOT / package).rglob("*.py")):
         parts = path.relative_to(ROOT).with_suffix("").parts
         name = ".".join(parts[:-1] if parts[-1] == "__init__" else parts)
-        found[name] = ast.parse(path.read_text(encoding="utf-8"))
-    return found
+        parsed[name] = ast.parse(path.read_text(encoding="utf-8"))
+    return parsed
 
 
 def imported(module: ast.Module, known: dict[str, ast.Module]) -> Iterator[str]:
@@ -64,12 +64,12 @@ def kinds_of_case(known: dict[str, ast.Module]) -> dict[str, str]:
         for node in ast.walk(module)
         if isinstance(node, ast.ClassDef)
     }
-    found = {"Case": owner("workflow.case")}
+    kinds = {"Case": owner("workflow.case")}
     while True:
-        more = {name: own for name, (own, bases) in classes.items() if bases & found.keys()}
-        if more.keys() <= found.keys():
-            return found
-        found |= more
+        more = {name: folder for name, (folder, bases) in classes.items() if bases & kinds.keys()}
+        if more.keys() <= kinds.keys():
+            return kinds
+        kinds |= more
 
 
 def names_asked_for(module: ast.Module) -> Iterator[tuple[int, str]]:

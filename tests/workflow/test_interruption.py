@@ -179,7 +179,7 @@ def test_worker_that_dies_is_one_line():
 
 
 @pytest.mark.slow
-def test_worker_that_cannot_be_set_up_says_why(own_processes):
+def test_worker_that_cannot_be_set_up_says_why(separate_processes):
     """What goes wrong in a worker is raised here, not printed there."""
     with (
         contact_workers.contact_workers(None, [None]) as team,
@@ -217,7 +217,7 @@ class Process:
 
     def descendants(self) -> list[int]:
         """Processes below it, where the system tells."""
-        found, queue = [], [self._process.pid]
+        descendants, queue = [], [self._process.pid]
         while queue:
             path = Path(f"/proc/{queue.pop()}/task")
             try:
@@ -227,9 +227,9 @@ class Process:
                 ]
             except OSError:
                 continue
-            found += children
+            descendants += children
             queue += children
-        return found
+        return descendants
 
     def ended(self, seconds: float) -> bool:
         """Whether it ends within so many seconds."""
@@ -318,7 +318,7 @@ def kill_and_resume(small_path, folder, moments):
 
 @posix_only
 @pytest.mark.slow
-def test_three_kills_lose_nothing(small_path, resume, reference, own_processes, tmp_path):
+def test_three_kills_lose_nothing(small_path, resume, reference, separate_processes, tmp_path):
     moments = [(0, 0.0), (3, 0.02), (8, 0.05)]
     assert kill_and_resume(small_path, tmp_path / "out", moments) == 3
     assert_equal_after(resume, tmp_path / "out", reference)
@@ -326,7 +326,7 @@ def test_three_kills_lose_nothing(small_path, resume, reference, own_processes, 
 
 @posix_only
 @pytest.mark.slow
-def test_twenty_kills_lose_nothing(small_path, resume, reference, own_processes, tmp_path):
+def test_twenty_kills_lose_nothing(small_path, resume, reference, separate_processes, tmp_path):
     """At random moments of the run, of its output and of its start."""
     dice, kills, number = random.Random(20), 0, 0
     while kills < 20:
@@ -347,7 +347,7 @@ def assert_equal_after(resume, folder, reference):
 @posix_only
 @pytest.mark.slow
 def test_kill_while_the_checkpoint_is_written(
-    small_path, resume, reference, own_processes, tmp_path
+    small_path, resume, reference, separate_processes, tmp_path
 ):
     """The half of it that is on disk is not the checkpoint."""
     code = """
@@ -399,7 +399,7 @@ def test_ctrl_c_while_workers_start_ends_in_one_line(small_path, tmp_path):
 @posix_only
 @pytest.mark.slow
 def test_ctrl_c_among_jumps_ends_in_one_line_and_resumes(
-    small_path, resume, reference, own_processes, tmp_path
+    small_path, resume, reference, separate_processes, tmp_path
 ):
     folder = tmp_path / "out"
     interrupt(small_path, folder, lambda process: (folder / "checkpoint.h5").exists())

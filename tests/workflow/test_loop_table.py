@@ -12,7 +12,7 @@ from workflow.errors import UserError
 def rows(count):
     numbers = np.random.default_rng(4).random((count, len(COLUMNS)))
     numbers[:, 1].sort()
-    return [dict(zip([c.name for c in COLUMNS], own, strict=True)) for own in numbers]
+    return [dict(zip([c.name for c in COLUMNS], row, strict=True)) for row in numbers]
 
 
 @pytest.mark.parametrize("per_length", [False, True])

@@ -84,8 +84,8 @@ def write_inp(path: Path, mesh) -> None:
         for number, (x, y, z) in enumerate(body.points.tolist(), node):
             nodes.append(f"{number}, {x!r}, {y!r}, {z!r}")
         cells.append(f"*ELEMENT, TYPE=C3D4, ELSET={body.name}")
-        for number, own in enumerate(corners + node, element):
-            cells.append(f"{number}, {', '.join(map(str, own))}")
+        for number, vertices in enumerate(corners + node, element):
+            cells.append(f"{number}, {', '.join(map(str, vertices))}")
         for name, index in body.mesh.boundaries.items():
             surfaces.append(f"*SURFACE, TYPE=ELEMENT, NAME={body.name}_{name}")
             for facet in index:
@@ -113,13 +113,13 @@ def dovetail_as_mesh(folder, dovetail, ending):
     rounded = {"shape": "rounded"} | {name: getattr(shape, name) for name in widths}
     contacts = [
         {
-            "name": own.name,
-            "face_1": f"disk_{own.name}",
-            "face_2": f"blade_{own.name}",
-            "x": own.frame.axes[0].tolist(),
+            "name": face.name,
+            "face_1": f"disk_{face.name}",
+            "face_2": f"blade_{face.name}",
+            "x": face.frame.axes[0].tolist(),
             "gap": rounded,
         }
-        for own in mesh.interfaces
+        for face in mesh.interfaces
     ]
     spin = {"kind": "rotation", "axis": [0.0, 1.0, 0.0], "through": [0.0, 0.0, 0.0]}
     spin |= {"speed": path.rotation_speed, "path": speeds.tolist()}
@@ -170,10 +170,10 @@ def test_dovetail_as_a_mesh_is_the_dovetail(tmp_path, small_path, ending, monkey
         np.testing.assert_allclose(
             two.slip[..., order], one.slip, atol=1e-6 * np.abs(one.slip).max()
         )
-    face, own = theirs.faces[0], ours.faces[0]
-    np.testing.assert_allclose(face.size, own.size, rtol=1e-9)
+    face, original = theirs.faces[0], ours.faces[0]
+    np.testing.assert_allclose(face.size, original.size, rtol=1e-9)
     x, y = np.linspace(-5.0, 5.0, 7)[:, None], np.linspace(-28.0, 28.0, 5)[None, :]
-    np.testing.assert_allclose(face.gap(x, y), own.gap(x, y), atol=1e-9)
+    np.testing.assert_allclose(face.gap(x, y), original.gap(x, y), atol=1e-9)
 
 
 # --- files of all kinds, run ----------------------------------------------------------------------
@@ -190,13 +190,13 @@ def cube(name, size):
     for n, first in enumerate(firsts, 1):
         below = [first, first + 1, first + 4, first + 3]
         lines.append(f"{n}, {', '.join(str(m) for m in [*below, *(m + 9 for m in below)])}")
-    for side, face, own in (
+    for side, face, elements in (
         ("low", "S1", (1, 2, 3, 4)),
         ("high", "S2", (5, 6, 7, 8)),
         ("cut", "S3", (1, 2, 5, 6)),
     ):
         lines.append(f"*Surface, type=ELEMENT, name={name}_{side}")
-        lines += [f"{n}, {face}" for n in own]
+        lines += [f"{n}, {face}" for n in elements]
     return "\n".join([*lines, "*End Part", ""])
 
 
@@ -272,14 +272,14 @@ def test_worn_faces_come_back_at_the_users_nodes(blocks, tmp_path):
 
 def test_cycle_of_another_peak_is_not_taken_from_the_cache(blocks, tmp_path, monkeypatch):
     """The same cycle, but stiff as at another of its loads."""
-    found = []
+    forces = []
     for leg, cache in ((4, "one"), (3, "one"), (3, "other")):
         monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path / cache))
         settings = [f"load_path.peak_leg={leg}", "nonlinearity.stiffness=relinearised"]
         (history,) = StructureStage(MeshModel(load_case(blocks, settings))).unworn()
-        found.append(history.force)
-    np.testing.assert_array_equal(found[1], found[2])
-    assert np.abs(found[1] - found[0]).max() > 1e-6 * np.abs(found[0]).max()
+        forces.append(history.force)
+    np.testing.assert_array_equal(forces[1], forces[2])
+    assert np.abs(forces[1] - forces[0]).max() > 1e-6 * np.abs(forces[0]).max()
 
 
 @pytest.mark.parametrize("stiffness", ["linear", "relinearised"])
@@ -329,8 +329,8 @@ def test_keyword_that_is_not_read_is_refused_with_its_line(blocks):
 def face_at(imported, body, height, normal):
     """The boundary of a body at a height that looks along z."""
     for name in imported.bodies[body].mesh.boundaries:
-        found = patch(imported.bodies[body], name)
-        if np.allclose(found.normal, [0, 0, normal]) and np.isclose(found.centroid[2], height):
+        surface = patch(imported.bodies[body], name)
+        if np.allclose(surface.normal, [0, 0, normal]) and np.isclose(surface.centroid[2], height):
             return name
     raise AssertionError((body, height, normal))
 

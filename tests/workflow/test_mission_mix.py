@@ -77,13 +77,13 @@ def test_blocks_of_a_mix_are_the_missions_one_after_the_other(staged):
                              "load_path.aerodynamic_moment=20 N*m")  # fmt: skip
     depths = [np.full(len(i), 1e-3) for i in mixed.mesh.interfaces]
     for whole, parts in (
-        (mixed.unworn(), [own.unworn() for own in alone]),
-        (mixed.worn(depths), [own.worn(depths) for own in alone]),
+        (mixed.unworn(), [stage.unworn() for stage in alone]),
+        (mixed.worn(depths), [stage.worn(depths) for stage in alone]),
     ):
-        for history, *own in zip(whole, *parts, strict=True):
+        for history, *separate in zip(whole, *parts, strict=True):
             assert history.loads.missions == [slice(0, 8), slice(8, 16)]
             assert history.loads.share.tolist() == [0.7] * 8 + [0.3] * 8
-            for block, part in zip(history.loads.missions, own, strict=True):
+            for block, part in zip(history.loads.missions, separate, strict=True):
                 np.testing.assert_array_equal(history.slip[block], part.slip)
                 np.testing.assert_array_equal(history.loads.P[block], part.loads.P)
                 np.testing.assert_array_equal(history.loads.Edx[block], part.loads.Edx)
@@ -104,10 +104,10 @@ def test_structural_friction_may_change_with_wear(staged, friction):
     stage, other = staged(), staged(f"friction.coefficient={friction}")
     unworn = [np.zeros(len(i)) for i in stage.mesh.interfaces]
     changed = stage.worn(unworn, [friction] * 2)
-    for own, expected in zip(changed, other.unworn(), strict=True):
+    for history, expected in zip(changed, other.unworn(), strict=True):
         for name in ("P", "Qx"):
-            found, right = getattr(own.loads, name), getattr(expected.loads, name)
-            np.testing.assert_allclose(found, right, atol=1e-3 * expected.loads.P.max())
+            computed, right = getattr(history.loads, name), getattr(expected.loads, name)
+            np.testing.assert_allclose(computed, right, atol=1e-3 * expected.loads.P.max())
     probes = stage.probe(unworn, [friction] * 2), other.probe(unworn)
     np.testing.assert_allclose(*probes, atol=1e-4 * probes[1].max())
     P, Qx = (getattr(changed[0].loads, name)[stage.peak] for name in ("P", "Qx"))
@@ -123,15 +123,15 @@ def test_flanks_may_differ_in_friction(staged):
     unworn, t = [np.zeros(len(i)) for i in stage.mesh.interfaces], stage.peak
     both = sum(h.loads.P[t] - h.loads.Qx[t] for h in stage.unworn())
     loads = [h.loads for h in stage.worn(unworn, [0.35, 0.45])]
-    assert sum(own.P[t] - own.Qx[t] for own in loads) == pytest.approx(both, rel=1e-6)
+    assert sum(flank.P[t] - flank.Qx[t] for flank in loads) == pytest.approx(both, rel=1e-6)
     assert loads[0].sliding[t]
     assert loads[0].Qx[t] == pytest.approx(-0.35 * loads[0].P[t], rel=1e-4)
     assert not loads[1].sliding[t]
     assert 0.35 < -loads[1].Qx[t] / loads[1].P[t] < 0.45
     # Flanks are alike: with the coefficients changed over, so are the loads.
     mirrored = [h.loads for h in stage.worn(unworn, [0.45, 0.35])]
-    for own, other in zip(loads, mirrored[::-1], strict=True):
-        np.testing.assert_allclose(own.P, other.P, atol=1e-4 * own.P.max())
+    for flank, other in zip(loads, mirrored[::-1], strict=True):
+        np.testing.assert_allclose(flank.P, other.P, atol=1e-4 * flank.P.max())
 
 
 def test_factors_of_a_mix_scale_the_loads_of_a_mesh(template_files):
@@ -172,13 +172,13 @@ def alone(run) -> Run:
     ids=["the same twice", "one that never happens"],
 )
 def test_a_mix_of_one_mission_wears_as_that_one(run, alone, entries):
-    for own, single in zip(summaries(run(entries)), summaries(alone), strict=True):
+    for mixed, single in zip(summaries(run(entries)), summaries(alone), strict=True):
         for key in ALIKE:
-            assert own[key] == pytest.approx(single[key], rel=1e-10), key
+            assert mixed[key] == pytest.approx(single[key], rel=1e-10), key
         for key, value in single["energy_per_cycle"].items():
-            assert own["energy_per_cycle"][key] == pytest.approx(value, rel=1e-10)
+            assert mixed["energy_per_cycle"][key] == pytest.approx(value, rel=1e-10)
         ruiz = "stress", "friction_parameter", "disk", "worn", "value"
-        one, two = own, single
+        one, two = mixed, single
         for key in ruiz:
             one, two = one[key], two[key]
         assert one == pytest.approx(two, rel=1e-8)
@@ -188,9 +188,9 @@ def test_a_mix_of_one_mission_wears_as_that_one(run, alone, entries):
 def test_two_missions_wear_by_their_mean_energy(run, alone):
     low = run("load_path.rotation_speed=4500 rpm", "load_path.aerodynamic_moment=20 N*m")
     mixed = run(mix(0.7, 0.3, last=LOW))
-    for own, *parts in zip(summaries(mixed), summaries(alone), summaries(low), strict=True):
-        assert own["volume_1"] == pytest.approx(1e-8 * own["energy"], rel=1e-10)
-        for key, value in own["energy_per_cycle"].items():
+    for flank, *parts in zip(summaries(mixed), summaries(alone), summaries(low), strict=True):
+        assert flank["volume_1"] == pytest.approx(1e-8 * flank["energy"], rel=1e-10)
+        for key, value in flank["energy_per_cycle"].items():
             first, second = (part["energy_per_cycle"][key] for part in parts)
             assert value == pytest.approx(0.7 * first + 0.3 * second, rel=1e-8), key
 
@@ -200,11 +200,11 @@ def test_friction_that_wear_raises_moves_the_load(run):
     """From µ 0.4 to 0.5 in the first step: the wedge then takes P = F / 2 (sin θ + µ cos θ)."""
     raised = run("friction.evolution={energy: [0, 1], factor: [1, 1.25]}")
     assert raised.summary["structure"]["solutions"] > 1
-    for own in summaries(raised):
-        unworn, worn = (own["peak_load"][moment] for moment in ("unworn", "worn"))
+    for flank in summaries(raised):
+        unworn, worn = (flank["peak_load"][moment] for moment in ("unworn", "worn"))
         assert worn["P"] == pytest.approx(1.4 / 1.5 * unworn["P"], rel=1e-3)
         assert worn["Qx"] == pytest.approx(-0.5 * worn["P"], rel=2e-3)
-        assert own["volume_1"] == pytest.approx(1e-8 * own["energy"], rel=1e-10)
+        assert flank["volume_1"] == pytest.approx(1e-8 * flank["energy"], rel=1e-10)
 
 
 # --- files ----------------------------------------------------------------------------------------
@@ -213,8 +213,8 @@ def test_friction_that_wear_raises_moves_the_load(run):
 def mixed_loads() -> LoadHistory:
     zero = np.zeros(3)
     P = np.array([100.0, 200.0, 0.0])
-    own = LoadHistory(P, -0.1 * P, zero, zero, zero, zero, 0.01 * P, zero, P > 1e3)
-    return LoadHistory.mix([own, own], (0.7, 0.3))
+    mission = LoadHistory(P, -0.1 * P, zero, zero, zero, zero, 0.01 * P, zero, P > 1e3)
+    return LoadHistory.mix([mission, mission], (0.7, 0.3))
 
 
 def test_only_a_mix_has_shares_and_blocks():
@@ -227,19 +227,19 @@ def test_only_a_mix_has_shares_and_blocks():
 def test_csv_of_a_mix_reads_back_bit_for_bit(tmp_path):
     loads = mixed_loads()
     write_resultants_csv(tmp_path / "loads.csv", {"a": loads, "b": loads})
-    for own in read_resultants(tmp_path / "loads.csv").values():
+    for imported in read_resultants(tmp_path / "loads.csv").values():
         for name, column in vars(loads).items():
-            np.testing.assert_array_equal(getattr(own.loads, name), column)
+            np.testing.assert_array_equal(getattr(imported.loads, name), column)
 
 
 def test_hdf5_of_a_mix_reads_back_bit_for_bit(tmp_path, staged):
     stage = staged(mix(0.7, 0.3, last=LOW))
     histories = {history.interface.name: history for history in stage.unworn()}
     write_resultants_h5(tmp_path / "loads.h5", histories)
-    for name, own in read_resultants(tmp_path / "loads.h5", line=True).items():
+    for name, imported in read_resultants(tmp_path / "loads.h5", line=True).items():
         for column in ("P", "share", "block", "sliding"):
             np.testing.assert_array_equal(
-                getattr(own.loads, column), getattr(histories[name].loads, column)
+                getattr(imported.loads, column), getattr(histories[name].loads, column)
             )
 
 
@@ -258,8 +258,8 @@ def test_exported_mix_and_laws_are_a_case(plane_path, staged, tmp_path):
     for number in (1, 2):
         assert read.wear_of(number) == given.wear_of(number)
     expected = staged(mix(0.7, 0.3, last=LOW)).unworn()
-    for own, history in zip(read.loads().values(), expected, strict=True):
-        assert own.loads.mean_energy == pytest.approx(history.loads.mean_energy, rel=1e-12)
+    for imported, history in zip(read.loads().values(), expected, strict=True):
+        assert imported.loads.mean_energy == pytest.approx(history.loads.mean_energy, rel=1e-12)
 
 
 HEADER = "P, Qx, Qy, Mx, My, Mz, Edx, Edy, block, share [%]\n"

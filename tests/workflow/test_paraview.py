@@ -67,15 +67,15 @@ def test_flank_fields_are_those_of_the_run(
         scalars["wear_depth"] = scalars["wear_depth_1"] + scalars["wear_depth_2"]
         vectors = {quantity: contact[quantity][()] for quantity in ("shear", "slip")}
     for key, expected in scalars.items():
-        found = image.cell_data[key].reshape(grid.shape, order="F")
-        np.testing.assert_allclose(found, expected, rtol=SINGLE, err_msg=key)
+        field = image.cell_data[key].reshape(grid.shape, order="F")
+        np.testing.assert_allclose(field, expected, rtol=SINGLE, err_msg=key)
     for key, (x, y) in vectors.items():
-        found = frame.components(np.array(image.cell_data[key], dtype=float))
-        found = found.reshape(*grid.shape, 3, order="F")
+        components = frame.components(np.array(image.cell_data[key], dtype=float))
+        components = components.reshape(*grid.shape, 3, order="F")
         scale = np.abs(x).max()
-        np.testing.assert_allclose(found[..., 0], x, atol=SINGLE * scale)
-        np.testing.assert_allclose(found[..., 1], y, atol=SINGLE * scale)
-        np.testing.assert_allclose(found[..., 2], 0.0, atol=SINGLE * scale)
+        np.testing.assert_allclose(components[..., 0], x, atol=SINGLE * scale)
+        np.testing.assert_allclose(components[..., 1], y, atol=SINGLE * scale)
+        np.testing.assert_allclose(components[..., 2], 0.0, atol=SINGLE * scale)
         np.testing.assert_allclose(image.cell_data[f"{key}_x"], x.ravel(order="F"), rtol=SINGLE)
 
 

@@ -110,8 +110,8 @@ def test_new_analysis_runs_to_its_end(ball: Path, tmp_path: Path) -> None:
     out = tmp_path / "out"
     done("run", ball, "--out", out)
     assert "run: Ball on a flat" in (out / "run.log").read_text("utf-8")
-    found = json.loads((out / "summary.json").read_text("utf-8"))["contact"]["radius"]
-    assert found == pytest.approx(RADIUS, rel=1e-12)
+    radius = json.loads((out / "summary.json").read_text("utf-8"))["contact"]["radius"]
+    assert radius == pytest.approx(RADIUS, rel=1e-12)
     assert "finished; nothing to do" in done("resume", out)
     other = invoke("run", ball, "--out", out, "--set", "force=1 kN")
     assert (other.exit_code, "another case" in other.stderr) == (2, True)

@@ -114,10 +114,10 @@ def test_template_works_without_its_comment_signs(tmp_path):
     interfaces, tail = rest.split("\n\n", 1)
     lines = [uncommented(line) for line in interfaces.splitlines()[1:]]
     case = "\n".join([f"{head}  interfaces:", *lines, tail])
-    (own,) = parse_case(case, str(tmp_path / "case.yaml")).structure.interfaces
-    assert own.frame is not None
-    assert own.nodes is not None
-    assert own.nodes.body_2 == str(tmp_path / "nodes_2.csv")
+    (interface,) = parse_case(case, str(tmp_path / "case.yaml")).structure.interfaces
+    assert interface.frame is not None
+    assert interface.nodes is not None
+    assert interface.nodes.body_2 == str(tmp_path / "nodes_2.csv")
 
 
 @pytest.mark.parametrize(
@@ -200,9 +200,9 @@ def test_rounded_gap_is_that_of_a_straight_flank(small_path):
     names = ("edge_width", "edge_radius", "end_width", "end_radius")
     shape = RoundedGap(shape="rounded", **{name: getattr(geometry, name) for name in names})
     nominal = Grid.covering(geometry.flank_size(), (1, 1))
-    own = gap_over(shape, None, nominal)(grid.x, grid.y)
+    rounded = gap_over(shape, None, nominal)(grid.x, grid.y)
     flank = geometry.flank_gap(grid.x, grid.y, 1)
-    np.testing.assert_allclose(own, flank, rtol=0.0, atol=1e-13 * flank.max())
+    np.testing.assert_allclose(rounded, flank, rtol=0.0, atol=1e-13 * flank.max())
 
 
 def test_paraboloid_is_straight_without_a_radius():
@@ -223,8 +223,8 @@ def test_heights_are_their_own_on_their_grid_and_bilinear_elsewhere(line):
     np.testing.assert_array_equal(GridHeights(grid, rough)(grid.x, grid.y), rough, strict=True)
     plane = 1.0 + 2.0 * grid.x + 0.3 * grid.y + 0.5 * grid.x * grid.y
     expected = 1.0 + 2.0 * other.x + 0.3 * other.y + 0.5 * other.x * other.y
-    found = GridHeights(grid, plane)(other.x, other.y)
-    np.testing.assert_allclose(found, expected, atol=1e-13)
+    heights = GridHeights(grid, plane)(other.x, other.y)
+    np.testing.assert_allclose(heights, expected, atol=1e-13)
 
 
 # --- a table typed by hand ----------------------------------------------------------------------
@@ -255,10 +255,12 @@ def test_table_wears_as_its_energy_says(typed):
     folder, summary = typed
     coefficient = 1e-8  # 1e4 µm³/J in 1/MPa
     for name, load in {"early": 5e4, "late": 0.0, "never": 0.0}.items():
-        own = summary[name]
-        assert own["peak_load"]["unworn"]["P"] == load
+        interface = summary[name]
+        assert interface["peak_load"]["unworn"]["P"] == load
         for body in (1, 2):
-            assert own[f"volume_{body}"] == pytest.approx(coefficient * own["energy"], rel=1e-9)
+            assert interface[f"volume_{body}"] == pytest.approx(
+                coefficient * interface["energy"], rel=1e-9
+            )
     assert summary["early"]["volume_1"] > 0.0
     assert summary["late"]["volume_1"] > 0.0
     assert summary["never"]["volume_1"] == 0.0
@@ -311,10 +313,10 @@ def test_a_new_run_takes_away_the_nodes_of_the_old(typed, tmp_path):
         "contact.grid=[64, 8]",
     )  # fmt: skip
     assert not list((tmp_path / "out").glob("worn_nodes_*"))
-    own = summary["interface"]
+    interface = summary["interface"]
     assert summary["per_length"]
-    assert own["energy_per_cycle"]["half_space"] == pytest.approx(11.3, rel=1e-6)
-    assert own["volume_1"] == pytest.approx(1e-8 * own["energy"], rel=1e-9)
+    assert interface["energy_per_cycle"]["half_space"] == pytest.approx(11.3, rel=1e-6)
+    assert interface["volume_1"] == pytest.approx(1e-8 * interface["energy"], rel=1e-9)
 
 
 @pytest.mark.slow

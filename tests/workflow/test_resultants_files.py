@@ -20,12 +20,6 @@ from workflow.analyses.wear.structures.resultants.writing import (
     write_resultants_csv,
     write_resultants_h5,
 )
-from workflow.analyses.wear.worn_nodes import (
-    nodal_depths,
-    read_nodes,
-    worn_displacement,
-    write_worn_nodes,
-)
 from workflow.case.input_files import InputFileError
 from workflow.shell.results import writing
 
@@ -82,15 +76,15 @@ def test_csv_reads_back_bit_for_bit(tmp_path, line):
     histories = {"intrados": random_loads(1), "extrados upper": random_loads(2)}
     if line:
         zeros = np.zeros(7)
-        histories = {n: replace(own, Mx=zeros, Mz=zeros) for n, own in histories.items()}
+        histories = {n: replace(loads, Mx=zeros, Mz=zeros) for n, loads in histories.items()}
     path = tmp_path / "loads.csv"
     write_resultants_csv(path, histories, line=line)
-    found = read_resultants(path, line=line)
-    assert list(found) == list(histories)
+    imported = read_resultants(path, line=line)
+    assert list(imported) == list(histories)
     for name, loads in histories.items():
-        assert_same(found[name].loads, loads)
-        assert found[name].slip is None
-        assert found[name].face(name) is None
+        assert_same(imported[name].loads, loads)
+        assert imported[name].slip is None
+        assert imported[name].face(name) is None
     header = path.read_text().splitlines()[1]
     assert ("P [N/mm]" if line else "P [N]") in header
 
@@ -100,16 +94,16 @@ def test_hdf5_reads_back_bit_for_bit(tmp_path, line):
     histories = {"intrados": face_history(1, line), "extrados": face_history(2, line)}
     if line:
         zeros = np.zeros(7)
-        for name, own in histories.items():
-            histories[name] = replace(own, loads=replace(own.loads, Mx=zeros, Mz=zeros))
+        for name, history in histories.items():
+            histories[name] = replace(history, loads=replace(history.loads, Mx=zeros, Mz=zeros))
     heights = {name: np.random.default_rng(3).random((6, 1 if line else 5)) for name in histories}
     path = tmp_path / "loads.h5"
     write_resultants_h5(path, histories, heights)
-    found = read_resultants(path, line=line)
-    assert set(found) == set(histories)
+    imported = read_resultants(path, line=line)
+    assert set(imported) == set(histories)
     for name, history in histories.items():
-        own, face = found[name], history.interface
-        assert_same(own.loads, history.loads)
+        read, face = imported[name], history.interface
+        assert_same(read.loads, history.loads)
         pairs = {
             "slip": history.slip,
             "coordinates": face.coordinates,
@@ -120,18 +114,18 @@ def test_hdf5_reads_back_bit_for_bit(tmp_path, line):
             "height": heights[name],
         }
         for key, written in pairs.items():
-            np.testing.assert_array_equal(getattr(own, key), written, err_msg=key, strict=True)
-        np.testing.assert_array_equal(own.frame.origin, face.frame.origin)
-        np.testing.assert_array_equal(own.frame.axes, face.frame.axes)
+            np.testing.assert_array_equal(getattr(read, key), written, err_msg=key, strict=True)
+        np.testing.assert_array_equal(read.frame.origin, face.frame.origin)
+        np.testing.assert_array_equal(read.frame.axes, face.frame.axes)
 
 
 def test_slip_on_the_grid_is_the_same_bit_for_bit(tmp_path):
     """What wear is computed from: slip on the cells, before writing and after reading."""
     history, grid = face_history(), Grid.covering(SIZE, (32, 64))
     write_resultants_h5(tmp_path / "loads.h5", {"f": history})
-    found = read_resultants(tmp_path / "loads.h5")["f"]
+    imported = read_resultants(tmp_path / "loads.h5")["f"]
     before = FaceTransfer.between(history.interface, grid).to_cells(history.slip)
-    after = FaceTransfer.between(found.face("f"), grid).to_cells(found.slip)
+    after = FaceTransfer.between(imported.face("f"), grid).to_cells(imported.slip)
     assert before.tobytes() == after.tobytes()
 
 
@@ -140,10 +134,10 @@ def test_results_of_a_run_are_read_from_their_group(tmp_path):
     history, path = face_history(), tmp_path / "results.h5"
     with writing(path) as writer:
         put_face(writer, "structure/intrados", history.interface, history)
-    found = read_resultants(f"{path}:structure")["intrados"]
-    assert_same(found.loads, history.loads)
-    assert found.frame is None
-    assert isinstance(found.face("intrados"), Face)
+    imported = read_resultants(f"{path}:structure")["intrados"]
+    assert_same(imported.loads, history.loads)
+    assert imported.frame is None
+    assert isinstance(imported.face("intrados"), Face)
 
 
 def test_loads_of_a_run_pass_all_checks(whole, tmp_path):
@@ -153,12 +147,12 @@ def test_loads_of_a_run_pass_all_checks(whole, tmp_path):
         sizes = {n: tuple(g.attrs["shape"] * g.attrs["pitch"]) for n, g in grids.items()}
         written = {name: group["slip"][()] for name, group in file["structure"].items()}
     bounds = {"friction": friction, "face_sizes": sizes}
-    found = read_resultants(f"{whole.folder / 'results.h5'}:structure", **bounds)
+    imported = read_resultants(f"{whole.folder / 'results.h5'}:structure", **bounds)
     for name, slip in written.items():
-        assert found[name].slip.tobytes() == slip.tobytes()
-    write_resultants_csv(tmp_path / "loads.csv", {n: own.loads for n, own in found.items()})
-    for name, own in read_resultants(tmp_path / "loads.csv", **bounds).items():
-        assert_same(own.loads, found[name].loads)
+        assert imported[name].slip.tobytes() == slip.tobytes()
+    write_resultants_csv(tmp_path / "loads.csv", {n: face.loads for n, face in imported.items()})
+    for name, from_csv in read_resultants(tmp_path / "loads.csv", **bounds).items():
+        assert_same(from_csv.loads, imported[name].loads)
 
 
 # --- units and columns --------------------------------------------------------------------------
@@ -180,8 +174,8 @@ def write(tmp_path: Path, text: str) -> Path:
 def test_units_of_the_header_are_converted_exactly(tmp_path):
     header = {"P": "P [kN]", "Qx": "Qx[kN]", "Mx": "Mx [N*m]", "My": "My [kN*mm]", "Edx": "Edx [J]"}
     row = GOOD | {"P": 1.1, "Qx": -0.3, "Mx": 0.7, "My": -0.1, "Edx": 0.0033}
-    found = read_resultants(write(tmp_path, table([row], header)))["interface"].loads
-    values = [getattr(found, name)[0] for name in COLUMNS]
+    loads = read_resultants(write(tmp_path, table([row], header)))["interface"].loads
+    values = [getattr(loads, name)[0] for name in COLUMNS]
     assert values == [1100.0, -300.0, 0.0, 700.0, -100.0, 5.0, 3.3, 0.0]
 
 
@@ -203,10 +197,10 @@ def test_units_of_datasets_are_converted(tmp_path):
         file["f/load_history/P"].attrs["unit"] = "kN"
         file["f/slip"].attrs["unit"] = np.bytes_("um")
         del file["f/nodal_height"].attrs["unit"]
-    found = read_resultants(path)["f"]
-    np.testing.assert_allclose(found.loads.P, 1e3 * history.loads.P, rtol=1e-15)
-    np.testing.assert_allclose(found.slip, 1e-3 * history.slip, rtol=1e-15)
-    np.testing.assert_array_equal(found.nodal_height, history.interface.gap)
+    imported = read_resultants(path)["f"]
+    np.testing.assert_allclose(imported.loads.P, 1e3 * history.loads.P, rtol=1e-15)
+    np.testing.assert_allclose(imported.slip, 1e-3 * history.slip, rtol=1e-15)
+    np.testing.assert_array_equal(imported.nodal_height, history.interface.gap)
     with h5py.File(path, "a") as file:
         file["f/slip"].attrs["unit"] = "MPa"
     with pytest.raises(InputFileError, match=r"/f/slip: unit: .*'MPa' cannot be converted to mm"):
@@ -221,9 +215,9 @@ def test_interfaces_may_alternate_and_comments_stand_anywhere(tmp_path):
     ]
     lines = table(rows).splitlines()
     lines[3:3] = ["# half way", "", "   # indented, with, commas"]
-    found = read_resultants(write(tmp_path, "\ufeff# first\n" + "\n".join(lines)))
-    assert list(found) == ["b", "a"]
-    assert found["a"].loads.P.tolist() == found["b"].loads.P.tolist() == [101.0, 102.0, 103.0]
+    imported = read_resultants(write(tmp_path, "\ufeff# first\n" + "\n".join(lines)))
+    assert list(imported) == ["b", "a"]
+    assert imported["a"].loads.P.tolist() == imported["b"].loads.P.tolist() == [101.0, 102.0, 103.0]
 
 
 def test_sliding_is_deduced_by_the_share_of_the_contact_solver(tmp_path):
@@ -489,9 +483,9 @@ def test_snippet_of_the_recipe_gives_our_resultants():
     points = frame.origin + frame.to_global(np.column_stack([places, np.zeros(5)]))
     vectors = frame.to_global(forces.T)
     moment = np.cross(points, vectors).sum(axis=0)
-    found = names["columns"](vectors.sum(axis=0)[None], moment[None], np.zeros(3))
+    columns = names["columns"](vectors.sum(axis=0)[None], moment[None], np.zeros(3))
     ours = resultants(forces, *places.T)
-    named = [found[name][0] for name in ("P", "Qx", "Qy", "Mx", "My", "Mz")]
+    named = [columns[name][0] for name in ("P", "Qx", "Qy", "Mx", "My", "Mz")]
     np.testing.assert_allclose(named, ours, rtol=1e-12, atol=1e-11)
 
 
@@ -501,10 +495,10 @@ def test_signs_as_the_recipe_tells_them():
     frame = Frame(names["origin"], names["axes"])
     point = frame.origin + frame.to_global(np.array([2.0, 3.0, 0.0]))
     force = frame.to_global(np.array([-40.0, 0.0, 100.0]))  # friction and pressure on body 2
-    found = names["columns"](force[None], np.zeros((1, 3)), point)
+    columns = names["columns"](force[None], np.zeros((1, 3)), point)
     expected = {"P": 100.0, "Qx": -40.0, "Qy": 0.0, "Mx": 300.0, "My": -200.0, "Mz": 120.0}
     for name, value in expected.items():
-        assert found[name][0] == pytest.approx(value, abs=1e-10), name
+        assert columns[name][0] == pytest.approx(value, abs=1e-10), name
     shear, slip = np.array([[[-40.0], [0.0]]]), np.array([[[0.01], [0.0]]])
     np.testing.assert_allclose(names["energies"](shear, slip), [[0.4], [0.0]])
 
@@ -514,156 +508,6 @@ def test_table_of_the_recipe_is_read(tmp_path):
     start = next(k for k, line in enumerate(lines) if line.startswith("    # dovetail"))
     text = "\n".join(line.strip() for line in lines[start : start + 6])
     sizes = dict.fromkeys(("intrados", "extrados"), SIZE)
-    found = read_resultants(write(tmp_path, text), friction=FRICTION, face_sizes=sizes)
-    assert found["intrados"].loads.My.tolist() == [-300.0, -1100.0]
-    assert found["extrados"].loads.sliding.all()
-
-
-# --- worn surfaces back to nodes ----------------------------------------------------------------
-
-
-def bowl(grid: Grid) -> np.ndarray:
-    """A depth that wears off towards the rim [mm]."""
-    x, y = grid.x / (0.5 * grid.size[0]), grid.y / (0.5 * grid.size[1])
-    return 0.02 * (1.0 - 0.8 * x**2) * (1.0 - 0.5 * y**2) * (1.0 + 0.3 * x)
-
-
-def nodes_over(size: tuple[float, float], shape: tuple[int, int], frame: Frame) -> np.ndarray:
-    """Global points of a mesh of nodes over a face, in no order."""
-    axes = [np.linspace(-0.5, 0.5, n) * s for n, s in zip(shape, size, strict=True)]
-    x, y = (axis.ravel() for axis in np.meshgrid(*axes, indexing="ij"))
-    local = np.stack([x, y, 0.0 * x], axis=1)
-    return frame.origin + frame.to_global(np.random.default_rng(5).permutation(local))
-
-
-AREA_GRID = Grid.covering(SIZE, (32, 64))
-FACES = {
-    "coarse": (SIZE, (8, 13)),
-    "beyond the grid": ((14.0, 71.0), (9, 16)),
-    "finer than the cells": ((10.2, 60.6), (40, 16)),
-}
-
-
-@pytest.mark.parametrize(("size", "shape"), FACES.values(), ids=FACES)
-def test_worn_volume_is_kept_where_nodes_cover_it(size, shape):
-    """To rounding, on coarse and on fine meshes."""
-    frame, depth = flank(), bowl(AREA_GRID)
-    found = nodal_depths(nodes_over(size, shape, frame), frame, AREA_GRID, depth)
-    assert found.volume_share == pytest.approx(1.0, abs=1e-12)
-    assert found.depth.min() >= 0.0
-    assert found.depth.max() <= depth.max()
-
-
-@pytest.mark.parametrize(("size", "shape"), FACES.values(), ids=FACES)
-def test_shared_areas_are_exact(size, shape):
-    """Of the cells, of the nodes, and their first moments: integrals of linear functions."""
-    frame, cell = Frame(np.zeros(3), np.eye(3)), AREA_GRID.cell_area
-    points = nodes_over(size, shape, frame)[:, :2]
-    # Nodes inside are moved about, so that triangles have any shape.
-    inside = np.all(np.abs(points) < 0.49 * np.array(size), axis=1)
-    moved = np.random.default_rng(2).uniform(-0.3, 0.3, points.shape)
-    points[inside] += (moved * size / np.array(shape))[inside]
-    face = Face("f", frame, points, facets_over(points, line=False))
-    shared = FaceTransfer.between(face, AREA_GRID).shared
-    np.testing.assert_allclose(shared.sum(axis=1), cell, rtol=1e-12)
-    x, y = np.broadcast_arrays(AREA_GRID.x, AREA_GRID.y)
-    for nodal, centres in zip(points.T, (x, y), strict=True):
-        np.testing.assert_allclose(shared @ nodal, cell * centres.ravel(), atol=1e-12)
-    areas = np.asarray(shared.sum(axis=0)).ravel()
-    if size == SIZE:
-        np.testing.assert_allclose(areas, face.nodal_areas, rtol=1e-12)
-    assert np.all(areas <= face.nodal_areas * (1.0 + 1e-12))
-
-
-def test_even_wear_stays_even():
-    frame = flank()
-    depth = np.full(AREA_GRID.shape, 0.0125)
-    found = nodal_depths(nodes_over(SIZE, (8, 13), frame), frame, AREA_GRID, depth)
-    np.testing.assert_allclose(found.depth, 0.0125, rtol=1e-12)
-
-
-def test_half_a_face_carries_half_the_wear():
-    """Nodes that cover half of what is worn say so."""
-    frame = flank()
-    points = nodes_over((SIZE[0], 0.5 * SIZE[1]), (8, 13), frame)
-    moved = points + 0.25 * SIZE[1] * frame.axes[1]
-    found = nodal_depths(moved, frame, AREA_GRID, np.full(AREA_GRID.shape, 0.01))
-    assert found.volume_share == pytest.approx(0.5, abs=1e-12)
-
-
-def test_nodes_far_from_the_contact_stay():
-    frame = flank()
-    points = nodes_over((40.0, 120.0), (41, 61), frame)
-    found = nodal_depths(points, frame, AREA_GRID, bowl(AREA_GRID))
-    local = np.abs(frame.coordinates(points))
-    assert not found.depth[(local[:, 0] > 6.01) | (local[:, 1] > 32.01)].any()
-    assert found.volume_share == pytest.approx(1.0, abs=1e-12)
-
-
-@pytest.mark.parametrize("width", [8.0, 11.0])
-def test_worn_area_of_a_line_contact_is_kept_exactly(width):
-    frame, grid = flank(), Grid.strips(8.0, 200)
-    depth = 0.01 * (1.0 - (grid.x / 4.0) ** 2)
-    x = np.random.default_rng(1).permutation(np.linspace(-0.5, 0.5, 23) ** 3 * 4.0 * width)
-    points = frame.origin + np.outer(x, frame.axes[0])
-    found = nodal_depths(points, frame, grid, depth)
-    assert found.volume_share == pytest.approx(1.0, abs=1e-12)
-
-
-def test_unworn_surfaces_stay():
-    frame = flank()
-    found = nodal_depths(nodes_over(SIZE, (8, 13), frame), frame, AREA_GRID, np.zeros((32, 64)))
-    assert not found.depth.any()
-    assert np.isnan(found.volume_share)
-
-
-def test_both_bodies_move_into_themselves():
-    """Away from each other: the gap along z of the frame opens by the sum of the depths."""
-    frame, depth = flank(), np.array([0.01, 0.02])
-    one, two = (worn_displacement(depth, frame, body) for body in (1, 2))
-    np.testing.assert_allclose((two - one) @ frame.axes[2], 2.0 * depth, rtol=1e-14)
-    np.testing.assert_allclose(frame.components(one), np.outer(depth, [0, 0, -1]), atol=1e-17)
-
-
-def test_wrong_frames_are_refused():
-    frame = flank()
-    points = nodes_over(SIZE, (8, 13), frame)
-    with pytest.raises(FaceError, match="off the plane of the interface; allowed"):
-        nodal_depths(points, Frame(np.zeros(3), np.eye(3)), AREA_GRID, bowl(AREA_GRID))
-    aside = Frame(frame.origin + 100.0 * frame.axes[0], frame.axes)
-    with pytest.raises(FaceError, match="no node is near the contact"):
-        nodal_depths(points, aside, AREA_GRID, bowl(AREA_GRID))
-
-
-def test_node_tables_and_displacements_keep_the_users_numbers(tmp_path):
-    path = write(tmp_path, "# blade\nnode, X [m], Y, Z\n10412, 0.012, -30, 248.2\n7, 1, 2, 3\n")
-    found = read_nodes(path)
-    assert found.numbers.tolist() == [10412, 7]
-    np.testing.assert_allclose(found.points, [[12.0, -30.0, 248.2], [1000.0, 2.0, 3.0]])
-    moved = np.random.default_rng(0).standard_normal((2, 3))
-    write_worn_nodes(tmp_path / "worn.csv", found.numbers, moved)
-    header, *rows = (tmp_path / "worn.csv").read_text().splitlines()
-    assert header == "node,ux [mm],uy [mm],uz [mm]"
-    values = np.array([[float(cell) for cell in row.split(",")] for row in rows])
-    assert values[:, 0].tolist() == [10412.0, 7.0]
-    assert values[:, 1:].tobytes() == moved.tobytes()
-
-
-NODES = {
-    "missing": (
-        "node, X\n1, 2\n",
-        "1: no column Y; this file has 'node', 'X'; allowed: node, X, Y",
-    ),
-    "text": ("node, X, Y\n1, 2, a\n", "2: Y: 'a': not a number; allowed: numbers"),
-    "fraction": ("node, X, Y\n1.5, 2, 3\n", "2: node: 1.5: not a whole number; allowed: whole"),
-    "twice": ("node, X, Y\n1, 2, 3\n# \n1, 4, 5\n", "4: node: 1: node given twice; allowed: once"),
-    "unknown": ("node, X, Y, W\n1, 2, 3, 4\n", "1: 'W': unknown column; allowed: node, X, Y, Z"),
-}
-
-
-@pytest.mark.parametrize(("text", "error"), NODES.values(), ids=NODES)
-def test_a_wrong_node_table_is_refused_at_its_line(tmp_path, text, error):
-    path = write(tmp_path, text)
-    with pytest.raises(InputFileError) as refused:
-        read_nodes(path)
-    assert str(refused.value).startswith(f"{path}:{error}"), refused.value
+    imported = read_resultants(write(tmp_path, text), friction=FRICTION, face_sizes=sizes)
+    assert imported["intrados"].loads.My.tolist() == [-300.0, -1100.0]
+    assert imported["extrados"].loads.sliding.all()

@@ -84,9 +84,9 @@ def test_volumes_heights_and_energies_agree(whole):
 def test_worn_mesh_holds_the_worn_volume(whole):
     """The grid's wear is moved to the mesh with its volume; the discrete move loses 1e-4."""
     for name in ("intrados", "extrados"):
-        own = whole.summary[name]
+        flank = whole.summary[name]
         for body in (1, 2):
-            assert own[f"mesh_volume_{body}"] == pytest.approx(own[f"volume_{body}"], rel=1e-3)
+            assert flank[f"mesh_volume_{body}"] == pytest.approx(flank[f"volume_{body}"], rel=1e-3)
 
 
 def test_symmetric_load_wears_both_flanks_alike(whole):
@@ -113,17 +113,17 @@ def test_a_contact_in_a_process_of_its_own_is_the_same(tmp_path, request):
     (tmp_path / "loads.csv").write_text(ROLLER_LOADS, encoding="utf-8")
     (tmp_path / "case.yaml").write_text(ROLLER_WEAR, encoding="utf-8")
     here = Run(invoke("run", tmp_path / "case.yaml", "--out", tmp_path / "here"), tmp_path / "here")
-    request.getfixturevalue("own_processes")
+    request.getfixturevalue("separate_processes")
     there = invoke("run", tmp_path / "case.yaml", "--out", tmp_path / "there")
-    own = Run(there, tmp_path / "there")
+    elsewhere = Run(there, tmp_path / "there")
     deepest = here.summary["interface"]["depth_1"]
     assert deepest > 0.0
     for name, height in here.heights().items():
-        other = own.heights()[name]
+        other = elsewhere.heights()[name]
         np.testing.assert_allclose(other, height, rtol=1e-12, atol=1e-9 * deepest, err_msg=name)
     for name, column in here.summary["kinetics"]["interface"].items():
         np.testing.assert_allclose(
-            own.summary["kinetics"]["interface"][name], column, rtol=1e-9, err_msg=name
+            elsewhere.summary["kinetics"]["interface"][name], column, rtol=1e-9, err_msg=name
         )
 
 
@@ -139,8 +139,10 @@ def test_two_runs_are_bitwise_equal(start, whole, tmp_path):
 
 
 @pytest.mark.slow
-def test_pictures_are_written(start, own_processes, tmp_path):
-    run = start(tmp_path / "out", "output.paraview=true", "output.figures=true", *QUICK)
+def test_pictures_are_written(start, separate_processes, tmp_path):
+    drawn = "output.paraview=true", "output.figures=true"
+    stressed = "stress.section=x", "stress.life.parameter=ruiz"
+    run = start(tmp_path / "out", *QUICK, *drawn, *stressed)
     assert run.ending.exit_code == 0, run.ending.stderr
     assert len(list((run.folder / "figures").glob("*.png"))) == 8
     assert (run.folder / "paraview" / "structure.pvd").exists()
@@ -205,12 +207,12 @@ def test_small_drift_limit_solves_the_structure_again(start, whole, tmp_path):
     assert max(run.summary["structure"]["drift"]) > 1e-5
     # Measured from the last solution: the drift of a single jump, where it adds up without.
     (_, first, _, last), (_, begun, _, added) = (
-        own.summary["structure"]["drift"] for own in (run, whole)
+        done.summary["structure"]["drift"] for done in (run, whole)
     )
     assert first == begun
     assert last < 1.5 * first
     assert added > 2.0 * begun
-    volumes = [own.summary["intrados"]["volume_1"] for own in (whole, run)]
+    volumes = [done.summary["intrados"]["volume_1"] for done in (whole, run)]
     assert volumes[0] != volumes[1]
     assert volumes[0] == pytest.approx(volumes[1], rel=0.02)
 
@@ -265,11 +267,11 @@ def test_warnings(start, tmp_path, overrides, words):
 def test_without_friction_nothing_wears(start, tmp_path, figures):
     run = start(tmp_path / "out", "friction.coefficient=0", *QUICK, f"output.figures={figures}")
     assert run.ending.exit_code == 0, run.ending.stderr
-    own = run.summary["intrados"]
-    assert (own["energy"], own["depth_1"], own["volume_2"]) == (0.0, 0.0, 0.0)
+    flank = run.summary["intrados"]
+    assert (flank["energy"], flank["depth_1"], flank["volume_2"]) == (0.0, 0.0, 0.0)
     # Exact without friction: P = F / (2 sin θ); F is that of the case's own expectation.
     load = 78523.5 * (np.sin(np.pi / 4) + 0.4 * np.cos(np.pi / 4)) / np.sin(np.pi / 4)
-    assert own["peak_load"]["unworn"]["P"] == pytest.approx(load, rel=1e-3)
+    assert flank["peak_load"]["unworn"]["P"] == pytest.approx(load, rel=1e-3)
 
 
 @pytest.mark.parametrize("step", ["wear.step.cycles=1e4", slow("wear.step.depth=1 um")])
@@ -339,18 +341,18 @@ def test_volumes_and_energies_agree(full):
 
 @pytest.mark.parametrize("flank", ["intrados", "extrados"])
 def test_where_the_flank_slides_energy_is_the_structures(full, flank):
-    own = full.summary[flank]["by_increment"]
-    sliding = np.array(own["sliding"])
+    increments = full.summary[flank]["by_increment"]
+    sliding = np.array(increments["sliding"])
     assert sliding.any()
     assert not sliding.all()
     energy = {
-        side: np.array(own["Edx"][side]) + np.array(own["Edy"][side])
+        side: np.array(increments["Edx"][side]) + np.array(increments["Edy"][side])
         for side in ("half_space", "structure")
     }
     np.testing.assert_allclose(
         energy["half_space"][sliding], energy["structure"][sliding], rtol=1e-5
     )
-    force = {side: np.array(own["Qx"][side]) for side in ("half_space", "structure")}
+    force = {side: np.array(increments["Qx"][side]) for side in ("half_space", "structure")}
     np.testing.assert_allclose(force["half_space"], force["structure"], rtol=0.02, atol=1e-3)
 
 

@@ -79,7 +79,7 @@ def test_failures_are_values_and_stop_nobody(contact, tmp_path):
     ]
     told = []
     slides, wrong, good = run_jobs(jobs, tmp_path / "out", report=told.append)
-    assert {own.job.name for own in told} == {"slides", "wrong", "good"}
+    assert {result.job.name for result in told} == {"slides", "wrong", "good"}
     assert slides.summary is None
     assert "friction cannot carry Qx" in slides.error
     assert "--set friction.coefficient=-1: -1: out of range" in wrong.error
@@ -180,7 +180,7 @@ def test_cores_are_shared_out(contact, tmp_path, monkeypatch):
     monkeypatch.setattr(runs, "run_job", pretend)
     monkeypatch.setattr(ContactCase, "cores", property(lambda case: wants[case.title]))
     done = run_jobs(list(cases.values()), tmp_path / "out", processes=3)
-    assert [own.error for own in done] == ["pretended"] * 5
+    assert [result.error for result in done] == ["pretended"] * 5
     assert max(most) == 3
 
 
@@ -203,15 +203,15 @@ def start(*arguments):
 
 def below(pid):
     """Processes below one, the job and its contact workers."""
-    found = []
+    processes = []
     for path in Path("/proc").glob("[0-9]*/stat"):
         try:
-            own, parent = path.parent.name, path.read_text().rpartition(")")[2].split()[1]
+            number, parent = path.parent.name, path.read_text().rpartition(")")[2].split()[1]
         except OSError:
             continue
         if int(parent) == pid:
-            found += [int(own), *below(int(own))]
-    return found
+            processes += [int(number), *below(int(number))]
+    return processes
 
 
 def alive(pid):
@@ -244,7 +244,7 @@ def test_a_job_ends_with_whoever_waits_for_it(contact, tmp_path):
     code = f"from workflow.runs import job\njob.COMMAND = {WAIT!r}\n{RUN}"
     process = subprocess.Popen([sys.executable, "-c", code, contact, tmp_path / "out"])
     # Libraries start short processes of their own while they are imported.
-    (job,) = wait_until(lambda: [own for own in below(process.pid) if waits(own)])
+    (job,) = wait_until(lambda: [pid for pid in below(process.pid) if waits(pid)])
     process.kill()
     process.wait(PATIENCE)
     wait_until(lambda: not alive(job))
@@ -331,7 +331,7 @@ def test_a_worker_killed_at_work_changes_nothing(contact, wear, tmp_path):
     """Two worker processes, one killed: all runs end, bit for bit as local processes find them."""
     distributed = pytest.importorskip("distributed")
     coefficients = [(MANY, f"wear.body_1.coefficient={value} um^3/J") for value in (5e3, 1e4, 2e4)]
-    jobs = [Job(f"run{number}", wear, own) for number, own in enumerate(coefficients)]
+    jobs = [Job(f"run{number}", wear, entries) for number, entries in enumerate(coefficients)]
     jobs.append(Job("slides", contact, ("load_path.legs.0.P=100 N",)))
     out, told = tmp_path / "cluster", []
     cluster = distributed.LocalCluster(
@@ -340,11 +340,11 @@ def test_a_worker_killed_at_work_changes_nothing(contact, wear, tmp_path):
     with cluster, ThreadPoolExecutor() as beside:
         workers = [nanny.pid for nanny in cluster.workers.values()]
         killed = beside.submit(kill_at_work, workers, out / "run0")
-        found = run_jobs(jobs, out, dask=cluster.scheduler_address, report=told.append)
+        results = run_jobs(jobs, out, dask=cluster.scheduler_address, report=told.append)
         assert killed.result() in workers
     assert (out / "run0/run.log").read_text("utf-8").count("resume: ") == 1
     assert len(told) == len(jobs)
-    for one, other in zip(found, run_jobs(jobs, tmp_path / "here"), strict=True):
+    for one, other in zip(results, run_jobs(jobs, tmp_path / "here"), strict=True):
         if one.job.name == "slides":
             assert "friction cannot carry" in one.error
             assert "friction cannot carry" in other.error

@@ -104,8 +104,8 @@ def flat(folder, curved):
 
 class TestSummary:
     def test_reduced_frequencies_come_from_above(self, summary):
-        own = summary["frequencies"]["body_1"]
-        full, reduced = np.array(own["full"]), np.array(own["reduced"])
+        frequencies = summary["frequencies"]["body_1"]
+        full, reduced = np.array(frequencies["full"]), np.array(frequencies["reduced"])
         assert np.all(reduced >= full * (1.0 - SOLVER))
         np.testing.assert_allclose(reduced, full, rtol=0.02)
         # Both specimens are one turned about.
@@ -144,12 +144,12 @@ class TestSummary:
 
     def test_half_space_beside_the_unworn_pair_is_hertzs(self, summary):
         hertz = HertzSphere(87.0, 1000.0 * 50.0 / 1050.0, ElasticPair(STEEL, STEEL).contact_modulus)
-        own = summary["loads"][0]["unworn"]["half_space"]
+        half_space = summary["loads"][0]["unworn"]["half_space"]
         # First order in a cell over the contact radius, 1/7.
-        assert own["approach"] == pytest.approx(hertz.approach, rel=5e-3)
-        assert own["peak_pressure"] == pytest.approx(hertz.peak_pressure, rel=3e-2)
+        assert half_space["approach"] == pytest.approx(hertz.approach, rel=5e-3)
+        assert half_space["peak_pressure"] == pytest.approx(hertz.peak_pressure, rel=3e-2)
         area = np.pi * hertz.contact_radius**2
-        assert own["area"] == pytest.approx(area, rel=0.1)
+        assert half_space["area"] == pytest.approx(area, rel=0.1)
 
     def test_uncoupled_cycle_is_close_to_the_coupled_one(self, summary):
         for load in summary["loads"]:
@@ -192,8 +192,8 @@ class TestSummary:
 
     def test_reduced_models_are_found_again(self, folder, curved, flat):
         assert "from the cache" in (flat / "run.log").read_text(encoding="utf-8")
-        own, other = (summary_of(path)["frequencies"] for path in (curved, flat))
-        assert own == other
+        frequencies, other = (summary_of(path)["frequencies"] for path in (curved, flat))
+        assert frequencies == other
 
 
 class TestResults:

@@ -165,11 +165,11 @@ class TestLaws:
     def test_coefficient_that_changes_with_energy(self, laws, unworn, pair, curved, scope):
         """On the way through its table: by place, or everywhere alike."""
         table = f"{{scope: {scope}, energy: [0, 500], factor: [1, 3]}}"
-        own = laws(f"wear.body_1.evolution={table}")
-        fretted = FrettedPair(pair, own, FrettingConditions(87.0, STROKE, FRICTION))
+        changing = laws(f"wear.body_1.evolution={table}")
+        fretted = FrettedPair(pair, changing, FrettingConditions(87.0, STROKE, FRICTION))
         state = NodalState.unworn(curved)
         state = fretted.contact_at(state).explicit_step(state, 40.0).state
-        wear, pressure, slip = unworn(own, state)
+        wear, pressure, slip = unworn(changing, state)
         surfaces = state.surfaces
         dissipated = surfaces.work_1 if scope == "local" else state.energy
         factor = np.interp(dissipated, [0.0, 500.0], [1.0, 3.0])
@@ -183,10 +183,10 @@ class TestLaws:
     def test_nothing_wears_below_a_threshold(self, laws, pair, curved):
         """V = α (ΣEd - Ed_th), in blocks whose limit is not known before."""
         threshold = 400.0
-        own = laws(
+        with_threshold = laws(
             *(f"wear.body_{n}.evolution={{scope: global, threshold: {threshold}}}" for n in (1, 2))
         )
-        fretted = FrettedPair(pair, own, FrettingConditions(87.0, STROKE, FRICTION))
+        fretted = FrettedPair(pair, with_threshold, FrettingConditions(87.0, STROKE, FRICTION))
         states = list(
             wear_in_cycle_blocks(
                 fretted, curved, ExplicitStepper(0.5), lambda block: rest(2e4, block.cycles)

@@ -54,8 +54,8 @@ def line(start: Any, tmp_path_factory: pytest.TempPathFactory) -> Any:
 def peak_traction(file: h5py.File, flank: str, moment: str) -> Array:
     """Tractions qx, qy, p that the run recorded at peak load."""
     jump = sorted(file["surfaces"][flank])[0 if moment == "unworn" else -1]
-    own = file["contact"][flank][jump]
-    return np.concatenate([own["shear"][()], own["pressure"][()][None]])
+    contact = file["contact"][flank][jump]
+    return np.concatenate([contact["shear"][()], contact["pressure"][()][None]])
 
 
 # --- against direct evaluation ------------------------------------------------------------------
@@ -77,9 +77,9 @@ def test_section_is_that_of_the_recorded_tractions(
                 solver = SubsurfaceStress(grid, METAL, 1 if number == 1 else 2)
                 direct = np.stack([solver.at_depth(traction, float(z)) for z in depths], axis=-1)
                 row = int(np.argmin(np.abs(grid.y[0] - group.attrs["at"])))
-                found = group[f"{moment}/body_{number}/stress"][()]
+                recorded = group[f"{moment}/body_{number}/stress"][()]
                 scale = np.abs(direct).max()
-                np.testing.assert_allclose(found, direct[:, :, row], atol=SOLVER * scale)
+                np.testing.assert_allclose(recorded, direct[:, :, row], atol=SOLVER * scale)
                 told = run.summary[flank]["stress"]["von_mises"][name][moment]
                 xx, yy, zz, xy, yz, zx = direct[:, :, row]
                 deviator = (xx - yy) ** 2 + (yy - zz) ** 2 + (zz - xx) ** 2
@@ -95,15 +95,15 @@ def test_summary_tells_the_largest_of_the_maps(normal: Any) -> None:
             grid, told = grid_of(file["grid"][flank]), normal.summary[flank]["stress"]
             for number, name in BODIES.items():
                 for quantity in ("cracking_parameter", "friction_parameter", "tension"):
-                    own = told[quantity][name]
+                    largest = told[quantity][name]
                     for moment in ("unworn", "worn"):
                         place = f"stress/life/{flank}/{moment}/body_{number}/{quantity}"
                         values = file[place][()]
                         at = np.unravel_index(values.argmax(), values.shape)
-                        assert own[moment]["value"] == values[at] > 0.0
-                        assert own[moment]["x"] == grid.x[at[0], 0]
-                        assert own[moment]["y"] == grid.y[0, at[1]]
-                    assert own["ratio"] == own["worn"]["value"] / own["unworn"]["value"]
+                        assert largest[moment]["value"] == values[at] > 0.0
+                        assert largest[moment]["x"] == grid.x[at[0], 0]
+                        assert largest[moment]["y"] == grid.y[0, at[1]]
+                    assert largest["ratio"] == largest["worn"]["value"] / largest["unworn"]["value"]
 
 
 def test_each_body_is_pulled_at_its_end(normal: Any) -> None:
@@ -119,9 +119,9 @@ def test_each_body_is_pulled_at_its_end(normal: Any) -> None:
 def test_wear_takes_the_peaks_off(normal: Any) -> None:
     for flank in FLANKS:
         for name in BODIES.values():
-            own = normal.summary[flank]["stress"]["von_mises"][name]
-            assert np.isfinite(own["worn"]["value"])
-            assert 0.5 < own["ratio"] < 1.0
+            stress = normal.summary[flank]["stress"]["von_mises"][name]
+            assert np.isfinite(stress["worn"]["value"])
+            assert 0.5 < stress["ratio"] < 1.0
 
 
 # --- balance ------------------------------------------------------------------------------------
@@ -140,9 +140,9 @@ def test_friction_parameter_integrates_to_the_energy_of_the_cycle(
                 history = file[f"comparison/{flank}/load_history"]
                 energy = float(np.sum(history["Edx"][()] + history["Edy"][()]))
             for number in BODIES:
-                own = file[f"stress/life/{flank}/unworn/body_{number}/friction_parameter"][()]
-                assert own.min() >= -1e-9 * own.max()
-                assert 4.0 * own.sum() * area == pytest.approx(energy, rel=1e-9)
+                parameter = file[f"stress/life/{flank}/unworn/body_{number}/friction_parameter"][()]
+                assert parameter.min() >= -1e-9 * parameter.max()
+                assert 4.0 * parameter.sum() * area == pytest.approx(energy, rel=1e-9)
 
 
 # --- symmetry -----------------------------------------------------------------------------------
@@ -198,7 +198,7 @@ def test_increments_with_unknown_shear_add_work_but_no_stress() -> None:
     grid = Grid.covering((2.0, 2.0), (20, 16))
     cycle, solver = reversed_cycle(grid), SubsurfaceStress(grid, METAL, 2)
     every, first = (
-        {name: own.values for name, own in maps.items()}
+        {name: quantity.values for name, quantity in maps.items()}
         for maps in (
             life_maps(Life(), solver, METAL, cycle, np.array([True, known]))
             for known in (True, False)
@@ -307,9 +307,9 @@ def test_figures_say_what_the_summary_says(request: pytest.FixtureRequest, metho
         "fretting_life": ("cracking_parameter", ".3g"),
     }
     with h5py.File(run.folder / "results.h5") as file, rc_context(STYLE):
-        found = figures.figures_of(contents_of(run.folder))
+        drawings = figures.figures_of(contents_of(run.folder))
         for name, (quantity, digits) in told.items():
-            figure = found[name](file)
+            figure = drawings[name](file)
             FigureCanvasAgg(figure).draw()
             for text in [axis._left_title for axis in figure.axes] + [figure._suptitle]:
                 box = text.get_window_extent()
@@ -317,7 +317,7 @@ def test_figures_say_what_the_summary_says(request: pytest.FixtureRequest, metho
                 assert box.x1 <= figure.bbox.x1, text.get_text()
             for flank in FLANKS:
                 bodies = run.summary[flank]["stress"][quantity].values()
-                largest = [max(own[m]["value"] for own in bodies) for m in ("unworn", "worn")]
+                largest = [max(body[m]["value"] for body in bodies) for m in ("unworn", "worn")]
                 text = " → ".join(format(value, digits) for value in largest)
                 assert f"{flank} {text}" in figure.get_suptitle()
 
@@ -341,9 +341,9 @@ def test_maps_are_on_the_flanks(normal: Any, paraview: Path) -> None:
         for jump, moment in {"00000": "unworn", last: "worn"}.items():
             image = pyvista.read(paraview / "intrados" / f"{jump}.vti")
             for number in BODIES:
-                own = file[f"stress/life/intrados/{moment}/body_{number}/tension"][()]
-                shown = image.cell_data[f"tension_{number}"].reshape(own.shape, order="F")
-                np.testing.assert_allclose(shown, own, rtol=1e-6)
+                tension = file[f"stress/life/intrados/{moment}/body_{number}/tension"][()]
+                shown = image.cell_data[f"tension_{number}"].reshape(tension.shape, order="F")
+                np.testing.assert_allclose(shown, tension, rtol=1e-6)
 
 
 def test_sections_sit_under_and_above_the_flank(normal: Any, paraview: Path) -> None:

@@ -56,16 +56,16 @@ def table(out):
 
 
 def test_a_grid_has_every_value_with_every_other(tmp_path):
-    found = runs(
+    design = runs(
         tmp_path,
         "vary:\n"
         "  friction.coefficient: {values: [0.5, 60 %]}\n"
         "  structure.radius: {range: {from: 10 mm, to: 40 mm, count: 3, scale: log}}\n",
     )
     expected = product([0.5, "60 %"], ["10 mm", "20 mm", "40 mm"])
-    assert [tuple(run.values.values()) for run in found] == list(expected)
-    assert len({run.name for run in found}) == 6
-    assert found[0].name == "coefficient=0.5_radius=10mm"
+    assert [tuple(run.values.values()) for run in design] == list(expected)
+    assert len({run.name for run in design}) == 6
+    assert design[0].name == "coefficient=0.5_radius=10mm"
 
 
 def test_zip_goes_in_step(tmp_path):
@@ -75,12 +75,12 @@ vary:
   contact.grid: {values: [[16, 16], [32, 16], [32, 32]]}
 design: zip
 """
-    found = runs(tmp_path, text)
-    assert [tuple(run.values.values()) for run in found] == [
+    design = runs(tmp_path, text)
+    assert [tuple(run.values.values()) for run in design] == [
         *((2, (16, 16)), (6, (32, 16)), (10, (32, 32))),
     ]
     sweep_file = load_sweep(tmp_path / "sweep.yaml")
-    case = found[1].job(sweep_file).load()
+    case = design[1].job(sweep_file).load()
     assert (case.contact.grid, case.load_path.legs[1].increments) == ((32, 16), 6)
 
 
@@ -96,8 +96,8 @@ samples: 400
 """
 
 
-def drawn(found):
-    columns = zip(*(run.values.values() for run in found), strict=True)
+def drawn(design):
+    columns = zip(*(run.values.values() for run in design), strict=True)
     return [[str(value).split()[0] for value in column] for column in columns]
 
 
@@ -125,15 +125,15 @@ def test_a_sample_is_the_same_again_and_another_with_another_seed(tmp_path):
 def test_names_tell_runs_apart_and_stay_short(tmp_path):
     """Units lose their signs, which must not make one run of two; long ones end in a hash."""
     values = ", ".join(f'"{name}"' for name in ("a/b", "ab", "a b", "x" * 300))
-    found = runs(tmp_path, f"vary:\n  title: {{values: [{values}]}}\n")
-    assert len({run.name for run in found}) == 4
-    assert all(len(run.name) < 150 and "/" not in run.name for run in found)
+    design = runs(tmp_path, f"vary:\n  title: {{values: [{values}]}}\n")
+    assert len({run.name for run in design}) == 4
+    assert all(len(run.name) < 150 and "/" not in run.name for run in design)
 
 
 def test_example_is_a_sweep():
-    found = load_sweep(CASES / "sweeps/dovetail_2d.yaml")
-    assert len(runs_of(found)) == 24
-    runs_of(found)[0].job(found).load()
+    example = load_sweep(CASES / "sweeps/dovetail_2d.yaml")
+    assert len(runs_of(example)) == 24
+    runs_of(example)[0].job(example).load()
 
 
 # --- mistakes -------------------------------------------------------------------------------------
@@ -178,7 +178,7 @@ def test_nonsense_is_told_before_anything_runs(tmp_path, text, line, words):
     path = write(tmp_path, text)
     result = sweep(path, tmp_path / "out")
     assert result.exit_code == 2
-    (told,) = [own for own in result.stderr.splitlines() if words in own]
+    (told,) = [message for message in result.stderr.splitlines() if words in message]
     assert told.startswith(f"fretscale: {path}:{line}: ")
     assert not (tmp_path / "out").exists()
 
@@ -267,12 +267,14 @@ def test_figures_are_drawn_against_all_that_varies(done):
 
 def test_again_runs_what_failed_and_nothing_else(done):
     path, out, _ = done
-    before = {own: own.stat().st_mtime_ns for own in out.glob("runs/*/summary.json")}
+    before = {summary: summary.stat().st_mtime_ns for summary in out.glob("runs/*/summary.json")}
     text = (out / "sweep.csv").read_text("utf-8")
     again = sweep(path, out)
     assert again.exit_code == 3
     assert "2 finished before" in again.stderr
-    assert {own: own.stat().st_mtime_ns for own in out.glob("runs/*/summary.json")} == before
+    assert {
+        summary: summary.stat().st_mtime_ns for summary in out.glob("runs/*/summary.json")
+    } == before
     assert (out / "sweep.csv").read_text("utf-8") == text
 
 
@@ -341,10 +343,10 @@ def worn(depth, line=False):
 
 def test_columns_of_wear_runs_are_of_both_bodies_and_have_units():
     rows = [worn(0.1), worn(0.2), Row(worn(0.3).run, Finished(None, Path(), None, "it broke"))]
-    found = columns_of(rows)
-    np.testing.assert_allclose(found["flank.depth"], [0.3, 0.6, np.nan], rtol=1e-15)
-    np.testing.assert_array_equal(found["flank.peak_pressure.worn"], [200.0, 200.0, np.nan])
-    assert found["work.contact_solves"][0] == 7
+    columns = columns_of(rows)
+    np.testing.assert_allclose(columns["flank.depth"], [0.3, 0.6, np.nan], rtol=1e-15)
+    np.testing.assert_array_equal(columns["flank.peak_pressure.worn"], [200.0, 200.0, np.nan])
+    assert columns["work.contact_solves"][0] == 7
     assert unit_of("flank.volume", rows) == "mm^3"
     assert unit_of("flank.volume", [worn(0.1, line=True)]) == "mm^3/mm"
     run = Run("pressed", {})

@@ -68,11 +68,11 @@ def test_a_section_meets_its_closed_forms(plane, plane_path):
     summary = plane.summary
     assert summary["per_length"]
     for expected in load_case(plane_path).expect:
-        found = summary
+        value = summary
         for key in expected.quantity.split("."):
-            found = found[key]
+            value = value[key]
         limit = expected.tolerance * (abs(expected.value) or 1.0)
-        assert found == pytest.approx(expected.value, abs=limit), expected.quantity
+        assert value == pytest.approx(expected.value, abs=limit), expected.quantity
 
 
 def test_flanks_wear_alike_and_by_their_energy(plane):
@@ -175,25 +175,25 @@ def test_sections_are_forces_and_energies_per_length():
     """p = 10 + y: P per length 4 (10 + y), Qx = -µP, energy µP Σ|Δs|, slip Σ|Δs|, all exact."""
     history = history_of(lambda y: 20.0 + y)
     transfer = FaceTransfer.between(history.interface, Grid.covering(SIZE, (7, 30)))
-    found = sections(transfer, history, 0)
+    rows = sections(transfer, history, 0)
     expected = SIZE[0] * (20.0 + transfer.grid.y.ravel())
-    np.testing.assert_allclose(found.P, expected, rtol=1e-12)
-    np.testing.assert_allclose(found.Qx, -FRICTION * expected, rtol=1e-12)
-    np.testing.assert_allclose(found.energy, FRICTION * expected * 3e-3, rtol=1e-12)
-    np.testing.assert_allclose(found.slip, 3e-3, rtol=1e-12)
+    np.testing.assert_allclose(rows.P, expected, rtol=1e-12)
+    np.testing.assert_allclose(rows.Qx, -FRICTION * expected, rtol=1e-12)
+    np.testing.assert_allclose(rows.energy, FRICTION * expected * 3e-3, rtol=1e-12)
+    np.testing.assert_allclose(rows.slip, 3e-3, rtol=1e-12)
     # The two rows about y = 0 together stand for the middle.
-    assert found.middle["P"] == pytest.approx(SIZE[0] * 20.0, rel=1e-12)
+    assert rows.middle["P"] == pytest.approx(SIZE[0] * 20.0, rel=1e-12)
 
 
 def test_sections_add_up_to_the_resultants():
     history = history_of(lambda y: 20.0 + np.cos(y))
     grid = Grid.covering(SIZE, (7, 30))
-    found = sections(FaceTransfer.between(history.interface, grid), history, 0)
+    rows = sections(FaceTransfer.between(history.interface, grid), history, 0)
     loads = history.loads
     for per_length, whole in (
-        (found.P, loads.P[0]),
-        (found.Qx, loads.Qx[0]),
-        (found.energy, (loads.Edx + loads.Edy).sum()),
+        (rows.P, loads.P[0]),
+        (rows.Qx, loads.Qx[0]),
+        (rows.energy, (loads.Edx + loads.Edy).sum()),
     ):
         assert per_length.sum() * grid.pitch[1] == pytest.approx(whole, rel=1e-12)
 
@@ -210,8 +210,8 @@ def slot(small_path):
         source,
         stages,
         [
-            stage.begin(own, case.wear.cycles)[0]
-            for stage, own in zip(stages, source.unworn(), strict=True)
+            stage.begin(history, case.wear.cycles)[0]
+            for stage, history in zip(stages, source.unworn(), strict=True)
         ],
     )
 
@@ -219,17 +219,17 @@ def slot(small_path):
 def test_uniformity_of_a_slot(slot):
     """Both flanks alike; ends carry more than the middle; and what is said fits the numbers."""
     source, stages, _ = slot
-    found = uniformities(*slot)
-    assert set(found) == {"intrados", "extrados"}
-    one, two = found.values()
+    flanks = uniformities(*slot)
+    assert set(flanks) == {"intrados", "extrados"}
+    one, two = flanks.values()
     assert one.mean_load == pytest.approx(two.mean_load, rel=1e-4)
     assert one.wear == 0.0  # nothing has worn yet
     transfer = stages[0].transfer
-    own = sections(transfer, source.unworn()[0], source.peak)
+    rows = sections(transfer, source.unworn()[0], source.peak)
     middle = np.abs(transfer.grid.y.ravel()) <= 0.25 * stages[0].grid.size[1]
-    assert one.pressure == pytest.approx(np.abs(own.P / own.middle["P"] - 1.0)[middle].max())
+    assert one.pressure == pytest.approx(np.abs(rows.P / rows.middle["P"] - 1.0)[middle].max())
     mean = source.unworn()[0].loads.P[source.peak] / stages[0].grid.size[1]
-    assert one.mean_load == pytest.approx(mean / own.middle["P"], rel=1e-6)
+    assert one.mean_load == pytest.approx(mean / rows.middle["P"], rel=1e-6)
     assert 0.0 < one.share_of_length_within < 1.0
     assert f"{one.share_of_length_within:.0%}" in one.sentence("intrados")
 
@@ -241,16 +241,16 @@ def test_what_has_worn_unevenly_is_not_uniform(slot):
     worn = np.where(np.abs(y) > 6.0, 2e-3, 1e-3) * np.ones(stages[0].grid.shape)
     surfaces = replace(states[0].surfaces, depth_1=worn)
     after = uniformities(source, stages, [replace(states[0], surfaces=surfaces), states[1]])
-    own = after["intrados"]
-    assert own.wear == pytest.approx(1.0)
+    uniformity = after["intrados"]
+    assert uniformity.wear == pytest.approx(1.0)
     # The last row of the middle is the one before the step.
     rows = np.abs(y.ravel())
-    assert own.share_of_length_within == pytest.approx(
+    assert uniformity.share_of_length_within == pytest.approx(
         min((rows[rows > 6.0].min() - 0.5 * stages[0].grid.pitch[1]) / 30.0,
             before.share_of_length_within)
     )  # fmt: skip
-    assert not own.uniform
-    assert "too uneven" in own.sentence("intrados")
+    assert not uniformity.uniform
+    assert "too uneven" in uniformity.sentence("intrados")
 
 
 def test_a_section_or_a_file_has_no_uniformity(plane_path):
@@ -295,7 +295,7 @@ def test_dimension_follows_the_accuracy(plane_path, accuracy, dimension):
     assert chosen.structure.dimension == dimension
     assert record["chosen"] == {"structure.dimension": dimension}
     (decision,) = record["decisions"]
-    largest = max(v for own in decision["probe"]["differences"].values() for v in own.values())
+    largest = max(v for flank in decision["probe"]["differences"].values() for v in flank.values())
     assert (largest <= case.accuracy) == (dimension == 2)
     assert f"{largest:.1%}" in decision["why"]
     # Whatever the case says itself, the same is chosen, and a case so written stands.
@@ -380,10 +380,10 @@ def test_run_in_space_says_how_uniform_it_is(whole):
     """The small case: its ends are rounded gently, its middle is nearly a section."""
     assert "fidelity" not in whole.summary
     for name in ("intrados", "extrados"):
-        own = Uniformity(**whole.summary[name]["uniformity"])
-        assert own.sentence(name) in whole.ending.stderr
-        assert own.mean_load == pytest.approx(1.04, abs=0.02)
-        assert own.pressure < 0.1
+        uniformity = Uniformity(**whole.summary[name]["uniformity"])
+        assert uniformity.sentence(name) in whole.ending.stderr
+        assert uniformity.mean_load == pytest.approx(1.04, abs=0.02)
+        assert uniformity.pressure < 0.1
 
 
 # --- Two and three dimensions ----------------------------------------------------------------
@@ -395,14 +395,14 @@ def in_the_middle(run: Run, name: str) -> dict[str, float]:
     source = structure_of(case).source(case)
     faces = {face.face.name: number for number, face in enumerate(source.faces)}
     stage = ContactStage(case, source.faces[faces[name]])
-    found = sections(stage.transfer, source.unworn()[faces[name]], source.peak).middle
+    middle = sections(stage.transfer, source.unworn()[faces[name]], source.peak).middle
     with h5py.File(run.folder / "results.h5") as file:
         surfaces = file[f"surfaces/{name}"]
         first, last = (surfaces[sorted(surfaces)[end]] for end in (0, -1))
         depths = [np.abs(last[body][()] - first[body][()]) for body in ("body_1", "body_2")]
     worn = np.sum(depths, axis=0)
     row = worn[:, worn.shape[1] // 2]
-    return found | {"depth": row.max(), "area": row.sum() * stage.grid.pitch[0]}
+    return middle | {"depth": row.max(), "area": row.sum() * stage.grid.pitch[0]}
 
 
 # What the middle section of 60 mm differs by: see cases/dovetail_2d.yaml.

@@ -51,16 +51,16 @@ def test_a_body_may_name_its_own_law(dovetail_path, law):
         "energy_amplitude": EnergyAmplitudeLaw(1e-8, 0.075),
     }[law]
     section = [f"wear.law={law}", *needed.get(law, [])]
-    for own, disk in ((ARCHARD, ArchardLaw(1e-4, 3500.0)), (ENERGY, EnergyLaw(2e-8))):
-        assert laws(dovetail_path, *section, f"wear.disk={own}") == (disk, blade)
+    for entry, disk in ((ARCHARD, ArchardLaw(1e-4, 3500.0)), (ENERGY, EnergyLaw(2e-8))):
+        assert laws(dovetail_path, *section, f"wear.disk={entry}") == (disk, blade)
 
 
 def test_reference_amplitude_is_of_the_section_or_of_the_body(dovetail_path):
     disk = f"wear.disk={AMPLITUDE}"
     first, _ = laws(dovetail_path, disk, "wear.reference_amplitude=50 um")
     assert first == EnergyAmplitudeLaw(3e-8, 0.05)
-    own, _ = laws(dovetail_path, disk, "wear.disk.reference_amplitude=20 um")
-    assert own == EnergyAmplitudeLaw(3e-8, 0.02)
+    second, _ = laws(dovetail_path, disk, "wear.disk.reference_amplitude=20 um")
+    assert second == EnergyAmplitudeLaw(3e-8, 0.02)
 
 
 @pytest.mark.parametrize(
@@ -162,9 +162,9 @@ def test_schema_takes_bodies_with_and_without_a_law():
     body = schema["$defs"]["DovetailWear"]["properties"]["disk"]
     assert len(body["anyOf"]) == 3
     for reference in body["anyOf"]:
-        own = schema["$defs"][reference["$ref"].rpartition("/")[2]]
-        assert "law" not in own["required"]
-        assert {"coefficient", "law", "evolution"} <= set(own["properties"])
+        definition = schema["$defs"][reference["$ref"].rpartition("/")[2]]
+        assert "law" not in definition["required"]
+        assert {"coefficient", "law", "evolution"} <= set(definition["properties"])
 
 
 def test_template_shows_how_a_body_names_its_own_law():

@@ -281,9 +281,9 @@ def test_bordered_systems_by_products_are_those_of_the_matrix(compact):
     column, row, wanted = noise[0], noise[1], rng.standard_normal((201, 2))
     bordered = np.block([[matrix, column[:, None]], [np.append(row, 0.5)]])
     products = Products(matrix)
-    found, _ = solve_bordered(products, column, np.append(row, 0.5), wanted)
+    solution, _ = solve_bordered(products, column, np.append(row, 0.5), wanted)
     assert products.asked != compact
-    assert np.linalg.norm(bordered @ found - wanted) <= 1e-5 * np.linalg.norm(wanted)
+    assert np.linalg.norm(bordered @ solution - wanted) <= 1e-5 * np.linalg.norm(wanted)
     exact, sign = solve_bordered(matrix, column, np.append(row, 0.5), wanted)
     np.testing.assert_allclose(exact, np.linalg.solve(bordered, wanted), atol=1e-9)
     assert sign == np.linalg.slogdet(bordered)[0]
@@ -302,12 +302,12 @@ def test_the_inverse_of_a_matrix_that_is_alike_saves_products():
     alike, alone = LikeAnother(matrix, other), Products(matrix)
     assert isinstance(alike, Preconditioned)
     for products in (alike, alone):
-        found = Bordered(products, column, row).solve(wanted, 1e-9)
-        np.testing.assert_allclose(found, exact[:, 0], atol=1e-7 * np.abs(exact).max())
+        solution = Bordered(products, column, row).solve(wanted, 1e-9)
+        np.testing.assert_allclose(solution, exact[:, 0], atol=1e-7 * np.abs(exact).max())
         assert not products.asked
     assert alike.products <= 8 < 20 < alone.products
-    found = solve_alone(alike, wanted[:-1], 1e-9)
-    np.testing.assert_allclose(found, np.linalg.solve(matrix, wanted[:-1]), atol=1e-7)
+    solution = solve_alone(alike, wanted[:-1], 1e-9)
+    np.testing.assert_allclose(solution, np.linalg.solve(matrix, wanted[:-1]), atol=1e-7)
     assert Bordered(matrix, column, row).sign == sign
 
 
@@ -317,9 +317,9 @@ def test_an_inverse_that_is_of_no_use_is_done_without():
     noise, wanted = rng.standard_normal((200, 2)), rng.standard_normal(200)
     products = LikeAnother(np.eye(200) + noise @ noise.T, np.eye(200))
     products._inverse[3, 3] = 0.0
-    found = solve_alone(products, wanted, 1e-9)
+    solution = solve_alone(products, wanted, 1e-9)
     assert not products.asked
-    np.testing.assert_allclose(products @ found, wanted, atol=1e-7)
+    np.testing.assert_allclose(products @ solution, wanted, atol=1e-7)
 
 
 def test_a_singular_matrix_has_its_smallest_solution():
@@ -337,8 +337,8 @@ def test_more_may_be_left_by_fewer_products():
     wanted, asked = rng.standard_normal(200), []
     for left in (1e-2, 1e-6):
         products.products = 0
-        found = solve_alone(products, wanted, left)
-        assert np.linalg.norm(products @ found - wanted) <= 1.01 * left * np.linalg.norm(wanted)
+        solution = solve_alone(products, wanted, left)
+        assert np.linalg.norm(products @ solution - wanted) <= 1.01 * left * np.linalg.norm(wanted)
         asked.append(products.products)
     assert 2 * asked[0] < asked[1]
 

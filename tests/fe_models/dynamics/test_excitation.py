@@ -33,10 +33,10 @@ def test_smooth_stretches_are_the_force(force):
         sum(w.amplitude * np.sin(w.angular * t + w.phase) for w in s.waves)
         for s, t in zip(stretches, times, strict=True)
     ]
-    found = force(times)
-    assert found.shape == (71, 2)
-    np.testing.assert_array_equal(found[:, 0], 0.0)
-    np.testing.assert_allclose(found[:, 1], 2.0 * np.add(lines, waves), atol=1e-11)
+    forces = force(times)
+    assert forces.shape == (71, 2)
+    np.testing.assert_array_equal(forces[:, 0], 0.0)
+    np.testing.assert_allclose(forces[:, 1], 2.0 * np.add(lines, waves), atol=1e-11)
 
 
 @pytest.mark.parametrize("force", FORCES.values(), ids=FORCES)

@@ -21,28 +21,28 @@ def decay(ratio, seconds=2.0, phase=0.0, frequency=FREQUENCY):
 @pytest.mark.parametrize("phase", [0.0, slow(1.0)])
 def test_linear_mode_gives_its_damping_and_frequency(ratio, phase, band):
     """To what the filter may hold of the ends (1e-4 of the amplitude, less in its slope)."""
-    found = ring_down(decay(ratio, phase=phase), STEP, band)
-    assert found.damping_ratio == pytest.approx(ratio, rel=5e-4)
+    ringing = ring_down(decay(ratio, phase=phase), STEP, band)
+    assert ringing.damping_ratio == pytest.approx(ratio, rel=5e-4)
     damped = FREQUENCY * np.sqrt(1.0 - ratio**2)
-    assert found.frequency == pytest.approx(damped, rel=5e-6)
-    amplitude = np.exp(-ratio * 2.0 * np.pi * FREQUENCY * found.time)
+    assert ringing.frequency == pytest.approx(damped, rel=5e-6)
+    amplitude = np.exp(-ratio * 2.0 * np.pi * FREQUENCY * ringing.time)
     # An exponential has a wider spectrum than its frequency: what the filter's gain bends of it.
-    assert found.amplitude == pytest.approx(amplitude, rel=1e-4 + 10.0 * ratio**2)
-    assert found.amplitude[-1] >= 0.99 * FLOOR * found.amplitude[0]
+    assert ringing.amplitude == pytest.approx(amplitude, rel=1e-4 + 10.0 * ratio**2)
+    assert ringing.amplitude[-1] >= 0.99 * FLOOR * ringing.amplitude[0]
 
 
 def test_other_modes_are_left_out():
-    found = ring_down(decay(0.005) + 0.3 * decay(0.005, frequency=650.0), STEP, (60.0, 140.0))
-    assert found.damping_ratio == pytest.approx(0.005, rel=0.01)
-    assert found.frequency == pytest.approx(FREQUENCY, rel=1e-3)
+    ringing = ring_down(decay(0.005) + 0.3 * decay(0.005, frequency=650.0), STEP, (60.0, 140.0))
+    assert ringing.damping_ratio == pytest.approx(0.005, rel=0.01)
+    assert ringing.frequency == pytest.approx(FREQUENCY, rel=1e-3)
 
 
 def test_noise_scatters_but_does_not_bias():
     generator = np.random.default_rng(2)
     signal = decay(0.005)
-    found = ring_down(signal + 0.01 * generator.standard_normal(signal.size), STEP, (60.0, 140.0))
-    loud = found.amplitude > 0.1
-    assert np.mean(found.damping_ratio[loud]) == pytest.approx(0.005, rel=0.02)
+    ringing = ring_down(signal + 0.01 * generator.standard_normal(signal.size), STEP, (60.0, 140.0))
+    loud = ringing.amplitude > 0.1
+    assert np.mean(ringing.damping_ratio[loud]) == pytest.approx(0.005, rel=0.02)
 
 
 # --- Iwan ---------------------------------------------------------------------------------------
@@ -96,27 +96,27 @@ def iwan():
 
 def test_iwan_ring_down_gives_its_law(iwan):
     """Within 2 % up to a tenth of full slip, in proportion: the law is of first order."""
-    *_, found = iwan
-    frequency, ratio = iwan_law(found.amplitude)
-    assert 0.05 * SLIP < found.amplitude[0] < 0.1 * SLIP
-    assert found.amplitude[-1] < 0.02 * SLIP
-    wrong = np.abs(found.damping_ratio / ratio - 1.0)
+    *_, ringing = iwan
+    frequency, ratio = iwan_law(ringing.amplitude)
+    assert 0.05 * SLIP < ringing.amplitude[0] < 0.1 * SLIP
+    assert ringing.amplitude[-1] < 0.02 * SLIP
+    wrong = np.abs(ringing.damping_ratio / ratio - 1.0)
     assert wrong.max() < 0.02
-    assert wrong[found.amplitude < 0.03 * SLIP].max() < 0.006
-    assert np.abs(found.frequency / frequency - 1.0).max() < 1e-3
+    assert wrong[ringing.amplitude < 0.03 * SLIP].max() < 0.006
+    assert np.abs(ringing.frequency / frequency - 1.0).max() < 1e-3
 
 
 def test_iwan_ring_down_agrees_with_its_decrement(iwan):
     """Successive maxima, each the top of a parabola, decay by 2πζ; no filter, no law."""
-    displacement, step, found = iwan
+    displacement, step, ringing = iwan
     inner = displacement[1:-1]
     tops = 1 + np.flatnonzero((inner > displacement[:-2]) & (inner >= displacement[2:]))
     before, at, after = displacement[tops - 1], displacement[tops], displacement[tops + 1]
     height = at - (after - before) ** 2 / (8.0 * (before - 2.0 * at + after))
     ratio = np.log(height[:-1] / height[1:]) / (2.0 * np.pi)
     time = 0.5 * step * (tops[1:] + tops[:-1])
-    seen = (time > found.time[0]) & (time < found.time[-1])
-    measured = np.interp(time[seen], found.time, found.damping_ratio)
+    seen = (time > ringing.time[0]) & (time < ringing.time[-1])
+    measured = np.interp(time[seen], ringing.time, ringing.damping_ratio)
     assert measured == pytest.approx(ratio[seen], rel=5e-3)
 
 

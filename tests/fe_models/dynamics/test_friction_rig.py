@@ -87,9 +87,9 @@ def test_open_it_is_the_rig_with_the_specimens_mass(rig, bodies):
     added = motion @ rig.mass @ motion - sum(MASSES)
     masses = MASSES[0], MASSES[1] + added
     wanted = natural_frequencies(two_mass_rig(masses, SPRINGS))
-    found = natural_frequencies(rig)
-    assert abs(found[0]) < 0.1
-    np.testing.assert_allclose(found[1:3], wanted, rtol=1e-3)
+    frequencies = natural_frequencies(rig)
+    assert abs(frequencies[0]) < 0.1
+    np.testing.assert_allclose(frequencies[1:3], wanted, rtol=1e-3)
 
 
 def test_tied_pads_are_as_stiff_as_the_reduced_pair(rig, bodies, mesh):

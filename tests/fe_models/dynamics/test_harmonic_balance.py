@@ -159,10 +159,10 @@ def test_products_with_the_jacobian_are_those_of_the_matrix(case, monkeypatch):
     np.testing.assert_allclose(
         products @ vector, matrix @ vector, atol=1e-12 * np.abs(matrix @ vector).max()
     )
-    found = problem.solve(90.0, force)
-    assert found.converged
+    solution = problem.solve(90.0, force)
+    assert solution.converged
     np.testing.assert_allclose(
-        found.coefficients, wanted.coefficients, atol=1e-8 * np.abs(wanted.coefficients).max()
+        solution.coefficients, wanted.coefficients, atol=1e-8 * np.abs(wanted.coefficients).max()
     )
     branch = along_frequency(problem, force, (85.0, 95.0))
     assert branch.message == ""
@@ -291,8 +291,8 @@ def test_duffing_oscillator_of_one_harmonic_folds_both_ways(upward):
     for solution in branch.solutions:
         omega, a = 2.0 * np.pi * solution.frequency, abs(solution.amplitude(0))
         elastic = 40.0 + 75.0 * a * a - 1e-3 * omega**2
-        found = a * np.hypot(elastic, omega * model.damping[0, 0])
-        assert found == pytest.approx(force, rel=1e-8)
+        balancing = a * np.hypot(elastic, omega * model.damping[0, 0])
+        assert balancing == pytest.approx(force, rel=1e-8)
     again = along_frequency(problem, force, (10.0, 100.0), upward=not upward)
     highest = (max(b.first_amplitudes(0)) for b in (branch, again))
     assert next(highest) == pytest.approx(next(highest), rel=2e-3)

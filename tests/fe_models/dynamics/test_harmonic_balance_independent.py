@@ -115,8 +115,8 @@ class NewmarkPeriod:
         apart = self.model.connection @ state[:size]
         stretch = state[2 * size :]
         # A slider remembers where it is and its stretch; a contact its stretch and how near it is.
-        own = [*stretch, apart[2]] if len(stretch) == 2 else [apart[0], *stretch]
-        start = Start(state[:size], speed * state[size : 2 * size], np.array([own]))
+        joint = [*stretch, apart[2]] if len(stretch) == 2 else [apart[0], *stretch]
+        start = Start(state[:size], speed * state[size : 2 * size], np.array([joint]))
         return integrate(
             self.model,
             self.law,
@@ -129,8 +129,8 @@ class NewmarkPeriod:
     def __call__(self, state):
         motion = self.motion(state, self.steps)
         assert motion.converged, motion.message
-        own = motion.joint_state[0]
-        stretch = own[:2] if self.law.directions == 3 else own[1:]
+        joint = motion.joint_state[0]
+        stretch = joint[:2] if self.law.directions == 3 else joint[1:]
         speed = 2.0 * np.pi * self.frequency
         return np.concatenate([motion.displacement[-1], motion.velocity[-1] / speed, stretch])
 
@@ -145,12 +145,12 @@ def newmark_steady(periods, state=None):
         state = np.zeros(size + max(periods[0].law.directions - 1, 1))
         for _ in range(PERIODS):
             state = periods[0](state)
-    found = []
+    steady = []
     for period in periods:
         state = fixed_point(period, state)
         motion = period.motion(state, period.steps // SAMPLES)
-        found.append((state, motion.displacement[:-1], motion.energies.joints[-1].sum()))
-    return found
+        steady.append((state, motion.displacement[:-1], motion.energies.joints[-1].sum()))
+    return steady
 
 
 def extrapolated(coarse, fine):
@@ -226,11 +226,11 @@ def test_jenkins_rig_is_the_fixed_point_of_newmark(ratio):
     force = HarmonicForce(unit_force(model, "m1"), 40.0, 150.0)
     periods = [NewmarkPeriod(model, JENKINS, force, 150.0, steps) for steps in (1024, 2048)]
     (_, coarse, lost), (_, fine, lost_fine) = newmark_steady(periods)
-    found = odd_balance(model, 63, 4096).solve(150.0, 40.0)
-    motion = found.displacement(SAMPLES)
+    solution = odd_balance(model, 63, 4096).solve(150.0, 40.0)
+    motion = solution.displacement(SAMPLES)
     assert 3.0 < furthest(coarse, motion) / furthest(fine, motion) < 5.0
     assert furthest(extrapolated(coarse, fine), motion) <= WANTED
-    assert found.cycle.dissipated[0] == pytest.approx(extrapolated(lost, lost_fine), rel=WANTED)
+    assert solution.cycle.dissipated[0] == pytest.approx(extrapolated(lost, lost_fine), rel=WANTED)
 
 
 # --- One contact in three dimensions, under a normal load that varies until it lifts off
@@ -285,14 +285,14 @@ def check_pressed_rig(pressed, steady, resolutions, allowed):
     wanted = extrapolated(coarse, fine)
     errors = []
     for highest, samples in resolutions:
-        found = pressed.balance(highest, samples).solve(pressed.frequency, 1.0)
-        assert found.converged
-        errors.append(furthest(found.displacement(SAMPLES), wanted))
-    assert {STICK, SLIP, SEPARATED} == set(np.unique(found.cycle.states))
+        solution = pressed.balance(highest, samples).solve(pressed.frequency, 1.0)
+        assert solution.converged
+        errors.append(furthest(solution.displacement(SAMPLES), wanted))
+    assert {STICK, SLIP, SEPARATED} == set(np.unique(solution.cycle.states))
     assert errors[-1] <= allowed
-    assert found.cycle.dissipated[0] == pytest.approx(extrapolated(lost, lost_fine), rel=allowed)
+    assert solution.cycle.dissipated[0] == pytest.approx(extrapolated(lost, lost_fine), rel=allowed)
     # The mean: spring and contact carry the load, and not as at rest, since lift-off cuts a part.
-    mean, pressing = found.amplitude(3, 0).real, found.cycle.samples[:, 0, 2].mean()
+    mean, pressing = solution.amplitude(3, 0).real, solution.cycle.samples[:, 0, 2].mean()
     assert 20e3 * mean + pressing == pytest.approx(LOAD + 8.0, rel=1e-8)
     assert abs(pressing - LOAD) > 5.0
     return np.array(errors)

@@ -61,18 +61,18 @@ def damped():
     return blow(0.01, 1.5)
 
 
-def near(found, lowest=20.0, highest=1500.0):
-    return (found.frequency > lowest) & (found.frequency < highest)
+def near(response, lowest=20.0, highest=1500.0):
+    return (response.frequency > lowest) & (response.frequency < highest)
 
 
 def error(sampling):
     """Largest error below 1500 Hz over the largest response."""
-    found = frequency_response(*blow(0.01, 1.0, sampling), sampling)
-    band = near(found)
-    assert found.coherence is None
-    assert found.remaining < 1e-4
-    exact = transfer(found.frequency[band], 0.01)
-    return np.abs(found.value[band] - exact).max() / np.abs(exact).max()
+    response = frequency_response(*blow(0.01, 1.0, sampling), sampling)
+    band = near(response)
+    assert response.coherence is None
+    assert response.remaining < 1e-4
+    exact = transfer(response.frequency[band], 0.01)
+    return np.abs(response.value[band] - exact).max() / np.abs(exact).max()
 
 
 def test_single_blow_is_the_transfer_function():
@@ -86,27 +86,27 @@ def test_single_blow_is_the_transfer_function():
 
 
 def test_conversions_are_factors_of_the_frequency(damped):
-    found = frequency_response(*damped, STEP)
-    receptance = found.converted("receptance")
+    response = frequency_response(*damped, STEP)
+    receptance = response.converted("receptance")
     assert receptance.quantity == "receptance"
-    rate = 2j * np.pi * found.frequency
-    assert receptance.value * rate**2 == pytest.approx(found.value, rel=1e-12)
+    rate = 2j * np.pi * response.frequency
+    assert receptance.value * rate**2 == pytest.approx(response.value, rel=1e-12)
     assert receptance.converted("mobility").value == pytest.approx(
-        found.converted("mobility").value, rel=1e-12
+        response.converted("mobility").value, rel=1e-12
     )
 
 
 def test_exponential_window_is_a_complex_frequency():
     """A tenth of a second is far too short for a damping of 0.001."""
     record, decay = blow(0.001, 0.15), 60.0
-    found = frequency_response(*record, STEP, decay=decay)
-    exact = transfer(found.frequency, 0.001, decay=decay)
-    band = near(found)
-    assert found.remaining < 1e-3
-    assert np.abs(found.value - exact)[band].max() < 3e-3 * np.abs(exact[band]).max()
+    response = frequency_response(*record, STEP, decay=decay)
+    exact = transfer(response.frequency, 0.001, decay=decay)
+    band = near(response)
+    assert response.remaining < 1e-3
+    assert np.abs(response.value - exact)[band].max() < 3e-3 * np.abs(exact[band]).max()
     assert frequency_response(*record, STEP).remaining > 0.1
     _, natural = rig(0.001)
-    (first,) = resonances(found, 50.0, 1000.0)
+    (first,) = resonances(response, 50.0, 1000.0)
     assert first.natural_frequency == pytest.approx(natural[0], rel=1e-4)
     # Of its damping rate 98 % are the window's, and are taken off again.
     assert first.damping_ratio == pytest.approx(0.001, abs=2e-4)
@@ -124,12 +124,12 @@ def test_h1_of_several_noisy_blows(damped):
     band = near(exact)
     assert alike.coherence[band] == pytest.approx(1.0, abs=1e-12)
     assert alike.value[band] == pytest.approx(exact.value[band], rel=1e-12)
-    found = frequency_response(forces, noisy, STEP)
+    estimate = frequency_response(forces, noisy, STEP)
     peak = np.argmax(np.abs(exact.value) * band)
-    assert found.coherence[peak] > 0.999
-    assert found.coherence[band].min() < 0.9
+    assert estimate.coherence[peak] > 0.999
+    assert estimate.coherence[band].min() < 0.9
     one = frequency_response(force, noisy[0] / scale[0], STEP)
-    averaged, single = (np.std((own.value - exact.value)[band]) for own in (found, one))
+    averaged, single = (np.std((h1.value - exact.value)[band]) for h1 in (estimate, one))
     assert averaged < 0.3 * single
 
 
@@ -141,22 +141,22 @@ def test_force_window_drops_what_comes_after_the_blow(damped):
     plain = frequency_response(noisy, response, STEP)
     windowed = frequency_response(noisy, response, STEP, blow_end=DURATION).value
     band = near(plain)
-    wrong = [np.abs(own - exact)[band].max() for own in (plain.value, windowed)]
+    wrong = [np.abs(value - exact)[band].max() for value in (plain.value, windowed)]
     assert wrong[1] < 0.1 * wrong[0]
 
 
 def test_resonances_are_those_of_the_modes(damped):
-    found = frequency_response(*damped, STEP)
+    response = frequency_response(*damped, STEP)
     _, natural = rig(0.01)
     # Short of 3750 Hz, which a half sine of 0.4 ms does not excite.
-    modes = resonances(found, 50.0, 3000.0, share=0.01)
+    modes = resonances(response, 50.0, 3000.0, share=0.01)
     assert [mode.natural_frequency for mode in modes] == pytest.approx(natural, rel=1e-3)
     assert [mode.damping_ratio for mode in modes] == pytest.approx([0.01, 0.01], rel=0.02)
     fine = np.linspace(150.0, 200.0, 50001)
     exact = np.abs(transfer(fine, 0.01))
     assert modes[0].frequency == pytest.approx(fine[exact.argmax()], rel=1e-3)
     assert modes[0].magnitude == pytest.approx(exact.max(), rel=5e-3)
-    assert resonances(found, 9000.0, 9001.0) == []
+    assert resonances(response, 9000.0, 9001.0) == []
 
 
 def test_resonance_of_a_single_mode_is_exact():
@@ -167,8 +167,10 @@ def test_resonance_of_a_single_mode_is_exact():
     receptance = 1.0 / (3.0 * (s**2 + 2.0 * ratio * natural * s + natural**2))
     blank = frequency_response(np.eye(1, 8)[0], np.ones(8), 1.0, "receptance")
     response = replace(blank, frequency=frequency, value=receptance)
-    own = [response.converted(quantity) for quantity in ("receptance", "mobility", "accelerance")]
-    for one in (*own, replace(own[2], value=own[2].value + 0.3)):
+    converted = [
+        response.converted(quantity) for quantity in ("receptance", "mobility", "accelerance")
+    ]
+    for one in (*converted, replace(converted[2], value=converted[2].value + 0.3)):
         (mode,) = resonances(one, 10.0)
         assert mode.natural_frequency == pytest.approx(41.3, rel=1e-9)
         assert mode.damping_ratio == pytest.approx(ratio, rel=1e-6)

@@ -103,7 +103,7 @@ def lagged(model, law, excitation, duration, step):
     state = law.rest(len(model.connection))
     joint_force = np.zeros(len(model.connection))
     effective = model.mass + 0.5 * step * model.damping + 0.25 * step**2 * model.stiffness
-    found = [x]
+    displacements = [x]
     for t in step * np.arange(round(duration / step)):
         mean = 0.5 * excitation(np.array([t, t + step])).sum(axis=0)
         unbalanced = mean - model.connection.T @ joint_force - model.damping @ v
@@ -113,8 +113,8 @@ def lagged(model, law, excitation, duration, step):
         x, v = x + moved, v + change
         response = law.respond(state, (model.connection @ moved)[:, None])
         state, joint_force = response.state, response.force[:, 0]
-        found.append(x)
-    return np.array(found)
+        displacements.append(x)
+    return np.array(displacements)
 
 
 @pytest.mark.slow
@@ -174,11 +174,11 @@ def test_a_harmonic_steady_state_is_the_closed_form():
         step = 1e-2 / parts
         motion = integrate(rig, joint, force, 0.6, TimeStepControl(step))
         late = motion.times > 0.58
-        found, times = motion.displacement[late], motion.times[late]
+        displacement, times = motion.displacement[late], motion.times[late]
         turned = 2.0 / step * np.tan(0.5 * step * angular)
-        largest = np.abs(found).max()
-        np.testing.assert_allclose(found, steady(turned, times), atol=SOLVED * largest)
-        errors.append(np.abs(found - steady(angular, times)).max() / largest)
+        largest = np.abs(displacement).max()
+        np.testing.assert_allclose(displacement, steady(turned, times), atol=SOLVED * largest)
+        errors.append(np.abs(displacement - steady(angular, times)).max() / largest)
     assert order([4.0, 2.0, 1.0], errors) == pytest.approx(2.0, abs=0.05)
 
 

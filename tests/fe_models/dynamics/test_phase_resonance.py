@@ -79,10 +79,10 @@ def pressed_block(joints=3):
     springs = {Link("x"): 500.0, Link("y", "x"): 800.0}
     links = []
     for joint in range(joints):
-        own = [f"{name}{joint}" for name in ("x", "y", "z")]
-        masses |= dict.fromkeys(own, 2e-05)
-        springs |= {Link(point, point[0]): 900.0 + 100.0 * joint for point in own}
-        links.append([Link(point) for point in own])
+        points = [f"{name}{joint}" for name in ("x", "y", "z")]
+        masses |= dict.fromkeys(points, 2e-05)
+        springs |= {Link(point, point[0]): 900.0 + 100.0 * joint for point in points}
+        links.append([Link(point) for point in points])
     model = lumped_rig(masses, springs, links, 0.01)
     damping = model.damping.copy()
     damping[0, 0] += 0.02
@@ -118,9 +118,13 @@ def test_derivatives_of_the_equations(case, seen):
     for direction in np.eye(len(place)):
         upper = equations(place + step * direction, force).residual
         lower = equations(place - step * direction, force).residual
-        wanted, found = (upper - lower) / (2.0 * step), at.jacobian @ direction
-        np.testing.assert_allclose(found[:-1], wanted[:-1], atol=1e-6 * np.abs(wanted[:-1]).max())
-        np.testing.assert_allclose(found[-1], wanted[-1], atol=1e-6 * np.abs(at.jacobian[-1]).max())
+        wanted, derivative = (upper - lower) / (2.0 * step), at.jacobian @ direction
+        np.testing.assert_allclose(
+            derivative[:-1], wanted[:-1], atol=1e-6 * np.abs(wanted[:-1]).max()
+        )
+        np.testing.assert_allclose(
+            derivative[-1], wanted[-1], atol=1e-6 * np.abs(at.jacobian[-1]).max()
+        )
     rise = 1e-5 * force
     ends = [equations(place, force + way).residual for way in (rise, -rise)]
     wanted = (ends[0] - ends[1]) / (2.0 * rise)
@@ -153,10 +157,10 @@ def test_products_with_the_jacobian_are_those_of_the_matrix(monkeypatch):
     assert matrix[-1] @ undone == pytest.approx(vector[-1], rel=1e-9)
     wanted_inner = inner(vector[:-1]) - undone[-1] * inner(matrix[:-1, -1])
     np.testing.assert_allclose(undone[:-1], wanted_inner, atol=1e-12 * np.abs(undone).max())
-    found = along_phase_resonance(problem, start, (4.0, 12.0))
-    assert found.message == ""
-    for own, other in zip((0, -1), (0, -1), strict=True):
-        one, two = wanted.solutions[own], found.solutions[other]
+    branch = along_phase_resonance(problem, start, (4.0, 12.0))
+    assert branch.message == ""
+    for end, other in zip((0, -1), (0, -1), strict=True):
+        one, two = wanted.solutions[end], branch.solutions[other]
         assert two.frequency == pytest.approx(one.frequency, rel=SOLVED)
         np.testing.assert_allclose(two.motion, one.motion, atol=1e-7 * np.abs(one.motion).max())
 
@@ -448,8 +452,8 @@ def test_mistakes_are_refused():
     spread = balance(model, Jenkins(KT, 0.88, 60.0), (1, 3), 64, turning)
     with pytest.raises(HarmonicBalanceError, match="several phases"):
         along_phase_resonance(spread, start, (1.0, 20.0), unit_force(model, "m1"))
-    found = along_phase_resonance(spread, peak(spread, 10.0, (150.0, 300.0)), (1.0, 20.0))
-    assert found.message == ""
+    branch = along_phase_resonance(spread, peak(spread, 10.0, (150.0, 300.0)), (1.0, 20.0))
+    assert branch.message == ""
 
 
 # --- Energies
@@ -461,9 +465,9 @@ def test_largest_kinetic_energy_of_many_harmonics():
     solution = problem.solve(47.0, 60.0)
     velocity = solution.velocity(20000)
     energies = 0.5 * np.einsum("ti,ij,tj->t", velocity, problem.model.mass, velocity)
-    found = largest_kinetic_energy(problem, solution)
-    assert found >= energies.max() * (1.0 - 1e-12)
-    assert found == pytest.approx(energies.max(), rel=1e-5)
+    largest = largest_kinetic_energy(problem, solution)
+    assert largest >= energies.max() * (1.0 - 1e-12)
+    assert largest == pytest.approx(energies.max(), rel=1e-5)
 
 
 def test_what_does_not_move_is_not_damped():

@@ -40,10 +40,10 @@ def test_the_thesis_rig_is_free_at_39_hz_and_stuck_at_214():
 )
 def test_the_rig_of_paper_c(held, first, second):
     """The values its printed parameters give, to the digits stated."""
-    found = natural_frequencies(PAPER_C, held)
-    assert found[0] == pytest.approx(first, abs=0.5 if first > 100.0 else 0.06)
+    frequencies = natural_frequencies(PAPER_C, held)
+    assert frequencies[0] == pytest.approx(first, abs=0.5 if first > 100.0 else 0.06)
     if second is not None:
-        assert found[1] == pytest.approx(second, abs=1.0)
+        assert frequencies[1] == pytest.approx(second, abs=1.0)
 
 
 def test_two_masses_are_the_roots_of_their_characteristic_equation():
@@ -52,9 +52,11 @@ def test_two_masses_are_the_roots_of_their_characteristic_equation():
     product = ((k1 + k2) * (k2 + k3) - k2**2) / (m1 * m2)
     root = np.sqrt(0.25 * sum_**2 - product)
     squares = np.array([product / (0.5 * sum_ + root), 0.5 * sum_ + root])
-    found = natural_frequencies(PAPER_C, k3)
-    np.testing.assert_allclose(found, np.sqrt(squares) / (2.0 * np.pi), rtol=1e-12)
-    np.testing.assert_allclose(natural_frequencies(PAPER_C, np.array([[[k3]]])), found, rtol=1e-12)
+    frequencies = natural_frequencies(PAPER_C, k3)
+    np.testing.assert_allclose(frequencies, np.sqrt(squares) / (2.0 * np.pi), rtol=1e-12)
+    np.testing.assert_allclose(
+        natural_frequencies(PAPER_C, np.array([[[k3]]])), frequencies, rtol=1e-12
+    )
 
 
 @pytest.mark.parametrize("ratio", [1e-3, np.array([0.01, 0.2])])
@@ -109,10 +111,10 @@ def test_a_reduced_body_in_a_rig_vibrates_as_the_full_one():
     # The joints' tangents.
     K += 300.0 * np.outer(*[np.eye(8)[6] - np.eye(8)[0]] * 2) + 20.0 * np.outer(*[np.eye(8)[0]] * 2)
     wanted = np.sqrt(sl.eigh(K, M, eigvals_only=True)) / (2.0 * np.pi)
-    found = natural_frequencies(rig, np.array([300.0, 20.0]))
+    frequencies = natural_frequencies(rig, np.array([300.0, 20.0]))
     # One of the five inner modes is left out: the lowest are as good as the full ones.
-    np.testing.assert_allclose(found[:3], wanted[:3], rtol=2e-3)
-    assert np.all(found >= wanted[:7] * (1.0 - 1e-12))
+    np.testing.assert_allclose(frequencies[:3], wanted[:3], rtol=2e-3)
+    assert np.all(frequencies >= wanted[:7] * (1.0 - 1e-12))
 
 
 def test_joints_of_three_directions_are_rows_one_after_the_other():
