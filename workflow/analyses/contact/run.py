@@ -48,6 +48,8 @@ def _march(
     with reporter.increments(len(table)) as show, reporter.stage("contact"):
 
         def keep(row: int, state: ContactState) -> None:
+            if row == 0:
+                passed.clear()  # the path is followed anew, in shorter increments
             passed[row] = state
             show(row + 1)
             reporter.log(
@@ -63,7 +65,7 @@ def _march(
                 case.friction.coefficient,
                 history=case.contact.history,
                 tolerance=case.contact.tolerance,
-                estimate_error=case.contact.estimate_error,
+                accuracy=case.contact.accuracy,
                 progress=keep,
             )
         except HistoryError as error:
@@ -80,8 +82,20 @@ def _march(
 
 
 def _warn(outcome: ContactOutcome, reporter: Reporter) -> None:
-    """Contacts cut off by the border of the grid, and pressures above yield."""
-    states = outcome.history.states
+    """Long increments, contacts cut off by the border of the grid, pressures above yield."""
+    states, history, case = outcome.history.states, outcome.history, outcome.case
+    if history.error is not None and history.error > case.contact.accuracy:
+        place = case.load_path.place(history.error_at)
+        shorter = f"take more increments ({place}) or raise contact.accuracy"
+        if history.method != "full":
+            shorter = "take all increments (contact.history: full)"
+        elif case.contact.history == "full":
+            shorter = f"take contact.history: auto, which splits them, or more of them ({place})"
+        reporter.warn(
+            f"the increments of the load leave about {history.error:.1%} of friction as an error "
+            f"of the shear, largest at increment {history.error_at + 1}, above contact.accuracy of "
+            f"{case.contact.accuracy:.1%}: {shorter}"
+        )
     if any(state.border_load > 0.0 for state in states):
         reporter.warn(
             "the contact touches the border of its grid, where it is cut off: raise contact.size"
