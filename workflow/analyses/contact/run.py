@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from sa_solver.contact import ContactState
 from sa_solver.errors import ContactProblemError
 from sa_solver.history import ContactLoadPath, History, HistoryError, march_history
@@ -14,6 +16,7 @@ from workflow.analyses.contact.results import (
     write_contact_results,
 )
 from workflow.errors import MethodFailed, UserError
+from workflow.shell.few_cells import check_cells
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
 
@@ -22,7 +25,8 @@ def run_contact(run: ContactRun) -> None:
     """Run a contact case to its end.
 
     Raises MethodFailed at an increment that does not converge or that no contact can carry; those
-    before it are written. Raises UserError where ``contact.history`` does not suit the path.
+    before it are written. Raises UserError where ``contact.history`` does not suit the path, or no
+    cells are left of the contact.
     """
     run.reporter.say(f"run: {run.case.title}")
     outcome, message = _march(run.case, run.folder, run.reporter)
@@ -34,6 +38,7 @@ def run_contact(run: ContactRun) -> None:
             write_contact_results(outcome, run)
             kept = f"; the increments so far are in {run.folder.results}"
         raise MethodFailed(f"{message}{kept}")
+    _check_grid(outcome, run.reporter)
     write_contact_output(outcome, run)
 
 
@@ -79,6 +84,13 @@ def _march(
             message = f"increment {row} of {len(table)} did not converge: {last.message}"
             message = "" if last.converged else message
     return ContactOutcome(case, grid, height, table, strain, history), message
+
+
+def _check_grid(outcome: ContactOutcome, reporter: Reporter) -> None:
+    """Raises UserError where even the largest contact is a point on the grid."""
+    pressures = [state.traction[2] for state in outcome.history.states]
+    largest = max(pressures, key=np.count_nonzero)
+    check_cells("the contact", outcome.case.contact, outcome.grid, largest, reporter)
 
 
 def _warn(outcome: ContactOutcome, reporter: Reporter) -> None:
