@@ -43,15 +43,16 @@ def run(tmp_path, text, *settings):
 
 @pytest.mark.parametrize(
     ("text", "grid", "size", "across"),
-    [(BALL, "[32, 32]", "[2 mm, 2 mm]", "8 x 8"), (STRIP, "36", "1.2 mm", "8")],
+    [(BALL, "[32, 32]", "[2 mm, 2 mm]", "8 x 8, 10"), (STRIP, "36", "1.2 mm", "8, 16")],
     ids=["sphere", "line"],
 )
 def test_a_run_proposes_grids_that_do(tmp_path, text, grid, size, across):
     coarse = f"contact={{grid: {grid}, size: {size}}}"
     done, (warning,) = run(tmp_path, text, coarse)
     assert done.exit_code == 0
-    assert f"the contact is {across} cells across, where 16 resolve it" in warning
-    found = re.search(r"take (contact.grid: .*), or take (contact.size: .*)", warning)
+    found, enough = across.split(", ")
+    assert f"the contact is {found} cells across, where {enough} resolve it" in warning
+    found = re.search(r"take (contact.grid: .*) or (contact.size: .*)", warning)
     for proposed in found.groups():
         _, warnings = run(tmp_path, text, coarse, proposed.replace(": ", "=", 1))
         assert warnings == []
@@ -62,7 +63,10 @@ def test_a_point_is_refused(tmp_path):
     assert done.exit_code == 2
     line = done.stderr.splitlines()[-1]
     assert "contact.grid: the contact is only 2 x 2 cells across" in line
-    assert "more cells than contact.grid: [320, 320], or less than contact.size: [0.2 mm" in line
+    assert (
+        "finer cells are needed than those of contact.grid: [200, 200] or contact.size: [0.32 mm"
+        in line
+    )
 
 
 def test_a_contact_that_fills_its_grid_needs_more_cells_there():
@@ -72,7 +76,7 @@ def test_a_contact_that_fills_its_grid_needs_more_cells_there():
     told = Warnings()
     check_cells("flank", settings, Grid.covering((2.0, 1.0), (64, 8)), pressure, told)
     (line,) = told
-    assert line.endswith("take contact.grid: [64, 20]")
+    assert line.endswith("take contact.grid: [64, 14]")
 
 
 def test_one_that_has_worn_to_a_point_is_warned_of():

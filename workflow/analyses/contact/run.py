@@ -90,7 +90,8 @@ def _check_grid(outcome: ContactOutcome, reporter: Reporter) -> None:
     """Raises UserError where even the largest contact is a point on the grid."""
     pressures = [state.traction[2] for state in outcome.history.states]
     largest = max(pressures, key=np.count_nonzero)
-    check_cells("the contact", outcome.case.contact, outcome.grid, largest, reporter)
+    settings = outcome.case.contact
+    check_cells("the contact", settings, outcome.grid, largest, reporter, fixed=False)
 
 
 def _warn(outcome: ContactOutcome, reporter: Reporter) -> None:
