@@ -41,7 +41,7 @@ ACCURACY = 0.02
 
 MOST_INCREMENTS = 256
 """So many are chosen for a path, or twice its own where these are more than half as many. In one
-leg 10 to 40 keep 2 %; more is for who asks for it."""
+leg 9 to 15 keep 2 %; more is for who asks for it."""
 
 PARTS_OF_LEGS = 4
 """Two halves of a leg differ little from the whole: they tell a sixth of its error, these half."""

@@ -53,7 +53,7 @@ def _march(
     with reporter.increments(len(table)) as show, reporter.stage("contact"):
 
         def keep(row: int, state: ContactState) -> None:
-            if row == 0:
+            if row in passed:
                 passed.clear()  # the path is followed anew, in shorter increments
             passed[row] = state
             show(row + 1)
