@@ -118,6 +118,40 @@ def test_border_and_yield_are_warned_of(solver, small, tmp_path):
     assert "reaches 950 MPa, above the yield stress of 900 MPa" in pressure
 
 
+UNLIKE = """\
+title: Rigid ball on rubber
+analysis: contact
+structure: {kind: bodies, shape: sphere, radius: 10 mm}
+materials: {body_1: rigid, body_2: {young: 115 GPa, poisson: 0}}
+friction: {coefficient: 0.5}
+load_path: {legs: [{P: 400 N}]}
+contact: {grid: [32, 32], size: [0.8 mm, 0.8 mm]}
+output: {paraview: false, figures: false}
+"""
+
+
+def test_unlike_bodies_pressed_in_one_increment_are_followed_or_warned_of(tmp_path):
+    path = tmp_path / "unlike.yaml"
+    path.write_text(UNLIKE, encoding="utf-8")
+    summaries = []
+    for history in ("auto", "full"):
+        out = tmp_path / history
+        done = invoke("run", path, "--out", out, "--set", f"contact.history={history}")
+        assert done.exit_code == 0, done.stderr
+        summaries.append(summary_of(out))
+    split, given = summaries
+    assert split["warnings"] == []
+    assert split["history"]["parts"] > 4
+    assert split["history"]["error"] <= 0.02
+    assert "shear within" in done.output
+    radii = [found["states"][0]["stick_radius"] for found in summaries]
+    assert radii[1] < 0.7 * radii[0]
+    (warning,) = given["warnings"]
+    assert "increment 1, above contact.accuracy of 2.0%" in warning
+    assert "contact.history: auto" in warning
+    assert "load_path.legs.0.increments" in warning
+
+
 def test_too_many_cells_are_refused_before_anything_is_done(monkeypatch, small, tmp_path):
     from workflow.shell import memory
 

@@ -10,7 +10,7 @@ from abc import abstractmethod
 from typing import Annotated, Generic, Literal, Self, TypeVar
 
 import numpy as np
-from pydantic import Discriminator, Field, StrictBool, Tag, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from sa_solver.types import Array, Grid
 from workflow.analyses.contact.load_table import LoadTable, conflict, ramps
@@ -267,6 +267,13 @@ class LegsOrFile(Section, Generic[LegT]):
         targets = {key: [getattr(leg, key) for leg in self.legs] for key in quantities}
         return LoadTable(ramps(targets, [leg.increments for leg in self.legs]))
 
+    def place(self, row: int) -> str:
+        """The entry that says how long increment ``row`` is."""
+        if self.file is not None:
+            return "load_path.file"
+        ends = np.cumsum([leg.increments for leg in self.legs])
+        return f"load_path.legs.{np.searchsorted(ends, row, side='right')}.increments"
+
 
 class ContactPath(LegsOrFile[Leg]):
     """Legs one after the other from the unloaded state, or a file."""
@@ -286,14 +293,14 @@ class HalfSpaceGrid(Section):
     size: object
     tolerance: Tolerance = entry("relative, of every residual [1]", 1e-8, default=1e-8)
     history: Literal["auto", "full", "reversals"] = entry(
-        "auto: the cheapest that is exact; full: all increments; reversals: turning points",
+        "auto: the cheapest that is accurate; full: all increments; reversals: turning points",
         "auto",
         default="auto",
     )
-    estimate_error: StrictBool = entry(
-        "follow a full history with half its increments too, and report the difference",
-        False,
-        default=False,
+    accuracy: Annotated[float, Quantity("1", at_least=1e-6, at_most=1.0)] = entry(
+        "of shear over µP that increments may leave: auto splits them, full warns [1]",
+        "2 %",
+        default=0.02,
     )
 
     @abstractmethod

@@ -7,8 +7,9 @@ from math import prod
 from workflow.analyses.contact.case import BodiesCase
 from workflow.shell.memory import Memory
 
-# Fields kept of a state, and spectra and iterates alive during a solve, per cell.
-STATE_FIELDS, SPECTRA = 6, 300
+# Fields kept of a state, with tractions of longer increments to compare with, and spectra and
+# iterates alive during a solve, per cell.
+STATE_FIELDS, SPECTRA = 13, 300
 
 
 def memory(case: BodiesCase) -> Memory:

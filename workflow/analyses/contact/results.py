@@ -68,7 +68,7 @@ def write_contact_results(outcome: ContactOutcome, run: ContactRun) -> None:
         writer.put_grid(f"grid/{BODIES}", grid, Frame(np.zeros(3), np.eye(3)))
         writer.put(f"surfaces/{BODIES}", {"height": height})
         writer.put("path", _path(outcome.table))
-        method = {"method": history.method, "reason": history.reason}
+        method = {"method": history.method, "reason": history.reason, "parts": history.parts}
         writer.put("history", _columns(history, friction), **method)
         for index, state in zip(history.indices, history.states, strict=True):
             place = f"contact/{BODIES}/{index + 1:05d}"
@@ -111,7 +111,7 @@ def _summary(outcome: ContactOutcome) -> dict[str, Any]:
     return {
         "increments": len(outcome.table),
         "history": {
-            key: getattr(history, key) for key in ("method", "reason", "error", "error_of")
+            key: getattr(history, key) for key in ("method", "reason", "parts", "error", "error_of")
         },
         "states": state_summaries(grid, friction, history),
         "loop": loop_summary(grid, friction, outcome.table, history, outcome.strain),
@@ -121,10 +121,12 @@ def _summary(outcome: ContactOutcome) -> dict[str, Any]:
 
 def _lines(summary: dict[str, Any], grid: Grid) -> Iterator[str]:
     """The end of the run in a few lines."""
-    last, method = summary["states"][-1], summary["history"]["method"]
+    last, history = summary["states"][-1], summary["history"]
+    split = f" in {history['parts']} parts each" if history["parts"] > 1 else ""
+    left = "" if history["error"] is None else f", shear within {history['error']:.1%}"
     yield (
-        f"{summary['increments']} increments, {len(summary['states'])} computed ({method}), "
-        f"{summary['convolutions']} convolutions"
+        f"{summary['increments']} increments, {len(summary['states'])} computed "
+        f"({history['method']}){split}{left}, {summary['convolutions']} convolutions"
     )
     size = "half_width" if grid.line else "radius"
     yield (

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from sa_solver.contact import ContactState
 from sa_solver.errors import ContactProblemError
 from sa_solver.history import ContactLoadPath, History, HistoryError, march_history
@@ -14,6 +16,7 @@ from workflow.analyses.contact.results import (
     write_contact_results,
 )
 from workflow.errors import MethodFailed, UserError
+from workflow.shell.few_cells import check_cells
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
 
@@ -22,7 +25,8 @@ def run_contact(run: ContactRun) -> None:
     """Run a contact case to its end.
 
     Raises MethodFailed at an increment that does not converge or that no contact can carry; those
-    before it are written. Raises UserError where ``contact.history`` does not suit the path.
+    before it are written. Raises UserError where ``contact.history`` does not suit the path, or no
+    cells are left of the contact.
     """
     run.reporter.say(f"run: {run.case.title}")
     outcome, message = _march(run.case, run.folder, run.reporter)
@@ -34,6 +38,7 @@ def run_contact(run: ContactRun) -> None:
             write_contact_results(outcome, run)
             kept = f"; the increments so far are in {run.folder.results}"
         raise MethodFailed(f"{message}{kept}")
+    _check_grid(outcome, run.reporter)
     write_contact_output(outcome, run)
 
 
@@ -48,6 +53,8 @@ def _march(
     with reporter.increments(len(table)) as show, reporter.stage("contact"):
 
         def keep(row: int, state: ContactState) -> None:
+            if row in passed:
+                passed.clear()  # the path is followed anew, in shorter increments
             passed[row] = state
             show(row + 1)
             reporter.log(
@@ -63,7 +70,7 @@ def _march(
                 case.friction.coefficient,
                 history=case.contact.history,
                 tolerance=case.contact.tolerance,
-                estimate_error=case.contact.estimate_error,
+                accuracy=case.contact.accuracy,
                 progress=keep,
             )
         except HistoryError as error:
@@ -79,9 +86,29 @@ def _march(
     return ContactOutcome(case, grid, height, table, strain, history), message
 
 
+def _check_grid(outcome: ContactOutcome, reporter: Reporter) -> None:
+    """Raises UserError where even the largest contact is a point on the grid."""
+    pressures = [state.traction[2] for state in outcome.history.states]
+    largest = max(pressures, key=np.count_nonzero)
+    settings = outcome.case.contact
+    check_cells("the contact", settings, outcome.grid, largest, reporter, fixed=False)
+
+
 def _warn(outcome: ContactOutcome, reporter: Reporter) -> None:
-    """Contacts cut off by the border of the grid, and pressures above yield."""
-    states = outcome.history.states
+    """Long increments, contacts cut off by the border of the grid, pressures above yield."""
+    states, history, case = outcome.history.states, outcome.history, outcome.case
+    if history.error is not None and history.error > case.contact.accuracy:
+        place = case.load_path.place(history.error_at)
+        shorter = f"take more increments ({place}) or raise contact.accuracy"
+        if history.method != "full":
+            shorter = "take all increments (contact.history: full)"
+        elif case.contact.history == "full":
+            shorter = f"take contact.history: auto, which splits them, or more of them ({place})"
+        reporter.warn(
+            f"the increments of the load leave about {history.error:.1%} of friction as an error "
+            f"of the shear, largest at increment {history.error_at + 1}, above contact.accuracy of "
+            f"{case.contact.accuracy:.1%}: {shorter}"
+        )
     if any(state.border_load > 0.0 for state in states):
         reporter.warn(
             "the contact touches the border of its grid, where it is cut off: raise contact.size"

@@ -30,6 +30,7 @@ from workflow.analyses.specimens.results import write_specimens_output
 from workflow.analyses.specimens.wear import BlockState, FrettedPair, wear_in_cycle_blocks
 from workflow.errors import MethodFailed, UserError
 from workflow.shell.analysis import Run
+from workflow.shell.few_cells import check_cells
 from workflow.shell.reporter import Reporter
 
 # States of each force that are kept with their fields: the unworn one, the last, others between
@@ -104,6 +105,9 @@ def _fret(
             half_space.fretting_cycle(height, state.depths.sum(axis=0), force, path)
             for state in (blocks[0], blocks[-1])
         )
+    name = f"the half-space under {force:g} N"
+    check_cells(name, case.contact, grid, first.pressure, reporter)
+    check_cells(name, case.contact, grid, last.pressure, reporter, worn=True)
     with reporter.stage("coupled cycle"):
         marched = marched_cycle(pair, model.face.gap, conditions)
     end = blocks[-1]

@@ -40,6 +40,7 @@ from workflow.analyses.wear.structures.bodies.case import BodiesWearCase
 from workflow.case.loading import load_named
 from workflow.errors import UserError
 from workflow.shell.dataset import Dataset
+from workflow.shell.few_cells import check_cells
 from workflow.shell.reporter import Reporter
 
 # Of the motion at which all of the contact slides: where loops in partial slip are compared.
@@ -101,7 +102,7 @@ class _Description:
         numbers = {"cycles": cycles, "steps": steps} | self._numbers(cycle)
         numbers["loop_error"] = _energy_error(cycle, loop)
         numbers["partial_loop_error"] = _energy_error(cycle, partial)
-        self._warn(cycle)
+        self._warn(cycle, worn=cycles > 0.0)
         numbers["error"], responses, linear = self._responses(cycle)
         self.reporter.log(
             f"{cycles:g} cycles: {steps} steps, stiffness {numbers['stiffness']:.5g} N/mm, "
@@ -138,7 +139,10 @@ class _Description:
             "adjusted": cycle.adjusted,
         }
 
-    def _warn(self, cycle: ContactCycle) -> None:
+    def _warn(self, cycle: ContactCycle, worn: bool) -> None:
+        settings, grid = self.contact.settings, self.contact.grid
+        pressure = cycle.slipping.normal.pressure
+        check_cells("the contact", settings, grid, pressure, self.reporter, worn=worn)
         if cycle.slipping.normal.touches_border:
             self.reporter.warn(
                 "the contact reaches the border of its grid: enlarge contact.size of its case"

@@ -28,7 +28,7 @@ from wear.joints.jenkins import Jenkins
 from wear.joints.parallel import ParallelSliders
 from wear.stepping import ContactFailure, SlidingCycle, WearingContact, WearState
 from workflow.analyses.rig.rig_model import RigModel
-from workflow.analyses.wear.structures.bodies.case import BodiesWearCase
+from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, WearGrid
 from workflow.analyses.wear.structures.bodies.source import gap_of
 
 # Contacts of the last states: those before and after a step.
@@ -108,6 +108,11 @@ class VibratingContact:
     def load(self) -> float:
         """Normal force [N]."""
         return self._case.load_path.P
+
+    @property
+    def settings(self) -> WearGrid:
+        """Its grid, as the case has it."""
+        return self._case.contact
 
     def unworn(self) -> WearState:
         """The surfaces before the first cycle, pressed."""

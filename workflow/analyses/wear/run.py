@@ -19,7 +19,11 @@ from workflow.analyses.wear.recording import Recorder, RunLog
 from workflow.analyses.wear.results import InterfaceOutcome, Outcome, write_output
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
-from workflow.analyses.wear.warnings import warn_of_contact, warn_of_structure
+from workflow.analyses.wear.warnings import (
+    warn_of_contact,
+    warn_of_structure,
+    warn_of_worn_cells,
+)
 from workflow.analyses.wear.worn_structure import nonlinearity_sentence
 from workflow.errors import MethodFailed, UserError
 from workflow.shell.analysis import Run
@@ -97,6 +101,7 @@ def _march(
     with reporter.jumps(settings.cycles, float(end.cycles[-1])) as bar:
         for end in loop.march(end):  # noqa: B020 - each from the one before
             bar(float(end.cycles[-1]), end.jump)
+    warn_of_worn_cells(case, source.peak, contacts.stages, end, reporter)
     return end, first
 
 

@@ -8,6 +8,7 @@ from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
+from workflow.shell.few_cells import check_cells
 from workflow.shell.reporter import Reporter
 
 # Every cycle should repeat the forces of the one before; a larger change is a cycle not closed.
@@ -49,7 +50,10 @@ def warn_of_contact(
     first: list[FirstContact],
     reporter: Reporter,
 ) -> None:
-    """Unlike bodies, pressures above yield, contacts at the border, edge peaks cut by the grid."""
+    """Unlike bodies, pressures above yield, contacts at the border or on few cells, edge peaks.
+
+    Raises UserError where no cells are left of a contact.
+    """
     pair = stages[0].pair
     if case.contact.method == "normal" and not pair.similar:
         reporter.warn(
@@ -74,6 +78,7 @@ def warn_of_contact(
             )
         if result.touches_border:
             warn_of_border(stage, reporter)
+        check_cells(stage.name, case.contact, stage.grid, result.pressure[peak], reporter)
         for line in structure_of(case).warnings(case, stage, float(interface.loads.P[peak])):
             reporter.warn(line)
 
@@ -97,6 +102,16 @@ def warn_of_growth(stages: list[ContactStage], state: CoupledState, reporter: Re
         worn = interface.surfaces.depth
         if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):
             warn_of_border(stage, reporter)
+
+
+def warn_of_worn_cells(
+    case: WearCase, peak: int, stages: list[ContactStage], state: CoupledState, reporter: Reporter
+) -> None:
+    """Contacts that carry the peak load on few cells after they have worn."""
+    for stage, interface in zip(stages, state.interfaces, strict=True):
+        if peak in interface.starts:
+            pressure = interface.starts[peak].pressure
+            check_cells(stage.name, case.contact, stage.grid, pressure, reporter, worn=True)
 
 
 def warn_of_border(stage: ContactStage, reporter: Reporter) -> None:

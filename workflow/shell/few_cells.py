@@ -1,0 +1,69 @@
+"""Contacts that lie on few cells of their grid: warned of, or refused where no field is left."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import ceil
+from typing import Any
+
+from sa_solver.resolution import cells_across, fewest_across, is_point, peak_error
+from sa_solver.types import Array, Grid
+from workflow.errors import UserError
+from workflow.shell.reporter import Reporter
+
+# A grid of a contact may have so many cells along a direction.
+MOST_CELLS = 4096
+# Proposed grids give so much more cells than enough: those counted may reach beyond the contact.
+MARGIN = 1.25
+# A grid that is made smaller has so many times more cells than the contact, for room around it.
+ROOM = 1.25
+
+
+def check_cells(
+    name: str,
+    settings: Any,
+    grid: Grid,
+    pressure: Array,
+    reporter: Reporter,
+    *,
+    fixed: bool = True,
+    worn: bool = False,
+) -> None:
+    """Warn of a ``pressure`` ``(nx, ny)`` on few cells, with a grid that would do.
+
+    ``settings`` is the section ``contact`` of a case, whose size stays if that is ``fixed``. Raises
+    UserError where the contact is a point on its grid, unless it is ``worn``: then all but the end
+    has been computed.
+    """
+    pressed, enough = pressure > 0.0, fewest_across(grid.line)
+    across = cells_across(pressed)[: 1 if grid.line else 2]
+    if min(across) >= enough or not pressed.any():
+        return
+    given = settings.grid if isinstance(settings.grid, tuple) else (settings.grid,)
+    factors = [MARGIN * enough / count if count < enough else 1.0 for count in across]
+    finer = [2 * ceil(0.5 * n * f) if f > 1.0 else n for n, f in zip(given, factors, strict=False)]
+    finer += given[len(finer) :]
+    grids = []
+    if max(finer) <= MOST_CELLS:
+        grids.append(f"contact.grid: {_entry(finer, settings.grid)}")
+    room = ROOM * MARGIN * enough
+    if not fixed and all(n >= room for n, f in zip(given, factors, strict=False) if f > 1.0):
+        less = [f"{mm / f:.3g} mm" for mm, f in zip(grid.size, factors, strict=False)]
+        grids.append(f"contact.size: {_entry(less, settings.size)}")
+    cells, remedy = " x ".join(map(str, across)), " or ".join(grids or ["a finer contact.grid"])
+    if is_point(pressed) and not worn:
+        raise UserError(
+            f"contact.grid: {name} is only {cells} cells across, which says nothing of its size "
+            f"and pressure: finer cells are needed than those of {remedy}"
+        )
+    after = " after wear" if worn else ""
+    reporter.warn(
+        f"{name} is {cells} cells across{after}, where {enough} resolve it: the largest pressure "
+        f"may be {peak_error(min(across)):.1%} off and the width a cell; take {remedy}"
+    )
+
+
+def _entry(values: Sequence[object], like: object) -> str:
+    """Values as the case has them: one, or a list."""
+    listed = ", ".join(map(str, values))
+    return f"[{listed}]" if isinstance(like, tuple) else listed
