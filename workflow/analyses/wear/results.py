@@ -245,7 +245,7 @@ def _holding_moments(contact: InterfaceOutcome) -> dict[str, Dataset]:
             getattr(loads, name), "N mm", f"{LOADS[name][1]} that holds the tilt, {when}"
         )
         for when, loads in contact.carried.items()
-        for name in ("Mx", "My")
+        for name in (("My",) if contact.stage.grid.line else ("Mx", "My"))
     }
 
 
@@ -415,14 +415,5 @@ def _lines(outcome: Outcome, summary: dict[str, Any]) -> Iterator[str]:
             f"  {name}: worn {numbers['depth_1'] * 1e3:.3g} um ({name_1}), "
             f"{numbers['depth_2'] * 1e3:.3g} um ({name_2}); {numbers['volume_1']:.3g}, "
             f"{numbers['volume_2']:.3g} {unit}; peak pressure {peaks['unworn']:.0f} -> "
-            f"{peaks['worn']:.0f} MPa; {_tilt_text(numbers, outcome.source.line)}"
+            f"{peaks['worn']:.0f} MPa; tilt {numbers['tilt']}"
         )
-
-
-def _tilt_text(numbers: dict[str, Any], line: bool) -> str:
-    """How a contact of the summary is kept from tilting."""
-    if numbers["tilt"] == "free":
-        return "tilt free"
-    moment = numbers["holding_moment"]
-    unit = "N mm/mm" if line else "N mm"
-    return f"tilt held by up to {moment['unworn']:.3g} -> {moment['worn']:.3g} {unit}"
