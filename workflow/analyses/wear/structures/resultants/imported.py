@@ -61,9 +61,8 @@ def base_units(line: bool) -> dict[str, str]:
 
 def required_columns(line: bool, given: Collection[str]) -> list[str]:
     """Columns that a file with those ``given`` must have: both moments of the pressure, or none."""
-    optional = OPTIONAL_IN_LINE if line else ()
-    if tilt_of(line, given) == "held":
-        optional += MOMENTS
+    moments = MOMENTS if tilt_of(line, given) == "held" else ()
+    optional = (*(OPTIONAL_IN_LINE if line else ()), *moments)
     return [name for name in COLUMNS if name not in optional]
 
 
