@@ -35,7 +35,7 @@ from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalStart, NormalState
 from sa_solver.tangential_loop import LoopFailure, LoopPath, stuck_stiffness, tractions_of_motion
-from sa_solver.types import Array
+from sa_solver.types import Array, Tilt
 
 STAGES = 24
 """Reduced loads. The energies of loops between spheres then differ from those of the whole
@@ -117,18 +117,21 @@ def partial_slip_curve(
     stages: int = STAGES,
     tolerance: float,
     start: NormalStart | None = None,
+    tilt: Tilt = "free",
 ) -> PartialSlip:
     """What a contact of alike bodies does when it is moved along x under a load ``P`` [N].
 
-    ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies, free to tilt under P. Raises
-    PartialSlipError for bodies that are not alike or a load that is not above 0, LoopFailure where
-    a normal problem does not converge.
+    ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies, whose ``tilt`` under P is free
+    of moments or held. Raises PartialSlipError for bodies that are not alike or a load that is not
+    above 0, LoopFailure where a normal problem does not converge.
     """
     if not contact.half_space.pair.similar:
         raise PartialSlipError("bodies that are not alike: their pressure follows the shear")
     if not P > 0.0:
         raise PartialSlipError(f"a load of {P:g} N: nothing is pressed")
-    normal = _converged(contact.solve(height, P, tolerance=tolerance, start=start))
+    held = 0.0 if tilt == "held" else None
+    pressed = contact.solve(height, P, tilt_x=held, tilt_y=held, tolerance=tolerance, start=start)
+    normal = _converged(pressed)
     tangential, ratio = _stiffness(contact.half_space, normal)
     tilted = height - normal.tilt_x * contact.grid.y + normal.tilt_y * contact.grid.x
     depth = normal.approach - float(tilted.min())

@@ -27,6 +27,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -36,6 +37,10 @@ from sa_solver.errors import InputError
 Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+
+Tilt = Literal["free", "held"]
+"""Whether bodies turn about x and y as imposed moments make them, or keep the tilt that they have
+unloaded and unworn, whatever moments that takes."""
 
 
 @dataclass(frozen=True)
@@ -276,6 +281,13 @@ class LoadHistory:
     def resultants(self) -> Array:
         """P, Qx, Qy, Mx, My and Mz ``(n, 6)``."""
         return np.stack([self.P, self.Qx, self.Qy, self.Mx, self.My, self.Mz], axis=1)
+
+    def pressing(self, increment: int, tilt: Tilt) -> dict[str, float]:
+        """What presses the bodies in an increment, as the normal contact takes it."""
+        P, Mx, My = (float(column[increment]) for column in (self.P, self.Mx, self.My))
+        if tilt == "held":
+            return {"P": P, "tilt_x": 0.0, "tilt_y": 0.0}
+        return {"P": P, "Mx": Mx, "My": My}
 
     @property
     def missions(self) -> list[slice]:

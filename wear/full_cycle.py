@@ -12,12 +12,16 @@ import numpy as np
 from sa_solver.contact import ContactLoad, ContactState, FrictionalContact
 from sa_solver.errors import ContactProblemError
 from sa_solver.history import ContactLoadPath
-from sa_solver.types import Array, LoadHistory
+from sa_solver.types import Array, LoadHistory, Tilt
 from wear.stepping import ContactFailure
 
 
 def march_cycle(
-    contact: FrictionalContact, height: Array, loads: LoadHistory, motion: Array | None = None
+    contact: FrictionalContact,
+    height: Array,
+    loads: LoadHistory,
+    motion: Array | None = None,
+    tilt: Tilt = "free",
 ) -> list[ContactState]:
     """States at the ends of the increments of one closed cycle, on surfaces that do not change.
 
@@ -26,14 +30,14 @@ def march_cycle(
     twice, and the second pass counts. In a mix every mission is such a cycle of its own, begun with
     the bodies apart. ``motion`` ``(t, 2)`` [mm] of body 2 over body 1 in each increment, far from
     the contact, is imposed in the place of Qx, Qy and Mz, without twist; the bodies meet in the
-    middle of it.
+    middle of it. A ``tilt`` that is held is imposed in the place of Mx and My.
 
     Raises :class:`ContactFailure` where an increment does not converge, or its load is more than
     the contact can carry.
     """
     states: list[ContactState] = []
     heights = np.broadcast_to(height, (len(loads), *contact.grid.shape))
-    path = _path(loads, motion)
+    path = _path(loads, motion, held=tilt == "held")
     for mission in loads.missions:
         increments = [path.load(t) for t in range(mission.start, mission.stop)]
         states += _closed_cycle(contact, heights[mission], increments, mission.start)
@@ -64,14 +68,21 @@ def _shifts(motion: Array) -> Array:
     return shifts
 
 
-def _path(loads: LoadHistory, motion: Array | None) -> ContactLoadPath:
-    """The resultants of all increments and what these dissipate, or the shifts of body 1."""
-    values = loads.resultants
+def _path(loads: LoadHistory, motion: Array | None, held: bool) -> ContactLoadPath:
+    """The resultants of all increments and what these dissipate, or the shifts of body 1.
+
+    A tilt that is ``held`` is 0.
+    """
+    values, moved = loads.resultants, motion is not None
+    if held:
+        values[:, 3:5] = 0.0
+    imposed = (False, moved, moved, held, held, moved)
     if motion is None:
-        return ContactLoadPath(values, energy=np.stack([loads.Edx, loads.Edy], axis=1))
+        energy = np.stack([loads.Edx, loads.Edy], axis=1)
+        return ContactLoadPath(values, imposed, energy=energy)
     values[:, 1:3] = np.concatenate([_shifts(motion[mission]) for mission in loads.missions])
     values[:, 5] = 0.0
-    return ContactLoadPath(values, motion=(False, True, True, False, False, True))
+    return ContactLoadPath(values, imposed)
 
 
 def _advance(

@@ -19,7 +19,7 @@ from sa_solver.contact import ContactState, FrictionalContact
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Tilt
 from wear.full_cycle import march_cycle
 from wear.laws import EvolvingLaw, WearLaw
 from wear.moving import followed, passages
@@ -92,7 +92,8 @@ class InterfaceSettings:
     body 2, and ``friction`` gives Coulomb's coefficient after so much dissipated energy [N mm].
     Slips are those of the loads, or with ``method`` full the half-space's own; there ``gross_slip``
     says in which direction it slides as a whole, and a ``driven`` contact has the slip of its loads
-    imposed as the motion of its bodies, in the place of the tangential force. ``follow`` says
+    imposed as the motion of its bodies, in the place of the tangential force. A ``tilt`` that is
+    held stays that of the unworn bodies, in the place of the loads' Mx and My. ``follow`` says
     whether surfaces that move over each other are followed; None: where that counts
     (:func:`wear.moving.moves`). ``tolerance`` is the contact solver's.
     """
@@ -108,6 +109,7 @@ class InterfaceSettings:
     method: Literal["normal", "full"] = "normal"
     gross_slip: Literal["force", "energies"] = "force"
     driven: bool = False
+    tilt: Tilt = "free"
     follow: bool | None = None
     tolerance: float = 1e-8
 
@@ -299,6 +301,14 @@ class InterfaceContact:
             return _half_space_tractions(first.cycle)
         return self._given_tractions(history.slip, first.pressure, 0.0)
 
+    def carried(self, loads: LoadHistory, pressure: Array) -> LoadHistory:
+        """``loads``, where tilt is held with the moments of ``pressure`` ``(t, nx, ny)`` [MPa]."""
+        if self.settings.tilt == "free":
+            return loads
+        force, grid = pressure * self.grid.cell_area, self.grid
+        Mx, My = (np.sum(force * arm, axis=(1, 2)) for arm in (grid.y, -grid.x))
+        return replace(loads, Mx=Mx, My=My)
+
     def frictional(self, energy: float) -> FrictionalContact:
         """The contact with the half-space's own friction, after so much ``energy`` [N mm]."""
         friction = self.settings.friction(energy)
@@ -329,7 +339,8 @@ class InterfaceContact:
         if self._current is not None and all(map(np.array_equal, self._current[0], key)):
             return self._current[1]
         slip, ways = self.transfer.to_cells(state.slip), passages(self.grid, state.ends)
-        sliding = SlidingCycle(state.loads, np.hypot(slip[:, 0], slip[:, 1]), None, ways)
+        sizes, tilt = np.hypot(slip[:, 0], slip[:, 1]), settings.tilt
+        sliding = SlidingCycle(state.loads, sizes, None, ways, tilt)
         cycle: tuple[ContactState, ...] = ()
         if settings.method == "full":
             cycle = self._half_space_cycle(state, sliding)
@@ -351,7 +362,8 @@ class InterfaceContact:
         """The closed cycle with the half-space's own friction, on the present surfaces."""
         gaps = np.stack([sliding.gap(state.surfaces, t) for t in range(len(state.loads))])
         motion = state.slip.mean(axis=2) if self.settings.driven else None
-        cycle = tuple(march_cycle(self.frictional(state.energy), gaps, state.loads, motion))
+        contact, tilt = self.frictional(state.energy), self.settings.tilt
+        cycle = tuple(march_cycle(contact, gaps, state.loads, motion, tilt))
         self._spent += Spent(len(cycle), sum(increment.convolutions for increment in cycle))
         return cycle
 

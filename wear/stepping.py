@@ -32,7 +32,7 @@ from sa_solver.errors import ConvergenceError
 from sa_solver.influence import Z
 from sa_solver.normal import NormalContact, NormalStart, NormalState
 from sa_solver.transform import SpectralFilter
-from sa_solver.types import Array, Grid, LoadHistory
+from sa_solver.types import Array, Grid, LoadHistory, Tilt
 from wear.laws import SlidingConditions, WearLaw
 from wear.moving import Passage, TravelError
 from wear.surfaces import Surfaces
@@ -56,12 +56,15 @@ class SlidingCycle:
     ``slip`` ``(t, nx, ny)`` is the size of the slip in each increment [mm]; ``uplift``
     ``(t, nx, ny)`` [mm] the normal displacement under its shear, None for similar bodies;
     ``passages`` how body 2 moves over body 1 in each, None where that is too little to matter.
+    The ``tilt`` is held at that of the unworn bodies by whatever moments it takes, or free under
+    those of the loads.
     """
 
     loads: LoadHistory
     slip: Array
     uplift: Array | None = None
     passages: tuple[Passage, ...] | None = None
+    tilt: Tilt = "free"
 
     def gap(self, surfaces: Surfaces, increment: int) -> Array:
         """Gap before loading ``(nx, ny)`` [mm] where an increment has body 2, lifted by shear."""
@@ -270,12 +273,9 @@ class WearingContact:
         compliance: Array | None = None,
     ) -> NormalState:
         """Contact state of one increment; ``compliance`` ``(nx, ny)`` [mm/MPa] is wear."""
-        loads = self.sliding.loads
         state = self.contact.solve(
             self.sliding.gap(surfaces, increment),
-            float(loads.P[increment]),
-            float(loads.Mx[increment]),
-            float(loads.My[increment]),
+            **self.sliding.loads.pressing(increment, self.sliding.tilt),
             tolerance=self.tolerance,
             start=start,
             compliance=compliance,

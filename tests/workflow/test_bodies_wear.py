@@ -5,14 +5,17 @@ import pickle
 from pathlib import Path
 from typing import Any
 
+import h5py
 import numpy as np
 import pytest
 
 from tests.workflow.commands import command
 from wear.interface import InterfaceState
+from workflow.analyses.wear.contact_loops import loop_path
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
 from workflow.analyses.wear.structures.bodies.source import BodiesSource
+from workflow.analyses.wear.structures.resultants.reading import read_resultants
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case, template
@@ -76,7 +79,8 @@ def test_shape_or_size_say_whether_bodies_touch_along_a_line(text, override, kin
         ("load_path.stroke=0 um", "above 0 mm"),
         ("load_path.increments=0", "a whole number from 1 to 1000"),
         ("contact.method=half", "normal"),
-        ("load_path.legs=[]", "unknown key; allowed: P, stroke, direction, increments"),
+        ("load_path.tilt=loose", "allowed: 'free' or 'held'"),
+        ("load_path.legs=[]", "unknown key; allowed: P, stroke, direction, increments, tilt"),
     ],
 )
 def test_what_makes_no_sense_is_refused(override: str, words: str) -> None:
@@ -266,6 +270,53 @@ def test_a_run_writes_what_every_wear_run_does(tmp_path: Path) -> None:
     assert interface["volume_1"] == pytest.approx(5e-9 * 0.5 * 1e5, rel=1e-9)
     assert interface["energy_per_cycle"]["half_space"] == pytest.approx(0.5, rel=1e-9)
     assert {"results.h5", "case.yaml", "run.log"} <= {p.name for p in (tmp_path / "out").iterdir()}
+
+
+@pytest.mark.parametrize("dimension", [2, 3])
+def test_moments_that_hold_the_tilt_are_results(dimension: int, tmp_path: Path) -> None:
+    """Of the places that a cylinder or a ball takes over its groove; the loads have none.
+
+    Read as loads of another code, they leave the tilt held.
+    """
+    text, small = (LINE, "contact.grid=[64, 1]") if dimension == 2 else (AREA, SMALL[0])
+    case = tmp_path / "case.yaml"
+    case.write_text(text, encoding="utf-8")
+    overrides = [
+        *(small, "wear.cycles=2000", "wear.step.cycles=500", "load_path.stroke=0.1 mm"),
+        *("load_path.P=20", "wear.motion=follow", "stress.section=none"),
+        *("stress.life.parameter=none", "output.paraview=false"),
+    ]
+    own = run(case, tmp_path / "held", *overrides)["interface"]
+    assert own["tilt"] == "held"
+    assert own["holding_moment"]["unworn"] < 1e-9 * 20.0 < own["holding_moment"]["worn"]
+    assert "tilt held" in command("check", case).stdout
+    with h5py.File(tmp_path / "held" / "results.h5") as file:
+        assert not {"Mx", "My"} & file["structure/interface/load_history"].keys()
+        moments = {name: file["contact/interface"].get(f"{name}_worn") for name in ("Mx", "My")}
+        assert (moments["Mx"] is None) == (dimension == 2)
+        assert moments["My"].attrs["unit"] == ("N mm" if dimension == 3 else "N mm/mm")
+        My = moments["My"][()]
+    assert np.abs(My).max() == pytest.approx(own["holding_moment"]["worn"], rel=1e-6)
+    # Body 2 stands at x > 0 of its groove half of the time, and then presses on the rim there.
+    assert My.max() > 0.5 * np.abs(My).max()
+    assert -My.min() > 0.5 * np.abs(My).max()
+    (again,) = read_resultants(
+        f"{tmp_path / 'held' / 'results.h5'}:structure", dimension == 2
+    ).values()
+    assert again.tilt == "held"
+    free = run(case, tmp_path / "free", *overrides, "load_path.tilt=free")["interface"]
+    assert free["tilt"] == "free"
+    assert "holding_moment" not in free
+    assert free["depth_1"] > 1.002 * own["depth_1"]
+
+
+def test_a_loop_on_worn_surfaces_keeps_the_tilt_too() -> None:
+    for tilt, moments in (("held", None), ("free", (0.0, 0.0))):
+        case = line(f"load_path.tilt={tilt}", "loops.amplitude=1 um")
+        stage = ContactStage(case, BodiesSource(case).faces[0])
+        state, _ = stage.begin(BodiesSource(case).unworn()[0], 1.0)
+        path = loop_path(case.loops, stage.name, state, 0, stage.settings.tilt)
+        assert path.moments == moments
 
 
 @pytest.mark.slow

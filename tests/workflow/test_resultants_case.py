@@ -319,6 +319,40 @@ def test_a_new_run_takes_away_the_nodes_of_the_old(typed, tmp_path):
     assert interface["volume_1"] == pytest.approx(1e-8 * interface["energy"], rel=1e-9)
 
 
+def test_a_table_without_moments_holds_the_tilt(tmp_path):
+    """On heights that do not lie level; a table of the moments that hold it presses alike."""
+    x = (np.arange(64) - 31.5) * 3.0 / 64
+    np.save(tmp_path / "gap.npy", (0.03 * x**4 + 0.01 * x)[:, None])
+    rows = [line.split(", ") for line in LINE_TABLE.splitlines()]
+    rows = [[P, Qx, energy] for P, Qx, _, energy in rows]
+    case = tmp_path / "case.yaml"
+    case.write_text(template("resultants"), encoding="utf-8")
+    overrides = [
+        *SMALL, "structure.dimension=2", "structure.size=[3]", "contact.grid=[64, 8]",
+        "structure.gap={shape: heights, file: gap.npy}",
+    ]  # fmt: skip
+
+    def worn(moments: list[str], name: str) -> dict[str, Any]:
+        table = [",".join([*row, moment]) for row, moment in zip(rows, moments, strict=True)]
+        (tmp_path / "loads.csv").write_text("\n".join(table), encoding="utf-8")
+        return run(case, tmp_path / name, *overrides)["interface"]
+
+    (tmp_path / "loads.csv").write_text("\n".join(map(",".join, rows)), encoding="utf-8")
+    checked = command("check", case, overrides=overrides)
+    assert "heights, tilt held" in checked.stdout, checked.stderr
+    held = run(case, tmp_path / "held", *overrides)["interface"]
+    with h5py.File(tmp_path / "held" / "results.h5") as file:
+        My = file["contact/interface/My_unworn"][()].tolist()
+    assert held["tilt"] == "held"
+    assert held["holding_moment"]["unworn"] == pytest.approx(max(map(abs, My)), rel=1e-12)
+    assert held["peak_load"]["unworn"]["My"] == pytest.approx(My[1], rel=1e-12)
+    same, none = worn(["My", *map(repr, My)], "same"), worn(["My", "0", "0", "0"], "none")
+    assert same["tilt"] == none["tilt"] == "free"
+    pressure = held["peak_pressure"]["unworn"]
+    assert same["peak_pressure"]["unworn"] == pytest.approx(pressure, rel=1e-6)
+    assert none["peak_pressure"]["unworn"] != pytest.approx(pressure, rel=1e-3)
+
+
 @pytest.mark.slow
 def test_pictures_of_resultants_alone(typed, tmp_path):
     """Figures leave out what another code did not tell; ParaView shows every face."""

@@ -190,6 +190,29 @@ def test_units_of_a_line_contact_are_per_length(tmp_path):
         read_resultants(path)
 
 
+def test_without_moments_the_tilt_is_held(tmp_path):
+    """Both of them, or in a line contact that about its length; in either kind of file."""
+    two = {name: value for name, value in GOOD.items() if name not in ("Mx", "My")}
+    one = {"P": 100, "Qx": -40, "Edx": 2}
+    for row, line in ((two, False), (one, True), (one | {"Mx": 0}, True)):
+        own = read_resultants(write(tmp_path, table([row])), line)["interface"]
+        assert own.tilt == "held"
+        assert not np.any([own.loads.Mx, own.loads.My])
+    for row, line in ((GOOD, False), (one | {"My": 0}, True)):
+        assert read_resultants(write(tmp_path, table([row])), line)["interface"].tilt == "free"
+    with pytest.raises(InputFileError, match=r"csv:1: no column My; .* or neither: held tilt"):
+        read_resultants(write(tmp_path, table([two | {"Mx": 0}])))
+    path = tmp_path / "loads.h5"
+    write_resultants_h5(path, {"f": face_history()})
+    with h5py.File(path, "a") as file:
+        del file["f/load_history/My"]
+    with pytest.raises(InputFileError, match=r"/f/load_history: My missing; .* neither: held tilt"):
+        read_resultants(path)
+    with h5py.File(path, "a") as file:
+        del file["f/load_history/Mx"]
+    assert read_resultants(path)["f"].tilt == "held"
+
+
 def test_units_of_datasets_are_converted(tmp_path):
     path, history = tmp_path / "loads.h5", face_history()
     write_resultants_h5(path, {"f": history})

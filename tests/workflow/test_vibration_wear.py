@@ -75,8 +75,8 @@ def refusal(folder, *settings, wear=WEAR):
     return " ".join(ended.stderr.split())
 
 
-def contact_in_rig(folder, force=75.0, frequency=100.0):
-    (folder / "wear.yaml").write_text(WEAR, encoding="utf-8")
+def contact_in_rig(folder, force=75.0, frequency=100.0, wear=WEAR):
+    (folder / "wear.yaml").write_text(wear, encoding="utf-8")
     rig = row_of_masses(Rig(kind="rig", masses=MASSES, springs=SPRINGS, damping_ratio=DAMPING))
     case = contact_case(str(folder / "wear.yaml"))
     return rig, VibratingContact(case, rig, force, frequency, RESOLUTION)
@@ -164,6 +164,29 @@ def test_the_loop_is_that_of_the_whole_tangential_problem(tmp_path):
         loop = contact.loop(cycle, amplitude)
         by_sliders = float(cycle.sliders.loop_energy(amplitude).sum())
         assert by_sliders == pytest.approx(loop.energy, rel=allowed)
+
+
+@pytest.mark.parametrize("tilt", ["held", "free"])
+def test_joint_wear_and_loop_tilt_alike(tilt, tmp_path):
+    """On a ball with a slope, either all three of them or none."""
+    x, y = np.meshgrid(*[(np.arange(16) - 7.5) * 0.9 / 16] * 2, indexing="ij")
+    np.save(tmp_path / "gap.npy", (x**2 + y**2) / 80.0 + 3e-3 * np.maximum(x, 0.0))
+    structure = next(line for line in WEAR.splitlines() if line.startswith("structure"))
+    wear = WEAR.replace(structure, "structure: {kind: bodies, shape: heights, file: gap.npy}")
+    wear = wear.replace("increments: 2}", f"increments: 2, tilt: {tilt}}}")
+    _, contact = contact_in_rig(tmp_path, wear=wear)
+    state = contact.unworn()
+    cycle = contact.at(state)
+    joint, wearing = cycle.slipping.normal, cycle.wearing.solve(state.surfaces, 0, None)
+    for solved in (joint, wearing):
+        assert (solved.tilt_y == 0.0) == (tilt == "held")
+        assert (abs(solved.My) < 1e-6) == (tilt == "free")
+    np.testing.assert_allclose(wearing.pressure, joint.pressure, atol=1e-6 * joint.pressure.max())
+    loop = contact.loop(cycle, 0.5 * cycle.full_slip)
+    pressed = np.count_nonzero(joint.pressure) * contact.grid.cell_area
+    assert loop.area == pytest.approx(pressed, rel=1e-9)
+    # The stiffness that both start with is that of the same pressed cells.
+    assert loop.stiffness == pytest.approx(cycle.slipping.stiffness, rel=1e-6)
 
 
 # --- wear ---------------------------------------------------------------------------------------

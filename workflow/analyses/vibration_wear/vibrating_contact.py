@@ -101,6 +101,7 @@ class VibratingContact:
         pair = ElasticPair(case.material(1), case.material(2))
         self._contact = NormalContact(HalfSpace(self.grid, pair))
         self._laws = case.wear_of(1).described(), case.wear_of(2).described()
+        self._tilt = case.load_path.tilt
         self._receptance = Receptance(rig.model)
         self._solved: deque[ContactCycle] = deque(maxlen=KEPT)
 
@@ -169,7 +170,8 @@ class VibratingContact:
         """
         half_space, tolerance = self._contact.half_space, self._case.contact.tolerance
         contact = FrictionalContact(half_space, cycle.friction, tolerance)
-        path = LoopPath(self.load, amplitude, increments=LOOP_INCREMENTS)
+        moments = None if self._tilt == "held" else (0.0, 0.0)
+        path = LoopPath(self.load, amplitude, increments=LOOP_INCREMENTS, moments=moments)
         try:
             return march_loop(contact, cycle.state.surfaces.gap, path)
         except LoopFailure as error:
@@ -181,7 +183,10 @@ class VibratingContact:
         start = state.starts.get(0)
         try:
             slipping = partial_slip_curve(
-                self._contact, state.surfaces.gap, self.load, tolerance=tolerance, start=start
+                *(self._contact, state.surfaces.gap, self.load),
+                tolerance=tolerance,
+                start=start,
+                tilt=self._tilt,
             )
         except (PartialSlipError, LoopFailure) as error:
             raise ContactFailure(str(error)) from error
@@ -222,4 +227,4 @@ class VibratingContact:
         """One increment: the load stays, and so does the pressure on surfaces that do not move."""
         nothing, pressed = np.zeros(1), np.array([self.load])
         loads = LoadHistory(pressed, *(nothing,) * 7, sliding=np.zeros(1, dtype=bool))
-        return SlidingCycle(loads, path[None])
+        return SlidingCycle(loads, path[None], tilt=self._tilt)

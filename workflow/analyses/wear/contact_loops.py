@@ -23,7 +23,7 @@ from sa_solver.tangential_loop import (
     LoopPath,
     march_loop,
 )
-from sa_solver.types import Array
+from sa_solver.types import Array, Tilt
 from wear.interface import InterfaceState
 from wear.stepping import ContactFailure
 from workflow.analyses.wear.case.loops import Loops
@@ -61,14 +61,20 @@ def loops_due(loops: Loops, jump: int, ended: bool) -> bool:
 
 
 def worn_loop(
-    contact: FrictionalContact, loops: Loops, name: str, state: InterfaceState, peak: int
+    contact: FrictionalContact,
+    loops: Loops,
+    name: str,
+    state: InterfaceState,
+    peak: int,
+    tilt: Tilt = "free",
 ) -> WornLoop:
     """The loop of the contact ``name`` in its present state, under its loads at ``peak``.
 
-    A normal force of one's own acts along the same line. Raises ContactFailure if it does not
-    converge or friction cannot carry it, UserError for a contact without load.
+    Its ``tilt`` is held, or free under their moments. A normal force of one's own acts along the
+    same line. Raises ContactFailure if it does not converge or friction cannot carry it, UserError
+    for a contact without load.
     """
-    path = loop_path(loops, name, state, peak)
+    path = loop_path(loops, name, state, peak, tilt)
     try:
         loop = march_loop(contact, state.surfaces.gap, path)
     except (LoopFailure, ContactProblemError) as error:
@@ -96,7 +102,9 @@ def worn_loop(
     return WornLoop(values, loop.displacement, loop.force)
 
 
-def loop_path(loops: Loops, name: str, state: InterfaceState, peak: int) -> LoopPath:
+def loop_path(
+    loops: Loops, name: str, state: InterfaceState, peak: int, tilt: Tilt = "free"
+) -> LoopPath:
     """What the loop imposes on the contact ``name``."""
     loads = state.loads
     P, Mx, My = (float(column[peak]) for column in (loads.P, loads.Mx, loads.My))
@@ -109,7 +117,7 @@ def loop_path(loops: Loops, name: str, state: InterfaceState, peak: int) -> Loop
     amplitude = loops.amplitude if loops.force is None else loops.force
     assert amplitude is not None, "loops that are not wanted"
     drive: Literal["motion", "force"] = "motion" if loops.force is None else "force"
-    moments = share * Mx, share * My
+    moments = None if tilt == "held" else (share * Mx, share * My)
     return LoopPath(force, amplitude, drive, loops.increments, loops.axis, moments)
 
 

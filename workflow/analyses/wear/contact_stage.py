@@ -45,10 +45,10 @@ class ContactStage(InterfaceContact):
 
     def coarse_pressure(self, loads: LoadHistory, peak: int) -> Array:
         """Unworn peak pressure on a grid as coarse as the mesh of the structure."""
-        at_peak = (float(column[peak]) for column in (loads.P, loads.Mx, loads.My))
         contact = NormalContact(HalfSpace(self.coarse_grid, self.pair))
         gap = gap_on(self._contact_face, self.coarse_grid)
-        return contact.solve(gap, *at_peak).pressure
+        load = loads.pressing(peak, self.settings.tilt)
+        return contact.solve(gap, **load, start=None, compliance=None).pressure
 
     def face_of(self, body: Literal[1, 2]) -> Face:
         """The face of one body, with its own nodes."""
@@ -64,7 +64,8 @@ class ContactStage(InterfaceContact):
     def loop(self, state: InterfaceState, peak: int) -> WornLoop:
         """The tangential loop that the case asks for, on the present surfaces."""
         contact = self.frictional(state.energy)
-        return worn_loop(contact, self._case.loops, self.name, state, peak)
+        tilt = self.settings.tilt
+        return worn_loop(contact, self._case.loops, self.name, state, peak, tilt)
 
 
 def _interface(case: WearCase, contact: ContactFace, transfer: FaceTransfer) -> InterfaceSettings:
@@ -82,6 +83,7 @@ def _interface(case: WearCase, contact: ContactFace, transfer: FaceTransfer) -> 
         method=settings.method,
         gross_slip=settings.gross_slip,
         driven=contact.driven,
+        tilt=contact.tilt,
         follow=_follow(case),
         tolerance=settings.tolerance,
     )

@@ -6,7 +6,7 @@ Extensive quantities are in the units of a contact over an area.
 from __future__ import annotations
 
 from fe_models.mesh import Face
-from sa_solver.types import Array
+from sa_solver.types import Array, Tilt
 from wear.interface import FaceLoads
 from workflow.analyses.contact.datasets import (
     load_columns,
@@ -27,9 +27,17 @@ def face_mesh(face: Face) -> dict[str, Dataset]:
     }
 
 
-def put_face(writer: ResultsWriter, group: str, face: Face, carried: FaceLoads) -> None:
-    """A contact face over a cycle; nodal pressure and shear where a structure gives them."""
-    writer.put(f"{group}/load_history", load_columns(carried.loads))
+def put_face(
+    writer: ResultsWriter, group: str, face: Face, carried: FaceLoads, tilt: Tilt = "free"
+) -> None:
+    """A contact face over a cycle; nodal pressure and shear where a structure gives them.
+
+    Where the ``tilt`` is held, the loads have no moments of the pressure.
+    """
+    columns = load_columns(carried.loads)
+    if tilt == "held":
+        del columns["Mx"], columns["My"]
+    writer.put(f"{group}/load_history", columns)
     writer.put(group, face_mesh(face) | {"slip": slip_field(carried.slip)})
     force = getattr(carried, "force", None)
     if force is not None:

@@ -10,7 +10,7 @@ from typing import Literal, Protocol
 import numpy as np
 
 from fe_models.mesh import Face
-from sa_solver.types import Array, Frame, Grid, Indices
+from sa_solver.types import Array, Frame, Grid, Indices, Tilt
 from wear import coupled
 from wear.interface import CycleLoads, FaceLoads
 
@@ -28,7 +28,8 @@ class ContactFace:
     ``size`` (x, y) [mm] is what the contact grid covers, ``gap`` gives the distance [mm] at x and y
     of the face, and ``coarse`` as many cells as the face has nodes. ``remedy`` is what to do where
     the contact reaches the end of the face. A ``driven`` contact has the motion of its bodies
-    imposed and not the tangential force: the slip of its loads is then that motion.
+    imposed and not the tangential force: the slip of its loads is then that motion. Where its
+    ``tilt`` is held, the moments of its loads do not count.
     """
 
     face: Face
@@ -37,6 +38,7 @@ class ContactFace:
     coarse: tuple[int, int]
     remedy: str = "make the face larger or round its edges"
     driven: bool = False
+    tilt: Tilt = "free"
 
     def grid(self, cells: tuple[int, int]) -> Grid:
         """The grid of so many cells along x and y over the face."""

@@ -15,7 +15,7 @@ from wear.coupled import KINETICS, CoupledState
 from wear.interface import CycleTractions, FaceLoads, FirstContact, InterfaceState
 from wear.kinetics import LinearRegime, linear_regime
 from wear.steppers import root_mean_square
-from workflow.analyses.contact.datasets import pressure_field, traction_fields
+from workflow.analyses.contact.datasets import LOADS, pressure_field, traction_fields
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.comparison import comparison_summary, write_comparison
 from workflow.analyses.wear.contact_loops import (
@@ -75,6 +75,17 @@ class InterfaceOutcome:
         columns = {"depth": self.kinetics[:, :2], "volume": self.kinetics[:, 2:4]}
         return {
             name: linear_regime(self.cycles, values.sum(axis=1)) for name, values in columns.items()
+        }
+
+    @cached_property
+    def carried(self) -> dict[str, LoadHistory]:
+        """Loads, unworn and worn, with the moments that hold the tilt where it is held."""
+        worn = np.zeros_like(self.first.pressure)
+        for t, start in self.state.starts.items():
+            worn[t] = start.pressure  # that the last wear step has left
+        return {
+            "unworn": self.stage.carried(self.unworn.loads, self.first.pressure),
+            "worn": self.stage.carried(self.state.loads, worn),
         }
 
     @property
@@ -193,12 +204,13 @@ def _write_results(
         for contact in outcome.interfaces:
             stage, first, loads = contact.stage, contact.first, contact.unworn.loads
             writer.put_grid(f"grid/{stage.name}", stage.grid, stage.face.frame)
-            put_face(writer, f"structure/{stage.name}", stage.face, contact.unworn)
+            tilt = stage.settings.tilt
+            put_face(writer, f"structure/{stage.name}", stage.face, contact.unworn, tilt)
             if _write_coarse(writer, stage, loads, source.peak):
                 coarse.append(stage.name)
             dissipated = "energy dissipated in each increment, half-space pressure"
             energy = {"energy_half_space": Dataset(first.energy, "N mm", dissipated)}
-            writer.put(f"contact/{stage.name}", energy)
+            writer.put(f"contact/{stage.name}", energy | _holding_moments(contact))
             if first.cycle:
                 write_comparison(writer, stage.name, first.cycle, loads, source.peak)
         recorded = _write_jumps(writer, outcome, run.folder)
@@ -222,6 +234,19 @@ def _write_results(
         life=tuple(sorted(stress.name for stress in stresses if stress.mapped)),
     )
     return recorded, contents
+
+
+def _holding_moments(contact: InterfaceOutcome) -> dict[str, Dataset]:
+    """Moments ``(t,)`` that hold the tilt, where it is held."""
+    if contact.stage.settings.tilt == "free":
+        return {}
+    return {
+        f"{name}_{when}": Dataset(
+            getattr(loads, name), "N mm", f"{LOADS[name][1]} that holds the tilt, {when}"
+        )
+        for when, loads in contact.carried.items()
+        for name in (("My",) if contact.stage.grid.line else ("Mx", "My"))
+    }
 
 
 def _write_coarse(
@@ -313,11 +338,12 @@ def _summary(
 
 
 def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str, Any]:
-    first, loads = contact.first, contact.unworn.loads
+    first, loads = contact.first, contact.carried["unworn"]
     explicit = outcome.case.wear.step.kind == "explicit"
     return {
         **dict(zip(KINETICS, contact.kinetics[-1].tolist(), strict=True)),
         "peak_load": {"unworn": resultants_at(loads, outcome.source.peak)},
+        **_tilt_summary(contact),
         "slip_per_cycle": contact.slip_per_cycle,
         "energy_per_cycle": {
             "half_space": float(first.energy.sum()),
@@ -333,6 +359,16 @@ def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str,
             for name, regime in contact.regimes.items()
         },
     }
+
+
+def _tilt_summary(contact: InterfaceOutcome) -> dict[str, Any]:
+    """Whether the tilt is held, and the largest moments of a cycle that hold it [N mm]."""
+    tilt = contact.stage.settings.tilt
+    if tilt == "free":
+        return {"tilt": tilt}
+    cycles = contact.carried.items()
+    largest = {when: float(np.hypot(loads.Mx, loads.My).max()) for when, loads in cycles}
+    return {"tilt": tilt, "holding_moment": largest}
 
 
 def _regime_summary(regime: LinearRegime) -> dict[str, Any]:
@@ -379,5 +415,5 @@ def _lines(outcome: Outcome, summary: dict[str, Any]) -> Iterator[str]:
             f"  {name}: worn {numbers['depth_1'] * 1e3:.3g} um ({name_1}), "
             f"{numbers['depth_2'] * 1e3:.3g} um ({name_2}); {numbers['volume_1']:.3g}, "
             f"{numbers['volume_2']:.3g} {unit}; peak pressure {peaks['unworn']:.0f} -> "
-            f"{peaks['worn']:.0f} MPa"
+            f"{peaks['worn']:.0f} MPa; tilt {numbers['tilt']}"
         )

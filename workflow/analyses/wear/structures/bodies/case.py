@@ -12,7 +12,7 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import Field, model_validator
 
-from sa_solver.types import Array
+from sa_solver.types import Array, Tilt
 from workflow.analyses.contact.case import (
     HEIGHTS,
     BodyMaterial,
@@ -40,6 +40,7 @@ Direction = Annotated[
 Increments = Annotated[int, Whole(1, 1000)]
 
 FLAT = "flat"
+TILTS = "of the bodies, held: as they are placed; free: as no moment at all leaves them"
 
 # --- bodies -------------------------------------------------------------------------------------
 
@@ -82,6 +83,7 @@ class Reciprocation(Section):
     stroke: Length = entry("of body 2, from end to end, far from the contact [mm]", "50 um")
     direction: Direction = entry("of the stroke, from x to y [rad]", "0 deg", default=0.0)
     increments: Increments = entry("equal steps of each way, there and back", 4, default=4)
+    tilt: Tilt = entry(TILTS, "held", default="held")
 
 
 class LineReciprocation(Section):
@@ -90,6 +92,7 @@ class LineReciprocation(Section):
     P: PressingLineForce = entry("normal force [N/mm]", "50 N/mm")
     stroke: Length = entry("of body 2, from end to end, far from the contact [mm]", "50 um")
     increments: Increments = entry("equal steps of each way, there and back", 4, default=4)
+    tilt: Tilt = entry(TILTS, "held", default="held")
 
 
 # --- grids --------------------------------------------------------------------------------------
@@ -203,7 +206,7 @@ def _require_fit(case: BodiesWearCase | LineBodiesWearCase, room: float) -> None
 def _outline(
     shape: str, kind: str, path: Reciprocation | LineReciprocation, load: str
 ) -> list[tuple[str, str]]:
-    steps = f"{2 * path.increments} increments"
+    steps = f"{2 * path.increments} increments, tilt {path.tilt}"
     return [
         ("structure", f"{shape}, {kind}"),
         ("load path", f"{load}, stroke {path.stroke:g} mm in {steps}"),

@@ -27,7 +27,10 @@ REMEDY = "enlarge contact.size, and contact.grid with it"
 
 
 class BodiesSource(UncoupledSource):
-    """Two bodies as load source of a wear run: forces of gross sliding over the whole stroke."""
+    """Two bodies as load source of a wear run: forces of gross sliding over the whole stroke.
+
+    Its moments are 0: those that are imposed where the tilt is free.
+    """
 
     def __init__(self, case: BodiesWearCase | LineBodiesWearCase) -> None:
         self._case, self.line = case, isinstance(case, LineBodiesWearCase)
@@ -45,6 +48,7 @@ class BodiesSource(UncoupledSource):
                 coarse_cells(grid.shape[0] // COARSER, grid.shape[1] // COARSER, self.line),
                 REMEDY,
                 driven=True,
+                tilt=self._case.load_path.tilt,
             ),
         )
 

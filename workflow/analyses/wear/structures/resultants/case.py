@@ -216,9 +216,15 @@ class ResultantsCase(WearCase):
         return [
             ("structure", f"loads in {self.structure.dimension}-D from {file}, {slip} slip"),
             ("load path", f"{len(first.loads)} increments"),
-            *(("face", f"{name}, P up to {imported.loads.P.max():g} {unit}, {self._shape(name)}")
-              for name, imported in loads.items()),
-        ]  # fmt: skip
+            *(
+                (
+                    "face",
+                    f"{name}, P up to {imported.loads.P.max():g} {unit}, {self._shape(name)}, "
+                    f"tilt {imported.tilt}",
+                )
+                for name, imported in loads.items()
+            ),
+        ]
 
     def _shape(self, name: str) -> str:
         size, gap = self.structure.size_of(name), self.structure.gap_of(name)

@@ -20,6 +20,7 @@ from workflow.analyses.wear.structures.resultants.imported import (
     ImportedLoads,
     base_units,
     required_columns,
+    tilt_of,
 )
 from workflow.case import units
 from workflow.case.input_files import InputFileError
@@ -123,6 +124,7 @@ def _read(group: Group, bounds: Bounds, line: bool) -> ImportedLoads:
         if name not in (LOADS, *NODAL, *IGNORED):
             raise group.error(name, "unknown", ", ".join((LOADS, *NODAL)))
     loads = _loads(Group(group.file, group.group[LOADS]), bounds)
+    tilt = tilt_of(line, group.group[LOADS])
     height = group.numbers("height", "mm")
     if height is not None:
         height = height.reshape(len(height), -1)  # a list is one column, as in a line contact
@@ -132,10 +134,11 @@ def _read(group: Group, bounds: Bounds, line: bool) -> ImportedLoads:
         for name in ("facets", "slip", "nodes_1", "nodes_2", "nodal_height"):
             if name in group.group:
                 raise group.error(name, "given without coordinates", "both or neither")
-        return ImportedLoads(loads, frame=frame, height=height)
+        return ImportedLoads(loads, tilt, frame=frame, height=height)
     count = len(coordinates)
     return ImportedLoads(
         loads,
+        tilt,
         slip=group.shaped("slip", "mm", (len(loads), 2, count)),
         coordinates=coordinates,
         facets=_facets(group, coordinates, line),
@@ -149,11 +152,12 @@ def _read(group: Group, bounds: Bounds, line: bool) -> ImportedLoads:
 
 def _loads(group: Group, bounds: Bounds) -> LoadHistory:
     units_of = base_units(bounds.line)
-    required = required_columns(bounds.line)
+    required = required_columns(bounds.line, group.group)
     missing = [name for name in required if name not in group.group]
     if missing:
         present = ", ".join(group.group) or "nothing"
-        raise group.error("", f"{', '.join(missing)} missing", f"all of them; there is {present}")
+        allowed = f"all of them (Mx and My, or neither: held tilt); there is {present}"
+        raise group.error("", f"{', '.join(missing)} missing", allowed)
     for name in group.group:
         known = (*units_of, "sliding", *MIX)
         if name not in known:

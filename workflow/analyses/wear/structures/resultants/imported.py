@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass
 
 import numpy as np
 
 from fe_models.mesh import Face
-from sa_solver.types import Array, Frame, Indices, LoadHistory
+from sa_solver.types import Array, Frame, Indices, LoadHistory, Tilt
 from workflow.analyses.contact.datasets import LOADS
 from workflow.shell.dataset import unit_in
 
 COLUMNS = ("P", "Qx", "Qy", "Mx", "My", "Mz", "Edx", "Edy")
+MOMENTS = ("Mx", "My")
 # A line contact has none of these unless it is sheared along its length.
 OPTIONAL_IN_LINE = ("Qy", "Mx", "Mz", "Edy")
 # Name of the interface of a file that names none.
@@ -22,15 +24,16 @@ UNNAMED = "interface"
 class ImportedLoads:
     """What a file says of one interface.
 
-    ``loads`` are those of one closed cycle. With the nodes of the face: ``slip`` ``(t, 2, n)`` of
-    each increment [mm], ``coordinates`` ``(n, 2)`` in the interface frame [mm], ``facets``
-    ``(m, 3)`` or, in a line contact, ``(m, 2)``, the ``frame`` in the user's axes, the user's node
-    numbers on body 1 and body 2 ``(n,)``, and the gap of the unloaded, unworn faces [mm]:
-    ``nodal_height`` ``(n,)`` at these nodes, ``height`` ``(nx, ny)`` on the grid of the case. None
-    where not given.
+    ``loads`` are those of one closed cycle; without moments the ``tilt`` is held. With the nodes of
+    the face: ``slip`` ``(t, 2, n)`` of each increment [mm], ``coordinates`` ``(n, 2)`` in the
+    interface frame [mm], ``facets`` ``(m, 3)`` or, in a line contact, ``(m, 2)``, the ``frame`` in
+    the user's axes, the user's node numbers on body 1 and body 2 ``(n,)``, and the gap of the
+    unloaded, unworn faces [mm]: ``nodal_height`` ``(n,)`` at these nodes, ``height`` ``(nx, ny)``
+    on the grid of the case. None where not given.
     """
 
     loads: LoadHistory
+    tilt: Tilt = "free"
     slip: Array | None = None
     coordinates: Array | None = None
     facets: Indices | None = None
@@ -56,6 +59,14 @@ def base_units(line: bool) -> dict[str, str]:
     return {name: unit_in(line, unit) for name, (unit, _) in LOADS.items() if name != "sliding"}
 
 
-def required_columns(line: bool) -> list[str]:
-    """Columns that every file must have."""
-    return [name for name in COLUMNS if not (line and name in OPTIONAL_IN_LINE)]
+def required_columns(line: bool, given: Collection[str]) -> list[str]:
+    """Columns that a file with those ``given`` must have: both moments of the pressure, or none."""
+    moments = MOMENTS if tilt_of(line, given) == "held" else ()
+    optional = (*(OPTIONAL_IN_LINE if line else ()), *moments)
+    return [name for name in COLUMNS if name not in optional]
+
+
+def tilt_of(line: bool, given: Collection[str]) -> Tilt:
+    """What a file with these columns leaves to the contact: without moments the tilt is held."""
+    moments = MOMENTS[1:] if line else MOMENTS
+    return "free" if any(name in given for name in moments) else "held"

@@ -21,6 +21,7 @@ from workflow.analyses.wear.structures.resultants.imported import (
     ImportedLoads,
     base_units,
     required_columns,
+    tilt_of,
 )
 from workflow.case.fields import Quantity, shown, split_dataset
 from workflow.case.input_files import InputFileError
@@ -55,9 +56,12 @@ def read_resultants(
 
     if file.endswith(HDF5):
         return _alike(file, read_h5(file, group, bounds, line))
-    table, units, required = read_table_file(file), _columns(line), required_columns(line)
+    table, units = read_table_file(file), _columns(line)
     table.check(units)
-    table.require(required, f"{', '.join(required)} in every file")
+    required, tilt = required_columns(line, table.names), tilt_of(line, table.names)
+    table.require(
+        required, f"{', '.join(required)} in every file (Mx and My, or neither: held tilt)"
+    )
     numbers = {
         name: table.column(name, Quantity(unit))
         for name, unit in units.items()
@@ -66,7 +70,7 @@ def read_resultants(
     rows = _rows_of(table)
     _check_counts(table, rows)
     read = {
-        name: ImportedLoads(_loads(table, numbers, places, bounds(name)))
+        name: ImportedLoads(_loads(table, numbers, places, bounds(name)), tilt)
         for name, places in rows.items()
     }
     return _alike(file, read)

@@ -80,7 +80,8 @@ class ResultantsSource(UncoupledSource):
         grid = Grid.over(structure.size_of(name), self._case.contact.grid, self.line)
         face = self._face(name, imported, grid.size)
         gap = gap_over(structure.gap_of(name), imported.height, grid)
-        return ContactFace(face, grid.size, gap, self._coarse(imported, grid), REMEDY)
+        coarse = self._coarse(imported, grid)
+        return ContactFace(face, grid.size, gap, coarse, REMEDY, tilt=imported.tilt)
 
     def _face(self, name: str, imported: ImportedLoads, size: tuple[float, float]) -> Face:
         """The face of the file, or the corners of the nominal one."""
