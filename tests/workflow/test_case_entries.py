@@ -40,7 +40,9 @@ INTERFACE = {
     "frame": {"origin": [15, 0, 245], "x": [-1, 0, 1], "normal": [-1, 0, -1]},
     "nodes": {"body_1": "nodes_1.csv", "body_2": "nodes_2.csv"},
 }
-EXPECT = [{"quantity": "a.b", "value": "3 um", "tolerance": "1 %", "source": "a test"}]
+EXPECT = [
+    {"quantity": "a.b", "value": "3 um", "tolerance": "1 %", "kind": "earlier", "source": "a test"}
+]
 REPORTED = [{"normal_force": "17 N", "steady": "stiffness", "cycles": 1e6}]
 ALWAYS = ""  # in place of a kind: for sections of one kind alone
 FRICTION = {"friction.evolution": {ALWAYS: {"energy": [0, 1e6], "factor": [1, 2]}}}

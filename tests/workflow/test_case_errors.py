@@ -93,8 +93,11 @@ WRONG = [
     ("date for a title", "title: Ti-6Al-4V dovetail, one mission per cycle", "title: 2020-01-01",
      "title", "quotes"),
     ("unknown assumed path", "- load_path", "- load_paths", "assumed.2", "no such entry"),
-    ("expectation without source", "assumed:", "expect: [{quantity: a.b, value: 1, tolerance: 1 %}]"
-     "\nassumed:", "expect.0.source", "missing"),
+    ("expectation without source", "    source: -µP\n", "", "expect.2.source", "missing"),
+    ("expectation of no kind", "    kind: closed_form\n    source: -µP", "    source: -µP",
+     "expect.2.kind", "missing; allowed: printed (by a publication"),
+    ("expectation of another kind", "kind: closed_form\n    source: -µP",
+     "kind: guess\n    source: -µP", "expect.2.kind", "'earlier'"),
     ("duplicate key", "peak_at: 8", "peak_at: 8\n  peak_at: 9", "'peak_at'", "given twice"),
 ]  # fmt: skip
 

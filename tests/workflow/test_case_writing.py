@@ -20,7 +20,10 @@ AWKWARD = ["yes", "null", "1e5", "12:30", "a: b", "# no", "- x", "ü µ", "'", '
         ["materials.blade.yield_stress=", "wear.stop={depth: 0.1 mm}", "assumed=[]"],
         ["wear.step={kind: explicit, volume: 1e-7 mm^3}", "structure.skew=-29.999 deg"],
         ["nonlinearity={stiffness: relinearised, check: true}", "fidelity=auto"],
-        ["expect=[{quantity: a.b-1.0, value: -1.23456789e-7, tolerance: 0.1 %, source: a}]"],
+        [
+            "expect=[{quantity: a.b-1.0, value: -1.23456789e-7, tolerance: 0.1 %, "
+            "kind: earlier, source: a}]"
+        ],
         *([f"title={json.dumps(title)}"] for title in AWKWARD),
     ],
 )
@@ -29,6 +32,15 @@ def test_dump_reads_back_equal(dovetail_path, overrides):
     text = dump_case(case)
     assert parse_case(text, "dump") == case
     assert dump_case(parse_case(text, "dump")) == text
+
+
+def test_dump_keeps_the_units_of_what_is_expected(dovetail_path):
+    """Values of any dimension: the file of the run says of which."""
+    expect = "[{quantity: a, value: 2.50 kN, tolerance: 0, kind: earlier, source: a}]"
+    case = load_case(dovetail_path, [f"expect={expect}"])
+    (again,) = parse_case(dump_case(case), "dump").expect
+    assert (again.value, again.value.unit) == (2500.0, "kN")
+    assert "value: 2.50 kN" in dump_case(case)
 
 
 def test_dump_has_every_default(dovetail_path, dovetail_text):
@@ -55,7 +67,8 @@ def test_numbers_are_numbers_in_every_yaml(dovetail_path):
 
 def test_dovetail_template_is_the_default_case(dovetail_path):
     written, default = parse_case(template("dovetail"), "dovetail"), load_case(dovetail_path)
-    assert written.model_copy(update={"assumed": default.assumed}) == default
+    ours = {"assumed": default.assumed, "expect": default.expect}
+    assert written.model_copy(update=ours) == default
 
 
 @pytest.mark.parametrize("kind", kinds())

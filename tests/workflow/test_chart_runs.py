@@ -34,11 +34,13 @@ expect:
   - quantity: states.-1.approach
     value: {HERTZ.approach!r}
     tolerance: 1 %
+    kind: closed_form
     source: Hertz
     exact: true
   - quantity: states.-1.central_pressure
     value: {HERTZ.peak_pressure!r}
     tolerance: 1 %
+    kind: closed_form
     source: Hertz
     exact: true
 """

@@ -130,7 +130,10 @@ def test_new_analysis_that_keeps_nothing_is_not_resumed(ball: Path, tmp_path: Pa
 def test_new_analysis_is_verified(
     ball: Path, tmp_path: Path, value: float, code: int, verdict: str
 ) -> None:
-    expected = f"{{quantity: contact.radius, value: {value!r}, tolerance: 1e-9, source: Hertz}}"
+    expected = (
+        f"{{quantity: contact.radius, value: {value!r}, tolerance: 1e-9, kind: closed_form, "
+        "source: Hertz}"
+    )
     with ball.open("a", encoding="utf-8") as file:
         file.write(f"expect: [{expected}]\n")
     result = invoke("verify", ball, "--out", tmp_path / "verified")

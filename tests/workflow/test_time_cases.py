@@ -10,9 +10,11 @@ import pytest
 
 from tests.marks import slow
 from tests.workflow.conftest import invoke, manifest_has_all
+from workflow.analyses.time.figures import ring_down
 from workflow.analyses.time.joint import steady_loop
 from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.time.memory import memory
+from workflow.analyses.time.outcome import Contents
 from workflow.chart.axes import axes_of
 from workflow.errors import CaseError, UserError
 from workflow.kinds import load_case, parse_case, template
@@ -307,6 +309,8 @@ def test_reported_values_are_told_beside_the_computed(tmp_path):
         "source": "a test",
     }
     assert summary["reported"][1]["computed"] is None
+    log = (tmp_path / "out" / "run.log").read_text(encoding="utf-8")
+    assert "mJ computed, 3 mJ reported (a test)" in log
     assert "no quantity states.0.colour" in summary["warnings"][0]
 
 
@@ -387,7 +391,7 @@ def test_a_blow_shows_the_frequency_response_of_a_stuck_rig(tmp_path):
     summary = run(tmp_path, RIG, HAMMER, "joint.friction=10", "integration.step=50 us")
     state = summary["states"][0]
     assert abs(state["first_frequency"] - state["stuck"][0]) <= state["resolution"]
-    assert "trend" not in summary
+    assert "change" not in summary
     with h5py.File(tmp_path / "out" / "results.h5") as file:
         group = file["states/00000/frequency_response"]
         frequency, magnitude = group["frequency"][()], group["magnitude"][()]
@@ -406,6 +410,26 @@ def test_a_blow_shows_the_frequency_response_of_a_stuck_rig(tmp_path):
     assert largest["frequency"] == pytest.approx(abs(first.imag) / (2.0 * np.pi), rel=2e-3)
 
 
+def test_states_without_a_ring_down_are_in_its_figure(tmp_path):
+    """Of a motion that was over at once the picture shows the motion."""
+    time = np.linspace(0.0, 1.0, 50)
+    moved = np.exp(-5.0 * time) * np.cos(60.0 * time)
+    with h5py.File(tmp_path / "results.h5", "w") as file:
+        file.attrs["seen"] = ["m1"]
+        for name in ("00000", "00001"):
+            state = file.create_group(f"states/{name}")
+            state.attrs.update(energy=1e3 * float(name), stuck=[50.0])
+            state["motion/time"], state["motion/displacement"] = time, moved[:, None]
+        for name in ("amplitude", "frequency", "damping_ratio"):
+            file[f"states/00001/ring_down/{name}"] = 1.0 + time
+        groups = {"motion": ("00000", "00001"), "ring_down": ("00001",)}
+        drawn = ring_down(file, Contents(groups, (), aged=False))
+    history, softened, damping = drawn.get_axes()
+    labels = [line.get_label() for line in history.get_lines()]
+    assert labels == ["unworn: stuck 50 Hz, no ring-down", "1 J: stuck 50 Hz"]
+    assert len(softened.get_lines()) == len(damping.get_lines()) == 1
+
+
 @pytest.mark.slow
 def test_wear_changes_the_response_to_a_blow(tmp_path):
     """E is frozen in each record; figures of what there is are drawn."""
@@ -419,7 +443,7 @@ def test_wear_changes_the_response_to_a_blow(tmp_path):
         "integration.step=50 us",
         "output.figures=true",
     )
-    assert summary["trend"]["first_frequency"] == 1.0
+    assert summary["change"]["first_frequency"] == 1.0
     assert [state["stiffness"] for state in summary["states"]] == [1e4, 2e4]
     names = {path.stem for path in (tmp_path / "out" / "figures").iterdir()}
     assert {"frequency_response", "ring_down", "evolution"} <= names

@@ -5,12 +5,14 @@ import csv
 import h5py
 import numpy as np
 import pytest
+import scipy.linalg as sl
 
 from tests.workflow.conftest import invoke
-from tests.workflow.test_time_cases import MASS, linear_rig, receptance, refused, run
+from tests.workflow.test_time_cases import MASS, STIFF, linear_rig, receptance, refused, run
 from wear.joints.jenkins import Jenkins
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.memory import memory
+from workflow.analyses.vibration.model import BESIDE
 from workflow.case.writing import dump_case
 from workflow.kinds import parse_case
 
@@ -73,6 +75,21 @@ def test_free_and_stuck_joints_leave_the_rig_linear(tmp_path, friction, held):
     sizes = [abs(receptance(frequency, held)[-1]) for frequency in grid]
     assert response["receptance"] == pytest.approx(max(sizes), rel=2.0 * SAMPLED)
     assert response["resonance"] == pytest.approx(grid[np.argmax(sizes)], rel=2e-3)
+
+
+def test_linear_limits_without_damping_have_their_peaks_beside_the_modes(tmp_path):
+    """At them there is no bound. A mode leaves f0 / 2 |f - f0| of what it would be at rest."""
+    where = ("structure.damping_ratio=0", "joint.friction=0.001", "forces=[2 N]")
+    summary = run(tmp_path, RIG, *where, "frequencies=[30 Hz, 40 Hz]")
+    with h5py.File(tmp_path / "out" / "results.h5") as file:
+        linear = {name: values[()] for name, values in file["linear"].items()}
+    place = int(np.argmax(linear["free"]))
+    assert linear["frequency"][place] == pytest.approx(summary["free"][0], rel=1.1 * BESIDE)
+    squares, shapes = sl.eigh(STIFF, MASS)
+    alone = abs(shapes[0, 0] * shapes[-1, 0]) / squares[0] / (2.0 * BESIDE)
+    assert linear["free"][place] == pytest.approx(alone, rel=1e-3)
+    assert np.isfinite(linear["stuck"]).all()
+    assert "what the joints do not hold back has no bound" in summary["warnings"][0]
 
 
 def test_single_harmonic_of_one_mass_is_the_closed_form(tmp_path):

@@ -12,7 +12,7 @@ import re
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from pathlib import Path as Pathname
-from typing import Any
+from typing import Any, Self
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
@@ -67,12 +67,36 @@ class Entry(ABC):
         return self.json_schema()
 
 
+class Written(float):
+    """A number in base units that remembers the ``text`` it was written as, with its unit."""
+
+    def __new__(cls, number: float, text: str = "") -> Self:
+        written = super().__new__(cls, number)
+        written.text = text
+        return written
+
+    text: str
+
+    @property
+    def unit(self) -> str:
+        """The unit it was written in."""
+        return units.split(self.text)[1]
+
+
+def in_unit_of(written: float, number: float) -> tuple[float, str]:
+    """``number``, in base units, in the unit of ``written``; "" where that was a bare number."""
+    if not isinstance(written, Written):
+        return number, ""
+    return number / units.to_base(f"1 {written.unit}", None), written.unit
+
+
 @dataclass(frozen=True)
 class Quantity(Entry):
     """A number in the base unit ``unit``, or a text with any unit of that dimension.
 
-    ``unit`` is ``"1"`` for a ratio and ``None`` for any dimension. The limits are in the base unit;
-    ``range_text`` says them in everyday units where those differ.
+    ``unit`` is ``"1"`` for a ratio, and ``None`` for any dimension: then the number remembers how
+    it was written. The limits are in the base unit; ``range_text`` says them in everyday units
+    where those differ.
     """
 
     unit: str | None
@@ -107,6 +131,8 @@ class Quantity(Entry):
 
     def parse(self, value: object) -> float:
         number = self._number(value)
+        if self.unit is None and isinstance(value, str):
+            number = Written(number, value)
         if not math.isfinite(number):
             raise self.refusal(value, "not a finite number")
         if not self.contains(number):

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Iterator
-from typing import Annotated, Any, ClassVar, Self, get_args
+from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, field_validator, model_validator
 from pydantic.fields import FieldInfo
@@ -78,11 +78,18 @@ class Expectation(Section):
     """A value the run must reproduce, checked by ``fretscale verify``."""
 
     quantity: DottedPath = entry("path into summary.json", "intrados.depth")
-    value: Annotated[float, Quantity(None)] = entry("in base units or with any unit", "12 um")
-    tolerance: Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)] = entry(
-        "relative to the value [1]", "1 %"
+    value: Annotated[float, Quantity(None)] = entry(
+        "with its unit, which `verify` shows; a bare number is in base units", "12 um"
     )
-    source: Title = entry("where the value comes from", "closed form")
+    tolerance: Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)] = entry(
+        "relative to the value; of a value 0 in its unit [1]", "1 %"
+    )
+    kind: Literal["printed", "closed_form", "independent", "earlier"] = entry(
+        "printed (by a publication, in numbers or words), closed_form (a formula, a balance or a "
+        "limit), independent (another method) or earlier (our own result, against change)",
+        "closed_form",
+    )
+    source: Title = entry("which publication, formula, method or run", "V = α µ P 2s N")
     exact: StrictBool = entry(
         "whether finer and finer grids go to the value, to all digits given: what `chart` needs",
         False,

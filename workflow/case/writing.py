@@ -10,6 +10,7 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from workflow.case.fields import Written
 from workflow.case.sections import Case, entries_of
 
 HEADER = """\
@@ -99,6 +100,8 @@ def scalar(value: Any) -> str:
     """A number, switch, text or list of them in YAML 1.1 and 1.2 alike."""
     if isinstance(value, list | tuple):
         return f"[{', '.join(map(scalar, value))}]"
+    if isinstance(value, Written):
+        return scalar(value.text)
     if isinstance(value, float):
         return _float(value)
     if isinstance(value, str) and (PLAIN_TEXT.fullmatch(value) or QUANTITY_TEXT.fullmatch(value)):

@@ -8,15 +8,16 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Column, Table
 
+from workflow.case.fields import in_unit_of
 from workflow.errors import UserError
 from workflow.kinds import load_case
 from workflow.runs.run import run_case
 from workflow.shell.folder import OutputFolder
 from workflow.shell.summary import QuantityError, required_number
 
-COLUMNS = "expected", "computed", "error", "verdict", "source"
+COLUMNS = "expected", "computed", "unit", "error", "verdict", "kind", "source"
 # Columns of text where the table goes to a file.
-FILE_WIDTH = 120
+FILE_WIDTH = 140
 
 
 def verify_cases(cases: tuple[Path, ...], out: Path) -> bool:
@@ -39,14 +40,19 @@ def verify_cases(cases: tuple[Path, ...], out: Path) -> bool:
                 computed = required_number(summary, entry.quantity)
             except QuantityError as wrong:
                 raise UserError(f"{path}: expect: {wrong}") from wrong
-            error = abs(computed - entry.value) / (abs(entry.value) or 1.0)
+            (value, unit), (found, _) = (
+                in_unit_of(entry.value, number) for number in (entry.value, computed)
+            )
+            error = abs(found - value) / (abs(value) or 1.0)
             met = error <= entry.tolerance
             met_all &= met
             row = (
-                f"{entry.value:.6g}",
-                f"{computed:.6g}",
-                f"{error:.2%}" if entry.value else f"{error:.1e}",
+                f"{value:.6g}",
+                f"{found:.6g}",
+                unit or "-",
+                f"{error:.2%}" if value else f"{error:.1e}",
                 "met" if met else "MISSED",
+                entry.kind.replace("_", " "),
             )
             table.add_row(entry.quantity, *row, entry.source)
         console.print(table)

@@ -76,7 +76,9 @@ class Reported(Section):
     """A value that the source reports, told beside what the run finds: nothing is asked of it."""
 
     quantity: DottedPath = entry("path into summary.json", "states.-1.friction")
-    value: Annotated[float, Quantity(None)] = entry("in base units or with any unit", 0.9)
+    value: Annotated[float, Quantity(None)] = entry(
+        "with its unit; a bare number is in base units", 0.9
+    )
     source: Title = entry("where the value comes from", "measured")
 
 

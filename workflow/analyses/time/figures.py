@@ -209,15 +209,17 @@ def _response_title(shown: list[tuple[str, Any, h5py.Group]]) -> str:
 
 def ring_down(file: h5py.File, contents: Contents) -> Figure:
     """Frequency and damping of the first mode against its amplitude, and the motion itself."""
-    shown = _states(file, contents, RING_DOWN)
+    shown = _states(file, contents, MOTION)
     figure = new_figure("First mode of the ring-down against its amplitude", 8.5)
     top, bottom = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.3))[:, 0]
     history = top.subplots()
     left, right = bottom.subplots(1, 2)
-    for label, colour, envelope in shown:
-        moved = envelope.parent[MOTION]
-        stuck = float(envelope.parent.attrs["stuck"][0])
-        _draw_history(history, moved, colour, f"{label}: stuck {stuck:.4g} Hz")
+    for label, colour, moved in shown:
+        stuck, envelope = float(moved.parent.attrs["stuck"][0]), moved.parent.get(RING_DOWN)
+        found = "" if envelope else ", no ring-down"
+        _draw_history(history, moved, colour, f"{label}: stuck {stuck:.4g} Hz{found}")
+        if not envelope:
+            continue
         amplitude = TO_MICRONS * envelope["amplitude"][()]
         softened = 100.0 * (envelope["frequency"][()] / stuck - 1.0)
         left.semilogx(amplitude, softened, color=colour)

@@ -58,7 +58,7 @@ def run_hammer(case: RigCase, rig: RigModel, joint: JointModel, reporter: Report
         with reporter.stage("signals"):
             states.append(_state(hammer, blow, rig, joint, energy, motion, reporter))
     curve = evolution_curve(joint, case.energies[-1])
-    return TimeOutcome(case, tuple(states), curve, _trend(states))
+    return TimeOutcome(case, tuple(states), curve, _change(states))
 
 
 def _state(
@@ -175,11 +175,11 @@ def _ends(decay: Datasets | None) -> dict[str, dict[str, float]] | None:
     }
 
 
-def _trend(states: Sequence[State]) -> dict[str, Any]:
+def _change(states: Sequence[State]) -> dict[str, Any]:
     """What wear makes of the first mode: ratios of the last state to the first; 1 up, -1 down.
 
     Its damping is that of the largest amplitude that the ring-downs show. A joint that dissipates
-    nothing has no trend.
+    nothing has no change.
     """
     if len(states) < 2:
         return {}
@@ -187,7 +187,7 @@ def _trend(states: Sequence[State]) -> dict[str, Any]:
     both = [name for name in first if name in last and first[name] > 0.0]
     return {
         "ratio": {name: last[name] / first[name] for name in both},
-        "trend": {name: float(np.sign(last[name] - first[name])) for name in both},
+        "change": {name: float(np.sign(last[name] - first[name])) for name in both},
     }
 
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from workflow.analyses.time.case import JointCase, RigCase, joules
+from workflow.analyses.time.case import JointCase, RigCase, TimeCase, joules
 from workflow.analyses.time.outcome import MOTION, State, TimeOutcome
+from workflow.case.fields import in_unit_of
 from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
@@ -27,7 +28,7 @@ def write_time_output(outcome: TimeOutcome, run: TimeRun) -> None:
         _write_tables(outcome, folder)
     run.draw(outcome.contents)
     summary = _summary(outcome, reporter)
-    finish(run, summary, _lines(summary))
+    finish(run, summary, _lines(summary, outcome.case))
 
 
 # --- results and tables -------------------------------------------------------------------------
@@ -83,19 +84,23 @@ def _state_summary(state: State) -> dict[str, Any]:
     return {"energy": state.energy, **cycles, **state.parameters, **state.numbers}
 
 
-def _lines(summary: dict[str, Any]) -> Iterator[str]:
+def _lines(summary: dict[str, Any], case: TimeCase) -> Iterator[str]:
     """The end of the run in a few lines."""
     for state in summary["states"]:
         yield f"  {_state_line(state)}"
-    for entry in summary["reported"]:
+    for entry, told in zip(summary["reported"], case.reported, strict=True):
         yield (
-            f"  {entry['quantity']}: {_shown(entry['computed'])} computed, "
-            f"{_shown(entry['reported'])} reported ({entry['source']})"
+            f"  {entry['quantity']}: {_shown(entry['computed'], told.value)} computed, "
+            f"{_shown(entry['reported'], told.value)} reported ({entry['source']})"
         )
 
 
-def _shown(value: float | None) -> str:
-    return "none" if value is None else f"{value:.5g}"
+def _shown(value: float | None, written: float) -> str:
+    """A value in the unit that another was written in."""
+    if value is None:
+        return "none"
+    number, unit = in_unit_of(written, value)
+    return f"{number:.5g} {unit}".rstrip()
 
 
 def _state_line(state: Mapping[str, Any]) -> str:

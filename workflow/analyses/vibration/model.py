@@ -30,6 +30,8 @@ from workflow.shell.reporter import Reporter
 # Frequencies of the linear limits, beside their own natural frequencies. Each takes the inverse of
 # a matrix of all joints' directions, which for many joints is slow.
 LINEAR_POINTS, FEWER_POINTS, FEW_DIRECTIONS = 2000, 200, 12
+# Beside an undamped natural frequency, over it: four digits of a peak that has no bound.
+BESIDE = 1e-5
 # Frequencies at once: a matrix of all joints' directions is held for each.
 AT_ONCE = 20
 # Joints that are worth a thread of their own, and threads at most.
@@ -86,6 +88,11 @@ class VibrationModel:
             return np.ones(self.rig.joints, dtype=bool)
         return np.asarray(self.rest.cycle.samples[0, :, 2] > 0.0)
 
+    @property
+    def undamped(self) -> bool:
+        """Whether only the joints bound a resonance."""
+        return not self.problem.receptance.damping.any()
+
     @cached_property
     def _natural(self) -> dict[str, list[float]]:
         """The lowest natural frequencies [Hz] with the joints free, stuck and sliding."""
@@ -121,8 +128,13 @@ class VibrationModel:
         }
 
     def linear(self, span: tuple[float, float]) -> dict[str, Dataset]:
-        """Amplitude over force of what is looked at, with the joints free, and stuck."""
+        """Amplitude over force of what is looked at, with the joints free, and stuck.
+
+        At the natural frequencies too; without damping, where these have no bound, beside them.
+        """
         natural = np.array([*self._natural["free"], *self._natural["stuck"]])
+        if self.undamped:
+            natural = np.concatenate([(1.0 - BESIDE) * natural, (1.0 + BESIDE) * natural])
         inside = natural[(natural > span[0]) & (natural < span[1])]
         directions = self.rig.joints * self.rig.directions
         points = LINEAR_POINTS if directions <= FEW_DIRECTIONS else FEWER_POINTS

@@ -48,6 +48,8 @@ STUCK_LOOP = 1e-4
 LARGEST_ERROR = 0.05
 # Times that a loop is repeated: the record then holds whole cycles wherever it begins.
 REPEATED = 3
+# Why a curve may end at a resonance.
+UNBOUNDED = "; without damping what the joints do not hold back has no bound at resonance"
 
 
 def step_control(case: VibrationCase) -> ContinuationControl:
@@ -94,7 +96,8 @@ def response_under(
     if not branch.solutions:
         raise MethodFailed(f"no motion under {force:g} N: {branch.message}; change frequencies")
     if branch.message:
-        reporter.warn(f"{force:g} N: {branch.message}")
+        unbounded = UNBOUNDED if model.undamped else ""
+        reporter.warn(f"{force:g} N: {branch.message}{unbounded}")
     curves = _curves(model, branch)
     if int(np.argmax(curves["amplitude"].values[:, -1])) in (0, len(branch.solutions) - 1):
         reporter.warn(f"{force:g} N: no resonance, the largest motion is at an end of the curve")
