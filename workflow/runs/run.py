@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
@@ -14,7 +15,10 @@ from workflow.case.writing import dump_case
 from workflow.errors import CaseError, UserError
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import write_pictures
+from workflow.runs.provenance import case_values, provenance_of
+from workflow.shell import checkpoint
 from workflow.shell.analysis import Analysis, Run
+from workflow.shell.checkpoint import Checkpoint
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
 from workflow.shell.reporter import Reporter
 
@@ -27,15 +31,18 @@ LOCK = ".lock"
 Kept = Literal["finished", "unfinished", "other", "nothing"]
 
 
-def run_case(case: Case, out: Path, force: bool) -> None:
-    """Run a case from the start into a folder, by the cheapest model if it leaves that open."""
+def run_case(case: Case, out: Path, force: bool, damaged: str = "") -> None:
+    """Run a case from the start into a folder, by the cheapest model if it leaves that open.
+
+    The log says why an earlier run there was ``damaged``.
+    """
     analysis = analysis_of(case)
     case, choice = analysis.choose(case)
     analysis.memory(case).check()
     folder = OutputFolder(out)
-    stays = folder.claim(case, force, resumable=analysis.resumable is not None)
+    stays = folder.claim(case, force, analysis.resumable)
     folder.keep_choice(choice)
-    _run(analysis, case, folder, resume=False, stays=stays)
+    _run(analysis, case, folder, stays=stays, damaged=damaged)
 
 
 def resume_run(out: Path) -> bool:
@@ -45,9 +52,10 @@ def resume_run(out: Path) -> bool:
         raise UserError(f"{out}: no run of fretscale here (case.yaml is missing)")
     case = load_case(folder.case)
     if folder.summary.exists():
+        folder.check_finished(case_values(folder))
         return False
     analysis = analysis_of(case)
-    if analysis.resumable is None:
+    if not analysis.resumable:
         raise UserError(
             f"{out}: a case of this kind takes up no run half done; start it again with "
             f"`fretscale run {folder.case} --out {out}`"
@@ -57,10 +65,11 @@ def resume_run(out: Path) -> bool:
             f"{out}: a run of an older version, which left no {MANIFEST} of its files; start it "
             f"again with `fretscale run {folder.case} --out DIR`"
         )
+    kept = _state(folder, case)
     analysis.memory(case).check()
     folder.clear_partial()
     folder.reserve_state()
-    _run(analysis, case, folder, resume=True)
+    _run(analysis, case, folder, resume=True, kept=kept)
     return True
 
 
@@ -72,35 +81,66 @@ def bring_to_end(case: Case, root: Path) -> bool:
     """
     _refuse_foreign(root)
     with _locked(root):
-        kept = kept_in(root, case)
+        kept, damaged = _found(root, case)
         if kept == "finished":
             return False
-        resumable = analysis_of(case).resumable
-        if kept == "unfinished" and resumable is not None and resumable(OutputFolder(root)):
+        if kept == "unfinished":
             resume_run(root)
         else:
-            run_case(case, root, force=True)
+            run_case(case, root, force=True, damaged=damaged)
         return True
 
 
 def kept_in(root: Path, case: Case) -> Kept:
-    """What a folder has of this case; "other" is a run of another case."""
-    folder = OutputFolder(root)
+    """What a folder has of this case; "other" is a run of another case.
+
+    A run whose files are not as it left them, or not of the same input files, is "nothing".
+    """
+    return _found(root, case)[0]
+
+
+def _found(root: Path, case: Case) -> tuple[Kept, str]:
+    """What a folder has of this case, and why that cannot be believed if there is more."""
+    folder, record, damaged = OutputFolder(root), None, ""
     if not folder.case.exists():
-        return "nothing"
+        return "nothing", ""
     finished = folder.summary.exists()
-    record = folder.read_summary().get("fidelity") if finished else folder.choice
+    try:
+        record = folder.read_summary().get("fidelity") if finished else folder.choice
+    except UserError as error:
+        damaged = str(error)
     # As a run of it was claimed, after its open settings had been chosen.
     if not _is_case(folder.case, changed(case, (record or {}).get("chosen", {}))):
-        return "other"
-    if finished:
-        return "finished"
-    listed = folder.manifest is not None and folder.checkpoint.exists()
-    return "unfinished" if listed and analysis_of(case).resumable is not None else "nothing"
+        return "other", ""
+    try:
+        if finished and not damaged:
+            folder.check_finished(case_values(folder))
+            return "finished", ""
+        listed = folder.manifest is not None and folder.checkpoint.exists()
+        if listed and not damaged and analysis_of(case).resumable:
+            _state(folder, case)
+            return "unfinished", ""
+    except UserError as error:
+        damaged = str(error)
+    return "nothing", damaged
+
+
+def _state(folder: OutputFolder, case: Case) -> Checkpoint | None:
+    """What an unfinished run goes on from; None if it left nothing before it was cut off."""
+    if not folder.checkpoint.exists():
+        return None
+    return checkpoint.load(folder, provenance_of(folder, case))
 
 
 def _run(
-    analysis: Analysis, case: Case, folder: OutputFolder, resume: bool, stays: Sequence[str] = ()
+    analysis: Analysis,
+    case: Case,
+    folder: OutputFolder,
+    *,
+    resume: bool = False,
+    kept: Checkpoint | None = None,
+    stays: Sequence[str] = (),
+    damaged: str = "",
 ) -> None:
     def compute(file: Path, root: Path) -> bool:
         return bring_to_end(load_case(file), root)
@@ -114,20 +154,58 @@ def _run(
                 write_pictures(case.output, folder, analysis.pictures, contents, processes)
 
     try:
+        if damaged:
+            reporter.say(f"an earlier run is not taken: {damaged}")
+        if resume and kept is None:
+            reporter.say("no state was kept: from the start")
         if stays:
             reporter.warn(
                 f"{', '.join(stays)}: in the folder before this run, and not of it; what has a "
                 f"name that the run needs gets {ASIDE} at its end"
             )
-        run = Run(kind_of(case), case, folder, reporter, resume, folder.choice, compute, draw)
-        analysis.run(run)
+        run = Run(
+            kind=kind_of(case),
+            case=case,
+            folder=folder,
+            reporter=reporter,
+            resume=resume,
+            kept=kept,
+            provenance=provenance_of(folder, case),
+            choice=folder.choice,
+            compute=compute,
+            draw=draw,
+        )
+        with _told(reporter):
+            analysis.run(run)
     finally:
         reporter.close()
 
 
+class _Telling(logging.Handler):
+    """Hands what is logged deep below to the reporter of a run."""
+
+    def __init__(self, reporter: Reporter) -> None:
+        super().__init__()
+        self._reporter = reporter
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._reporter.say(record.getMessage())
+
+
+@contextmanager
+def _told(reporter: Reporter) -> Iterator[None]:
+    """What our modules log goes to the reporter."""
+    ours, telling = logging.getLogger("workflow"), _Telling(reporter)
+    ours.addHandler(telling)
+    try:
+        yield
+    finally:
+        ours.removeHandler(telling)
+
+
 def _is_case(path: Path, case: Case) -> bool:
     """Whether the file says this case, perhaps in the words of another version."""
-    if path.read_text(encoding="utf-8") == dump_case(case):
+    if path.read_bytes() == dump_case(case).encode("utf-8"):
         return True
     try:
         return load_case(path) == case

@@ -1,8 +1,12 @@
-"""Condensed structures and solved cycles on disk, found again by what they were made from."""
+"""Condensed structures and solved cycles on disk, found again by what they were made from.
+
+A file that is not what was written under its key is passed over, and said to be.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 from importlib.metadata import version
 from pathlib import Path
@@ -16,7 +20,9 @@ from fe_models.joint import JointResolvent
 from fe_models.structure import FIELDS, CycleSolution, Structure
 from fe_models.symmetry import Mirror, SplitMatrix
 from sa_solver.types import Array
-from workflow.shell.store import read_arrays, write_arrays
+from workflow.shell.store import DamagedFile, read_arrays, write_arrays
+
+LOG = logging.getLogger(__name__)
 
 # Files are pruned, least recently used first, above this size; one default dovetail takes 67 MB.
 LARGEST_CACHE = 4 * 1024**3
@@ -114,8 +120,11 @@ def _load(name: str) -> tuple[dict[str, Any], dict[str, Any]] | None:
     try:
         os.utime(path)
         return read_arrays(path)
+    except DamagedFile as error:
+        LOG.warning("cache: %s; computed again", error)
     except OSError:
-        return None
+        pass
+    return None
 
 
 def _save(name: str, arrays: dict[str, Array], attributes: dict[str, Any]) -> None:

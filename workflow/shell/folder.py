@@ -16,7 +16,7 @@ from typing import Any
 from workflow.case.sections import Case
 from workflow.case.writing import dump_case
 from workflow.errors import UserError
-from workflow.shell.store import PARTIAL, write_json, write_text
+from workflow.shell.store import PARTIAL, file_digest, json_digest, write_json, write_text
 
 MANIFEST = "manifest.json"
 # What every run makes. Without a manifest no more than these can be told to be of a run.
@@ -25,6 +25,10 @@ CERTAIN = ("case.yaml", "summary.json", "results.h5", "checkpoint.h5", "run.log"
 ASIDE = ".aside"
 # Record of the settings that were chosen for a case, so that a resumed run knows it.
 CHOICE = "fidelity.json"
+# Entry of the summary by which a finished run is known to be as it was left; not of what is written
+# to later, or by what a run knows itself.
+DIGESTS = "digests"
+NOT_DIGESTED = ("case.yaml", "summary.json", "checkpoint.h5", "run.log")
 
 
 class OutputFolder:
@@ -83,13 +87,44 @@ class OutputFolder:
         """The path of what the run says."""
         return self.reserve("run.log", "what the run said, and when")
 
-    def write_summary(self, summary: Mapping[str, Any]) -> None:
-        """Write the summary, which marks the run as finished."""
-        write_json(self.reserve("summary.json", "numbers of the run"), summary)
+    def write_summary(self, summary: Mapping[str, Any], provenance: Mapping[str, Any]) -> None:
+        """Write the summary, which marks the run as finished, with digests of what belongs to it.
+
+        These are the values of the case, the files that it names, what the run wrote, the summary.
+        """
+        path, names = self.reserve("summary.json", "numbers of the run"), self.manifest or {}
+        written = {
+            name: file_digest(self.root / name)
+            for name in sorted(names.keys() - set(NOT_DIGESTED))
+            if (self.root / name).is_file()
+        }
+        case = {"case.yaml": json_digest(provenance["case"])}
+        digests = case | provenance["input_files"] | written
+        content = {**summary, DIGESTS: digests}
+        write_json(path, content | {DIGESTS: digests | {"summary.json": json_digest(content)}})
 
     def read_summary(self) -> dict[str, Any]:
-        """The summary of a finished run."""
-        return json.loads(self.summary.read_text(encoding="utf-8"))
+        """The summary of a finished run. Raises UserError unless it is as it was written."""
+        try:
+            summary = json.loads(self.summary.read_bytes())
+            kept = summary[DIGESTS].pop("summary.json")
+        except (ValueError, LookupError, TypeError, AttributeError):
+            kept = None
+        if kept is None or kept != json_digest(summary):
+            raise UserError(f"{self.summary}: damaged, or of an older version; {self.again}")
+        return summary
+
+    def check_finished(self, case: Mapping[str, Any]) -> None:
+        """Raise UserError unless a finished run is as it was left, and of the values of a case."""
+        for name, kept in self.read_summary()[DIGESTS].items():
+            path = self.root / name
+            if kept != (json_digest(case) if path == self.case else file_digest(path)):
+                raise UserError(f"{path}: not as the run in {self.root} had it; {self.again}")
+
+    @property
+    def again(self) -> str:
+        """What to do where a run cannot be believed."""
+        return f"start again with `fretscale run {self.case} --out {self.root} --force`"
 
     def keep_choice(self, record: Mapping[str, Any] | None) -> None:
         """Keep what was chosen for the case with the run until it is finished."""
@@ -100,7 +135,10 @@ class OutputFolder:
     def choice(self) -> dict[str, Any] | None:
         """What was chosen for the case, of a run that is not finished yet; None for nothing."""
         path = self.jumps / CHOICE
-        return json.loads(path.read_text(encoding="utf-8")) if path.exists() else None
+        try:
+            return json.loads(path.read_bytes()) if path.exists() else None
+        except ValueError as error:
+            raise UserError(f"{path}: damaged; {self.again}") from error
 
     # --- whose it is ----------------------------------------------------------------------------
 
@@ -169,7 +207,7 @@ class OutputFolder:
 
     def _holds(self, case: Case) -> bool:
         """Whether the folder was claimed for this case."""
-        return self.case.exists() and self.case.read_text(encoding="utf-8") == dump_case(case)
+        return self.case.exists() and self.case.read_bytes() == dump_case(case).encode("utf-8")
 
 
 def _is_entry(name: str) -> bool:

@@ -25,7 +25,8 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
             "warnings": reporter.warnings,
             "seconds": seconds,
             "versions": versions(),
-        }
+        },
+        run.provenance,
     )
     for line in lines:
         reporter.say(line)
