@@ -196,16 +196,36 @@ def test_what_is_not_of_the_run_is_one_line_before_it_computes(
     assert (interrupted.folder / "run.log").read_text("utf-8") == log
 
 
-def edit(folder, written, instead):
-    """Another value of the first entry so ``written`` in the case of a run."""
-    path = folder / "case.yaml"
+def edit(path, written, instead):
+    """Write something else where it is ``written`` first."""
     text = path.read_text("utf-8")
     assert written in text
     path.write_text(text.replace(written, instead, 1), encoding="utf-8")
 
 
+def test_state_that_the_manifest_does_not_list_is_not_touched(interrupted, resume):
+    """It would be set aside as what is not of the run."""
+    edit(interrupted.folder / "manifest.json", "jumps", "jump5")
+    run = resume(interrupted.folder)
+    assert run.ending.exit_code == 2
+    (line,) = run.ending.stderr.splitlines()
+    assert "its manifest.json does not list its files" in line
+    assert jumps_kept(interrupted.folder) == 2
+
+
+def test_state_of_another_version_is_one_line(interrupted, resume):
+    path = interrupted.folder / "checkpoint.h5"
+    arrays, attributes = read_arrays(path)
+    del arrays["interface_0/scalars"]
+    write_arrays(path, arrays, attributes)
+    run = resume(interrupted.folder)
+    assert run.ending.exit_code == 2
+    line = run.ending.stderr.splitlines()[-1]
+    assert line.startswith(f"fretscale: {path}: of another version of fretscale (no 'interface_0/")
+
+
 def test_another_case_does_not_go_on(interrupted, resume):
-    edit(interrupted.folder, "coefficient: 0.4 ", "coefficient: 0.45 ")
+    edit(interrupted.folder / "case.yaml", "coefficient: 0.4 ", "coefficient: 0.45 ")
     run = resume(interrupted.folder)
     assert run.ending.exit_code == 2
     (line,) = run.ending.stderr.splitlines()
@@ -229,8 +249,8 @@ def test_state_of_another_case_is_not_taken(interrupted, start, resume, tmp_path
 
 
 def test_what_no_number_depends_on_may_change(interrupted, resume, whole):
-    edit(interrupted.folder, "title: ", "title: Another one # ")
-    edit(interrupted.folder, "figures: false", "figures: true")
+    edit(interrupted.folder / "case.yaml", "title: ", "title: Another one # ")
+    edit(interrupted.folder / "case.yaml", "figures: false", "figures: true")
     run = resume(interrupted.folder)
     assert_equal(run, whole)
     assert run.summary["title"] == "Another one"

@@ -60,10 +60,10 @@ def resume_run(out: Path) -> bool:
             f"{out}: a case of this kind takes up no run half done; start it again with "
             f"`fretscale run {folder.case} --out {out}`"
         )
-    if folder.manifest is None:
+    if not folder.lists_state:
         raise UserError(
-            f"{out}: a run of an older version, which left no {MANIFEST} of its files; start it "
-            f"again with `fretscale run {folder.case} --out DIR`"
+            f"{out}: its {MANIFEST} does not list its files: damaged, or a run of an older "
+            f"version; start it again with `fretscale run {folder.case} --out DIR`"
         )
     kept = _state(folder, case)
     analysis.memory(case).check()
@@ -116,7 +116,7 @@ def _found(root: Path, case: Case) -> tuple[Kept, str]:
         if finished and not damaged:
             folder.check_finished(case_values(folder))
             return "finished", ""
-        listed = folder.manifest is not None and folder.checkpoint.exists()
+        listed = folder.lists_state and folder.checkpoint.exists()
         if listed and not damaged and analysis_of(case).resumable:
             _state(folder, case)
             return "unfinished", ""

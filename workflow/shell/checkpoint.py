@@ -20,6 +20,8 @@ from workflow.shell.store import DamagedFile, checked_digest, read_arrays, write
 
 # Names beside those of the analysis.
 PROVENANCE, JUMPS = "provenance", "jumps"
+# What a message says of an entry that only the other case has.
+ABSENT = "not given"
 
 
 @dataclass(frozen=True)
@@ -74,10 +76,10 @@ def _changed(folder: OutputFolder, begun: Mapping[str, Any], now: Mapping[str, A
 def _entry(begun: Any, now: Any, place: str = "") -> str:
     """The first entry of two different cases that they do not share."""
     if isinstance(begun, dict) and isinstance(now, dict):
-        pairs = [(key, begun.get(key), now.get(key)) for key in {**begun, **now}]
+        values = {key: (begun.get(key, ABSENT), now.get(key, ABSENT)) for key in {**begun, **now}}
     elif isinstance(begun, list) and isinstance(now, list) and len(begun) == len(now):
-        pairs = [(str(n), *pair) for n, pair in enumerate(zip(begun, now, strict=True))]
+        values = {str(n): pair for n, pair in enumerate(zip(begun, now, strict=True))}
     else:
         return f"{place}: {shown(now)}, but {shown(begun)} when the run was begun"
-    key, *values = next(pair for pair in pairs if pair[1] != pair[2])
-    return _entry(*values, f"{place}.{key}".lstrip("."))
+    key = next(key for key, (before, after) in values.items() if before != after)
+    return _entry(*values[key], f"{place}.{key}".lstrip("."))

@@ -83,6 +83,11 @@ class OutputFolder:
         self.reserve("checkpoint.h5", "state after the last jump, for the run to go on from")
         self.reserve("jumps", "fields after each jump, until the run ends").mkdir(exist_ok=True)
 
+    @property
+    def lists_state(self) -> bool:
+        """Whether the manifest names what a run needs to go on, which no other run may have."""
+        return {self.checkpoint.name, self.jumps.name} <= (self.manifest or {}).keys()
+
     def reserve_log(self) -> Path:
         """The path of what the run says."""
         return self.reserve("run.log", "what the run said, and when")
@@ -129,7 +134,7 @@ class OutputFolder:
     def keep_choice(self, record: Mapping[str, Any] | None) -> None:
         """Keep what was chosen for the case with the run until it is finished."""
         if record is not None:
-            (self.jumps / CHOICE).write_text(json.dumps(record), encoding="utf-8")
+            write_json(self.jumps / CHOICE, record)
 
     @property
     def choice(self) -> dict[str, Any] | None:

@@ -11,8 +11,9 @@ import json
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from io import BufferedRandom, BufferedReader
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import h5py
 
@@ -107,7 +108,7 @@ def json_digest(content: Any) -> str:
     return hashlib.sha256(json.dumps(as_read, sort_keys=True).encode("utf-8")).hexdigest()
 
 
-def _digest(raw: IO[bytes], name: str) -> str:
+def _digest(raw: BufferedReader | BufferedRandom, name: str) -> str:
     """SHA-256 of a file's name and of all that follows the place of its digest."""
     raw.seek(SEAL)
     return hashlib.file_digest(raw, lambda: hashlib.sha256(name.encode("utf-8"))).hexdigest()
