@@ -99,9 +99,9 @@ class OutputFolder:
         """
         path, names = self.reserve("summary.json", "numbers of the run"), self.manifest or {}
         written = {
-            name: file_digest(self.root / name)
-            for name in sorted(names.keys() - set(NOT_DIGESTED))
-            if (self.root / name).is_file()
+            own.name: file_digest(own)
+            for own in sorted(self.root.iterdir())
+            if own.name in names.keys() - set(NOT_DIGESTED) and own.is_file()
         }
         case = {"case.yaml": json_digest(provenance["case"])}
         digests = case | provenance["input_files"] | written
