@@ -55,8 +55,8 @@ def load(folder: OutputFolder, provenance: Mapping[str, Any]) -> Checkpoint:
         path = folder.jump(number)
         try:
             same = checked_digest(path) == kept
-        except FileNotFoundError:
-            raise UserError(f"{path}: missing; {folder.again}") from None
+        except OSError:
+            raise UserError(f"{path}: missing or not to be read; {folder.again}") from None
         except DamagedFile as error:
             raise UserError(f"{error}; {folder.again}") from error
         if not same:

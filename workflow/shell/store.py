@@ -94,11 +94,11 @@ def checked_digest(path: Path) -> str:
 
 
 def file_digest(path: Path) -> str:
-    """SHA-256 of any file; empty for one that is not there."""
+    """SHA-256 of any file; empty for one that cannot be read."""
     try:
         with path.open("rb") as raw:
             return hashlib.file_digest(raw, "sha256").hexdigest()
-    except FileNotFoundError:
+    except OSError:
         return ""
 
 
