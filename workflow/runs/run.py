@@ -2,40 +2,35 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
+from contextlib import closing
 from pathlib import Path
 from typing import Any, Literal
 
 from workflow.case.changing import changed
 from workflow.case.sections import Case
 from workflow.case.writing import dump_case
-from workflow.errors import CaseError, UserError
+from workflow.errors import UNWRITTEN, CaseError, NotWritten, UserError
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import write_pictures
 from workflow.shell.analysis import Analysis, Run
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
+from workflow.shell.lock import locked
 from workflow.shell.reporter import Reporter
 
-if sys.platform != "win32":
-    import fcntl
-
-# Held while a process works in the folder: one that was cut off may still be about to end.
-LOCK = ".lock"
+# Seconds in which a process that was cut off, or whoever started it, has come to its end.
+PATIENCE = 60.0
 
 Kept = Literal["finished", "unfinished", "other", "nothing"]
 
 
 def run_case(case: Case, out: Path, force: bool) -> None:
-    """Run a case from the start into a folder, by the cheapest model if it leaves that open."""
-    analysis = analysis_of(case)
-    case, choice = analysis.choose(case)
-    analysis.memory(case).check()
-    folder = OutputFolder(out)
-    stays = folder.claim(case, force, resumable=analysis.resumable is not None)
-    folder.keep_choice(choice)
-    _run(analysis, case, folder, resume=False, stays=stays)
+    """Run a case from the start into a folder, by the cheapest model if it leaves that open.
+
+    Raises FretscaleError; UserError too where another process works in the folder.
+    """
+    with locked(out) as gone:
+        _start(case, out, force, gone)
 
 
 def resume_run(out: Path) -> bool:
@@ -46,40 +41,28 @@ def resume_run(out: Path) -> bool:
     case = load_case(folder.case)
     if folder.summary.exists():
         return False
-    analysis = analysis_of(case)
-    if analysis.resumable is None:
-        raise UserError(
-            f"{out}: a case of this kind takes up no run half done; start it again with "
-            f"`fretscale run {folder.case} --out {out}`"
-        )
-    if folder.manifest is None:
-        raise UserError(
-            f"{out}: a run of an older version, which left no {MANIFEST} of its files; start it "
-            f"again with `fretscale run {folder.case} --out DIR`"
-        )
-    analysis.memory(case).check()
-    folder.clear_partial()
-    folder.reserve_state()
-    _run(analysis, case, folder, resume=True)
+    with locked(out) as gone:
+        _go_on(case, folder, gone)
     return True
 
 
-def bring_to_end(case: Case, root: Path) -> bool:
+def bring_to_end(case: Case, root: Path, take_over: bool = False) -> bool:
     """Bring a case to its end in a folder, from where that has got to; False if it was there.
 
     A finished run of the same case stays, an unfinished one goes on from its last jump if it can,
-    and what else the folder has of earlier runs gives way. Raises FretscaleError.
+    and what else the folder has of earlier runs gives way. For ``take_over`` see
+    :func:`workflow.shell.lock.locked`. Raises FretscaleError.
     """
-    _refuse_foreign(root)
-    with _locked(root):
+    with locked(root, PATIENCE, take_over) as gone:
+        OutputFolder(root).refuse_foreign()
         kept = kept_in(root, case)
         if kept == "finished":
             return False
-        resumable = analysis_of(case).resumable
-        if kept == "unfinished" and resumable is not None and resumable(OutputFolder(root)):
-            resume_run(root)
+        resumable, folder = analysis_of(case).resumable, OutputFolder(root)
+        if kept == "unfinished" and resumable is not None and resumable(folder):
+            _go_on(load_case(folder.case), folder, gone)
         else:
-            run_case(case, root, force=True)
+            _start(case, root, True, gone)
         return True
 
 
@@ -99,13 +82,46 @@ def kept_in(root: Path, case: Case) -> Kept:
     return "unfinished" if listed and analysis_of(case).resumable is not None else "nothing"
 
 
+def _start(case: Case, out: Path, force: bool, gone: str) -> None:
+    """Run a case from the start; ``gone`` is what to tell of a process that was there before."""
+    analysis = analysis_of(case)
+    case, choice = analysis.choose(case)
+    analysis.memory(case).check()
+    folder = OutputFolder(out)
+    stays = folder.claim(case, force, resumable=analysis.resumable is not None)
+    folder.keep_choice(choice)
+    _run(analysis, case, folder, gone, resume=False, stays=stays)
+
+
+def _go_on(case: Case, folder: OutputFolder, gone: str) -> None:
+    """Continue the run in a folder."""
+    analysis, out = analysis_of(case), folder.root
+    if analysis.resumable is None:
+        raise UserError(
+            f"{out}: a case of this kind takes up no run half done; start it again with "
+            f"`fretscale run {folder.case} --out {out}`"
+        )
+    if folder.manifest is None:
+        raise UserError(
+            f"{out}: a run of an older version, which left no {MANIFEST} of its files; start it "
+            f"again with `fretscale run {folder.case} --out DIR`"
+        )
+    analysis.memory(case).check()
+    folder.clear_partial()
+    folder.reserve_state()
+    _run(analysis, case, folder, gone, resume=True)
+
+
 def _run(
-    analysis: Analysis, case: Case, folder: OutputFolder, resume: bool, stays: Sequence[str] = ()
+    analysis: Analysis,
+    case: Case,
+    folder: OutputFolder,
+    gone: str,
+    resume: bool,
+    stays: Sequence[str] = (),
 ) -> None:
     def compute(file: Path, root: Path) -> bool:
         return bring_to_end(load_case(file), root)
-
-    reporter = Reporter(folder.reserve_log(), append=resume)
 
     def draw(contents: Any) -> None:
         with reporter.stage("paraview and figures"):
@@ -114,15 +130,22 @@ def _run(
                 write_pictures(case.output, folder, analysis.pictures, contents, processes)
 
     try:
-        if stays:
-            reporter.warn(
-                f"{', '.join(stays)}: in the folder before this run, and not of it; what has a "
-                f"name that the run needs gets {ASIDE} at its end"
-            )
-        run = Run(kind_of(case), case, folder, reporter, resume, folder.choice, compute, draw)
-        analysis.run(run)
-    finally:
-        reporter.close()
+        with closing(Reporter(folder.reserve_log(), append=resume)) as reporter:
+            if gone:
+                reporter.say(gone)
+            if stays:
+                reporter.warn(
+                    f"{', '.join(stays)}: in the folder before this run, and not of it; what has "
+                    f"a name that the run needs gets {ASIDE} at its end"
+                )
+            run = Run(kind_of(case), case, folder, reporter, resume, folder.choice, compute, draw)
+            analysis.run(run)
+    except OSError as error:
+        if error.errno not in UNWRITTEN:
+            raise
+        again = "the same command" if analysis.resumable is None else f"`resume {folder.root}`"
+        where = error.filename or folder.root
+        raise NotWritten(f"{where}: {error.strerror}; go on with {again} once it can be") from error
 
 
 def _is_case(path: Path, case: Case) -> bool:
@@ -133,23 +156,3 @@ def _is_case(path: Path, case: Case) -> bool:
         return load_case(path) == case
     except CaseError:
         return False
-
-
-def _refuse_foreign(root: Path) -> None:
-    """Leave alone what no run of ours has made."""
-    if not root.exists():
-        return
-    ours = any((root / name).exists() for name in (LOCK, MANIFEST, OutputFolder(root).case.name))
-    if not root.is_dir() or (any(root.iterdir()) and not ours):
-        raise UserError(f"{root}: not empty and no run of fretscale; give another folder")
-
-
-@contextmanager
-def _locked(root: Path) -> Iterator[None]:
-    """Wait for the folder, as long as another process works in it."""
-    root.mkdir(parents=True, exist_ok=True)
-    with (root / LOCK).open("w") as file:
-        if sys.platform != "win32":
-            with suppress(OSError):  # a file system without locks
-                fcntl.flock(file, fcntl.LOCK_EX)
-        yield
