@@ -102,11 +102,11 @@ def test_unfinished_run_is_not_started_again(interrupted, start):
 def test_what_a_kill_left_half_written_does_not_matter(interrupted, resume, whole):
     """A torn checkpoint beside the whole one, a torn jump, torn results."""
     torn = (interrupted.folder / "checkpoint.h5").read_bytes()[:1000]
-    for name in (".checkpoint.h5.99999.part", "jumps/.00003.h5.99999.part", "jumps/00003.h5"):
+    for name in (".checkpoint.h5.99999.part.h5", "jumps/.00003.h5.9.part.h5", "jumps/00003.h5"):
         (interrupted.folder / name).write_bytes(torn)
     (interrupted.folder / "results.h5").write_bytes(torn)
     assert_equal(resume(interrupted.folder), whole)
-    assert not list(interrupted.folder.rglob("*.part"))
+    assert not list(interrupted.folder.rglob("*.part.*"))
 
 
 def truncated(folder):
@@ -481,7 +481,7 @@ def assert_equal_after(resume, folder, reference):
     """Resume to the end, if it is not reached, and compare."""
     run = resume(folder)
     assert_equal(run, reference)
-    assert not list(folder.rglob("*.part"))
+    assert not list(folder.rglob("*.part.*"))
 
 
 @posix_only

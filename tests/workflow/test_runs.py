@@ -295,7 +295,7 @@ def test_a_chosen_case_is_known_by_the_case_that_was_asked_for(wear, here, tmp_p
     (done,) = run_jobs([job], tmp_path / "out")
     folder = OutputFolder(done.folder)
     record = {"fidelity": {"chosen": {"contact.grid": [32, 8]}}}
-    folder.write_summary(done.summary | record, provenance_of(folder, job.load()))
+    folder.finish(done.summary | record, provenance_of(folder, job.load()))
     asked = load_case(wear, ("contact.grid=[64, 16]",))
     assert kept_in(done.folder, asked) == "finished"
     assert kept_in(done.folder, load_case(wear, ("friction.coefficient=0.6",))) == "other"

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 import logging
-import sys
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
 from workflow.case.changing import changed
 from workflow.case.sections import Case
 from workflow.case.writing import dump_case
-from workflow.errors import CaseError, UserError
+from workflow.errors import UNWRITTEN, CaseError, NotWritten, UserError
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import write_pictures
 from workflow.runs.provenance import case_values, provenance_of
@@ -20,29 +19,22 @@ from workflow.shell import checkpoint
 from workflow.shell.analysis import Analysis, Run
 from workflow.shell.checkpoint import Checkpoint
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
+from workflow.shell.lock import locked
 from workflow.shell.reporter import Reporter
 
-if sys.platform != "win32":
-    import fcntl
-
-# Held while a process works in the folder: one that was cut off may still be about to end.
-LOCK = ".lock"
+# Seconds in which a process that was cut off, or whoever started it, has come to its end.
+PATIENCE = 60.0
 
 Kept = Literal["finished", "unfinished", "other", "nothing"]
 
 
-def run_case(case: Case, out: Path, force: bool, damaged: str = "") -> None:
+def run_case(case: Case, out: Path, force: bool) -> None:
     """Run a case from the start into a folder, by the cheapest model if it leaves that open.
 
-    The log says why an earlier run there was ``damaged``.
+    Raises FretscaleError; UserError too where another process works in the folder.
     """
-    analysis = analysis_of(case)
-    case, choice = analysis.choose(case)
-    analysis.memory(case).check()
-    folder = OutputFolder(out)
-    stays = folder.claim(case, force, analysis.resumable)
-    folder.keep_choice(choice)
-    _run(analysis, case, folder, stays=stays, damaged=damaged)
+    with locked(out) as gone:
+        _start(case, out, force, gone)
 
 
 def resume_run(out: Path) -> bool:
@@ -54,40 +46,27 @@ def resume_run(out: Path) -> bool:
     if folder.summary.exists():
         folder.check_finished(case_values(folder))
         return False
-    analysis = analysis_of(case)
-    if not analysis.resumable:
-        raise UserError(
-            f"{out}: a case of this kind takes up no run half done; start it again with "
-            f"`fretscale run {folder.case} --out {out}`"
-        )
-    if not folder.lists_state:
-        raise UserError(
-            f"{out}: its {MANIFEST} does not list its files: damaged, or a run of an older "
-            f"version; start it again with `fretscale run {folder.case} --out DIR`"
-        )
-    kept = _state(folder, case)
-    analysis.memory(case).check()
-    folder.clear_partial()
-    folder.reserve_state()
-    _run(analysis, case, folder, resume=True, kept=kept)
+    with locked(out) as gone:
+        _go_on(case, folder, gone)
     return True
 
 
-def bring_to_end(case: Case, root: Path) -> bool:
+def bring_to_end(case: Case, root: Path, take_over: bool = False) -> bool:
     """Bring a case to its end in a folder, from where that has got to; False if it was there.
 
     A finished run of the same case stays, an unfinished one goes on from its last jump if it can,
-    and what else the folder has of earlier runs gives way. Raises FretscaleError.
+    and what else the folder has of earlier runs gives way. For ``take_over`` see
+    :func:`workflow.shell.lock.locked`. Raises FretscaleError.
     """
-    _refuse_foreign(root)
-    with _locked(root):
-        kept, damaged = _found(root, case)
+    with locked(root, PATIENCE, take_over) as gone:
+        OutputFolder(root).refuse_foreign()
+        (kept, damaged), folder = _found(root, case), OutputFolder(root)
         if kept == "finished":
             return False
         if kept == "unfinished":
-            resume_run(root)
+            _go_on(load_case(folder.case), folder, gone)
         else:
-            run_case(case, root, force=True, damaged=damaged)
+            _start(case, root, True, gone, damaged)
         return True
 
 
@@ -132,20 +111,55 @@ def _state(folder: OutputFolder, case: Case) -> Checkpoint | None:
     return checkpoint.load(folder, provenance_of(folder, case))
 
 
+def _start(case: Case, out: Path, force: bool, gone: str, damaged: str = "") -> None:
+    """Run a case from the start.
+
+    ``gone`` is what to tell of a process that was there before, ``damaged`` why its run is not
+    believed.
+    """
+    analysis = analysis_of(case)
+    case, choice = analysis.choose(case)
+    analysis.memory(case).check()
+    folder = OutputFolder(out)
+    stays = folder.claim(case, force, analysis.resumable)
+    folder.keep_choice(choice)
+    if damaged:
+        damaged = f"an earlier run is not taken: {damaged}"
+    _run(analysis, case, folder, (gone, damaged), stays=stays)
+
+
+def _go_on(case: Case, folder: OutputFolder, gone: str) -> None:
+    """Continue the run in a folder."""
+    analysis, out = analysis_of(case), folder.root
+    if not analysis.resumable:
+        raise UserError(
+            f"{out}: a case of this kind takes up no run half done; start it again with "
+            f"`fretscale run {folder.case} --out {out}`"
+        )
+    if not folder.lists_state:
+        raise UserError(
+            f"{out}: its {MANIFEST} does not list its files: damaged, or a run of an older "
+            f"version; start it again with `fretscale run {folder.case} --out DIR`"
+        )
+    kept = _state(folder, case)
+    analysis.memory(case).check()
+    folder.clear_partial()
+    folder.reserve_state()
+    new = "" if kept else "no state was kept: from the start"
+    _run(analysis, case, folder, (gone, new), resume=True, kept=kept)
+
+
 def _run(
     analysis: Analysis,
     case: Case,
     folder: OutputFolder,
-    *,
+    told: Sequence[str],
     resume: bool = False,
     kept: Checkpoint | None = None,
     stays: Sequence[str] = (),
-    damaged: str = "",
 ) -> None:
     def compute(file: Path, root: Path) -> bool:
         return bring_to_end(load_case(file), root)
-
-    reporter = Reporter(folder.reserve_log(), append=resume)
 
     def draw(contents: Any) -> None:
         with reporter.stage("paraview and figures"):
@@ -154,31 +168,34 @@ def _run(
                 write_pictures(case.output, folder, analysis.pictures, contents, processes)
 
     try:
-        if damaged:
-            reporter.say(f"an earlier run is not taken: {damaged}")
-        if resume and kept is None:
-            reporter.say("no state was kept: from the start")
-        if stays:
-            reporter.warn(
-                f"{', '.join(stays)}: in the folder before this run, and not of it; what has a "
-                f"name that the run needs gets {ASIDE} at its end"
+        with closing(Reporter(folder.reserve_log(), append=resume)) as reporter:
+            for line in filter(None, told):
+                reporter.say(line)
+            if stays:
+                reporter.warn(
+                    f"{', '.join(stays)}: in the folder before this run, and not of it; what has "
+                    f"a name that the run needs gets {ASIDE} at its end"
+                )
+            run = Run(
+                kind=kind_of(case),
+                case=case,
+                folder=folder,
+                reporter=reporter,
+                resume=resume,
+                kept=kept,
+                provenance=provenance_of(folder, case),
+                choice=folder.choice,
+                compute=compute,
+                draw=draw,
             )
-        run = Run(
-            kind=kind_of(case),
-            case=case,
-            folder=folder,
-            reporter=reporter,
-            resume=resume,
-            kept=kept,
-            provenance=provenance_of(folder, case),
-            choice=folder.choice,
-            compute=compute,
-            draw=draw,
-        )
-        with _told(reporter):
-            analysis.run(run)
-    finally:
-        reporter.close()
+            with _told(reporter):
+                analysis.run(run)
+    except OSError as error:
+        if error.errno not in UNWRITTEN:
+            raise
+        again = f"`resume {folder.root}`" if analysis.resumable else "the same command"
+        where = error.filename or folder.root
+        raise NotWritten(f"{where}: {error.strerror}; go on with {again} once it can be") from error
 
 
 class _Telling(logging.Handler):
@@ -211,23 +228,3 @@ def _is_case(path: Path, case: Case) -> bool:
         return load_case(path) == case
     except CaseError:
         return False
-
-
-def _refuse_foreign(root: Path) -> None:
-    """Leave alone what no run of ours has made."""
-    if not root.exists():
-        return
-    ours = any((root / name).exists() for name in (LOCK, MANIFEST, OutputFolder(root).case.name))
-    if not root.is_dir() or (any(root.iterdir()) and not ours):
-        raise UserError(f"{root}: not empty and no run of fretscale; give another folder")
-
-
-@contextmanager
-def _locked(root: Path) -> Iterator[None]:
-    """Wait for the folder, as long as another process works in it."""
-    root.mkdir(parents=True, exist_ok=True)
-    with (root / LOCK).open("w") as file:
-        if sys.platform != "win32":
-            with suppress(OSError):  # a file system without locks
-                fcntl.flock(file, fcntl.LOCK_EX)
-        yield

@@ -8,6 +8,7 @@ from __future__ import annotations
 import hashlib
 import logging
 import os
+import re
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -26,6 +27,8 @@ LOG = logging.getLogger(__name__)
 
 # Files are pruned, least recently used first, above this size; one default dovetail takes 67 MB.
 LARGEST_CACHE = 4 * 1024**3
+# Files by what is in them and the hash of what they were made from.
+NAME = re.compile(r"[a-z]+-[0-9a-f]{32}\.h5")
 SOLVERS = ("numpy", "scipy", "scikit-fem", "gmsh")
 
 
@@ -138,8 +141,13 @@ def _save(name: str, arrays: dict[str, Array], attributes: dict[str, Any]) -> No
         return
 
 
+def kept_files(folder: Path) -> list[Path]:
+    """What is kept in a cache folder, and nothing that somebody else has put there."""
+    return [path for path in folder.glob("*.h5") if NAME.fullmatch(path.name)]
+
+
 def _prune(folder: Path) -> None:
-    files = sorted(folder.glob("*.h5"), key=lambda path: path.stat().st_mtime, reverse=True)
+    files = sorted(kept_files(folder), key=lambda path: path.stat().st_mtime, reverse=True)
     total = 0
     for path in files:
         total += path.stat().st_size
