@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -22,6 +24,8 @@ MATCHING_TOLERANCE = 1e-9
 AXES = {2: (0, 2), 3: (0, 1, 2)}
 # gmsh's numbers for first-order cells and their facets, by dimension.
 GMSH_CELL, GMSH_FACET = {2: 2, 3: 4}, {2: 1, 3: 2}
+# How a file of gmsh ends that is whole.
+MSH_END = b"$EndElements\n"
 
 
 class MeshError(InputError):
@@ -224,7 +228,10 @@ def matched_interface(
 
 
 def write_msh(path: Path, structure: StructureMesh) -> None:
-    """Write both bodies and all their named boundaries to one gmsh 4.1 file (text)."""
+    """Write both bodies and all their named boundaries to one gmsh 4.1 file (text).
+
+    Raises OSError where the disk is full, which gmsh does not notice.
+    """
     with gmsh_model("structure") as gmsh:
         offset = 0
         for tag, body in enumerate((structure.body_1, structure.body_2), start=1):
@@ -242,3 +249,7 @@ def write_msh(path: Path, structure: StructureMesh) -> None:
                 gmsh.model.mesh.addElementsByType(face, GMSH_FACET[dim], [], facets)
             offset += body.mesh.nvertices
         gmsh.write(str(path))
+    with path.open("rb") as file:
+        file.seek(max(0, path.stat().st_size - len(MSH_END)))
+        if file.read() != MSH_END:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))

@@ -16,6 +16,7 @@ doi:10.2514/3.4741.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from io import RawIOBase
 from pathlib import Path
 from typing import Any
 
@@ -153,8 +154,8 @@ def free_frequencies(
     return np.sqrt(np.abs(np.sort(squares))) / (2.0 * np.pi)
 
 
-def save_reduced(path: Path, model: ReducedModel) -> None:
-    """Write a model to HDF5, with the unit and description of every dataset."""
+def save_reduced(path: Path | RawIOBase, model: ReducedModel) -> None:
+    """Write a model to HDF5, a path or an open file, with unit and description of every dataset."""
     with h5py.File(path, "w") as file:
         for name, (unit, description) in DATASETS.items():
             values = getattr(model, name)

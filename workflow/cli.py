@@ -6,7 +6,11 @@ a command early ends it in one line and an exit code (``workflow.errors``).
 
 from __future__ import annotations
 
+import errno
+import os
 import sys
+from collections.abc import Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -15,29 +19,47 @@ import click
 from sa_solver.errors import FretscaleError
 from workflow import errors
 
+# How a command goes on that was stopped.
+ADVICE = "a run continues with `resume DIR`, many with the same command"
+
 
 class _OneLineGroup(click.Group):
     """A group of commands whose failures are one line on stderr and an exit code."""
 
     def main(self, *args: Any, **settings: Any) -> NoReturn:
         settings["standalone_mode"] = False
+        message, prefix = "", "fretscale: "
         try:
             code = super().main(*args, **settings)
+            if sys.stdout is not None:
+                sys.stdout.flush()
         except (FretscaleError, OSError, ImportError, MemoryError) as error:
             message, code = _ending(error)
-            for line in message.splitlines():
-                click.echo(f"fretscale: {line}", err=True)
+        except SystemExit:  # what click and rich make of a pipe that was closed
+            message, code = _ending(BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE)))
         except click.Abort:
-            advice = "a run continues with `resume DIR`, many with the same command"
-            click.echo(f"fretscale: interrupted; {advice}", err=True)
-            code = errors.INTERRUPTED
+            message, code = f"interrupted; {ADVICE}", errors.INTERRUPTED
         except click.exceptions.NoArgsIsHelpError as error:
-            error.show()
-            code = errors.UserError.exit_code
+            message, prefix, code = error.format_message(), "", errors.UserError.exit_code
         except click.ClickException as error:
-            click.echo(f"fretscale: {_usage(error)}", err=True)
-            code = errors.UserError.exit_code
+            message, code = _usage(error), errors.UserError.exit_code
+        _say([prefix + line for line in message.splitlines()])
         sys.exit(code if isinstance(code, int) else errors.DONE)
+
+
+def _say(lines: Sequence[str]) -> None:
+    """Say why a command ended, if anybody can read it; then nothing is left to be written."""
+    with suppress(OSError):
+        for line in lines:
+            click.echo(line, err=True)
+    for stream in (sys.stdout, sys.stderr):
+        if stream is None:
+            continue
+        try:
+            stream.flush()
+        except OSError:
+            # Python would try again as it ends, and say that it cannot.
+            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _ending(error: Exception) -> tuple[str, int]:
@@ -46,6 +68,9 @@ def _ending(error: Exception) -> tuple[str, int]:
         return f"out of memory: {error}".rstrip(": "), errors.OutOfMemory.exit_code
     if isinstance(error, FretscaleError):
         return str(error), errors.exit_code(error)
+    if isinstance(error, OSError) and error.errno in errors.UNWRITTEN:
+        said = f"{error.filename or 'output'}: {error.strerror}; {ADVICE}"
+        return said, errors.NotWritten.exit_code
     from workflow.shell.system_check import remedy
 
     if missing := remedy(error):
@@ -67,8 +92,8 @@ def _usage(error: click.ClickException) -> str:
 def cli() -> None:
     """Fretting wear across scales: a structure, its contacts, and how they wear.
 
-    Exit codes: 0 done, 1 an expectation missed, 2 bad case or usage, 3 a method failed,
-    4 not enough memory, 130 interrupted.
+    Exit codes: 0 done, 1 an expectation missed, 2 bad case or usage, 3 a method failed or the disk
+    is full, 4 not enough memory, 130 interrupted.
     """
 
 
@@ -136,17 +161,21 @@ def chart(
     """
     from workflow.chart import accuracy_of, chart_case
     from workflow.chart.report import show, write_chart
+    from workflow.shell.lock import locked
 
-    charted = chart_case(
-        case,
-        out,
-        axes=axes,
-        overrides=overrides,
-        quantities=quantities,
-        accuracy=accuracy_of(accuracy),
-        report=lambda line: click.echo(line, err=True),
-    )
-    write_chart(charted, out)
+    with locked(out) as gone:
+        if gone:
+            click.echo(gone, err=True)
+        charted = chart_case(
+            case,
+            out,
+            axes=axes,
+            overrides=overrides,
+            quantities=quantities,
+            accuracy=accuracy_of(accuracy),
+            report=lambda line: click.echo(line, err=True),
+        )
+        write_chart(charted, out)
     show(charted)
     return errors.DONE if charted.complete else errors.MethodFailed.exit_code
 
@@ -284,4 +313,8 @@ def schema() -> None:
 
 def main() -> None:
     """Entry point of the command."""
+    # No file of a run may get the number of a stream that is closed, where libraries print.
+    while (free := os.open(os.devnull, os.O_RDWR)) <= 2:
+        pass
+    os.close(free)
     cli(prog_name="fretscale")

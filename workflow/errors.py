@@ -6,10 +6,15 @@ person who started the command: one line, what is wrong and what to do about it.
 
 from __future__ import annotations
 
+import errno
+
 from sa_solver.errors import FretscaleError, InputError
 
 DONE = 0
 INTERRUPTED = 130
+# What the system says where no more can be written, whatever the case: a disk or a quota is full, a
+# file too large, a device broken, or whoever read the output has gone.
+UNWRITTEN = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EPIPE}
 
 
 class Ending(FretscaleError):
@@ -36,6 +41,12 @@ class CaseError(UserError, ValueError):
 
 class MethodFailed(Ending):
     """A numerical method did not converge; the message carries its residual and a remedy."""
+
+    exit_code = 3
+
+
+class NotWritten(Ending):
+    """What was to be written could not be; what was written before is whole, and kept."""
 
     exit_code = 3
 

@@ -20,6 +20,7 @@ from workflow.analyses.wear.layout import Contents
 from workflow.kinds import load_case
 from workflow.pictures import drawing
 from workflow.shell import processes
+from workflow.shell.folder import OutputFolder
 
 SIZE, EDGE, END = (10.0, 60.0), 1.0, 3.0
 EDGE_RADIUS, END_RADIUS = 30.0, 150.0
@@ -279,9 +280,16 @@ def contents_of(folder: Path) -> Contents:
 
 
 def manifest_has_all(folder: Path) -> bool:
-    """Whether the manifest of a run lists what there is, and nothing else."""
-    listed: dict[str, str] = json.loads((folder / "manifest.json").read_text("utf-8"))
-    there = {path.name for path in folder.iterdir() if not path.name.startswith(".")}
+    """Whether the manifest of a run lists what there is, and nothing else, nor a lock is left."""
+    listed = OutputFolder(folder).manifest
+    assert listed is not None
+    runs = [path.parent for path in folder.glob("*/manifest.json")]
+    there = {path.name for path in folder.iterdir() if path.is_dir()}
+    there |= {
+        path.relative_to(folder).as_posix()
+        for path in folder.rglob("*")
+        if path.is_file() and not any(run in path.parents for run in runs)
+    }
     return there == listed.keys() | {"manifest.json"} and all(listed.values())
 
 

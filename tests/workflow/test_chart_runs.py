@@ -324,7 +324,7 @@ def test_a_chart_that_was_killed_goes_on(ball: Path, tmp_path: Path):
     first, second = (out / "runs" / name for name in ("own", "grid-16-x-16"))
     try:
         deadline = time.monotonic() + PATIENCE
-        while not (second / ".lock").exists():
+        while not (second / ".fretscale.lock").exists():
             assert running.poll() is None
             assert time.monotonic() < deadline
             time.sleep(0.02)

@@ -41,13 +41,87 @@ def test_claim_removes_only_what_the_earlier_run_wrote(case, folder):
     folder.claim(case, force=False, resumable=True)
     make(folder, "summary.json", "results.h5", "worn.msh", "loops_left.csv")
     folder.jump(1).write_text("old")
-    (folder.reserve("figures", "a test") / "below").mkdir(parents=True)
+    with folder.filling("figures", "a test") as figures:
+        (figures / "below").mkdir(parents=True)
+        for name in ("loops.png", "below/state.vti"):
+            (figures / name).write_text("old")
     for name in ("notes.txt", "loops_mine.csv"):
         (folder.root / name).write_text("mine")
-    (folder.root / ".results.h5.123.part").write_text("old")
-    (folder.jumps / ".00002.h5.123.part").write_text("old")
+    (folder.root / ".results.h5.123.part.h5").write_text("old")
+    (folder.jumps / ".00002.h5.123.part.h5").write_text("old")
+    (folder.jumps / "fidelity.json").write_text("{}")
     assert folder.claim(case, force=False, resumable=True) == []
     assert files(folder) == ["case.yaml", "jumps", "loops_mine.csv", "manifest.json", "notes.txt"]
+
+
+@pytest.mark.parametrize("force", [False, True])
+def test_own_files_in_the_folders_of_a_run_stay(case, folder, force):
+    folder.claim(case, force=False, resumable=True)
+    folder.jump(1).write_text("old")
+    with folder.filling("figures", "a test") as figures:
+        (figures / "loops.png").write_text("old")
+    for mine in (figures / "mine.png", folder.jumps / "mine.txt"):
+        mine.write_text("mine")
+    folder.claim(case, force=force, resumable=True)
+    folder.reserve("figures", "a test")
+    assert files(folder) == [
+        *("case.yaml", "figures.aside", "figures.aside/mine.png"),
+        *("jumps", "jumps.aside", "jumps.aside/mine.txt", "manifest.json"),
+    ]
+
+
+def test_what_links_lead_to_stays(case, folder, tmp_path):
+    """A file, a folder with what would be of a run, and partial files, all outside."""
+    folder.claim(case, force=False, resumable=True)
+    with folder.filling("figures", "a test") as figures:
+        (figures / "loops.png").write_text("old")
+    make(folder, "results.h5")
+    outside = tmp_path / "outside"
+    folder.jumps.rename(outside)
+    folder.jumps.symlink_to(outside)
+    figures.rename(outside / "figures")
+    figures.symlink_to(outside / "figures")
+    (folder.root / "mine").symlink_to(outside)
+    for name in ("00001.h5", ".x.h5.1.part.h5", "mine.h5"):
+        (outside / name).write_text("mine")
+    folder.results.unlink()
+    folder.results.symlink_to(outside / "mine.h5")
+    before = sorted(outside.rglob("*"))
+    folder.clear_partial()
+    folder.claim(case, force=True, resumable=True)
+    assert sorted(outside.rglob("*")) == before
+    assert not folder.results.is_symlink()
+    assert not folder.jumps.is_symlink()
+
+
+def test_a_manifest_of_another_program_is_no_list_of_ours(case, folder):
+    folder.root.mkdir()
+    for name in ("main.js", "index.html"):
+        (folder.root / name).write_text("mine")
+    (folder.root / "manifest.json").write_text('{"main.js": "a.js", "index.html": "b"}')
+    with pytest.raises(UserError, match="no run of fretscale"):
+        folder.claim(case, force=False, resumable=False)
+    folder.claim(case, force=True, resumable=False)
+    assert (folder.root / "manifest.json.aside").read_text().startswith('{"main.js"')
+    assert {"main.js", "index.html"} <= set(files(folder))
+
+
+def test_a_summary_of_somebody_else_ends_no_run(case, folder):
+    folder.root.mkdir()
+    folder.summary.write_text("mine")
+    folder.claim(case, force=True, resumable=True)
+    assert not folder.summary.exists()
+    assert (folder.root / "summary.json.aside").read_text() == "mine"
+
+
+def test_kinds_of_folder_do_not_take_each_other_for_theirs(case, folder):
+    table = OutputFolder(folder.root, "sweep").reserve("sweep.csv", "a test")
+    table.write_text("old")
+    with pytest.raises(UserError, match="no run of fretscale"):
+        folder.claim(case, force=False, resumable=False)
+    folder.claim(case, force=True, resumable=False)
+    assert table.exists()
+    assert OutputFolder(folder.root, "sweep").manifest.keys() == {"sweep.csv"}
 
 
 def test_entries_are_listed_before_they_are_made(case, folder):
@@ -80,8 +154,9 @@ def test_a_manifest_leads_nowhere_else(case, folder):
     outside = folder.root.parent / "outside"
     outside.mkdir()
     (folder.root / ".hidden").touch()
-    names = ["case.yaml", "../outside", str(outside), "", ".", "..", ".hidden"]
-    (folder.root / "manifest.json").write_text(json.dumps(dict.fromkeys(names, "")))
+    names = ["case.yaml", "../outside", "a/../../outside", str(outside), "", ".", "..", ".hidden"]
+    listed = {"fretscale": {"run": dict.fromkeys(names, "")}}
+    (folder.root / "manifest.json").write_text(json.dumps(listed))
     folder.claim(case, force=False, resumable=False)
     assert outside.exists()
     assert files(folder) == [".hidden", "case.yaml", "manifest.json"]
@@ -109,16 +184,20 @@ def unfinished(folder, case):
     folder.checkpoint.touch()
 
 
+OLDER = ["case.yaml", "results.h5", "summary.json", "worn.msh"]
+
+
 @pytest.mark.parametrize(
-    ("prepare", "words", "stays"),
+    ("prepare", "words", "stays", "aside"),
     [
-        (foreign, "no run of fretscale", ["thesis.tex"]),
-        (older, "older version, which left no manifest.json", ["worn.msh"]),
-        (other, "another case", []),
-        (unfinished, "fretscale resume", []),
+        (foreign, "no run of fretscale", ["thesis.tex"], []),
+        (older, "no run of fretscale", OLDER, ["case.yaml", "summary.json"]),
+        (other, "another case", [], []),
+        (unfinished, "fretscale resume", [], []),
     ],
 )
-def test_what_is_refused_and_what_force_takes(case, folder, prepare, words, stays):
+def test_what_is_refused_and_what_force_takes(case, folder, prepare, words, stays, aside):
+    """Without a manifest nothing is removed: what is in the way is set aside."""
     prepare(folder, case)
     before = files(folder)
     with pytest.raises(UserError, match=words) as refusal:
@@ -126,13 +205,8 @@ def test_what_is_refused_and_what_force_takes(case, folder, prepare, words, stay
     assert "\n" not in str(refusal.value)
     assert files(folder) == before
     assert folder.claim(case, force=True, resumable=True) == stays
-    assert files(folder) == sorted(["case.yaml", "jumps", "manifest.json", *stays])
-
-
-def test_a_case_alone_is_no_run_yet(case, folder):
-    folder.root.mkdir()
-    folder.case.write_text(dump_case(case))
-    assert folder.claim(case, force=False, resumable=False) == []
+    kept = [f"{name}.aside" if name in aside else name for name in stays]
+    assert files(folder) == sorted(["case.yaml", "jumps", "manifest.json", *kept])
 
 
 def test_finished_run_of_the_same_case_may_be_repeated(case, folder):

@@ -17,9 +17,10 @@ import pytest
 
 import wear.coupled
 import workflow.analyses.wear.run
-from workflow.analyses.wear import checkpoint, contact_workers
+from workflow.analyses.wear import contact_workers
 from workflow.analyses.wear.recording import Recorder
 from workflow.shell import processes as workers
+from workflow.shell.store import read_arrays, write_arrays
 
 # Many quick jumps, so that a random moment mostly falls among them.
 MANY = "wear.step.cycles=1500", "coupling.drift=2e-4"
@@ -48,7 +49,7 @@ def assert_equal(run, reference):
 def jumps_kept(folder: Path) -> int:
     """Whole jumps in the checkpoint."""
     path = folder / "checkpoint.h5"
-    return checkpoint.load(path).jump if path.exists() else -1
+    return len(read_arrays(path)[0]["jumps"]) - 1 if path.exists() else -1
 
 
 # --- in this process ----------------------------------------------------------------------------
@@ -101,35 +102,174 @@ def test_unfinished_run_is_not_started_again(interrupted, start):
 def test_what_a_kill_left_half_written_does_not_matter(interrupted, resume, whole):
     """A torn checkpoint beside the whole one, a torn jump, torn results."""
     torn = (interrupted.folder / "checkpoint.h5").read_bytes()[:1000]
-    for name in (".checkpoint.h5.99999.part", "jumps/.00003.h5.99999.part", "jumps/00003.h5"):
+    for name in (".checkpoint.h5.99999.part.h5", "jumps/.00003.h5.9.part.h5", "jumps/00003.h5"):
         (interrupted.folder / name).write_bytes(torn)
     (interrupted.folder / "results.h5").write_bytes(torn)
     assert_equal(resume(interrupted.folder), whole)
-    assert not list(interrupted.folder.rglob("*.part"))
+    assert not list(interrupted.folder.rglob("*.part.*"))
 
 
-@pytest.mark.parametrize("damage", ["truncated", "empty", "other"])
-def test_damaged_checkpoint_is_one_line(interrupted, resume, damage):
+def truncated(folder):
+    path = folder / "checkpoint.h5"
+    path.write_bytes(path.read_bytes()[:1000])
+
+
+def emptied(folder):
+    (folder / "checkpoint.h5").write_bytes(b"")
+
+
+def written_by_others(folder):
+    with h5py.File(folder / "checkpoint.h5", "w") as file:
+        file["something"] = 1.0
+
+
+def deeper(folder):
+    """One worn depth, by whoever knows HDF5."""
+    with h5py.File(folder / "checkpoint.h5", "r+") as file:
+        file["kinetics"][1, 0, 0] *= 2.0
+
+
+def without_energies(folder):
+    with h5py.File(folder / "checkpoint.h5", "r+") as file:
+        del file["interface_0/scalars"]
+
+
+def flipped(folder):
+    path = folder / "jumps/00001.h5"
+    content = bytearray(path.read_bytes())
+    content[len(content) // 2] ^= 1
+    path.write_bytes(content)
+
+
+def lost(folder):
+    (folder / "jumps/00001.h5").unlink()
+
+
+def exchanged(folder):
+    one, two, aside = (folder / f"jumps/{name}" for name in ("00001.h5", "00002.h5", "aside"))
+    one.rename(aside)
+    two.rename(one)
+    aside.rename(two)
+
+
+def rewritten(folder):
+    """A whole file of that name, such as another run has left."""
+    path = folder / "jumps/00001.h5"
+    arrays, attributes = read_arrays(path)
+    write_arrays(path, arrays, attributes | {"cycles": 1.0})
+
+
+def chosen_otherwise(folder):
+    (folder / "jumps/fidelity.json").write_text("{}")
+
+
+def chosen_unreadably(folder):
+    (folder / "jumps/fidelity.json").write_bytes(b"\xff{")
+
+
+@pytest.mark.parametrize(
+    ("damage", "place", "wrong"),
+    [
+        (truncated, "checkpoint.h5", "damaged"),
+        (emptied, "checkpoint.h5", "damaged"),
+        (written_by_others, "checkpoint.h5", "damaged"),
+        (deeper, "checkpoint.h5", "damaged"),
+        (without_energies, "checkpoint.h5", "damaged"),
+        (flipped, "jumps/00001.h5", "damaged"),
+        (lost, "jumps/00001.h5", "missing"),
+        (exchanged, "jumps/00001.h5", "damaged"),
+        (rewritten, "jumps/00001.h5", "of another run than"),
+        (chosen_otherwise, "jumps/fidelity.json", "has changed since the run was begun"),
+        (chosen_unreadably, "jumps/fidelity.json", "damaged"),
+    ],
+)
+def test_what_is_not_of_the_run_is_one_line_before_it_computes(
+    interrupted, resume, damage, place, wrong
+):
+    log = (interrupted.folder / "run.log").read_text("utf-8")
+    damage(interrupted.folder)
+    run = resume(interrupted.folder)
+    assert run.ending.exit_code == 2
+    (line,) = run.ending.stderr.splitlines()
+    assert line.startswith(f"fretscale: {interrupted.folder / place}: {wrong}")
+    assert f"start again with `fretscale run {interrupted.folder}/case.yaml" in line
+    assert (interrupted.folder / "run.log").read_text("utf-8") == log
+
+
+def edit(path, written, instead):
+    """Write something else where it is ``written`` first."""
+    text = path.read_text("utf-8")
+    assert written in text
+    path.write_text(text.replace(written, instead, 1), encoding="utf-8")
+
+
+def test_state_that_the_manifest_does_not_list_is_not_touched(interrupted, resume):
+    """It would be set aside as what is not of the run."""
+    edit(interrupted.folder / "manifest.json", "jumps", "jump5")
+    run = resume(interrupted.folder)
+    assert run.ending.exit_code == 2
+    (line,) = run.ending.stderr.splitlines()
+    assert "its manifest.json does not list its files" in line
+    assert jumps_kept(interrupted.folder) == 2
+
+
+def test_state_of_another_version_is_one_line(interrupted, resume):
     path = interrupted.folder / "checkpoint.h5"
-    if damage == "other":
-        path.unlink()
-        with h5py.File(path, "w") as file:
-            file["something"] = 1.0
-    else:
-        path.write_bytes(path.read_bytes()[: 1000 if damage == "truncated" else 0])
+    arrays, attributes = read_arrays(path)
+    del arrays["interface_0/scalars"]
+    write_arrays(path, arrays, attributes)
     run = resume(interrupted.folder)
     assert run.ending.exit_code == 2
     line = run.ending.stderr.splitlines()[-1]
-    assert line.startswith(f"fretscale: {path}: damaged (")
-    assert "--force" in line
-    assert "Traceback" not in run.ending.stderr
+    assert line.startswith(f"fretscale: {path}: of another version of fretscale (no 'interface_0/")
+
+
+def test_another_case_does_not_go_on(interrupted, resume):
+    edit(interrupted.folder / "case.yaml", "coefficient: 0.4 ", "coefficient: 0.45 ")
+    run = resume(interrupted.folder)
+    assert run.ending.exit_code == 2
+    (line,) = run.ending.stderr.splitlines()
+    assert line.startswith(
+        f"fretscale: {interrupted.folder}/case.yaml: friction.coefficient: 0.45, but 0.4 when the "
+        "run was begun; put that back, or start again with `fretscale run"
+    )
+
+
+def test_state_of_another_case_is_not_taken(interrupted, start, resume, tmp_path, monkeypatch):
+    """Nor with all of its jumps."""
+    with monkeypatch.context() as patch:
+        patch.setattr(workflow.analyses.wear.run, "write_output", refuse)
+        other = start(tmp_path / "other", "wear.cycles=1e4", "friction.coefficient=0.45")
+    for name in ("checkpoint.h5", "jumps/00000.h5", "jumps/00001.h5"):
+        shutil.copy(other.folder / name, interrupted.folder / name)
+    run = resume(interrupted.folder)
+    assert run.ending.exit_code == 2
+    (line,) = run.ending.stderr.splitlines()
+    assert f"{interrupted.folder}/case.yaml: friction.coefficient: 0.4, but 0.45 when" in line
+
+
+def test_what_no_number_depends_on_may_change(interrupted, resume, whole):
+    edit(interrupted.folder / "case.yaml", "title: ", "title: Another one # ")
+    edit(interrupted.folder / "case.yaml", "figures: false", "figures: true")
+    run = resume(interrupted.folder)
+    assert_equal(run, whole)
+    assert run.summary["title"] == "Another one"
+    assert (run.folder / "figures").is_dir()
+
+
+def test_run_whose_state_is_gone_begins_anew_and_says_so(interrupted, resume, whole):
+    (interrupted.folder / "checkpoint.h5").unlink()
+    run = resume(interrupted.folder)
+    assert_equal(run, whole)
+    assert "no state was kept: from the start" in run.ending.stderr
+
+
+def refuse(*_):
+    raise KeyboardInterrupt
 
 
 @pytest.mark.slow
 def test_interruption_after_the_last_jump_writes_the_output(start, resume, monkeypatch, tmp_path):
-    def refuse(*_):
-        raise KeyboardInterrupt
-
     quick = "wear.cycles=1e4", "contact.grid=[16, 24]"
     reference = start(tmp_path / "reference", *quick)
     with monkeypatch.context() as patch:
@@ -341,7 +481,7 @@ def assert_equal_after(resume, folder, reference):
     """Resume to the end, if it is not reached, and compare."""
     run = resume(folder)
     assert_equal(run, reference)
-    assert not list(folder.rglob("*.part"))
+    assert not list(folder.rglob("*.part.*"))
 
 
 @posix_only
@@ -352,8 +492,7 @@ def test_kill_while_the_checkpoint_is_written(
     """The half of it that is on disk is not the checkpoint."""
     code = """
 import os, signal, sys
-from workflow.analyses.wear import checkpoint, contact_workers
-from workflow.shell import store
+from workflow.shell import checkpoint, store
 whole, written = store.write_arrays, []
 def torn(path, arrays, attributes):
     written.append(path)

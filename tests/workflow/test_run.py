@@ -146,7 +146,7 @@ def test_pictures_are_written(start, separate_processes, tmp_path):
     assert run.ending.exit_code == 0, run.ending.stderr
     assert len(list((run.folder / "figures").glob("*.png"))) == 8
     assert (run.folder / "paraview" / "structure.pvd").exists()
-    assert not list(run.folder.rglob("*.part"))
+    assert not list(run.folder.rglob("*.part.*"))
 
 
 # --- steps and stops ----------------------------------------------------------------------------

@@ -1,6 +1,5 @@
 """Many runs in folders: done once, taken up again, none stopped by another."""
 
-import json
 import os
 import signal
 import subprocess
@@ -21,6 +20,7 @@ from workflow.kinds import load_case
 from workflow.runs import job as runs_job
 from workflow.runs.job import Job
 from workflow.runs.jobs import run_jobs
+from workflow.runs.provenance import provenance_of
 from workflow.runs.run import kept_in
 from workflow.shell.folder import OutputFolder
 
@@ -284,7 +284,7 @@ def test_a_damaged_state_is_started_again(wear, here, tmp_path):
     folder = OutputFolder(done.folder)
     folder.summary.unlink()
     folder.checkpoint.write_bytes(folder.checkpoint.read_bytes()[:1000])
-    assert kept_in(done.folder, job.load()) == "unfinished"
+    assert kept_in(done.folder, job.load()) == "nothing"
     (again,) = run_jobs([job], tmp_path / "out")
     assert without_times(again.summary) == without_times(done.summary)
 
@@ -294,8 +294,8 @@ def test_a_chosen_case_is_known_by_the_case_that_was_asked_for(wear, here, tmp_p
     job = Job("one", wear)
     (done,) = run_jobs([job], tmp_path / "out")
     folder = OutputFolder(done.folder)
-    chosen = json.dumps(done.summary | {"fidelity": {"chosen": {"contact.grid": [32, 8]}}})
-    folder.summary.write_text(chosen, encoding="utf-8")
+    record = {"fidelity": {"chosen": {"contact.grid": [32, 8]}}}
+    folder.finish(done.summary | record, provenance_of(folder, job.load()))
     asked = load_case(wear, ("contact.grid=[64, 16]",))
     assert kept_in(done.folder, asked) == "finished"
     assert kept_in(done.folder, load_case(wear, ("friction.coefficient=0.6",))) == "other"

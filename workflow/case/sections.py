@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from sa_solver.types import Material as ElasticMaterial
-from workflow.case.fields import Entry, Path, Quantity, Text, Whole
+from workflow.case.fields import Entry, File, Path, Quantity, Text, Whole, split_dataset
 from workflow.case.source import Source
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual machine.
@@ -217,6 +217,17 @@ def entry_of(field: FieldInfo) -> Entry | None:
             return part
         parts += [*getattr(part, "__metadata__", ()), *get_args(part)]
     return None
+
+
+def files_of(section: BaseModel) -> Iterator[str]:
+    """The files that the entries of a section name, wherever in it."""
+    for name, field in type(section).model_fields.items():
+        value = getattr(section, name)
+        for item in value if isinstance(value, tuple) else (value,):
+            if isinstance(item, BaseModel):
+                yield from files_of(item)
+            elif item is not None and isinstance(entry_of(field), File):
+                yield split_dataset(item)[0]
 
 
 def quantities_of(model: type[Section]) -> dict[str, Quantity]:

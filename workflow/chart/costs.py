@@ -53,7 +53,8 @@ def costs(
     That is the longest of all runs of the same structure.
     """
     stages = [
-        stage_seconds(OutputFolder(folder).log.read_text(encoding="utf-8")) for folder in folders
+        stage_seconds(OutputFolder(folder).log.read_text(encoding="utf-8", errors="replace"))
+        for folder in folders
     ]
     cold: dict[tuple[str, str], float] = {}
     for case, logged in zip(cases, stages, strict=True):

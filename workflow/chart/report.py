@@ -12,8 +12,8 @@ from rich.table import Column, Table
 
 from workflow.chart.frontier import Combination, cheapest
 from workflow.chart.ladder import Judged, Ladder
-from workflow.chart.run import Chart
-from workflow.shell.store import write_json
+from workflow.chart.run import KIND, Chart
+from workflow.shell.folder import OutputFolder
 from workflow.shell.tables import write_table
 from workflow.shell.versions import versions
 
@@ -25,9 +25,11 @@ def write_chart(chart: Chart, out: Path) -> None:
     """Write ``chart.csv``, ``figures`` and, last, ``summary.json``."""
     from workflow.chart.figures import write_chart_figures
 
-    _write_table(chart, out / "chart.csv")
-    write_chart_figures(chart, out / "figures")
-    write_json(out / "summary.json", _summary(chart))
+    folder = OutputFolder(out, KIND)
+    _write_table(chart, folder.reserve("chart.csv", "errors and costs of every rung"))
+    with folder.filling("figures", "errors against costs") as figures:
+        write_chart_figures(chart, figures)
+    folder.write_summary(_summary(chart))
 
 
 # --- what to choose -----------------------------------------------------------------------------

@@ -26,12 +26,15 @@ from workflow.kinds import analysis_of, load_case
 from workflow.runs.job import Finished, Job
 from workflow.runs.jobs import run_jobs
 from workflow.runs.run import kept_in
+from workflow.shell.cache import kept_files
+from workflow.shell.folder import OutputFolder
 from workflow.shell.processes import environment
 from workflow.shell.summary import number_at
 
 CACHE = "FRETSCALE_CACHE"
 ACCURACY = Quantity("1", above=0.0, at_most=1.0)
-# Folders of a chart, and the run of the case as it is written.
+# What the folder of a chart is called, those in it, and the run of the case as it is written.
+KIND = "chart"
 RUNS, STRUCTURES, BASELINE = "runs", "structures", "own"
 # Entry of an interface in the summary: the longest stable explicit step of the unworn contact.
 LIMIT = "explicit_limit"
@@ -89,7 +92,7 @@ def chart_case(
     base = (*overrides, *_plain(load_case(case, overrides), quantities))
     settings = axes_of(case, base, axes)
     jobs = _jobs(case, base, settings)
-    _claim(out, load_case(case, base))
+    _claim(OutputFolder(out, KIND), load_case(case, base))
     with environment({CACHE: str((out / STRUCTURES).absolute())}):
         ended, left_out = _run(jobs, settings, out / RUNS, quantities, report)
     runs = _runs(ended)
@@ -114,13 +117,13 @@ def _plain(case: Case, quantities: Sequence[str]) -> Iterator[str]:
         yield "fidelity=fixed"
 
 
-def _claim(out: Path, case: Case) -> None:
+def _claim(folder: OutputFolder, case: Case) -> None:
     """Make sure of the folder. Raises UserError where it holds anything but a chart."""
-    if out.exists() and not (out / RUNS).is_dir() and (not out.is_dir() or any(out.iterdir())):
-        raise UserError(f"{out}: not empty and no chart of fretscale; give another folder")
-    if kept_in(out / RUNS / BASELINE, case) != "finished":
+    folder.refuse_foreign()
+    structures = folder.reserve(STRUCTURES, "what runs of the same structure share")
+    if kept_in(folder.root / RUNS / BASELINE, case) != "finished":
         # It is the first to run, and is to pay for its structure itself.
-        for path in (out / STRUCTURES).glob("*.h5"):
+        for path in [] if structures.is_symlink() else kept_files(structures):
             path.unlink()
 
 

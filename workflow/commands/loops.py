@@ -14,6 +14,8 @@ from workflow.analyses.wear.loop_table import write_loop_table
 from workflow.case.units import UnitError, to_base
 from workflow.commands.loop_file import BASE_UNITS, read_loop_file
 from workflow.errors import UserError
+from workflow.shell.folder import OutputFolder
+from workflow.shell.lock import locked
 
 TABLE, FIGURE = "loops.csv", "loops.png"
 # More cycles than this are not all printed.
@@ -150,17 +152,13 @@ def write_loops(loops: MeasuredLoops, out: Path, title: str, force: bool) -> lis
 
     Raises UserError for a folder that has them already, unless ``force``.
     """
-    if out.exists() and not out.is_dir():
-        raise UserError(f"{out}: is a file; give a folder to --out")
-    paths = [out / TABLE, out / FIGURE]
-    there = [path for path in paths if path.exists()]
-    if there and not force:
-        raise UserError(f"{there[0]}: exists; give another folder, or --force")
-    out.mkdir(parents=True, exist_ok=True)
-    write_loop_table(paths[0], list(_rows(loops)))
     from workflow.commands.loops_figure import write_figure
 
-    write_figure(loops, title, paths[1])
+    with locked(out):
+        folder = OutputFolder(out, "record of loops")
+        paths = folder.replace(dict.fromkeys((TABLE, FIGURE), "measured loops"), force)
+        write_loop_table(paths[0], list(_rows(loops)))
+        write_figure(loops, title, paths[1])
     return paths
 
 

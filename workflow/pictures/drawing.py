@@ -13,6 +13,7 @@ files: the doubles are in ``results.h5``.
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from functools import partial
 from itertools import islice
 from pathlib import Path
@@ -39,17 +40,19 @@ def write_pictures(
     """
     drawn = pictures, contents, folder.results
     jobs: list[tuple[Callable[..., Any], tuple[Any, ...]]] = []
-    if output.paraview:
-        jobs.append((write_paraview, (*drawn, folder.reserve("paraview", "files for ParaView"))))
-    if output.figures:
-        parts = max(processes, 1)
-        figures = folder.reserve("figures", "figures of the results")
-        jobs += [(write_figures, (*drawn, figures, part, parts)) for part in range(parts)]
-    if processes:
-        side_by_side(jobs)
-        return
-    for write, arguments in jobs:
-        write(*arguments)
+    with ExitStack() as stack:
+        if output.paraview:
+            paraview = stack.enter_context(folder.filling("paraview", "files for ParaView"))
+            jobs.append((write_paraview, (*drawn, paraview)))
+        if output.figures:
+            parts = max(processes, 1)
+            figures = stack.enter_context(folder.filling("figures", "figures of the results"))
+            jobs += [(write_figures, (*drawn, figures, part, parts)) for part in range(parts)]
+        if processes:
+            side_by_side(jobs)
+            return
+        for write, arguments in jobs:
+            write(*arguments)
 
 
 def write_paraview(

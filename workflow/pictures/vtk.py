@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import errno
+import os
 from collections.abc import Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -113,7 +115,12 @@ def _write_xml(data: Any, path: Path) -> None:
 
 def _run(writer: Any, path: Path) -> None:
     """Let a VTK writer write ``path``; raises OSError where it cannot."""
+    from vtkmodules.vtkCommonCore import vtkObject
+
+    # Said once, by us.
+    vtkObject.GlobalWarningDisplayOff()
     with replacing(path) as partial:
         writer.SetFileName(str(partial))
         if not writer.Write():
-            raise OSError(writer.GetErrorCode(), "could not be written", str(path))
+            # It does not tell why: mostly this.
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))

@@ -68,7 +68,8 @@ def _on_worker(job: Job, out: Path) -> str:
         task = worker.state.tasks.get(key)
         return task is None or task.state == "cancelled"
 
-    return run_job(job, out, unwanted)
+    # The scheduler gives a run to one worker at a time, and has seen the last one die.
+    return run_job(job, out, unwanted, take_over=True)
 
 
 def _error_of(future: Any) -> str:

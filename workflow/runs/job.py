@@ -68,7 +68,7 @@ def main() -> None:
     job = Job(arguments["name"], Path(arguments["case"]), tuple(arguments["overrides"]))
     root, error = Path(arguments["out"]) / job.name, ""
     try:
-        bring_to_end(job.load(), root)
+        bring_to_end(job.load(), root, arguments["take_over"])
     except FretscaleError as ending:
         error = str(ending)
     except Exception as ending:
@@ -89,13 +89,20 @@ def _end_with_parent() -> None:
 # --- in the process that waits ------------------------------------------------------------------
 
 
-def run_job(job: Job, out: Path, unwanted: Callable[[], bool], one_thread: bool = True) -> str:
+def run_job(
+    job: Job,
+    out: Path,
+    unwanted: Callable[[], bool],
+    one_thread: bool = True,
+    take_over: bool = False,
+) -> str:
     """Compute a job in a fresh process; the error in one line, "" if none.
 
     It is ended when it is ``unwanted``. It has a separate process group, so that Ctrl-C comes to
-    whoever waits, and only there.
+    whoever waits, and only there. For ``take_over`` see :func:`workflow.shell.lock.locked`.
     """
     arguments = asdict(job) | {"case": str(job.case.absolute()), "out": str(out.absolute())}
+    arguments["take_over"] = take_over
     # Held open as long as this process lives: its end is the end of the other.
     theirs, lifeline = os.pipe()
     try:

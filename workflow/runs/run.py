@@ -2,40 +2,39 @@
 
 from __future__ import annotations
 
-import sys
+import logging
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
 from workflow.case.changing import changed
 from workflow.case.sections import Case
 from workflow.case.writing import dump_case
-from workflow.errors import CaseError, UserError
+from workflow.errors import UNWRITTEN, CaseError, NotWritten, UserError
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import write_pictures
+from workflow.runs.provenance import case_values, provenance_of
+from workflow.shell import checkpoint
 from workflow.shell.analysis import Analysis, Run
+from workflow.shell.checkpoint import Checkpoint
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
+from workflow.shell.lock import locked
 from workflow.shell.reporter import Reporter
 
-if sys.platform != "win32":
-    import fcntl
-
-# Held while a process works in the folder: one that was cut off may still be about to end.
-LOCK = ".lock"
+# Seconds in which a process that was cut off, or whoever started it, has come to its end.
+PATIENCE = 60.0
 
 Kept = Literal["finished", "unfinished", "other", "nothing"]
 
 
 def run_case(case: Case, out: Path, force: bool) -> None:
-    """Run a case from the start into a folder, by the cheapest model if it leaves that open."""
-    analysis = analysis_of(case)
-    case, choice = analysis.choose(case)
-    analysis.memory(case).check()
-    folder = OutputFolder(out)
-    stays = folder.claim(case, force, resumable=analysis.resumable is not None)
-    folder.keep_choice(choice)
-    _run(analysis, case, folder, resume=False, stays=stays)
+    """Run a case from the start into a folder, by the cheapest model if it leaves that open.
+
+    Raises FretscaleError; UserError too where another process works in the folder.
+    """
+    with locked(out) as gone:
+        _start(case, out, force, gone)
 
 
 def resume_run(out: Path) -> bool:
@@ -45,67 +44,122 @@ def resume_run(out: Path) -> bool:
         raise UserError(f"{out}: no run of fretscale here (case.yaml is missing)")
     case = load_case(folder.case)
     if folder.summary.exists():
+        folder.check_finished(case_values(folder))
         return False
-    analysis = analysis_of(case)
-    if analysis.resumable is None:
-        raise UserError(
-            f"{out}: a case of this kind takes up no run half done; start it again with "
-            f"`fretscale run {folder.case} --out {out}`"
-        )
-    if folder.manifest is None:
-        raise UserError(
-            f"{out}: a run of an older version, which left no {MANIFEST} of its files; start it "
-            f"again with `fretscale run {folder.case} --out DIR`"
-        )
-    analysis.memory(case).check()
-    folder.clear_partial()
-    folder.reserve_state()
-    _run(analysis, case, folder, resume=True)
+    with locked(out) as gone:
+        _go_on(case, folder, gone)
     return True
 
 
-def bring_to_end(case: Case, root: Path) -> bool:
+def bring_to_end(case: Case, root: Path, take_over: bool = False) -> bool:
     """Bring a case to its end in a folder, from where that has got to; False if it was there.
 
     A finished run of the same case stays, an unfinished one goes on from its last jump if it can,
-    and what else the folder has of earlier runs gives way. Raises FretscaleError.
+    and what else the folder has of earlier runs gives way. For ``take_over`` see
+    :func:`workflow.shell.lock.locked`. Raises FretscaleError.
     """
-    _refuse_foreign(root)
-    with _locked(root):
-        kept = kept_in(root, case)
+    with locked(root, PATIENCE, take_over) as gone:
+        OutputFolder(root).refuse_foreign()
+        (kept, damaged), folder = _found(root, case), OutputFolder(root)
         if kept == "finished":
             return False
-        resumable = analysis_of(case).resumable
-        if kept == "unfinished" and resumable is not None and resumable(OutputFolder(root)):
-            resume_run(root)
+        if kept == "unfinished":
+            _go_on(load_case(folder.case), folder, gone)
         else:
-            run_case(case, root, force=True)
+            _start(case, root, True, gone, damaged)
         return True
 
 
 def kept_in(root: Path, case: Case) -> Kept:
-    """What a folder has of this case; "other" is a run of another case."""
-    folder = OutputFolder(root)
+    """What a folder has of this case; "other" is a run of another case.
+
+    A run whose files are not as it left them, or not of the same input files, is "nothing".
+    """
+    return _found(root, case)[0]
+
+
+def _found(root: Path, case: Case) -> tuple[Kept, str]:
+    """What a folder has of this case, and why that cannot be believed if there is more."""
+    folder, record, damaged = OutputFolder(root), None, ""
     if not folder.case.exists():
-        return "nothing"
+        return "nothing", ""
     finished = folder.summary.exists()
-    record = folder.read_summary().get("fidelity") if finished else folder.choice
+    try:
+        record = folder.read_summary().get("fidelity") if finished else folder.choice
+    except UserError as error:
+        damaged = str(error)
     # As a run of it was claimed, after its open settings had been chosen.
     if not _is_case(folder.case, changed(case, (record or {}).get("chosen", {}))):
-        return "other"
-    if finished:
-        return "finished"
-    listed = folder.manifest is not None and folder.checkpoint.exists()
-    return "unfinished" if listed and analysis_of(case).resumable is not None else "nothing"
+        return "other", ""
+    try:
+        if finished and not damaged:
+            folder.check_finished(case_values(folder))
+            return "finished", ""
+        listed = folder.lists_state and folder.checkpoint.exists()
+        if listed and not damaged and analysis_of(case).resumable:
+            _state(folder, case)
+            return "unfinished", ""
+    except UserError as error:
+        damaged = str(error)
+    return "nothing", damaged
+
+
+def _state(folder: OutputFolder, case: Case) -> Checkpoint | None:
+    """What an unfinished run goes on from; None if it left nothing before it was cut off."""
+    if not folder.checkpoint.exists():
+        return None
+    return checkpoint.load(folder, provenance_of(folder, case))
+
+
+def _start(case: Case, out: Path, force: bool, gone: str, damaged: str = "") -> None:
+    """Run a case from the start.
+
+    ``gone`` is what to tell of a process that was there before, ``damaged`` why its run is not
+    believed.
+    """
+    analysis = analysis_of(case)
+    case, choice = analysis.choose(case)
+    analysis.memory(case).check()
+    folder = OutputFolder(out)
+    stays = folder.claim(case, force, analysis.resumable)
+    folder.keep_choice(choice)
+    if damaged:
+        damaged = f"an earlier run is not taken: {damaged}"
+    _run(analysis, case, folder, (gone, damaged), stays=stays)
+
+
+def _go_on(case: Case, folder: OutputFolder, gone: str) -> None:
+    """Continue the run in a folder."""
+    analysis, out = analysis_of(case), folder.root
+    if not analysis.resumable:
+        raise UserError(
+            f"{out}: a case of this kind takes up no run half done; start it again with "
+            f"`fretscale run {folder.case} --out {out}`"
+        )
+    if not folder.lists_state:
+        raise UserError(
+            f"{out}: its {MANIFEST} does not list its files: damaged, or a run of an older "
+            f"version; start it again with `fretscale run {folder.case} --out DIR`"
+        )
+    kept = _state(folder, case)
+    analysis.memory(case).check()
+    folder.clear_partial()
+    folder.reserve_state()
+    new = "" if kept else "no state was kept: from the start"
+    _run(analysis, case, folder, (gone, new), resume=True, kept=kept)
 
 
 def _run(
-    analysis: Analysis, case: Case, folder: OutputFolder, resume: bool, stays: Sequence[str] = ()
+    analysis: Analysis,
+    case: Case,
+    folder: OutputFolder,
+    told: Sequence[str],
+    resume: bool = False,
+    kept: Checkpoint | None = None,
+    stays: Sequence[str] = (),
 ) -> None:
     def compute(file: Path, root: Path) -> bool:
         return bring_to_end(load_case(file), root)
-
-    reporter = Reporter(folder.reserve_log(), append=resume)
 
     def draw(contents: Any) -> None:
         with reporter.stage("paraview and figures"):
@@ -114,42 +168,63 @@ def _run(
                 write_pictures(case.output, folder, analysis.pictures, contents, processes)
 
     try:
-        if stays:
-            reporter.warn(
-                f"{', '.join(stays)}: in the folder before this run, and not of it; what has a "
-                f"name that the run needs gets {ASIDE} at its end"
+        with closing(Reporter(folder.reserve_log(), append=resume)) as reporter:
+            for line in filter(None, told):
+                reporter.say(line)
+            if stays:
+                reporter.warn(
+                    f"{', '.join(stays)}: in the folder before this run, and not of it; what has "
+                    f"a name that the run needs gets {ASIDE} at its end"
+                )
+            run = Run(
+                kind=kind_of(case),
+                case=case,
+                folder=folder,
+                reporter=reporter,
+                resume=resume,
+                kept=kept,
+                provenance=provenance_of(folder, case),
+                choice=folder.choice,
+                compute=compute,
+                draw=draw,
             )
-        run = Run(kind_of(case), case, folder, reporter, resume, folder.choice, compute, draw)
-        analysis.run(run)
+            with _told(reporter):
+                analysis.run(run)
+    except OSError as error:
+        if error.errno not in UNWRITTEN:
+            raise
+        again = f"`resume {folder.root}`" if analysis.resumable else "the same command"
+        where = error.filename or folder.root
+        raise NotWritten(f"{where}: {error.strerror}; go on with {again} once it can be") from error
+
+
+class _Telling(logging.Handler):
+    """Hands what is logged deep below to the reporter of a run."""
+
+    def __init__(self, reporter: Reporter) -> None:
+        super().__init__()
+        self._reporter = reporter
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._reporter.say(record.getMessage())
+
+
+@contextmanager
+def _told(reporter: Reporter) -> Iterator[None]:
+    """What our modules log goes to the reporter."""
+    ours, telling = logging.getLogger("workflow"), _Telling(reporter)
+    ours.addHandler(telling)
+    try:
+        yield
     finally:
-        reporter.close()
+        ours.removeHandler(telling)
 
 
 def _is_case(path: Path, case: Case) -> bool:
     """Whether the file says this case, perhaps in the words of another version."""
-    if path.read_text(encoding="utf-8") == dump_case(case):
+    if path.read_bytes() == dump_case(case).encode("utf-8"):
         return True
     try:
         return load_case(path) == case
     except CaseError:
         return False
-
-
-def _refuse_foreign(root: Path) -> None:
-    """Leave alone what no run of ours has made."""
-    if not root.exists():
-        return
-    ours = any((root / name).exists() for name in (LOCK, MANIFEST, OutputFolder(root).case.name))
-    if not root.is_dir() or (any(root.iterdir()) and not ours):
-        raise UserError(f"{root}: not empty and no run of fretscale; give another folder")
-
-
-@contextmanager
-def _locked(root: Path) -> Iterator[None]:
-    """Wait for the folder, as long as another process works in it."""
-    root.mkdir(parents=True, exist_ok=True)
-    with (root / LOCK).open("w") as file:
-        if sys.platform != "win32":
-            with suppress(OSError):  # a file system without locks
-                fcntl.flock(file, fcntl.LOCK_EX)
-        yield

@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     import h5py
     from matplotlib.figure import Figure
 
+    from workflow.shell.checkpoint import Checkpoint
     from workflow.shell.folder import OutputFolder
     from workflow.shell.reporter import Reporter
 
@@ -26,7 +27,9 @@ class Run(Generic[AnyCase]):
     """A run that an analysis is to bring to its end.
 
     ``kind`` is the name of its kind of case. It goes on from where ``folder`` has got to if it is
-    to ``resume``. ``choice`` is the record of the settings that were chosen for the case, None
+    to ``resume``, with the state in ``kept``, None where it left none before it was cut off.
+    ``provenance`` is what its numbers come from, by which its files are known again.
+    ``choice`` is the record of the settings that were chosen for the case, None
     where they stand as written. ``compute`` runs another case file into a folder, from where an
     earlier run there has got to; False if that was finished already. ``draw`` writes the pictures
     of the results that the case asks for, told what these hold.
@@ -37,6 +40,8 @@ class Run(Generic[AnyCase]):
     folder: OutputFolder
     reporter: Reporter
     resume: bool
+    kept: Checkpoint | None
+    provenance: Mapping[str, Any]
     choice: dict[str, Any] | None
     compute: Callable[[Path, Path], bool]
     draw: Callable[[Any], None]
@@ -93,8 +98,7 @@ class Analysis(Generic[AnyCase]):
     themselves how they are told apart, what they would run and on how many cores. ``memory`` is
     what a run needs before anything is meshed, ``pictures`` how its results are shown:
     figures in so many ``drawing_processes``, and the files beside them; 0: all in that of the run.
-    Of an unfinished run with a checkpoint ``resumable`` says whether it can go on from there; None
-    where runs leave none.
+    ``resumable`` are runs that leave a checkpoint to go on from (:mod:`workflow.shell.checkpoint`).
     ``choose`` gives the case with the settings that it leaves open, and a record of why.
     ``write_loads`` solves the structure of a case alone and writes the loads of its contacts into a
     folder, None where there is no structure.
@@ -106,7 +110,7 @@ class Analysis(Generic[AnyCase]):
     memory: Callable[[AnyCase], Memory]
     pictures: Callable[[], Pictures] | None = None
     drawing_processes: int = 0
-    resumable: Callable[[OutputFolder], bool] | None = None
+    resumable: bool = False
     choose: Callable[[AnyCase], tuple[AnyCase, dict[str, Any] | None]] = as_written
     comparison: Comparison[AnyCase] = Comparison()
     write_loads: Callable[[AnyCase, str, Path, bool], Sequence[str]] | None = None

@@ -1,9 +1,14 @@
-"""Condensed structures and solved cycles on disk, found again by what they were made from."""
+"""Condensed structures and solved cycles on disk, found again by what they were made from.
+
+A file that is not what was written under its key is passed over, and said to be.
+"""
 
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
+import re
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -16,10 +21,14 @@ from fe_models.joint import JointResolvent
 from fe_models.structure import FIELDS, CycleSolution, Structure
 from fe_models.symmetry import Mirror, SplitMatrix
 from sa_solver.types import Array
-from workflow.shell.store import read_arrays, write_arrays
+from workflow.shell.store import DamagedFile, read_arrays, write_arrays
+
+LOG = logging.getLogger(__name__)
 
 # Files are pruned, least recently used first, above this size; one default dovetail takes 67 MB.
 LARGEST_CACHE = 4 * 1024**3
+# Files by what is in them and the hash of what they were made from.
+NAME = re.compile(r"[a-z]+-[0-9a-f]{32}\.h5")
 SOLVERS = ("numpy", "scipy", "scikit-fem", "gmsh")
 
 
@@ -114,8 +123,11 @@ def _load(name: str) -> tuple[dict[str, Any], dict[str, Any]] | None:
     try:
         os.utime(path)
         return read_arrays(path)
+    except DamagedFile as error:
+        LOG.warning("cache: %s; computed again", error)
     except OSError:
-        return None
+        pass
+    return None
 
 
 def _save(name: str, arrays: dict[str, Array], attributes: dict[str, Any]) -> None:
@@ -129,8 +141,13 @@ def _save(name: str, arrays: dict[str, Array], attributes: dict[str, Any]) -> No
         return
 
 
+def kept_files(folder: Path) -> list[Path]:
+    """What is kept in a cache folder, and nothing that somebody else has put there."""
+    return [path for path in folder.glob("*.h5") if NAME.fullmatch(path.name)]
+
+
 def _prune(folder: Path) -> None:
-    files = sorted(folder.glob("*.h5"), key=lambda path: path.stat().st_mtime, reverse=True)
+    files = sorted(kept_files(folder), key=lambda path: path.stat().st_mtime, reverse=True)
     total = 0
     for path in files:
         total += path.stat().st_size

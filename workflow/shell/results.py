@@ -15,7 +15,7 @@ from workflow.case.sections import Case
 from workflow.case.writing import dump_case
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Datasets, unit_in
-from workflow.shell.store import replacing
+from workflow.shell.store import replacing_hdf5
 from workflow.shell.versions import versions
 
 # Datasets of more values are worth packing.
@@ -49,7 +49,7 @@ class ResultsWriter:
 @contextmanager
 def writing(path: Path, line: bool = False) -> Iterator[ResultsWriter]:
     """Write an HDF5 file, which appears once it is whole."""
-    with replacing(path) as partial, h5py.File(partial, "w") as file:
+    with replacing_hdf5(path) as stream, h5py.File(stream, "w") as file:
         yield ResultsWriter(file, line)
 
 

@@ -16,7 +16,7 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
     """
     reporter = run.reporter
     seconds = {name: round(value, 2) for name, value in reporter.seconds.items()}
-    run.folder.write_summary(
+    run.folder.finish(
         {
             "title": run.case.title,
             "assumed": list(run.case.assumed),
@@ -25,7 +25,8 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
             "warnings": reporter.warnings,
             "seconds": seconds,
             "versions": versions(),
-        }
+        },
+        run.provenance,
     )
     for line in lines:
         reporter.say(line)

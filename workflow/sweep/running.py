@@ -9,21 +9,23 @@ import os
 import re
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import closing
 from pathlib import Path
 
 from workflow.errors import CaseError, UserError
 from workflow.runs.job import Finished, Job
 from workflow.runs.jobs import run_jobs
 from workflow.runs.run import kept_in
+from workflow.shell.folder import OutputFolder
+from workflow.shell.lock import locked
 from workflow.shell.reporter import Reporter
-from workflow.shell.store import write_json, write_text
+from workflow.shell.store import write_text
 from workflow.shell.versions import versions
 from workflow.sweep.design import Run, runs_of
 from workflow.sweep.schema import Sweep, load_sweep
 from workflow.sweep.table import Row, columns_of, spread, unit_of, varied_in, write_sweep_table
 
-# A copy of the file marks the folder as that of a sweep.
-FILE, RUNS, TABLE, SUMMARY, LOG = "sweep.yaml", "runs", "sweep.csv", "summary.json", "sweep.log"
+FILE, RUNS, TABLE, LOG = "sweep.yaml", "runs", "sweep.csv", "sweep.log"
 FIGURES = "figures"
 # Lines about cases that cannot be run; the same mistake mostly is in many of them.
 MOST_LINES = 10
@@ -38,30 +40,26 @@ def run_sweep(
     UserError if ``out`` has something else, or runs of another case and ``force`` is not given.
     """
     sweep = load_sweep(path)
-    runs = runs_of(sweep)
-    _check_folder(out)
-    finished = _check_runs(sweep, runs, out / RUNS, force)
-    (out / RUNS).mkdir(parents=True, exist_ok=True)
-    write_text(out / FILE, path.read_text(encoding="utf-8"))
-    reporter = Reporter(out / LOG, append=True)
-    try:
-        reporter.say(f"sweep: {len(runs)} runs of {sweep.file.case}, {finished} finished before")
-        rows = _run(sweep, runs, out, processes, dask, reporter)
-        with reporter.stage("figures"):
-            _write_figures(sweep, rows, out)
-        _write_summary(sweep, rows, out)
-        failed = sum(not row.done for row in rows)
-        reporter.say(f"{len(rows) - failed} runs done, {failed} failed: {out / TABLE}")
-    finally:
-        reporter.close()
+    text, runs = path.read_text(encoding="utf-8"), runs_of(sweep)
+    folder = OutputFolder(out, "sweep")
+    with locked(out) as gone:
+        folder.refuse_foreign()
+        finished = _check_runs(sweep, runs, out / RUNS, force)
+        write_text(folder.reserve(FILE, "the sweep as run"), text)
+        (out / RUNS).mkdir(exist_ok=True)
+        with closing(Reporter(folder.reserve(LOG, "what it said, and when"), True)) as reporter:
+            if gone:
+                reporter.say(gone)
+            reporter.say(
+                f"sweep: {len(runs)} runs of {sweep.file.case}, {finished} finished before"
+            )
+            rows = _run(sweep, runs, folder, processes, dask, reporter)
+            with reporter.stage("figures"):
+                _write_figures(sweep, rows, folder)
+            _write_summary(sweep, rows, folder)
+            failed = sum(not row.done for row in rows)
+            reporter.say(f"{len(rows) - failed} runs done, {failed} failed: {out / TABLE}")
     return failed == 0
-
-
-def _check_folder(out: Path) -> None:
-    if out.exists() and not out.is_dir():
-        raise UserError(f"{out}: is a file; give a folder to --out")
-    if out.is_dir() and any(out.iterdir()) and not (out / FILE).exists():
-        raise UserError(f"{out}: not empty and no sweep of fretscale; give another folder")
 
 
 def _check_runs(sweep: Sweep, runs: Sequence[Run], out: Path, force: bool) -> int:
@@ -103,7 +101,7 @@ def _explained(sweep: Sweep, job: Job, text: str) -> Iterator[str]:
 def _run(
     sweep: Sweep,
     runs: Sequence[Run],
-    out: Path,
+    folder: OutputFolder,
     processes: int | None,
     dask: str | None,
     reporter: Reporter,
@@ -123,19 +121,20 @@ def _run(
         reporter.say(f"  {len(ended)}/{len(jobs)}, {spent:.0f} s: {finished.job.name}: {how}")
 
     try:
-        run_jobs(list(jobs.values()), out / RUNS, processes=processes, dask=dask, report=report)
+        out = folder.root / RUNS
+        run_jobs(list(jobs.values()), out, processes=processes, dask=dask, report=report)
     finally:
         rows = [Row(run, ended[run.name]) for run in runs if run.name in ended]
         if rows:
-            write_sweep_table(rows, out / TABLE)
+            write_sweep_table(rows, folder.reserve(TABLE, "values and results of every run"))
     return rows
 
 
-def _write_summary(sweep: Sweep, rows: list[Row], out: Path) -> None:
+def _write_summary(sweep: Sweep, rows: list[Row], folder: OutputFolder) -> None:
     columns = columns_of(rows)
     summary = {
         "title": _title(sweep, rows),
-        "case": os.path.relpath(sweep.file.case, out),
+        "case": os.path.relpath(sweep.file.case, folder.root),
         "design": sweep.file.design,
         "varied": [varied.path for varied in varied_in(rows)],
         "runs": len(rows),
@@ -148,7 +147,7 @@ def _write_summary(sweep: Sweep, rows: list[Row], out: Path) -> None:
         "seconds": round(sum(row.seconds or 0.0 for row in rows), 2),
         "versions": versions(),
     }
-    write_json(out / SUMMARY, summary)
+    folder.write_summary(summary)
 
 
 def _title(sweep: Sweep, rows: Sequence[Row]) -> str:
@@ -159,9 +158,10 @@ def _title(sweep: Sweep, rows: Sequence[Row]) -> str:
     return next((str(summary["title"]) for summary in summaries), sweep.name)
 
 
-def _write_figures(sweep: Sweep, rows: list[Row], out: Path) -> None:
+def _write_figures(sweep: Sweep, rows: list[Row], folder: OutputFolder) -> None:
     if not any(row.done for row in rows):
         return
     from workflow.sweep.figures import write_sweep_figures
 
-    write_sweep_figures(_title(sweep, rows), rows, out / FIGURES)
+    with folder.filling(FIGURES, "figures of the results") as figures:
+        write_sweep_figures(_title(sweep, rows), rows, figures)

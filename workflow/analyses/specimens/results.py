@@ -29,7 +29,7 @@ from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset, described
 from workflow.shell.reporter import Reporter
 from workflow.shell.results import ResultsWriter, run_results
-from workflow.shell.store import replacing
+from workflow.shell.store import replacing_hdf5
 from workflow.shell.summary import finish
 
 # Name of the pad's grid, and of the two shapes that a half-space is put beside.
@@ -73,11 +73,11 @@ def write_specimens_output(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -
     """Write all files of a finished run; the summary comes last and marks it as finished."""
     folder, reporter = run.folder, run.reporter
     with reporter.stage("results"):
-        reduced = folder.reserve("reduced", "reduced models of the specimens, to build rigs of")
-        reduced.mkdir(exist_ok=True)
-        for number, model in enumerate(outcome.model.reduction.models, 1):
-            with replacing(reduced / f"body_{number}.h5") as partial:
-                save_reduced(partial, model)
+        what = "reduced models of the specimens, to build rigs of"
+        with folder.filling("reduced", what) as reduced:
+            for number, model in enumerate(outcome.model.reduction.models, 1):
+                with replacing_hdf5(reduced / f"body_{number}.h5") as stream:
+                    save_reduced(stream, model)
         _write_results(outcome, run)
     run.draw(None)  # every run leaves the same
     summary = _summary(outcome, reporter)

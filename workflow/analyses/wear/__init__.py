@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.measures import COMPARISON
 from workflow.analyses.wear.structures import STRUCTURES, structure_of
 from workflow.shell.analysis import Analysis, Pictures, Run
-
-if TYPE_CHECKING:
-    from workflow.shell.folder import OutputFolder
 
 __all__ = ["ANALYSIS"]
 
@@ -22,12 +18,6 @@ def _run(run: Run[WearCase]) -> None:
     from workflow.analyses.wear.run import run_wear
 
     run_wear(run)
-
-
-def _resumable(folder: OutputFolder) -> bool:
-    from workflow.analyses.wear.checkpoint import readable
-
-    return readable(folder.checkpoint)
 
 
 def _write_loads(case: WearCase, name: str, out: Path, force: bool) -> Sequence[str]:
@@ -51,7 +41,7 @@ ANALYSIS = Analysis(
     pictures=_pictures,
     drawing_processes=2,  # ten seconds and more on one core
     memory=lambda case: structure_of(case).memory(case, 0, 0),
-    resumable=_resumable,
+    resumable=True,
     choose=lambda case: structure_of(case).choose(case),
     comparison=COMPARISON,
     write_loads=_write_loads,

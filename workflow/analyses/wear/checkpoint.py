@@ -1,9 +1,9 @@
-"""The copy on disk of the state that a wear run has between two jumps."""
+"""The state that a wear run has between two jumps, as its checkpoint has it."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import fields
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -15,7 +15,8 @@ from wear.interface import InterfaceState
 from wear.surfaces import Surfaces
 from wear.worn import Spent
 from workflow.errors import UserError
-from workflow.shell.store import read_arrays, write_arrays
+from workflow.shell.analysis import Run
+from workflow.shell.checkpoint import Checkpoint, save
 
 # What the state has of all jumps.
 HISTORIES = ("cycles", "kinetics", "drift", "solved_resultants")
@@ -25,8 +26,8 @@ ARRAYS = ("slip", "error", "ends")
 SCALARS = ("energy", "depth_rate", "volume_rate", "volume_error", "next_cycles")
 
 
-def save(path: Path, state: CoupledState) -> None:
-    """Write the state; the old file stays until the new one is whole."""
+def keep(run: Run[Any], state: CoupledState, jumps: Sequence[str]) -> None:
+    """Write the state after jumps whose files have these digests."""
     arrays: dict[str, object] = {name: getattr(state, name) for name in HISTORIES}
     for number, interface in enumerate(state.interfaces):
         group = f"interface_{number}"
@@ -41,28 +42,21 @@ def save(path: Path, state: CoupledState) -> None:
             arrays[f"{group}/starts/{increment}/displacement"] = start.displacement
     attributes = {"solutions": state.solutions, "interfaces": len(state.interfaces)}
     attributes |= vars(state.spent)
-    write_arrays(path, arrays, attributes)
+    save(run.folder, Checkpoint(arrays, attributes, jumps), run.provenance)
 
 
-def load(path: Path) -> CoupledState:
-    """Read a state; raises :class:`UserError` if the file is damaged."""
+def restored(run: Run[Any], kept: Checkpoint) -> CoupledState:
+    """The state that a run goes on from. Raises UserError for one that another version kept."""
     try:
-        return _restored(*read_arrays(path))
-    except (OSError, KeyError, TypeError, ValueError, RuntimeError) as error:
-        reason = " ".join(str(error).split())
-        raise UserError(f"{path}: damaged ({reason}): start again with `run --force`") from error
+        return _restored(kept.arrays, kept.attributes)
+    except (KeyError, TypeError, ValueError) as error:
+        folder = run.folder
+        raise UserError(
+            f"{folder.checkpoint}: of another version of fretscale (no {error}); {folder.again}"
+        ) from error
 
 
-def readable(path: Path) -> bool:
-    """Whether the state is whole."""
-    try:
-        load(path)
-    except UserError:
-        return False
-    return True
-
-
-def _restored(arrays: dict[str, Any], attributes: dict[str, Any]) -> CoupledState:
+def _restored(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> CoupledState:
     return CoupledState(
         interfaces=tuple(
             _load_interface(arrays, f"interface_{number}")
@@ -74,7 +68,7 @@ def _restored(arrays: dict[str, Any], attributes: dict[str, Any]) -> CoupledStat
     )
 
 
-def _load_interface(arrays: dict[str, Any], group: str) -> InterfaceState:
+def _load_interface(arrays: Mapping[str, Any], group: str) -> InterfaceState:
     prefix = f"{group}/starts/"
     increments = sorted(
         {int(n[len(prefix) :].split("/")[0]) for n in arrays if n.startswith(prefix)}

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import closing
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,8 @@ from workflow.analyses.wear.structures.resultants.writing import (
 from workflow.analyses.wear.warnings import warn_of_structure
 from workflow.case.writing import dump_case
 from workflow.errors import UserError
+from workflow.shell.folder import OutputFolder
+from workflow.shell.lock import locked
 from workflow.shell.reporter import Reporter
 from workflow.shell.store import write_text
 
@@ -43,14 +46,17 @@ def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list
             "to take loads from; allowed: a case with a structure of ours, such as dovetail"
         )
     structure.memory(case, 0, 0).check()
-    _claim(out, force)
-    reporter = Reporter(out / LOG)
-    try:
-        _write(case, source, out, reporter)
-    except MeshError as error:
-        raise UserError(f"{name}: structure: {error}") from error
-    finally:
-        reporter.close()
+    with locked(out) as gone:
+        folder = OutputFolder(out, "resultants")
+        folder.replace(dict.fromkeys((TABLE, FIELDS, CASE), "loads of the contacts"), force)
+        log = folder.reserve(LOG, "what was said, and when")
+        with closing(Reporter(log)) as reporter:
+            if gone:
+                reporter.say(gone)
+            try:
+                _write(case, source, out, reporter)
+            except MeshError as error:
+                raise UserError(f"{name}: structure: {error}") from error
     return [
         f"{out / TABLE}: forces, moments and energies of every interface and increment",
         f"{out / FIELDS}: the same with slip, nodes, frames and unworn gaps",
@@ -58,16 +64,6 @@ def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list
         "DIR",
         f"Columns, signs, and how other codes write them: {RECIPE}",
     ]
-
-
-def _claim(out: Path, force: bool) -> None:
-    """Make the folder; refuse to overwrite without ``force``."""
-    if out.exists() and not out.is_dir():
-        raise UserError(f"{out}: is a file; give a folder to --out")
-    there = [name for name in (TABLE, FIELDS, CASE) if (out / name).exists()]
-    if there and not force:
-        raise UserError(f"{out / there[0]}: exists; give another folder, or --force")
-    out.mkdir(parents=True, exist_ok=True)
 
 
 def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter) -> None:

@@ -52,17 +52,18 @@ class RunLog(Observer):
 class Recorder(Observer):
     """Writes the fields of every jump, and after them the state that the next one starts from.
 
-    Fields are those at ``peak`` load. A run that is ``resumed`` has those of its first state.
+    Fields are those at ``peak`` load. ``jumps`` are the digests of their files, those of the run
+    that this one goes on from to begin with.
     """
 
     run: Run[WearCase]
     settings: CoupledSettings
     peak: int
     contacts: ContactProcesses
-    resumed: bool
+    jumps: list[str]
 
     def begin(self, state: CoupledState) -> None:
-        if not self.resumed:
+        if not self.jumps:
             self.keep(state)
 
     def jumped(self, before: CoupledState, after: CoupledState) -> None:
@@ -80,8 +81,9 @@ class Recorder(Observer):
                     arrays[f"surfaces/{name}/body_{body}"] = height
                 arrays |= {f"contact/{name}/{k}": field for k, field in vars(fields).items()}
             attributes = {"cycles": float(state.cycles[-1])}
-            write_arrays(self.run.folder.jump(state.jump), arrays | loops, attributes)
-            checkpoint.save(self.run.folder.checkpoint, state)
+            path = self.run.folder.jump(state.jump)
+            self.jumps.append(write_arrays(path, arrays | loops, attributes))
+            checkpoint.keep(self.run, state, self.jumps)
 
     def _loops(self, state: CoupledState) -> dict[str, Array]:
         """Tangential loops on the present surfaces, where they are due."""

@@ -54,11 +54,10 @@ def run_wear(run: Run[WearCase]) -> None:
 
 def _compute(run: Run[WearCase]) -> Outcome:
     """The run up to its end, without its files."""
-    case, reporter, checkpoint_file = run.case, run.reporter, run.folder.checkpoint
+    case, reporter = run.case, run.reporter
     reporter.say(f"{'resume' if run.resume else 'run'}: {case.title}")
-    # Read first, so that a damaged one is told before anything is computed.
-    resumed = run.resume and checkpoint_file.exists()
-    kept = checkpoint.load(checkpoint_file) if resumed else None
+    # First, so that a state that cannot be gone on from is told before anything is computed.
+    kept = checkpoint.restored(run, run.kept) if run.kept else None
     source = structure_of(case).source(case)
     faces = meshed_faces(case, source, reporter)
     with contact_workers(case, faces) as workers:
@@ -93,7 +92,8 @@ def _march(
 ) -> tuple[CoupledState, list[FirstContact]]:
     """The state at the end, from ``kept`` or from unworn surfaces; and the first contact."""
     case, reporter, settings = run.case, run.reporter, coupled_settings(run.case)
-    recorder = Recorder(run, settings, source.peak, contacts, resumed=kept is not None)
+    jumps = list(run.kept.jumps) if run.kept else []
+    recorder = Recorder(run, settings, source.peak, contacts, jumps)
     loop = CoupledWear(settings, source, contacts, (RunLog(run, contacts.stages), recorder))
     state, first = loop.begin(unworn)
     warn_of_contact(case, source.peak, contacts.stages, state, first, reporter)

@@ -129,10 +129,7 @@ def worn_structure(
             stage.mesh, [contact.depths_of_bodies(interface) for contact, interface in pairs]
         )
         with replacing(folder.reserve("worn.msh", "the mesh with the worn faces")) as partial:
-            # gmsh goes by the ending; the name stays one that a resumed run clears away.
-            path = partial.with_name(f"{partial.name}.msh")
-            write_msh(path, mesh)
-            path.replace(partial)
+            write_msh(partial, mesh)
     with reporter.stage("stress"):
         stresses = {
             "unworn": stage.stress(stage.mesh, stage.unworn_cycle),
