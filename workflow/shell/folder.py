@@ -2,8 +2,8 @@
 
 A run asks the folder by name for every entry that it makes, and says what it is. Its manifest has
 them before they are made, but for the files in the folders that it fills, which are listed
-afterwards. A later run removes what the manifest names and nothing else, through no link; what is in
-its way is set aside.
+afterwards. A later run removes what the manifest names and nothing else, through no link; what is
+in its way is set aside.
 """
 
 from __future__ import annotations
@@ -160,7 +160,7 @@ class OutputFolder:
         that is ``resumable`` keeps in ``jumps`` what it needs until it is finished. Returns the
         names of what stays where nothing tells whose it is.
         Raises :class:`UserError` if it holds anything of another case, an unfinished run, or what
-        nothing tells whose it is, and ``force`` is not given. Without a manifest nothing is removed.
+        nothing tells whose it is, and ``force`` is not given; nothing of that is removed.
         """
         if not force:
             self._refuse_other(case)
