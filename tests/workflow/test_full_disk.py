@@ -163,7 +163,7 @@ def test_a_run_goes_on_from_any_file_that_was_not_written(share, whole, monkeypa
     with runs_here():
         with monkeypatch.context() as patch:
             patch.setattr(os, "fsync", full)
-            with pytest.raises((NotWritten, OSError), match="No space left") as raised:
+            with pytest.raises(NotWritten, match="No space left") as raised:
                 run_case(case, out, force=False)
         assert str(out) in str(raised.value)
         if (out / "checkpoint.h5").exists():
@@ -174,8 +174,8 @@ def test_a_run_goes_on_from_any_file_that_was_not_written(share, whole, monkeypa
 
 
 @posix_only
-@pytest.mark.parametrize(("size", "advice"), [(0, "many with the"), (4_000, "go on with the")])
-def test_a_limit_of_the_system_ends_a_run_in_one_line(size, advice, ball, tmp_path):
+@pytest.mark.parametrize("size", [0, 4_000])
+def test_a_limit_of_the_system_ends_a_run_in_one_line(size, ball, tmp_path):
     """Neither the lock, at first, nor then the results may grow beyond it."""
     out = tmp_path / "out"
     ending = command("run", ball, "--out", out, code=LIMITED.format(size))
@@ -183,7 +183,7 @@ def test_a_limit_of_the_system_ends_a_run_in_one_line(size, advice, ball, tmp_pa
     *said, line = [line for line in ending.stderr.splitlines() if line]
     assert line.startswith(f"fretscale: {out}/")
     assert "File too large" in line
-    assert f"{advice} same command" in line
+    assert "go on with the same command" in line
     assert said == (["run: Ball"] if size else [])
     assert not list(tmp_path.rglob(".*"))
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from contextlib import closing
+from collections.abc import Iterator, Sequence
+from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, Literal
 
@@ -29,7 +29,7 @@ def run_case(case: Case, out: Path, force: bool) -> None:
 
     Raises FretscaleError; UserError too where another process works in the folder.
     """
-    with locked(out) as gone:
+    with _working(case, out) as gone:
         _start(case, out, force, gone)
 
 
@@ -41,7 +41,7 @@ def resume_run(out: Path) -> bool:
     case = load_case(folder.case)
     if folder.summary.exists():
         return False
-    with locked(out) as gone:
+    with _working(case, out) as gone:
         _go_on(case, folder, gone)
     return True
 
@@ -53,7 +53,7 @@ def bring_to_end(case: Case, root: Path, take_over: bool = False) -> bool:
     and what else the folder has of earlier runs gives way. For ``take_over`` see
     :func:`workflow.shell.lock.locked`. Raises FretscaleError.
     """
-    with locked(root, PATIENCE, take_over) as gone:
+    with _working(case, root, PATIENCE, take_over) as gone:
         OutputFolder(root).refuse_foreign()
         kept = kept_in(root, case)
         if kept == "finished":
@@ -80,6 +80,27 @@ def kept_in(root: Path, case: Case) -> Kept:
         return "finished"
     listed = folder.manifest is not None and folder.checkpoint.exists()
     return "unfinished" if listed and analysis_of(case).resumable is not None else "nothing"
+
+
+@contextmanager
+def _working(
+    case: Case, out: Path, patience: float = 0.0, take_over: bool = False
+) -> Iterator[str]:
+    """Hold the folder of a run (see :func:`workflow.shell.lock.locked`).
+
+    Raises NotWritten where the disk is full, with what goes on from there.
+    """
+    try:
+        with locked(out, patience, take_over) as gone:
+            yield gone
+    except OSError as error:
+        if error.errno not in UNWRITTEN:
+            raise
+        again = "the same command"
+        if analysis_of(case).resumable is not None and OutputFolder(out).case.exists():
+            again = f"`resume {out}`"
+        where = error.filename or out
+        raise NotWritten(f"{where}: {error.strerror}; go on with {again} once it can be") from error
 
 
 def _start(case: Case, out: Path, force: bool, gone: str) -> None:
@@ -129,23 +150,16 @@ def _run(
                 processes = analysis.drawing_processes
                 write_pictures(case.output, folder, analysis.pictures, contents, processes)
 
-    try:
-        with closing(Reporter(folder.reserve_log(), append=resume)) as reporter:
-            if gone:
-                reporter.say(gone)
-            if stays:
-                reporter.warn(
-                    f"{', '.join(stays)}: in the folder before this run, and not of it; what has "
-                    f"a name that the run needs gets {ASIDE} at its end"
-                )
-            run = Run(kind_of(case), case, folder, reporter, resume, folder.choice, compute, draw)
-            analysis.run(run)
-    except OSError as error:
-        if error.errno not in UNWRITTEN:
-            raise
-        again = "the same command" if analysis.resumable is None else f"`resume {folder.root}`"
-        where = error.filename or folder.root
-        raise NotWritten(f"{where}: {error.strerror}; go on with {again} once it can be") from error
+    with closing(Reporter(folder.reserve_log(), append=resume)) as reporter:
+        if gone:
+            reporter.say(gone)
+        if stays:
+            reporter.warn(
+                f"{', '.join(stays)}: in the folder before this run, and not of it; what has a "
+                f"name that the run needs gets {ASIDE} at its end"
+            )
+        run = Run(kind_of(case), case, folder, reporter, resume, folder.choice, compute, draw)
+        analysis.run(run)
 
 
 def _is_case(path: Path, case: Case) -> bool:
