@@ -251,5 +251,5 @@ def write_msh(path: Path, structure: StructureMesh) -> None:
         gmsh.write(str(path))
     with path.open("rb") as file:
         file.seek(max(0, path.stat().st_size - len(MSH_END)))
-        if file.read() != MSH_END:
+        if file.read(len(MSH_END)) != MSH_END:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC), str(path))

@@ -69,8 +69,10 @@ def _ending(error: Exception) -> tuple[str, int]:
     if isinstance(error, FretscaleError):
         return str(error), errors.exit_code(error)
     if isinstance(error, OSError) and error.errno in errors.UNWRITTEN:
-        said = f"{error.filename or 'output'}: {error.strerror}; {ADVICE}"
-        return said, errors.NotWritten.exit_code
+        written = f"output: {error.strerror}"
+        if error.filename is not None:
+            written = f"{error.filename}: {error.strerror}; {ADVICE}"
+        return written, errors.NotWritten.exit_code
     from workflow.shell.system_check import remedy
 
     if missing := remedy(error):

@@ -66,3 +66,16 @@ def test_written_file_is_read_back(coarse_mesh, tmp_path):
             assert dimension == 2
             tags = read.cell_data_dict["gmsh:physical"]["triangle"]
             assert np.sum(tags == tag) == len(body.facets(boundary))
+
+
+@pytest.mark.parametrize("size", [0, 5_000])
+def test_a_file_that_cannot_be_written_to_its_end_is_an_error(coarse_mesh, size, tmp_path):
+    """gmsh does not look whether what it writes arrives."""
+    resource = pytest.importorskip("resource")
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (size, before[1]))
+    try:
+        with pytest.raises(OSError, match="No space left"):
+            write_msh(tmp_path / "structure.msh", coarse_mesh)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)

@@ -33,7 +33,7 @@ def run_case(case: Case, out: Path, force: bool) -> None:
 
     Raises FretscaleError; UserError too where another process works in the folder.
     """
-    with locked(out) as gone:
+    with _working(case, out) as gone:
         _start(case, out, force, gone)
 
 
@@ -46,7 +46,7 @@ def resume_run(out: Path) -> bool:
     if folder.summary.exists():
         folder.check_finished(case_values(folder))
         return False
-    with locked(out) as gone:
+    with _working(case, out) as gone:
         _go_on(case, folder, gone)
     return True
 
@@ -58,7 +58,7 @@ def bring_to_end(case: Case, root: Path, take_over: bool = False) -> bool:
     and what else the folder has of earlier runs gives way. For ``take_over`` see
     :func:`workflow.shell.lock.locked`. Raises FretscaleError.
     """
-    with locked(root, PATIENCE, take_over) as gone:
+    with _working(case, root, PATIENCE, take_over) as gone:
         OutputFolder(root).refuse_foreign()
         (kept, damaged), folder = _found(root, case), OutputFolder(root)
         if kept == "finished":
@@ -109,6 +109,27 @@ def _state(folder: OutputFolder, case: Case) -> Checkpoint | None:
     if not folder.checkpoint.exists():
         return None
     return checkpoint.load(folder, provenance_of(folder, case))
+
+
+@contextmanager
+def _working(
+    case: Case, out: Path, patience: float = 0.0, take_over: bool = False
+) -> Iterator[str]:
+    """Hold the folder of a run (see :func:`workflow.shell.lock.locked`).
+
+    Raises NotWritten where the disk is full, with what goes on from there.
+    """
+    try:
+        with locked(out, patience, take_over) as gone:
+            yield gone
+    except OSError as error:
+        if error.errno not in UNWRITTEN:
+            raise
+        again = "the same command"
+        if analysis_of(case).resumable and OutputFolder(out).case.exists():
+            again = f"`resume {out}`"
+        where = error.filename or out
+        raise NotWritten(f"{where}: {error.strerror}; go on with {again} once it can be") from error
 
 
 def _start(case: Case, out: Path, force: bool, gone: str, damaged: str = "") -> None:
@@ -167,35 +188,28 @@ def _run(
                 processes = analysis.drawing_processes
                 write_pictures(case.output, folder, analysis.pictures, contents, processes)
 
-    try:
-        with closing(Reporter(folder.reserve_log(), append=resume)) as reporter:
-            for line in filter(None, told):
-                reporter.say(line)
-            if stays:
-                reporter.warn(
-                    f"{', '.join(stays)}: in the folder before this run, and not of it; what has "
-                    f"a name that the run needs gets {ASIDE} at its end"
-                )
-            run = Run(
-                kind=kind_of(case),
-                case=case,
-                folder=folder,
-                reporter=reporter,
-                resume=resume,
-                kept=kept,
-                provenance=provenance_of(folder, case),
-                choice=folder.choice,
-                compute=compute,
-                draw=draw,
+    with closing(Reporter(folder.reserve_log(), append=resume)) as reporter:
+        for line in filter(None, told):
+            reporter.say(line)
+        if stays:
+            reporter.warn(
+                f"{', '.join(stays)}: in the folder before this run, and not of it; what has a "
+                f"name that the run needs gets {ASIDE} at its end"
             )
-            with _told(reporter):
-                analysis.run(run)
-    except OSError as error:
-        if error.errno not in UNWRITTEN:
-            raise
-        again = f"`resume {folder.root}`" if analysis.resumable else "the same command"
-        where = error.filename or folder.root
-        raise NotWritten(f"{where}: {error.strerror}; go on with {again} once it can be") from error
+        run = Run(
+            kind=kind_of(case),
+            case=case,
+            folder=folder,
+            reporter=reporter,
+            resume=resume,
+            kept=kept,
+            provenance=provenance_of(folder, case),
+            choice=folder.choice,
+            compute=compute,
+            draw=draw,
+        )
+        with _told(reporter):
+            analysis.run(run)
 
 
 class _Telling(logging.Handler):

@@ -204,8 +204,7 @@ class OutputFolder:
         that is ``resumable`` keeps in ``jumps`` what it needs until it is finished. Returns the
         names of what stays where nothing tells whose it is.
         Raises :class:`UserError` if it holds anything of another case, an unfinished run, or what
-        nothing tells whose it is, and ``force`` is not given. Without a manifest nothing is
-        removed.
+        nothing tells whose it is, and ``force`` is not given; nothing of that is removed.
         """
         if not force:
             self._refuse_other(case)

@@ -39,7 +39,6 @@ def locked(root: Path, patience: float = 0.0, take_over: bool = False) -> Iterat
     if root.exists() and not root.is_dir():
         raise UserError(f"{root}: is a file; give a folder to --out")
     fresh = not root.exists()
-    root.mkdir(parents=True, exist_ok=True)
     path = root / LOCK
     file, alone = _opened(path, patience)
     try:
@@ -66,7 +65,11 @@ def _opened(path: Path, patience: float) -> tuple[int, bool]:
     """The lock file, open, and whether the system says that no other process has it."""
     end = time.monotonic() + patience
     while True:
-        file = os.open(path, FLAGS, 0o666)
+        path.parent.mkdir(parents=True, exist_ok=True)
+        try:
+            file = os.open(path, FLAGS, 0o666)
+        except FileNotFoundError:  # its last holder has just removed the folder, left empty
+            continue
         try:
             if sys.platform != "win32":
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
