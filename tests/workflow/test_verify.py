@@ -84,7 +84,7 @@ def test_table_has_the_units_of_the_case_and_the_kind_of_each_value(
     def run_case(case, out, force):
         out.mkdir(parents=True)
         summary = {"length": 0.0121, "share": 0.5, "nothing": 4e-4, "sign": -1.0}
-        OutputFolder(out).write_summary(summary)
+        OutputFolder(out).finish(summary, UNTIED)
 
     monkeypatch.setattr(verification, "run_case", run_case)
     text = small_path.read_text("utf-8")
@@ -108,7 +108,7 @@ def test_every_case_says_what_it_expects():
 def test_case_is_named_that_expects_what_is_not_computed(small_path, tmp_path, monkeypatch):
     def run_case(case, out, force):
         out.mkdir(parents=True)
-        OutputFolder(out).write_summary({})
+        OutputFolder(out).finish({}, UNTIED)
 
     monkeypatch.setattr(verification, "run_case", run_case)
     with pytest.raises(UserError, match=r"\.yaml: expect: no quantity "):
