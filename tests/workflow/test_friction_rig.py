@@ -60,6 +60,7 @@ def files(tmp_path):
     return tmp_path
 
 
+@pytest.mark.slow
 def test_the_rig_sticks_under_a_small_force_and_slides_under_a_large_one(files):
     summary = run(files, RIG, "loops={frequency: 100 Hz, harmonics: [3, 8]}")
     (warning,) = summary["warnings"]

@@ -221,6 +221,7 @@ def test_a_pipe_that_nobody_reads_is_one_line(arguments):
     assert ending.stderr == "fretscale: output: Broken pipe\n"
 
 
+@pytest.mark.slow
 @posix_only
 def test_a_run_that_nobody_listens_to_ends_and_is_repeated(ball, tmp_path):
     read, write = os.pipe()

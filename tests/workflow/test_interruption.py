@@ -248,6 +248,7 @@ def test_state_of_another_case_is_not_taken(interrupted, start, resume, tmp_path
     assert f"{interrupted.folder}/case.yaml: friction.coefficient: 0.4, but 0.45 when" in line
 
 
+@pytest.mark.slow
 def test_what_no_number_depends_on_may_change(interrupted, resume, whole):
     edit(interrupted.folder / "case.yaml", "title: ", "title: Another one # ")
     edit(interrupted.folder / "case.yaml", "figures: false", "figures: true")
@@ -257,6 +258,7 @@ def test_what_no_number_depends_on_may_change(interrupted, resume, whole):
     assert (run.folder / "figures").is_dir()
 
 
+@pytest.mark.slow
 def test_run_whose_state_is_gone_begins_anew_and_says_so(interrupted, resume, whole):
     (interrupted.folder / "checkpoint.h5").unlink()
     run = resume(interrupted.folder)
