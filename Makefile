@@ -22,8 +22,9 @@ test: $(TESTABLE)
 	@$(MAKE) --no-print-directory lint
 	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 --dist worksteal
 
-test-full: lint
-	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 --dist worksteal -m "slow or not slow"
+test-full: test
+	@echo 'fretscale: the tests of more than a few seconds: about 13 minutes on two cores.'
+	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 --dist worksteal -m slow
 
 lint: $(TESTABLE)
 	$(BIN)/ruff check .
