@@ -60,7 +60,7 @@ def bring_to_end(case: Case, root: Path, take_over: bool = False) -> bool:
     """
     with _working(case, root, PATIENCE, take_over) as gone:
         OutputFolder(root).refuse_foreign()
-        (kept, damaged), folder = _found(root, case), OutputFolder(root)
+        (kept, damaged), folder = _kept_and_damaged(root, case), OutputFolder(root)
         if kept == "finished":
             return False
         if kept == "unfinished":
@@ -75,10 +75,10 @@ def kept_in(root: Path, case: Case) -> Kept:
 
     A run whose files are not as it left them, or not of the same input files, is "nothing".
     """
-    return _found(root, case)[0]
+    return _kept_and_damaged(root, case)[0]
 
 
-def _found(root: Path, case: Case) -> tuple[Kept, str]:
+def _kept_and_damaged(root: Path, case: Case) -> tuple[Kept, str]:
     """What a folder has of this case, and why that cannot be believed if there is more."""
     folder, record, damaged = OutputFolder(root), None, ""
     if not folder.case.exists():

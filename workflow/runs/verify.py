@@ -40,15 +40,15 @@ def verify_cases(cases: tuple[Path, ...], out: Path) -> bool:
                 computed = required_number(summary, entry.quantity)
             except QuantityError as wrong:
                 raise UserError(f"{path}: expect: {wrong}") from wrong
-            (value, unit), (found, _) = (
+            (value, unit), (computed_value, _) = (
                 in_unit_of(entry.value, number) for number in (entry.value, computed)
             )
-            error = abs(found - value) / (abs(value) or 1.0)
+            error = abs(computed_value - value) / (abs(value) or 1.0)
             met = error <= entry.tolerance
             met_all &= met
             row = (
                 f"{value:.6g}",
-                f"{found:.6g}",
+                f"{computed_value:.6g}",
                 unit or "-",
                 f"{error:.2%}" if value else f"{error:.1e}",
                 "met" if met else "MISSED",

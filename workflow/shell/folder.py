@@ -151,8 +151,8 @@ class OutputFolder:
         These are the values of the case, the files that it names, what the run wrote, the summary.
         """
         names = (self.manifest or {}).keys() - set(NOT_DIGESTED)
-        own = [path for path in sorted(self.root.iterdir()) if path.name in names]
-        written = {path.name: file_digest(path) for path in own if path.is_file()}
+        paths = [path for path in sorted(self.root.iterdir()) if path.name in names]
+        written = {path.name: file_digest(path) for path in paths if path.is_file()}
         case = {"case.yaml": json_digest(provenance["case"])}
         digests = case | provenance["input_files"] | written
         content = {**summary, DIGESTS: digests}

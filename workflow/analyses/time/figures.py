@@ -216,8 +216,8 @@ def ring_down(file: h5py.File, contents: Contents) -> Figure:
     left, right = bottom.subplots(1, 2)
     for label, colour, moved in shown:
         stuck, envelope = float(moved.parent.attrs["stuck"][0]), moved.parent.get(RING_DOWN)
-        found = "" if envelope else ", no ring-down"
-        _draw_history(history, moved, colour, f"{label}: stuck {stuck:.4g} Hz{found}")
+        missing = "" if envelope else ", no ring-down"
+        _draw_history(history, moved, colour, f"{label}: stuck {stuck:.4g} Hz{missing}")
         if not envelope:
             continue
         amplitude = TO_MICRONS * envelope["amplitude"][()]
