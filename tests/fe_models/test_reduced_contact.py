@@ -13,26 +13,16 @@ from fe_models.constraints import Constraints
 from fe_models.geometry.specimens import Specimen
 from fe_models.mesh import Face
 from fe_models.reduced_contact import FrettingConditions, ReducedPair, masing_loop
-from fe_models.specimens import pad_stiffness, reduced_specimens
 from sa_solver.influence import rectangle_influence
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Frame, Material
-
-STEEL = Material(200e3, 0.3, 7.8e-9)
-FRICTION, STROKE = 0.88, 14e-3
-# Depth per energy: 1500 µm³/J, the slope of the rig's tests.
-ALPHA = 1.5e-9
-# A share of the solver's rounding and of its exchange of nodes.
-SOLVER = 1e-9
+from tests.reduced_pads import ALPHA, FRICTION, SOLVER, STROKE, coarse_pads, pad_stiffnesses
 
 
 @pytest.fixture(scope="module")
 def specimens():
-    """A coarse pair: pad stiffness of both bodies, the pad and its curved gap."""
-    specimen = Specimen(pad_elements=6, radii=(1000.0, 50.0))
-    mesh = specimen.mesh(2.0)
-    models = reduced_specimens(specimen, mesh, (STEEL, STEEL), modes=0)
-    return mesh.interfaces[0], [pad_stiffness(model, specimen) for model in models]
+    """A coarse pair: the pad with its curved gap, the stiffness of both bodies there."""
+    return coarse_pads()
 
 
 @pytest.fixture(scope="module")
@@ -346,8 +336,7 @@ class TestRig:
             with pytest.MonkeyPatch.context() as patch:
                 if not tied:
                     patch.setattr(Constraints, "average", but_the_ring)
-                models = reduced_specimens(specimen, mesh, (STEEL, STEEL), 2, modes=0)
-            pads = [pad_stiffness(model, specimen) for model in models]
+                pads = pad_stiffnesses(specimen, mesh)
             pairs[tied] = ReducedPair.from_stiffness(mesh.interfaces[0], *pads)
         return pairs
 

@@ -5,8 +5,7 @@ import pytest
 
 from fe_models.geometry.specimens import Specimen
 from fe_models.reduced_contact import FrettingConditions, ReducedPair
-from fe_models.specimens import pad_stiffness, reduced_specimens
-from sa_solver.types import Material
+from tests.reduced_pads import ALPHA, FRICTION, SOLVER, STROKE, coarse_pads, pad_stiffnesses
 from wear.laws import EnergyLaw
 from wear.nodes import NodalState
 from wear.steppers import ExplicitStepper, StabilityError, rest
@@ -15,22 +14,12 @@ from workflow.analyses.specimens.wear import FrettedPair, wear_in_cycle_blocks
 from workflow.errors import CaseError
 from workflow.kinds import load_case
 
-STEEL = Material(200e3, 0.3, 7.8e-9)
-FRICTION, STROKE = 0.88, 14e-3
-# Depth per energy: 1500 µm³/J, the slope of the rig's tests.
-ALPHA = 1.5e-9
-# A share of the solver's rounding and of its exchange of nodes.
-SOLVER = 1e-9
-
 
 @pytest.fixture(scope="module")
 def pair():
     """A coarse pair of crossed strips."""
-    specimen = Specimen(pad_elements=6, radii=(1000.0, 50.0))
-    mesh = specimen.mesh(2.0)
-    models = reduced_specimens(specimen, mesh, (STEEL, STEEL), modes=0)
-    pads = [pad_stiffness(model, specimen) for model in models]
-    return ReducedPair.from_stiffness(mesh.interfaces[0], *pads)
+    face, pads = coarse_pads()
+    return ReducedPair.from_stiffness(face, *pads)
 
 
 @pytest.fixture(scope="module")
@@ -220,9 +209,7 @@ class TestRig:
     def rig():
         specimen = Specimen(radii=(1000.0, 50.0))
         mesh = specimen.mesh()
-        models = reduced_specimens(specimen, mesh, (STEEL, STEEL), 2, modes=0)
-        pads = [pad_stiffness(model, specimen) for model in models]
-        return ReducedPair.from_stiffness(mesh.interfaces[0], *pads)
+        return ReducedPair.from_stiffness(mesh.interfaces[0], *pad_stiffnesses(specimen, mesh))
 
     def test_flat_pads(self, rig):
         """Even pressure within some 1e4 cycles; the secant falls, since edges slip earlier."""
