@@ -45,13 +45,15 @@ class Preconditioned(Protocol):
 def solve_alone(
     jacobian: Array | LinearMap, rhs: Array, tolerance: float = GMRES_TOLERANCE
 ) -> Array:
-    """x of J x = b, ``(n,)``; by products it leaves the share ``tolerance`` of b.
+    """x of J x = b, ``(n,)`` or ``(n, r)``; by products it leaves the share ``tolerance`` of b.
 
     A singular J has its smallest least squares. Raises ``numpy.linalg.LinAlgError`` where numbers
     are not finite.
     """
     if isinstance(jacobian, np.ndarray):
         return _Factors(jacobian).solve(rhs)
+    if rhs.ndim == 2:
+        return np.stack([solve_alone(jacobian, side, tolerance) for side in rhs.T], axis=1)
     preconditioner = jacobian.precondition if isinstance(jacobian, Preconditioned) else None
     solution = _iteratively(lambda vector: jacobian @ vector, preconditioner, rhs, tolerance)
     return _Factors(jacobian.assembled()).solve(rhs) if solution is None else solution

@@ -20,7 +20,7 @@ from fe_models.dynamics.harmonic_balance import (
     Balance,
     HarmonicBalance,
 )
-from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from fe_models.dynamics.harmonic_solution import HarmonicSolution, ResolutionError
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.newton import Equations, solve
 from fe_models.dynamics.resolution_error import resolution_error
@@ -143,10 +143,11 @@ class _Recorder:
             iterations=point.iterations,
         )
         if self._accuracy is not None:
-            solution = replace(solution, error=resolution_error(self.problem, solution))
-            finer = finer_resolution(self.problem, solution, self._accuracy)
+            error = resolution_error(self.problem, solution)
+            finer = finer_resolution(self.problem.resolution, error, self._accuracy)
             if finer is not None:
                 return self._refine(finer)
+            solution = replace(solution, error=error)
         self.solutions.append(solution)
         return None
 
@@ -161,15 +162,13 @@ class _Recorder:
 
 
 def finer_resolution(
-    problem: HarmonicBalance, solution: HarmonicSolution, accuracy: Accuracy
+    present: Resolution, error: ResolutionError, accuracy: Accuracy
 ) -> Resolution | None:
-    """The resolution that a solution asks for, None if its own will do or is the finest allowed.
+    """The resolution that an error asks for, None if the present will do or is the finest allowed.
 
-    The solution knows its error. The harmonics that cause most of it are added.
+    The harmonics that cause most of the error are added.
     """
-    present, tolerance, error = problem.resolution, accuracy.tolerance, solution.error
-    assert error is not None
-    harmonics, samples = present.harmonics, present.samples
+    tolerance, harmonics, samples = accuracy.tolerance, present.harmonics, present.samples
     if error.largest > tolerance:
         parts = error.harmonics[: accuracy.highest + 1]
         order = np.argsort(parts)

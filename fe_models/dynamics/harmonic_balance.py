@@ -216,7 +216,6 @@ class HarmonicBalance:
     ) -> HarmonicSolution:
         """The motion with these unknowns."""
         coefficients, record = self.transfer.shaped(unknowns), CycleRecord.of(at.cycle)
-        shares = self.left_out(coefficients, record, frequency)
         return HarmonicSolution(
             frequency=frequency,
             force=force,
@@ -226,7 +225,7 @@ class HarmonicBalance:
             cycle=record,
             iterations=0,
             residual=at.relative,
-            left_out=float(np.linalg.norm(shares)),
+            shares=self.left_out(coefficients, record, frequency),
             error=None,
             message="",
         )

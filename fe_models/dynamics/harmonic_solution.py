@@ -40,9 +40,9 @@ class HarmonicSolution:
     ``cycle`` what the joints do, ``iterations`` and ``residual`` of Newton's method. ``message`` is
     empty, or says why this is not a solution.
 
-    ``left_out`` is the share of the joints' vibration that their forces would cause in other
-    harmonics than those of the ``resolution``, as if those would not change for it; ``error``, what
-    a richer resolution would change, is None if not asked for.
+    ``shares`` ``(k + 1,)`` of the joints' vibration are what their forces would cause in each
+    harmonic 0, 1, 2, ... left out, as if those of the ``resolution`` would not change for it;
+    ``error``, what a richer resolution would change, is None if not asked for.
     """
 
     frequency: float
@@ -53,9 +53,14 @@ class HarmonicSolution:
     cycle: CycleRecord
     iterations: int
     residual: float
-    left_out: float
+    shares: Array
     error: ResolutionError | None
     message: str
+
+    @property
+    def left_out(self) -> float:
+        """Of all harmonics left out together."""
+        return float(np.linalg.norm(self.shares))
 
     @property
     def converged(self) -> bool:

@@ -273,10 +273,11 @@ class _Recorder:
         problem = self.equations.problem
         solution = problem.describe(point.unknowns[:-1], at.balance, at.frequency, point.parameter)
         if self._accuracy is not None:
-            solution = replace(solution, error=resolution_error(problem, solution))
-            finer = finer_resolution(problem, solution, self._accuracy)
+            error = resolution_error(problem, solution)
+            finer = finer_resolution(problem.resolution, error, self._accuracy)
             if finer is not None:
                 return self._refine(finer)
+            solution = replace(solution, error=error)
         self.solutions.append(replace(solution, iterations=point.iterations, residual=at.relative))
         return None
 

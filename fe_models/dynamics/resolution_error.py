@@ -36,8 +36,7 @@ def resolution_error(problem: HarmonicBalance, solution: HarmonicSolution) -> Re
     vibration = problem.vibration(solution.coefficients)
     if vibration == 0.0:
         return ResolutionError(0.0, 0.0, np.zeros(1), 0.0)
-    shares = problem.left_out(solution.coefficients, solution.cycle, solution.frequency)
-    richer = problem.richer(set(np.flatnonzero(shares > LOOKED_AT).tolist()))
+    richer = problem.richer(set(np.flatnonzero(solution.shares > LOOKED_AT).tolist()))
     coefficients = richer.resolution.adopt(solution.coefficients, problem.resolution)
     at = richer.evaluate(coefficients.ravel(), solution.frequency, solution.force, "frequency")
     change, share, distance = _step(richer, at, solution.frequency, vibration)
@@ -71,8 +70,8 @@ def _step(
     Along the curve the unknowns u change by the slope with the frequency. Of all u' + slope s the
     one is taken with the least |u' + slope s|² + (STEEPEST s)², in shares.
     """
-    change = solve_alone(at.jacobian, -at.residual, LINEAR_TOLERANCE)
-    slope = solve_alone(at.jacobian, -frequency * at.slope, LINEAR_TOLERANCE)
+    sides = -np.stack([at.residual, frequency * at.slope], axis=1)
+    change, slope = solve_alone(at.jacobian, sides, LINEAR_TOLERANCE).T
     moved, along = (richer.vibrating(rows) / vibration for rows in (change, slope))
     share = -float(moved @ along) / (float(along @ along) + STEEPEST**2)
     size = float(np.hypot(np.linalg.norm(moved + share * along), STEEPEST * share))

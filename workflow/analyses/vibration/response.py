@@ -347,8 +347,9 @@ def _accurate(
 ) -> tuple[HarmonicBalance, HarmonicSolution]:
     """The motion with its error; as accurate as asked for, if that is asked for."""
     while True:
-        motion = replace(motion, error=resolution_error(problem, motion))
-        finer = finer_resolution(problem, motion, accuracy) if accuracy is not None else None
+        error = resolution_error(problem, motion)
+        motion, present = replace(motion, error=error), problem.resolution
+        finer = finer_resolution(present, error, accuracy) if accuracy is not None else None
         if finer is None:
             return problem, motion
         refined = problem.refined(finer)
