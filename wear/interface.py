@@ -249,6 +249,8 @@ class InterfaceContact:
 
     def follow(self, state: InterfaceState, history: FaceLoads) -> InterfaceState:
         """The state under the loads of a new solution. Raises :class:`MotionError`."""
+        if isinstance(state.coarse, InterfaceState):
+            state = replace(state, coarse=self.follow(state.coarse, history))
         starts = {t: start for t, start in state.starts.items() if history.loads.P[t] > 0.0}
         state = replace(state, loads=history.loads, slip=history.slip, starts=starts)
         if self.settings.method == "full":

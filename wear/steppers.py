@@ -6,21 +6,15 @@ only what a cycle takes off: cells of a half-space or nodes of a structure (:mod
 Implicit steps and those of second order solve a half-space contact on the way, and are as long as
 the caller says or as an error estimate allows.
 
-An implicit step errs by what it wears more than ½ ΔN (r₀ + r₁), r being the depth per cycle at the
-pressures (and slips) of its two ends. What came before and what it adds are both pressed away in
-part by wear itself, the short waves first: see
-:meth:`wear.stepping.WearingContact.damped_errors` and Shampine & Baca 1984,
-doi:10.1007/BF01934907. So the estimated error of the depth is carried from
-step to step. In root mean square it came within 50 % of the true one where that was 0.3 % or more
-of the depth, on two rounded flats under three and nine loads (without damping it was ten times too
-large); in long runs of short steps it was up to three times too small, six where flanks carry
-unevenly, since edges that are pressed part of the time are damped less. Steps of second order are
-measured by a quarter of the error of a first-order step between the same ends, and by what their
-second pass with other slips has changed.
+What a step of these leaves is told by a companion: the same run, under the same loads, by steps of
+twice the length. It goes its own way from the first cycle to the last, so that whatever wear does
+to an error, pressing it away or letting it grow, it does to the difference of the two: global
+extrapolation (Shampine & Watts 1976, doi:10.1145/355666.355671). Of steps of order p that is
+2^p - 1 times the error of the shorter ones. It takes half as many contact problems again.
 
 Errors count by their root mean square over the worn cells: the few at a moving contact edge are
 worn by jumps however short the steps, and say little about depth or volume. The volume counts for
-itself, undamped: where slip follows from wear, as in partial slip, no pressure corrects it.
+itself: where slip follows from wear, as in partial slip, no pressure corrects it.
 """
 
 from __future__ import annotations
@@ -48,9 +42,13 @@ SHORTEST = 0.01
 """Steps so short, over the explicit limit, are not tried again: something other than their length
 is wrong."""
 
-LEAST_ROOM = 0.1
-"""Share of the tolerance that a step may always fill: errors carried along die out by themselves,
-or more slowly than steps without length would ever show."""
+EARLY = 0.3
+"""Share of the error at the end of a run that it may have at once: much of what the first steps
+miss, while the contact grows fastest, is pressed away later."""
+
+MOVING = 1.5
+"""What the order of steps of second order comes to where surfaces move over each other: between the
+second that they have at rest and the first of very short ones (:mod:`wear.stepping`)."""
 
 ROUNDING = 1e-9
 """Steps that add up to the cycles asked for but for this share leave none over."""
@@ -256,59 +254,66 @@ def root_mean_square(field: Array, depth: Array) -> float:
 
 
 ContactAt = Callable[[WearState], WearingContact]
-Attempt = tuple[WearStep[WearState], Array]
 
 
 @dataclass(frozen=True)
 class _HalfSpaceStepper(ABC):
-    """Steps of a half-space contact: as long as asked for, or as ``control`` lets them be."""
+    """Steps of a half-space contact: as long as asked for, or as ``control`` lets them be.
+
+    Each is taken in two halves, and as a whole by the companion of the state.
+    """
 
     control: ErrorControl | None = None
 
     @abstractmethod
-    def _attempt(
+    def _advance(
         self, state: WearState, cycles: float, contact: WearingContact, contact_at: ContactAt
-    ) -> Attempt:
-        """A step of so many cycles from ``state``, whose contact is given, and its own error.
+    ) -> WearStep[WearState]:
+        """So many cycles at once from ``state``, whose contact is given."""
 
-        That is what it adds to the error of the depth ``(nx, ny)`` [mm], undamped.
-        """
+    @abstractmethod
+    def _order(self, contact: WearingContact) -> float:
+        """Of the error in the length of the steps."""
 
     def step(
         self, state: WearState, most: float, left: float, contact_at: ContactAt
     ) -> WearStep[WearState]:
-        """A step with the error of the depth after it, tried again until ``control`` agrees."""
-        contact, control = contact_at(state), self.control
+        """A step, tried again until ``control`` agrees with its error."""
+        contact, control, companion = contact_at(state), self.control, state.companion
+        with_companion = contact if companion is state else contact_at(companion)
+        order = self._order(contact)
 
         def trial(cycles: float) -> _Trial[WearState]:
-            step, raw = self._attempt(state, cycles, contact, contact_at)
-            shortest = _shortest(min(contact.stable_cycles(end) for end in (state, step.state)))
-            carried, added = contact.damped_errors([state.error, raw], state, cycles)
+            half = 0.5 * cycles
+            first = self._advance(state, half, contact, contact_at)
+            second = self._advance(first.state, half, contact_at(first.state), contact_at)
+            whole = self._advance(companion, cycles, with_companion, contact_at)
+            after = replace(second.state, coarse=whole.state, order=order)
+            shortest = 2.0 * _shortest(min(contact.stable_cycles(end) for end in (state, after)))
             fits, proposed = True, cycles
             if control is not None:
-                fits, change = _judged(control, state, step, left, carried, added, raw)
+                fits, change = _judged(control, state, after, max(left / cycles, 1.0))
                 proposed = max(cycles * float(np.clip(change, SHRINKAGE, GROWTH)), shortest)
-            after = replace(
-                step.state,
-                error=carried + added,
-                volume_error=state.volume_error + abs(float(raw.sum())) * contact.grid.cell_area,
-                next_cycles=proposed,
-            )
-            return _Trial(replace(step, state=after), fits, min(proposed, 0.5 * cycles), shortest)
+            spent = replace(first.spent + second.spent + whole.spent, steps=2)
+            step = WearStep(replace(after, next_cycles=proposed), cycles, spent)
+            return _Trial(step, fits, min(proposed, 0.5 * cycles), shortest)
 
-        return _accepted(trial, most if control is None else min(most, state.next_cycles))
+        # Of the two halves either must be comparable.
+        longest = min(most, 2.0 * contact.comparable_cycles(state))
+        return _accepted(trial, longest if control is None else min(longest, state.next_cycles))
 
 
 @dataclass(frozen=True)
 class ImplicitStepper(_HalfSpaceStepper):
     """Implicit Euler."""
 
-    def _attempt(
+    def _advance(
         self, state: WearState, cycles: float, contact: WearingContact, contact_at: ContactAt
-    ) -> Attempt:
-        step = contact.implicit_step(state, cycles)
-        mean_rate = 0.5 * (contact.rate(state) + contact_at(step.state).rate(step.state))
-        return step, step.state.surfaces.depth - state.surfaces.depth - cycles * mean_rate
+    ) -> WearStep[WearState]:
+        return contact.implicit_step(state, cycles)
+
+    def _order(self, contact: WearingContact) -> float:
+        return 1.0
 
 
 @dataclass(frozen=True)
@@ -319,52 +324,49 @@ class SecondOrderStepper(_HalfSpaceStepper):
     with the mean of those and the ones at its end.
     """
 
-    def _attempt(
+    def _advance(
         self, state: WearState, cycles: float, contact: WearingContact, contact_at: ContactAt
-    ) -> Attempt:
+    ) -> WearStep[WearState]:
         step = contact.second_order_step(state, cycles)
         following = contact_at(step.state)
-        drift: Array | float = 0.0
-        if following is not contact:
-            predicted, step = step, contact.midway(following).second_order_step(state, cycles)
-            step = replace(step, spent=replace(predicted.spent + step.spent, steps=1))
-            # What slips and friction, changing on the way, have added.
-            drift = step.state.surfaces.depth - predicted.state.surfaces.depth
-        assert step.midway is not None
-        ends = 0.5 * (state.surfaces.depth + step.state.surfaces.depth)
-        return step, ends - step.midway + drift
+        if following is contact:
+            return step
+        predicted, step = step, contact.midway(following).second_order_step(state, cycles)
+        return replace(step, spent=predicted.spent + step.spent)
+
+    def _order(self, contact: WearingContact) -> float:
+        return 2.0 if contact.sliding.passages is None else MOVING
 
 
 def _judged(
-    control: ErrorControl,
-    state: WearState,
-    step: WearStep[WearState],
-    left: float,
-    carried: Array,
-    added: Array,
-    raw: Array,
+    control: ErrorControl, before: WearState, after: WearState, to_go: float
 ) -> tuple[bool, float]:
-    """Whether a step's error will do, and the change of length that fills what it may be.
+    """Whether the error after a step will do, and the change of length that fills what it may be.
 
-    ``carried`` and ``added`` are what is left of the error before and of the step's own ``raw``
-    one. Wear presses no error of the volume away: of that each step gets its share.
+    ``to_go`` are the steps of this length to the end of the run, this one included. Of the
+    tolerance the error of the depth may have the share :data:`EARLY` at once and the rest by and
+    by, as the depth grows; that of the volume, which no pressure presses away, grows with it.
     """
-    depth = step.state.surfaces.depth
-    worn = depth - state.surfaces.depth
-    expected = depth + worn * max(left / step.cycles - 1.0, 0.0)
+    depth, order = after.surfaces.depth, after.order
+    worn = depth - before.surfaces.depth
+    expected = depth + worn * (to_go - 1.0)
     tolerance = control.tolerance(depth, expected)
-    bound = tolerance * root_mean_square(expected, depth)
-    before, size, total = (root_mean_square(e, depth) for e in (carried, added, carried + added))
-    volume, volume_room = abs(float(raw.sum())), tolerance * float(worn.sum())
-    fits = (total <= bound or size <= LEAST_ROOM * bound) and volume <= volume_room
-    # Errors of different steps lie in different places: their squares add up.
-    taken = total if fits else before
-    room = max(LEAST_ROOM * bound, np.sqrt(max(bound**2 - taken**2, 0.0)))
+    bound, so_far, share = (
+        tolerance * root_mean_square(field, depth) for field in (expected, depth, worn)
+    )
+    total = max(root_mean_square(error, depth) for error in after.errors)
+    changed = [now - then for now, then in zip(after.errors, before.errors, strict=True)]
+    added = max(root_mean_square(error, depth) for error in changed)
+    missed, volume_share = abs(float(np.sum(changed))), tolerance * float(worn.sum())
+    room = EARLY * bound + (1.0 - EARLY) * so_far - total
+    fits = (room >= 0.0 or added <= share) and missed <= volume_share
     changes = [GROWTH]
-    if size > 0.0:
-        changes.append(np.sqrt(SAFETY * room / size))
-    if volume > 0.0:
-        changes.append(SAFETY * volume_room / volume)
+    if added > 0.0:
+        # A share of the whole shrinks with the step that it is for; what is left does not.
+        at_once = (SAFETY * max(room, 0.0) / added) ** (1.0 / (order + 1))
+        changes.append(max(at_once, (SAFETY * share / added) ** (1.0 / order)))
+    if missed > 0.0:
+        changes.append((SAFETY * volume_share / missed) ** (1.0 / order))
     return fits, min(changes)
 
 

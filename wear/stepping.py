@@ -22,7 +22,6 @@ stands for that: then no step is better than first order.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -31,7 +30,6 @@ import numpy as np
 from sa_solver.errors import ConvergenceError
 from sa_solver.influence import Z
 from sa_solver.normal import NormalContact, NormalStart, NormalState
-from sa_solver.transform import SpectralFilter
 from sa_solver.types import Array, Grid, LoadHistory, Tilt
 from wear.laws import SlidingConditions, WearLaw
 from wear.moving import Passage, TravelError
@@ -111,9 +109,31 @@ class WearState(WornState):
     """What the wear of a half-space contact must remember between two steps.
 
     Fields are ``(nx, ny)``, one value per cell; ``starts`` are the contact solver's, by increment.
+    ``coarse`` is the state that steps of twice the length have led to, None before the first one
+    and where none have been taken; ``order`` that of the error of all these steps.
     """
 
     starts: Starts = field(default_factory=dict)
+    coarse: WearState | None = None
+    order: float = 1.0
+
+    @property
+    def companion(self) -> WearState:
+        """Where steps of twice the length go on from."""
+        return self if self.coarse is None else self.coarse
+
+    @property
+    def errors(self) -> tuple[Array, Array]:
+        """Estimated errors of the depth of body 1 and body 2 ``(nx, ny)`` [mm]: 0 if unknown.
+
+        Those of a run by steps of order p are the difference to steps twice as long, over 2^p - 1.
+        """
+        fine, coarse, share = self.surfaces, self.companion.surfaces, 1.0 / (2.0**self.order - 1.0)
+        error_1, error_2 = (
+            share * (longer - shorter)
+            for longer, shorter in zip(coarse.depths, fine.depths, strict=True)
+        )
+        return error_1, error_2
 
 
 @dataclass(frozen=True, eq=False)
@@ -177,14 +197,6 @@ class WearingContact:
         depth: Array = loads.share[:, None, None] * np.concatenate(parts)
         return depth
 
-    def rate(self, state: WearState) -> Array:
-        """Depth of both bodies per mean cycle ``(nx, ny)`` [mm] at the state's last pressures."""
-        wear_1, wear_2 = self.depth_per_pressure(state)
-        rate = np.zeros(self.grid.shape)
-        for t, start in state.starts.items():
-            rate += self._on_body_1(t, wear_1[t] * start.pressure) + wear_2[t] * start.pressure
-        return rate
-
     def stable_cycles(self, state: WearState, cycles: float = 0.0) -> float:
         """Longest explicit step that does not make a roughness of the grid's shortest waves grow.
 
@@ -200,22 +212,29 @@ class WearingContact:
         softest = float(self.contact.half_space.symbol(Z, Z).min())
         return 2.0 * softest / fastest if fastest > 0.0 else np.inf
 
-    def damped_errors(
-        self, errors: Sequence[Array], state: WearState, cycles: float
-    ) -> list[Array]:
-        """What implicit wear over ``cycles`` leaves of ``errors`` of the depth ``(nx, ny)`` [mm].
+    def comparable_cycles(self, state: WearState) -> float:
+        """Longest step whose error shows in the difference to another length.
 
-        A depth e is pressed away to K (K + D)⁻¹ e, with D the largest depth per pressure of all
-        increments and both bodies over the step; here on the whole grid, as if all of it touched.
-        That is too much damping where slip is uneven or cells are pressed part of the time.
+        Increments wear one after the other. A step in which one of them presses away waves as long
+        as the contact leaves the surfaces to the last one, whatever its length: with the compliance
+        λ = L/π E* of a wave of the contact's length L and w of one increment, a step of w ΔN = x λ
+        has an error of x/(1 + x). At x = 1 the difference to steps of twice the length is a third
+        of the error, not all of it. Increments that are all alike may wear together.
         """
-        per_pressure = np.add(*self.depth_per_pressure(state)).sum(axis=0)
-        compliance = cycles * float(per_pressure.max())
-        half_space, shape = self.contact.half_space, self.grid.shape
-        symbol = half_space.symbol(Z, Z)
-        transform = half_space.transform(shape, half_space.padded, 1)
-        damping = SpectralFilter(transform, [[symbol / (symbol + compliance)]])
-        return [damping.apply(error[None])[0] for error in errors]
+        working, sliding = self.dissipating, self.sliding
+        wear, loads = np.add(*self.depth_per_pressure(state)), sliding.loads
+        imposed = (values[working] for values in (loads.P, loads.Mx, loads.My, wear))
+        alike = sliding.passages is None and all((v == v[:1]).all() for v in imposed)
+        if alike or not wear.any():
+            return np.inf
+        pressures = [start.pressure for start in state.starts.values()]
+        touched = np.sum(pressures, axis=0) > 0.0 if pressures else np.ones(self.grid.shape, bool)
+        length = max(
+            np.count_nonzero(touched.any(axis=1 - axis)) * pitch
+            for axis, pitch in enumerate(self.grid.pitch[: 1 if self.grid.line else 2])
+        )
+        pair = self.contact.half_space.pair
+        return length / (np.pi * pair.contact_modulus * float(wear.max()))
 
     # -- cycles on surfaces that do not change --------------------------------------------------
     def cycle(self, state: WearState, increments: list[int]) -> CycleResult:
@@ -259,10 +278,9 @@ class WearingContact:
         half = 0.5 * cycles
         for t in reversed(self.dissipating):
             march.two_stages(t, half)
-        midway = march.surfaces.depth
         for t in self.dissipating:
             march.two_stages(t, half)
-        return replace(march.step(), midway=midway)
+        return march.step()
 
     # -- one increment --------------------------------------------------------------------------
     def solve(

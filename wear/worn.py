@@ -33,17 +33,13 @@ class WornState:
 
     ``energy`` is what the contact has dissipated so far [N mm]; ``depth_rate`` the largest depth
     [mm] and ``volume_rate`` the volume of both bodies [mm³] worn per cycle of the last step;
-    ``error`` the estimated error of the depth of both bodies [mm], by cell or node, and
-    ``volume_error`` a bound of that of their volume [mm³]; ``next_cycles`` how far a step that
-    chooses its own length would go next.
+    ``next_cycles`` how far a step that chooses its own length would go next.
     """
 
     surfaces: Surfaces
     energy: float
     depth_rate: float
     volume_rate: float
-    error: Array
-    volume_error: float
     next_cycles: float
 
     @classmethod
@@ -52,7 +48,7 @@ class WornState:
 
         ``further`` are the fields that a subclass adds and has no default for.
         """
-        return cls(Surfaces.unworn(gap), 0.0, 0.0, 0.0, np.zeros_like(gap), 0.0, np.inf, **further)
+        return cls(Surfaces.unworn(gap), 0.0, 0.0, 0.0, np.inf, **further)
 
 
 State = TypeVar("State", bound=WornState)
@@ -62,7 +58,6 @@ State = TypeVar("State", bound=WornState)
 class WearStep(Generic[State]):
     """A step, or several one after the other: the ``state`` after it, its ``cycles``, what it took.
 
-    ``midway`` is the depth of both bodies in the middle of a step of second order [mm], by cell.
     ``error`` is what a step whose length is judged by itself may have got wrong, over what it
     wears; of several steps the largest.
     """
@@ -70,5 +65,4 @@ class WearStep(Generic[State]):
     state: State
     cycles: float
     spent: Spent
-    midway: Array | None = None
     error: float = 0.0

@@ -22,27 +22,37 @@ from workflow.shell.checkpoint import Checkpoint, save
 HISTORIES = ("cycles", "kinetics", "drift", "solved_resultants")
 # What the state of one interface has: parts of arrays, arrays, numbers.
 PARTS: dict[str, Any] = {"surfaces": Surfaces, "loads": LoadHistory}
-ARRAYS = ("slip", "error", "ends")
-SCALARS = ("energy", "depth_rate", "volume_rate", "volume_error", "next_cycles")
+ARRAYS = ("slip", "ends")
+# Where it has its companion.
+COARSE = "coarse"
+SCALARS = ("energy", "depth_rate", "volume_rate", "next_cycles", "order")
 
 
 def keep(run: Run[Any], state: CoupledState, jumps: Sequence[str]) -> None:
     """Write the state after jumps whose files have these digests."""
     arrays: dict[str, object] = {name: getattr(state, name) for name in HISTORIES}
     for number, interface in enumerate(state.interfaces):
-        group = f"interface_{number}"
-        for part, kind in PARTS.items():
-            for field in fields(kind):
-                values = getattr(getattr(interface, part), field.name)
-                arrays[f"{group}/{part}/{field.name}"] = values
-        arrays |= {f"{group}/{name}": getattr(interface, name) for name in ARRAYS}
-        arrays[f"{group}/scalars"] = np.array([getattr(interface, name) for name in SCALARS])
-        for increment, start in interface.starts.items():
-            arrays[f"{group}/starts/{increment}/pressure"] = start.pressure
-            arrays[f"{group}/starts/{increment}/displacement"] = start.displacement
+        arrays |= _arrays_of(interface, f"interface_{number}")
     attributes = {"solutions": state.solutions, "interfaces": len(state.interfaces)}
     attributes |= vars(state.spent)
     save(run.folder, Checkpoint(arrays, attributes, jumps), run.provenance)
+
+
+def _arrays_of(interface: InterfaceState, group: str) -> dict[str, object]:
+    """The state of one interface and of its companion."""
+    arrays: dict[str, object] = {
+        f"{group}/{part}/{field.name}": getattr(getattr(interface, part), field.name)
+        for part, kind in PARTS.items()
+        for field in fields(kind)
+    }
+    arrays |= {f"{group}/{name}": getattr(interface, name) for name in ARRAYS}
+    arrays[f"{group}/scalars"] = np.array([getattr(interface, name) for name in SCALARS])
+    for increment, start in interface.starts.items():
+        arrays[f"{group}/starts/{increment}/pressure"] = start.pressure
+        arrays[f"{group}/starts/{increment}/displacement"] = start.displacement
+    if isinstance(interface.coarse, InterfaceState):
+        arrays |= _arrays_of(interface.coarse, f"{group}/{COARSE}")
+    return arrays
 
 
 def restored(run: Run[Any], kept: Checkpoint) -> CoupledState:
@@ -77,11 +87,12 @@ def _load_interface(arrays: Mapping[str, Any], group: str) -> InterfaceState:
         t: NormalStart(arrays[f"{prefix}{t}/pressure"], arrays[f"{prefix}{t}/displacement"])
         for t in increments
     }
+    companion = f"{group}/{COARSE}"
+    coarse = _load_interface(arrays, companion) if f"{companion}/scalars" in arrays else None
     scalars = dict(zip(SCALARS, arrays[f"{group}/scalars"].tolist(), strict=True))
     parts: dict[str, Any] = {
         part: kind(**{f.name: arrays[f"{group}/{part}/{f.name}"] for f in fields(kind)})
         for part, kind in PARTS.items()
     }
-    return InterfaceState(
-        starts=starts, **parts, **{name: arrays[f"{group}/{name}"] for name in ARRAYS}, **scalars
-    )
+    given = parts | {name: arrays[f"{group}/{name}"] for name in ARRAYS} | scalars
+    return InterfaceState(starts=starts, coarse=coarse, **given)

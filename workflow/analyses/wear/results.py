@@ -104,15 +104,20 @@ class InterfaceOutcome:
 
     @property
     def step_error(self) -> dict[str, float] | None:
-        """Errors of depth (root mean square) and volume by wear steps, relative; None unworn."""
-        depth = self.state.surfaces.depth
-        if not depth.any():
+        """Errors by wear steps of depth (root mean square, of the worse body) and volume, relative.
+
+        None unworn.
+        """
+        surfaces = self.state.surfaces
+        if not surfaces.depth.any():
             return None
-        volume = float(depth.sum()) * self.stage.grid.cell_area
-        return {
-            "depth": root_mean_square(self.state.error, depth) / root_mean_square(depth, depth),
-            "volume": abs(self.state.volume_error) / volume,
-        }
+        bodies = [
+            root_mean_square(error, depth) / root_mean_square(depth, depth)
+            for error, depth in zip(self.state.errors, surfaces.depths, strict=True)
+            if depth.any()
+        ]
+        volume = abs(float(np.sum(self.state.errors))) / float(surfaces.depth.sum())
+        return {"depth": max(bodies), "volume": volume}
 
 
 @dataclass(frozen=True)
