@@ -232,14 +232,14 @@ class ErrorControl:
     """What error the depth may have: the smaller of those given.
 
     ``relative`` is a share of the depth at the end of the run, ``absolute`` a depth [mm]; both
-    bound the root mean square over the worn cells, of both bodies together.
+    bound the root mean square over the worn cells of either body.
     """
 
     relative: float | None = None
     absolute: float | None = None
 
     def tolerance(self, depth: Array, expected: Array) -> float:
-        """The bound for a contact worn to ``depth``, as a share of the one ``expected`` to come."""
+        """The bound for a body worn to ``depth``, as a share of the one ``expected`` to come."""
         scale = root_mean_square(expected, depth)
         bounds = [np.inf if self.relative is None else self.relative]
         if self.absolute is not None and scale > 0.0:
@@ -298,8 +298,7 @@ class _HalfSpaceStepper(ABC):
             step = WearStep(replace(after, next_cycles=proposed), cycles, spent)
             return _Trial(step, fits, min(proposed, 0.5 * cycles), shortest)
 
-        # Of the two halves either must be comparable.
-        longest = min(most, 2.0 * contact.comparable_cycles(state))
+        longest = min(most, 2.0 / order * contact.comparable_cycles(state))
         return _accepted(trial, longest if control is None else min(longest, state.next_cycles))
 
 
@@ -344,29 +343,30 @@ def _judged(
     """Whether the error after a step will do, and the change of length that fills what it may be.
 
     ``to_go`` are the steps of this length to the end of the run, this one included. Of the
-    tolerance the error of the depth may have the share :data:`EARLY` at once and the rest by and
-    by, as the depth grows; that of the volume, which no pressure presses away, grows with it.
+    tolerance the error of a body's depth may have the share :data:`EARLY` at once and the rest by
+    and by, as the depth grows; that of its volume, which no pressure presses away, grows with it.
     """
-    depth, order = after.surfaces.depth, after.order
-    worn = depth - before.surfaces.depth
-    expected = depth + worn * (to_go - 1.0)
-    tolerance = control.tolerance(depth, expected)
-    bound, so_far, share = (
-        tolerance * root_mean_square(field, depth) for field in (expected, depth, worn)
-    )
-    total = max(root_mean_square(error, depth) for error in after.errors)
-    changed = [now - then for now, then in zip(after.errors, before.errors, strict=True)]
-    added = max(root_mean_square(error, depth) for error in changed)
-    missed, volume_share = abs(float(np.sum(changed))), tolerance * float(worn.sum())
-    room = EARLY * bound + (1.0 - EARLY) * so_far - total
-    fits = (room >= 0.0 or added <= share) and missed <= volume_share
-    changes = [GROWTH]
-    if added > 0.0:
-        # A share of the whole shrinks with the step that it is for; what is left does not.
-        at_once = (SAFETY * max(room, 0.0) / added) ** (1.0 / (order + 1))
-        changes.append(max(at_once, (SAFETY * share / added) ** (1.0 / order)))
-    if missed > 0.0:
-        changes.append((SAFETY * volume_share / missed) ** (1.0 / order))
+    fits, changes, order = True, [GROWTH], after.order
+    columns = (after.surfaces.depths, before.surfaces.depths, after.errors, before.errors)
+    for depth, depth_before, error, error_before in zip(*columns, strict=True):
+        worn, missed = depth - depth_before, error - error_before
+        if not worn.any():
+            continue
+        expected = depth + worn * (to_go - 1.0)
+        tolerance = control.tolerance(depth, expected)
+        ahead, so_far, lost, total, added = (
+            root_mean_square(field, depth) for field in (expected, depth, worn, error, missed)
+        )
+        share = (1.0 - EARLY) * tolerance
+        room = EARLY * tolerance * ahead + share * so_far - total
+        volume, volume_share = abs(float(missed.sum())), tolerance * float(worn.sum())
+        fits = fits and (room >= 0.0 or added <= share * lost) and volume <= volume_share
+        if added > 0.0:
+            # A share of the step shrinks with it; what is left of the whole does not.
+            filling = (SAFETY * max(room, 0.0) / added) ** (1.0 / (order + 1.0))
+            changes.append(max(filling, (SAFETY * share * lost / added) ** (1.0 / order)))
+        if volume > 0.0:
+            changes.append((SAFETY * volume_share / volume) ** (1.0 / order))
     return fits, min(changes)
 
 

@@ -362,6 +362,8 @@ def numbers(state: InterfaceState) -> dict[str, object]:
         elif name == "starts":
             for t, start in value.items():
                 parts |= {f"{name}.{t}.{part}": field for part, field in vars(start).items()}
+        elif isinstance(value, InterfaceState):
+            parts |= {f"{name}.{part}": field for part, field in numbers(value).items()}
         else:
             parts[name] = value
     return parts

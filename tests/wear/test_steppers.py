@@ -115,9 +115,11 @@ def test_methods_agree_in_the_limit() -> None:
         np.testing.assert_allclose(end, ends[0], rtol=2e-4)
 
 
-def advance_in(stepper, state: WearState, cycles: float, jumps: int) -> Array:
+def advance_in(
+    stepper, state: WearState, cycles: float, jumps: int, contact_at=unchanging
+) -> Array:
     for _ in range(jumps):
-        state = stepper.step(state, cycles / jumps, cycles, unchanging).state
+        state = stepper.step(state, cycles / jumps, cycles, contact_at).state
     return state.surfaces.depth
 
 
@@ -141,32 +143,83 @@ def exact_depth(cycles: float) -> Array:
     return advance_in(SecondOrderStepper(), rounded(), cycles, 100)
 
 
+def errors(state: WearState, exact: Array) -> tuple[float, float]:
+    """What the state says of its error of the depth, and what it is: shares of it."""
+    size = root_mean_square(exact, exact)
+    told = root_mean_square(np.add(*state.errors), exact)
+    return told / size, root_mean_square(state.surfaces.depth - exact, exact) / size
+
+
 @pytest.mark.parametrize("kind", [ImplicitStepper, SecondOrderStepper])
 def test_automatic_steps_meet_their_tolerance_and_grow_fewer_with_it(kind) -> None:
-    """At 1 % and above, implicit ones also say how large their error is, within 50 %."""
+    """And say within a factor of three how large their error is."""
     cycles = 100.0 * CONSTANT.stable_cycles(rounded())
     exact = exact_depth(cycles)
     steps = []
-    for tolerance in (0.05, 0.01, 0.002):
+    for tolerance in (0.02, 1e-3, 1e-4):
         end = automatic(kind(ErrorControl(tolerance)), cycles)
-        depth, size = end.state.surfaces.depth, root_mean_square(exact, exact)
-        error = root_mean_square(depth - exact, exact) / size
-        told = root_mean_square(end.state.error, exact) / size
-        assert told <= tolerance
-        if tolerance >= 0.01:
-            assert error < tolerance
-            assert kind is SecondOrderStepper or error == pytest.approx(told, rel=0.5)
-        assert depth.max() == pytest.approx(exact.max(), rel=tolerance)
+        told, error = errors(end.state, exact)
+        assert told < tolerance
+        assert error < 1.1 * tolerance
+        assert error / 3.0 < told < 3.0 * error
+        assert end.state.surfaces.depth.max() == pytest.approx(exact.max(), rel=tolerance)
         steps.append(end.spent.steps)
     assert steps == sorted(set(steps))
 
 
-def test_automatic_steps_take_a_tenth_of_the_explicit_ones() -> None:
-    """One per cent of depth and volume, against explicit steps at their limit."""
+def test_the_companion_takes_steps_of_twice_the_length() -> None:
+    """Both run on from their own surfaces; V = α E for the companion as for the state."""
+    cycles = 0.4 * LIMIT
+    state = waved()
+    for _ in range(3):
+        state = ImplicitStepper().step(state, cycles, cycles, unchanging).state
+    ends = []
+    for count in (6, 3):
+        alone = waved()
+        for _ in range(count):
+            alone = CONSTANT.implicit_step(alone, 3.0 * cycles / count).state
+        ends.append(alone.surfaces)
+    np.testing.assert_array_equal(state.surfaces.depths, ends[0].depths)
+    np.testing.assert_array_equal(state.companion.surfaces.depths, ends[1].depths)
+    difference = np.subtract(ends[1].depths, ends[0].depths)
+    np.testing.assert_allclose(state.errors, difference, atol=1e-18)
+    volume = state.companion.surfaces.depth.sum() * GRID.cell_area
+    assert volume == pytest.approx(3e-8 * state.companion.energy, rel=1e-10)
+
+
+@pytest.mark.parametrize("kind", [ImplicitStepper, slow(SecondOrderStepper)])
+def test_steps_stay_short_enough_to_compare(kind) -> None:
+    """Ten times as long as it takes to press away all that three unlike loads can.
+
+    Longer and longer steps would come to the same surfaces, whatever their length, and these are
+    not those of short steps: told were a tenth of the error.
+    """
+    cycles = 1000.0 * CONSTANT.stable_cycles(rounded())
+    exact = advance_in(SecondOrderStepper(), rounded(), cycles, 100)
+    told, error = errors(automatic(kind(ErrorControl(0.01)), cycles).state, exact)
+    assert 1e-4 < error < 0.01
+    assert error / 3.0 < told < 3.0 * error
+
+
+def test_steps_under_loads_that_are_all_alike_may_be_of_any_length() -> None:
+    loads, slip = history(np.full(2, MEAN), np.zeros(2)), np.full((2, *GRID.shape), 0.01)
+    alike = replace(CONSTANT, sliding=SlidingCycle(loads, slip))
+    assert alike.comparable_cycles(rounded()) == np.inf
+    twice = replace(
+        CONSTANT, sliding=SlidingCycle(loads, slip * np.array([1.0, 2.0])[:, None, None])
+    )
+    assert twice.comparable_cycles(rounded()) < np.inf
+
+
+def test_automatic_steps_take_a_sixth_of_the_explicit_ones() -> None:
+    """One per cent of depth and volume, against explicit steps at their limit.
+
+    A third of it is what their companion takes.
+    """
     cycles = 150.0 * CONSTANT.stable_cycles(rounded())
     explicit = automatic(ExplicitStepper(fraction=1.0), cycles)
     implicit = automatic(ImplicitStepper(ErrorControl(0.01)), cycles)
-    assert implicit.spent.contact_solves <= 0.1 * explicit.spent.contact_solves
+    assert implicit.spent.contact_solves <= explicit.spent.contact_solves / 6.0
     depth, other = (end.state.surfaces.depth for end in (implicit, explicit))
     assert depth.max() == pytest.approx(other.max(), rel=0.01)
     assert depth.sum() == pytest.approx(other.sum(), rel=0.01)
@@ -225,16 +278,12 @@ def test_steps_add_up_to_the_cycles_asked_for(stepper) -> None:
     )
 
 
-@pytest.mark.slow
-def test_the_volume_has_an_error_of_its_own() -> None:
+@pytest.mark.parametrize("kind", [ImplicitStepper, slow(SecondOrderStepper)])
+def test_the_volume_has_an_error_of_its_own(kind) -> None:
     """Slip that grows with wear: no pressure corrects the volume, and the estimate says so."""
-    cycles, control = 6.0 * LIMIT, ErrorControl(0.01)
-    reference = waved()
-    for _ in range(40):
-        reference = SecondOrderStepper().step(reference, cycles / 40, cycles, evolving).state
-    state = advance_cycles(ImplicitStepper(control), waved(), cycles, cycles, evolving).state
-    exact = reference.surfaces.depth.sum() * GRID.cell_area
-    error = state.surfaces.depth.sum() * GRID.cell_area - exact
-    # Slip grows by half over the run, and errors with it.
-    assert 0.4 < state.volume_error / abs(error) < 1.0
-    assert abs(error) < 0.02 * exact
+    cycles, control = 6.0 * LIMIT, ErrorControl(0.02)
+    reference = advance_in(SecondOrderStepper(), waved(), cycles, 40, evolving)
+    state = advance_cycles(kind(control), waved(), cycles, cycles, evolving).state
+    error = float((state.surfaces.depth - reference).sum())
+    assert float(np.sum(state.errors)) == pytest.approx(error, rel=0.3)
+    assert abs(error) < 0.02 * reference.sum()

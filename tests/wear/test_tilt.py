@@ -11,7 +11,13 @@ from tests.oracles.sliding_cylinder import wear_without_tilt
 from wear.full_cycle import march_cycle
 from wear.interface import CellNodes, CycleLoads, InterfaceContact, InterfaceSettings
 from wear.laws import EnergyLaw
-from wear.steppers import ExplicitStepper, ImplicitStepper, SecondOrderStepper
+from wear.steppers import (
+    ErrorControl,
+    ExplicitStepper,
+    ImplicitStepper,
+    SecondOrderStepper,
+    root_mean_square,
+)
 from wear.stepping import WearState
 
 BODY, STEEL = Material(115e3, 0.29), Material(200e3, 0.3)
@@ -194,6 +200,26 @@ def test_a_sliding_cylinder_wears_as_in_a_model_of_its_own(stepper, jumps: int) 
     for depth, own in zip(state.surfaces.depths, expected, strict=True):
         assert depth.sum() * 0.01 == pytest.approx(COEFFICIENT * energy, rel=1e-9)
         assert depth.max() == pytest.approx(own.max(), rel=4e-3)
+
+
+@pytest.mark.parametrize("kind", [ImplicitStepper, SecondOrderStepper])
+def test_steps_of_moving_surfaces_say_what_they_leave(kind) -> None:
+    """Of the depth of either body, within a factor of three, and close to what was asked for."""
+    grid, load, each_way, cells, cycles = Grid.strips(0.72, 72), 18.5, 2, 6, 1e4
+    stroke, form, steps = each_way * cells * 0.01, (grid.x**2 / (2.0 * RADIUS)).ravel(), 400
+    expected = wear_without_tilt(
+        *(form, 0.01, PAIR.contact_modulus, load, each_way, cells),
+        *(COEFFICIENT * FRICTION * stroke / each_way * cycles / steps, steps),
+    )
+    contact = interface(grid, form[:, None], "held", stepper=kind(ErrorControl(0.01)), follow=True)
+    state, _ = contact.begin(reciprocating(grid, load, stroke, each_way), cycles)
+    state, _ = contact.jump(state, cycles, cycles)
+    for depth, error, own in zip(state.surfaces.depths, state.errors, expected, strict=True):
+        scale = root_mean_square(own, own)
+        told = root_mean_square(error, own) / scale
+        true = root_mean_square(depth.ravel() - own, own) / scale
+        assert max(told, true) < 0.013
+        assert true / 3.0 < told < 3.0 * true
 
 
 @pytest.mark.parametrize("other", [BODY, STEEL], ids=["alike", "unlike"])

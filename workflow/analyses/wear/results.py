@@ -104,20 +104,21 @@ class InterfaceOutcome:
 
     @property
     def step_error(self) -> dict[str, float] | None:
-        """Errors by wear steps of depth (root mean square, of the worse body) and volume, relative.
+        """Errors by wear steps of depth (root mean square) and volume, relative; None unworn.
 
-        None unworn.
+        Those of the body that has more of them.
         """
-        surfaces = self.state.surfaces
-        if not surfaces.depth.any():
-            return None
         bodies = [
-            root_mean_square(error, depth) / root_mean_square(depth, depth)
-            for error, depth in zip(self.state.errors, surfaces.depths, strict=True)
+            (error, depth)
+            for error, depth in zip(self.state.errors, self.state.surfaces.depths, strict=True)
             if depth.any()
         ]
-        volume = abs(float(np.sum(self.state.errors))) / float(surfaces.depth.sum())
-        return {"depth": max(bodies), "volume": volume}
+        if not bodies:
+            return None
+        return {
+            "depth": max(root_mean_square(e, d) / root_mean_square(d, d) for e, d in bodies),
+            "volume": max(abs(float(e.sum())) / float(d.sum()) for e, d in bodies),
+        }
 
 
 @dataclass(frozen=True)
