@@ -260,7 +260,9 @@ ContactAt = Callable[[WearState], WearingContact]
 class _HalfSpaceStepper(ABC):
     """Steps of a half-space contact: as long as asked for, or as ``control`` lets them be.
 
-    Each is taken in two halves, and as a whole by the companion of the state.
+    Each is taken in two halves, and as a whole by the companion of the state. The last one of a run
+    is always of second order: after a long step of first order pressure peaks at the edges that it
+    has worn, up to twice what is left of it once it is worn off.
     """
 
     control: ErrorControl | None = None
@@ -284,10 +286,11 @@ class _HalfSpaceStepper(ABC):
         order = self._order(contact)
 
         def trial(cycles: float) -> _Trial[WearState]:
-            half = 0.5 * cycles
-            first = self._advance(state, half, contact, contact_at)
-            second = self._advance(first.state, half, contact_at(first.state), contact_at)
-            whole = self._advance(companion, cycles, with_companion, contact_at)
+            half, last = 0.5 * cycles, cycles >= left * (1.0 - ROUNDING)
+            advance = _second_order if last else self._advance
+            first = advance(state, half, contact, contact_at)
+            second = advance(first.state, half, contact_at(first.state), contact_at)
+            whole = advance(companion, cycles, with_companion, contact_at)
             after = replace(second.state, coarse=whole.state, order=order)
             shortest = 2.0 * _shortest(min(contact.stable_cycles(end) for end in (state, after)))
             fits, proposed = True, cycles
@@ -317,24 +320,29 @@ class ImplicitStepper(_HalfSpaceStepper):
 
 @dataclass(frozen=True)
 class SecondOrderStepper(_HalfSpaceStepper):
-    """Second order in the step, also where slip changes with wear.
-
-    A contact whose slips come from the half-space is worn once with those of the start, and again
-    with the mean of those and the ones at its end.
-    """
+    """Second order in the step, also where slip changes with wear."""
 
     def _advance(
         self, state: WearState, cycles: float, contact: WearingContact, contact_at: ContactAt
     ) -> WearStep[WearState]:
-        step = contact.second_order_step(state, cycles)
-        following = contact_at(step.state)
-        if following is contact:
-            return step
-        predicted, step = step, contact.midway(following).second_order_step(state, cycles)
-        return replace(step, spent=predicted.spent + step.spent)
+        return _second_order(state, cycles, contact, contact_at)
 
     def _order(self, contact: WearingContact) -> float:
         return 2.0 if contact.sliding.passages is None else MOVING
+
+
+def _second_order(
+    state: WearState, cycles: float, contact: WearingContact, contact_at: ContactAt
+) -> WearStep[WearState]:
+    """A contact whose slips come from the half-space is worn once with those of the start, and
+    again with the mean of those and the ones at its end.
+    """
+    step = contact.second_order_step(state, cycles)
+    following = contact_at(step.state)
+    if following is contact:
+        return step
+    predicted, step = step, contact.midway(following).second_order_step(state, cycles)
+    return replace(step, spent=predicted.spent + step.spent)
 
 
 def _judged(

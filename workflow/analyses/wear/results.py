@@ -48,6 +48,9 @@ from workflow.shell.summary import finish
 
 # What the file of a jump has of each interface.
 JUMP_FIELDS = {"surfaces": ("body_1", "body_2"), "contact": ("pressure", "shear", "slip")}
+# What wear steps may leave of depth and volume where nobody has asked for less, and of the largest
+# pressure.
+UNASKED, PEAK = 0.05, 0.1
 # What the kinetics have of each linear regime; not numbers where there is none.
 REGIME_ATTRIBUTES = {"linear_from": "start", "rate": "rate", "trend": "trend", "scatter": "scatter"}
 
@@ -102,22 +105,30 @@ class InterfaceOutcome:
         path = np.hypot(slip[:, 0], slip[:, 1])
         return float(np.tensordot(self.unworn.loads.share, path, 1).max())
 
-    @property
+    @cached_property
     def step_error(self) -> dict[str, float] | None:
-        """Errors by wear steps of depth (root mean square) and volume, relative; None unworn.
+        """What wear steps leave of depth (root mean square), volume and largest pressure, relative.
 
-        Those of the body that has more of them.
+        Depth and volume are those of the body with the larger error, the pressure is that of a
+        whole cycle: its change for steps of twice the length, since next to a worn edge it has no
+        order. None where nothing has worn or it is not known.
         """
+        companion, surfaces = self.state.coarse, self.state.surfaces
         bodies = [
             (error, depth)
-            for error, depth in zip(self.state.errors, self.state.surfaces.depths, strict=True)
+            for error, depth in zip(self.state.errors, surfaces.depths, strict=True)
             if depth.any()
         ]
-        if not bodies:
+        if not bodies or not isinstance(companion, InterfaceState):
             return None
+        worn = self.stage.tractions(self.state) if self.worn is None else self.worn
+        largest, other = (
+            float(cycle.pressure.max()) for cycle in (worn, self.stage.tractions(companion))
+        )
         return {
             "depth": max(root_mean_square(e, d) / root_mean_square(d, d) for e, d in bodies),
             "volume": max(abs(float(e.sum())) / float(d.sum()) for e, d in bodies),
+            "pressure": abs(other - largest) / largest,
         }
 
 
@@ -345,7 +356,6 @@ def _summary(
 
 def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str, Any]:
     first, loads = contact.first, contact.carried["unworn"]
-    explicit = outcome.case.wear.step.kind == "explicit"
     return {
         **dict(zip(KINETICS, contact.kinetics[-1].tolist(), strict=True)),
         "peak_load": {"unworn": resultants_at(loads, outcome.source.peak)},
@@ -356,7 +366,7 @@ def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str,
             "structure": loads.mean_energy,
         },
         **({"by_increment": comparison_summary(first.cycle, loads)} if first.cycle else {}),
-        "step_error": None if explicit else contact.step_error,
+        "step_error": contact.step_error,
         "explicit_limit": first.stable_cycles if np.isfinite(first.stable_cycles) else None,
         "contact_residual": first.largest_residual,
         "convolutions": first.spent.convolutions,
@@ -390,22 +400,29 @@ def _regime_summary(regime: LinearRegime) -> dict[str, Any]:
 
 
 def _warn_of_steps(outcome: Outcome, reporter: Reporter) -> None:
-    """Automatic steps that did not meet their tolerance."""
+    """Wear steps that leave more than was asked for, or than may pass without being asked for."""
     wear = outcome.case.wear
-    if not wear.step.automatic:
-        return
     for contact in outcome.interfaces:
-        if contact.step_error is None:
+        left, name = contact.step_error, contact.stage.name
+        if left is None:
             continue
-        error, asked = max(contact.step_error.values()), wear.tolerance
-        if wear.depth_tolerance is not None:
-            depth = contact.state.surfaces.depth
-            asked = wear.depth_tolerance / root_mean_square(depth, depth)
+        error, asked = max(left["depth"], left["volume"]), UNASKED
+        if wear.step.automatic:
+            asked = wear.tolerance
+            if wear.depth_tolerance is not None:
+                depths = contact.state.surfaces.depths
+                asked = wear.depth_tolerance / max(root_mean_square(d, d) for d in depths)
         if error > asked:
+            what = "was asked for (wear.tolerance)" if wear.step.automatic else "may pass"
             reporter.warn(
-                f"{contact.stage.name}: wear steps leave an estimated error of {error:.2%} "
-                f"where {asked:.2%} was asked for (wear.tolerance): try wear.step.kind: "
-                "second_order, or a smaller tolerance"
+                f"{name}: wear steps leave an estimated error of {error:.2%} of depth and volume "
+                f"where {asked:.2%} {what}: try wear.step.kind: second_order, or shorter steps"
+            )
+        if left["pressure"] > PEAK:
+            reporter.warn(
+                f"{name}: the largest pressure on the worn surfaces changes by "
+                f"{left['pressure']:.0%} with steps of twice the length, and the parameters of "
+                "fretting life with it: try wear.step.kind: second_order, or shorter steps"
             )
 
 
@@ -421,5 +438,15 @@ def _lines(outcome: Outcome, summary: dict[str, Any]) -> Iterator[str]:
             f"  {name}: worn {numbers['depth_1'] * 1e3:.3g} um ({name_1}), "
             f"{numbers['depth_2'] * 1e3:.3g} um ({name_2}); {numbers['volume_1']:.3g}, "
             f"{numbers['volume_2']:.3g} {unit}; peak pressure {peaks['unworn']:.0f} -> "
-            f"{peaks['worn']:.0f} MPa; tilt {numbers['tilt']}"
+            f"{peaks['worn']:.0f} MPa; tilt {numbers['tilt']}{_left(numbers['step_error'])}"
         )
+
+
+def _left(error: dict[str, float] | None) -> str:
+    """What wear steps leave, where it is known."""
+    if error is None:
+        return ""
+    return (
+        f"; wear steps leave {max(error['depth'], error['volume']):.1%} of depth and volume, "
+        f"{error['pressure']:.1%} of the largest pressure"
+    )
