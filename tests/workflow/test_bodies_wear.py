@@ -9,6 +9,7 @@ import h5py
 import numpy as np
 import pytest
 
+from tests.marks import slow
 from tests.workflow.commands import command
 from wear.interface import InterfaceState
 from workflow.analyses.wear.contact_loops import loop_path
@@ -324,3 +325,36 @@ def test_a_loop_on_worn_surfaces_keeps_the_tilt_too() -> None:
 def test_cases_of_the_repository_are_verified(name: str, tmp_path: Path) -> None:
     done = command("verify", CASES / f"{name}.yaml", "--out", tmp_path)
     assert done.exit_code == 0, done.output
+
+
+# --- what wear steps leave ------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("step", "warned"),
+    [
+        ("{kind: implicit, cycles: 6000}", True),
+        slow("{kind: second_order, cycles: 1200}", False),
+    ],
+)
+def test_a_run_says_what_its_steps_leave_of_the_pressure(tmp_path, step, warned) -> None:
+    """A cylinder over a stroke of 50 µm: at the edges that long steps have worn pressure peaks.
+
+    138.5 MPa are left by 60 and by 120 steps of second order.
+    """
+    (tmp_path / "case.yaml").write_text(LINE)
+    done = command(
+        *("run", tmp_path / "case.yaml", "--out", tmp_path / "out"),
+        overrides=[
+            "output={figures: false, paraview: false}",
+            "load_path={P: 18.5 N/mm, stroke: 50 um, increments: 2}",
+            *("structure.radius=6 mm", "contact.size=0.8 mm", "contact.grid=[100, 1]"),
+            *("wear.cycles=18000", f"wear.step={step}", "stress={section: none}"),
+        ],
+    )
+    assert done.exit_code == 0, done.output
+    interface = json.loads((tmp_path / "out" / "summary.json").read_text())["interface"]
+    left, peak = interface["step_error"]["pressure"], interface["peak_pressure"]["worn"]
+    assert (left > 0.1) == warned
+    assert abs(peak / 138.5 - 1.0) < left
+    assert ("of the peak pressure on the worn surfaces" in done.output) == warned

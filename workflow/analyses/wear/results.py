@@ -48,7 +48,7 @@ from workflow.shell.summary import finish
 
 # What the file of a jump has of each interface.
 JUMP_FIELDS = {"surfaces": ("body_1", "body_2"), "contact": ("pressure", "shear", "slip")}
-# What wear steps may leave of depth and volume where nobody has asked for less, and of the largest
+# What wear steps may leave of depth and volume where nobody has asked for less, and of the peak
 # pressure.
 UNASKED, PEAK = 0.05, 0.1
 # What the kinetics have of each linear regime; not numbers where there is none.
@@ -107,11 +107,11 @@ class InterfaceOutcome:
 
     @cached_property
     def step_error(self) -> dict[str, float] | None:
-        """What wear steps leave of depth (root mean square), volume and largest pressure, relative.
+        """What wear steps leave of depth (root mean square), volume and pressure, relative.
 
-        Depth and volume are those of the body with the larger error, the pressure is that of a
-        whole cycle: its change for steps of twice the length, since next to a worn edge it has no
-        order. None where nothing has worn or it is not known.
+        Depth and volume are those of the body with the larger error. Of the pressure it is the
+        largest change anywhere in a cycle for steps of twice the length, over the largest pressure:
+        next to a worn edge it has no order. None where nothing has worn or it is not known.
         """
         companion, surfaces = self.state.coarse, self.state.surfaces
         bodies = [
@@ -122,13 +122,11 @@ class InterfaceOutcome:
         if not bodies or not isinstance(companion, InterfaceState):
             return None
         worn = self.stage.tractions(self.state) if self.worn is None else self.worn
-        largest, other = (
-            float(cycle.pressure.max()) for cycle in (worn, self.stage.tractions(companion))
-        )
+        change = np.abs(worn.pressure - self.stage.tractions(companion).pressure)
         return {
             "depth": max(root_mean_square(e, d) / root_mean_square(d, d) for e, d in bodies),
             "volume": max(abs(float(e.sum())) / float(d.sum()) for e, d in bodies),
-            "pressure": abs(other - largest) / largest,
+            "pressure": float(change.max() / worn.pressure.max()),
         }
 
 
@@ -420,9 +418,9 @@ def _warn_of_steps(outcome: Outcome, reporter: Reporter) -> None:
             )
         if left["pressure"] > PEAK:
             reporter.warn(
-                f"{name}: the largest pressure on the worn surfaces changes by "
-                f"{left['pressure']:.0%} with steps of twice the length, and the parameters of "
-                "fretting life with it: try wear.step.kind: second_order, or shorter steps"
+                f"{name}: wear steps leave an estimated error of {left['pressure']:.0%} of the "
+                "peak pressure on the worn surfaces, and of what follows from it (fretting life): "
+                "try wear.step.kind: second_order, or shorter steps"
             )
 
 
@@ -448,5 +446,5 @@ def _left(error: dict[str, float] | None) -> str:
         return ""
     return (
         f"; wear steps leave {max(error['depth'], error['volume']):.1%} of depth and volume, "
-        f"{error['pressure']:.1%} of the largest pressure"
+        f"{error['pressure']:.1%} of the peak pressure"
     )
