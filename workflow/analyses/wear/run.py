@@ -19,8 +19,11 @@ from workflow.analyses.wear.recording import Recorder, RunLog
 from workflow.analyses.wear.results import InterfaceOutcome, Outcome, write_output
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.structures.resultants.source import ResultantsSource
+from workflow.analyses.wear.structures.resultants.writing import marched
 from workflow.analyses.wear.warnings import (
     warn_of_contact,
+    warn_of_file,
     warn_of_structure,
     warn_of_worn_cells,
 )
@@ -67,6 +70,8 @@ def _compute(run: Run[WearCase]) -> Outcome:
             unworn = source.unworn()
         if isinstance(source, StructureStage):
             _check_structure(case, source, reporter)
+        if isinstance(source, ResultantsSource):
+            warn_of_file(source, reporter)
         with reporter.stage("contact set-up"):
             stages = [ContactStage(case, face) for face in faces]
         contacts = ContactProcesses(stages, workers)
@@ -107,6 +112,7 @@ def _march(
 
 def _check_structure(case: WearCase, structure: StructureStage, reporter: Reporter) -> None:
     """Warnings about the structure, and the check of its nonlinearity."""
+    reporter.log(f"loads: {marched(structure.unworn_cycle)}")
     warn_of_structure(structure, reporter)
     if case.friction.evolution and case.recoupling.resultants == "constant":
         reporter.warn(
