@@ -246,7 +246,7 @@ def test_progress_and_failure(monkeypatch):
         path([0.3, 0.6]),
         FRICTION,
         history="full",
-        progress=lambda row, state: rows.append((row, state.converged)),
+        progress=lambda row, state, share: rows.append((row, state.converged)),
     )
     assert rows == [(row, True) for row in range(5)]
     advance = FrictionalContact.advance

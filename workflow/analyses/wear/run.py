@@ -103,9 +103,12 @@ def _march(
     state, first = loop.begin(unworn)
     warn_of_contact(case, source.peak, contacts.stages, state, first, reporter)
     end = kept or state
-    with reporter.jumps(settings.cycles, float(end.cycles[-1])) as bar:
+    begun = end.jump
+    with reporter.course("wear"):
         for end in loop.march(end):  # noqa: B020 - each from the one before
-            bar(float(end.cycles[-1]), end.jump)
+            left = loop.jumps_left(end)
+            at = f"jump {end.jump} of about {end.jump + left}, {end.cycles[-1]:.4g} cycles"
+            reporter.reached((end.jump - begun) / (end.jump - begun + left), at)
     warn_of_worn_cells(case, source.peak, contacts.stages, end, reporter)
     return end, first
 

@@ -28,9 +28,9 @@ class ImportedLoads:
 
     ``loads`` are those of one closed cycle; without moments the ``tilt`` is held. ``closure`` is by
     how much that changed the contact forces of the cycle before it, over the largest. With the
-    nodes of the face: ``slip`` ``(t, 2, n)`` of each increment [mm], ``coordinates`` ``(n, 2)`` in the
-    interface frame [mm], ``facets`` ``(m, 3)`` or, in a line contact, ``(m, 2)``, the ``frame`` in
-    the user's axes, the user's node numbers on body 1 and body 2 ``(n,)``, and the gap of the
+    nodes of the face: ``slip`` ``(t, 2, n)`` of each increment [mm], ``coordinates`` ``(n, 2)`` in
+    the interface frame [mm], ``facets`` ``(m, 3)`` or, in a line contact, ``(m, 2)``, the ``frame``
+    in the user's axes, the user's node numbers on body 1 and body 2 ``(n,)``, and the gap of the
     unloaded, unworn faces [mm]: ``nodal_height`` ``(n,)`` at these nodes, ``height`` ``(nx, ny)``
     on the grid of the case. None where not given.
     """
