@@ -43,7 +43,8 @@ MOST_INCREMENTS = 256
 leg 9 to 15 keep 2 %; more is for who asks for it."""
 
 USUAL_PARTS = 10
-"""Increments that must be split are mostly split in about so many: to say what is to come."""
+"""About so many increments of a path that must be split are mostly enough: to say what is to
+come."""
 
 PARTS_OF_LEGS = 4
 """Two halves of a leg differ little from the whole: they tell a sixth of its error, these half."""
@@ -203,12 +204,12 @@ class _Marches:
         self, contact: FrictionalContact, height: Array, path: ContactLoadPath, progress: Progress
     ) -> None:
         self._contact, self._height, self._path = contact, height, path
-        self._progress, self._solved = progress, 0
+        self._progress, self._solved, self.rows = progress, 0, len(path)
 
     def __call__(self, parts: int, ahead: int = 0) -> list[ContactState]:
         """States at all rows; marches in ``ahead`` parts are expected after this one."""
-        rows, solved = len(self._path), self._solved
-        whole = solved + rows * (parts + ahead)
+        solved = self._solved
+        whole = solved + self.rows * (parts + ahead)
 
         def passed_row(row: int, state: ContactState) -> None:
             self._solved = solved + (row + 1) * parts
@@ -271,12 +272,13 @@ def _split(
     contact: FrictionalContact, march: _Marches, reason: str, accuracy: float, most: int
 ) -> History:
     """The increments in as many parts as keep ``accuracy``, or in up to ``most``."""
-    history, error = _history(march(1, 2 + USUAL_PARTS), reason), inf
+    more = USUAL_PARTS // march.rows
+    history, error = _history(march(1, 2 + more), reason), inf
     while history.states[-1].converged and error > accuracy and 2 * history.parts <= most:
         parts = history.parts
         wanted = 2 if parts == 1 else ceil(parts * error / accuracy)
         finer = min(most, max(2 * parts, wanted))
-        ahead = USUAL_PARTS if parts == 1 else 0
+        ahead = more if parts == 1 else 0
         coarse, history = history.states, _history(march(finer, ahead), reason, finer)
         if not history.states[-1].converged:
             break

@@ -13,11 +13,14 @@ from rich.console import Console
 from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
 
 from workflow.shell.forecast import Forecast, in_words
+from workflow.shell.run_time import RunTime
 
 T = TypeVar("T")
+NOTHING_EXPECTED = RunTime(after=0.0)
 
-# Seconds of work before a forecast is told, and of a run for which none is needed.
-FIRST_WORK, SHORT_RUN = 1.0, 10.0
+# Seconds of work before a forecast is told, those of a single step, of which some may be loading,
+# and those of a run for which none is needed.
+FIRST_WORK, FIRST_STEP, SHORT_RUN = 1.0, 10.0, 10.0
 # A forecast is told again when that of the whole time has changed by this factor.
 CHANGED = 1.5
 
@@ -36,13 +39,15 @@ class _Course:
 class Reporter:
     """Times stages, logs lines, collects warnings, and forecasts how long the run will take.
 
-    ``after`` is about how long it goes on once its long part is over [s].
+    What comes after its long part takes as much longer than ``expected`` as what came before it.
     """
 
-    def __init__(self, log: Path, append: bool = False, after: float = 0.0) -> None:
+    def __init__(
+        self, log: Path, append: bool = False, expected: RunTime = NOTHING_EXPECTED
+    ) -> None:
         self._log = log.open("a" if append else "w", encoding="utf-8")
         self._console = Console(stderr=True, highlight=False)
-        self._begin, self._after = time.perf_counter(), after
+        self._begin, self._expected, self._after = time.perf_counter(), expected, 0.0
         self._course: _Course | None = None
         self._span, self._names = (0.0, 1.0), ""
         self.seconds: dict[str, float] = {}
@@ -93,6 +98,8 @@ class Reporter:
         columns = TextColumn(name), BarColumn(), next(texts), TimeElapsedColumn(), next(texts)
         with Progress(*columns, console=self._console, transient=True) as bar:
             task = bar.add_task(name, total=1.0, at="", left="")
+            spent = time.perf_counter() - self._begin
+            self._after = self._expected.after * max(1.0, spent / self._expected.begun)
             self._course = _Course(name, bar, task, Forecast())
             try:
                 yield
@@ -136,8 +143,10 @@ class Reporter:
         at, told = f"{self._names}{text}".rstrip(": "), f"about {in_words(to_go)} to go"
         course.bar.update(course.task, at=at, left=told)
         whole, before = time.perf_counter() - self._begin + to_go, course.told
-        if course.forecast.elapsed < FIRST_WORK or whole < SHORT_RUN:
+        least = FIRST_STEP if course.forecast.steps == 1 else FIRST_WORK
+        if course.forecast.measured < least or whole < SHORT_RUN:
             return
         if before is None or max(whole / before, before / whole) > CHANGED:
-            (self.say if before is None else self.log)(f"{course.name}, {at}: {told}")
+            where = ", ".join(filter(None, (course.name, at)))
+            (self.say if before is None else self.log)(f"{where}: {told}")
             course.told = whole

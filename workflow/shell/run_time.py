@@ -30,9 +30,14 @@ class RunTime:
     after: float = FIGURES
 
     @property
+    def begun(self) -> float:
+        """Until the long part begins."""
+        return START + self.before
+
+    @property
     def seconds(self) -> float:
         """Of all."""
-        return START + self.before + self.course + self.after
+        return self.begun + self.course + self.after
 
     @property
     def text(self) -> str:

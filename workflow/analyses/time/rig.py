@@ -33,6 +33,8 @@ IN_A_ROW = 3
 # Steady states that an ageing is first built on, beside that of no energy, and at most. Doubled
 # until the cycles agree.
 FEWEST_STATES, MOST_STATES = 6, 48
+# The first state that is settled takes as long as so many others, which begin from one nearby.
+FROM_REST = 4
 # The first of them, as a share of the last energy: friction that rises as ln E changes early.
 FIRST_STATE = 1e-6
 
@@ -165,8 +167,9 @@ class _SteadyStates:
         if energy not in self.settled:
             near = min(self.settled, key=lambda settled: abs(settled - energy), default=None)
             start, done = None if near is None else self.settled[near].end, len(self.settled)
-            whole = max(expected, done + 1)
-            with self.reporter.part(done / whole, (done + 1) / whole, joules(energy)):
+            end = done + FROM_REST
+            begin, whole = 0 if start is None else end - 1, max(expected + FROM_REST - 1, end)
+            with self.reporter.part(begin / whole, end / whole, joules(energy)):
                 self.settled[energy] = self._settle(energy, start)
         return self.settled[energy]
 
@@ -178,7 +181,7 @@ class _SteadyStates:
         if start is not None:
             # Where a period begins, whatever came before: times must not lose their digits.
             start = replace(start, time=0.0)
-        before, in_a_row, first = np.full(2, np.inf), 0, 1.0
+        before, in_a_row, first, settled = np.full(2, np.inf), 0, 1.0, 0.0
         for periods in range(1, excitation.periods + 1):
             motion = motion_of(rig, self.joint, energy, force, period, control, start)
             start = replace(motion.end, time=0.0)
@@ -187,12 +190,11 @@ class _SteadyStates:
             now = np.array([dissipated, np.ptp(stretch)])
             change = _change(now, before)
             if np.isfinite(change):
-                # It decays by about the same factor in each period.
+                # It falls by about the same factor in each period.
                 first = max(first, change)
-                share = np.log(first / max(change, excitation.steady)) / np.log(
-                    first / excitation.steady
-                )
-                self.reporter.reached(float(share), f"period {periods}")
+                fallen = np.log(first / max(change, excitation.steady))
+                settled = max(settled, float(fallen / np.log(first / excitation.steady)))
+                self.reporter.reached(settled, f"period {periods}")
             in_a_row = in_a_row + 1 if change <= excitation.steady else 0
             if in_a_row == IN_A_ROW:
                 return SteadyCycle(

@@ -15,7 +15,6 @@ from workflow.analyses.vibration.response import response_under, warn_of_error
 from workflow.analyses.vibration_wear.outcome import WornState
 from workflow.shell.reporter import Reporter
 
-
 # Of the work for a state, what the wear to it is; the rest are the responses in it.
 WEAR = 0.2
 

@@ -33,10 +33,12 @@ STABLE = 1.16
 ITERATIONS, ENTRY, INVERSE = 24, 5e-10, 1e-10
 # Cycles until that of the structure is closed.
 CYCLES = 2
+# Branches of a tangential loop that are marched until it is closed, each problem soon solved.
+BRANCHES = 4
 # Stress under a contact, of a cell in an increment: on a face, and by a search for the worst plane.
-STRESS, SEARCHED = 8e-7, 30.0
+STRESS, SEARCHED = 1.2e-6, 10.0
 # Stress and mesh of the structure at the end, in sparse factors; figures and files of fields [s].
-WORN, PICTURES = 2.0, 4.0
+WORN, PICTURES = 2.0, 6.0
 
 
 @dataclass(frozen=True)
@@ -70,11 +72,11 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
         begun += solves(2 * extent.increments, cells, FRICTIONAL)
         worn += solves(steps * extent.increments, cells, FRICTIONAL)
     if case.loops.wanted:
-        worn += solves(jumps * 4 * case.loops.increments, cells, FRICTIONAL)
+        worn += solves(jumps * BRANCHES * case.loops.increments, cells, NORMAL)
     again = {"constant": 0.0, "drift": 1.0, "every": jumps}[case.recoupling.resultants]
     cycle = _structural_cycle(extent)
     before = shared * begun + _condensation(extent) + CYCLES * cycle
-    after = PICTURES + WORN * factors(extent.nodes) + cycle + shared * _stress(case, extent, cells)
+    after = PICTURES + WORN * factors(extent.nodes) + cycle + _stress(case, extent, cells)
     return RunTime(before, shared * worn + again * cycle, after)
 
 
@@ -123,9 +125,9 @@ def _structural_cycle(extent: Extent) -> float:
 
 
 def _stress(case: WearCase, extent: Extent, cells: int) -> float:
-    """Under a contact, unworn and worn [s]."""
+    """Under all contacts, unworn and worn [s]."""
     life = case.stress.life.parameter
     if life == "none":
         return 0.0
     searched = 1.0 if life == "ruiz" else SEARCHED
-    return 2.0 * STRESS * searched * extent.increments * cells
+    return 2.0 * STRESS * searched * extent.faces * extent.increments * cells
