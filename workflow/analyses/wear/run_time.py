@@ -20,6 +20,8 @@ from workflow.shell.run_time import (
 # Automatic steps of 1 %, on pressures alone and with the half-space's own friction; steps by depth
 # or volume, whose number nobody knows; jumps of explicit steps that are recorded.
 AUTOMATIC, AUTOMATIC_FULL, BY_SIZE, RECORDED = 15, 40, 30, 10
+# What is written after a jump [s].
+JUMP = 0.02
 # Contact problems of an increment that dissipates in a step: of each kind.
 PROBLEMS = {"explicit": 1, "implicit": 1, "second_order": 4}
 # Of the increments of a structure's cycle, those that dissipate.
@@ -46,7 +48,8 @@ class Extent:
     """What a structure lays on its contacts: ``increments`` of a cycle, on so many ``faces``.
 
     ``nodes`` are those of both bodies and ``interface_nodes`` those of all faces, 0 without finite
-    elements. Between two contact problems a body passes a ``path`` [mm] in a cycle.
+    elements. In a cycle the bodies pass a ``path`` [mm] over each other; ``dissipating`` is the
+    share of its increments in which they slide.
     """
 
     increments: int
@@ -63,7 +66,7 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
     cells = case.contact.grid[0] if plane else prod(case.contact.grid)
     at_once = min(extent.faces, os.cpu_count() or 1)
     shared = extent.faces / at_once
-    steps, jumps = _steps(case, extent, cells, plane)
+    steps, jumps = _steps(case, extent)
     normal = NORMAL_LINE if plane else NORMAL
     in_a_step = extent.increments * extent.dissipating * PROBLEMS[case.wear.step.kind]
     begun = solves(2 * extent.increments, cells, normal)
@@ -73,6 +76,7 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
         worn += solves(steps * extent.increments, cells, FRICTIONAL)
     if case.loops.wanted:
         worn += solves(jumps * BRANCHES * case.loops.increments, cells, NORMAL)
+    worn += jumps * JUMP
     again = {"constant": 0.0, "drift": 1.0, "every": jumps}[case.recoupling.resultants]
     cycle = _structural_cycle(extent)
     before = shared * begun + _condensation(extent) + CYCLES * cycle
@@ -80,14 +84,14 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
     return RunTime(before, shared * worn + again * cycle, after)
 
 
-def _steps(case: WearCase, extent: Extent, cells: int, plane: bool) -> tuple[float, float]:
+def _steps(case: WearCase, extent: Extent) -> tuple[float, float]:
     """Steps of a run, and its jumps."""
     wear, step = case.wear, case.wear.step
     if step.cycles is not None:
         jumps = ceil(wear.cycles / step.cycles)
         return jumps, jumps
     if step.fraction is not None:
-        steps = max(RECORDED, wear.cycles / (step.fraction * _stable(case, extent, plane)))
+        steps = max(RECORDED, wear.cycles / (step.fraction * _stable(case, extent)))
         return steps, RECORDED
     if not step.automatic:
         return BY_SIZE, BY_SIZE
@@ -96,7 +100,7 @@ def _steps(case: WearCase, extent: Extent, cells: int, plane: bool) -> tuple[flo
     return steps, 0.5 * steps
 
 
-def _stable(case: WearCase, extent: Extent, plane: bool) -> float:
+def _stable(case: WearCase, extent: Extent) -> float:
     """About the longest stable explicit step [cycles]."""
     bodies = [case.material(number) for number in (1, 2)]
     compliance = sum((1.0 - body.poisson**2) / body.young for body in bodies)
