@@ -42,7 +42,7 @@ class RunTime:
     @property
     def text(self) -> str:
         """As it is told."""
-        return f"{in_words(self.seconds)}, within a factor of five"
+        return f"about {in_words(self.seconds)}, within a factor of five"
 
 
 def solves(count: float, cells: int, convolutions: float) -> float:
