@@ -29,8 +29,7 @@ from sa_solver.rigid_modes import NORMAL, PLANAR
 from sa_solver.types import Array
 
 Method = Literal["full", "reversals", "ciavarella_jaeger"]
-Progress = Callable[[int, ContactState], None]
-March = Callable[[int], list[ContactState]]
+Progress = Callable[[int, ContactState, float], None]
 """States at all rows of a path, its increments passed in so many parts."""
 
 STRAIGHT = 1e-9
@@ -42,6 +41,10 @@ ACCURACY = 0.02
 MOST_INCREMENTS = 256
 """So many are chosen for a path, or twice its own where these are more than half as many. In one
 leg 9 to 15 keep 2 %; more is for who asks for it."""
+
+USUAL_PARTS = 10
+"""About so many increments of a path that must be split are mostly enough: to say what is to
+come."""
 
 PARTS_OF_LEGS = 4
 """Two halves of a leg differ little from the whole: they tell a sixth of its error, these half."""
@@ -121,7 +124,7 @@ def march_history(
     history: Literal["auto", "full", "reversals"] = "auto",
     accuracy: float = ACCURACY,
     tolerance: float = 1e-8,
-    progress: Progress = lambda row, state: None,
+    progress: Progress = lambda row, state, share: None,
 ) -> History:
     """Solve a history on surfaces that do not wear.
 
@@ -129,8 +132,8 @@ def march_history(
     cheapest method that suffices, and splits increments that matter until their error is within
     ``accuracy``; ``full`` takes those of the path, and estimates what they leave; ``reversals``
     raises HistoryError where legs cannot be taken in one step. An increment that has not converged
-    ends the march: it is the last state. ``progress`` is called with each row and its state, anew
-    when increments are split.
+    ends the march: it is the last state. ``progress`` is called with each row, its state and about
+    what share of the work is done; anew when increments are split.
 
     Raises what :meth:`FrictionalContact.advance` raises.
     """
@@ -141,9 +144,7 @@ def march_history(
     if not obstacle and history != "reversals" and not _proportional(path.shear):
         obstacle = "the shear load changes direction"
 
-    def march(parts: int) -> list[ContactState]:
-        return _march(contact, height, path, parts, progress)
-
+    march = _Marches(contact, height, path, progress)
     if history == "full":
         return _as_given(contact, march, "asked for", 2 if obstacle else 1)
     if obstacle and history == "auto":
@@ -196,12 +197,33 @@ def _proportional(shear: Array) -> bool:
     return bool(len(singular) < 2 or singular[1] <= STRAIGHT * singular[0])
 
 
+class _Marches:
+    """Marches over one path, in ever more parts, and how much of their work is done."""
+
+    def __init__(
+        self, contact: FrictionalContact, height: Array, path: ContactLoadPath, progress: Progress
+    ) -> None:
+        self._contact, self._height, self._path = contact, height, path
+        self._progress, self._solved, self.rows = progress, 0, len(path)
+
+    def __call__(self, parts: int, ahead: int = 0) -> list[ContactState]:
+        """States at all rows; marches in ``ahead`` parts are expected after this one."""
+        solved = self._solved
+        whole = solved + self.rows * (parts + ahead)
+
+        def passed_row(row: int, state: ContactState) -> None:
+            self._solved = solved + (row + 1) * parts
+            self._progress(row, state, self._solved / whole)
+
+        return _march(self._contact, self._height, self._path, parts, passed_row)
+
+
 def _march(
     contact: FrictionalContact,
     height: Array,
     path: ContactLoadPath,
     parts: int,
-    progress: Progress,
+    passed_row: Callable[[int, ContactState], None],
 ) -> list[ContactState]:
     """States at all rows, each increment passed in ``parts``; ends where one has not converged."""
     states, state = [], contact.apart(height)
@@ -226,15 +248,15 @@ def _march(
                 start=None,
             )
         )
-        progress(row, states[-1])
+        passed_row(row, states[-1])
         if not state.converged:
             break
     return states
 
 
-def _as_given(contact: FrictionalContact, march: March, reason: str, parts: int) -> History:
+def _as_given(contact: FrictionalContact, march: _Marches, reason: str, parts: int) -> History:
     """The increments of the path, with their error by as many ``parts``; none if that is 1."""
-    history = _history(march(1), reason)
+    history = _history(march(1, parts if parts > 1 else 0), reason)
     if parts == 1 or not history.states[-1].converged:
         return history
     finer = march(parts)
@@ -247,15 +269,17 @@ def _as_given(contact: FrictionalContact, march: March, reason: str, parts: int)
 
 
 def _split(
-    contact: FrictionalContact, march: March, reason: str, accuracy: float, most: int
+    contact: FrictionalContact, march: _Marches, reason: str, accuracy: float, most: int
 ) -> History:
     """The increments in as many parts as keep ``accuracy``, or in up to ``most``."""
-    history, error = _history(march(1), reason), inf
+    more = USUAL_PARTS // march.rows
+    history, error = _history(march(1, 2 + more), reason), inf
     while history.states[-1].converged and error > accuracy and 2 * history.parts <= most:
         parts = history.parts
         wanted = 2 if parts == 1 else ceil(parts * error / accuracy)
         finer = min(most, max(2 * parts, wanted))
-        coarse, history = history.states, _history(march(finer), reason, finer)
+        ahead = more if parts == 1 else 0
+        coarse, history = history.states, _history(march(finer, ahead), reason, finer)
         if not history.states[-1].converged:
             break
         change, row = _shear_difference(contact, history.states, coarse)
@@ -278,9 +302,9 @@ def _reversals(
     rows = turning_points(path)
     legs = path.at(rows)
 
-    def march(parts: int) -> list[ContactState]:
-        return _march(contact, height, legs, parts, lambda leg, state: progress(rows[leg], state))
-
+    march = _Marches(
+        contact, height, legs, lambda leg, state, share: progress(rows[leg], state, share)
+    )
     alike = contact.grid.line or contact.half_space.pair.poisson == 0.0
     exact = alike and _proportional(path.shear)
     reason = "similar bodies, pressure constant while the shear load turns"

@@ -281,6 +281,13 @@ class CoupledWear:
                 observer.jumped(before, state)
             yield state
 
+    def jumps_left(self, state: CoupledState) -> int:
+        """About how many jumps are left, if all of them are as long as the next one."""
+        if self.settings.ended(state):
+            return 0
+        left = min(self._left(state), self._to_stop(state))
+        return max(1, int(np.ceil(left / self._jump_cycles(state) * (1.0 - ROUNDING))))
+
     @contextmanager
     def _stage(self, name: Stage) -> Iterator[None]:
         with ExitStack() as stack:

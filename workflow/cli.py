@@ -210,14 +210,16 @@ def sweep(file: Path, out: Path, processes: int | None, dask: str | None, force:
 @click.argument("case")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
 def check(case: str, overrides: tuple[str, ...]) -> None:
-    """Read CASE and say what it would run, if the memory of this machine is enough."""
+    """Read CASE, say what it would run and about how long, if this machine's memory is enough."""
     from workflow.kinds import analysis_of, load_case
 
     loaded = load_case(case, overrides)
-    memory = analysis_of(loaded).memory(loaded)
+    analysis = analysis_of(loaded)
+    memory, run_time = analysis.memory(loaded), analysis.run_time(loaded)
     memory.check()
     click.echo(f"OK {case}: {loaded.title}")
-    for name, text in [*loaded.outline(), ("memory", f"up to {memory.required / 1e9:.1f} GB")]:
+    needed = ("memory", f"up to {memory.required / 1e9:.1f} GB"), ("time", run_time.text)
+    for name, text in [*loaded.outline(), *needed]:
         click.echo(f"  {name:<10} {text}")
 
 

@@ -53,7 +53,7 @@ class ContinuationControl:
 
     ``first``, ``least`` and ``most`` sizes; ``iterations`` of Newton's method that are wanted, and
     ``max_iterations``, after which a step is halved; ``max_angle`` [degrees] by which the tangent
-    may turn in one step; ``max_points`` on one curve.
+    may turn in one step; ``max_points`` on one curve. Each new λ is told to ``watch``.
     """
 
     first: float = 0.02
@@ -64,6 +64,7 @@ class ContinuationControl:
     max_angle: float = 30.0
     max_points: int = 2000
     tolerance: float = 1e-10
+    watch: Callable[[float], None] = lambda parameter: None
 
 
 @dataclass(frozen=True)
@@ -347,6 +348,7 @@ def follow(
             point = _refound(equations, finer.lifted(point), scaling, control)
             continue
         points.append(new)
+        control.watch(new.parameter)
         if new.parameter in span:
             return SolutionCurve(tuple(points), _turned_back(start, points, end))
         point = new

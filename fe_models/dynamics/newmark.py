@@ -36,6 +36,8 @@ from sa_solver.types import Array
 MAX_HALVED = 12
 # A step is doubled when its error is this share of what is allowed: doubling multiplies it by 8.
 DOUBLE_BELOW = 1.0 / 16.0
+# Of the work of a motion whose steps are chosen, about what its first run in whole steps is.
+WHOLE_STEPS = 0.2
 # Steps held in full before their energies are summed and the rows not asked for dropped.
 BLOCK = 1024
 
@@ -71,12 +73,14 @@ def integrate(
     duration: float,
     control: TimeStepControl,
     start: Start | None = None,
+    reached: Callable[[float], None] = lambda share: None,
 ) -> Motion:
     """Motion of a structure with joints from ``start`` on, at rest unless given.
 
     ``excitation`` takes times ``(t,)`` to forces ``(t, n)``; None is none, and None of ``joints``
     leaves all of them free. The last time is the first multiple of the step at or after
     ``duration`` [s]. A motion that has not been found to the end says so in its ``message``.
+    ``reached`` is told now and then about what share of the work is done.
     Raises ``ValueError`` if joints and connection do not have the same directions.
     """
     laws = joints if joints is not None else _FreeJoints()
@@ -88,12 +92,16 @@ def integrate(
     steps = int(np.ceil(duration / control.step * (1.0 - 1e-12)))
     forcing = excitation if excitation is not None else _NoForce(len(model.mass))
     begin = start or Start()
-    allowed = np.inf
+    allowed, before = np.inf, 0.0
     if control.tolerance is not None:
-        whole = _March(model, laws, forcing, control, begin, np.inf)
-        allowed = control.tolerance * _followed(whole, steps, steps).largest_displacement
+        whole, before = _March(model, laws, forcing, control, begin, np.inf), WHOLE_STEPS
+        rough = _followed(whole, steps, steps, lambda share: reached(before * share))
+        allowed = control.tolerance * rough.largest_displacement
     march = _March(model, laws, forcing, control, begin, allowed)
-    return _followed(march, steps, control.every).motion(march.message)
+    record = _followed(
+        march, steps, control.every, lambda share: reached(before + (1.0 - before) * share)
+    )
+    return record.motion(march.message)
 
 
 @dataclass(frozen=True)
@@ -290,9 +298,12 @@ class _March:
         )
 
 
-def _followed(march: _March, steps: int, every: int) -> MotionRecord:
+def _followed(
+    march: _March, steps: int, every: int, reached: Callable[[float], None]
+) -> MotionRecord:
     """The record of a march until it has taken so many steps, or says why it has not."""
     record = MotionRecord(march.model, march.directions, every, march.at)
     while march.taken < steps and not march.message:
         record.add(march.block(min(BLOCK, steps - march.taken)))
+        reached(march.taken / steps)
     return record

@@ -237,6 +237,22 @@ def test_first_loading_of_a_line_contact_is_two_normal_problems(monkeypatch):
     np.testing.assert_allclose(two.shear[0], expected, atol=1e-6 * np.abs(expected).max())
 
 
+def test_progress_tells_what_is_done_of_all_marches():
+    """In one part and in two: 5 of 15, and on from there to the end."""
+    half_space, height = cylinder(32)
+    shares = []
+    march_history(
+        half_space,
+        height,
+        path(CYCLE),
+        FRICTION,
+        history="full",
+        progress=lambda row, state, share: shares.append(share),
+    )
+    assert np.all(np.diff(shares) > 0.0)
+    assert shares[-1] == 1.0
+
+
 def test_progress_and_failure(monkeypatch):
     half_space, height = cylinder(32)
     rows = []
@@ -246,7 +262,7 @@ def test_progress_and_failure(monkeypatch):
         path([0.3, 0.6]),
         FRICTION,
         history="full",
-        progress=lambda row, state: rows.append((row, state.converged)),
+        progress=lambda row, state, share: rows.append((row, state.converged)),
     )
     assert rows == [(row, True) for row in range(5)]
     advance = FrictionalContact.advance

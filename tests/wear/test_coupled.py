@@ -294,6 +294,33 @@ def test_jumps_may_be_as_long_as_they_wear(size: JumpSize, column: slice) -> Non
     np.testing.assert_allclose(worn[1:-1], asked, rtol=1e-6 if size.volume else 0.15)
 
 
+@pytest.mark.parametrize(
+    ("jump", "tolerance", "left"),
+    [
+        (JumpSize(0.3 * SCALE), None, [4, 3, 2, 1, 0]),
+        (JumpSize(), 0.01, None),
+        (JumpSize(volume=1e-4), None, None),
+    ],
+    ids=["given", "automatic", "by volume"],
+)
+def test_jumps_that_are_left_are_foreseen(
+    jump: JumpSize, tolerance: float | None, left: list[int] | None
+) -> None:
+    """Of given ones all; where they grow, within a factor of two from the second on."""
+    control = None if tolerance is None else ErrorControl(tolerance)
+    settings = CoupledSettings(SCALE, jump, resultants="constant")
+    histories = [cycle(LOAD, patch().grid)]
+    contacts = in_turn([patch(stepper=ImplicitStepper(control))])
+    loop = CoupledWear(settings, ConstantLoads(histories), contacts)
+    state, _ = loop.begin(histories)
+    foreseen = [loop.jumps_left(state)] + [loop.jumps_left(each) for each in loop.march(state)]
+    true = np.arange(len(foreseen))[::-1]
+    assert left is None or foreseen == left
+    assert foreseen[-1] == 0
+    assert np.all(foreseen[1:] <= 2 * true[1:])
+    assert np.all(true[1:] <= 2 * np.array(foreseen[1:]))
+
+
 def test_a_jump_has_one_size() -> None:
     with pytest.raises(InputError, match="more than one size"):
         JumpSize(cycles=1.0, depth=1e-3)

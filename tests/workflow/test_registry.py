@@ -24,11 +24,13 @@ from workflow.analyses.wear import structures
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import TwoMaterials, Wear
 from workflow.analyses.wear.load_source import ContactFace, UserFace
+from workflow.analyses.wear.run_time import Extent
 from workflow.analyses.wear.structure import WearStructure
 from workflow.case.fields import Quantity
 from workflow.case.sections import Case, Length, Section, Stress, entry
 from workflow.shell.analysis import Analysis, Run
 from workflow.shell.memory import Memory
+from workflow.shell.run_time import RunTime
 from workflow.shell.summary import finish
 
 Force = Annotated[float, Quantity("N", above=0.0, at_most=1e6)]
@@ -76,7 +78,13 @@ def no_memory(case: HertzCase) -> Memory:
     return Memory(0.0, "nothing is large")
 
 
-HERTZ = Analysis(name="hertz", cases={"ball": HertzCase}, run=run_hertz, memory=no_memory)
+HERTZ = Analysis(
+    name="hertz",
+    cases={"ball": HertzCase},
+    run=run_hertz,
+    memory=no_memory,
+    run_time=lambda case: RunTime(),
+)
 # a³ = 3 F R / (4 E*): 100 N, 10 mm, E* = 100 GPa.
 RADIUS = 0.0075 ** (1.0 / 3.0)
 
@@ -241,7 +249,9 @@ class StampLoads:
         return np.array([[self._case.structure.force, 0.0, 0.0, 0.0, 0.0, 0.0]])
 
 
-STAMP = WearStructure(name="stamp", case=StampCase, source=StampLoads)
+STAMP = WearStructure(
+    name="stamp", case=StampCase, source=StampLoads, extent=lambda case: Extent(2)
+)
 # Of a small run: two jumps, no stress below the contact.
 SMALL = (
     *("contact.grid=[32, 32]", "wear.cycles=1e5", "wear.step.cycles=5e4", "stress.section=none"),

@@ -20,10 +20,12 @@ from workflow.analyses.wear.case.gaps import ParaboloidGap, RoundedGap
 from workflow.analyses.wear.gaps import GridHeights, gap_over
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
+from workflow.analyses.wear.warnings import warn_of_file
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError
 from workflow.kinds import load_case, parse_case, template
 from workflow.pictures.drawing import write_figures, write_paraview
+from workflow.shell.reporter import Reporter
 
 # Typed by hand: what presses and slides, what opens and closes, a face that is never closed.
 TABLE = """\
@@ -80,6 +82,10 @@ def written(tmp_path: Path) -> Path:
     path = tmp_path / "case.yaml"
     path.write_text(template("resultants"), encoding="utf-8")
     return path
+
+
+# Attributes of an interface of a cycle that was marched.
+CLOSING = "closure", "cycles"
 
 
 # --- the case -----------------------------------------------------------------------------------
@@ -394,11 +400,27 @@ def test_our_loads_through_files_wear_the_same_bit_for_bit(small_path, tmp_path,
             for body in ("body_1", "body_2"):
                 key = f"surfaces/{interface}/{last}/{body}"
                 assert ours[key][()].tobytes() == read[key][()].tobytes(), key
+            told = original["structure"]["closure"], original["structure"]["cycles"]
+            assert tuple(ours[f"structure/{interface}"].attrs[k] for k in CLOSING) == told
+    assert f"the last of {told[1]} cycles marched" in (tmp_path / "resultants.log").read_text()
     for interface in ("intrados", "extrados"):
         assert imported[interface]["depth_1"] > 0.0
         assert imported[interface]["slip_per_cycle"] == original[interface]["slip_per_cycle"]
         for told in imported[interface]["worn_nodes"].values():
             assert told["volume_share"] == pytest.approx(1.0, rel=1e-12)
+
+
+@pytest.mark.parametrize(("closure", "told"), [(9e-4, 0), (2e-3, 1)])
+def test_loads_that_do_not_close_are_warned_of(tmp_path, closure, told):
+    rows = [f"{row}, {closure}" for row in LINE_TABLE.splitlines()[1:]]
+    table = [f"{LINE_TABLE.splitlines()[0]}, closure", *rows]
+    (tmp_path / "loads.csv").write_text("\n".join(table), encoding="utf-8")
+    text = template("resultants").replace("dimension: 3", "dimension: 2")
+    case = parse_case(text, str(tmp_path / "case.yaml"))
+    reporter = Reporter(tmp_path / "log")
+    warn_of_file(ResultantsSource(case), reporter)
+    assert len(reporter.warnings) == told
+    assert all("0.20% of the largest contact force" in line for line in reporter.warnings)
 
 
 @pytest.mark.slow

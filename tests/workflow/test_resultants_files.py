@@ -10,7 +10,7 @@ import pytest
 
 import workflow.analyses.wear.structures.resultants
 from fe_models.mesh import Face, Interface
-from fe_models.structure import InterfaceHistory
+from fe_models.structure import CycleSolution, InterfaceHistory
 from fe_models.transfer import FaceTransfer
 from sa_solver.types import Frame, Grid, LoadHistory, resultants
 from workflow.analyses.wear.datasets import put_face
@@ -117,6 +117,41 @@ def test_hdf5_reads_back_bit_for_bit(tmp_path, line):
             np.testing.assert_array_equal(getattr(read, key), written, err_msg=key, strict=True)
         np.testing.assert_array_equal(read.frame.origin, face.frame.origin)
         np.testing.assert_array_equal(read.frame.axes, face.frame.axes)
+
+
+def marched_cycle(history: InterfaceHistory) -> CycleSolution:
+    """The last of 13 cycles, which has not closed."""
+    return CycleSolution(
+        (history,), (), history.displacement[-1], 1, 1e-9, True, 3.5e-3, np.zeros(7), 13
+    )
+
+
+def test_how_well_a_cycle_is_closed_is_told_and_read_back(tmp_path):
+    """By either file, each interface for itself; files of other codes need not say."""
+    history = face_history()
+    cycle, table, fields = marched_cycle(history), tmp_path / "loads.csv", tmp_path / "loads.h5"
+    write_resultants_csv(table, {"f": history.loads}, cycle=cycle)
+    write_resultants_h5(fields, {"f": history}, cycle=cycle)
+    for path in (table, fields):
+        assert read_resultants(path)["f"].closure == 3.5e-3
+    told = table.read_text().splitlines()[0]
+    assert told.endswith(
+        "the last of 13 cycles marched from rest, which changes the contact forces of the one "
+        "before it by 3.5e-03 of the largest"
+    )
+    with h5py.File(fields) as file:
+        assert file["f"].attrs["cycles"] == 13
+    write_resultants_csv(table, {"f": history.loads})
+    assert read_resultants(table)["f"].closure is None
+
+
+@pytest.mark.parametrize("written", [-1e-3, "open", [1e-3, 1e-3], np.nan])
+def test_a_closure_that_is_none_is_refused(tmp_path, written):
+    write_resultants_h5(tmp_path / "loads.h5", {"f": face_history()})
+    with h5py.File(tmp_path / "loads.h5", "a") as file:
+        file["f"].attrs["closure"] = written
+    with pytest.raises(InputFileError, match=r"/f: attribute closure: .*; allowed: a number, 0"):
+        read_resultants(tmp_path / "loads.h5")
 
 
 def test_slip_on_the_grid_is_the_same_bit_for_bit(tmp_path):

@@ -17,6 +17,7 @@ from sa_solver.types import Array
 from tests.workflow.conftest import invoke
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.vibration import model as vibration_model
+from workflow.kinds import template
 
 SIDE, ROWS = 10.0, 5  # of the pad [mm]
 HEIGHT = 1.5  # of the drive over the pad [mm]
@@ -86,7 +87,7 @@ def run_block(folder: Path, *overrides: str, rig: RigModel | None = None) -> Res
     """Run the case into ``folder/out``, the block in place of the specimens."""
     path = folder / "case.yaml"
     path.write_text(CASE, encoding="utf-8")
-    (folder / "block.yaml").write_text("", encoding="utf-8")
+    (folder / "block.yaml").write_text(template("specimens"), encoding="utf-8")
     settings = [part for override in overrides for part in ("--set", override)]
 
     def stands_in(*_: Any) -> RigModel:

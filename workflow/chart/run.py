@@ -8,7 +8,8 @@ as it is and an interrupted one goes on.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping, Sequence
+import time
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import chain, count
 from pathlib import Path
@@ -28,6 +29,7 @@ from workflow.runs.jobs import run_jobs
 from workflow.runs.run import kept_in
 from workflow.shell.cache import kept_files
 from workflow.shell.folder import OutputFolder
+from workflow.shell.forecast import Forecast, in_words
 from workflow.shell.processes import environment
 from workflow.shell.summary import number_at
 
@@ -40,6 +42,8 @@ RUNS, STRUCTURES, BASELINE = "runs", "structures", "own"
 LIMIT = "explicit_limit"
 # Quantities of a computed increment counted from the first, which is another one with other steps.
 FROM_THE_FIRST = re.compile(r"states\.\d")
+# A run that ends in less than this share of the time that it took was there before.
+KEPT = 0.5
 # Explicit steps beyond this number are left out: as many cycles are solved, most of a day in 3-D.
 MOST_STEPS = 5000
 
@@ -153,7 +157,7 @@ def _run(
 
     The first one shows whether there are such ``quantities``, before all others are run.
     """
-    progress = _progress(len(jobs), report)
+    progress = _Progress(jobs, report)
     baseline, *others = jobs.values()
     ended = run_jobs([baseline], out, alone=True, report=progress)
     if (summary := ended[0].summary) is not None:
@@ -162,6 +166,7 @@ def _run(
     for setting in chain.from_iterable(settings.values()):
         if why := _too_long(setting, ended[0].summary or {}):
             left_out[jobs[setting.text].name] = why
+    progress.leave_out(left_out)
     others = [job for job in others if job.name not in left_out]
     return ended + run_jobs(others, out, alone=True, report=progress), left_out
 
@@ -177,17 +182,37 @@ def _too_long(setting: Setting, summary: Mapping[str, Any]) -> str:
     return f"it would take {steps:.2g} steps of {length:.3g} cycles" if steps > MOST_STEPS else ""
 
 
-def _progress(total: int, report: Callable[[str], None]) -> Callable[[Finished], None]:
-    """Reports each run as it ends."""
-    numbers = count(1)
+class _Progress:
+    """Reports each run as it ends, and how long the others will take.
 
-    def ended(finished: Finished) -> None:
-        ending = f"failed: {finished.error}"
+    They are weighed by the time that a check tells of them: from rung to rung that grows.
+    """
+
+    def __init__(self, jobs: Mapping[str, Job], report: Callable[[str], None]) -> None:
+        self._report, self._forecast, self._ended = report, Forecast(), 0.0
+        self._numbers, self._total, self._last = count(1), len(jobs), time.perf_counter()
+        cases = {job.name: job.load() for job in jobs.values()}
+        self._times = {n: analysis_of(case).run_time(case).seconds for n, case in cases.items()}
+
+    def leave_out(self, names: Iterable[str]) -> None:
+        """Runs that there will not be."""
+        for name in names:
+            self._times.pop(name, None)
+
+    def __call__(self, finished: Finished) -> None:
+        ending, own = f"failed: {finished.error}", 0.0
         if finished.summary is not None:
-            ending = f"{sum(finished.summary.get('seconds', {}).values()):.1f} s"
-        report(f"{next(numbers)}/{total} {finished.job.name}: {ending}")
-
-    return ended
+            own = sum(finished.summary.get("seconds", {}).values())
+            ending = f"{own:.1f} s"
+        name, now = finished.job.name, time.perf_counter()
+        self._ended += self._times[name]
+        self._forecast.reach(self._ended / sum(self._times.values()))
+        if now - self._last < KEPT * own:
+            self._forecast.go_on()
+        self._last = now
+        left = self._forecast.left
+        to_go = f"; about {in_words(left)} to go" if left else ""
+        self._report(f"{next(self._numbers)}/{self._total} {name}: {ending}{to_go}")
 
 
 def _runs(ended: Sequence[Finished]) -> dict[str, _Run]:

@@ -188,7 +188,8 @@ def _run(
                 processes = analysis.drawing_processes
                 write_pictures(case.output, folder, analysis.pictures, contents, processes)
 
-    with closing(Reporter(folder.reserve_log(), append=resume)) as reporter:
+    expected = analysis.run_time(case)
+    with closing(Reporter(folder.reserve_log(), resume, expected)) as reporter:
         for line in filter(None, told):
             reporter.say(line)
         if stays:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from workflow.case.sections import Case
 from workflow.shell.memory import Memory
+from workflow.shell.run_time import RunTime
 
 if TYPE_CHECKING:
     import h5py
@@ -96,8 +97,9 @@ class Analysis(Generic[AnyCase]):
 
     ``cases`` are its kinds of case by the names that ``fretscale new`` has for them; these say
     themselves how they are told apart, what they would run and on how many cores. ``memory`` is
-    what a run needs before anything is meshed, ``pictures`` how its results are shown:
-    figures in so many ``drawing_processes``, and the files beside them; 0: all in that of the run.
+    what a run needs before anything is meshed, ``run_time`` about how long it takes, ``pictures``
+    how its results are shown: figures in so many ``drawing_processes``, and the files beside them;
+    0: all in that of the run.
     ``resumable`` are runs that leave a checkpoint to go on from (:mod:`workflow.shell.checkpoint`).
     ``choose`` gives the case with the settings that it leaves open, and a record of why.
     ``write_loads`` solves the structure of a case alone and writes the loads of its contacts into a
@@ -108,6 +110,7 @@ class Analysis(Generic[AnyCase]):
     cases: Mapping[str, type[AnyCase]]
     run: Callable[[Run[AnyCase]], None]
     memory: Callable[[AnyCase], Memory]
+    run_time: Callable[[AnyCase], RunTime]
     pictures: Callable[[], Pictures] | None = None
     drawing_processes: int = 0
     resumable: bool = False

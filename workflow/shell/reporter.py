@@ -1,32 +1,55 @@
-"""What a run says while it works: stages and jumps on the terminal, everything in ``run.log``."""
+"""What a run says while it works: stages, forecasts, and everything of it in ``run.log``."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from functools import partial
+from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeVar
 
 from rich.console import Console
-from rich.progress import (
-    BarColumn,
-    MofNCompleteColumn,
-    Progress,
-    ProgressColumn,
-    TextColumn,
-    TimeElapsedColumn,
-    TimeRemainingColumn,
-)
+from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
+
+from workflow.shell.forecast import Forecast, in_words
+from workflow.shell.run_time import RunTime
+
+T = TypeVar("T")
+NOTHING_EXPECTED = RunTime(after=0.0)
+
+# Seconds of work before a forecast is told, those of a single step, of which some may be loading,
+# and those of a run for which none is needed.
+FIRST_WORK, FIRST_STEP, SHORT_RUN = 1.0, 10.0, 10.0
+# A forecast is told again when that of the whole time has changed by this factor.
+CHANGED = 1.5
+
+
+@dataclass
+class _Course:
+    """The long part of a run, on the screen; ``told`` is the last forecast of its whole time."""
+
+    name: str
+    bar: Progress
+    task: TaskID
+    forecast: Forecast
+    told: float | None = None
 
 
 class Reporter:
-    """Times stages, logs lines and collects warnings."""
+    """Times stages, logs lines, collects warnings, and forecasts how long the run will take.
 
-    def __init__(self, log: Path, append: bool = False) -> None:
+    What comes after its long part takes as much longer than ``expected`` as what came before it.
+    """
+
+    def __init__(
+        self, log: Path, append: bool = False, expected: RunTime = NOTHING_EXPECTED
+    ) -> None:
         self._log = log.open("a" if append else "w", encoding="utf-8")
         self._console = Console(stderr=True, highlight=False)
-        self._bar_shown = False
+        self._begin, self._expected, self._after = time.perf_counter(), expected, 0.0
+        self._course: _Course | None = None
+        self._span, self._names = (0.0, 1.0), ""
         self.seconds: dict[str, float] = {}
         self.warnings: list[str] = []
 
@@ -54,7 +77,7 @@ class Reporter:
         """Show and time a stage; seconds of the same name add up."""
         begin = time.perf_counter()
         # One thing at a time can live on the screen.
-        shown = nullcontext() if self._bar_shown else self._console.status(name)
+        shown = nullcontext() if self._course else self._console.status(name)
         try:
             with shown:
                 yield
@@ -63,33 +86,67 @@ class Reporter:
             self.seconds[name] = self.seconds.get(name, 0.0) + spent
             self.log(f"{name}: {spent:.2f} s")
 
-    @contextmanager
-    def increments(self, total: int) -> Iterator[Callable[[int], None]]:
-        """A bar over the increments of a path; yields what is told the number reached."""
-        with self._bar("contact", total, MofNCompleteColumn()) as update:
-            yield lambda reached: update(completed=reached)
+    # -- how long it will take -----------------------------------------------------------------
 
     @contextmanager
-    def jumps(self, total: float, done: float) -> Iterator[Callable[[float, int], None]]:
-        """A bar over the cycles of a run; yields what is told those reached, and of the jumps."""
-        with self._bar("wear", total, TextColumn("{task.fields[text]}")) as update:
+    def course(self, name: str) -> Iterator[None]:
+        """The long part of a run: a bar on the screen, where no stage is shown beside it.
 
-            def show(cycles: float, jump: int) -> None:
-                update(completed=cycles, text=f"jump {jump}, {cycles:.4g} cycles")
-
-            show(done, 0)
-            yield show
+        :meth:`part` and :meth:`reached` tell how far it has got.
+        """
+        texts = (TextColumn(f"{{task.fields[{field}]}}", markup=False) for field in ("at", "left"))
+        columns = TextColumn(name), BarColumn(), next(texts), TimeElapsedColumn(), next(texts)
+        with Progress(*columns, console=self._console, transient=True) as bar:
+            task = bar.add_task(name, total=1.0, at="", left="")
+            spent = time.perf_counter() - self._begin
+            self._after = self._expected.after * max(1.0, spent / self._expected.begun)
+            self._course = _Course(name, bar, task, Forecast())
+            try:
+                yield
+            finally:
+                self._course = None
 
     @contextmanager
-    def _bar(
-        self, name: str, total: float, reached: ProgressColumn
-    ) -> Iterator[Callable[..., None]]:
-        """A bar on the screen, where no stage is shown beside it; yields what moves it."""
-        left = TextColumn("left"), TimeRemainingColumn()
-        columns = TextColumn(name), BarColumn(), reached, TimeElapsedColumn(), *left
-        self._bar_shown = True
+    def part(self, begin: float, end: float, name: str = "") -> Iterator[None]:
+        """The work between two shares of the part around it, or of the course."""
+        (first, last), names = around = self._span, self._names
+        size = last - first
+        self._span = first + begin * size, first + end * size
+        self._names = f"{names}{name}: " if name else names
         try:
-            with Progress(*columns, console=self._console, transient=True) as progress:
-                yield partial(progress.update, progress.add_task(name, total=total, text=""))
+            yield
+            self.reached(1.0)
         finally:
-            self._bar_shown = False
+            self._span, self._names = around
+
+    def parts(self, items: Sequence[T], name: Callable[[T], str]) -> Iterator[T]:
+        """Items one after the other, each an equal :meth:`part` of the work, by its name."""
+        for number, item in enumerate(items):
+            with self.part(number / len(items), (number + 1) / len(items), name(item)):
+                yield item
+
+    def goes_on(self) -> None:
+        """What has been told to be done was kept from an earlier run."""
+        if self._course:
+            self._course.forecast.go_on()
+
+    def reached(self, share: float, text: str = "") -> None:
+        """About so large a ``share`` of the present part is done; ``text`` says how far that is."""
+        course, (begin, end) = self._course, self._span
+        if course is None:
+            return
+        course.forecast.reach(begin + (end - begin) * share)
+        course.bar.update(course.task, completed=course.forecast.share)
+        if course.forecast.left is None:
+            return
+        to_go = course.forecast.left + self._after
+        at, told = f"{self._names}{text}".rstrip(": "), f"about {in_words(to_go)} to go"
+        course.bar.update(course.task, at=at, left=told)
+        whole, before = time.perf_counter() - self._begin + to_go, course.told
+        least = FIRST_STEP if course.forecast.steps == 1 else FIRST_WORK
+        if course.forecast.measured < least or whole < SHORT_RUN:
+            return
+        if before is None or max(whole / before, before / whole) > CHANGED:
+            where = ", ".join(filter(None, (course.name, at)))
+            (self.say if before is None else self.log)(f"{where}: {told}")
+            course.told = whole

@@ -53,7 +53,7 @@ def run_sweep(
             reporter.say(
                 f"sweep: {len(runs)} runs of {sweep.file.case}, {finished} finished before"
             )
-            rows = _run(sweep, runs, folder, processes, dask, reporter)
+            rows = _run(sweep, runs, folder, processes, dask, finished, reporter)
             with reporter.stage("figures"):
                 _write_figures(sweep, rows, folder)
             _write_summary(sweep, rows, folder)
@@ -104,11 +104,13 @@ def _run(
     folder: OutputFolder,
     processes: int | None,
     dask: str | None,
+    finished_before: int,
     reporter: Reporter,
 ) -> list[Row]:
     """Run all there are, each once; the table is written of those that have ended, come what may.
 
-    A sample may draw the same run twice, which then has two rows.
+    Those that were ``finished_before`` end first. A sample may draw the same run twice, which then
+    has two rows.
     """
     jobs = {run.name: run.job(sweep) for run in runs}
     ended: dict[str, Finished] = {}
@@ -119,10 +121,14 @@ def _run(
         how = f"failed: {finished.error}" if finished.error else "done"
         spent = time.perf_counter() - begin
         reporter.say(f"  {len(ended)}/{len(jobs)}, {spent:.0f} s: {finished.job.name}: {how}")
+        reporter.reached(len(ended) / len(jobs), f"{len(ended)} of {len(jobs)}")
+        if len(ended) <= finished_before:
+            reporter.goes_on()
 
     try:
         out = folder.root / RUNS
-        run_jobs(list(jobs.values()), out, processes=processes, dask=dask, report=report)
+        with reporter.course("runs"):
+            run_jobs(list(jobs.values()), out, processes=processes, dask=dask, report=report)
     finally:
         rows = [Row(run, ended[run.name]) for run in runs if run.name in ended]
         if rows:

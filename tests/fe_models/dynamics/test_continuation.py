@@ -118,6 +118,13 @@ def test_both_folds_are_passed_both_ways(upward):
         assert pair.max() > fold - 0.3
 
 
+def test_every_point_is_told():
+    told = []
+    control = ContinuationControl(watch=told.append)
+    curve = follow(S_CURVE, start(S_CURVE, -3.0, 1.0), (0.5, 9.5), control)
+    assert told == curve.parameters.tolist()
+
+
 def test_a_curve_is_taken_up_again_from_any_point():
     whole = follow(S_CURVE, start(S_CURVE, -3.0, 1.0), (0.5, 9.5))
     middle = whole.points[len(whole.points) // 2]

@@ -50,13 +50,13 @@ def _march(
     height, half_space = case.structure.gap_on(grid), half_space_of(case, grid)
     strain = bulk_strain(table, bodies_of(case))
     passed: dict[int, ContactState] = {}
-    with reporter.increments(len(table)) as show, reporter.stage("contact"):
+    with reporter.course("contact"), reporter.stage("contact"):
 
-        def keep(row: int, state: ContactState) -> None:
+        def keep(row: int, state: ContactState, share: float) -> None:
             if row in passed:
                 passed.clear()  # the path is followed anew, in shorter increments
             passed[row] = state
-            show(row + 1)
+            reporter.reached(share, f"increment {row + 1} of {len(table)}")
             reporter.log(
                 f"increment {row + 1}: residual {state.residual:.1e}, "
                 f"{state.convolutions} convolutions"

@@ -2,6 +2,7 @@
 
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
+from workflow.analyses.specimens.run_time import run_time
 from workflow.shell.analysis import Analysis, Pictures, Run
 
 __all__ = ["ANALYSIS"]
@@ -28,4 +29,5 @@ ANALYSIS = Analysis(
     run=_run,
     pictures=_pictures,
     memory=memory,
+    run_time=run_time,
 )

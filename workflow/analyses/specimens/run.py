@@ -41,6 +41,8 @@ CURVE_POINTS, CURVE_POWER = 61, 2.0
 HALF_SPACE_POINTS = 13
 # Increments of the marched cycle in a quarter of it: 16 leave 2e-3 of the energy of Masing's loop.
 QUARTER = 16
+# Of the work for a force, what wear is; the rest are the half-space and the marched cycle.
+WEAR = 0.7
 # First motion of the marched cycle as a share of half the stroke: nearly all sticks.
 SMALL_MOTION = 1e-3
 # More cycle blocks than this, each some milliseconds, are a slip of the pen in the case.
@@ -79,9 +81,12 @@ def _compute(case: SpecimensCase, reporter: Reporter) -> SpecimensOutcome:
         case.friction.coefficient,
         case.contact.tolerance,
     )
-    loads = tuple(
-        _fret(model, half_space, force, reporter) for force in case.load_path.normal_forces
-    )
+    forces = case.load_path.normal_forces
+    with reporter.course("specimens"):
+        loads = tuple(
+            _fret(model, half_space, force, reporter)
+            for force in reporter.parts(forces, "{:g} N".format)
+        )
     with reporter.stage("half-space"):
         bulk = bulk_compliance(pair, half_space)
     return SpecimensOutcome(model, half_space, bulk, loads)
@@ -92,8 +97,8 @@ def _fret(
 ) -> LoadOutcome:
     case, pair = model.case, model.pair
     conditions = FrettingConditions(force, case.load_path.stroke, case.friction.coefficient)
-    with reporter.stage("wear"):
-        blocks = tuple(_blocks(model, conditions))
+    with reporter.part(0.0, WEAR), reporter.stage("wear"):
+        blocks = tuple(_blocks(model, conditions, reporter))
         kept = tuple(
             KeptState(state, first_loading(pair, state, conditions)) for state in _chosen(blocks)
         )
@@ -115,7 +120,9 @@ def _fret(
     return LoadOutcome(force, blocks, kept, (first, last), marched)
 
 
-def _blocks(model: SpecimensModel, conditions: FrettingConditions) -> Iterator[BlockState]:
+def _blocks(
+    model: SpecimensModel, conditions: FrettingConditions, reporter: Reporter
+) -> Iterator[BlockState]:
     """The states of a worn pair, up to the end that the case asks for."""
     case = model.case
     step = case.wear.step
@@ -128,6 +135,9 @@ def _blocks(model: SpecimensModel, conditions: FrettingConditions) -> Iterator[B
     states = wear_in_cycle_blocks(fretted, model.face.gap, stepper, partial(_to_go, case))
     for number, state in enumerate(states):
         _check(state, number, conditions, case)
+        if number and (left := _to_go(case, state)) > 0.0:
+            blocks = number + left / _block(case, state)
+            reporter.reached(number / blocks, f"cycle block {number} of about {blocks:.0f}")
         yield state
 
 

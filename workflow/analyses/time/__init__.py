@@ -2,6 +2,7 @@
 
 from workflow.analyses.time.case import JointCase, RigCase
 from workflow.analyses.time.memory import memory
+from workflow.analyses.time.run_time import run_time
 from workflow.shell.analysis import Analysis, Pictures, Run
 
 __all__ = ["ANALYSIS"]
@@ -27,4 +28,5 @@ ANALYSIS = Analysis(
     run=_run,
     pictures=_pictures,
     memory=memory,
+    run_time=run_time,
 )

@@ -51,12 +51,13 @@ def run_hammer(case: RigCase, rig: RigModel, joint: JointModel, reporter: Report
     assert isinstance(case.excitation, given.Hammer)
     hammer, control = case.excitation, step_control(case)
     blow = HammerBlow(rig.driven, hammer.force, hammer.duration)
-    states = []
-    for energy in case.energies:
-        with reporter.stage("motion"):
-            motion = motion_of(rig, joint, energy, blow, hammer.record, control)
-        with reporter.stage("signals"):
-            states.append(_state(hammer, blow, rig, joint, energy, motion, reporter))
+    states, tell = [], reporter.reached
+    with reporter.course("motions"):
+        for energy in reporter.parts(case.energies, joules):
+            with reporter.stage("motion"):
+                motion = motion_of(rig, joint, energy, blow, hammer.record, control, reached=tell)
+            with reporter.stage("signals"):
+                states.append(_state(hammer, blow, rig, joint, energy, motion, reporter))
     curve = evolution_curve(joint, case.energies[-1])
     return TimeOutcome(case, tuple(states), curve, _change(states))
 

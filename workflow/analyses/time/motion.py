@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -29,13 +30,16 @@ def motion_of(
     duration: float,
     control: TimeStepControl,
     start: Start | None = None,
+    reached: Callable[[float], None] = lambda share: None,
 ) -> Motion:
     """Motion of a rig whose joints have dissipated so much ``energy`` [N mm] before.
 
-    Raises MethodFailed for one that was not found to its end.
+    ``reached`` is told now and then about what share of it is found. Raises MethodFailed for one
+    that was not found to its end.
     """
     law = joint.at(energy)
-    motion = integrate(rig.model, law, rig.with_preload(law, force), duration, control, start)
+    loaded = rig.with_preload(law, force)
+    motion = integrate(rig.model, law, loaded, duration, control, start, reached)
     if not motion.converged:
         raise MethodFailed(f"motion at {joules(energy)}: {motion.message}")
     return motion

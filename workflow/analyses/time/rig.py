@@ -33,6 +33,8 @@ IN_A_ROW = 3
 # Steady states that an ageing is first built on, beside that of no energy, and at most. Doubled
 # until the cycles agree.
 FEWEST_STATES, MOST_STATES = 6, 48
+# The first state that is settled takes as long as so many others, which begin from one nearby.
+FROM_REST = 4
 # The first of them, as a share of the last energy: friction that rises as ln E changes early.
 FIRST_STATE = 1e-6
 
@@ -83,14 +85,17 @@ def _run_recorded(
     times, samples = case.excitation.read()
     force = RecordedForce(rig.driven, times, samples)
     control, begin = step_control(case), Start(time=float(times[0]))
-    states = []
-    for energy in case.energies:
-        with reporter.stage("motion"):
-            motion = motion_of(rig, joint, energy, force, float(np.ptp(times)), control, begin)
-        largest = {"largest_force": float(np.abs(rig.loop(motion)[1]).max())}
-        numbers = rig.modes(joint.at(energy)) | motion_numbers(rig, motion) | largest
-        curves = {MOTION: motion_curves(rig, motion, force)}
-        states.append(State(energy, None, joint.parameters(energy), numbers, curves))
+    states, tell = [], reporter.reached
+    with reporter.course("motions"):
+        for energy in reporter.parts(case.energies, joules):
+            with reporter.stage("motion"):
+                motion = motion_of(
+                    rig, joint, energy, force, float(np.ptp(times)), control, begin, tell
+                )
+            largest = {"largest_force": float(np.abs(rig.loop(motion)[1]).max())}
+            numbers = rig.modes(joint.at(energy)) | motion_numbers(rig, motion) | largest
+            curves = {MOTION: motion_curves(rig, motion, force)}
+            states.append(State(energy, None, joint.parameters(energy), numbers, curves))
     return TimeOutcome(case, tuple(states), evolution_curve(joint, case.energies[-1]))
 
 
@@ -101,20 +106,22 @@ def _run_harmonic(
     case: RigCase, rig: RigModel, joint: JointModel, reporter: Reporter
 ) -> TimeOutcome:
     assert isinstance(case.excitation, given.Harmonic)
-    steady = _SteadyStates(case.excitation, case.integration, rig, joint)
+    steady = _SteadyStates(case.excitation, case.integration, rig, joint, reporter)
     energies, rate, test = list(case.energies), None, None
     cycles: list[float | None] = [None] * len(energies)
     numbers: dict[str, Any] = {}
-    if case.ageing.wanted:
-        with reporter.stage("ageing"):
-            rate, test, numbers = _aged(case.ageing, steady, joint, reporter)
-        energies = list(energies_within(case.energies, numbers["energy"], reporter))
-        cycles = test.cycles_at(np.array(energies)).tolist()
-    with reporter.stage("steady states"):
-        states = tuple(
-            _steady_state(rig, joint, energy, steady.at(energy), reached)
-            for energy, reached in zip(energies, cycles, strict=True)
-        )
+    with reporter.course("steady states"):
+        if case.ageing.wanted:
+            with reporter.stage("ageing"):
+                rate, test, numbers = _aged(case, steady, joint, reporter)
+            energies = list(energies_within(case.energies, numbers["energy"], reporter))
+            cycles = test.cycles_at(np.array(energies)).tolist()
+        with reporter.stage("steady states"):
+            expected = len({*steady.settled, *energies})
+            states = tuple(
+                _steady_state(rig, joint, energy, steady.at(energy, expected), reached)
+                for energy, reached in zip(energies, cycles, strict=True)
+            )
     return TimeOutcome(case, states, evolution_curve(joint, energies[-1], test, rate), numbers)
 
 
@@ -149,14 +156,21 @@ class _SteadyStates:
     integration: Integration
     rig: RigModel
     joint: JointModel
+    reporter: Reporter
     settled: dict[float, SteadyCycle] = field(default_factory=dict)
 
-    def at(self, energy: float) -> SteadyCycle:
-        """The steady cycle after so much dissipated ``energy`` [N mm]."""
+    def at(self, energy: float, expected: int) -> SteadyCycle:
+        """The steady cycle after so much dissipated ``energy`` [N mm].
+
+        About so many are ``expected`` in all.
+        """
         if energy not in self.settled:
             near = min(self.settled, key=lambda settled: abs(settled - energy), default=None)
-            start = None if near is None else self.settled[near].end
-            self.settled[energy] = self._settle(energy, start)
+            start, done = None if near is None else self.settled[near].end, len(self.settled)
+            end = done + FROM_REST
+            begin, whole = 0 if start is None else end - 1, max(expected + FROM_REST - 1, end)
+            with self.reporter.part(begin / whole, end / whole, joules(energy)):
+                self.settled[energy] = self._settle(energy, start)
         return self.settled[energy]
 
     def _settle(self, energy: float, start: Start | None) -> SteadyCycle:
@@ -167,7 +181,7 @@ class _SteadyStates:
         if start is not None:
             # Where a period begins, whatever came before: times must not lose their digits.
             start = replace(start, time=0.0)
-        before, in_a_row = np.full(2, np.inf), 0
+        before, in_a_row, first, settled = np.full(2, np.inf), 0, 1.0, 0.0
         for periods in range(1, excitation.periods + 1):
             motion = motion_of(rig, self.joint, energy, force, period, control, start)
             start = replace(motion.end, time=0.0)
@@ -175,6 +189,12 @@ class _SteadyStates:
             stretch, joint_force = rig.loop(motion)
             now = np.array([dissipated, np.ptp(stretch)])
             change = _change(now, before)
+            if np.isfinite(change):
+                # It falls by about the same factor in each period.
+                first = max(first, change)
+                fallen = np.log(first / max(change, excitation.steady))
+                settled = max(settled, float(fallen / np.log(first / excitation.steady)))
+                self.reporter.reached(settled, f"period {periods}")
             in_a_row = in_a_row + 1 if change <= excitation.steady else 0
             if in_a_row == IN_A_ROW:
                 return SteadyCycle(
@@ -207,18 +227,20 @@ def _change(now: Array, before: Array) -> float:
 
 
 def _aged(
-    ageing: Ageing, steady: _SteadyStates, joint: JointModel, reporter: Reporter
+    case: RigCase, steady: _SteadyStates, joint: JointModel, reporter: Reporter
 ) -> tuple[Callable[[float], float], LongTest, dict[str, Any]]:
     """Energy per cycle between steady states, the test that it makes, and its numbers.
 
     Steady states are added between those there are until they no longer change the cycles.
     """
-    breaks = joint.evolution.breaks
+    ageing, breaks = case.ageing, joint.evolution.breaks
     end = ageing.energy or _energy_of(ageing, steady)
     nodes = [0.0, *np.geomspace(FIRST_STATE * end, end, FEWEST_STATES).tolist()]
     before = np.inf
     while True:
-        rate = _between(nodes, [steady.at(energy).energy for energy in nodes])
+        # Once more in between, most often, and those that the case asks for.
+        expected = len(case.energies) + 2 * len(nodes)
+        rate = _between(nodes, [steady.at(energy, expected).energy for energy in nodes])
         test = aged(rate, ageing, (*breaks, *nodes[1:-1]))
         last = test_end(test, ageing)
         cycles = test.total_cycles
@@ -242,8 +264,9 @@ def _aged(
 def _energy_of(ageing: Ageing, steady: _SteadyStates) -> float:
     """About the energy of so many cycles [N mm]."""
     assert ageing.cycles is not None
-    energy = ageing.cycles * steady.at(0.0).energy
-    return ageing.cycles * max(steady.at(energy).energy, steady.at(0.0).energy)
+    unworn = steady.at(0.0, FEWEST_STATES).energy
+    energy = ageing.cycles * unworn
+    return ageing.cycles * max(steady.at(energy, FEWEST_STATES).energy, unworn)
 
 
 def _between(energies: list[float], rates: list[float]) -> Callable[[float], float]:

@@ -4,6 +4,7 @@ from itertools import product
 
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.memory import memory
+from workflow.analyses.vibration.run_time import run_time
 from workflow.shell.analysis import Analysis, Comparison, Pictures, Run, Summary
 
 __all__ = ["ANALYSIS"]
@@ -39,5 +40,6 @@ ANALYSIS = Analysis(
     run=_run,
     pictures=_pictures,
     memory=memory,
+    run_time=run_time,
     comparison=Comparison(quantities=_quantities),
 )

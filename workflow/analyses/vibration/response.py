@@ -48,12 +48,17 @@ STUCK_LOOP = 1e-4
 LARGEST_ERROR = 0.05
 # Times that a loop is repeated: the record then holds whole cycles wherever it begins.
 REPEATED = 3
+# Points of a curve, usually, where the frequency or the force grows by a factor of e; this counts
+# until so large a share of the curve is known.
+POINTS, BEGUN = 50, 0.2
 # Why a curve may end at a resonance.
 UNBOUNDED = "; without damping what the joints do not hold back has no bound at resonance"
 
 
-def step_control(case: VibrationCase) -> ContinuationControl:
-    """How the case wants its curves followed."""
+def step_control(
+    case: VibrationCase, watch: Callable[[float], None] = lambda parameter: None
+) -> ContinuationControl:
+    """How the case wants its curves followed, by whom each new point is told to."""
     steps = case.continuation
     return ContinuationControl(
         first=steps.first_step,
@@ -64,7 +69,31 @@ def step_control(case: VibrationCase) -> ContinuationControl:
         max_angle=float(np.degrees(steps.largest_angle)),
         max_points=steps.most_points,
         tolerance=steps.tolerance,
+        watch=watch,
     )
+
+
+def progress_along(
+    span: tuple[float, float], upward: bool, unit: str, reporter: Reporter
+) -> Callable[[float], None]:
+    """Tells how far a curve has got along a ``span``, by its points.
+
+    The rest has as many points for its logarithm as what is behind, and the usual ones to begin
+    with. Points that turn back are still ahead.
+    """
+    begin, end = span if upward else span[::-1]
+    length = abs(float(np.log(end / begin)))
+    points, farthest = 0, 0.0
+
+    def watch(parameter: float) -> None:
+        nonlocal points, farthest
+        points += 1
+        farthest = max(farthest, float(np.log(parameter / begin) / np.log(end / begin)))
+        density = (points + BEGUN * POINTS * length) / (farthest + BEGUN)
+        left = (1.0 - farthest) * density
+        reporter.reached(points / (points + left), f"{parameter:.4g} {unit}")
+
+    return watch
 
 
 def accuracy_of(case: VibrationCase) -> Accuracy | None:
@@ -84,13 +113,13 @@ def response_under(
     Raises MethodFailed where there is no motion at all. A curve that ends before its span does is
     told as a warning.
     """
-    accuracy = accuracy_of(case)
+    accuracy, upward = accuracy_of(case), case.continuation.start == "lower"
     branch = along_frequency(
         model.problem,
         force,
         case.frequencies,
-        upward=case.continuation.start == "lower",
-        control=step_control(case),
+        upward=upward,
+        control=step_control(case, progress_along(case.frequencies, upward, "Hz", reporter)),
         accuracy=accuracy,
     )
     if not branch.solutions:
@@ -141,8 +170,9 @@ def force_sweep(
     told as a warning.
     """
     span = case.forces[0], case.forces[-1]
+    control = step_control(case, progress_along(span, True, "N", reporter))
     branch = along_force(
-        model.problem, frequency, span, control=step_control(case), accuracy=accuracy_of(case)
+        model.problem, frequency, span, control=control, accuracy=accuracy_of(case)
     )
     if not branch.solutions:
         raise MethodFailed(f"no motion at {frequency:g} Hz: {branch.message}; change force_sweeps")
@@ -167,8 +197,9 @@ def backbone_of(
 ) -> Curves | None:
     """The curve of phase resonance through all forces, from the motions under one of them."""
     span = case.forces[0], case.forces[-1]
+    control = step_control(case, progress_along(span, True, "N", reporter))
     backbone = along_phase_resonance(
-        model.problem, branch, span, control=step_control(case), accuracy=accuracy_of(case)
+        model.problem, branch, span, control=control, accuracy=accuracy_of(case)
     )
     if backbone.message:
         reporter.warn(f"backbone: {backbone.message}")

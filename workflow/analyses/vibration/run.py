@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager
+from dataclasses import dataclass
 from typing import Any
 
 from fe_models.dynamics.harmonics import HarmonicBalanceError
@@ -41,18 +43,20 @@ def _outcome(case: VibrationCase, reporter: Reporter) -> VibrationOutcome:
         linear = model.linear(case.frequencies)
     responses: list[Response] = []
     backbone = None
-    for force in case.forces:
-        with reporter.stage("response"):
-            response, branch = response_under(case, model, force, reporter)
-        responses.append(response)
-        if case.backbone and backbone is None:
-            # From the least force on which there is a phase resonance.
-            with reporter.stage("backbone"):
-                backbone = backbone_of(case, model, branch, reporter)
     sweeps = []
-    for frequency in case.force_sweeps:
-        with reporter.stage("force sweep"):
-            sweeps.append(force_sweep(case, model, frequency, reporter))
+    curves = _Curves(len(case.forces) + case.backbone + len(case.force_sweeps), reporter)
+    with reporter.course("vibration"):
+        for force in case.forces:
+            with curves.next(f"{force:g} N"), reporter.stage("response"):
+                response, branch = response_under(case, model, force, reporter)
+            responses.append(response)
+            if case.backbone and backbone is None:
+                # From the least force on which there is a phase resonance.
+                with curves.next("backbone"), reporter.stage("backbone"):
+                    backbone = backbone_of(case, model, branch, reporter)
+        for frequency in case.force_sweeps:
+            with curves.next(f"{frequency:g} Hz"), reporter.stage("force sweep"):
+                sweeps.append(force_sweep(case, model, frequency, reporter))
     return VibrationOutcome(
         case,
         model.rig.labels,
@@ -63,6 +67,22 @@ def _outcome(case: VibrationCase, reporter: Reporter) -> VibrationOutcome:
         backbone,
         tuple(sweeps),
     )
+
+
+@dataclass
+class _Curves:
+    """So many curves, taken as equal parts of the work."""
+
+    count: int
+    reporter: Reporter
+    begun: int = 0
+
+    def next(self, name: str) -> AbstractContextManager[None]:
+        """The next one is followed."""
+        begin, self.begun = self.begun, min(self.begun + 1, self.count)
+        return self.reporter.part(
+            min(begin, self.count - 1) / self.count, self.begun / self.count, name
+        )
 
 
 def _across(responses: list[Response]) -> dict[str, Any]:

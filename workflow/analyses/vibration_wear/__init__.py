@@ -2,6 +2,7 @@
 
 from workflow.analyses.vibration.memory import memory
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
+from workflow.analyses.vibration_wear.run_time import run_time
 from workflow.shell.analysis import Analysis, Pictures, Run
 
 __all__ = ["ANALYSIS"]
@@ -27,4 +28,5 @@ ANALYSIS = Analysis(
     run=_run,
     pictures=_pictures,
     memory=memory,
+    run_time=run_time,
 )

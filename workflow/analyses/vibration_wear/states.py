@@ -15,6 +15,9 @@ from workflow.analyses.vibration.response import response_under, warn_of_error
 from workflow.analyses.vibration_wear.outcome import WornState
 from workflow.shell.reporter import Reporter
 
+# Of the work for a state, what the wear to it is; the rest are the responses in it.
+WEAR = 0.2
+
 
 def worn_states(
     numbers: tuple[float, ...],
@@ -30,14 +33,17 @@ def worn_states(
     error of a step so far.
     """
     total, done, error = numbers[-1], 0.0, 0.0
-    states = [describe(state, done, 0, error)]
-    with reporter.jumps(total, 0.0) as progress:
-        for cycles in numbers:
-            with reporter.stage("wear"):
-                worn = advance_cycles(stepper, state, cycles - done, total - done, contact_at)
-            state, done, error = worn.state, cycles, max(error, worn.error)
-            states.append(describe(state, cycles, worn.spent.steps, error))
-            progress(cycles, len(states) - 1)
+    states = []
+    with reporter.course("vibration and wear"):
+        for cycles in reporter.parts((0.0, *numbers), lambda cycles: f"{cycles:.4g} cycles"):
+            steps = 0
+            if cycles > 0.0:
+                with reporter.part(0.0, WEAR, "wear"), reporter.stage("wear"):
+                    worn = advance_cycles(stepper, state, cycles - done, total - done, contact_at)
+                state, done, error = worn.state, cycles, max(error, worn.error)
+                steps = worn.spent.steps
+            with reporter.part(WEAR if steps else 0.0, 1.0):
+                states.append(describe(state, cycles, steps, error))
     return tuple(states)
 
 
@@ -48,5 +54,8 @@ def responses_to_all(
     error = resolution_error(model.problem.refined(motion.resolution), motion).largest
     warn_of_error("the motion that wears", error, case, reporter)
     with reporter.stage("response"):
-        responses = [response_under(case, model, force, reporter)[0] for force in case.forces]
+        responses = [
+            response_under(case, model, force, reporter)[0]
+            for force in reporter.parts(case.forces, "{:g} N".format)
+        ]
     return error, tuple(responses)

@@ -17,6 +17,7 @@ from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import resultants, structure_of
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 from workflow.analyses.wear.structures.resultants.writing import (
+    marched,
     write_resultants_csv,
     write_resultants_h5,
 )
@@ -77,8 +78,10 @@ def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter
     warn_of_structure(source, reporter)
     heights = {face.face.name: gap_on(face, face.grid(case.contact.grid)) for face in faces}
     loads = {name: history.loads for name, history in histories.items()}
-    write_resultants_csv(out / TABLE, loads, source.line)
-    write_resultants_h5(out / FIELDS, histories, heights)
+    cycle = source.unworn_cycle
+    reporter.say(f"loads: {marched(cycle)}")
+    write_resultants_csv(out / TABLE, loads, source.line, cycle)
+    write_resultants_h5(out / FIELDS, histories, heights, cycle)
     write_text(out / CASE, dump_case(_imported(case, faces, out)))
 
 

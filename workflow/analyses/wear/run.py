@@ -19,8 +19,11 @@ from workflow.analyses.wear.recording import Recorder, RunLog
 from workflow.analyses.wear.results import InterfaceOutcome, Outcome, write_output
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.structures.resultants.source import ResultantsSource
+from workflow.analyses.wear.structures.resultants.writing import marched
 from workflow.analyses.wear.warnings import (
     warn_of_contact,
+    warn_of_file,
     warn_of_structure,
     warn_of_worn_cells,
 )
@@ -67,6 +70,8 @@ def _compute(run: Run[WearCase]) -> Outcome:
             unworn = source.unworn()
         if isinstance(source, StructureStage):
             _check_structure(case, source, reporter)
+        if isinstance(source, ResultantsSource):
+            warn_of_file(source, reporter)
         with reporter.stage("contact set-up"):
             stages = [ContactStage(case, face) for face in faces]
         contacts = ContactProcesses(stages, workers)
@@ -98,15 +103,19 @@ def _march(
     state, first = loop.begin(unworn)
     warn_of_contact(case, source.peak, contacts.stages, state, first, reporter)
     end = kept or state
-    with reporter.jumps(settings.cycles, float(end.cycles[-1])) as bar:
+    begun = end.jump
+    with reporter.course("wear"):
         for end in loop.march(end):  # noqa: B020 - each from the one before
-            bar(float(end.cycles[-1]), end.jump)
+            left = loop.jumps_left(end)
+            at = f"jump {end.jump} of about {end.jump + left}, {end.cycles[-1]:.4g} cycles"
+            reporter.reached((end.jump - begun) / (end.jump - begun + left), at)
     warn_of_worn_cells(case, source.peak, contacts.stages, end, reporter)
     return end, first
 
 
 def _check_structure(case: WearCase, structure: StructureStage, reporter: Reporter) -> None:
     """Warnings about the structure, and the check of its nonlinearity."""
+    reporter.log(f"loads: {marched(structure.unworn_cycle)}")
     warn_of_structure(structure, reporter)
     if case.friction.evolution and case.recoupling.resultants == "constant":
         reporter.warn(

@@ -8,6 +8,7 @@ from math import prod
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.run_time import Extent
 from workflow.shell.analysis import as_written
 from workflow.shell.memory import Memory, factor_bytes
 
@@ -43,15 +44,17 @@ def memory(
 class WearStructure(Generic[AnyWearCase]):
     """What a wear run needs to know of a kind of structure.
 
-    ``case`` is the kind of case that has it, ``source`` gives the loads of its contacts and
-    ``memory`` what a run needs, given the nodes of both bodies and of all interfaces (0: unknown).
-    ``choose`` gives the case with the settings that it leaves open, and a record of why;
-    ``warnings`` are about the unworn contact of a stage under a peak load [N].
+    ``case`` is the kind of case that has it, ``source`` gives the loads of its contacts, ``extent``
+    how many they are, by which the time of a run is told, and ``memory`` what a run needs, given
+    the nodes of both bodies and of all interfaces (0: unknown). ``choose`` gives the case with the
+    settings that it leaves open, and a record of why; ``warnings`` are about the unworn contact of
+    a stage under a peak load [N].
     """
 
     name: str
     case: type[AnyWearCase]
     source: Callable[[AnyWearCase], LoadSource]
+    extent: Callable[[AnyWearCase], Extent]
     memory: Callable[[AnyWearCase, int, int], Memory] = memory
     choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = as_written
     warnings: Callable[[AnyWearCase, ContactStage, float], Iterable[str]] = lambda *_: ()

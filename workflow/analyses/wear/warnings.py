@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from fe_models.structure import CLOSED
 from wear.coupled import CoupledState
 from wear.interface import FirstContact
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
+from workflow.analyses.wear.structures.resultants.source import ResultantsSource
 from workflow.shell.few_cells import check_cells
 from workflow.shell.reporter import Reporter
 
-# Every cycle should repeat the forces of the one before; a larger change is a cycle not closed.
-OPEN_CYCLE = 0.02
 # Forces and moments on body 2 left out of balance, relative: the friction solver leaves 1e-7.
 OUT_OF_BALANCE = 1e-3
 # Energies of structure and half-space over a cycle that differ by more indicate different slips.
@@ -23,9 +23,9 @@ def warn_of_structure(stage: StructureStage, reporter: Reporter) -> None:
     """What the model knows, cycles that do not close, faces that lose their contact."""
     stage.model.warn(stage.structure, reporter)
     unworn = stage.unworn_cycle
-    if unworn.closure > OPEN_CYCLE:
+    if unworn.closure > CLOSED:
         reporter.warn(
-            f"the last two of {unworn.cycles} cycles differ by {unworn.closure:.1%} of the largest "
+            f"the last two of {unworn.cycles} cycles differ by {unworn.closure:.2%} of the largest "
             "contact force: the cycle that feeds the wear is not closed"
         )
     imbalance = float(unworn.equilibrium.max())
@@ -40,6 +40,17 @@ def warn_of_structure(stage: StructureStage, reporter: Reporter) -> None:
             reporter.warn(f"{name} is open all the time: it does not wear")
         elif P[stage.peak] <= 0.0:
             reporter.warn(f"{name} is open at peak load: its pressure and stress there are none")
+
+
+def warn_of_file(source: ResultantsSource, reporter: Reporter) -> None:
+    """Loads of a cycle that does not close, as far as their file tells."""
+    closures = [imported.closure or 0.0 for imported in source.imported.values()]
+    if max(closures) > CLOSED:
+        reporter.warn(
+            f"structure.file: {source.file}: its cycle differs from the one before by "
+            f"{max(closures):.2%} of the largest contact force: the cycle that feeds the wear is "
+            "not closed; march more cycles there, and take the last"
+        )
 
 
 def warn_of_contact(

@@ -18,6 +18,7 @@ from workflow.analyses.wear.case.evolution import EvolvingFriction
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.datasets import put_face
 from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.analyses.wear.structures.resultants.writing import put_closure
 from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
@@ -44,8 +45,10 @@ class WornStructure:
     def write(self, writer: ResultsWriter) -> None:
         """Load histories of the worn faces, and both bodies unworn and worn."""
         for history in self.cycle.histories:
-            group = f"structure_worn/{history.interface.name}"
-            put_face(writer, group, history.interface, history)
+            name = history.interface.name
+            put_face(writer, f"structure_worn/{name}", history.interface, history)
+            put_closure(writer, f"structure_worn/{name}", self.cycle)
+            put_closure(writer, f"structure/{name}", self.stage.unworn_cycle)
         for moment, mesh in (("unworn", self.stage.mesh), ("worn", self.mesh)):
             bodies = zip((mesh.body_1, mesh.body_2), self.stresses[moment], strict=True)
             for body, field in bodies:

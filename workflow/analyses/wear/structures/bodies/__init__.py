@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from workflow.analyses.wear.run_time import Extent
 from workflow.analyses.wear.structure import WearStructure
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
 
@@ -17,5 +18,13 @@ def _source(case: BodiesWearCase | LineBodiesWearCase) -> LoadSource:
     return BodiesSource(case)
 
 
-STRUCTURE = WearStructure(name="bodies_wear", case=BodiesWearCase, source=_source)
-LINE_STRUCTURE = WearStructure(name="line_wear", case=LineBodiesWearCase, source=_source)
+def _extent(case: BodiesWearCase | LineBodiesWearCase) -> Extent:
+    """Every increment of the way there and back dissipates."""
+    path = case.load_path
+    return Extent(2 * path.increments, path=2.0 * path.stroke)
+
+
+STRUCTURE = WearStructure(name="bodies_wear", case=BodiesWearCase, source=_source, extent=_extent)
+LINE_STRUCTURE = WearStructure(
+    name="line_wear", case=LineBodiesWearCase, source=_source, extent=_extent
+)

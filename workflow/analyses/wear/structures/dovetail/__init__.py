@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from math import prod
+from math import pi, prod
 from typing import TYPE_CHECKING, Any
 
+from workflow.analyses.wear.run_time import DISSIPATING, Extent
 from workflow.analyses.wear.structure import SPECTRA, WearStructure, memory
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.shell.memory import Memory
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
 
 # Fields per cell and increment: slips, depths per pressure, pressures, starts.
 FIELDS = 12
+# Nodes of both bodies in space, for every node of a flank and by their volume; of quadratic
+# elements so many times more.
+FLANK_NODES, VOLUME_NODES, QUADRATIC = 40.0, 1.5, 7.0
 
 
 def _source(case: DovetailCase) -> LoadSource:
@@ -36,6 +40,22 @@ def _memory(case: DovetailCase, nodes: int = 0, interface_nodes: int = 0) -> Mem
     return memory(case, nodes, interface_nodes, kept, remedy)
 
 
+def _extent(case: DovetailCase) -> Extent:
+    """In space the nodes grow from the flanks into both bodies."""
+    (across, along), path = case.mesh.flank_nodes, case.load_path
+    structure, faces = case.structure, 2
+    increments = len(path.shares) * path.increments
+    if structure.dimension == 2:
+        return Extent(increments, faces, 0.0, faces * across, dissipating=DISSIPATING)
+    sector = 2.0 * pi * structure.rim_radius / structure.blades * structure.disk_height
+    blade = structure.shank_height * structure.neck_width
+    volume = (sector + blade) * structure.slot_length
+    nodes = FLANK_NODES * across * along + VOLUME_NODES * volume / case.mesh.size**3
+    if case.mesh.order == 2:
+        nodes *= QUADRATIC
+    return Extent(increments, faces, nodes, faces * across * along, dissipating=DISSIPATING)
+
+
 def _choose(case: DovetailCase) -> tuple[DovetailCase, dict[str, Any] | None]:
     if case.fidelity == "fixed":
         return case, None
@@ -54,6 +74,7 @@ STRUCTURE = WearStructure(
     name="dovetail",
     case=DovetailCase,
     source=_source,
+    extent=_extent,
     memory=_memory,
     choose=_choose,
     warnings=_warnings,

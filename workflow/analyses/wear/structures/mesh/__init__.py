@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from workflow.analyses.wear.run_time import DISSIPATING, Extent
 from workflow.analyses.wear.structure import WearStructure
 from workflow.analyses.wear.structures.mesh.case import MeshCase
 
@@ -19,4 +20,17 @@ def _source(case: MeshCase) -> LoadSource:
     return StructureStage(MeshModel(case))
 
 
-STRUCTURE = WearStructure(name="mesh", case=MeshCase, source=_source)
+def _extent(case: MeshCase) -> Extent:
+    """As the file has it, which a check reads anyway."""
+    mesh, path = case.structure.mesh(), case.load_path
+    cycles = max(1, len(path.mix))
+    return Extent(
+        cycles * sum(path.increments[path.cycle_from - 1 :]),
+        len(mesh.interfaces),
+        mesh.body_1.mesh.nvertices + mesh.body_2.mesh.nvertices,
+        sum(len(interface) for interface in mesh.interfaces),
+        dissipating=DISSIPATING,
+    )
+
+
+STRUCTURE = WearStructure(name="mesh", case=MeshCase, source=_source, extent=_extent)

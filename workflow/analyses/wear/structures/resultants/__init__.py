@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+from workflow.analyses.wear.run_time import DISSIPATING, Extent
 from workflow.analyses.wear.structure import WearStructure
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 
@@ -20,4 +21,10 @@ def _source(case: ResultantsCase) -> LoadSource:
     return ResultantsSource(case)
 
 
-STRUCTURE = WearStructure(name="resultants", case=ResultantsCase, source=_source)
+def _extent(case: ResultantsCase) -> Extent:
+    loads = case.loads()
+    increments = len(next(iter(loads.values())).loads)
+    return Extent(increments, len(loads), dissipating=DISSIPATING)
+
+
+STRUCTURE = WearStructure(name="resultants", case=ResultantsCase, source=_source, extent=_extent)

@@ -17,6 +17,7 @@ from workflow.analyses.wear.structures.resultants.consistency import (
 )
 from workflow.analyses.wear.structures.resultants.faces import FaceError, check_facets, facets_over
 from workflow.analyses.wear.structures.resultants.imported import (
+    CLOSURE,
     ImportedLoads,
     base_units,
     required_columns,
@@ -129,16 +130,17 @@ def _read(group: Group, bounds: Bounds, line: bool) -> ImportedLoads:
     if height is not None:
         height = height.reshape(len(height), -1)  # a list is one column, as in a line contact
     frame = _frame(group)
-    coordinates = _coordinates(group, line)
+    closure, coordinates = _closure(group), _coordinates(group, line)
     if coordinates is None:
         for name in ("facets", "slip", "nodes_1", "nodes_2", "nodal_height"):
             if name in group.group:
                 raise group.error(name, "given without coordinates", "both or neither")
-        return ImportedLoads(loads, tilt, frame=frame, height=height)
+        return ImportedLoads(loads, tilt, closure, frame=frame, height=height)
     count = len(coordinates)
     return ImportedLoads(
         loads,
         tilt,
+        closure,
         slip=group.shaped("slip", "mm", (len(loads), 2, count)),
         coordinates=coordinates,
         facets=_facets(group, coordinates, line),
@@ -182,6 +184,16 @@ def _loads(group: Group, bounds: Bounds) -> LoadHistory:
         raise group.error("sliding", "neither yes nor no", "0 or 1")
     sliding = None if marks is None else marks == 1.0
     return checked_loads(columns, sliding, mix, bounds, refusal)
+
+
+def _closure(group: Group) -> float | None:
+    """How well the cycle is closed, None where the file does not say."""
+    written = group.group.attrs.get(CLOSURE)
+    if written is None:
+        return None
+    if np.ndim(written) or np.asarray(written).dtype.kind not in "iuf" or not written >= 0.0:
+        raise group.error("", f"attribute {CLOSURE}: {written}", "a number, 0 or more")
+    return float(written)
 
 
 def _frame(group: Group) -> Frame | None:

@@ -16,6 +16,8 @@ COLUMNS = ("P", "Qx", "Qy", "Mx", "My", "Mz", "Edx", "Edy")
 MOMENTS = ("Mx", "My")
 # A line contact has none of these unless it is sheared along its length.
 OPTIONAL_IN_LINE = ("Qy", "Mx", "Mz", "Edy")
+# How well the cycle repeats the one before it, relative; all rows of an interface have the same.
+CLOSURE = "closure"
 # Name of the interface of a file that names none.
 UNNAMED = "interface"
 
@@ -24,16 +26,18 @@ UNNAMED = "interface"
 class ImportedLoads:
     """What a file says of one interface.
 
-    ``loads`` are those of one closed cycle; without moments the ``tilt`` is held. With the nodes of
-    the face: ``slip`` ``(t, 2, n)`` of each increment [mm], ``coordinates`` ``(n, 2)`` in the
-    interface frame [mm], ``facets`` ``(m, 3)`` or, in a line contact, ``(m, 2)``, the ``frame`` in
-    the user's axes, the user's node numbers on body 1 and body 2 ``(n,)``, and the gap of the
+    ``loads`` are those of one closed cycle; without moments the ``tilt`` is held. ``closure`` is by
+    how much that changed the contact forces of the cycle before it, over the largest. With the
+    nodes of the face: ``slip`` ``(t, 2, n)`` of each increment [mm], ``coordinates`` ``(n, 2)`` in
+    the interface frame [mm], ``facets`` ``(m, 3)`` or, in a line contact, ``(m, 2)``, the ``frame``
+    in the user's axes, the user's node numbers on body 1 and body 2 ``(n,)``, and the gap of the
     unloaded, unworn faces [mm]: ``nodal_height`` ``(n,)`` at these nodes, ``height`` ``(nx, ny)``
     on the grid of the case. None where not given.
     """
 
     loads: LoadHistory
     tilt: Tilt = "free"
+    closure: float | None = None
     slip: Array | None = None
     coordinates: Array | None = None
     facets: Indices | None = None

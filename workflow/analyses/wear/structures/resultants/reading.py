@@ -17,6 +17,7 @@ from workflow.analyses.wear.structures.resultants.consistency import (
 )
 from workflow.analyses.wear.structures.resultants.hdf5 import read_h5
 from workflow.analyses.wear.structures.resultants.imported import (
+    CLOSURE,
     UNNAMED,
     ImportedLoads,
     base_units,
@@ -69,8 +70,15 @@ def read_resultants(
     }
     rows = _rows_of(table)
     _check_counts(table, rows)
+    closures = (
+        table.column(CLOSURE, Quantity("1", at_least=0.0)) if CLOSURE in table.names else None
+    )
     read = {
-        name: ImportedLoads(_loads(table, numbers, places, bounds(name)), tilt)
+        name: ImportedLoads(
+            _loads(table, numbers, places, bounds(name)),
+            tilt,
+            None if closures is None else float(closures[places].max()),
+        )
         for name, places in rows.items()
     }
     return _alike(file, read)
@@ -94,7 +102,7 @@ def _alike(file: str, read: dict[str, ImportedLoads]) -> dict[str, ImportedLoads
 
 def _columns(line: bool) -> dict[str, str | None]:
     """Base units of all columns of a CSV file; None is text."""
-    bare = dict.fromkeys((SLIDING, *MIX), "1")
+    bare = dict.fromkeys((SLIDING, *MIX, CLOSURE), "1")
     return {INTERFACE: None, INCREMENT: "1", **base_units(line), **bare}
 
 

@@ -33,7 +33,7 @@ class ResultantsSource(UncoupledSource):
 
     def __init__(self, case: ResultantsCase) -> None:
         self._case = case
-        self.line = case.structure.line
+        self.line, self.file = case.structure.line, case.structure.file
 
     @cached_property
     def imported(self) -> dict[str, ImportedLoads]:

@@ -10,25 +10,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from fe_models.mesh import Interface
-from fe_models.structure import InterfaceHistory
+from fe_models.structure import CycleSolution, InterfaceHistory
 from sa_solver.types import Array, LoadHistory
 from workflow.analyses.contact.datasets import load_columns, slip_field
 from workflow.analyses.wear.datasets import face_mesh
 from workflow.analyses.wear.structures.resultants.consistency import MIX
-from workflow.analyses.wear.structures.resultants.imported import base_units
+from workflow.analyses.wear.structures.resultants.imported import CLOSURE, base_units
 from workflow.shell.dataset import Dataset
-from workflow.shell.results import writing
+from workflow.shell.results import ResultsWriter, writing
 from workflow.shell.tables import heading, write_table
 
-NOTE = "forces and moments of body 1 on body 2, in the frame of each interface; one closed cycle"
+NOTE = "forces and moments of body 1 on body 2, in the frame of each interface"
+
+
+def marched(cycle: CycleSolution) -> str:
+    """Which cycle the loads are, and how well it is closed."""
+    return (
+        f"the last of {cycle.cycles} cycles marched from rest, which changes the contact forces "
+        f"of the one before it by {cycle.closure:.1e} of the largest"
+    )
 
 
 def write_resultants_csv(
-    path: Path, histories: Mapping[str, LoadHistory], line: bool = False
+    path: Path,
+    histories: Mapping[str, LoadHistory],
+    line: bool = False,
+    cycle: CycleSolution | None = None,
 ) -> None:
     """Write the loads of every interface; numbers read back are the same, bit for bit.
 
-    Loads of a ``line`` contact are per mm.
+    Loads of a ``line`` contact are per mm. They are those of a ``cycle``, where one was marched.
     """
     loads = list(histories.values())
     units = base_units(line) | {"sliding": ""}
@@ -42,17 +53,21 @@ def write_resultants_csv(
     for name, unit in units.items():
         values = np.concatenate([getattr(history, name) for history in loads])
         columns[heading(name, unit)] = values.astype(int) if name == "sliding" else values
-    write_table(path, columns, note=NOTE)
+    if cycle is not None:
+        columns[CLOSURE] = np.full(sum(lengths), cycle.closure)
+    write_table(path, columns, note=NOTE if cycle is None else f"{NOTE}; {marched(cycle)}")
 
 
 def write_resultants_h5(
     path: Path,
     histories: Mapping[str, InterfaceHistory],
     heights: Mapping[str, Array] | None = None,
+    cycle: CycleSolution | None = None,
 ) -> None:
     """Write loads and slip of every interface with its face, frame and node numbers.
 
-    ``heights`` ``(nx, ny)`` [mm] are the unworn gaps on the grid of the case, by interface.
+    ``heights`` ``(nx, ny)`` [mm] are the unworn gaps on the grid of the case, by interface. Loads
+    are those of a ``cycle``, where one was marched.
     """
     line = any(history.interface.line for history in histories.values())
     with writing(path, line) as writer:
@@ -65,6 +80,13 @@ def write_resultants_h5(
             if isinstance(face, Interface):
                 datasets |= _at_nodes(face)
             writer.put(name, datasets, origin=face.frame.origin, axes=face.frame.axes)
+            if cycle is not None:
+                put_closure(writer, name, cycle)
+
+
+def put_closure(writer: ResultsWriter, group: str, cycle: CycleSolution) -> None:
+    """Which of how many cycles marched the loads of an interface are, as they are read back."""
+    writer.put(group, {}, cycles=cycle.cycles, **{CLOSURE: cycle.closure})
 
 
 def _at_nodes(face: Interface) -> dict[str, Dataset]:

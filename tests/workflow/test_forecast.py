@@ -1,0 +1,225 @@
+"""How long a run will take: told after its first steps, and by a check before it begins."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from tests.marks import slow
+from tests.workflow.commands import command
+from workflow.kinds import analysis_of, load_case
+from workflow.shell.forecast import Forecast, in_words
+from workflow.shell.reporter import Reporter
+from workflow.shell.run_time import RunTime
+
+CASES = Path("cases")
+
+
+class Clock:
+    """Tells the time that a test sets."""
+
+    def __init__(self) -> None:
+        self.now = 100.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+@pytest.fixture
+def clock(monkeypatch: pytest.MonkeyPatch) -> Clock:
+    told = Clock()
+    monkeypatch.setattr("time.perf_counter", told)
+    monkeypatch.setattr(Forecast.__init__, "__defaults__", (told,))
+    return told
+
+
+def test_what_is_left_takes_what_its_share_tells(clock: Clock) -> None:
+    forecast = Forecast()
+    assert forecast.left is None
+    clock.now += 18.0
+    forecast.reach(1.0 / 40.0)
+    assert forecast.left == pytest.approx(39 * 18.0)
+    forecast.reach(1.0)
+    assert forecast.left == 0.0
+
+
+def test_what_an_earlier_run_left_tells_nothing_of_the_rest(clock: Clock) -> None:
+    """Three quarters at once, then a tenth in 10 s: the last 15 % take 15 s."""
+    forecast = Forecast()
+    forecast.reach(0.75)
+    forecast.go_on()
+    assert forecast.left is None
+    clock.now += 10.0
+    forecast.reach(0.85)
+    assert forecast.left == pytest.approx(15.0)
+
+
+@pytest.mark.parametrize(
+    ("seconds", "told"),
+    [
+        (0.0, "a few seconds"),
+        (6.0, "5 s"),
+        (17.0, "20 s"),
+        (59.0, "1 min"),
+        (12.4 * 60.0, "12 min"),
+        (48.0 * 60.0, "50 min"),
+        (3590.0, "1 h"),
+        (26.0 * 3600.0, "25 h"),
+        (60.0 * 3600.0, "2 days"),
+    ],
+)
+def test_times_are_told_as_roughly_as_they_are_known(seconds: float, told: str) -> None:
+    assert in_words(seconds) == told
+
+
+def test_a_forecast_is_told_once_and_again_where_it_changes(clock: Clock, tmp_path: Path) -> None:
+    """Ten steps of 60 s, of which the seventh takes ten times as long; the first does not count."""
+    reporter = Reporter(tmp_path / "log", expected=RunTime(after=30.0))
+    with reporter.course("wear"):
+        for step in range(1, 11):
+            clock.now += 600.0 if step == 7 else 60.0
+            reporter.reached(step / 10.0, f"step {step}")
+    told = [line[9:] for line in (tmp_path / "log").read_text().splitlines()]
+    # 9 steps of 60 s and 30 s; after the seventh 3 of 150 s and 30 s, 1440 s in place of 630.
+    assert told == [
+        "wear, step 1: about 10 min to go",
+        "wear, step 7: about 8 min to go",
+    ]
+
+
+def test_short_runs_are_not_forecast(clock: Clock, tmp_path: Path) -> None:
+    reporter = Reporter(tmp_path / "log")
+    with reporter.course("wear"):
+        for share in (0.2, 0.4):
+            clock.now += 1.5
+            reporter.reached(share)
+    assert (tmp_path / "log").read_text() == ""
+
+
+def test_a_first_step_may_be_loading(clock: Clock, tmp_path: Path) -> None:
+    """6 s of compiling do not make an hour of 1000 steps of 0.06 s."""
+    reporter = Reporter(tmp_path / "log")
+    with reporter.course("motions"):
+        for step in range(1, 200):
+            clock.now += 6.0 if step == 1 else 0.0625
+            reporter.reached(step / 1000.0, f"step {step}")
+    told = (tmp_path / "log").read_text()[9:]
+    assert told == "motions, step 17: about 1 min to go\n"
+
+
+def test_what_comes_after_is_as_slow_as_what_came_before(clock: Clock, tmp_path: Path) -> None:
+    """40 s in place of 7 + 3 until the long part: 20 s more of it and 80 of pictures, not 20."""
+    reporter = Reporter(tmp_path / "log", expected=RunTime(before=7.0, after=20.0))
+    clock.now += 40.0
+    with reporter.course("wear"):
+        for step in (1, 2):
+            clock.now += 20.0
+            reporter.reached(step / 2.0)
+    assert (tmp_path / "log").read_text()[9:] == "wear: about 2 min to go\n"
+
+
+def test_parts_share_the_work_of_what_is_around_them(clock: Clock, tmp_path: Path) -> None:
+    """Two forces of two parts, whose first halves are told: from 1/8 to 5/8 in 100 s."""
+    reporter = Reporter(tmp_path / "log")
+    with reporter.course("curves"):
+        for force in reporter.parts((10.0, 30.0), "{:g} N".format):
+            with reporter.part(0.0, 0.5, "wear"):
+                clock.now += 5.0 * force - 50.0
+                reporter.reached(0.5, "95 Hz")
+    told = (tmp_path / "log").read_text()
+    assert "curves, 30 N: wear: 95 Hz: about 1 min to go" in told
+
+
+# --- the loops of every analysis ------------------------------------------------------------------
+
+
+@pytest.fixture
+def every_step(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Forecasts of runs however short, from their first step on."""
+    for least in ("FIRST_WORK", "FIRST_STEP", "SHORT_RUN"):
+        monkeypatch.setattr(f"workflow.shell.reporter.{least}", 0.0)
+
+
+SHORT = ["output.figures=false", "output.paraview=false"]
+
+
+@pytest.mark.parametrize(
+    ("name", "settings", "told"),
+    [
+        ("cylinder_wear.yaml", ["wear.cycles=1.2e5"], r"wear, jump 1 of about 3, 4e\+04 cycles"),
+        slow("sphere_normal.yaml", [], r"contact, increment \d+ of \d+"),
+        slow("rig_force_75N.yaml", ["energies=[0 J]"], r"steady states, 0 J: period \d+"),
+        slow("rig_hammer_7N.yaml", ["energies=[0 J]"], r"motions, 0 J"),
+        slow("rig_two_dof.yaml", ["forces=[1 N]"], r"vibration, 1 N: [\d.]+ Hz"),
+        slow("specimens_coarse.yaml", [], r"specimens, [\d.]+ N"),
+    ],
+)
+def test_runs_of_every_kind_tell_how_far_they_are(
+    every_step: None, tmp_path: Path, name: str, settings: list[str], told: str
+) -> None:
+    out = tmp_path / "out"
+    settings = [*settings, *(SHORT if "paraview" in (CASES / name).read_text() else SHORT[:1])]
+    done = command("run", CASES / name, "--out", out, overrides=settings)
+    assert done.exit_code == 0, done.stderr
+    assert re.search(rf"{told}: (about [\d.]+ \w+|about a few seconds) to go", done.stderr)
+
+
+# --- before it begins -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "true"),
+    [
+        ("bolted_joint_test2", 4),
+        ("cylinder_wear", 8),
+        ("dovetail", 60),
+        ("dovetail_2d", 15),
+        ("dovetail_small", 12),
+        ("line_dissimilar", 14),
+        ("rig_computed_wear", 51),
+        ("rig_force_75N", 9),
+        ("rig_hammer_60N", 15),
+        ("rig_harmonic_balance", 400),
+        ("rig_reduced", 18),
+        ("rig_two_dof", 50),
+        ("rig_wear_specimens", 170),
+        ("rig_wear_vibration", 62),
+        ("specimens_rig", 28),
+        ("specimens_wear", 27),
+        ("sphere_fretting", 6),
+        ("sphere_wear", 10),
+    ],
+)
+def test_check_tells_the_order_of_magnitude(name: str, true: float) -> None:
+    """Against processor seconds of the shipped cases on one core, structures not in the cache."""
+    case = load_case(CASES / f"{name}.yaml")
+    told = analysis_of(case).run_time(case).seconds
+    assert true / 5.0 < told < 5.0 * true
+
+
+@pytest.mark.parametrize(
+    ("name", "finer"),
+    [
+        ("dovetail", "mesh.flank_nodes=[40, 68]"),
+        ("dovetail", "wear.step.cycles=3000"),
+        ("dovetail", "contact.grid=[512, 1024]"),
+        ("cylinder_wear", "wear.step.cycles=100"),
+        ("sphere_fretting", "contact.grid=[512, 512]"),
+        ("rig_hammer_60N", "integration.step=1 us"),
+        ("rig_harmonic_balance", "resolution.harmonics=15"),
+        ("rig_wear_specimens", "wear.cycles=[1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14]"),
+        ("specimens_rig", "mesh.size=0.3 mm"),
+    ],
+)
+def test_more_work_takes_longer(name: str, finer: str) -> None:
+    path = CASES / f"{name}.yaml"
+    case, more = load_case(path), load_case(path, [finer])
+    times = [analysis_of(each).run_time(each).seconds for each in (case, more)]
+    assert times[1] > 2.0 * times[0]
+
+
+def test_check_says_how_long() -> None:
+    checked = command("check", CASES / "dovetail.yaml")
+    assert re.search(
+        r"^  time +about 1 min, within a factor of five$", checked.stdout, re.MULTILINE
+    )

@@ -1,0 +1,43 @@
+"""How long a case in time takes."""
+
+from __future__ import annotations
+
+from workflow.analyses import wear
+from workflow.analyses.rig.excitation import Harmonic
+from workflow.analyses.rig.structure import ReducedBody
+from workflow.analyses.specimens.run_time import reduction_of
+from workflow.analyses.time.case import JointCase, RigCase
+from workflow.case.loading import load_named
+from workflow.shell.run_time import RunTime
+
+# A step of a rig in time; of a reduced body [s]. Chosen steps are parts of what the case gives.
+STEP, REDUCED_STEP, CHOSEN = 5e-5, 7e-4, 5.0
+# Periods to a steady state, and steady states that an ageing is built on.
+PERIODS, AGEING = 30, 20
+# A joint alone, aged at its stroke [s].
+JOINT = 1.0
+
+
+def run_time(case: JointCase | RigCase) -> RunTime:
+    """Of all motions, or of the cycles up to steady ones."""
+    worn = _computed_wear(case.evolution.file)
+    if isinstance(case, JointCase):
+        return RunTime(worn, JOINT)
+    reduced = isinstance(case.structure, ReducedBody)
+    motions = len(case.energies)
+    if isinstance(case.excitation, Harmonic):
+        motions = PERIODS * (motions + (AGEING if case.ageing.wanted else 0))
+    step = REDUCED_STEP if reduced else STEP
+    if case.integration.tolerance is not None:
+        step *= CHOSEN
+    if isinstance(case.structure, ReducedBody):
+        worn += reduction_of(case.structure.file)
+    return RunTime(worn, motions * case.steps * step)
+
+
+def _computed_wear(file: str | None) -> float:
+    """Of the wear case that the joint follows, if there is one [s]."""
+    if file is None or not file.endswith(".yaml"):
+        return 0.0
+    kinds = list(wear.ANALYSIS.cases.values())
+    return wear.ANALYSIS.run_time(load_named("evolution.file", file, kinds, "wear")).seconds

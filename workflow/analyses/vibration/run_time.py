@@ -1,0 +1,61 @@
+"""How long a vibration case takes."""
+
+from __future__ import annotations
+
+from math import log
+
+from workflow.analyses.rig.structure import FrictionRig, ReducedBody, Rig
+from workflow.analyses.specimens.case import SpecimensCase
+from workflow.analyses.specimens.run_time import reduction_of
+from workflow.analyses.vibration.case import VibrationCase, VibrationCaseBase
+from workflow.case.loading import load_named
+from workflow.shell.run_time import RunTime
+
+# Points of a curve, usually, where the frequency or the force grows by a factor of e.
+POINTS = 50
+# A point of a rig with one joint; the same where harmonics grow to a tolerance [s].
+POINT, GROWING_POINT = 5e-3, 2e-2
+# A point of so many unknowns, and the linear limits of so many directions, of joints [s].
+MANY, MANY_UNKNOWNS, MANY_POWER = 0.37, 4000.0, 1.5
+LIMITS, DIRECTIONS, CUBE = 25.0, 363.0, 3
+# Joints of a reduced body whose points are not counted.
+JOINTS = 100
+
+
+def run_time(case: VibrationCase) -> RunTime:
+    """Of the structure, its linear limits, and all curves."""
+    span = log(case.frequencies[1] / case.frequencies[0])
+    curves = len(case.forces) * span
+    if case.backbone or case.force_sweeps:
+        along = log(case.forces[-1] / case.forces[0])
+        curves += (case.backbone + len(case.force_sweeps)) * along
+    return RunTime(structure_time(case), POINTS * curves * point_time(case))
+
+
+def structure_time(case: VibrationCaseBase) -> float:
+    """Until curves can be followed [s]."""
+    limits = LIMITS * (_directions(case) / DIRECTIONS) ** CUBE
+    if isinstance(case.structure, FrictionRig):
+        return limits + reduction_of(case.structure.specimens)
+    if isinstance(case.structure, ReducedBody):
+        return limits + reduction_of(case.structure.file)
+    return limits
+
+
+def point_time(case: VibrationCaseBase) -> float:
+    """Of a point of a curve [s]."""
+    unknowns = _directions(case) * 2 * len(case.harmonics)
+    one = POINT if case.resolution.tolerance is None else GROWING_POINT
+    return one + float(MANY * (unknowns / MANY_UNKNOWNS) ** MANY_POWER)
+
+
+def _directions(case: VibrationCaseBase) -> int:
+    """Of all joints."""
+    if isinstance(case.structure, Rig):
+        return 1
+    joints = JOINTS
+    if isinstance(case.structure, FrictionRig):
+        file = case.structure.specimens
+        specimens = load_named("structure.specimens", file, [SpecimensCase], "specimens")
+        joints = (specimens.mesh.pad_elements + 1) ** 2
+    return joints * (3 if case.contacts else 1)

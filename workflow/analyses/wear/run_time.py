@@ -1,0 +1,137 @@
+"""How long a wear run takes: its structure, its contacts' steps, and what is found at the end."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from math import ceil, prod, sqrt
+
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.case.worn_bodies import WornByArchard
+from workflow.shell.run_time import (
+    FRICTIONAL,
+    NORMAL,
+    NORMAL_LINE,
+    RunTime,
+    factors,
+    solves,
+)
+
+# Automatic steps of 1 %, on pressures alone and with the half-space's own friction; steps by depth
+# or volume, whose number nobody knows; jumps of explicit steps that are recorded.
+AUTOMATIC, AUTOMATIC_FULL, BY_SIZE, RECORDED = 15, 40, 30, 10
+# What is written after a jump [s].
+JUMP = 0.02
+# Contact problems of an increment that dissipates in a step: of each kind.
+PROBLEMS = {"explicit": 1, "implicit": 1, "second_order": 4}
+# Of the increments of a structure's cycle, those that dissipate.
+DISSIPATING = 0.6
+# A way [mm] that contacts of structures slip in a cycle.
+SLIP = 0.03
+# Longest stable explicit step, of the pitch over E* times the wear per pressure (wear.stepping).
+STABLE = 1.16
+# Iterations of friction in the structure in an increment, each entry of its dense matrix in one of
+# them; and the same of its inverse [s].
+ITERATIONS, ENTRY, INVERSE = 24, 5e-10, 1e-10
+# Cycles until that of the structure is closed.
+CYCLES = 2
+# Branches of a tangential loop that are marched until it is closed, each problem soon solved.
+BRANCHES = 4
+# Stress under a contact, of a cell in an increment: on a face, and by a search for the worst plane.
+STRESS, SEARCHED = 1.2e-6, 10.0
+# Stress and mesh of the structure at the end, in sparse factors; figures and files of fields [s].
+WORN, PICTURES = 2.0, 6.0
+
+
+@dataclass(frozen=True)
+class Extent:
+    """What a structure lays on its contacts: ``increments`` of a cycle, on so many ``faces``.
+
+    ``nodes`` are those of both bodies and ``interface_nodes`` those of all faces, 0 without finite
+    elements. In a cycle the bodies pass a ``path`` [mm] over each other; ``dissipating`` is the
+    share of its increments in which they slide.
+    """
+
+    increments: int
+    faces: int = 1
+    nodes: float = 0.0
+    interface_nodes: float = 0.0
+    path: float = SLIP
+    dissipating: float = 1.0
+
+
+def run_time(case: WearCase, extent: Extent) -> RunTime:
+    """Of a wear case with a structure of this extent."""
+    plane = getattr(case.structure, "dimension", 3) == 2 or case.contact.grid[1] == 1
+    cells = case.contact.grid[0] if plane else prod(case.contact.grid)
+    at_once = min(extent.faces, os.cpu_count() or 1)
+    shared = extent.faces / at_once
+    steps, jumps = _steps(case, extent)
+    normal = NORMAL_LINE if plane else NORMAL
+    in_a_step = extent.increments * extent.dissipating * PROBLEMS[case.wear.step.kind]
+    begun = solves(2 * extent.increments, cells, normal)
+    worn = solves(steps * in_a_step, cells, normal)
+    if case.contact.method == "full":
+        begun += solves(2 * extent.increments, cells, FRICTIONAL)
+        worn += solves(steps * extent.increments, cells, FRICTIONAL)
+    if case.loops.wanted:
+        worn += solves(jumps * BRANCHES * case.loops.increments, cells, NORMAL)
+    worn += jumps * JUMP
+    again = {"constant": 0.0, "drift": 1.0, "every": jumps}[case.recoupling.resultants]
+    cycle = _structural_cycle(extent)
+    before = shared * begun + _condensation(extent) + CYCLES * cycle
+    after = PICTURES + WORN * factors(extent.nodes) + cycle + _stress(case, extent, cells)
+    return RunTime(before, shared * worn + again * cycle, after)
+
+
+def _steps(case: WearCase, extent: Extent) -> tuple[float, float]:
+    """Steps of a run, and its jumps."""
+    wear, step = case.wear, case.wear.step
+    if step.cycles is not None:
+        jumps = ceil(wear.cycles / step.cycles)
+        return jumps, jumps
+    if step.fraction is not None:
+        steps = max(RECORDED, wear.cycles / (step.fraction * _stable(case, extent)))
+        return steps, RECORDED
+    if not step.automatic:
+        return BY_SIZE, BY_SIZE
+    finer = 1.0 if wear.depth_tolerance is not None else max(1.0, sqrt(0.01 / wear.tolerance))
+    steps = finer * (AUTOMATIC_FULL if case.contact.method == "full" else AUTOMATIC)
+    return steps, 0.5 * steps
+
+
+def _stable(case: WearCase, extent: Extent) -> float:
+    """About the longest stable explicit step [cycles]."""
+    bodies = [case.material(number) for number in (1, 2)]
+    compliance = sum((1.0 - body.poisson**2) / body.young for body in bodies)
+    worn = 0.0
+    for number in (1, 2):
+        law = case.wear_of(number)
+        friction = case.friction.coefficient
+        coefficient: float = getattr(law, "coefficient")  # of every law  # noqa: B009
+        worn += (
+            coefficient / law.hardness if isinstance(law, WornByArchard) else coefficient * friction
+        )
+    size = getattr(case.contact, "size", None) or getattr(case.structure, "size", None)
+    length = size[0] if isinstance(size, tuple) else (size or 10.0)
+    pitch = length / case.contact.grid[0]
+    return STABLE * pitch * compliance / (worn * extent.path) if worn > 0.0 else case.wear.cycles
+
+
+def _condensation(extent: Extent) -> float:
+    """Of the structure onto its interfaces [s]."""
+    return factors(extent.nodes) + INVERSE * (3.0 * extent.interface_nodes) ** 3
+
+
+def _structural_cycle(extent: Extent) -> float:
+    """Of a cycle of the structure with friction [s]."""
+    return extent.increments * ITERATIONS * ENTRY * (3.0 * extent.interface_nodes) ** 2
+
+
+def _stress(case: WearCase, extent: Extent, cells: int) -> float:
+    """Under all contacts, unworn and worn [s]."""
+    life = case.stress.life.parameter
+    if life == "none":
+        return 0.0
+    searched = 1.0 if life == "ruiz" else SEARCHED
+    return 2.0 * STRESS * searched * extent.faces * extent.increments * cells
