@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -242,6 +243,21 @@ def test_a_container_leaves_less_than_its_machine(monkeypatch, tmp_path):
     assert memory.available_bytes() == 1000 * 1024
     (tmp_path / "memory.max").write_text("800000\n", encoding="ascii")
     assert memory.available_bytes() == 400000
+
+
+@pytest.mark.parametrize("chosen", [None, "COMPATIBLE"])
+def test_the_user_may_choose_mkls_mode_of_results(monkeypatch, chosen):
+    need_pardiso()
+    import pypardiso
+
+    modes = []
+    mkl = SimpleNamespace(MKL_CBWR_Set=modes.append)
+    monkeypatch.setattr(pypardiso.ps, "libmkl", mkl)
+    monkeypatch.delenv("MKL_CBWR", raising=False)
+    if chosen:
+        monkeypatch.setenv("MKL_CBWR", chosen)
+    assert pardiso.library.__wrapped__() is mkl
+    assert modes == ([] if chosen else [pardiso.REPRODUCIBLE])
 
 
 @pytest.mark.slow

@@ -160,13 +160,13 @@ class InterfaceStress:
         i, k = np.unravel_index(first_largest(values), values.shape)
         along, across = ("y", "x") if planes.settings.section == "y" else ("x", "y")
         place = {along: float(planes.along[i]), across: planes.at, "depth": float(planes.depths[k])}
-        return {"value": float(values[i, k]), **place}
+        return {"value": float(values.max()), **place}
 
     def _largest(self, values: Array) -> dict[str, float]:
         grid = self.planes.grid
         i, j = np.unravel_index(first_largest(values), values.shape)
         place = {"x": float(grid.x[i, 0]), "y": float(grid.y[0, j])}
-        return {"value": float(values[i, j]), **place, "depth": self.planes.settings.life.depth}
+        return {"value": float(values.max()), **place, "depth": self.planes.settings.life.depth}
 
 
 def contact_stresses(
