@@ -401,7 +401,8 @@ def test_rigid_motions_take_no_energy_and_follow_the_constraints(box, titanium):
     scale = np.abs(elastic.stiffness).max()
     assert np.abs(elastic.stiffness @ modes).max() < 1e-12 * scale
     assert np.linalg.matrix_rank(modes) == 6
-    assert abs(softness(elastic.stiffness, modes)) < 1e-14
+    # No energy to the solver, which takes less for a body that is not held.
+    assert abs(softness(elastic.stiffness, modes)) * linear_solver.GROWTH_LIMIT < 1.0
     # On a slide with a slanted normal the motions along it remain, exactly.
     constraints = Constraints(len(elastic.nodes))
     slanted = np.array([0.6, 0.0, 0.8])
