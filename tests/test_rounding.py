@@ -19,9 +19,14 @@ OLD_PROCESSOR = {
     "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX512F,-AVX512VL,-AVX2,-AVX,-FMA,-FMA4",
 }
 PERTURBED = ("-p", "tests.perturbed")
-SOLVERS = ("tests/sa_solver", "tests/fe_models", "tests/wear")
-# Of these the compiled joints and the branches of vibrations take the longest.
-LONG = ("tests/fe_models/dynamics", "tests/wear/joints")
+SOLVERS = [
+    "tests/sa_solver",
+    "tests/fe_models",
+    "tests/wear",
+    "tests/workflow/test_specimens_case.py",
+]
+# The compiled joints and the branches of vibrations would double the time.
+SOLVERS += [f"--ignore=tests/{path}" for path in ("fe_models/dynamics", "wear/joints")]
 CLOSED_FORMS = [
     f"tests/sa_solver/test_{name}.py"
     for name in ("convergence", "tangential_dense", "gross_slip", "friction_limit")
@@ -46,13 +51,11 @@ def test_closed_forms_are_met_by_perturbed_matrices():
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("seed", [1, 2])
-def test_solvers_do_not_notice_perturbed_matrices(seed):
-    run_tests(*PERTURBED, *SOLVERS, *(f"--ignore={path}" for path in LONG), SEED=str(seed))
+def test_solvers_do_not_notice_perturbed_matrices():
+    run_tests(*PERTURBED, *SOLVERS)
 
 
 @pytest.mark.slow
 def test_solvers_do_not_notice_another_processor(tmp_path):
     # What is compiled for it is kept apart.
-    old = OLD_PROCESSOR | {"NUMBA_CACHE_DIR": str(tmp_path)}
-    run_tests(*SOLVERS, "tests/workflow/test_specimens_case.py", f"--ignore={LONG[0]}", **old)
+    run_tests(*SOLVERS, **OLD_PROCESSOR, NUMBA_CACHE_DIR=str(tmp_path))
