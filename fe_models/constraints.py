@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import scipy.sparse as sp
 
+from sa_solver.ties import first_largest
 from sa_solver.types import Array, Indices
 
 # An equation whose coefficients shrink to this share, once others are put in, says nothing new.
@@ -56,7 +57,7 @@ class Constraints:
         free, shares = self._in_free(dofs, coefficients)
         if np.abs(shares).max(initial=0.0) <= ALREADY_MET * np.abs(coefficients).max():
             return
-        pivot = int(np.argmax(np.abs(shares)))
+        pivot = first_largest(np.abs(shares))
         others = np.flatnonzero(shares)
         others = others[others != pivot]
         entry = free[others], -shares[others] / shares[pivot]

@@ -18,6 +18,7 @@ from fe_models.mortar import frame_of_faces, mortar_interface
 from fe_models.spin_softening import spin_softening
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes
+from sa_solver.ties import first_largest
 from sa_solver.types import Array, Indices, Material
 
 AXIS_NAMES = "xyz"
@@ -281,7 +282,8 @@ def _check_rest(body: SupportedBody) -> None:
     points = body.elastic.nodes
     motions = body.free_motions(points.mean(axis=0), float(np.ptp(points, axis=0).max()))
     if len(motions):
-        motion = int(np.argmax(np.abs(motions[0])))
+        # Of several, how much of each axis is among them, whatever basis they have been given in.
+        motion = first_largest(np.sum(motions**2, axis=0))
         freely = f"{'shift along' if motion < 3 else 'turn about'} {AXIS_NAMES[motion % 3]}"
         raise MeshError(
             f"the supports let body {body.elastic.body.name} {freely}, which must be held by them "

@@ -8,6 +8,7 @@ Source: Schenk and Gärtner 2004, doi:10.1016/j.future.2003.07.011; oneMKL's ref
 from __future__ import annotations
 
 import ctypes
+import os
 import weakref
 from functools import cache
 from typing import Any
@@ -25,8 +26,10 @@ NO_DEFAULTS, ORDERING, ZERO_BASED, SCHUR = 0, 1, 34, 35
 ANALYSIS_PEAK, ANALYSIS_KEPT, FACTORS = 14, 15, 16
 NESTED_DISSECTION = 2
 # MKL's mode of reproducible results with its fastest kernels: two solutions with two threads
-# differ in the last bits otherwise.
+# differ in the last bits otherwise. MKL's own variable chooses another, say that which gives the
+# same bits on every processor; what is set by a call would win over it.
 REPRODUCIBLE = 2
+MODE_VARIABLE = "MKL_CBWR"
 # Its number for real symmetric positive definite matrices.
 POSITIVE_DEFINITE = 2
 KILOBYTE = 1024
@@ -44,7 +47,8 @@ def library() -> Any | None:
     except ImportError:
         return None
     mkl = pypardiso.ps.libmkl
-    mkl.MKL_CBWR_Set(REPRODUCIBLE)
+    if MODE_VARIABLE not in os.environ:
+        mkl.MKL_CBWR_Set(REPRODUCIBLE)
     return mkl
 
 

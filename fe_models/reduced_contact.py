@@ -281,9 +281,12 @@ class ReducedPair:
         A change of gap changes the forces by δf = -K' δg: with K the inverse of A_zz on the nodes
         in contact, K' = K - K 1 1ᵀK/(1ᵀK 1), which leaves the imposed force as it is. A cycle block
         of ΔN cycles turns δg into (I - ΔN C K') δg, C = diag(c): stable while ΔN < 2/λ, with λ the
-        largest eigenvalue of C^½ K' C^½. The change of slip with the forces is neglected.
+        largest eigenvalue of C^½ K' C^½. The change of slip with the forces is neglected. A single
+        node carries all of the force, whatever its gap, and any number of cycles.
         """
         touching = np.flatnonzero(normal.touching)
+        if len(touching) < 2:
+            return np.inf  # K' is 0, or what rounding leaves of it
         K = _inverse(self.block(Z)[np.ix_(touching, touching)])
         sums = K.sum(axis=1)
         K -= np.outer(sums, sums) / sums.sum()

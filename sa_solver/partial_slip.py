@@ -35,6 +35,7 @@ from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalStart, NormalState
 from sa_solver.tangential_loop import LoopFailure, LoopPath, stuck_stiffness, tractions_of_motion
+from sa_solver.ties import SAME
 from sa_solver.types import Array, Tilt
 
 STAGES = 24
@@ -104,8 +105,11 @@ class PartialSlip:
 
     @property
     def onset(self) -> Array:
-        """Shift up to which every cell sticks ``(nx, ny)`` [mm]; 0 off the contact."""
-        sticking = np.count_nonzero(self.slip == 0.0, axis=0) - 1
+        """Shift up to which every cell sticks ``(nx, ny)`` [mm]; 0 off the contact.
+
+        The last of a symmetric contact to part do so together, but for rounding.
+        """
+        sticking = np.count_nonzero(self.slip <= SAME * self.slip.max(), axis=0) - 1
         return np.where(self.normal.pressure > 0.0, self.shift[sticking], 0.0)
 
 

@@ -38,6 +38,9 @@ Array = NDArray[np.float64]
 Indices = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 
+ALIKE = 1e-12
+"""|β| up to which bodies are alike: what rounding leaves of moduli in different units."""
+
 Tilt = Literal["free", "held"]
 """Whether bodies turn about x and y as imposed moments make them, or keep the tilt that they have
 unloaded and unworn, whatever moments that takes."""
@@ -120,7 +123,7 @@ class ElasticPair:
     @property
     def similar(self) -> bool:
         """Whether pressure and shear do not influence each other."""
-        return self.coupling == 0.0
+        return abs(self.dundurs_beta) <= ALIKE
 
 
 @dataclass(frozen=True)

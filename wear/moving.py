@@ -29,6 +29,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from sa_solver.errors import InputError
+from sa_solver.ties import exceeds
 from sa_solver.types import Array, Grid, Mask
 
 LEAST_RESOLVED = 1.5
@@ -155,10 +156,11 @@ def moves(path: Array, pressed: Mask, grid: Grid) -> bool:
         path = path * [1.0, 0.0]
     stroke, (x, y) = stroke_of(path)
     along = np.broadcast_to(grid.x * x + grid.y * y, grid.shape)[pressed]
-    if stroke < LEAST_RESOLVED * np.hypot(grid.pitch[0] * x, grid.pitch[1] * y) or not len(along):
+    pitch = float(np.hypot(grid.pitch[0] * x, grid.pitch[1] * y))
+    if exceeds(LEAST_RESOLVED * pitch, stroke) or not len(along):
         return False
     width = np.ptp(along) + abs(grid.pitch[0] * x) + abs(grid.pitch[1] * y)
-    return bool(stroke > LARGE_STROKE * width)
+    return exceeds(stroke, LARGE_STROKE * float(width))
 
 
 def followed(

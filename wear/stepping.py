@@ -30,6 +30,7 @@ import numpy as np
 from sa_solver.errors import ConvergenceError
 from sa_solver.influence import Z
 from sa_solver.normal import NormalContact, NormalStart, NormalState
+from sa_solver.ties import first_largest
 from sa_solver.types import Array, Grid, LoadHistory, Tilt
 from wear.laws import SlidingConditions, WearLaw
 from wear.moving import Passage, TravelError
@@ -164,7 +165,7 @@ class WearingContact:
         """
         loads = self.sliding.loads
         works = (loads.P > 0.0) & (loads.share > 0.0) & self.sliding.slip.any(axis=(1, 2))
-        count, heaviest = len(loads), int(np.argmax(loads.P))
+        count, heaviest = len(loads), first_largest(loads.P)
         order = [(heaviest + 1 + k) % count for k in range(count)]
         return [t for t in order if works[t]]
 

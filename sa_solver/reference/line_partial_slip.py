@@ -25,6 +25,7 @@ import numpy as np
 from sa_solver.errors import InputError
 from sa_solver.reference.hertz import HertzCylinder
 from sa_solver.reference.masing import superpose
+from sa_solver.ties import exceeds
 from sa_solver.types import Array
 
 ROUNDING = 1e-12
@@ -213,12 +214,11 @@ def _shear(contact: HertzCylinder, friction: float, x: Array, stick: float, offs
 
 def reserve(tangential: float, sliding_force: float, unit: str = "N/mm") -> float:
     """1 - |Q| / µP, what is left before sliding. Raises ``InputError`` beyond |Q| = µP."""
-    left = 1.0 - abs(tangential) / sliding_force
-    if left < 0.0:
+    if exceeds(abs(tangential), sliding_force):
         raise InputError(
             f"Q = {tangential} {unit} slides: it is beyond µP = {sliding_force} {unit}"
         )
-    return left
+    return max(0.0, 1.0 - abs(tangential) / sliding_force)
 
 
 def _x_log_x(x: float) -> float:

@@ -33,6 +33,7 @@ from scipy.special import ellipe, elliprd, elliprj
 from sa_solver.errors import InputError
 from sa_solver.reference.hertz import FrictionalSphere
 from sa_solver.reference.masing import superpose
+from sa_solver.ties import exceeds
 from sa_solver.types import Array
 
 ROUNDING = 1e-12
@@ -67,7 +68,7 @@ class TwistedSphere(FrictionalSphere):
     def stick_radius(self, moment: float) -> float:
         """c [mm] on first loading to ``moment`` [N mm]."""
         target = abs(moment)
-        if target > self.sliding_moment:
+        if exceeds(target, self.sliding_moment):
             raise InputError(
                 f"Mz = {moment} N mm slides: it is beyond 3πµPa/16 = {self.sliding_moment} N mm"
             )

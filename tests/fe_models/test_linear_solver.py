@@ -3,6 +3,7 @@
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -244,6 +245,21 @@ def test_a_container_leaves_less_than_its_machine(monkeypatch, tmp_path):
     assert memory.available_bytes() == 400000
 
 
+@pytest.mark.parametrize("chosen", [None, "COMPATIBLE"])
+def test_the_user_may_choose_mkls_mode_of_results(monkeypatch, chosen):
+    need_pardiso()
+    import pypardiso
+
+    modes = []
+    mkl = SimpleNamespace(MKL_CBWR_Set=modes.append)
+    monkeypatch.setattr(pypardiso.ps, "libmkl", mkl)
+    monkeypatch.delenv("MKL_CBWR", raising=False)
+    if chosen:
+        monkeypatch.setenv("MKL_CBWR", chosen)
+    assert pardiso.library.__wrapped__() is mkl
+    assert modes == ([] if chosen else [pardiso.REPRODUCIBLE])
+
+
 @pytest.mark.slow
 def test_factors_on_two_threads_are_the_same_bit_for_bit(box, titanium):
     need_pardiso()
@@ -385,7 +401,8 @@ def test_rigid_motions_take_no_energy_and_follow_the_constraints(box, titanium):
     scale = np.abs(elastic.stiffness).max()
     assert np.abs(elastic.stiffness @ modes).max() < 1e-12 * scale
     assert np.linalg.matrix_rank(modes) == 6
-    assert abs(softness(elastic.stiffness, modes)) < 1e-14
+    # No energy to the solver, which takes less for a body that is not held.
+    assert abs(softness(elastic.stiffness, modes)) * linear_solver.GROWTH_LIMIT < 1.0
     # On a slide with a slanted normal the motions along it remain, exactly.
     constraints = Constraints(len(elastic.nodes))
     slanted = np.array([0.6, 0.0, 0.8])

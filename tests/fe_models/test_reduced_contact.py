@@ -315,6 +315,14 @@ class TestStability:
         cycle = pair.fretting_cycle(flat, replace(conditions(), stroke=0.0))
         assert pair.stable_cycles(cycle.normal, cycle.cycle_slip) == np.inf
 
+    def test_a_single_node_has_no_limit(self, pair, flat):
+        """Its gap changes nothing, whatever digits its compliance ends in."""
+        for node in range(len(flat)):
+            gap = np.where(np.arange(len(flat)) == node, 0.0, 1.0)
+            alone = pair.normal(gap, 1.0)
+            assert np.count_nonzero(alone.touching) == 1
+            assert pair.stable_cycles(alone, np.ones(len(flat))) == np.inf
+
 
 @pytest.mark.slow
 class TestRig:

@@ -14,7 +14,7 @@ from sa_solver.normal import NormalContact
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.reference.torsion import TwistedSphere
 from sa_solver.tangential import FrictionLimitError
-from sa_solver.types import Grid
+from sa_solver.types import ElasticPair, Grid, Material
 from tests.limits.conditions import frictional_error
 from tests.limits.scenes import ALIKE, BOTH, FRICTION, PAIRS, RADIUS, SOLVED, P, sphere
 
@@ -80,6 +80,20 @@ def test_the_stick_zone_closes_as_in_mindlins_solution():
             assert stuck == pytest.approx(wanted, abs=contact.grid.pitch[0])
     assert np.all(np.diff(shifts) > 0.0)
     np.testing.assert_allclose(state.shear[0], FRICTION * state.pressure, atol=1e-5)
+
+
+@pytest.mark.parametrize("off", [-1e-10, -1e-13, 0.0, 1e-13])
+def test_at_the_limit_rounding_does_not_choose_a_motion(off):
+    """With Poisson's ratio no motion is long enough at Q = µP: it was 10 mm for a radius of 0.1."""
+    grid = Grid.covering((0.6, 0.6), (32, 32))
+    steel = Material(200e3, 0.3)
+    contact = FrictionalContact(HalfSpace(grid, ElasticPair(steel, steel)), 0.3)
+    height = (grid.x**2 + grid.y**2) / 40.0
+    pressed = contact.advance(contact.apart(height), height, ContactLoad(10.0 * np.eye(6)[0]))
+    values = np.array([10.0, 3.0 * (1.0 + off), 0.0, 0.0, 0.0, 0.0])
+    with pytest.raises(FrictionLimitError, match="without sliding") as info:
+        contact.advance(pressed, height, ContactLoad(values))
+    assert info.value.share == pytest.approx(1.0, rel=1e-7)
 
 
 @pytest.mark.slow

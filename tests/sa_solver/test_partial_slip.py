@@ -1,5 +1,7 @@
 """Contacts moved to and fro by normal problems alone: Mindlin, and the whole tangential problem."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -142,6 +144,17 @@ def test_what_has_not_reached_its_onset_has_not_slipped():
     assert np.all(path[pressed & (curve.onset >= amplitude)] < 1e-12 * path.max())
     assert np.all(path[pressed & (curve.onset < amplitude * (1.0 - 1e-12))] > 0.0)
     assert not curve.travelled(np.zeros(len(curve.reach))).any()
+
+
+def test_the_last_cells_to_slip_do_so_together():
+    """Four of them in the middle, which rounding parts one after the other."""
+    curve, _, _ = moved(sphere(STEEL))
+    slip = curve.slip.copy()
+    middle = [k // 2 for k in slip.shape[1:]]
+    first, second = (slice(k - 1, k + 1) for k in middle)
+    slip[-1, first, second] = 1e-16 * slip.max() * np.array([[0.0, 1.0], [2.0, 3.0]])
+    onset = replace(curve, slip=slip).onset
+    assert np.all(onset[first, second] == curve.shift[-1])
 
 
 def test_a_flat_punch_slips_all_at_once():

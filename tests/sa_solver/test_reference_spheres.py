@@ -140,6 +140,12 @@ def test_reversed_shear_carries_the_load_and_respects_friction():
     assert np.trapezoid(2.0 * np.pi * r * q, r) == pytest.approx(-60.0, rel=1e-4)
 
 
+def test_a_load_at_the_limit_but_for_rounding_is_at_the_limit():
+    """As one that a solver was given, and found again from the shear."""
+    assert SHEARED.stick_radius(SHEARED.sliding_force * (1.0 + 1e-9)) == 0.0
+    assert TWISTED.stick_radius(TWISTED.sliding_moment * (1.0 + 1e-9)) == 0.0
+
+
 def test_beyond_friction_there_is_no_partial_slip():
     with pytest.raises(ValueError, match="slides"):
         SHEARED.displacement(281.0)

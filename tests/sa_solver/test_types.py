@@ -35,6 +35,15 @@ def test_identical_materials_are_exactly_similar(poisson):
     assert pair.similar
 
 
+def test_the_same_modulus_in_other_units_is_alike():
+    """Conversions leave the last digits to chance."""
+    off = 115e3 * (1.0 + 4.0 * np.finfo(float).eps)
+    pair = ElasticPair(Material(115e3, 0.29), Material(off, 0.29))
+    assert pair.coupling != 0.0
+    assert pair.similar
+    assert not ElasticPair(Material(115e3, 0.29), Material(115e3 + 1.0, 0.29)).similar
+
+
 @pytest.mark.parametrize(("poisson", "beta"), [(0.0, 0.5), (0.3, 2.0 / 7.0), (0.5, 0.0)])
 def test_dundurs_beta_of_a_body_on_a_rigid_one(poisson, beta):
     """β = (1-2ν) / 2(1-ν), positive where body 2 is the compliant one."""

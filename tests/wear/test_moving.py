@@ -233,6 +233,15 @@ def test_motion_counts_where_it_is_large_and_can_be_resolved(
     assert moves(reciprocating(stroke, 2), pressed, GRID) is expected
 
 
+@pytest.mark.parametrize("off", [-1e-12, 0.0, 1e-12])
+def test_rounding_does_not_decide_whether_motion_counts(off: float) -> None:
+    """A stroke of exactly 1.5 cells is followed, one of exactly a tenth of the width is not."""
+    cells, width = (np.abs(GRID.x) < half for half in (0.3, 1.0))
+    assert moves(reciprocating(0.15 * (1.0 + off), 2), np.broadcast_to(cells, GRID.shape), GRID)
+    tenth = 0.1 * np.count_nonzero(width) * GRID.pitch[0] * (1.0 + off)
+    assert not moves(reciprocating(tenth, 2), np.broadcast_to(width, GRID.shape), GRID)
+
+
 def test_motion_without_contact_does_not_count() -> None:
     assert not moves(reciprocating(1.0, 2), np.zeros(GRID.shape, dtype=bool), GRID)
 

@@ -158,6 +158,14 @@ def test_working_increments_end_with_the_heaviest() -> None:
     assert wearing(history=history, slip=slip).dissipating == [2, 4, 0, 1]
 
 
+@pytest.mark.parametrize("off", [-1e-9, 1e-9])
+def test_of_loads_that_are_held_the_first_is_the_heaviest(off: float) -> None:
+    """Wherever the solver of the structure left the larger residual."""
+    history = loads(100.0, 500.0, 500.0 * (1.0 + off), 300.0)
+    slip = np.full((4, *GRID.shape), SLIP)
+    assert wearing(history=history, slip=slip).dissipating == [2, 3, 0, 1]
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_stuck_cycle_wears_nothing(kind: str) -> None:
     contact = wearing(slip=np.zeros((1, *GRID.shape)))

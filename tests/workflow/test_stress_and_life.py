@@ -99,10 +99,12 @@ def test_summary_tells_the_largest_of_the_maps(normal: Any) -> None:
                     for moment in ("unworn", "worn"):
                         place = f"stress/life/{flank}/{moment}/body_{number}/{quantity}"
                         values = file[place][()]
-                        at = np.unravel_index(values.argmax(), values.shape)
-                        assert largest[moment]["value"] == values[at] > 0.0
-                        assert largest[moment]["x"] == grid.x[at[0], 0]
-                        assert largest[moment]["y"] == grid.y[0, at[1]]
+                        assert largest[moment]["value"] == values.max() > 0.0
+                        # Of several as large, as those at y and -y here, the first.
+                        alike = np.argwhere(values >= values.max() * (1.0 - 1e-6))
+                        x, y = alike[0]
+                        assert largest[moment]["x"] == grid.x[x, 0]
+                        assert largest[moment]["y"] == grid.y[0, y]
                     assert largest["ratio"] == largest["worn"]["value"] / largest["unworn"]["value"]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import shutil
 import subprocess
 import sys
@@ -38,10 +39,16 @@ def test_a_changed_function_is_compiled_into_those_that_call_it(tmp_path):
     (package / "__init__.py").touch()
     shutil.copy(compiled.__file__, package)
     (package / "doubled.py").write_text(DOUBLED, encoding="utf-8")
+    kept_beside = {name: value for name, value in os.environ.items() if name != "NUMBA_CACHE_DIR"}
     for value in (3.0, 3.0, 5.0):
         (package / "slope.py").write_text(SLOPE.format(value=value), encoding="utf-8")
         ended = subprocess.run(
-            [sys.executable, "-c", ASKED], cwd=tmp_path, capture_output=True, text=True, check=True
+            [sys.executable, "-c", ASKED],
+            cwd=tmp_path,
+            env=kept_beside,
+            capture_output=True,
+            text=True,
+            check=True,
         )
         assert float(ended.stdout) == 2.0 * value
     assert len(list((package / "__pycache__").glob("numba-*"))) == 2

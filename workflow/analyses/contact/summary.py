@@ -10,6 +10,7 @@ from scipy.integrate import trapezoid
 
 from sa_solver.contact import ContactState
 from sa_solver.history import History
+from sa_solver.ties import first_largest
 from sa_solver.types import Array, Grid, Mask
 from workflow.analyses.contact.load_table import FORCES, MOTIONS, LoadTable
 
@@ -119,7 +120,7 @@ def loop_summary(
     states = history.states[first : last + 1]
     forces = np.array([state.resultants for state in states])
     motions = np.array([state.rigid for state in states])
-    driven = int(np.argmax(np.ptp(forces, axis=0) * np.ptp(motions, axis=0)))
+    driven = first_largest(np.ptp(forces, axis=0) * np.ptp(motions, axis=0))
     loop: dict[str, Any] = {
         "from_increment": history.indices[first] + 1,
         "to_increment": history.indices[last] + 1,

@@ -16,6 +16,7 @@ import numpy as np
 
 from fe_models.elasticity import von_mises
 from sa_solver.subsurface import COMPONENTS, SubsurfaceStress
+from sa_solver.ties import first_largest
 from sa_solver.types import Array, Grid, Material
 from wear.interface import CycleTractions
 from wear.life import Ruiz, findley, ruiz, smith_watson_topper
@@ -156,16 +157,16 @@ class InterfaceStress:
     def _largest_von_mises(self, body: BodyStress) -> dict[str, float]:
         assert body.section is not None
         values, planes = von_mises(body.section), self.planes
-        i, k = np.unravel_index(np.argmax(values), values.shape)
+        i, k = np.unravel_index(first_largest(values), values.shape)
         along, across = ("y", "x") if planes.settings.section == "y" else ("x", "y")
         place = {along: float(planes.along[i]), across: planes.at, "depth": float(planes.depths[k])}
-        return {"value": float(values[i, k]), **place}
+        return {"value": float(values.max()), **place}
 
     def _largest(self, values: Array) -> dict[str, float]:
         grid = self.planes.grid
-        i, j = np.unravel_index(np.argmax(values), values.shape)
+        i, j = np.unravel_index(first_largest(values), values.shape)
         place = {"x": float(grid.x[i, 0]), "y": float(grid.y[0, j])}
-        return {"value": float(values[i, j]), **place, "depth": self.planes.settings.life.depth}
+        return {"value": float(values.max()), **place, "depth": self.planes.settings.life.depth}
 
 
 def contact_stresses(

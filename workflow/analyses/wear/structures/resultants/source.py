@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from fe_models.mesh import Face
+from sa_solver.ties import first_largest
 from sa_solver.types import Array, Frame, Grid
 from wear.interface import CycleLoads
 from workflow.analyses.wear.gaps import gap_over
@@ -21,7 +22,6 @@ from workflow.analyses.wear.load_source import (
     nominal_face,
 )
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
-from workflow.analyses.wear.structures.resultants.consistency import REMAINDER
 from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
 from workflow.analyses.wear.worn_nodes import read_nodes
 
@@ -48,7 +48,7 @@ class ResultantsSource(UncoupledSource):
     def peak(self) -> int:  # type: ignore[override]
         """First increment in which a face carries the largest P of all."""
         heaviest = np.max([imported.loads.P for imported in self.imported.values()], axis=0)
-        return int(np.argmax(heaviest >= (1.0 - REMAINDER) * heaviest.max()))
+        return first_largest(heaviest)
 
     def frame(self, name: str) -> Frame | None:
         """Where a face lies in the user's axes, None where nobody says."""

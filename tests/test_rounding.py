@@ -1,0 +1,61 @@
+"""The tests of solvers again, rounded as by another processor, and with perturbed matrices."""
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).parent.parent
+# What an x86 processor of 2008 would do: no fused products, other sums, other elementary functions.
+# Elsewhere these do nothing, or change what they can.
+OLD_PROCESSOR = {
+    "OPENBLAS_CORETYPE": "Prescott",
+    "MKL_CBWR": "COMPATIBLE",
+    "NPY_DISABLE_CPU_FEATURES": "X86_V3 X86_V4 AVX512_ICL AVX512_SPR",
+    "NUMBA_CPU_NAME": "generic",
+    "NUMBA_CPU_FEATURES": "",
+    "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX512F,-AVX512VL,-AVX2,-AVX,-FMA,-FMA4",
+}
+PERTURBED = ("-p", "tests.perturbed")
+SOLVERS = [
+    "tests/sa_solver",
+    "tests/fe_models",
+    "tests/wear",
+    "tests/workflow/test_specimens_case.py",
+]
+# The compiled joints and the branches of vibrations would double the time.
+SOLVERS += [f"--ignore=tests/{path}" for path in ("fe_models/dynamics", "wear/joints")]
+CLOSED_FORMS = [
+    f"tests/sa_solver/test_{name}.py"
+    for name in ("convergence", "tangential_dense", "gross_slip", "friction_limit")
+]
+
+
+def run_tests(*arguments, **environment):
+    """Run pytest by itself; what fails is shown."""
+    words = [sys.executable, "-m", "pytest", "-q", "--tb=short", "-p", "no:cacheprovider"]
+    done = subprocess.run(
+        [*words, *arguments],
+        cwd=ROOT,
+        env=os.environ | environment,
+        capture_output=True,
+        text=True,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_closed_forms_are_met_by_perturbed_matrices():
+    run_tests(*PERTURBED, *CLOSED_FORMS)
+
+
+@pytest.mark.slow
+def test_solvers_do_not_notice_perturbed_matrices():
+    run_tests(*PERTURBED, *SOLVERS)
+
+
+@pytest.mark.slow
+def test_solvers_do_not_notice_another_processor(tmp_path):
+    # What is compiled for it is kept apart.
+    run_tests(*SOLVERS, **OLD_PROCESSOR, NUMBA_CACHE_DIR=str(tmp_path))
