@@ -1,6 +1,7 @@
 """Shared by the tests of ``workflow``: synthetic results, and runs of the small case."""
 
 import json
+import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,6 +14,7 @@ from click.testing import Result
 
 from fe_models.gmsh_session import gmsh_model
 from sa_solver.types import Array, Frame, Grid
+from tests.conftest import CASES
 from tests.workflow.commands import invoke, runs_here
 from workflow.analyses.wear import contact_workers
 from workflow.analyses.wear.case.base import WearCase
@@ -225,7 +227,7 @@ def template_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     for body in (1, 2):
         (folder / f"nodes_{body}.csv").write_text(NODES, encoding="utf-8")
     for name in ("specimens_wear.yaml", "specimens_rig.yaml"):
-        (folder / name).touch()
+        shutil.copy(CASES / name, folder)
     return folder
 
 
