@@ -113,9 +113,7 @@ def test_friction_that_grows_within_a_few_cycles_is_followed(tmp_path):
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     rig = row_of_masses(Rig(kind="rig", masses=MASSES, springs=SPRINGS, damping_ratio=0.01))
     resolution = Resolution((1, 3, 5), 64)
-    contact = VibratingContact(
-        load_case(tmp_path / "wear.yaml"), rig, 75.0, 100.0, resolution
-    )
+    contact = VibratingContact(load_case(tmp_path / "wear.yaml"), rig, 75.0, 100.0, resolution)
     state = contact.unworn()
     for _ in range(20):
         # In so few cycles the form does not change.

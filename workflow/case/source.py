@@ -76,7 +76,8 @@ class Source:
 
     def _set(self, override: str) -> None:
         """Put ``key=value`` into the data, making sections on the way."""
-        written = shown(override)[1:-1]
+        quoted = shown(override)
+        written = quoted[1:].removesuffix(quoted[0])
         label = f"--set {written}"
         keys, equals, text = override.partition("=")
         if not equals or not re.fullmatch(DOTTED, keys.strip()):
