@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     import h5py
 
 COMMENT = "#"
+# What h5py makes of links that lead nowhere; damage ends in more ways.
+HDF5_ERRORS = OSError, RuntimeError, LookupError
 
 
 class InputFileError(UserError, ValueError):
@@ -131,7 +133,7 @@ def open_hdf5(file: str) -> Iterator[h5py.File]:
             yield opened
     except InputFileError:
         raise
-    except (OSError, RuntimeError, LookupError, TypeError, ValueError, MemoryError) as error:
+    except (*HDF5_ERRORS, TypeError, ValueError, MemoryError, SystemError) as error:
         raise _unreadable(file, error) from error
 
 
@@ -143,7 +145,7 @@ def _astray(opened: h5py.File, name: str, link: Any) -> str | None:
         return f"/{name}: a link to another file"
     try:
         item = opened[name]
-    except (OSError, RuntimeError, LookupError):
+    except HDF5_ERRORS:
         return f"/{name}: a link that leads nowhere"
     if isinstance(item, h5py.Dataset) and (item.is_virtual or item.external):
         return f"/{name}: a dataset with numbers of another file"
