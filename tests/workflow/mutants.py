@@ -8,6 +8,7 @@ from __future__ import annotations
 import copy
 import json
 import random
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -67,6 +68,8 @@ BYTES = (
     *(b":", b"- ", b"#", b"'", b'"', b"&a ", b"*a", b"|", b"%YAML 9.9\n", b"---\n", b"...\n"),
     *(b"<<: ", b"!!", b"\x1b[2J", b"? ", b",", b"\n", b"  "),
 )  # fmt: skip
+
+OFF = re.compile(rb"^( *)# ?( *(?:- )?\w+:)")
 
 
 @dataclass(frozen=True)
@@ -203,7 +206,7 @@ def _edited(chance: random.Random, raw: bytes) -> tuple[bytes, str]:
     place = chance.randrange(len(raw) + 1)
     lines = raw.split(b"\n")
     line = chance.randrange(len(lines))
-    how = chance.choice(("cut", "insert", "drop", "twice", "indent", "flip", "join"))
+    how = chance.choice(("cut", "insert", "drop", "twice", "indent", "flip", "join", "take"))
     if how == "cut":
         return raw[:place], f"cut at {place}"
     if how == "insert":
@@ -212,7 +215,12 @@ def _edited(chance: random.Random, raw: bytes) -> tuple[bytes, str]:
     if how == "flip":
         other = bytes([chance.randrange(256)])
         return raw[:place] + other + raw[place + 1 :], f"{other!r} for one at {place}"
-    if how == "drop":
+    if how == "take":  # an entry that a template has as a comment, with those below it
+        rows = [number for number, row in enumerate(lines) if OFF.match(row)]
+        line = chance.choice(rows or [line])
+        for number in range(line, min(line + chance.choice((1, 1, 2, 5)), len(lines))):
+            lines[number] = OFF.sub(rb"\1\2", lines[number])
+    elif how == "drop":
         del lines[line]
     elif how == "twice":
         lines.insert(line, lines[line])
