@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any, Literal
@@ -14,6 +16,9 @@ def gmsh_model(name: str) -> Iterator[Any]:
 
     # Signals stay with Python, so that Ctrl-C during meshing ends the run tidily.
     gmsh.initialize(interruptible=False)
+    # Its libraries let the system end a process that writes to another one that has gone.
+    if hasattr(signal, "SIGPIPE") and threading.current_thread() is threading.main_thread():
+        signal.signal(signal.SIGPIPE, signal.SIG_IGN)
     try:
         gmsh.option.setNumber("General.Terminal", 0)
         # One thread: the same mesh, node for node, on every machine.

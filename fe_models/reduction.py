@@ -15,6 +15,7 @@ doi:10.2514/3.4741.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from io import RawIOBase
 from pathlib import Path
@@ -171,13 +172,40 @@ def load_reduced(path: Path) -> ReducedModel:
     Raises ``OSError`` for a file that is not HDF5, ``ValueError`` for one that holds no model.
     """
     with h5py.File(path, "r") as file:
-        datasets: dict[str, Any] = {name: file[name][()] for name in DATASETS if name in file}
+        datasets: dict[str, Any] = {
+            name: np.asarray(file[name][()]) for name in DATASETS if name in file
+        }
     missing = [name for name in DATASETS if name not in datasets and name not in OPTIONAL]
     if missing:
         raise ValueError(f"{path}: no dataset {missing[0]}: not a reduced model")
+    _check_shapes(path, datasets)
     if "names" in datasets:
         datasets["names"] = tuple(name.decode() for name in datasets["names"])
     return ReducedModel(**({"mass": None} | datasets))
+
+
+def _check_shapes(path: Path, datasets: Mapping[str, Any]) -> None:
+    """Raise ValueError unless arrays fit together and their numbers are finite."""
+    kept, modes = datasets["kept"].size, datasets["frequencies"].size
+    size, names = kept + modes, datasets.get("names", np.empty(0)).ravel()
+    shapes: dict[str, tuple[int, ...]] = {
+        "kept": (kept,),
+        "frequencies": (modes,),
+        "stiffness": (size, size),
+        "mass": (size, size),
+        "loads": (size, *datasets["loads"].shape[-1:]),
+        "mode_shapes": (*datasets["mode_shapes"].shape[:1], modes),
+        "names": (kept,),
+        "places": (kept, 3),
+    }
+    for name, values in datasets.items():
+        if values.shape != shapes[name]:
+            wanted = " x ".join(map(str, shapes[name]))
+            raise ValueError(f"{path}: {name}: shape {values.shape}; allowed: {wanted}")
+        if name != "names" and not (values.dtype.kind in "iuf" and np.isfinite(values).all()):
+            raise ValueError(f"{path}: {name}: not all finite numbers")
+    if not all(isinstance(name, bytes) for name in names):
+        raise ValueError(f"{path}: names: not texts")
 
 
 def _others(size: int, kept: Indices) -> Indices:

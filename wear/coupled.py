@@ -17,6 +17,7 @@ from typing import Any, Literal, Protocol, TypeVar
 import numpy as np
 
 from sa_solver.errors import InputError
+from sa_solver.ties import first_largest
 from sa_solver.types import Array, resultant_change
 from wear.interface import (
     FaceLoads,
@@ -130,7 +131,7 @@ class ConstantLoads:
 
     def probe(self, depths: list[Array], friction: Sequence[float] | None = None) -> Array:
         """Resultants where each contact is loaded most."""
-        return np.array([h.loads.resultants[int(np.argmax(h.loads.P))] for h in self.histories])
+        return np.array([h.loads.resultants[first_largest(h.loads.P)] for h in self.histories])
 
 
 class Contacts:

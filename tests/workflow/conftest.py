@@ -1,6 +1,7 @@
 """Shared by the tests of ``workflow``: synthetic results, and runs of the small case."""
 
 import json
+import shutil
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -13,11 +14,12 @@ from click.testing import Result
 
 from fe_models.gmsh_session import gmsh_model
 from sa_solver.types import Array, Frame, Grid
+from tests.conftest import CASES
 from tests.workflow.commands import invoke, runs_here
 from workflow.analyses.wear import contact_workers
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.layout import Contents
-from workflow.kinds import load_case, template
+from workflow.kinds import load_case
 from workflow.pictures import drawing
 from workflow.shell import processes
 from workflow.shell.folder import OutputFolder
@@ -224,8 +226,8 @@ def template_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     (folder / "loads.csv").write_text(LOADS, encoding="utf-8")
     for body in (1, 2):
         (folder / f"nodes_{body}.csv").write_text(NODES, encoding="utf-8")
-    for name, kind in (("specimens_wear", "bodies_wear"), ("specimens_rig", "specimens")):
-        (folder / f"{name}.yaml").write_text(template(kind), encoding="utf-8")
+    for name in ("specimens_wear.yaml", "specimens_rig.yaml"):
+        shutil.copy(CASES / name, folder)
     return folder
 
 

@@ -18,6 +18,8 @@ import numpy as np
 import pytest
 from pydantic import BaseModel
 
+from fe_models.reduction import ReducedModel, save_reduced
+from tests.conftest import CASES
 from workflow.analyses.contact.load_table import FORCES, MOTIONS
 from workflow.case import source
 from workflow.case.fields import File, Path, Quantity, Text, Whole
@@ -25,6 +27,15 @@ from workflow.case.sections import Section, entry_of, sections_of
 from workflow.errors import CaseError
 from workflow.kinds import kinds, load_case, parse_case, template
 
+BODY = ReducedModel(
+    kept=np.arange(1),
+    stiffness=np.eye(1),
+    mass=np.eye(1),
+    loads=np.zeros((1, 0)),
+    mode_shapes=np.zeros((1, 0)),
+    frequencies=np.zeros(0),
+    names=("pad 1 x",),
+)
 LENGTHS = {"cycles": 1e5, "step": {"kind": "implicit", "cycles": 5000}}
 ARCHARD_BODY = {"coefficient": 1e-4, "hardness": "3.5 GPa"}
 ENERGY_BODY = {"coefficient": "1e4 um^3/J"}
@@ -310,8 +321,8 @@ def folders(tmp_path_factory, template_files) -> dict[str, Folder]:
         np.save(made[kind] / "gap.npy", np.zeros(CELLS.get(kind, (0, 0))))
         (made[kind] / "history.csv").write_text("P,Qx\n1,0\n1,0.1\n", encoding="utf-8")
         (made[kind] / "force.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
-        for file in ("body_2.h5", "specimens.yaml", "specimens_wear.yaml", "specimens_rig.yaml"):
-            (made[kind] / file).touch()
+        shutil.copy(CASES / "specimens_coarse.yaml", made[kind] / "specimens.yaml")
+        save_reduced(made[kind] / "body_2.h5", BODY)
         (made[kind] / "loops.csv").write_text("energy,P,kt,mu\n0,1,1,1\n", encoding="utf-8")
     return made
 

@@ -1,12 +1,17 @@
 """A wrong case ends in exit code 2 and a line: file, line, key, what is wrong, what is allowed."""
 
+import os
 import re
 
 import pytest
 from click.testing import CliRunner
 
 from tests.marks import slow
+from tests.workflow.scenes import BALL
+from workflow.case.fields import LONGEST_SHOWN
 from workflow.cli import cli
+
+posix_only = pytest.mark.skipif(os.name != "posix", reason="pipes and devices of POSIX")
 
 # Name, text to replace in the default case, its replacement, key in the message, words in it.
 WRONG = [
@@ -119,7 +124,11 @@ UNREADABLE = [
         b"%c: &%c [%s]\n" % (n + 1, n + 1, b",".join([b"*%c" % n] * 8)) for n in range(97, 105)
     ), 1, "too long"),
     ("nesting", b"title: " + b"[" * 50 + b"]" * 50, 1, "nested too deeply"),
-    ("deep nesting", b"title: " + b"[" * 1000 + b"]" * 1000, 1, "nested too deeply"),
+    ("deep nesting", b"title: " + b"[" * 100_000 + b"]" * 100_000, 1, "nested too deeply"),
+    ("deep sections", b"".join(b"  " * n + b"a:\n" for n in range(900)), 22, "nested too deeply"),
+    ("merged without end", b"a: &a\n  <<: *a\n", 1, "not YAML"),
+    ("60,000 keys", b"".join(b"k%d: 1\n" % n for n in range(60_000)), 10_001, "too long"),
+    ("60,000 numbers", b"title: [" + b"1, " * 60_000 + b"1]", 1, "too long"),
     ("endless number", b"title: " + b"9" * 5000, 1, "not YAML"),
     ("huge file", b"#" * 1_000_001, None, "over 1000000 bytes"),
 ]  # fmt: skip
@@ -133,7 +142,7 @@ def refusal(arguments):
     assert result.stdout == ""
     assert "Traceback" not in result.stderr
     (line,) = result.stderr.splitlines()
-    assert len(line) < 400
+    assert len(line) < 600
     return line
 
 
@@ -157,7 +166,7 @@ def test_wrong_entry_is_told_in_one_line(tmp_path, dovetail_text, old, new, key,
 
 @pytest.mark.parametrize(
     ("raw", "number", "words"),
-    [slow(*row) if name == "deep nesting" else row for name, *row in UNREADABLE],
+    [slow(*row) if name.startswith("60,000") else row for name, *row in UNREADABLE],
     ids=[name for name, *_ in UNREADABLE],
 )
 def test_unreadable_file_is_told_in_one_line(tmp_path, raw, number, words):
@@ -169,9 +178,62 @@ def test_unreadable_file_is_told_in_one_line(tmp_path, raw, number, words):
     assert words in line
 
 
-def test_missing_file_and_directory(tmp_path):
-    assert "no such file" in refusal(["check", str(tmp_path / "none.yaml")])
-    assert "a directory" in refusal(["check", str(tmp_path)])
+def no_files(folder):
+    """Names in a folder that lead to no file, by what is said of them."""
+    (folder / "folder.csv").mkdir()
+    (folder / "loop.csv").symlink_to("loop.csv")
+    os.mkfifo(folder / "pipe.csv")
+    (folder / "zero.csv").symlink_to("/dev/zero")
+    return {
+        "none.csv": "no such file",
+        "folder.csv": "a directory",
+        "loop.csv": "Too many levels",
+        "pipe.csv": "a pipe or a device",
+        "zero.csv": "a pipe or a device",
+        f"{'x' * 300}.csv": "File name too long",
+    }
+
+
+@posix_only
+def test_what_is_no_file_is_no_case_and_no_table(tmp_path):
+    """Nobody waits for what a pipe may say."""
+    for name, words in no_files(tmp_path).items():
+        for command in ("check", "loops"):
+            line = refusal([command, str(tmp_path / name)])
+            assert line.startswith(f"fretscale: {tmp_path / name}: ")
+            assert words in line
+
+
+@posix_only
+def test_what_is_no_file_is_told_where_it_is_named(tmp_path):
+    path = tmp_path / "case.yaml"
+    legs = BALL.index("  legs:"), BALL.index("contact:")
+    for name, words in no_files(tmp_path).items():
+        text = f"{BALL[: legs[0]]}  file: {name}\n{BALL[legs[1] :]}"
+        path.write_text(text, encoding="utf-8")
+        line = refusal(["check", str(path)])
+        number = text[: legs[0]].count("\n") + 1
+        assert line.startswith(f"fretscale: {path}:{number}: load_path.file: ")
+        assert words in line
+
+
+def test_of_many_mistakes_the_first_are_told(tmp_path, dovetail_text):
+    path = tmp_path / "wrong.yaml"
+    more = "".join(f"contakt{n}: 1\n" for n in range(500))
+    path.write_text(dovetail_text + more, encoding="utf-8")
+    result = CliRunner().invoke(cli, ["check", str(path)])
+    *lines, last = result.stderr.splitlines()
+    assert len(lines) == 20
+    assert "contakt19: unknown key; did you mean 'contact'?" in lines[-1]
+    assert last == f"fretscale: {path}: and 480 more like these"
+
+
+def test_odd_keys_are_quoted(tmp_path, dovetail_text):
+    path = tmp_path / "wrong.yaml"
+    path.write_text(dovetail_text + f'"\\e[2J": 1\n{"x" * 900}: 1\n(a): 1\n', encoding="utf-8")
+    result = CliRunner().invoke(cli, ["check", str(path)])
+    keys = [line.split(": ")[2] for line in result.stderr.splitlines()]
+    assert keys == [r"'\x1b[2J'", f"'{'x' * 59}...", "'(a)'"]
 
 
 def test_every_error_has_its_line(tmp_path, dovetail_text):
@@ -202,10 +264,16 @@ def test_every_error_has_its_line(tmp_path, dovetail_text):
         ("wear.step.fraction=0.5", "with explicit"),
         ("wear.stop.depht=1 um", "did you mean 'depth'?"),
         ("output=", "not a section"),
+        ("x" * 100_000 + "=1", "unknown key"),
+        ("9" * 100_000 + "=1", "unknown key"),
+        ("a." * 1000 + "a=1", "nested too deeply"),
+        ("friction\x1b=1", "not key=value"),
+        ("contact.grid." + "9" * 5000 + "=1", "no such entry"),
     ],
 )
 def test_wrong_override_is_named(dovetail_path, override, words):
     line = refusal(["check", str(dovetail_path), "--set", override])
-    shown = override.replace("\t", "\\t")
+    shown = override.replace("\t", "\\t").replace("\x1b", "\\x1b")
+    shown = shown if len(shown) < LONGEST_SHOWN else shown[: LONGEST_SHOWN - 1] + "..."
     assert line.startswith(f"fretscale: --set {shown}: "), line
     assert words in line

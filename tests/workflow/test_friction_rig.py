@@ -128,4 +128,4 @@ def test_a_case_that_has_no_specimens_is_refused(files):
     (files / "specimens.yaml").write_text(RIG, encoding="utf-8")
     code, message = refused(files, RIG)
     assert code == 2
-    assert "is no case of specimens; allowed: such a case" in message
+    assert "no case of specimens" in message

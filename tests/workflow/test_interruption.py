@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
+from multiprocessing import resource_tracker, spawn
 from pathlib import Path
 
 import h5py
@@ -318,6 +319,17 @@ def test_worker_that_dies_is_one_line():
 
     with workers._processes(die, [(9,)]) as connections, pytest.raises(MethodFailed, match="gone"):
         workers._answers(connections)
+
+
+@posix_only
+def test_worker_killed_before_its_first_word_is_one_line(monkeypatch):
+    """It ends while it is told what to do: a large setting does not go into the pipe at once."""
+    from workflow.errors import MethodFailed
+
+    resource_tracker.ensure_running()
+    monkeypatch.setattr(spawn, "_python_exe", b"/bin/true")
+    with pytest.raises(MethodFailed, match="a process of the run has gone"):
+        workers.side_by_side([(len, (bytes(1_000_000),))])
 
 
 @pytest.mark.slow

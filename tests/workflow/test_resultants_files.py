@@ -401,7 +401,7 @@ def test_files_without_rows_are_refused(tmp_path):
     for text in ("", "# nothing\n", "P, Qx\n"):
         with pytest.raises(InputFileError, match=r"loads.csv:1: no rows; allowed"):
             read_resultants(write(tmp_path, text))
-    with pytest.raises(InputFileError, match=r"missing.csv: cannot be read"):
+    with pytest.raises(InputFileError, match=r"missing.csv: no such file"):
         read_resultants(tmp_path / "missing.csv")
 
 

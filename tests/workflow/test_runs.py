@@ -1,9 +1,11 @@
 """Many runs in folders: done once, taken up again, none stopped by another."""
 
+import json
 import os
 import signal
 import subprocess
 import sys
+import threading
 import time
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
@@ -15,7 +17,7 @@ import pytest
 from tests.workflow.commands import jobs_here
 from tests.workflow.scenes import BALL, ROLLER_LOADS, ROLLER_WEAR
 from workflow.analyses.contact.case import ContactCase
-from workflow.errors import UserError
+from workflow.errors import MethodFailed, UserError
 from workflow.kinds import load_case
 from workflow.runs import job as runs_job
 from workflow.runs.job import Job
@@ -145,6 +147,12 @@ def test_a_mistake_of_the_program_leaves_its_traceback_in_the_log(contact, tmp_p
     (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
     assert done.error == "TypeError: 'NoneType' object is not callable"
     assert "Traceback" in (done.folder / "run.log").read_text("utf-8")
+
+
+def test_a_process_that_ends_early_is_a_failure(contact, tmp_path, monkeypatch):
+    monkeypatch.setattr(runs_job, "COMMAND", "pass")
+    (done,) = run_jobs([Job("one", contact)], tmp_path / "out")
+    assert done.error.endswith("exit code 0: it said nothing")
 
 
 def test_jobs_have_one_thread_each(contact, tmp_path, monkeypatch):
@@ -311,6 +319,26 @@ def test_no_scheduler_is_one_line(contact, tmp_path, monkeypatch):
     monkeypatch.setattr(runs_dask, "PATIENCE", "1 s")
     with pytest.raises(UserError, match=r"--dask tcp://127.0.0.1:9: no scheduler answers: \S+"):
         run_jobs([Job("one", contact)], tmp_path / "out", dask="tcp://127.0.0.1:9")
+
+
+@pytest.mark.slow
+@posix_only
+def test_a_scheduler_that_is_killed_is_one_line(contact, tmp_path, caplog):
+    pytest.importorskip("distributed")
+    file = tmp_path / "scheduler.json"
+    module = "distributed.cli.dask_scheduler"
+    options = "--port=0", "--no-dashboard", f"--scheduler-file={file}"
+    scheduler = subprocess.Popen([sys.executable, "-m", module, *options], stderr=subprocess.PIPE)
+    try:
+        address = json.loads(wait_until(lambda: file.exists() and file.read_text()))["address"]
+        threading.Timer(1.0, scheduler.kill).start()
+        # No worker is there to take the run before.
+        with pytest.raises(MethodFailed, match=r"the scheduler has gone, 1 of 1 runs not known"):
+            run_jobs([Job("one", contact)], tmp_path / "out", dask=address)
+    finally:
+        scheduler.kill()
+        scheduler.communicate()
+    assert not caplog.records
 
 
 @pytest.mark.slow

@@ -152,6 +152,8 @@ def test_example_is_a_sweep():
         ("+{value: [1]}", 3, "unknown key; did you mean 'values'?"),
         ("+{}", 3, "nothing given; allowed: exactly one of values, range, distribution"),
         ("+{values: []}", 3, "too short"),
+        (f"+{{values: [{'9' * 400}]}}", 3, "a huge number: not the value of an entry"),
+        (f"+{{range: {{from: 0, to: {'9' * 400}, count: 2}}}}", 3, "a huge number: not a number"),
         ("+{values: [0.5, 0.5]}", 3, "0.5: given twice"),
         ("+{values: [0.5], range: {from: 1, to: 2, count: 3}}", 3, "values and range given"),
         ("+{range: {from: 0.1, count: 3}}", 3, "range.to: missing; allowed: last value"),

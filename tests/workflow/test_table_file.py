@@ -77,8 +77,9 @@ def test_what_is_wrong_is_told_with_its_line(tmp_path, text, complaint):
 def test_what_is_no_text_is_refused_in_one_line(tmp_path):
     path = tmp_path / "force.csv"
     path.write_bytes(bytes(range(256)))
-    for file in (path, tmp_path / "none.csv", tmp_path):
-        with pytest.raises(InputFileError, match="cannot be read") as refusal:
+    wrong = {path: "cannot be read", tmp_path / "none.csv": "no such file", tmp_path: "a directory"}
+    for file, words in wrong.items():
+        with pytest.raises(InputFileError, match=words) as refusal:
             read_table_file(file)
         assert "\n" not in str(refusal.value)
 

@@ -16,10 +16,9 @@ from wear.steppers import ErrorControl, ImplicitStepper, advance_cycles, first_c
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.rig.structure import Rig
 from workflow.analyses.vibration_wear.case import VibrationWearCase
-from workflow.analyses.vibration_wear.half_space_run import contact_case
 from workflow.analyses.vibration_wear.vibrating_contact import VibratingContact
 from workflow.case.writing import dump_case
-from workflow.kinds import parse_case
+from workflow.kinds import load_case, parse_case
 
 WEAR = """\
 title: Ball that wears
@@ -78,7 +77,7 @@ def refusal(folder, *settings, wear=WEAR):
 def contact_in_rig(folder, force=75.0, frequency=100.0, wear=WEAR):
     (folder / "wear.yaml").write_text(wear, encoding="utf-8")
     rig = row_of_masses(Rig(kind="rig", masses=MASSES, springs=SPRINGS, damping_ratio=DAMPING))
-    case = contact_case(str(folder / "wear.yaml"))
+    case = load_case(folder / "wear.yaml")
     return rig, VibratingContact(case, rig, force, frequency, RESOLUTION)
 
 
@@ -114,9 +113,7 @@ def test_friction_that_grows_within_a_few_cycles_is_followed(tmp_path):
     summary = json.loads((tmp_path / "out" / "summary.json").read_text(encoding="utf-8"))
     rig = row_of_masses(Rig(kind="rig", masses=MASSES, springs=SPRINGS, damping_ratio=0.01))
     resolution = Resolution((1, 3, 5), 64)
-    contact = VibratingContact(
-        contact_case(str(tmp_path / "wear.yaml")), rig, 75.0, 100.0, resolution
-    )
+    contact = VibratingContact(load_case(tmp_path / "wear.yaml"), rig, 75.0, 100.0, resolution)
     state = contact.unworn()
     for _ in range(20):
         # In so few cycles the form does not change.
@@ -317,8 +314,10 @@ def test_contacts_that_cannot_be_a_joint_are_refused(tmp_path, before, after, sa
 
 
 def test_a_case_of_something_else_is_no_contact(tmp_path):
-    said = refusal(tmp_path, "contact.file=rig.yaml")
-    assert "is no case of wear of two bodies over an area" in said
+    assert "'rig.yaml': the case itself" in refusal(tmp_path, "contact.file=rig.yaml")
+    (tmp_path / "other.yaml").write_text(RIG, encoding="utf-8")
+    said = refusal(tmp_path, "contact.file=other.yaml")
+    assert "no case of wear of two bodies over an area" in said
 
 
 def test_cycles_and_forces_ascend_and_the_mass_is_there(tmp_path):

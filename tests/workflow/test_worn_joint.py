@@ -92,7 +92,7 @@ def test_a_run_that_was_broken_off_takes_its_finished_wear(folder):
 @pytest.mark.parametrize(
     ("wear", "words"),
     [
-        (BALL, "is no case of wear with loops"),
+        (BALL, "no case of wear with loops"),
         (WEAR.replace("loops: {amplitude: 10 um}\n", ""), "leaves no table of loops"),
         (WEAR.replace("P: 50 N", "P: 50 mm"), "load_path.P"),
     ],

@@ -16,6 +16,9 @@ from workflow.case.source import KeyPath, Source, child, dotted, split_path
 KINDS_ARE_NAMED_BY = ("kind", "law", "shape", "scope")
 INHERITED = "law"
 
+# Lines about a text: the same mistake mostly is in many places.
+MOST_LINES = 20
+
 # What to say about pydantic's own errors, in the words of a case.
 SENTENCES = {
     "literal_error": "not known; allowed: {expected}",
@@ -35,14 +38,17 @@ class Explanation:
         self.source, self.case = source, case
 
     def lines(self, errors: Sequence[ErrorDetails]) -> list[str]:
-        """The lines of text about ``errors``, in the order of the file."""
+        """The lines of text about ``errors``, in the order of the file; of many, the first."""
+        by_line = sorted(errors, key=lambda details: self.source.where(self._path(details))[0])
+        errors, left = by_line[:MOST_LINES], len(by_line[MOST_LINES:])
         unknown = [
             self._path(details) for details in errors if details["type"] == "extra_forbidden"
         ]
         meant = {(*path[:-1], near) for path in unknown if (near := self._nearest(path))}
         # A misspelt key is unknown and its right spelling missing; one line is enough.
         reported = [d for d in errors if d["type"] != "missing" or self._path(d) not in meant]
-        return [line for _, line in sorted({self._line_about(details) for details in reported})]
+        lines = [line for _, line in sorted({self._line_about(details) for details in reported})]
+        return [*lines, f"{self.source.name}: and {left} more like these"] if left else lines
 
     def _line_about(self, details: ErrorDetails) -> tuple[int, str]:
         """Line number, for sorting, and the line of text about one error."""
@@ -128,15 +134,16 @@ class Explanation:
         path: list[str | int] = []
         node: Any = self.source.data
         tag_seen = False
-        loc = details["loc"]
+        loc, last = details["loc"], len(details["loc"]) - 1
         # Then the last part is a key, even where it reads like a kind.
         named = details["type"] in ("missing", "extra_forbidden", "entry")
         for index, key in enumerate(loc):
             is_kind = key in [child(node, name) for name in KINDS_ARE_NAMED_BY]
-            if is_kind and not tag_seen and not (named and index == len(loc) - 1):
+            if is_kind and not tag_seen and not (named and index == last):
                 tag_seen = True
                 continue
-            if isinstance(key, str) and key.startswith("("):  # a tag of ours, as (section)
+            # A tag of ours, as (section).
+            if isinstance(key, str) and key.startswith("(") and not (named and index == last):
                 continue
             path.append(key)
             node, tag_seen = _within(node, key), False

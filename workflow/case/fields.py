@@ -10,6 +10,7 @@ import math
 import os
 import re
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path as Pathname
 from typing import Any, Self
@@ -20,6 +21,7 @@ from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 from workflow.case import units
 
 DOTTED = r"[\w-]+(\.[\w-]+)*"
+NO_CONTEXT: Mapping[str, Any] = {}
 LONGEST_SHOWN = 60  # of a wrong value in a message, which must stay one readable line
 
 
@@ -236,27 +238,44 @@ class File(Entry):
     def allowed(self) -> str:
         return f"a file {', '.join(self.endings)}, as seen from the folder of the case"
 
-    def parse(self, value: object, folder: str = "") -> str:
+    def parse(self, value: object, context: Mapping[str, Any] = NO_CONTEXT) -> str:
         if not isinstance(value, str):
             raise self.refusal(value, "not a file name")
         name, dataset = split_dataset(value)
         if not value.isprintable() or not name.endswith(self.endings):
             raise self.refusal(value, "not a file of this kind")
+        folder = context.get("folder", "")
         path = os.path.abspath(os.path.join(folder, name))  # noqa: PTH100, PTH118
-        if not Pathname(path).is_file():
-            raise self.refusal(value, "no such file")
+        if wrong := unreadable(Pathname(path)):
+            raise self.refusal(value, wrong)
         return f"{path}:{dataset}" if dataset else path
 
     def __get_pydantic_core_schema__(
         self, source: Any, handler: GetCoreSchemaHandler
     ) -> CoreSchema:
         def parse(value: object, info: ValidationInfo) -> str:
-            return self.parse(value, (info.context or {}).get("folder", ""))
+            return self.parse(value, info.context or NO_CONTEXT)
 
         return core_schema.with_info_plain_validator_function(parse)
 
     def json_schema(self) -> dict[str, Any]:
         return {"type": "string", "minLength": 1}
+
+
+def unreadable(path: Pathname) -> str:
+    """Why a file cannot be read, empty if it can: a pipe, say, would be waited for."""
+    try:
+        if path.is_dir():
+            return "a directory"
+        if path.exists() and not path.is_file():
+            return "not a file: a pipe or a device"
+        with path.open("rb") as file:
+            file.read(1)
+    except FileNotFoundError:
+        return "no such file"
+    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
+        return f"cannot be read ({getattr(error, 'strerror', None) or error})"
+    return ""
 
 
 def split_dataset(text: str) -> tuple[str, str]:

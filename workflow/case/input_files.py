@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 import csv
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from sa_solver.types import Array
-from workflow.case.fields import shown, split_dataset
-from workflow.errors import one_line
+from workflow.case.fields import shown, split_dataset, unreadable
+from workflow.errors import UserError, one_line
+
+if TYPE_CHECKING:
+    import h5py
 
 COMMENT = "#"
+# What h5py makes of links that lead nowhere; damage ends in more ways.
+HDF5_ERRORS = OSError, RuntimeError, LookupError
 
 
-class InputFileError(ValueError):
+class InputFileError(UserError, ValueError):
     """A file that cannot be taken; ``file:line: what is wrong; what is allowed``."""
 
 
@@ -24,6 +31,8 @@ def csv_rows(file: str | Path) -> list[tuple[int, tuple[str, ...]]]:
 
     Comments begin with ``#``; a byte-order mark is passed over. Raises InputFileError.
     """
+    if wrong := unreadable(Path(file)):
+        raise InputFileError(f"{file}: {wrong}; allowed: a CSV file")
     try:
         with Path(file).open(newline="", encoding="utf-8-sig") as stream:
             # Empty in place of comments, so that they still count.
@@ -90,7 +99,7 @@ def read_heights(file: str) -> Array:
 def _read_npy(file: str) -> np.ndarray:
     try:
         return np.asarray(np.load(file, allow_pickle=False))
-    except (OSError, ValueError, EOFError) as error:
+    except Exception as error:  # what is no such file, or a damaged one, ends in a dozen ways
         raise _unreadable(file, error) from error
 
 
@@ -99,15 +108,48 @@ def _read_dataset(file: str, dataset: str) -> np.ndarray:
 
     if not dataset:
         raise InputFileError(f"{file}: which dataset? allowed: such as {Path(file).name}:gap")
+    with open_hdf5(file) as opened:
+        item = opened.get(dataset)
+        if not isinstance(item, h5py.Dataset):
+            known = ", ".join(opened) or "none"
+            raise InputFileError(f"{file}: {dataset}: no such dataset; at the top: {known}")
+        return np.asarray(item[()])
+
+
+@contextmanager
+def open_hdf5(file: str) -> Iterator[h5py.File]:
+    """An HDF5 file to read, with all that it leads to in it.
+
+    Raises InputFileError, also for damage that is met while it is read. Links to other files would
+    bring in numbers that nobody has named; what they lead to may be missing, which HDF5 reads as 0.
+    """
+    import h5py
+
     try:
-        with h5py.File(file) as opened:
-            item = opened.get(dataset)
-            if not isinstance(item, h5py.Dataset):
-                known = ", ".join(opened) or "none"
-                raise InputFileError(f"{file}: {dataset}: no such dataset; at the top: {known}")
-            return np.asarray(item[()])
-    except OSError as error:
+        with h5py.File(file, "r") as opened:
+            astray = opened.visititems_links(lambda name, link: _astray(opened, name, link))
+            if astray:
+                raise InputFileError(f"{file}: {astray}; allowed: data in the file itself")
+            yield opened
+    except InputFileError:
+        raise
+    except (*HDF5_ERRORS, TypeError, ValueError, MemoryError, SystemError) as error:
         raise _unreadable(file, error) from error
+
+
+def _astray(opened: h5py.File, name: str, link: Any) -> str | None:
+    """What is wrong with a link of the file, None for one that leads to something in it."""
+    import h5py
+
+    if isinstance(link, h5py.ExternalLink):
+        return f"/{name}: a link to another file"
+    try:
+        item = opened[name]
+    except HDF5_ERRORS:
+        return f"/{name}: a link that leads nowhere"
+    if isinstance(item, h5py.Dataset) and (item.is_virtual or item.external):
+        return f"/{name}: a dataset with numbers of another file"
+    return None
 
 
 def _read_csv(file: str) -> np.ndarray:

@@ -2,48 +2,61 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import os
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, TypeVar
 
 from pydantic import ValidationError
 
 from workflow.case.explain import Explanation
-from workflow.case.fields import shown
+from workflow.case.fields import NO_CONTEXT, File, shown
 from workflow.case.sections import Case, Section, words_of
 from workflow.case.source import KeyPath, Source, dotted, read_text
-from workflow.errors import CaseError, UserError
+from workflow.errors import CaseError
 
 AnyCase = TypeVar("AnyCase", bound=Case)
 AnySection = TypeVar("AnySection", bound=Section)
+YAML = ".yaml"
 
 
 def load_case(
-    path: str | Path, kinds: Sequence[type[AnyCase]], overrides: Sequence[str] = ()
+    path: str | Path,
+    kinds: Sequence[type[AnyCase]],
+    overrides: Sequence[str] = (),
+    within: Sequence[str] = (),
 ) -> AnyCase:
     """The case in file ``path``, one of ``kinds``, with overrides (``"wear.cycles=1e4"``) on top.
 
     Raises ``CaseError`` with one line ``file:line: key: what is wrong; allowed: ...`` for each
     thing wrong, ``--set key=value`` in the place of file and line where an override is at fault.
+    ``within`` are the cases that led to this one, each named by the one before.
     """
-    return parse_case(read_text(Path(path)), str(path), kinds, overrides)
+    return parse_case(read_text(Path(path)), str(path), kinds, overrides, within)
 
 
 def parse_case(
-    text: str, name: str, kinds: Sequence[type[AnyCase]], overrides: Sequence[str] = ()
+    text: str,
+    name: str,
+    kinds: Sequence[type[AnyCase]],
+    overrides: Sequence[str] = (),
+    within: Sequence[str] = (),
 ) -> AnyCase:
     """As ``load_case``, from ``text``; ``name`` stands for the file in messages.
 
     Files that the case names are looked for from the folder of ``name``.
     """
     source = Source(name, text, overrides)
-    return validated(source, _kind_of_case(source, kinds))
+    return validated(source, _kind_of_case(source, kinds), within)
 
 
-def validated(source: Source, model: type[AnySection]) -> AnySection:
+def validated(source: Source, model: type[AnySection], within: Sequence[str] = ()) -> AnySection:
     """What the source says, as a ``model``. Raises ``CaseError``, a line for each thing wrong."""
+    known = (*within, os.path.realpath(source.name))
+    context = {"folder": str(Path(source.name).parent), "within": known}
     try:
-        return model.model_validate(source.data, context={"folder": str(Path(source.name).parent)})
+        return model.model_validate(source.data, context=context)
     except ValidationError as error:
         raise CaseError("\n".join(Explanation(source, model).lines(error.errors()))) from None
 
@@ -52,18 +65,39 @@ class OtherKind(CaseError):
     """A case whose analysis or structure is none of those asked for."""
 
 
-def load_named(key: str, file: str, kinds: Sequence[type[AnyCase]], what: str) -> AnyCase:
-    """The case in a ``file`` that another case names at ``key``: ``what``, one of ``kinds``.
+@dataclass(frozen=True)
+class CaseFile(File):
+    """A file that, where it is one of YAML, is a case of ``what``, one of ``kinds``.
 
-    Raises UserError.
+    It is read with the case that names it: what is wrong there is told before anything runs.
     """
-    try:
-        return load_case(file, kinds)
-    except OtherKind as error:
-        message = f"{key}: {file} is no case of {what}; allowed: such a case ({error})"
-        raise UserError(message) from error
-    except CaseError as error:
-        raise UserError(f"{key}: {error}") from error
+
+    kinds: tuple[type[Case], ...]
+    what: str
+    # What is wrong with such a case where it is named, empty for nothing.
+    unfit: Callable[[Any], str] = lambda case: ""
+
+    @property
+    def allowed(self) -> str:
+        others = "".join(f" or a file {ending}" for ending in self.endings if ending != YAML)
+        return f"a case of {self.what}{others}, as seen from the folder of the case"
+
+    def parse(self, value: object, context: Mapping[str, Any] = NO_CONTEXT) -> str:
+        path = super().parse(value, context)
+        if not path.endswith(YAML):
+            return path
+        within = context.get("within", ())
+        if os.path.realpath(path) in within:
+            raise self.refusal(value, "the case itself, or one that names it")
+        try:
+            case = load_case(path, self.kinds, within=within)
+        except OtherKind as error:
+            raise self.refusal(value, f"no case of {self.what} ({error})") from error
+        except CaseError as error:
+            raise self.refusal(value, f"cannot be run ({str(error).splitlines()[0]})") from error
+        if wrong := self.unfit(case):
+            raise self.refusal(value, wrong)
+        return path
 
 
 def _kind_of_case(source: Source, kinds: Sequence[type[AnyCase]]) -> type[AnyCase]:

@@ -15,7 +15,7 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from sa_solver.types import Material as ElasticMaterial
-from workflow.case.fields import Entry, File, Path, Quantity, Text, Whole, split_dataset
+from workflow.case.fields import Entry, File, Path, Quantity, Text, Whole, shown, split_dataset
 from workflow.case.source import Source
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual machine.
@@ -160,7 +160,7 @@ class Case(Section, ABC):
         for index, path in enumerate(self.assumed):
             if not _has(self, path):
                 raise disagreement(
-                    f"'{path}': no such entry in a case of this kind; "
+                    f"{shown(path)}: no such entry in a case of this kind; "
                     "allowed: dotted paths such as structure or friction.coefficient",
                     f"assumed.{index}",
                 )

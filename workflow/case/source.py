@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
@@ -10,16 +11,22 @@ from ruamel.yaml import YAML
 from ruamel.yaml.comments import CommentedMap, CommentedSeq
 from ruamel.yaml.constructor import DuplicateKeyError
 from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.events import CollectionEndEvent, CollectionStartEvent, Event, NodeEvent
+from ruamel.yaml.parser import RoundTripParser
 from ruamel.yaml.reader import ReaderError
 
-from workflow.case.fields import shown
+from workflow.case.fields import DOTTED, shown, unreadable
 from workflow.errors import CaseError
 
 KeyPath = tuple[str | int, ...]
+# Keys that a message has as they are.
+WORD = r"[\w -]{1,60}"
 
 LARGEST_FILE = 1_000_000  # bytes; cases have a few thousand
 MOST_ENTRIES = 10_000  # after expanding YAML aliases, which can grow without bound
 DEEPEST = 20  # levels; a case has four
+TOO_MUCH = "nested too deeply or too long for a case"
+LONGEST_NUMBER = 9  # digits of a place in a list, far beyond the longest
 LONGEST_REASON = 100  # of what the YAML parser has to say
 
 
@@ -69,12 +76,15 @@ class Source:
 
     def _set(self, override: str) -> None:
         """Put ``key=value`` into the data, making sections on the way."""
-        written = shown(override)[1:-1]
+        quoted = shown(override)
+        written = quoted[1:].removesuffix(quoted[0])
         label = f"--set {written}"
         keys, equals, text = override.partition("=")
-        path = split_path(keys.strip())
-        if not equals or "" in path:
+        if not equals or not re.fullmatch(DOTTED, keys.strip()):
             raise CaseError(f"{label}: not key=value; allowed: such as wear.cycles=1e4")
+        path = split_path(keys.strip())
+        if len(path) > DEEPEST:
+            raise CaseError(f"{label}: {TOO_MUCH}; allowed: up to {DEEPEST} keys")
         value = _Reading(label).plain(parse_yaml(text, label), (), 1)
         node: Any = self.data
         for key in path[:-1]:
@@ -104,7 +114,7 @@ class _Reading:
         """``node`` as dictionaries, lists and scalars; its lines are noted in ``lines``."""
         self.lines[path] = line
         if len(path) > DEEPEST or len(self.lines) > MOST_ENTRIES:
-            raise CaseError(f"{_place(self.name, line)}: nested too deeply or too long for a case")
+            raise CaseError(f"{_place(self.name, line)}: {TOO_MUCH}")
         if isinstance(node, CommentedMap):
             return dict(self._item(key, node, path, line) for key in node)
         if isinstance(node, CommentedSeq):
@@ -130,16 +140,10 @@ class _Reading:
 
 def read_text(path: Path) -> str:
     """The text of a case file; raises ``CaseError``."""
-    try:
-        with path.open("rb") as file:
-            raw = file.read(LARGEST_FILE + 1)
-    except FileNotFoundError:
-        raise CaseError(f"{path}: no such file; allowed: a case file in YAML") from None
-    except IsADirectoryError:
-        raise CaseError(f"{path}: a directory; allowed: a case file in YAML") from None
-    except (OSError, ValueError) as error:  # ValueError: a zero byte in the name
-        reason = getattr(error, "strerror", None) or error
-        raise CaseError(f"{path}: cannot be read ({reason}); allowed: a case file") from None
+    if wrong := unreadable(path):
+        raise CaseError(f"{path}: {wrong}; allowed: a case file in YAML")
+    with path.open("rb") as file:
+        raw = file.read(LARGEST_FILE + 1)
     if len(raw) > LARGEST_FILE:
         raise CaseError(f"{path}: over {LARGEST_FILE} bytes; allowed: a case file in YAML")
     try:
@@ -149,10 +153,36 @@ def read_text(path: Path) -> str:
         raise CaseError(f"{path}:{line}: not UTF-8; allowed: text in UTF-8") from None
 
 
+class _TooMuch(MarkedYAMLError):
+    """What no case can be, told as soon as it is met: ruamel takes minutes for a megabyte of it."""
+
+
+class _Parser(RoundTripParser):
+    """Ruamel's parser, as far as a case may go."""
+
+    def __init__(self, loader: Any) -> None:
+        super().__init__(loader)
+        self._nodes = self._depth = 0
+
+    def get_event(self) -> Event:
+        event = super().get_event()
+        self._nodes += isinstance(event, NodeEvent)
+        self._depth += isinstance(event, CollectionStartEvent)
+        self._depth -= isinstance(event, CollectionEndEvent)
+        # Keys are nodes too.
+        if self._depth > DEEPEST + 1 or self._nodes > 2 * MOST_ENTRIES + 1:
+            raise _TooMuch(problem_mark=event.start_mark)
+        return event
+
+
 def parse_yaml(text: str, name: str) -> Any:
     """``text`` as ruamel's nodes; YAML 1.2, where ``1e5`` is a number and ``yes`` a word."""
+    yaml = YAML(typ="rt", pure=True)
+    yaml.Parser = _Parser
     try:
-        return YAML(typ="rt", pure=True).load(text)
+        return yaml.load(text)
+    except _TooMuch as error:
+        raise CaseError(f"{_marked(error, name)}: {TOO_MUCH}") from None
     except DuplicateKeyError as error:
         key = shown(str(error.problem).partition('"')[2].partition('"')[0])
         raise CaseError(f"{_marked(error, name)}: {key}: given twice; allowed: once") from None
@@ -161,8 +191,6 @@ def parse_yaml(text: str, name: str) -> Any:
     except ReaderError as error:
         line = text.count("\n", 0, error.position) + 1
         raise CaseError(f"{_place(name, line)}: unprintable character; allowed: text") from None
-    except RecursionError:
-        raise CaseError(f"{_place(name, 1)}: nested too deeply for a case") from None
     except (YAMLError, ValueError, TypeError, LookupError, AttributeError) as error:
         # Odd tags and monstrous numbers end up here: ruamel has no one kind for them.
         raise CaseError(f"{_place(name, 1)}: not YAML: {_one_line(error)}") from None
@@ -207,9 +235,14 @@ def child(node: Any, key: str | int) -> Any:
 
 def split_path(text: str) -> KeyPath:
     """The keys of a dotted path; numbers are places in a list."""
-    return tuple(int(key) if key.isdecimal() else key for key in text.split("."))
+    return tuple(
+        int(key) if key.isdecimal() and len(key) <= LONGEST_NUMBER else key
+        for key in text.split(".")
+    )
 
 
 def dotted(path: Iterable[str | int]) -> str:
-    """A path as it is written, keys joined by dots."""
-    return ".".join(str(key) for key in path)
+    """A path as it goes into a message, keys joined by dots; odd and long ones are quoted."""
+    return ".".join(
+        str(key) if isinstance(key, int) or re.fullmatch(WORD, key) else shown(key) for key in path
+    )

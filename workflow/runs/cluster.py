@@ -7,13 +7,14 @@ share. A run whose worker dies is taken up by another one, from the last jump.
 from __future__ import annotations
 
 import hashlib
+import logging
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
 from workflow.case.sections import Case
 from workflow.case.writing import dump_case
-from workflow.errors import UserError, one_line
+from workflow.errors import MethodFailed, UserError, one_line
 from workflow.runs.job import Job, run_job
 
 # Times a run is tried again where it could not even be started; how often its worker may die is
@@ -21,6 +22,8 @@ from workflow.runs.job import Job, run_job
 RETRIES = 2
 # Seconds to wait for the scheduler to answer.
 PATIENCE = "30 s"
+# Whose messages are for those who run the cluster.
+LOGGERS = "distributed", "tornado"
 
 
 def run_on_cluster(
@@ -28,8 +31,9 @@ def run_on_cluster(
 ) -> None:
     """Run jobs on the workers of the scheduler at ``address`` and ``end`` each with its error.
 
-    Raises UserError if there is no scheduler. Runs that are no longer wanted, because this process
-    has ended in whatever way, are ended by their workers.
+    Raises UserError if there is no scheduler, MethodFailed where it goes away meanwhile. Runs that
+    are no longer wanted, because this process has ended in whatever way, are ended by their
+    workers.
     """
     try:
         from distributed import Client, as_completed
@@ -37,18 +41,37 @@ def run_on_cluster(
         raise UserError(
             f"--dask needs the package distributed ({one_line(error)}): install fretscale[cluster]"
         ) from error
+    _silence()
     try:
         client = Client(address, timeout=PATIENCE)
     except (OSError, ValueError) as error:
         raise UserError(f"--dask {address}: no scheduler answers: {one_line(error)}") from error
     with client:
-        futures = {}
-        for job, case in jobs:
-            settings = {"key": _key(job, case, out), "pure": False, "retries": RETRIES}
-            absolute = Job(job.name, job.case.absolute(), job.overrides)
-            futures[client.submit(_on_worker, absolute, out.absolute(), **settings)] = job
-        for future in as_completed(futures):
+        futures = _submitted(client, jobs, out)
+        for ended, future in enumerate(as_completed(futures)):
+            if future.cancelled():
+                raise MethodFailed(
+                    f"--dask {address}: the scheduler has gone, {len(jobs) - ended} of {len(jobs)} "
+                    "runs not known to have ended; what is done is kept: the same command goes on"
+                )
             end(futures[future], _error_of(future))
+
+
+def _silence() -> None:
+    """What becomes of the cluster is told in our own words, in one line."""
+    for name in (*LOGGERS, *logging.root.manager.loggerDict):
+        if name.partition(".")[0] in LOGGERS:
+            logging.getLogger(name).setLevel(logging.CRITICAL)
+
+
+def _submitted(client: Any, jobs: Sequence[tuple[Job, Case]], out: Path) -> dict[Any, Job]:
+    """The jobs, each by what the scheduler will tell of it."""
+    futures = {}
+    for job, case in jobs:
+        settings = {"key": _key(job, case, out), "pure": False, "retries": RETRIES}
+        absolute = Job(job.name, job.case.absolute(), job.overrides)
+        futures[client.submit(_on_worker, absolute, out.absolute(), **settings)] = job
+    return futures
 
 
 def _key(job: Job, case: Case, out: Path) -> str:

@@ -20,7 +20,7 @@ from typing import Any
 
 from sa_solver.errors import FretscaleError
 from workflow.case.sections import Case
-from workflow.errors import MethodFailed, one_line
+from workflow.errors import MethodFailed, UserError, one_line
 from workflow.kinds import load_case
 from workflow.runs.run import bring_to_end
 from workflow.shell.folder import OutputFolder
@@ -138,7 +138,7 @@ def _wait(process: subprocess.Popen[str], unwanted: Callable[[], bool]) -> tuple
 
 def _ending(process: subprocess.Popen[str], answer: str, stderr: str) -> str:
     """Why the job failed, in one line; "" if it did not."""
-    if process.returncode == 0:
+    if process.returncode == 0 and answer:
         return one_line(json.loads(answer)["error"])
     if process.returncode < 0:
         number = -process.returncode
@@ -152,4 +152,7 @@ def finished(job: Job, out: Path, error: str) -> Finished:
     root = out / job.name
     if not error and not OutputFolder(root).summary.exists():
         error = f"{root}: finished, but its summary is not to be seen here: is the folder shared?"
-    return Finished(job, root, None if error else OutputFolder(root).read_summary(), error)
+    try:
+        return Finished(job, root, None if error else OutputFolder(root).read_summary(), error)
+    except UserError as damaged:
+        return Finished(job, root, None, one_line(damaged))

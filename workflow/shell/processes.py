@@ -81,13 +81,19 @@ def _processes(
             if one_thread:
                 stack.enter_context(environment(dict.fromkeys(THREAD_SETTINGS, "1")))
             stack.enter_context(_interrupts_held())
-            for parts in arguments:
+            for _ in arguments:
                 ours, theirs = context.Pipe()
-                process = context.Process(target=_run, args=(target, theirs, *parts), daemon=True)
+                process = context.Process(target=_run, args=(target, theirs), daemon=True)
                 process.start()
                 theirs.close()
                 connections.append(ours)
                 processes.append(process)
+        # Python itself would wait forever for a process that is killed before it has read them.
+        for connection, parts in zip(connections, arguments, strict=True):
+            try:
+                connection.send(parts)
+            except OSError as error:
+                raise _gone(error) from error
         yield connections
     finally:
         for connection in connections:
@@ -97,12 +103,12 @@ def _processes(
             process.join()
 
 
-def _run(target: Callable[..., None], connection: Connection, *arguments: Any) -> None:
+def _run(target: Callable[..., None], connection: Connection) -> None:
     """First thing in a new process: leave Ctrl-C to the parent, and end when it ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     threading.Thread(target=_end_with_parent, daemon=True).start()
     try:
-        target(connection, *arguments)
+        target(connection, *connection.recv())
     except (EOFError, BrokenPipeError):
         return
 

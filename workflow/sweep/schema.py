@@ -61,7 +61,15 @@ def amount_of(value: object) -> Amount | None:
         return Amount(float(number), unit)
     if isinstance(value, bool) or not isinstance(value, int | float):
         return None
-    return Amount(float(value)) if math.isfinite(value) else None
+    return Amount(float(value)) if _is_finite(value) else None
+
+
+def _is_finite(number: float) -> bool:
+    """Whether a number, a whole one of any length, is finite as a float."""
+    try:
+        return math.isfinite(number)
+    except OverflowError:
+        return False
 
 
 @dataclass(frozen=True)
@@ -99,7 +107,7 @@ class Value(Entry):
             return tuple(self.parse(item) for item in value)
         if isinstance(value, bool | str):
             return value
-        if isinstance(value, int | float) and math.isfinite(value):
+        if isinstance(value, int | float) and _is_finite(value):
             return value
         raise self.refusal(value, "not the value of an entry")
 

@@ -7,8 +7,11 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
+from workflow.analyses import wear
+from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.evolution import PositiveEnergy, Table, TotalEnergy
-from workflow.case.fields import File, Quantity
+from workflow.case.fields import Quantity
+from workflow.case.loading import YAML, CaseFile
 from workflow.case.sections import Section, disagreement, entry
 from workflow.errors import UserError
 
@@ -22,6 +25,7 @@ Slope = Annotated[
 ]
 Final = Annotated[float, Quantity("1", at_least=0.0, at_most=1e6)]
 Part = Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)]
+WEAR_CASES = tuple(wear.ANALYSIS.cases.values())
 
 
 class Logarithmic(Section):
@@ -74,6 +78,11 @@ Factor = Annotated[
 ]
 
 
+def _unfit(worn: WearCase) -> str:
+    """Why a wear case says nothing of a joint."""
+    return "" if worn.loops.wanted else "leaves no table of loops; give loops.amplitude or force"
+
+
 class JointEvolution(Section):
     """Factors of the joint's parameters against the energy E that it has dissipated so far."""
 
@@ -81,12 +90,14 @@ class JointEvolution(Section):
     stiffness: Factor | None = entry("of joint.stiffness", default=None)
     residual_stiffness: Factor | None = entry("of joint.residual_stiffness", default=None)
     normal_load: Factor | None = entry("of joint.normal_load", default=None)
-    file: Annotated[str, File((".csv", ".yaml"))] | None = entry(
-        "loops_<interface>.csv of a wear run, or measured: its kt (all of the stuck slope, "
-        "joint.residual_stiffness included) and mu against energy take the place of "
-        "joint.stiffness and joint.friction; or the wear case itself, which is run first",
-        "loops.csv",
-        default=None,
+    file: Annotated[str, CaseFile((".csv", YAML), WEAR_CASES, "wear with loops", _unfit)] | None = (
+        entry(
+            "loops_<interface>.csv of a wear run, or measured: its kt (all of the stuck slope, "
+            "joint.residual_stiffness included) and mu against energy take the place of "
+            "joint.stiffness and joint.friction; or the wear case itself, which is run first",
+            "loops.csv",
+            default=None,
+        )
     )
 
     @model_validator(mode="after")

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections import Counter, defaultdict
 from collections.abc import Iterator
-from pathlib import Path
 
 import numpy as np
 
 from fe_models.dynamics.rig import Link, RigError, reduced_rig, unit_force
 from fe_models.mesh import MeshError
-from fe_models.reduction import ReducedModel, load_reduced
+from fe_models.reduction import ReducedModel
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import Against, JointPlaces, Moved, ReducedBody
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
 from workflow.analyses.specimens.model import SpecimensModel
-from workflow.case.loading import load_named
+from workflow.case.loading import load_case
 from workflow.errors import UserError
 from workflow.shell.reporter import Reporter
 
@@ -77,10 +76,7 @@ def _across(direction: str) -> list[str]:
 
 def _reduced_body(body: ReducedBody, reporter: Reporter) -> ReducedModel:
     if body.body is None:
-        try:
-            return load_reduced(Path(body.file))
-        except (OSError, ValueError) as error:
-            raise UserError(f"structure.file: {error}") from error
+        return body.stored()
     return reduced_specimens("structure.file", body.file, reporter).reduction.models[body.body - 1]
 
 
@@ -91,7 +87,7 @@ def reduced_specimens(
 
     Raises UserError for one that is no case of specimens, or that cannot be meshed.
     """
-    case = load_named(key, file, [SpecimensCase], "specimens")
+    case = load_case(file, [SpecimensCase])
     model = SpecimensModel(case, target_distance)
     try:
         memory(case, model.node_count()).check()

@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from workflow.case.fields import File, Quantity, Whole
+from workflow.analyses.specimens.case import SpecimensCase
+from workflow.case.fields import Quantity, Whole
+from workflow.case.input_files import InputFileError, open_hdf5
+from workflow.case.loading import YAML, CaseFile
 from workflow.case.sections import Length, Section, Title, disagreement, entry
+
+if TYPE_CHECKING:
+    from fe_models.reduction import ReducedModel
 
 Mass = Annotated[float, Quantity("t", above=0.0, at_most=1e3, range_text="above 0 to 1e6 kg")]
 Spring = Annotated[float, Quantity("N/mm", at_least=0.0, at_most=1e12, range_text="0 to 1e6 kN/um")]
@@ -90,7 +96,7 @@ class ReducedBody(Section):
     """A body on a few points and its lowest modes, with joints, masses and springs there."""
 
     kind: Literal["reduced"] = entry("a Craig-Bampton model with joints at its points", "reduced")
-    file: Annotated[str, File((".h5", ".yaml"))] = entry(
+    file: Annotated[str, CaseFile((".h5", YAML), (SpecimensCase,), "specimens")] = entry(
         "body_1.h5 or body_2.h5 of a specimens run; or the specimens case itself, whose body is "
         "reduced first; its points are pad 1, pad 2, ... and ring 1, ring 2, ...",
         "body_2.h5",
@@ -107,11 +113,27 @@ class ReducedBody(Section):
 
     @model_validator(mode="after")
     def _body_of_a_case(self) -> ReducedBody:
-        of_a_case = self.file.endswith(".yaml")
+        of_a_case = self.file.endswith(YAML)
         if of_a_case != (self.body is not None):
             wrong = "missing" if of_a_case else f"{self.body}: given beside a single body"
             raise disagreement(f"{wrong}; allowed: with a case of specimens, 1 or 2", "body")
         return self
+
+    @model_validator(mode="after")
+    def _file_is_a_model(self) -> ReducedBody:
+        if self.body is None:
+            try:
+                self.stored()
+            except InputFileError as error:
+                raise disagreement(str(error), "file") from error
+        return self
+
+    def stored(self) -> ReducedModel:
+        """The model in a file that holds one. Raises InputFileError."""
+        from fe_models.reduction import load_reduced
+
+        with open_hdf5(self.file):
+            return load_reduced(Path(self.file))
 
     @model_validator(mode="after")
     def _has_joints(self) -> ReducedBody:
@@ -130,7 +152,7 @@ class FrictionRig(Section):
     """Two masses in a row, and the specimens in contact between the second mass and the ground."""
 
     kind: Literal["friction_rig"] = entry("two reduced specimens in a rig", "friction_rig")
-    specimens: Annotated[str, File((".yaml",))] = entry(
+    specimens: Annotated[str, CaseFile((YAML,), (SpecimensCase,), "specimens")] = entry(
         "a case of specimens: bodies, form, materials, mesh and reduction are taken from it",
         "specimens_rig.yaml",
     )

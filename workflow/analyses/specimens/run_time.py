@@ -5,7 +5,7 @@ from __future__ import annotations
 from math import pi, prod
 
 from workflow.analyses.specimens.case import SpecimensCase
-from workflow.case.loading import load_named
+from workflow.case.loading import load_case
 from workflow.shell.run_time import FRICTIONAL, RunTime, factors, solves
 
 # Nodes of a specimen of quadratic elements: of a cube as wide as its pad, and by its volume; linear
@@ -43,4 +43,4 @@ def reduction_of(file: str) -> float:
     """Of the specimens of a case, or of a body that is reduced already [s]."""
     if not file.endswith(".yaml"):
         return 0.0
-    return reduction(load_named("specimens", file, [SpecimensCase], "specimens"))
+    return reduction(load_case(file, [SpecimensCase]))

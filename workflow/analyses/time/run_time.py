@@ -7,7 +7,7 @@ from workflow.analyses.rig.excitation import Harmonic
 from workflow.analyses.rig.structure import ReducedBody
 from workflow.analyses.specimens.run_time import reduction_of
 from workflow.analyses.time.case import JointCase, RigCase
-from workflow.case.loading import load_named
+from workflow.case.loading import load_case
 from workflow.shell.run_time import RunTime
 
 # A step of a rig in time; of a reduced body [s]. Chosen steps are parts of what the case gives.
@@ -40,4 +40,4 @@ def _computed_wear(file: str | None) -> float:
     if file is None or not file.endswith(".yaml"):
         return 0.0
     kinds = list(wear.ANALYSIS.cases.values())
-    return wear.ANALYSIS.run_time(load_named("evolution.file", file, kinds, "wear")).seconds
+    return wear.ANALYSIS.run_time(load_case(file, kinds)).seconds

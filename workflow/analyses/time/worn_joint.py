@@ -6,11 +6,9 @@ from pathlib import Path
 
 import numpy as np
 
-from workflow.analyses import wear
 from workflow.analyses.time.case import JointCase, RigCase
-from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.loop_table import read_loop_table
-from workflow.case.loading import load_named
+from workflow.case.loading import YAML
 from workflow.errors import UserError
 from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
@@ -26,12 +24,11 @@ def with_computed_wear(run: Run[JointCase | RigCase]) -> JointCase | RigCase:
     """The case with the table of loops that its wear case leaves; as it is if it names none.
 
     The wear case runs into ``wear`` in the folder, from where an earlier run of it there has got
-    to. Raises UserError if it cannot be read, is not one of a single contact, or asks for no loops.
+    to. Raises UserError if it is not one of a single contact.
     """
     case, file = run.case, run.case.evolution.file
-    if file is None or not file.endswith(".yaml"):
+    if file is None or not file.endswith(YAML):
         return case
-    _check(file)
     folder = run.folder.reserve(WEAR, "the wear of the contact, a run of its own")
     with run.reporter.stage("wear of the contact"):
         computed = run.compute(Path(file), folder)
@@ -70,15 +67,4 @@ def warn_of_table(case: JointCase | RigCase, last: float, reporter: Reporter) ->
         reporter.warn(
             f"evolution.file: its loops are under {table.P.min():g} to {table.P.max():g} N, the "
             f"joint is under {load:g} N: stiffness depends on the load"
-        )
-
-
-def _check(file: str) -> None:
-    """Refuse a file that is no wear case, or one without loops."""
-    kinds = list(wear.ANALYSIS.cases.values())
-    case: WearCase = load_named("evolution.file", file, kinds, "wear with loops")
-    if not case.loops.wanted:
-        raise UserError(
-            f"evolution.file: {file} leaves no table of loops; allowed: a wear case with "
-            "loops.amplitude or loops.force"
         )

@@ -8,7 +8,7 @@ from workflow.analyses.rig.structure import FrictionRig, ReducedBody, Rig
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.run_time import reduction_of
 from workflow.analyses.vibration.case import VibrationCase, VibrationCaseBase
-from workflow.case.loading import load_named
+from workflow.case.loading import load_case
 from workflow.shell.run_time import RunTime
 
 # Points of a curve, usually, where the frequency or the force grows by a factor of e.
@@ -56,6 +56,6 @@ def _directions(case: VibrationCaseBase) -> int:
     joints = JOINTS
     if isinstance(case.structure, FrictionRig):
         file = case.structure.specimens
-        specimens = load_named("structure.specimens", file, [SpecimensCase], "specimens")
+        specimens = load_case(file, [SpecimensCase])
         joints = (specimens.mesh.pad_elements + 1) ** 2
     return joints * (3 if case.contacts else 1)

@@ -18,7 +18,9 @@ from workflow.analyses.rig.joint_sections import (
 from workflow.analyses.rig.structure import FrictionRig, Rig
 from workflow.analyses.vibration.case import DrivenMass, VibrationCase, VibrationCaseBase, wears
 from workflow.analyses.wear.case.sections import Cycles, PressingForce
-from workflow.case.fields import File, Quantity
+from workflow.analyses.wear.structures.bodies.case import BodiesWearCase
+from workflow.case.fields import Quantity
+from workflow.case.loading import YAML, CaseFile
 from workflow.case.sections import OutputWithoutFields, Section, Title, disagreement, entry
 from workflow.case.source import Source
 
@@ -27,10 +29,29 @@ WearingFriction = Annotated[float, Quantity("1", above=0.0, at_most=10.0)]
 NOT_OF_A_STATE = ("assumed", "expect")
 
 
+def _unfit(bodies: BodiesWearCase) -> str:
+    """Why the contact of a wear case cannot be the joint of a rig."""
+    if bodies.material(1) != bodies.material(2):
+        return (
+            "materials that are not alike, whose pressure follows the shear; take the same "
+            "material twice"
+        )
+    if bodies.friction.at(0.0) == 0.0:
+        return "no friction.coefficient above 0"
+    if not bodies.wear.step.automatic:
+        return (
+            "wear.step of a given size; take implicit or second_order steps, whose length follows "
+            "from wear.tolerance"
+        )
+    return ""
+
+
 class WornContact(Section):
     """The contact that is the rig's joint."""
 
-    file: Annotated[str, File((".yaml",))] = entry(
+    file: Annotated[
+        str, CaseFile((YAML,), (BodiesWearCase,), "wear of two bodies over an area", _unfit)
+    ] = entry(
         "a wear case of two bodies: form, materials, friction, normal force, grid and wear are "
         "taken from it; its stroke, cycles and stop are not",
         "specimens_wear.yaml",

@@ -25,7 +25,7 @@ from workflow.analyses.vibration_wear.outcome import (
 )
 from workflow.analyses.vibration_wear.pads import PadCycle, WearingPads
 from workflow.analyses.vibration_wear.states import responses_to_all, worn_states
-from workflow.case.loading import load_named
+from workflow.case.loading import load_case
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
@@ -34,8 +34,7 @@ def wear_specimens(case: FrictionRigWearCase, reporter: Reporter) -> VibrationWe
     """All that is kept of a run."""
     wear = case.wear
     unworn = VibrationModel.of(case.unworn, reporter)
-    file = case.structure.specimens
-    specimens = load_named("structure.specimens", file, [SpecimensCase], "specimens")
+    specimens = load_case(case.structure.specimens, [SpecimensCase])
     pads = WearingPads(unworn, specimens.laws, wear.force, wear.frequency)
     state = pads.begin()
     with reporter.stage("wear"):

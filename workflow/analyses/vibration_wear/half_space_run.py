@@ -37,8 +37,7 @@ from workflow.analyses.vibration_wear.states import responses_to_all, worn_state
 from workflow.analyses.vibration_wear.vibrating_contact import ContactCycle, VibratingContact
 from workflow.analyses.wear.contact_stage import stepper_of
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase
-from workflow.case.loading import load_named
-from workflow.errors import UserError
+from workflow.case.loading import load_case
 from workflow.shell.dataset import Dataset
 from workflow.shell.few_cells import check_cells
 from workflow.shell.reporter import Reporter
@@ -53,7 +52,7 @@ def wear_half_space(case: VibrationWearCase, reporter: Reporter) -> VibrationWea
     Raises UserError where contact or rig cannot be what the case says, and what contact problems
     and motions raise that are not found.
     """
-    bodies = contact_case(case.contact.file)
+    bodies = load_case(case.contact.file, [BodiesWearCase])
     rig, wear = row_of_masses(case.structure, case.mass or 1), case.wear
     resolution = Resolution(tuple(case.resolution.harmonics), case.resolution.samples)
     contact = VibratingContact(bodies, rig, wear.force, wear.frequency, resolution)
@@ -65,24 +64,6 @@ def wear_half_space(case: VibrationWearCase, reporter: Reporter) -> VibrationWea
     describe = _Description(case, contact, reporter)
     states = worn_states(wear.cycles, stepper, state, contact.wearing, describe, reporter)
     return VibrationWearOutcome(case, states, grid=contact.grid)
-
-
-def contact_case(file: str) -> BodiesWearCase:
-    """The wear case of the contact. Raises UserError where it cannot be that of a rig."""
-    case = load_named("contact.file", file, [BodiesWearCase], "wear of two bodies over an area")
-    if case.material(1) != case.material(2):
-        raise UserError(
-            f"contact.file: {file}: materials that are not alike, whose pressure follows the "
-            "shear; allowed: the same material twice"
-        )
-    if case.friction.at(0.0) == 0.0:
-        raise UserError(f"contact.file: {file}: no friction; allowed: a coefficient above 0")
-    if not case.wear.step.automatic:
-        raise UserError(
-            f"contact.file: {file}: wear.step of a given size; allowed: implicit or second_order "
-            "steps, whose length follows from wear.tolerance"
-        )
-    return case
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from workflow.analyses.wear.case.sections import (
     Nonlinearity,
 )
 from workflow.analyses.wear.case.worn_bodies import Worn
+from workflow.case.fields import shown
 from workflow.case.sections import Case, Section, Title, disagreement, entry
 
 # What the summary and the results call their own entries.
@@ -29,7 +30,7 @@ def check_interface_name(name: str, key: str) -> None:
     """Refuse, at ``key``, an interface whose name could not stand in the results."""
     if name in RESERVED or "/" in name:
         raise disagreement(
-            f"an interface called {name!r}; allowed: names without / and none of "
+            f"an interface called {shown(name)}; allowed: names without / and none of "
             f"{', '.join(RESERVED)}",
             key,
         )

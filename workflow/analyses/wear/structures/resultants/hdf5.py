@@ -24,7 +24,7 @@ from workflow.analyses.wear.structures.resultants.imported import (
     tilt_of,
 )
 from workflow.case import units
-from workflow.case.input_files import InputFileError
+from workflow.case.input_files import InputFileError, open_hdf5
 from workflow.case.table_file import check_unit
 from workflow.shell.results import frame_of
 
@@ -90,23 +90,19 @@ def read_h5(
 
     Raises InputFileError.
     """
-    try:
-        with h5py.File(file, "r") as opened:
-            top = opened.get(group or "/")
-            interfaces = [
-                (name, item)
-                for name, item in (top.items() if isinstance(top, h5py.Group) else ())
-                if isinstance(item, h5py.Group) and isinstance(item.get(LOADS), h5py.Group)
-            ]
-            if not interfaces:
-                raise InputFileError(
-                    f"{file}: /{group}: no interfaces; allowed: a group for each, with a group "
-                    f"{LOADS} in it; at the top: {', '.join(opened) or 'nothing'}"
-                )
-            read = {name: _read(Group(file, item), bounds(name), line) for name, item in interfaces}
-    except OSError as error:
-        reason = " ".join(str(error).split())
-        raise InputFileError(f"{file}: cannot be read ({reason})") from error
+    with open_hdf5(file) as opened:
+        top = opened.get(group or "/")
+        interfaces = [
+            (name, item)
+            for name, item in (top.items() if isinstance(top, h5py.Group) else ())
+            if isinstance(item, h5py.Group) and isinstance(item.get(LOADS), h5py.Group)
+        ]
+        if not interfaces:
+            raise InputFileError(
+                f"{file}: /{group}: no interfaces; allowed: a group for each, with a group "
+                f"{LOADS} in it; at the top: {', '.join(opened) or 'nothing'}"
+            )
+        read = {name: _read(Group(file, item), bounds(name), line) for name, item in interfaces}
     _check_counts(file, read)
     return read
 

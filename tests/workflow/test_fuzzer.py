@@ -1,0 +1,162 @@
+"""Mutants of all cases and templates: whatever a case says, ``check`` answers in time and in place.
+
+The numbers of the mutants are their seeds: ``Mutants(sources())[number]`` makes one again.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import shutil
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tests.conftest import CASES
+from tests.marks import slow
+from tests.workflow import scenes
+from tests.workflow.commands import command
+from tests.workflow.mutants import Mutant, Mutants, sources
+from workflow.case.writing import dump_case
+from workflow.kinds import load_case, parse_case
+
+# Seconds of a processor that a check may take, and after which it is taken for endless.
+LIMIT, ENDLESS = 5.0, 60
+# Numbers of mutants in a test; tests of the quick part, and of all.
+BLOCK, QUICK, ALL = 50, 4, 80
+# What a line may be long, of any text that somebody may write.
+LONGEST = 600
+# Of runs: those looked at, and seconds after which one has shown enough.
+RUNS, ENOUGH = 25, 20.0
+
+
+@pytest.fixture(scope="module")
+def folder(template_files: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the files that cases and templates name."""
+    place = tmp_path_factory.mktemp("mutants")
+    for path in [*template_files.iterdir(), *CASES.glob("*.yaml")]:
+        shutil.copy(path, place)
+    return place
+
+
+@pytest.fixture(scope="module")
+def mutants() -> Mutants:
+    return Mutants(sources())
+
+
+def checked(mutant: Mutant, path: Path) -> Any:
+    """How ``check`` ends; anything but an exit is raised."""
+    path.write_bytes(mutant.text)
+    return command("check", path, overrides=mutant.overrides)
+
+
+def faults(mutant: Mutant, path: Path) -> Iterator[str]:
+    """What is wrong with how a mutant is taken."""
+    begun = time.process_time()
+    ended = checked(mutant, path)
+    if time.process_time() - begun > LIMIT:
+        yield "too slow"
+    if ended.exit_code == 0:
+        yield from _of_an_accepted_one(mutant, path, ended.stdout)
+    elif ended.exit_code == 4:
+        if not re.search(r"needs about .* GB of memory, .*: .*\b[a-z_]+\.[a-z_]+", ended.stderr):
+            yield f"no remedy: {ended.stderr}"
+    elif ended.exit_code == 2:
+        yield from _of_a_refusal(path, ended.stderr)
+    else:
+        yield f"exit code {ended.exit_code}"
+
+
+def _of_a_refusal(path: Path, said: str) -> Iterator[str]:
+    """Every line names a place: a line of the file, the file, or an override."""
+    lines = said.removesuffix("\n").split("\n")
+    place = re.compile(rf"fretscale: ({re.escape(str(path))}(:\d+)?|--set .*?): \S")
+    yield from (f"no place: {line}" for line in lines if not place.match(line))
+    yield from (f"unprintable: {line!r}" for line in lines if not line.isprintable())
+    yield from (f"too long: {line}" for line in lines if len(line) > LONGEST)
+    if len(lines) > 25:
+        yield f"{len(lines)} lines"
+
+
+def _of_an_accepted_one(mutant: Mutant, path: Path, said: str) -> Iterator[str]:
+    """What is taken has numbers only, and reads back as it is written."""
+    outline = said.partition("\n")[2]
+    if re.search(r"\b(nan|inf|None)\b", outline):
+        yield f"no numbers: {outline}"
+    case = load_case(path, mutant.overrides)
+    if parse_case(dump_case(case), str(path)) != case:
+        yield "another case once it is written"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no alarm")
+@pytest.mark.parametrize("block", [block if block < QUICK else slow(block) for block in range(ALL)])
+def test_whatever_is_wrong_is_told_in_its_place(
+    block: int, folder: Path, mutants: Mutants, alarm: None
+) -> None:
+    for number in range(block * BLOCK, (block + 1) * BLOCK):
+        mutant = mutants[number]
+        try:
+            found = list(faults(mutant, folder / "mutant.yaml"))
+        except Exception as error:
+            raise AssertionError(f"mutant {number}: {mutant.told}") from error
+        assert not found, f"mutant {number}: {mutant.told}"
+
+
+@pytest.fixture
+def alarm() -> Iterator[None]:
+    """Raises TimeoutError in a test that seems endless."""
+    import signal
+
+    def late(*_: object) -> None:
+        raise TimeoutError("endless")
+
+    before = signal.signal(signal.SIGALRM, late)
+    signal.alarm(ENDLESS)
+    yield
+    signal.alarm(0)
+    signal.signal(signal.SIGALRM, before)
+
+
+# --- runs -----------------------------------------------------------------------------------------
+
+QUIET = "output: {paraview: false, figures: false}\n"
+
+
+def _numbers(summary: Any) -> Iterator[float]:
+    values = summary.values() if isinstance(summary, dict) else summary
+    for value in values if isinstance(summary, dict | list) else ():
+        if isinstance(value, float):
+            yield value
+        yield from _numbers(value)
+
+
+@pytest.mark.slow
+def test_what_is_accepted_runs_or_says_why_not(tmp_path: Path) -> None:
+    """Small cases that ``check`` takes: an exit code of ours, one line, no NaN in the summary."""
+    small = Mutants({"ball": scenes.BALL + QUIET, "roller": scenes.ROLLER_WEAR})
+    (tmp_path / "loads.csv").write_text(scenes.ROLLER_LOADS, encoding="utf-8")
+    path, looked_at = tmp_path / "mutant.yaml", 0
+    for number in range(100 * RUNS):
+        mutant, out = small[number], tmp_path / f"out{number}"
+        if looked_at == RUNS:
+            return
+        if mutant.overrides or checked(mutant, path).exit_code:
+            continue
+        told, looked_at = f"mutant {number}: {mutant.told}", looked_at + 1
+        run = "from workflow.cli import main; main()"
+        arguments = [sys.executable, "-c", run, "run", str(path), "--out", str(out)]
+        try:
+            ended = subprocess.run(arguments, capture_output=True, text=True, timeout=ENOUGH)
+        except subprocess.TimeoutExpired:
+            continue
+        assert ended.returncode in (0, 2, 3, 4), (told, ended.stderr)
+        assert "Traceback" not in ended.stderr, (told, ended.stderr)
+        if ended.returncode == 0:
+            summary = json.loads((out / "summary.json").read_bytes())
+            assert all(map(math.isfinite, _numbers(summary))), told
