@@ -110,21 +110,27 @@ class CycleResult:
 class WearState(WornState):
     """What the wear of a half-space contact must remember between two steps.
 
-    Fields are ``(nx, ny)``, one value per cell; ``starts`` are the contact solver's, by increment.
+    Fields are ``(nx, ny)``, one value per cell; ``starts`` are the contact solver's, by increment,
+    and ``start`` is that of whoever found the cycle that led to it.
     """
 
     starts: Starts = field(default_factory=dict)
+    start: object = None
 
 
 @dataclass(frozen=True, eq=False)
 class WearingContact:
-    """One interface under a ``sliding`` cycle; ``laws`` are those of body 1 and body 2."""
+    """One interface under a ``sliding`` cycle; ``laws`` are those of body 1 and body 2.
+
+    ``start`` is what the cycle of surfaces that are little different may be found from.
+    """
 
     contact: NormalContact
     laws: tuple[WearLaw, WearLaw]
     friction: float
     sliding: SlidingCycle
     tolerance: float
+    start: object = None
 
     @property
     def grid(self) -> Grid:
@@ -368,5 +374,6 @@ class _March:
             depth_rate=float(max(depth.max() for depth in lost)) / self._cycles,
             volume_rate=float(sum(depth.sum() for depth in lost)) * area / self._cycles,
             starts=self._starts,
+            start=self._contact.start,
         )
         return WearStep(state, self._cycles, self._spent)

@@ -28,4 +28,5 @@ ANALYSIS = Analysis(
     run=_run,
     pictures=_pictures,
     memory=memory,
+    resumable=True,
 )

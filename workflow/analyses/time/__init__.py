@@ -27,4 +27,5 @@ ANALYSIS = Analysis(
     run=_run,
     pictures=_pictures,
     memory=memory,
+    resumable=True,
 )

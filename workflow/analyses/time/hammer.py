@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -16,6 +17,7 @@ from fe_models.dynamics.impact_hammer import (
     frequency_response,
 )
 from fe_models.dynamics.motion import Motion
+from sa_solver.steps import Steps
 from sa_solver.types import Array
 from workflow.analyses.rig import excitation as given
 from workflow.analyses.rig.rig_model import RigModel
@@ -43,7 +45,9 @@ DECAYED = 0.9
 RING_DOWN_POINTS = 400
 
 
-def run_hammer(case: RigCase, rig: RigModel, joint: JointModel, reporter: Reporter) -> TimeOutcome:
+def run_hammer(
+    case: RigCase, rig: RigModel, joint: JointModel, reporter: Reporter, steps: Steps
+) -> TimeOutcome:
     """Hit the rig at every energy, which stays what it is during the record.
 
     Raises MethodFailed where a motion is not found, or shows no resonance.
@@ -51,14 +55,16 @@ def run_hammer(case: RigCase, rig: RigModel, joint: JointModel, reporter: Report
     assert isinstance(case.excitation, given.Hammer)
     hammer, control = case.excitation, step_control(case)
     blow = HammerBlow(rig.driven, hammer.force, hammer.duration)
-    states = []
-    for energy in case.energies:
+
+    def hit(energy: float) -> State:
         with reporter.stage("motion"):
-            motion = motion_of(rig, joint, energy, blow, hammer.record, control)
+            motion = motion_of(rig, joint, energy, blow, hammer.record, control, steps=steps)
         with reporter.stage("signals"):
-            states.append(_state(hammer, blow, rig, joint, energy, motion, reporter))
+            return _state(hammer, blow, rig, joint, energy, motion, reporter)
+
+    states = tuple(steps("blow", partial(hit, energy)) for energy in case.energies)
     curve = evolution_curve(joint, case.energies[-1])
-    return TimeOutcome(case, tuple(states), curve, _change(states))
+    return TimeOutcome(case, states, curve, _change(states))
 
 
 def _state(

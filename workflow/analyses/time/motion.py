@@ -9,6 +9,7 @@ import numpy as np
 from fe_models.dynamics.excitation import ExcitationForce
 from fe_models.dynamics.motion import Motion, Start
 from fe_models.dynamics.newmark import TimeStepControl, integrate
+from sa_solver.steps import COMPUTED, Steps
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.time.case import RigCase, joules
 from workflow.analyses.time.joint_model import JointModel
@@ -29,13 +30,15 @@ def motion_of(
     duration: float,
     control: TimeStepControl,
     start: Start | None = None,
+    steps: Steps = COMPUTED,
 ) -> Motion:
     """Motion of a rig whose joints have dissipated so much ``energy`` [N mm] before.
 
     Raises MethodFailed for one that was not found to its end.
     """
     law = joint.at(energy)
-    motion = integrate(rig.model, law, rig.with_preload(law, force), duration, control, start)
+    pulled = rig.with_preload(law, force)
+    motion = integrate(rig.model, law, pulled, duration, control, start, steps)
     if not motion.converged:
         raise MethodFailed(f"motion at {joules(energy)}: {motion.message}")
     return motion

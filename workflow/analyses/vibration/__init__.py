@@ -39,5 +39,6 @@ ANALYSIS = Analysis(
     run=_run,
     pictures=_pictures,
     memory=memory,
+    resumable=True,
     comparison=Comparison(quantities=_quantities),
 )

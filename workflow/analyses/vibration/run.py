@@ -6,6 +6,7 @@ from typing import Any
 
 from fe_models.dynamics.harmonics import HarmonicBalanceError
 from fe_models.dynamics.receptance import ReceptanceError
+from sa_solver.steps import Steps
 from wear.joints.parameters import JointError
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
@@ -15,6 +16,7 @@ from workflow.analyses.vibration.results import write_vibration_output
 from workflow.errors import UserError
 from workflow.shell.analysis import Run
 from workflow.shell.reporter import Reporter
+from workflow.shell.steps import kept_steps
 
 
 def run_vibration(run: Run[VibrationCase]) -> None:
@@ -24,9 +26,9 @@ def run_vibration(run: Run[VibrationCase]) -> None:
     does not rest, or a force has no motion at all. A curve that ends before its span does is told
     as a warning.
     """
-    run.reporter.say(f"run: {run.case.title}")
     try:
-        outcome = _outcome(run.case, run.reporter)
+        with kept_steps(run) as steps:
+            outcome = _outcome(run.case, run.reporter, steps)
     except JointError as error:
         raise UserError(f"{run.folder.case}: joint: {error}") from error
     except (HarmonicBalanceError, ReceptanceError) as error:
@@ -34,25 +36,25 @@ def run_vibration(run: Run[VibrationCase]) -> None:
     write_vibration_output(outcome, run)
 
 
-def _outcome(case: VibrationCase, reporter: Reporter) -> VibrationOutcome:
+def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> VibrationOutcome:
     model = VibrationModel.of(case, reporter)
     with reporter.stage("rest and linear limits"):
         numbers, contact = model.numbers(), model.contact()
-        linear = model.linear(case.frequencies)
+        linear = steps("linear limits", lambda: model.linear(case.frequencies))
     responses: list[Response] = []
     backbone = None
     for force in case.forces:
         with reporter.stage("response"):
-            response, branch = response_under(case, model, force, reporter)
+            response, branch = response_under(case, model, force, reporter, steps)
         responses.append(response)
         if case.backbone and backbone is None:
             # From the least force on which there is a phase resonance.
             with reporter.stage("backbone"):
-                backbone = backbone_of(case, model, branch, reporter)
+                backbone = backbone_of(case, model, branch, reporter, steps)
     sweeps = []
     for frequency in case.force_sweeps:
         with reporter.stage("force sweep"):
-            sweeps.append(force_sweep(case, model, frequency, reporter))
+            sweeps.append(force_sweep(case, model, frequency, reporter, steps))
     return VibrationOutcome(
         case,
         model.rig.labels,

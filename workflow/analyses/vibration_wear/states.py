@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.resolution_error import resolution_error
+from sa_solver.steps import Steps
 from wear.steppers import Contact, Stepper, advance_cycles
 from wear.worn import State
 from workflow.analyses.vibration.case import VibrationCase
@@ -23,6 +25,7 @@ def worn_states(
     contact_at: Callable[[State], Contact],
     describe: Callable[[State, float, int, float], WornState],
     reporter: Reporter,
+    steps: Steps,
 ) -> tuple[WornState, ...]:
     """The states after so many cycles each, the unworn one before them.
 
@@ -30,23 +33,31 @@ def worn_states(
     error of a step so far.
     """
     total, done, error = numbers[-1], 0.0, 0.0
-    states = [describe(state, done, 0, error)]
+    states = [steps("unworn state", partial(describe, state, done, 0, error))]
     with reporter.jumps(total, 0.0) as progress:
         for cycles in numbers:
             with reporter.stage("wear"):
-                worn = advance_cycles(stepper, state, cycles - done, total - done, contact_at)
+                stretch, left = cycles - done, total - done
+                worn = advance_cycles(stepper, state, stretch, left, contact_at, steps)
             state, done, error = worn.state, cycles, max(error, worn.error)
-            states.append(describe(state, cycles, worn.spent.steps, error))
+            described = partial(describe, state, cycles, worn.spent.steps, error)
+            states.append(steps("worn state", described))
             progress(cycles, len(states) - 1)
     return tuple(states)
 
 
 def responses_to_all(
-    case: VibrationCase, model: VibrationModel, motion: HarmonicSolution, reporter: Reporter
+    case: VibrationCase,
+    model: VibrationModel,
+    motion: HarmonicSolution,
+    reporter: Reporter,
+    steps: Steps,
 ) -> tuple[float, tuple[Response, ...]]:
     """The error of the ``motion`` that wears, and what its state does under each force."""
     error = resolution_error(model.problem.refined(motion.resolution), motion).largest
     warn_of_error("the motion that wears", error, case, reporter)
     with reporter.stage("response"):
-        responses = [response_under(case, model, force, reporter)[0] for force in case.forces]
+        responses = [
+            response_under(case, model, force, reporter, steps)[0] for force in case.forces
+        ]
     return error, tuple(responses)
