@@ -9,13 +9,10 @@ that was cut off had. What a step gives is handed on as it would be read, in mem
 
 from __future__ import annotations
 
-import io
-import pickle
 import time
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass
-from functools import cache
+from itertools import pairwise
 from typing import Any, TypeVar
 
 import numpy as np
@@ -24,6 +21,7 @@ from workflow.errors import UserError
 from workflow.shell import checkpoint
 from workflow.shell.analysis import Run
 from workflow.shell.checkpoint import Checkpoint
+from workflow.shell.packing import PackingError, packed, unpacked
 from workflow.shell.store import read_arrays, write_arrays
 
 T = TypeVar("T")
@@ -32,21 +30,12 @@ Place = tuple[int, ...]
 
 # Of the time before a save, what the last one took at most; packing takes about as much again.
 SHARE = 0.005
-# Seconds that the first one is taken to need: a run of two seconds keeps nothing.
-FIRST_SAVE = 0.01
-# What numpy reads arrays and numbers with, by module and name.
-OF_NUMPY = {
-    ("numpy", "ndarray"),
-    ("numpy", "dtype"),
-    ("numpy._core.multiarray", "_reconstruct"),
-    ("numpy._core.multiarray", "scalar"),
-    ("numpy._core.numeric", "_frombuffer"),
-    ("numpy.polynomial.chebyshev", "Chebyshev"),
-}
-# Where the classes are defined that steps may give.
-PACKAGES = ("sa_solver", "wear", "fe_models", "workflow")
+# Seconds that the first one is taken to need: a run of four seconds keeps nothing.
+FIRST_SAVE = 0.02
 # Name of the entry that has the places of steps, and of those that have what the steps gave.
 PLACES, ENDS, VALUES = "places", "ends", "values"
+# Attribute of the checkpoint: how many steps have been taken to get there.
+STEPS = "steps"
 
 
 @contextmanager
@@ -78,11 +67,11 @@ class RunSteps:
         # What has not been brought to the disk yet, those last taken last.
         self._new: dict[Place, bytes] = {}
         self._above: Place = ()
-        self._count = self._computed = 0
+        self._count = self._computed = self._before = 0
         self._saved, self._cost = time.perf_counter(), FIRST_SAVE
         if run.kept is not None:
-            number = len(self._kept) + len(self._marches)
-            run.reporter.say(f"  goes on from {number} steps that were kept")
+            self._before = int(run.kept.attributes[STEPS])
+            run.reporter.say(f"  goes on after {self._before} steps")
 
     def __call__(self, name: str, step: Callable[[], T]) -> T:
         place = self._next()
@@ -112,7 +101,7 @@ class RunSteps:
 
     def report(self) -> None:
         """Log how many steps this process has computed."""
-        self._reporter.log(f"steps: {self._computed} computed")
+        self._reporter.log(f"steps: {self._computed} computed, {self._before} taken as kept")
 
     def save(self) -> None:
         """Bring to the disk what is not there."""
@@ -123,7 +112,8 @@ class RunSteps:
             path = self._folder.jump(len(self._files))
             self._files.append(write_arrays(path, _joined(self._new)))
             self._new.clear()
-        state = Checkpoint(_joined(self._marches), {}, self._files)
+        steps = {STEPS: self._before + self._computed}
+        state = Checkpoint(_joined(self._marches), steps, self._files)
         checkpoint.save(self._folder, state, self._provenance)
         self._saved = time.perf_counter()
         self._cost = self._saved - begun
@@ -148,7 +138,7 @@ class RunSteps:
     def _keep(self, among: dict[Place, bytes], place: Place, name: str, value: T, warned: int) -> T:
         """Keep what a step gave, with the warnings on the way, in place of its own steps."""
         begun = time.perf_counter()
-        data, faithful = _packed((name, value, self._reporter.warnings[warned:]))
+        data, faithful = packed((name, value, self._reporter.warnings[warned:]))
         inside = place[:-1] if among is self._marches else place
         for steps in (self._new, self._marches):
             while steps and _within(last := next(reversed(steps)), inside):
@@ -167,8 +157,8 @@ class RunSteps:
     def _read(self, data: bytes, name: str) -> Any:
         """What a step gave; its warnings are said again. Raises UserError for another step."""
         try:
-            written, value, warnings = _Unpickler(io.BytesIO(data)).load()
-        except (pickle.UnpicklingError, ValueError, TypeError, AttributeError) as error:
+            written, value, warnings = unpacked(data)
+        except PackingError as error:
             raise self._of_another_version(error) from error
         if written != name:
             raise self._of_another_version(f"{written} in the place of {name}")
@@ -217,58 +207,5 @@ def _unjoined(arrays: Mapping[str, Any]) -> dict[Place, bytes]:
     """The inverse of :func:`_joined`."""
     places = [tuple(map(int, place.split(b"."))) for place in arrays[PLACES].tolist()]
     ends, values = arrays[ENDS].tolist(), arrays[VALUES].tobytes()
-    begins = [0, *ends[:-1]]
-    return {
-        place: values[begin:end] for place, begin, end in zip(places, begins, ends, strict=True)
-    }
-
-
-@cache
-def _names(kind: type[Any]) -> tuple[str, ...]:
-    """The entries of a dataclass."""
-    return tuple(field.name for field in fields(kind))
-
-
-def _restored(kind: type[Any], values: dict[str, Any]) -> Any:
-    """An object of a dataclass. Raises TypeError if it has other entries now."""
-    if tuple(values) != _names(kind):
-        raise TypeError(f"{kind.__name__} has other entries")
-    restored = object.__new__(kind)
-    restored.__dict__.update(values)
-    return restored
-
-
-class _Pickler(pickle.Pickler):
-    """Writes dataclasses by their entries, without what they have found of themselves since."""
-
-    # Whether all arrays would be read with the order in memory that they have.
-    faithful = True
-
-    def reducer_override(self, value: Any) -> Any:
-        if isinstance(value, np.ndarray):
-            self.faithful = self.faithful and value.flags.forc
-        elif is_dataclass(value) and not isinstance(value, type):
-            names = _names(type(value))
-            return _restored, (type(value), {name: getattr(value, name) for name in names})
-        return NotImplemented
-
-
-class _Unpickler(pickle.Unpickler):
-    """Reads arrays and our own dataclasses, and calls nothing else that a file may name."""
-
-    def find_class(self, module: str, name: str) -> Any:
-        known = (module, name) in OF_NUMPY or (module, name) == (__name__, _restored.__name__)
-        if known or module.partition(".")[0] in PACKAGES:
-            found = super().find_class(module, name)
-            ours = is_dataclass(found) or (isinstance(found, type) and issubclass(found, tuple))
-            if known or ours:
-                return found
-        raise pickle.UnpicklingError(f"{module}.{name} is not read")
-
-
-def _packed(value: Any) -> tuple[bytes, bool]:
-    """The bytes of a value, and whether what is read from them is the same in memory too."""
-    stream = io.BytesIO()
-    pickler = _Pickler(stream, protocol=pickle.HIGHEST_PROTOCOL)
-    pickler.dump(value)
-    return stream.getvalue(), pickler.faithful
+    spans = pairwise([0, *ends])
+    return {place: values[begin:end] for place, (begin, end) in zip(places, spans, strict=True)}

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -55,16 +54,14 @@ def run_hammer(
     assert isinstance(case.excitation, given.Hammer)
     hammer, control = case.excitation, step_control(case)
     blow = HammerBlow(rig.driven, hammer.force, hammer.duration)
-
-    def hit(energy: float) -> State:
+    states = []
+    for energy in case.energies:
         with reporter.stage("motion"):
             motion = motion_of(rig, joint, energy, blow, hammer.record, control, steps=steps)
         with reporter.stage("signals"):
-            return _state(hammer, blow, rig, joint, energy, motion, reporter)
-
-    states = tuple(steps("blow", partial(hit, energy)) for energy in case.energies)
+            states.append(_state(hammer, blow, rig, joint, energy, motion, reporter))
     curve = evolution_curve(joint, case.energies[-1])
-    return TimeOutcome(case, states, curve, _change(states))
+    return TimeOutcome(case, tuple(states), curve, _change(states))
 
 
 def _state(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from functools import partial
 from typing import Any
 
 import numpy as np
@@ -85,18 +84,15 @@ def _run_recorded(
     times, samples = case.excitation.read()
     force = RecordedForce(rig.driven, times, samples)
     control, begin = step_control(case), Start(time=float(times[0]))
-    duration = float(np.ptp(times))
-
-    def driven(energy: float) -> State:
+    duration, states = float(np.ptp(times)), []
+    for energy in case.energies:
         with reporter.stage("motion"):
             motion = motion_of(rig, joint, energy, force, duration, control, begin, steps)
         largest = {"largest_force": float(np.abs(rig.loop(motion)[1]).max())}
         numbers = rig.modes(joint.at(energy)) | motion_numbers(rig, motion) | largest
         curves = {MOTION: motion_curves(rig, motion, force)}
-        return State(energy, None, joint.parameters(energy), numbers, curves)
-
-    states = tuple(steps("motion", partial(driven, energy)) for energy in case.energies)
-    return TimeOutcome(case, states, evolution_curve(joint, case.energies[-1]))
+        states.append(State(energy, None, joint.parameters(energy), numbers, curves))
+    return TimeOutcome(case, tuple(states), evolution_curve(joint, case.energies[-1]))
 
 
 # --- harmonic -----------------------------------------------------------------------------------
