@@ -129,8 +129,8 @@ class OutputFolder:
 
     def reserve_state(self) -> None:
         """Make room for what a run needs to go on where it was cut off."""
-        self.reserve("checkpoint.h5", "state after the last jump, for the run to go on from")
-        self.reserve(STATE, "fields after each jump, until the run ends").mkdir(exist_ok=True)
+        self.reserve("checkpoint.h5", "how far the run has come, for it to go on from")
+        self.reserve(STATE, "what the run has found so far, until it ends").mkdir(exist_ok=True)
 
     @property
     def lists_state(self) -> bool:

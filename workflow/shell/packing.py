@@ -19,8 +19,11 @@ from numpy.polynomial import Chebyshev
 
 # Where the dataclasses and named tuples are defined that may be packed.
 PACKAGES = ("sa_solver", "wear", "fe_models", "workflow")
-SIMPLE = frozenset((float, int, str, bool, complex, bytes, type(None)))
+# What stands for itself; other values are tuples that begin with what they are.
+SIMPLE = frozenset((float, int, str, bool, bytes, type(None)))
 TUPLE, LIST, DICT, ARRAY, SCALAR, OBJECT, NAMED, POLYNOMIAL = range(8)
+# What bytes that were packed by another version lead to.
+WRONG = (ValueError, TypeError, LookupError, AttributeError, ImportError, pickle.UnpicklingError)
 
 
 class PackingError(ValueError):
@@ -41,9 +44,7 @@ def unpacked(data: bytes) -> Any:
     """The value that was packed. Raises PackingError."""
     try:
         return _restored(_Plain(io.BytesIO(data)).load())
-    except (ValueError, TypeError, LookupError, AttributeError, ImportError) as error:
-        raise PackingError(str(error)) from error
-    except pickle.UnpicklingError as error:
+    except WRONG as error:
         raise PackingError(str(error)) from error
 
 
@@ -55,13 +56,13 @@ class _Plain(pickle.Unpickler):
 
 
 @cache
-def _entries_of(kind: type[Any]) -> tuple[str, ...] | None:
+def _entries_of(kind: Any) -> tuple[str, ...] | None:
     """The names of a dataclass's entries, None of what is none."""
     return tuple(field.name for field in fields(kind)) if is_dataclass(kind) else None
 
 
 @cache
-def _described(kind: type[Any]) -> str:
+def _described(kind: Any) -> str:
     """Where a dataclass or named tuple is defined, and with which entries."""
     if kind.__module__.partition(".")[0] not in PACKAGES:
         raise TypeError(f"{kind.__module__}.{kind.__qualname__} cannot be packed")
@@ -70,7 +71,7 @@ def _described(kind: type[Any]) -> str:
 
 
 @cache
-def _kind(described: str) -> type[Any]:
+def _kind(described: str) -> Any:
     """The dataclass or named tuple that is described so. Raises ValueError."""
     module, name, _ = described.split(":")
     kind = getattr(import_module(module), name) if module.partition(".")[0] in PACKAGES else None
@@ -82,7 +83,7 @@ def _kind(described: str) -> type[Any]:
 
 def _plain(value: Any, strided: list[Any]) -> Any:
     """A value in terms of what Python has built in; arrays of another stride are noted."""
-    kind = type(value)
+    kind: Any = type(value)
     if kind in SIMPLE:
         return value
     if kind is np.ndarray:
@@ -104,7 +105,7 @@ def _plain_array(array: Any, strided: list[Any]) -> Any:
     return ARRAY, array.dtype.str, array.shape, order, array.tobytes(order)
 
 
-def _plain_others(kind: type[Any], value: Any, strided: list[Any]) -> Any:
+def _plain_others(kind: Any, value: Any, strided: list[Any]) -> Any:
     if kind is dict:
         return DICT, [(_plain(k, strided), _plain(v, strided)) for k, v in value.items()]
     if kind in (tuple, list):

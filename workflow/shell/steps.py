@@ -62,15 +62,15 @@ class RunSteps:
     def __init__(self, run: Run[Any]) -> None:
         self._folder, self._reporter, self._provenance = run.folder, run.reporter, run.provenance
         self._files = [] if run.kept is None else list(run.kept.jumps)
+        self._before = 0 if run.kept is None else int(run.kept.attributes[STEPS])
         self._marches = {} if run.kept is None else _unjoined(run.kept.arrays)
         self._kept = self._of_files()
         # What has not been brought to the disk yet, those last taken last.
         self._new: dict[Place, bytes] = {}
         self._above: Place = ()
-        self._count = self._computed = self._before = 0
+        self._count = self._computed = 0
         self._saved, self._cost = time.perf_counter(), FIRST_SAVE
         if run.kept is not None:
-            self._before = int(run.kept.attributes[STEPS])
             run.reporter.say(f"  goes on after {self._before} steps")
 
     def __call__(self, name: str, step: Callable[[], T]) -> T:
