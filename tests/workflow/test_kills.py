@@ -33,8 +33,8 @@ NOT_RESULTS = {"run.log", "checkpoint.h5", "manifest.json", "summary.json"}
 QUIET = "output={figures: false, paraview: false}"
 # Seconds within which a run must have ended.
 PATIENCE = 300.0
-# Kills of every kind, more than 50 in all, and the most that one run takes.
-KILLS, IN_ONE_RUN = 7, 4
+# Kills of every kind, more than 50 in all, the most that one run takes, and runs at most.
+KILLS, IN_ONE_RUN, MOST_RUNS = 7, 4, 20
 
 VIBRATION = """\
 title: Slider that shakes
@@ -63,12 +63,12 @@ class LongRun:
     overrides: tuple[str, ...] = ()
     files: tuple[tuple[str, str], ...] = ()
 
-    def command(self, folder: Path) -> list[object]:
-        """The command that runs it into ``out`` in the folder."""
+    def command(self, folder: Path, out: Path) -> list[object]:
+        """The command that runs it, its files being in a folder."""
         for name, text in (("case.yaml", self.text), *self.files):
             (folder / name).write_text(text, encoding="utf-8")
         settings = [part for entry in (QUIET, *self.overrides) for part in ("--set", entry)]
-        return ["run", folder / "case.yaml", "--out", folder / "out", *settings]
+        return ["run", folder / "case.yaml", "--out", out, *settings]
 
 
 IN_A_ROW = "excitation={kind: harmonic, force: 50 N, frequency: 80 Hz, steady: 1e-7}"
@@ -153,19 +153,17 @@ EVERY_KIND = ["joint", *(slow(kind) for kind in RUNS if kind != "joint")]
 def test_every_step_can_be_the_last(kind, tmp_path):
     """Wherever a run is cut off, the next one computes what is left and nothing again."""
     whole, parts = tmp_path / "whole", tmp_path / "parts"
-    for folder in (whole, parts):
-        folder.mkdir()
-    run_here(RUNS[kind].command(whole))
-    reference, (total, _) = results_of(whole / "out"), counted(whole / "out")
-    dice, reached, command = random.Random(7), 0, RUNS[kind].command(parts)
+    run_here(RUNS[kind].command(tmp_path, whole))
+    reference, (total, _) = results_of(whole), counted(whole)
+    dice, reached, command = random.Random(7), 0, RUNS[kind].command(tmp_path, parts)
     for _ in range(3):
         further = dice.randint(1, max((total - reached) // 2, 1))
         cut(command, further)
-        assert kept_in(parts / "out") == reached + further - 1
-        reached, command = reached + further - 1, ["resume", parts / "out"]
+        assert kept_in(parts) == reached + further - 1
+        reached, command = reached + further - 1, ["resume", parts]
     run_here(command)
-    assert counted(parts / "out") == (total - reached, reached)
-    assert results_of(parts / "out") == reference
+    assert counted(parts) == (total - reached, reached)
+    assert results_of(parts) == reference
 
 
 # --- killed --------------------------------------------------------------------------------------
@@ -220,18 +218,18 @@ def killed(command: list[object], out: Path, seconds: float, code: str) -> Kill 
 
 
 def kill_at_random(
-    kind: str, folder: Path, dice: random.Random, whole: float, code: str, most: int
+    command: list[object], out: Path, dice: random.Random, whole: float, code: str, most: int
 ) -> list[Kill]:
     """Kill a run and its resumptions at random moments of the ``whole`` seconds; it then ends."""
-    out, kills, command = folder / "out", [], RUNS[kind].command(folder)
+    kills: list[Kill] = []
     for _ in range(most):
         kill = killed(command, out, dice.uniform(0.0, whole), code)
         if kill is None:
             break
         # Nothing that was kept is lost again.
-        assert kill.kept >= max((before.kept for before in kills), default=0)
+        assert kill.kept >= kill.before
         kills.append(kill)
-        command = ["resume", out]
+        command = ["resume", out] if (out / "case.yaml").exists() else command
     if not (out / "summary.json").exists():
         run_here(command)
     assert not list(out.rglob("*.part.*"))
@@ -245,19 +243,21 @@ def kills_of(kind: str, folder: Path, most: int) -> list[Kill]:
     What they leave in the end is that of one that nobody has killed.
     """
     dice, kills, whole = random.Random(20), [], folder / "whole"
-    whole.mkdir()
     begun = time.monotonic()
-    run_here(RUNS[kind].command(whole))
+    run_here(RUNS[kind].command(folder, whole))
     seconds = time.monotonic() - begun
-    reference, (total, _) = results_of(whole / "out"), counted(whole / "out")
-    for number, code in enumerate((EVERY_STEP, AS_SHIPPED) * most):
+    reference, (total, _) = results_of(whole), counted(whole)
+    for number in range(MOST_RUNS):
         if len(kills) >= most:
             break
-        parts = folder / str(number)
-        parts.mkdir()
-        new = kill_at_random(kind, parts, dice, seconds, code, min(IN_ONE_RUN, most - len(kills)))
-        assert results_of(parts / "out") == reference
-        computed, kept = counted(parts / "out")
+        # The first step that is kept has the start behind it.
+        code, share = (AS_SHIPPED, 1.0) if number % 3 == 2 else (EVERY_STEP, 0.5)
+        out = folder / str(number)
+        most_now = min(IN_ONE_RUN, most - len(kills))
+        command = RUNS[kind].command(folder, out)
+        new = kill_at_random(command, out, dice, share * seconds, code, most_now)
+        assert results_of(out) == reference
+        computed, kept = counted(out)
         # Nothing that was kept has been computed again.
         assert computed + kept == total
         assert kept >= max((kill.kept for kill in new), default=0)
