@@ -132,6 +132,14 @@ class OutputFolder:
         self.reserve("checkpoint.h5", "how far the run has come, for it to go on from")
         self.reserve(STATE, "what the run has found so far, until it ends").mkdir(exist_ok=True)
 
+    def discard_state(self) -> None:
+        """Remove what the run has found on the way, and the name of a state that it never kept."""
+        listed = self.manifest or {}
+        if self.jumps.name in listed:
+            self.discard(self.jumps.name)
+        if self.checkpoint.name in listed and not self.checkpoint.exists():
+            self.discard(self.checkpoint.name)
+
     @property
     def lists_state(self) -> bool:
         """Whether the manifest names what a run needs to go on, which no other run may have."""

@@ -12,7 +12,7 @@ from workflow.shell.versions import versions
 def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> None:
     """Write the summary of a run, which marks it as finished, and say how it ended.
 
-    What it has kept to go on from is removed.
+    What it has found on the way is removed.
 
     ``numbers`` are what the analysis tells, ``lines`` the same in short.
     """
@@ -30,8 +30,7 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
         },
         run.provenance,
     )
-    if run.folder.lists_state:
-        run.folder.discard(run.folder.jumps.name)
+    run.folder.discard_state()
     for line in lines:
         reporter.say(line)
     reporter.say(
