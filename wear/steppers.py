@@ -27,6 +27,7 @@ from typing import Generic, Protocol, Self, TypeVar
 import numpy as np
 
 from sa_solver.errors import InputError
+from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 from wear.stepping import WearingContact, WearState
 from wear.worn import Spent, State, WearStep
@@ -395,11 +396,13 @@ class SubcyclingStepper(Generic[State, Contact]):
 
     stepper: Stepper[State, Contact]
     longest: Callable[[State, float], float]
+    marched_by: Steps = COMPUTED
 
     def step(
         self, state: State, most: float, left: float, contact_at: Callable[[State], Contact]
     ) -> WearStep[State]:
-        return advance_cycles(self.stepper, state, self.longest(state, most), left, contact_at)
+        longest, by = self.longest(state, most), self.marched_by
+        return advance_cycles(self.stepper, state, longest, left, contact_at, by)
 
 
 def steps(
@@ -431,9 +434,17 @@ def advance_cycles(
     cycles: float,
     left: float,
     contact_at: Callable[[State], Contact],
+    marched_by: Steps = COMPUTED,
 ) -> WearStep[State]:
     """Wear ``cycles`` cycles of the ``left`` ones of the run, in as many steps as it takes."""
-    spent, error = Spent(), 0.0
-    for step in steps(stepper, state, lambda _, done: rest(cycles, done), left, contact_at):
-        state, spent, error = step.state, spent + step.spent, max(error, step.error)
-    return WearStep(state, cycles, spent, error=error)
+
+    def further(worn: WearStep[State]) -> WearStep[State] | None:
+        most = rest(cycles, worn.cycles)
+        if not most > 0.0:
+            return None
+        step = stepper.step(worn.state, most, left - worn.cycles, contact_at)
+        spent, error = worn.spent + step.spent, max(worn.error, step.error)
+        return WearStep(step.state, worn.cycles + step.cycles, spent, error=error)
+
+    worn = marched_by.march("wear step", WearStep(state, 0.0, Spent()), further)
+    return replace(worn, cycles=cycles)

@@ -109,12 +109,14 @@ class CycleResult:
 class WearState(WornState):
     """What the wear of a half-space contact must remember between two steps.
 
-    Fields are ``(nx, ny)``, one value per cell; ``starts`` are the contact solver's, by increment.
-    ``coarse`` is the state that steps of twice the length have led to, None before the first one
-    and where none have been taken; ``order`` that of the error of all these steps.
+    Fields are ``(nx, ny)``, one value per cell; ``starts`` are the contact solver's, by increment,
+    and ``start`` is that of whoever found the cycle that led to it. ``coarse`` is the state that
+    steps of twice the length have led to, None before the first one and where none have been taken;
+    ``order`` that of the error of all these steps.
     """
 
     starts: Starts = field(default_factory=dict)
+    start: object = None
     coarse: WearState | None = None
     order: float = 1.0
 
@@ -139,13 +141,17 @@ class WearState(WornState):
 
 @dataclass(frozen=True, eq=False)
 class WearingContact:
-    """One interface under a ``sliding`` cycle; ``laws`` are those of body 1 and body 2."""
+    """One interface under a ``sliding`` cycle; ``laws`` are those of body 1 and body 2.
+
+    ``start`` is what the cycle of surfaces that are little different may be found from.
+    """
 
     contact: NormalContact
     laws: tuple[WearLaw, WearLaw]
     friction: float
     sliding: SlidingCycle
     tolerance: float
+    start: object = None
 
     @property
     def grid(self) -> Grid:
@@ -388,5 +394,6 @@ class _March:
             depth_rate=float(max(depth.max() for depth in lost)) / self._cycles,
             volume_rate=float(sum(depth.sum() for depth in lost)) * area / self._cycles,
             starts=self._starts,
+            start=self._contact.start,
         )
         return WearStep(state, self._cycles, self._spent)

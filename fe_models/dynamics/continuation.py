@@ -11,7 +11,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Generic
+from functools import partial
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -25,7 +26,10 @@ from fe_models.dynamics.newton import (
     linear_tolerance,
     solve,
 )
+from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
+
+D = TypeVar("D")
 
 # Unknowns are measured by their norm, but at least by this share of the largest norm on the curve:
 # where all of them pass through zero, no step would be small enough.
@@ -314,38 +318,58 @@ class Refinement(Generic[L]):
         )
 
 
+class Recorder(Protocol[L, D]):
+    """Whoever keeps what there is at the points of a curve, and has it followed more finely."""
+
+    def describe(self, point: CurvePoint, at: L) -> D:
+        """What there is at a point with these equations; nothing is remembered of it."""
+        ...
+
+    def take(self, description: D) -> Refinement[L] | None:
+        """Keep the description of a new point, or forget it and ask for finer equations."""
+        ...
+
+
 def follow(
     equations: Equations[L],
     start: CurvePoint,
     span: tuple[float, float],
     control: ContinuationControl | None = None,
-    on_point: Callable[[CurvePoint, L], Refinement[L] | None] | None = None,
+    recorder: Recorder[L, D] | None = None,
     origin: Array | None = None,
     rounding: float = 0.0,
     end: float | None = None,
+    steps: Steps = COMPUTED,
 ) -> SolutionCurve:
     """Follow a curve from a point until λ leaves the ``span``; its last point lies on the end.
 
     ``end`` is the one of its two ends that the curve is to reach; without it either will do.
-    ``on_point`` is called with every new point; where it answers with finer equations, the point is
-    forgotten, and found again with these. Steps are shares of what the unknowns differ from an
-    ``origin``, zero unless given; below a norm of ``rounding`` they do not differ. The start is not
-    repeated among the points. A curve that does not reach an end says why.
+    The ``recorder`` takes every new point; where it answers with finer equations, the point is
+    forgotten, and found again with these. Each of the ``steps`` finds and describes one; their
+    lengths are shares of what the unknowns differ from an ``origin``, zero unless given; below a
+    norm of ``rounding`` they do not differ. The start is not repeated among the points. A curve
+    that does not reach an end says why.
     """
     control = control or ContinuationControl()
     scaling, point = Scaling(max(map(abs, span)), origin, rounding), start
     points: list[CurvePoint] = []
     while len(points) < control.max_points:
         scaling.adapt(point)
-        following = _next_within(equations, point, span, scaling, control)
+        following = steps(
+            "point of a curve",
+            partial(_described, equations, point, span, scaling, control, recorder),
+        )
         if isinstance(following, str):
             return SolutionCurve(tuple(points), following)
-        new, at = following
-        finer = on_point(new, at) if on_point is not None else None
+        new, description = following
+        finer = None if recorder is None or description is None else recorder.take(description)
         if finer is not None:
             equations = finer.equations
             scaling.origin = None if scaling.origin is None else finer.lift(scaling.origin)
-            point = _refound(equations, finer.lifted(point), scaling, control)
+            point = finer.lifted(point)
+            scaling.adapt(point)
+            refound = partial(_refound, equations, point, scaling, control)
+            point = steps("point of a finer curve", refound)
             continue
         points.append(new)
         control.watch(new.parameter)
@@ -379,7 +403,6 @@ def _refound(
     Itself if that fails. It keeps the orientation: where equations that differ a little have a peak
     or a fold elsewhere, its tangent may be the opposite of the one it came with.
     """
-    scaling.adapt(point)
     solution = solve(equations, point.unknowns, point.parameter, NewtonControl(control.tolerance))
     if solution.converged:
         upward = bool(point.tangent[-1] > 0.0)
@@ -399,6 +422,22 @@ def _oriented(point: CurvePoint, orientation: int) -> CurvePoint:
     if point.orientation * orientation >= 0:
         return point
     return replace(point, tangent=-point.tangent, orientation=orientation)
+
+
+def _described(
+    equations: Equations[L],
+    point: CurvePoint,
+    span: tuple[float, float],
+    scaling: Scaling,
+    control: ContinuationControl,
+    recorder: Recorder[L, D] | None,
+) -> tuple[CurvePoint, D | None] | str:
+    """The next point with what there is, or a message why there is none."""
+    following = _next_within(equations, point, span, scaling, control)
+    if isinstance(following, str):
+        return following
+    new, at = following
+    return new, None if recorder is None else recorder.describe(new, at)
 
 
 def _next_within(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Literal
 
 import numpy as np
@@ -23,7 +24,8 @@ from fe_models.dynamics.harmonic_balance import (
 from fe_models.dynamics.harmonic_solution import HarmonicSolution, ResolutionError
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
 from fe_models.dynamics.newton import Equations, solve
-from fe_models.dynamics.resolution_error import resolution_error
+from fe_models.dynamics.resolution_error import resolution_error, richer_problem
+from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
 # Of the tolerance, what harmonics that stay left out may have of the error, and samples.
@@ -87,15 +89,17 @@ def along_frequency(
     upward: bool = True,
     control: ContinuationControl | None = None,
     accuracy: Accuracy | None = None,
+    steps: Steps = COMPUTED,
 ) -> ResponseBranch:
     """Motions under a force for the frequencies of ``span`` [Hz], folds included.
 
     From its lower end upward or from its upper end downward: a branch that does not get to the
     other end says why. From a ``start`` if there is one: a solution as a first guess; or a branch,
     to go on from its last point to either end. Without ``accuracy`` the
-    resolution is that of the problem.
+    resolution is that of the problem. Each of the ``steps`` finds a motion.
     """
-    return _branch(problem, _Along("frequency", force), span, start, upward, control, accuracy)
+    along = _Along("frequency", force)
+    return _branch(problem, along, span, start, upward, control, accuracy, steps)
 
 
 def along_force(
@@ -107,9 +111,11 @@ def along_force(
     upward: bool = True,
     control: ContinuationControl | None = None,
     accuracy: Accuracy | None = None,
+    steps: Steps = COMPUTED,
 ) -> ResponseBranch:
     """Motions at a frequency [Hz] for the forces of ``span``; see :func:`along_frequency`."""
-    return _branch(problem, _Along("force", frequency), span, start, upward, control, accuracy)
+    along = _Along("force", frequency)
+    return _branch(problem, along, span, start, upward, control, accuracy, steps)
 
 
 @dataclass(frozen=True)
@@ -135,20 +141,24 @@ class _Recorder:
         self.problem, self._along, self._accuracy = problem, along, accuracy
         self.solutions: list[HarmonicSolution] = []
 
-    def __call__(self, point: CurvePoint, at: Balance) -> Refinement[Balance] | None:
+    def describe(self, point: CurvePoint, at: Balance) -> HarmonicSolution:
+        """The motion at a point, with its error if it is to be accurate."""
         solution = replace(
             self.problem.describe(
                 point.unknowns, at, *self._along.frequency_and_force(point.parameter)
             ),
             iterations=point.iterations,
         )
-        if self._accuracy is not None:
-            error = resolution_error(self.problem, solution)
-            finer = finer_resolution(self.problem.resolution, error, self._accuracy)
-            if finer is not None:
-                return self._refine(finer)
-            solution = replace(solution, error=error)
-        self.solutions.append(solution)
+        if self._accuracy is None:
+            return solution
+        return replace(solution, error=resolution_error(self.problem, solution))
+
+    def take(self, description: HarmonicSolution) -> Refinement[Balance] | None:
+        """Keep a motion, or ask for finer equations where it is not accurate."""
+        finer = finer_for(self.problem, description, self._accuracy)
+        if finer is not None:
+            return self._refine(finer)
+        self.solutions.append(replace(description, resolution=self.problem.resolution))
         return None
 
     def _refine(self, finer: Resolution) -> Refinement[Balance]:
@@ -159,6 +169,16 @@ class _Recorder:
             return finer.adopt(unknowns.reshape(-1, *size), coarse).ravel()
 
         return Refinement(self._along.equations(self.problem), lift)
+
+
+def finer_for(
+    problem: HarmonicBalance, motion: HarmonicSolution, accuracy: Accuracy | None
+) -> Resolution | None:
+    """The resolution that a motion of known error asks for, None if that of the problem will do."""
+    if accuracy is None or motion.error is None:
+        return None
+    richer_problem(problem, motion)
+    return finer_resolution(problem.resolution, motion.error, accuracy)
 
 
 def finer_resolution(
@@ -192,6 +212,7 @@ def _branch(
     upward: bool,
     control: ContinuationControl | None,
     accuracy: Accuracy | None,
+    steps: Steps,
 ) -> ResponseBranch:
     above = 0.0 if along.varies == "frequency" else -np.inf
     if not above < span[0] < span[1] < np.inf:
@@ -207,7 +228,7 @@ def _branch(
         end = None
     else:
         record = _Recorder(problem, along, accuracy)
-        first = _first(record, along, span[0 if upward else 1], start, upward, control)
+        first = _first(record, along, span[0 if upward else 1], start, upward, control, steps)
         if isinstance(first, str):
             return ResponseBranch((), SolutionCurve((), first), problem)
         point = first
@@ -222,6 +243,7 @@ def _branch(
         rest,
         record.problem.rounding,
         end=end,
+        steps=steps,
     )
     return ResponseBranch(tuple(record.solutions), curve, record.problem)
 
@@ -233,18 +255,27 @@ def _first(
     start: HarmonicSolution | None,
     upward: bool,
     control: ContinuationControl,
+    steps: Steps,
 ) -> CurvePoint | str:
     """The first point of a branch, recorded; or why there is none."""
     frequency, force = along.frequency_and_force(parameter)
-    problem, unknowns = record.problem, record.problem.guess(start)
-    while True:
-        solution = problem.find(frequency, force, unknowns, control)
+
+    def found(unknowns: Array) -> tuple[CurvePoint, HarmonicSolution] | str:
+        solution = record.problem.find(frequency, force, unknowns, control)
         if not solution.converged:
             return solution.message
         if along.varies == "force":
-            solution = solve(along.equations(problem), solution.unknowns, parameter)
+            solution = solve(along.equations(record.problem), solution.unknowns, parameter)
         point = first_point(solution, parameter, upward, control.first)
-        finer = record(point, solution.at)
+        return point, record.describe(point, solution.at)
+
+    unknowns = record.problem.guess(start)
+    while True:
+        first = steps("first point of a curve", partial(found, unknowns))
+        if isinstance(first, str):
+            return first
+        point, motion = first
+        finer = record.take(motion)
         if finer is None:
             return point
-        problem, unknowns = record.problem, finer.lift(solution.unknowns)
+        unknowns = finer.lift(point.unknowns)

@@ -29,7 +29,8 @@ import numpy as np
 from fe_models.dynamics.joint_equilibrium import TOLERANCE, JointEquilibrium, largest_entry
 from fe_models.dynamics.model import DynamicModel, IncrementResponse, Joints
 from fe_models.dynamics.motion import Motion, Start
-from fe_models.dynamics.record import MotionRecord, StepState
+from fe_models.dynamics.record import MotionRecord, RecordedSteps, StepState
+from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
 # A step is halved at most this often: to 1/4096, where any continuous law is nearly linear.
@@ -73,14 +74,16 @@ def integrate(
     duration: float,
     control: TimeStepControl,
     start: Start | None = None,
+    steps: Steps = COMPUTED,
     reached: Callable[[float], None] = lambda share: None,
 ) -> Motion:
     """Motion of a structure with joints from ``start`` on, at rest unless given.
 
     ``excitation`` takes times ``(t,)`` to forces ``(t, n)``; None is none, and None of ``joints``
     leaves all of them free. The last time is the first multiple of the step at or after
-    ``duration`` [s]. A motion that has not been found to the end says so in its ``message``.
-    ``reached`` is told now and then about what share of the work is done.
+    ``duration`` [s]. A motion that has not been found to the end says so in its ``message``. Each
+    of the ``steps`` marches many steps in time; ``reached`` is told after each what share of the
+    work is done.
     Raises ``ValueError`` if joints and connection do not have the same directions.
     """
     laws = joints if joints is not None else _FreeJoints()
@@ -89,17 +92,17 @@ def integrate(
             f"a connection of {len(model.connection)} rows for joints of {laws.directions} "
             "directions: give a row for each direction of each joint"
         )
-    steps = int(np.ceil(duration / control.step * (1.0 - 1e-12)))
+    count = int(np.ceil(duration / control.step * (1.0 - 1e-12)))
     forcing = excitation if excitation is not None else _NoForce(len(model.mass))
     begin = start or Start()
     allowed, before = np.inf, 0.0
     if control.tolerance is not None:
         whole, before = _March(model, laws, forcing, control, begin, np.inf), WHOLE_STEPS
-        rough = _followed(whole, steps, steps, lambda share: reached(before * share))
+        rough = _followed(whole, count, count, steps, lambda share: reached(before * share))
         allowed = control.tolerance * rough.largest_displacement
     march = _March(model, laws, forcing, control, begin, allowed)
     record = _followed(
-        march, steps, control.every, lambda share: reached(before + (1.0 - before) * share)
+        march, count, control.every, steps, lambda share: reached(before + (1.0 - before) * share)
     )
     return record.motion(march.message)
 
@@ -150,6 +153,21 @@ class _Operators:
         self.flexibility = half * model.connection @ self.joint_gain
 
 
+@dataclass(frozen=True)
+class _Reached:
+    """Where a march is: ``at`` a point, with so many whole steps ``taken``.
+
+    Steps are ``halved`` so often, and ``largest_force`` is that of a joint so far. ``message`` says
+    why it goes no further, if it does not.
+    """
+
+    at: StepState
+    taken: int
+    halved: int
+    largest_force: float
+    message: str
+
+
 class _March:
     """The structure marched step by step; ``allowed`` is the error one may add (mass norm)."""
 
@@ -171,6 +189,18 @@ class _March:
         self._halved, self._missed = 0, 0.0
         self._largest_force = largest_entry(self.at.response.force)
         self._inverse_mass = np.linalg.inv(model.mass)
+
+    @property
+    def reached(self) -> _Reached:
+        """Where it is; a march that is put there goes on from it."""
+        return _Reached(self.at, self.taken, self._halved, self._largest_force, self.message)
+
+    @reached.setter
+    def reached(self, reached: _Reached) -> None:
+        self.at, self.taken, self.message = reached.at, reached.taken, reached.message
+        self._halved, self._largest_force = reached.halved, reached.largest_force
+        # Newton's method keeps an inverse of steps before, of which nothing may depend.
+        self._operators.clear()
 
     def block(self, steps: int) -> list[list[StepState]]:
         """The points of up to ``steps`` whole steps; fewer if ``message`` says so."""
@@ -299,11 +329,18 @@ class _March:
 
 
 def _followed(
-    march: _March, steps: int, every: int, reached: Callable[[float], None]
+    march: _March, count: int, every: int, steps: Steps, reached: Callable[[float], None]
 ) -> MotionRecord:
     """The record of a march until it has taken so many steps, or says why it has not."""
     record = MotionRecord(march.model, march.directions, every, march.at)
-    while march.taken < steps and not march.message:
-        record.add(march.block(min(BLOCK, steps - march.taken)))
-        reached(march.taken / steps)
+
+    def block() -> tuple[RecordedSteps | None, _Reached]:
+        points = march.block(min(BLOCK, count - march.taken))
+        return record.recorded(points), march.reached
+
+    while march.taken < count and not march.message:
+        recorded, march.reached = steps("steps in time", block)
+        if recorded is not None:
+            record.add(recorded)
+        reached(march.taken / count)
     return record

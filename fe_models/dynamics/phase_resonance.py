@@ -19,7 +19,7 @@ symmetric.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -32,13 +32,14 @@ from fe_models.dynamics.continuation import (
     first_point,
     follow,
 )
-from fe_models.dynamics.forced_response import Accuracy, Motions, ResponseBranch, finer_resolution
+from fe_models.dynamics.forced_response import Accuracy, Motions, ResponseBranch, finer_for
 from fe_models.dynamics.harmonic_balance import Balance, HarmonicBalance
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import ComplexArray, HarmonicBalanceError, Resolution
-from fe_models.dynamics.newton import NewtonControl, NewtonSolution, solve
+from fe_models.dynamics.newton import NewtonControl, solve
 from fe_models.dynamics.receptance import SteadyMotion
 from fe_models.dynamics.resolution_error import resolution_error
+from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 
 # Frequencies are looked for up to this factor from the start's: Newton's method that goes farther
@@ -154,6 +155,7 @@ def along_phase_resonance(
     *,
     control: ContinuationControl | None = None,
     accuracy: Accuracy | None = None,
+    steps: Steps = COMPUTED,
 ) -> Backbone:
     """Phase resonances for ``forces`` from a least to a largest, folds included.
 
@@ -161,7 +163,7 @@ def along_phase_resonance(
     near one motion, best its peak. Newton's method finds the phase resonance under its force, from
     which the curve is followed both ways. ``output`` ``(n,)`` is the displacement whose phase
     counts, as a combination of those of the structure; the force's own if it is not given. Without
-    ``accuracy`` the resolution is that of the problem.
+    ``accuracy`` the resolution is that of the problem. Each of the ``steps`` finds a motion.
 
     Raises :class:`HarmonicBalanceError` for a load without a first harmonic, an ``output`` that
     is nothing or lags a force of several phases, and forces that are not above zero or do not
@@ -183,11 +185,11 @@ def along_phase_resonance(
         return Backbone((), f"the start is no solution: {nearest.message}", problem)
     control = control or ContinuationControl()
     equations = PhaseResonance.near(problem, nearest, output)
-    first = _first(_Recorder(equations, accuracy), nearest, control)
+    first = _first(_Recorder(equations, accuracy), nearest, control, steps)
     if isinstance(first, str):
         return Backbone((), first, problem)
-    below = _half(first, False, forces, accuracy, control)
-    above = _half(first, True, forces, accuracy, control)
+    below = _half(first, False, forces, accuracy, control, steps)
+    above = _half(first, True, forces, accuracy, control, steps)
     return Backbone(
         (*reversed(below.solutions), first.solution, *above.solutions),
         "; ".join(filter(None, (below.message, above.message))),
@@ -269,16 +271,21 @@ class _Recorder:
         self.equations, self._accuracy = equations, accuracy
         self.solutions: list[HarmonicSolution] = []
 
-    def __call__(self, point: CurvePoint, at: PhaseBalance) -> Refinement[PhaseBalance] | None:
+    def describe(self, point: CurvePoint, at: PhaseBalance) -> HarmonicSolution:
+        """The motion at a point, with its error if it is to be accurate."""
         problem = self.equations.problem
         solution = problem.describe(point.unknowns[:-1], at.balance, at.frequency, point.parameter)
         if self._accuracy is not None:
-            error = resolution_error(problem, solution)
-            finer = finer_resolution(problem.resolution, error, self._accuracy)
-            if finer is not None:
-                return self._refine(finer)
-            solution = replace(solution, error=error)
-        self.solutions.append(replace(solution, iterations=point.iterations, residual=at.relative))
+            solution = replace(solution, error=resolution_error(problem, solution))
+        return replace(solution, iterations=point.iterations, residual=at.relative)
+
+    def take(self, description: HarmonicSolution) -> Refinement[PhaseBalance] | None:
+        """Keep a motion, or ask for finer equations where it is not accurate."""
+        problem = self.equations.problem
+        finer = finer_for(problem, description, self._accuracy)
+        if finer is not None:
+            return self._refine(finer)
+        self.solutions.append(replace(description, resolution=problem.resolution))
         return None
 
     def _refine(self, finer: Resolution) -> Refinement[PhaseBalance]:
@@ -295,19 +302,20 @@ class _Recorder:
 
 @dataclass(frozen=True)
 class _First:
-    """The phase resonance from which the curve is followed both ways."""
+    """The phase resonance from which the curve is followed ``down`` and ``up`` in force."""
 
     equations: PhaseResonance
-    resonance: NewtonSolution[PhaseBalance]
+    down: CurvePoint
+    up: CurvePoint
     solution: HarmonicSolution
 
 
 def _first(
-    record: _Recorder, start: HarmonicSolution, control: ContinuationControl
+    record: _Recorder, start: HarmonicSolution, control: ContinuationControl, steps: Steps
 ) -> _First | str:
     """The phase resonance under the start's force; or why there is none."""
-    unknowns = np.append(record.equations.problem.guess(start), 0.0)
-    while True:
+
+    def found(unknowns: Array) -> tuple[CurvePoint, CurvePoint, HarmonicSolution] | str:
         resonance = solve(record.equations, unknowns, start.force, NewtonControl(control.tolerance))
         if not resonance.converged:
             return (
@@ -316,11 +324,21 @@ def _first(
                 f"{resonance.iterations} iterations; start from a motion nearer to the peak of the "
                 "response"
             )
-        point = first_point(resonance, start.force, True, control.first)
-        finer = record(point, resonance.at)
+        down, up = (
+            first_point(resonance, start.force, upward, control.first) for upward in (False, True)
+        )
+        return down, up, record.describe(up, resonance.at)
+
+    unknowns = np.append(record.equations.problem.guess(start), 0.0)
+    while True:
+        first = steps("first phase resonance", partial(found, unknowns))
+        if isinstance(first, str):
+            return first
+        down, up, motion = first
+        finer = record.take(motion)
         if finer is None:
-            return _First(record.equations, resonance, record.solutions[-1])
-        unknowns = finer.lift(resonance.unknowns)
+            return _First(record.equations, down, up, record.solutions[-1])
+        unknowns = finer.lift(up.unknowns)
 
 
 @dataclass(frozen=True)
@@ -338,15 +356,17 @@ def _half(
     forces: tuple[float, float],
     accuracy: Accuracy | None,
     control: ContinuationControl,
+    steps: Steps,
 ) -> _Half:
     force, problem = first.solution.force, first.equations.problem
     if force == forces[upward]:
         return _Half((), "", problem)
     record = _Recorder(first.equations, accuracy)
-    point = first_point(first.resonance, force, upward, control.first)
+    point = first.up if upward else first.down
     # Steps are shares of the vibration, as those of forced responses.
     rest = np.append(problem.guess(None), 0.0)
-    curve = follow(first.equations, point, forces, control, record, rest, end=forces[upward])
+    end = forces[upward]
+    curve = follow(first.equations, point, forces, control, record, rest, end=end, steps=steps)
     message = curve.message
     if message:
         message = f"{'upward' if upward else 'downward'} in force, {message}"

@@ -6,6 +6,7 @@ closes: forces and velocities of a step are the means of its ends.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -31,35 +32,77 @@ class StepState(NamedTuple):
     residual: float
 
 
+@dataclass(frozen=True)
+class RecordedSteps:
+    """What is kept of some whole steps: ``rows`` by column, None where no step of them has one.
+
+    ``last`` is the point that they end with, ``sums`` ``(3 + j,)`` the energies until there, and
+    ``kept`` the point of the last row so far. They are so many whole steps, of ``points`` in all;
+    ``jump`` and ``moved`` are the largest squared error that one adds and the largest squared
+    displacement, both as half of their norm weighted by mass, ``residual`` the largest one.
+    """
+
+    rows: tuple[Array, Array, Array, Array, Array] | None
+    last: StepState
+    sums: Array
+    kept: StepState
+    whole_steps: int
+    points: int
+    jump: float
+    moved: float
+    residual: float
+
+
 class MotionRecord:
     """Rows of the result, and the energies summed until each."""
 
     def __init__(self, model: DynamicModel, directions: int, every: int, first: StepState) -> None:
         self._model, self._directions, self._every = model, directions, every
         self._before, self._kept = first, first
-        self._sums = np.zeros((1, 3 + len(model.connection) // directions))
-        self._rows = [(*_columns([first]), self._sums)]
+        sums = np.zeros((1, 3 + len(model.connection) // directions))
+        self._sums, self._rows = sums[0], [(*_columns([first]), sums)]
         self._largest_jump = self._largest_motion = self._residual = 0.0
         self._taken = self._steps = 0
 
-    def add(self, block: list[list[StepState]]) -> None:
-        """Sum the energies of whole steps, each of one or more points, and keep rows."""
+    def recorded(self, block: list[list[StepState]]) -> RecordedSteps | None:
+        """What is to be added of whole steps, each of one or more points; None without any."""
         points = [point for whole in block for point in whole]
         if not points:
-            return
+            return None
         ends = np.cumsum([len(whole) for whole in block]) - 1
         kept = ends[(self._taken + 1 + np.arange(len(block))) % self._every == 0]
-        sums = self._sums[-1] + np.cumsum(self._flows([self._before, *points]), axis=0)
+        flows, jump, moved = self._flows([self._before, *points])
+        sums, rows = self._sums + np.cumsum(flows, axis=0), None
         if len(kept):
-            self._rows.append((*_columns([points[row] for row in kept]), sums[kept]))
-            self._kept = points[kept[-1]]
-        self._before, self._sums = points[-1], sums
-        self._taken += len(block)
-        self._steps += len(points)
-        self._residual = max(self._residual, *(point.residual for point in points))
+            rows = (*_columns([points[row] for row in kept]), sums[kept])
+        return RecordedSteps(
+            rows=rows,
+            last=points[-1],
+            sums=sums[-1].copy(),
+            kept=points[kept[-1]] if len(kept) else self._kept,
+            whole_steps=len(block),
+            points=len(points),
+            jump=jump,
+            moved=moved,
+            residual=max(point.residual for point in points),
+        )
 
-    def _flows(self, points: list[StepState]) -> Array:
-        """Energies of each step ``(s, 3 + j)``: brought in, damped, into joints, lost in each."""
+    def add(self, recorded: RecordedSteps) -> None:
+        """Add what has been recorded of the next whole steps."""
+        if recorded.rows is not None:
+            self._rows.append(recorded.rows)
+        self._before, self._kept, self._sums = recorded.last, recorded.kept, recorded.sums
+        self._taken += recorded.whole_steps
+        self._steps += recorded.points
+        self._largest_jump = max(self._largest_jump, recorded.jump)
+        self._largest_motion = max(self._largest_motion, recorded.moved)
+        self._residual = max(self._residual, recorded.residual)
+
+    def _flows(self, points: list[StepState]) -> tuple[Array, float, float]:
+        """Energies of each step ``(s, 3 + j)``: brought in, damped, into joints, lost in each.
+
+        Beside them the largest squares of :class:`RecordedSteps`.
+        """
         model = self._model
         _, motion, force, joint_force = _columns(points)
         steps = np.array([point.step for point in points[1:]])[:, None]
@@ -71,18 +114,11 @@ class MotionRecord:
             (0.5 * (joint_force[1:] + joint_force[:-1]), travel @ model.connection.T),
         )
         works = np.stack([np.einsum("ti,ti->t", *pair) for pair in pairs], axis=1)
-        self._judge(motion, accelerations(model, motion, force, joint_force), steps)
+        jumps = steps**2 / 12.0 * np.diff(accelerations(model, motion, force, joint_force), axis=0)
+        displacement = motion[:, : len(model.mass)]
+        jump, moved = (float(quadratic(model.mass, part).max()) for part in (jumps, displacement))
         dissipated = np.array([point.response.dissipated for point in points[1:]])
-        return np.hstack([works, dissipated])
-
-    def _judge(self, motion: Array, acceleration: Array, steps: Array) -> None:
-        """Note the largest displacement, and the largest error of it that a step adds."""
-        mass = self._model.mass
-        jumps = steps**2 / 12.0 * np.diff(acceleration, axis=0)
-        displacement = motion[:, : len(mass)]
-        jump, moved = (float(quadratic(mass, part).max()) for part in (jumps, displacement))
-        self._largest_jump = max(self._largest_jump, jump)
-        self._largest_motion = max(self._largest_motion, moved)
+        return np.hstack([works, dissipated]), jump, moved
 
     @property
     def largest_displacement(self) -> float:

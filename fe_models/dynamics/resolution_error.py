@@ -36,7 +36,7 @@ def resolution_error(problem: HarmonicBalance, solution: HarmonicSolution) -> Re
     vibration = problem.vibration(solution.coefficients)
     if vibration == 0.0:
         return ResolutionError(0.0, 0.0, np.zeros(1), 0.0)
-    richer = problem.richer(set(np.flatnonzero(solution.shares > LOOKED_AT).tolist()))
+    richer = richer_problem(problem, solution)
     coefficients = richer.resolution.adopt(solution.coefficients, problem.resolution)
     at = richer.evaluate(coefficients.ravel(), solution.frequency, solution.force, "frequency")
     change, share, distance = _step(richer, at, solution.frequency, vibration)
@@ -44,6 +44,14 @@ def resolution_error(problem: HarmonicBalance, solution: HarmonicSolution) -> Re
     by_harmonic, sampling = _causes(problem.resolution, richer, at)
     scale = max(distance, energy) / (float(np.hypot(np.linalg.norm(by_harmonic), sampling)) or 1.0)
     return ResolutionError(distance, energy, scale * by_harmonic, scale * sampling)
+
+
+def richer_problem(problem: HarmonicBalance, solution: HarmonicSolution) -> HarmonicBalance:
+    """The problem with what a motion leaves out: it has grown with all that were looked at before.
+
+    Whoever takes an error that was estimated earlier lets it grow by this motion too.
+    """
+    return problem.richer(set(np.flatnonzero(solution.shares > LOOKED_AT).tolist()))
 
 
 def _energy_error(

@@ -406,11 +406,11 @@ class TestCase:
             assert load["volumes"] == [0.0, 0.0]
             assert load["cycles"] == 1e5
 
-    def test_half_done_run_is_started_again(self, folder, curved, tmp_path):
+    def test_run_without_a_manifest_is_started_again(self, folder, curved, tmp_path):
         (tmp_path / "case.yaml").write_text((curved / "case.yaml").read_text(), encoding="utf-8")
         result = invoke("resume", tmp_path)
         assert result.exit_code == 2
-        assert "takes up no run half done" in result.stderr
+        assert "start it again with `fretscale run" in result.stderr
 
 
 @pytest.mark.slow

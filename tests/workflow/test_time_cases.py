@@ -520,13 +520,13 @@ def test_memory_grows_with_what_is_recorded(monkeypatch, tmp_path):
     assert "raise integration.step" in message
 
 
-def test_a_finished_run_is_not_resumed_and_a_broken_one_starts_again(tmp_path):
+def test_a_finished_run_is_not_resumed_and_one_that_kept_nothing_starts_again(tmp_path):
     run(tmp_path, JOINT)
     assert "nothing to do" in invoke("resume", tmp_path / "out").stdout
     (tmp_path / "out" / "summary.json").unlink()
     ended = invoke("resume", tmp_path / "out")
     assert ended.exit_code == 2
-    assert "start it again" in ended.stderr
+    assert "its manifest.json does not list its files" in ended.stderr
 
 
 @pytest.mark.parametrize(

@@ -209,6 +209,7 @@ def _run(
             compute=compute,
             draw=draw,
         )
+        reporter.say(f"{'resume' if resume else 'run'}: {case.title}")
         with _told(reporter):
             analysis.run(run)
 

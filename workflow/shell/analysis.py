@@ -100,7 +100,8 @@ class Analysis(Generic[AnyCase]):
     what a run needs before anything is meshed, ``run_time`` about how long it takes, ``pictures``
     how its results are shown: figures in so many ``drawing_processes``, and the files beside them;
     0: all in that of the run.
-    ``resumable`` are runs that leave a checkpoint to go on from (:mod:`workflow.shell.checkpoint`).
+    ``resumable`` are runs that leave a checkpoint to go on from (:mod:`workflow.shell.checkpoint`),
+    by their steps (:mod:`workflow.shell.steps`) or a state of their own.
     ``choose`` gives the case with the settings that it leaves open, and a record of why.
     ``write_loads`` solves the structure of a case alone and writes the loads of its contacts into a
     folder, None where there is no structure.

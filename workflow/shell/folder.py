@@ -129,8 +129,16 @@ class OutputFolder:
 
     def reserve_state(self) -> None:
         """Make room for what a run needs to go on where it was cut off."""
-        self.reserve("checkpoint.h5", "state after the last jump, for the run to go on from")
-        self.reserve(STATE, "fields after each jump, until the run ends").mkdir(exist_ok=True)
+        self.reserve("checkpoint.h5", "how far the run has come, for it to go on from")
+        self.reserve(STATE, "what the run has found so far, until it ends").mkdir(exist_ok=True)
+
+    def discard_state(self) -> None:
+        """Remove what the run has found on the way, and the name of a state that it never kept."""
+        listed = self.manifest or {}
+        if self.jumps.name in listed:
+            self.discard(self.jumps.name)
+        if self.checkpoint.name in listed and not self.checkpoint.exists():
+            self.discard(self.checkpoint.name)
 
     @property
     def lists_state(self) -> bool:

@@ -12,6 +12,8 @@ from workflow.shell.versions import versions
 def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> None:
     """Write the summary of a run, which marks it as finished, and say how it ended.
 
+    What it has found on the way is removed.
+
     ``numbers`` are what the analysis tells, ``lines`` the same in short.
     """
     reporter = run.reporter
@@ -28,6 +30,7 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
         },
         run.provenance,
     )
+    run.folder.discard_state()
     for line in lines:
         reporter.say(line)
     reporter.say(

@@ -215,10 +215,12 @@ def peak(place):
 def test_finer_equations_with_their_peak_elsewhere_do_not_turn_the_curve_round(place, refined):
     """Beyond the coarse peak the unknown falls, where finer equations still have it rise."""
 
-    def on_point(point, at):
-        if at.peak == 5.0 and point.parameter > refined:
-            return Refinement(marked(place), lambda unknowns: unknowns)
-        return None
+    class Finer:
+        def describe(self, point, at):
+            return at.peak == 5.0 and point.parameter > refined
+
+        def take(self, beyond):
+            return Refinement(marked(place), lambda unknowns: unknowns) if beyond else None
 
     def marked(place):
         def equations(unknowns, parameter):
@@ -227,7 +229,7 @@ def test_finer_equations_with_their_peak_elsewhere_do_not_turn_the_curve_round(p
 
         return equations
 
-    curve = follow(marked(5.0), start(marked(5.0), 0.1, 1.0), (1.0, 9.0), None, on_point, end=9.0)
+    curve = follow(marked(5.0), start(marked(5.0), 0.1, 1.0), (1.0, 9.0), None, Finer(), end=9.0)
     assert curve.message == ""
     assert curve.points[-1].parameter == 9.0
     assert curve.folds == ()
@@ -259,12 +261,14 @@ def test_finer_equations_take_over_on_the_way():
             1.0 + abs(u) + abs(v),
         )
 
-    def on_point(point, at):
-        if len(point.unknowns) == 1 and point.parameter > 3.0:
-            return Refinement(fine, lambda unknowns: np.append(unknowns, 0.0))
-        return None
+    class Finer:
+        def describe(self, point, at):
+            return len(point.unknowns) == 1 and point.parameter > 3.0
 
-    curve = follow(coarse, start(coarse, 1.0, 1.0), (0.0, 9.0), None, on_point)
+        def take(self, beyond):
+            return Refinement(fine, lambda unknowns: np.append(unknowns, 0.0)) if beyond else None
+
+    curve = follow(coarse, start(coarse, 1.0, 1.0), (0.0, 9.0), None, Finer())
     assert curve.message == ""
     assert {len(point.unknowns) for point in curve.points} == {1, 2}
     for point in curve.points:

@@ -28,7 +28,6 @@ def run_contact(run: ContactRun) -> None:
     before it are written. Raises UserError where ``contact.history`` does not suit the path, or no
     cells are left of the contact.
     """
-    run.reporter.say(f"run: {run.case.title}")
     outcome, message = _march(run.case, run.folder, run.reporter)
     if outcome.history.states:
         _warn(outcome, run.reporter)

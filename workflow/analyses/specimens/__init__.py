@@ -30,4 +30,5 @@ ANALYSIS = Analysis(
     pictures=_pictures,
     memory=memory,
     run_time=run_time,
+    resumable=True,
 )

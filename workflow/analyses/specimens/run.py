@@ -14,6 +14,7 @@ import numpy as np
 
 from fe_models.mesh import MeshError
 from fe_models.reduced_contact import FrettingConditions, ReducedPair, VirginCurve
+from sa_solver.steps import Steps
 from sa_solver.types import Array, ElasticPair
 from wear.steppers import ExplicitStepper, StabilityError, rest
 from workflow.analyses.specimens.case import SpecimensCase
@@ -32,6 +33,7 @@ from workflow.errors import MethodFailed, UserError
 from workflow.shell.analysis import Run
 from workflow.shell.few_cells import check_cells
 from workflow.shell.reporter import Reporter
+from workflow.shell.steps import kept_steps
 
 # States of each force that are kept with their fields: the unworn one, the last, others between
 # them evenly over the logarithm of the cycles.
@@ -55,9 +57,9 @@ def run_specimens(run: Run[SpecimensCase]) -> None:
     Raises UserError where the mesher refuses or a cycle block would be unstable, MethodFailed where
     a contact does not converge.
     """
-    run.reporter.say(f"run: {run.case.title}")
     try:
-        outcome = _compute(run.case, run.reporter)
+        with kept_steps(run) as steps:
+            outcome = _compute(run.case, run.reporter, steps)
     except MeshError as error:
         raise UserError(f"{run.folder.case}: {error}") from error
     except StabilityError as error:
@@ -65,7 +67,7 @@ def run_specimens(run: Run[SpecimensCase]) -> None:
     write_specimens_output(outcome, run)
 
 
-def _compute(case: SpecimensCase, reporter: Reporter) -> SpecimensOutcome:
+def _compute(case: SpecimensCase, reporter: Reporter, steps: Steps) -> SpecimensOutcome:
     model = SpecimensModel(case)
     with reporter.stage("mesh"):
         nodes = model.node_count()
@@ -84,44 +86,54 @@ def _compute(case: SpecimensCase, reporter: Reporter) -> SpecimensOutcome:
     forces = case.load_path.normal_forces
     with reporter.course("specimens"):
         loads = tuple(
-            _fret(model, half_space, force, reporter)
+            _fret(model, half_space, force, reporter, steps)
             for force in reporter.parts(forces, "{:g} N".format)
         )
     with reporter.stage("half-space"):
-        bulk = bulk_compliance(pair, half_space)
+        bulk = steps("tied pad", lambda: bulk_compliance(pair, half_space))
     return SpecimensOutcome(model, half_space, bulk, loads)
 
 
 def _fret(
-    model: SpecimensModel, half_space: PadHalfSpace, force: float, reporter: Reporter
+    model: SpecimensModel,
+    half_space: PadHalfSpace,
+    force: float,
+    reporter: Reporter,
+    steps: Steps,
 ) -> LoadOutcome:
     case, pair = model.case, model.pair
     conditions = FrettingConditions(force, case.load_path.stroke, case.friction.coefficient)
     with reporter.part(0.0, WEAR), reporter.stage("wear"):
-        blocks = tuple(_blocks(model, conditions, reporter))
-        kept = tuple(
-            KeptState(state, first_loading(pair, state, conditions)) for state in _chosen(blocks)
+        blocks = tuple(_blocks(model, conditions, reporter, steps))
+        curves = (
+            steps("first loading", partial(first_loading, pair, state, conditions))
+            for state in _chosen(blocks)
         )
+        kept = tuple(map(KeptState, _chosen(blocks), curves))
     grid = half_space.grid
     height = model.specimen.gap(grid.x, grid.y)
     path = 0.5 * conditions.stroke * rising(HALF_SPACE_POINTS)
     with reporter.stage("half-space"):
         first, last = (
-            half_space.fretting_cycle(height, state.depths.sum(axis=0), force, path)
+            steps(
+                "half-space",
+                partial(half_space.fretting_cycle, height, state.depths.sum(axis=0), force, path),
+            )
             for state in (blocks[0], blocks[-1])
         )
     name = f"the half-space under {force:g} N"
     check_cells(name, case.contact, grid, first.pressure, reporter)
     check_cells(name, case.contact, grid, last.pressure, reporter, worn=True)
     with reporter.stage("coupled cycle"):
-        marched = marched_cycle(pair, model.face.gap, conditions)
+        cycle = partial(marched_cycle, pair, model.face.gap, conditions)
+        marched = steps("coupled cycle", cycle)
     end = blocks[-1]
     reporter.say(f"  {force:g} N: {end.cycles:.4g} cycles in {len(blocks) - 1} cycle blocks")
     return LoadOutcome(force, blocks, kept, (first, last), marched)
 
 
 def _blocks(
-    model: SpecimensModel, conditions: FrettingConditions, reporter: Reporter
+    model: SpecimensModel, conditions: FrettingConditions, reporter: Reporter, steps: Steps
 ) -> Iterator[BlockState]:
     """The states of a worn pair, up to the end that the case asks for."""
     case = model.case
@@ -131,7 +143,7 @@ def _blocks(
         if step.cycles is None
         else ExplicitStepper(cycles=step.cycles)
     )
-    fretted = FrettedPair(model.pair, case.laws, conditions)
+    fretted = FrettedPair(model.pair, case.laws, conditions, steps)
     states = wear_in_cycle_blocks(fretted, model.face.gap, stepper, partial(_to_go, case))
     for number, state in enumerate(states):
         _check(state, number, conditions, case)

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from fe_models.reduced_contact import FrettingConditions, FrettingCycle, ReducedPair
+from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 from wear.laws import WearLaw
 from wear.nodes import NodalContact, NodalState
@@ -59,12 +60,17 @@ class PairCycle:
 
 
 class FrettedPair:
-    """A pair under one cycle of loads, on whatever shape it has worn to."""
+    """A pair under one cycle of loads, on whatever shape it has worn to; a step finds one cycle."""
 
     def __init__(
-        self, pair: ReducedPair, laws: tuple[WearLaw, WearLaw], conditions: FrettingConditions
+        self,
+        pair: ReducedPair,
+        laws: tuple[WearLaw, WearLaw],
+        conditions: FrettingConditions,
+        steps: Steps = COMPUTED,
     ) -> None:
         self._pair, self._laws, self._conditions = pair, laws, conditions
+        self._steps = steps
         self._last: tuple[NodalState, PairCycle] | None = None
 
     def cycle_at(self, state: NodalState) -> PairCycle:
@@ -72,7 +78,8 @@ class FrettedPair:
         if self._last is None or self._last[0].surfaces is not state.surfaces:
             conditions = self._conditions
             guess = None if state.start is None else np.asarray(state.start)
-            contact = self._pair.fretting_cycle(state.surfaces.gap, conditions, guess)
+            gap, cycle = state.surfaces.gap, self._pair.fretting_cycle
+            contact = self._steps("fretting cycle", lambda: cycle(gap, conditions, guess))
             self._last = state, PairCycle(self._pair, contact, conditions.friction)
         return self._last[1]
 

@@ -16,6 +16,7 @@ from fe_models.dynamics.impact_hammer import (
     frequency_response,
 )
 from fe_models.dynamics.motion import Motion
+from sa_solver.steps import Steps
 from sa_solver.types import Array
 from workflow.analyses.rig import excitation as given
 from workflow.analyses.rig.rig_model import RigModel
@@ -43,7 +44,9 @@ DECAYED = 0.9
 RING_DOWN_POINTS = 400
 
 
-def run_hammer(case: RigCase, rig: RigModel, joint: JointModel, reporter: Reporter) -> TimeOutcome:
+def run_hammer(
+    case: RigCase, rig: RigModel, joint: JointModel, reporter: Reporter, steps: Steps
+) -> TimeOutcome:
     """Hit the rig at every energy, which stays what it is during the record.
 
     Raises MethodFailed where a motion is not found, or shows no resonance.
@@ -55,7 +58,9 @@ def run_hammer(case: RigCase, rig: RigModel, joint: JointModel, reporter: Report
     with reporter.course("motions"):
         for energy in reporter.parts(case.energies, joules):
             with reporter.stage("motion"):
-                motion = motion_of(rig, joint, energy, blow, hammer.record, control, reached=tell)
+                motion = motion_of(
+                    rig, joint, energy, blow, hammer.record, control, steps=steps, reached=tell
+                )
             with reporter.stage("signals"):
                 states.append(_state(hammer, blow, rig, joint, energy, motion, reporter))
     curve = evolution_curve(joint, case.energies[-1])

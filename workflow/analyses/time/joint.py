@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from sa_solver.steps import Steps
 from sa_solver.types import Array
 from wear.joints.ageing import (
     AgeingError,
@@ -40,7 +42,7 @@ STRETCH = 1000
 CURVE_POINTS, CURVE_BEGIN = 101, 1e-6
 
 
-def run_joint(case: JointCase, reporter: Reporter) -> TimeOutcome:
+def run_joint(case: JointCase, reporter: Reporter, steps: Steps) -> TimeOutcome:
     """Age a joint at its stroke, and look at it at the energies asked for.
 
     Raises UserError where it never dissipates the energy, MethodFailed where it cannot be aged.
@@ -48,15 +50,15 @@ def run_joint(case: JointCase, reporter: Reporter) -> TimeOutcome:
     model, amplitude = JointModel.of(case), 0.5 * case.drive.stroke
     with reporter.stage("ageing"):
         rate = steady_stroke(model.line_law, model.evolution, amplitude)
-        test = aged(rate, case.ageing, model.evolution.breaks)
+        test = steps("ageing", lambda: aged(rate, case.ageing, model.evolution.breaks))
     last = test_end(test, case.ageing)
     with reporter.stage("loops"):
         states = tuple(
-            _state(model, energy, float(test.cycles_at(energy)), amplitude)
+            steps("loop", partial(_state, model, energy, float(test.cycles_at(energy)), amplitude))
             for energy in energies_within(case.energies, last, reporter)
         )
     with reporter.stage("check of the jumps"):
-        numbers = _ageing_numbers(model, test, amplitude)
+        numbers = steps("check of the jumps", lambda: _ageing_numbers(model, test, amplitude))
     cycles = test.total_cycles
     ended = {"cycles": cycles, "energy": last, "duration": cycles / case.drive.frequency}
     curve = evolution_curve(model, last, test, rate)

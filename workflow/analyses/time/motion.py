@@ -10,6 +10,7 @@ import numpy as np
 from fe_models.dynamics.excitation import ExcitationForce
 from fe_models.dynamics.motion import Motion, Start
 from fe_models.dynamics.newmark import TimeStepControl, integrate
+from sa_solver.steps import COMPUTED, Steps
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.time.case import RigCase, joules
 from workflow.analyses.time.joint_model import JointModel
@@ -30,6 +31,7 @@ def motion_of(
     duration: float,
     control: TimeStepControl,
     start: Start | None = None,
+    steps: Steps = COMPUTED,
     reached: Callable[[float], None] = lambda share: None,
 ) -> Motion:
     """Motion of a rig whose joints have dissipated so much ``energy`` [N mm] before.
@@ -38,8 +40,8 @@ def motion_of(
     that was not found to its end.
     """
     law = joint.at(energy)
-    loaded = rig.with_preload(law, force)
-    motion = integrate(rig.model, law, loaded, duration, control, start, reached)
+    pulled = rig.with_preload(law, force)
+    motion = integrate(rig.model, law, pulled, duration, control, start, steps, reached)
     if not motion.converged:
         raise MethodFailed(f"motion at {joules(energy)}: {motion.message}")
     return motion

@@ -12,6 +12,7 @@ from scipy.interpolate import PchipInterpolator
 from fe_models.dynamics.excitation import HarmonicForce, RecordedForce
 from fe_models.dynamics.motion import Start
 from fe_models.dynamics.newmark import TimeStepControl
+from sa_solver.steps import Steps
 from sa_solver.types import Array
 from wear.joints.ageing import LongTest
 from workflow.analyses.rig import excitation as given
@@ -60,7 +61,7 @@ class SteadyCycle:
     end: Start
 
 
-def run_rig(case: RigCase, reporter: Reporter) -> TimeOutcome:
+def run_rig(case: RigCase, reporter: Reporter, steps: Steps) -> TimeOutcome:
     """Run a rig at all energies that are asked for.
 
     Raises MethodFailed where a motion is not found or not steady, UserError where the joint can
@@ -70,7 +71,7 @@ def run_rig(case: RigCase, reporter: Reporter) -> TimeOutcome:
     memory(case, len(rig.model.mass)).check()
     joint = JointModel.of(case, rig.joints)
     runs = {"hammer": run_hammer, "recorded": _run_recorded, "harmonic": _run_harmonic}
-    outcome = runs[case.excitation.kind](case, rig, joint, reporter)
+    outcome = runs[case.excitation.kind](case, rig, joint, reporter, steps)
     numbers = {"free": rig.free(), **outcome.numbers}
     return replace(outcome, numbers=numbers, seen=rig.labels)
 
@@ -79,19 +80,17 @@ def run_rig(case: RigCase, reporter: Reporter) -> TimeOutcome:
 
 
 def _run_recorded(
-    case: RigCase, rig: RigModel, joint: JointModel, reporter: Reporter
+    case: RigCase, rig: RigModel, joint: JointModel, reporter: Reporter, steps: Steps
 ) -> TimeOutcome:
     assert isinstance(case.excitation, given.Recorded)
     times, samples = case.excitation.read()
     force = RecordedForce(rig.driven, times, samples)
     control, begin = step_control(case), Start(time=float(times[0]))
-    states, tell = [], reporter.reached
+    duration, states, tell = float(np.ptp(times)), [], reporter.reached
     with reporter.course("motions"):
         for energy in reporter.parts(case.energies, joules):
             with reporter.stage("motion"):
-                motion = motion_of(
-                    rig, joint, energy, force, float(np.ptp(times)), control, begin, tell
-                )
+                motion = motion_of(rig, joint, energy, force, duration, control, begin, steps, tell)
             largest = {"largest_force": float(np.abs(rig.loop(motion)[1]).max())}
             numbers = rig.modes(joint.at(energy)) | motion_numbers(rig, motion) | largest
             curves = {MOTION: motion_curves(rig, motion, force)}
@@ -103,10 +102,10 @@ def _run_recorded(
 
 
 def _run_harmonic(
-    case: RigCase, rig: RigModel, joint: JointModel, reporter: Reporter
+    case: RigCase, rig: RigModel, joint: JointModel, reporter: Reporter, steps: Steps
 ) -> TimeOutcome:
     assert isinstance(case.excitation, given.Harmonic)
-    steady = _SteadyStates(case.excitation, case.integration, rig, joint, reporter)
+    steady = _SteadyStates(case.excitation, case.integration, rig, joint, reporter, steps)
     energies, rate, test = list(case.energies), None, None
     cycles: list[float | None] = [None] * len(energies)
     numbers: dict[str, Any] = {}
@@ -149,6 +148,23 @@ def _steady_state(
 
 
 @dataclass(frozen=True)
+class _Settling:
+    """A rig on its way to a steady state, after so many ``periods``.
+
+    The next one begins at ``start``. ``now`` are energy and stroke of the last one, their
+    ``change`` has been small ``in_a_row`` so often, and ``steady`` is the last one if that is
+    enough.
+    """
+
+    start: Start | None
+    now: Array
+    change: float = np.inf
+    in_a_row: int = 0
+    periods: int = 0
+    steady: SteadyCycle | None = None
+
+
+@dataclass(frozen=True)
 class _SteadyStates:
     """Steady states of a rig at any energy, each settled once, from the one that is nearest."""
 
@@ -157,6 +173,7 @@ class _SteadyStates:
     rig: RigModel
     joint: JointModel
     reporter: Reporter
+    steps: Steps
     settled: dict[float, SteadyCycle] = field(default_factory=dict)
 
     def at(self, energy: float, expected: int) -> SteadyCycle:
@@ -181,23 +198,30 @@ class _SteadyStates:
         if start is not None:
             # Where a period begins, whatever came before: times must not lose their digits.
             start = replace(start, time=0.0)
-        before, in_a_row, first, settled = np.full(2, np.inf), 0, 1.0, 0.0
-        for periods in range(1, excitation.periods + 1):
-            motion = motion_of(rig, self.joint, energy, force, period, control, start)
-            start = replace(motion.end, time=0.0)
-            dissipated = float(motion.energies.joints[-1].sum())
-            stretch, joint_force = rig.loop(motion)
-            now = np.array([dissipated, np.ptp(stretch)])
-            change = _change(now, before)
+        first, settled = 1.0, 0.0
+
+        def tell(change: float, periods: int) -> None:
+            nonlocal first, settled
             if np.isfinite(change):
                 # It falls by about the same factor in each period.
                 first = max(first, change)
                 fallen = np.log(first / max(change, excitation.steady))
                 settled = max(settled, float(fallen / np.log(first / excitation.steady)))
                 self.reporter.reached(settled, f"period {periods}")
-            in_a_row = in_a_row + 1 if change <= excitation.steady else 0
+
+        def further(last: _Settling) -> _Settling | None:
+            if last.steady is not None or last.periods == excitation.periods:
+                return None
+            motion = motion_of(rig, self.joint, energy, force, period, control, last.start)
+            dissipated = float(motion.energies.joints[-1].sum())
+            stretch, joint_force = rig.loop(motion)
+            now = np.array([dissipated, np.ptp(stretch)])
+            change, periods = _change(now, last.now), last.periods + 1
+            tell(change, periods)
+            in_a_row = last.in_a_row + 1 if change <= excitation.steady else 0
+            begin, steady = replace(motion.end, time=0.0), None
             if in_a_row == IN_A_ROW:
-                return SteadyCycle(
+                steady = SteadyCycle(
                     0.5 * np.ptp(motion.displacement @ rig.seen.T, axis=0),
                     stretch,
                     joint_force,
@@ -206,13 +230,17 @@ class _SteadyStates:
                     periods,
                     change,
                     motion.error,
-                    start,
+                    begin,
                 )
-            before = now
-        raise MethodFailed(
-            f"no steady state at {joules(energy)} after {excitation.periods} cycles: they still "
-            f"change by {change:.1e}; raise excitation.periods or excitation.steady"
-        )
+            return _Settling(begin, now, change, in_a_row, periods, steady)
+
+        last = self.steps.march("period", _Settling(start, np.full(2, np.inf)), further)
+        if last.steady is None:
+            raise MethodFailed(
+                f"no steady state at {joules(energy)} after {excitation.periods} cycles: they "
+                f"still change by {last.change:.1e}; raise excitation.periods or excitation.steady"
+            )
+        return last.steady
 
 
 def _change(now: Array, before: Array) -> float:

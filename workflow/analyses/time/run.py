@@ -10,6 +10,7 @@ from workflow.analyses.time.rig import run_rig
 from workflow.analyses.time.worn_joint import warn_of_table, with_computed_wear
 from workflow.errors import UserError
 from workflow.shell.analysis import Run
+from workflow.shell.steps import kept_steps
 
 
 def run_time(run: Run[JointCase | RigCase]) -> None:
@@ -19,13 +20,13 @@ def run_time(run: Run[JointCase | RigCase]) -> None:
     cannot be followed or is not steady.
     """
     folder, reporter = run.folder, run.reporter
-    reporter.say(f"run: {run.case.title}")
     case = with_computed_wear(run)
     try:
-        if isinstance(case, JointCase):
-            outcome = run_joint(case, reporter)
-        else:
-            outcome = run_rig(case, reporter)
+        with kept_steps(run) as steps:
+            if isinstance(case, JointCase):
+                outcome = run_joint(case, reporter, steps)
+            else:
+                outcome = run_rig(case, reporter, steps)
     except JointError as error:
         raise UserError(f"{folder.case}: joint: {error}") from error
     warn_of_table(case, float(outcome.evolution["energy"].values[-1]), reporter)

@@ -41,5 +41,6 @@ ANALYSIS = Analysis(
     pictures=_pictures,
     memory=memory,
     run_time=run_time,
+    resumable=True,
     comparison=Comparison(quantities=_quantities),
 )

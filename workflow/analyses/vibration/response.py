@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -24,6 +25,7 @@ from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.harmonics import Resolution
 from fe_models.dynamics.phase_resonance import along_phase_resonance
 from fe_models.dynamics.resolution_error import resolution_error
+from sa_solver.steps import Steps
 from sa_solver.types import Array
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
@@ -106,7 +108,7 @@ def accuracy_of(case: VibrationCase) -> Accuracy | None:
 
 
 def response_under(
-    case: VibrationCase, model: VibrationModel, force: float, reporter: Reporter
+    case: VibrationCase, model: VibrationModel, force: float, reporter: Reporter, steps: Steps
 ) -> tuple[Response, ResponseBranch]:
     """What the structure does under a force, and the branch of motions that it was taken from.
 
@@ -121,6 +123,7 @@ def response_under(
         upward=upward,
         control=step_control(case, progress_along(case.frequencies, upward, "Hz", reporter)),
         accuracy=accuracy,
+        steps=steps,
     )
     if not branch.solutions:
         raise MethodFailed(f"no motion under {force:g} N: {branch.message}; change frequencies")
@@ -130,17 +133,18 @@ def response_under(
     curves = _curves(model, branch)
     if int(np.argmax(curves["amplitude"].values[:, -1])) in (0, len(branch.solutions) - 1):
         reporter.warn(f"{force:g} N: no resonance, the largest motion is at an end of the curve")
-    peak = _resonance(model, branch, curves)
+    peak = steps("resonance", lambda: _resonance(model, branch, curves))
     # The peak may have been found before the resolution grew.
-    problem, resonance = _accurate(branch.problem.refined(peak.resolution), peak, accuracy)
+    problem = branch.problem.refined(peak.resolution)
+    resonance = steps("accurate resonance", lambda: _accurate(problem, peak, accuracy))
     _warn_of_stroke(model, resonance, reporter)
     response = Response(
         force,
         curves,
-        _numbers(model, branch, curves, problem, resonance),
+        _numbers(model, branch, curves, problem.refined(resonance.resolution), resonance),
         nodes=_nodes(branch) if model.rig.pressing is not None else None,
         resonance=_cycle(resonance) if model.rig.pressing is not None else None,
-        loops=_loops(case, model, branch, reporter),
+        loops=_loops(case, model, branch, reporter, steps),
     )
     warn_of_error(f"{force:g} N: the motion", response.numbers["error"], case, reporter)
     return response, branch
@@ -162,7 +166,7 @@ def warn_of_error(motion: str, error: float, case: VibrationCase, reporter: Repo
 
 
 def force_sweep(
-    case: VibrationCase, model: VibrationModel, frequency: float, reporter: Reporter
+    case: VibrationCase, model: VibrationModel, frequency: float, reporter: Reporter, steps: Steps
 ) -> Curves:
     """The motions at a frequency from the least force of a case to the largest.
 
@@ -172,7 +176,7 @@ def force_sweep(
     span = case.forces[0], case.forces[-1]
     control = step_control(case, progress_along(span, True, "N", reporter))
     branch = along_force(
-        model.problem, frequency, span, control=control, accuracy=accuracy_of(case)
+        model.problem, frequency, span, control=control, accuracy=accuracy_of(case), steps=steps
     )
     if not branch.solutions:
         raise MethodFailed(f"no motion at {frequency:g} Hz: {branch.message}; change force_sweeps")
@@ -193,13 +197,17 @@ def force_sweep(
 
 
 def backbone_of(
-    case: VibrationCase, model: VibrationModel, branch: ResponseBranch, reporter: Reporter
+    case: VibrationCase,
+    model: VibrationModel,
+    branch: ResponseBranch,
+    reporter: Reporter,
+    steps: Steps,
 ) -> Curves | None:
     """The curve of phase resonance through all forces, from the motions under one of them."""
     span = case.forces[0], case.forces[-1]
     control = step_control(case, progress_along(span, True, "N", reporter))
     backbone = along_phase_resonance(
-        model.problem, branch, span, control=control, accuracy=accuracy_of(case)
+        model.problem, branch, span, control=control, accuracy=accuracy_of(case), steps=steps
     )
     if backbone.message:
         reporter.warn(f"backbone: {backbone.message}")
@@ -375,18 +383,18 @@ def _resonance(model: VibrationModel, branch: ResponseBranch, curves: Datasets) 
 
 def _accurate(
     problem: HarmonicBalance, motion: HarmonicSolution, accuracy: Accuracy | None
-) -> tuple[HarmonicBalance, HarmonicSolution]:
+) -> HarmonicSolution:
     """The motion with its error; as accurate as asked for, if that is asked for."""
     while True:
         error = resolution_error(problem, motion)
         motion, present = replace(motion, error=error), problem.resolution
         finer = finer_resolution(present, error, accuracy) if accuracy is not None else None
         if finer is None:
-            return problem, motion
+            return motion
         refined = problem.refined(finer)
         more_accurate = refined.solve(motion.frequency, motion.force, motion)
         if not more_accurate.converged:
-            return problem, motion
+            return motion
         problem, motion = refined, more_accurate
 
 
@@ -394,7 +402,11 @@ def _accurate(
 
 
 def _loops(
-    case: VibrationCase, model: VibrationModel, branch: ResponseBranch, reporter: Reporter
+    case: VibrationCase,
+    model: VibrationModel,
+    branch: ResponseBranch,
+    reporter: Reporter,
+    steps: Steps,
 ) -> tuple[Curves, ...]:
     """Loops at the frequency that the case asks for, a resolution after the other."""
     if case.loops is None:
@@ -406,14 +418,21 @@ def _loops(
         every = case.with_mean(harmonics)
         samples = max(case.resolution.samples, SAMPLES_PER_PERIOD * every[-1])
         problem = branch.problem.refined(Resolution(every, samples))
-        motion = problem.solve(frequency, start.force, start)
+        motion = steps("loop", partial(_known, problem, frequency, start))
         if not motion.converged:
             reporter.warn(f"{start.force:g} N: no loop at {frequency:g} Hz: {motion.message}")
             continue
-        motion = replace(motion, error=resolution_error(problem, motion))
         loops.append(loop_of(case, model, motion))
         start = motion
     return tuple(loops)
+
+
+def _known(problem: HarmonicBalance, frequency: float, near: HarmonicSolution) -> HarmonicSolution:
+    """The motion at a frequency found from another one, with its error."""
+    motion = problem.solve(frequency, near.force, near)
+    if not motion.converged:
+        return motion
+    return replace(motion, error=resolution_error(problem, motion))
 
 
 def loop_of(case: VibrationCase, model: VibrationModel, motion: HarmonicSolution) -> Curves:

@@ -8,6 +8,7 @@ from typing import Any
 
 from fe_models.dynamics.harmonics import HarmonicBalanceError
 from fe_models.dynamics.receptance import ReceptanceError
+from sa_solver.steps import Steps
 from wear.joints.parameters import JointError
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel
@@ -17,6 +18,7 @@ from workflow.analyses.vibration.results import write_vibration_output
 from workflow.errors import UserError
 from workflow.shell.analysis import Run
 from workflow.shell.reporter import Reporter
+from workflow.shell.steps import kept_steps
 
 
 def run_vibration(run: Run[VibrationCase]) -> None:
@@ -26,9 +28,9 @@ def run_vibration(run: Run[VibrationCase]) -> None:
     does not rest, or a force has no motion at all. A curve that ends before its span does is told
     as a warning.
     """
-    run.reporter.say(f"run: {run.case.title}")
     try:
-        outcome = _outcome(run.case, run.reporter)
+        with kept_steps(run) as steps:
+            outcome = _outcome(run.case, run.reporter, steps)
     except JointError as error:
         raise UserError(f"{run.folder.case}: joint: {error}") from error
     except (HarmonicBalanceError, ReceptanceError) as error:
@@ -36,11 +38,11 @@ def run_vibration(run: Run[VibrationCase]) -> None:
     write_vibration_output(outcome, run)
 
 
-def _outcome(case: VibrationCase, reporter: Reporter) -> VibrationOutcome:
+def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> VibrationOutcome:
     model = VibrationModel.of(case, reporter)
     with reporter.stage("rest and linear limits"):
         numbers, contact = model.numbers(), model.contact()
-        linear = model.linear(case.frequencies)
+        linear = steps("linear limits", lambda: model.linear(case.frequencies))
     responses: list[Response] = []
     backbone = None
     sweeps = []
@@ -48,15 +50,15 @@ def _outcome(case: VibrationCase, reporter: Reporter) -> VibrationOutcome:
     with reporter.course("vibration"):
         for force in case.forces:
             with curves.next(f"{force:g} N"), reporter.stage("response"):
-                response, branch = response_under(case, model, force, reporter)
+                response, branch = response_under(case, model, force, reporter, steps)
             responses.append(response)
             if case.backbone and backbone is None:
                 # From the least force on which there is a phase resonance.
                 with curves.next("backbone"), reporter.stage("backbone"):
-                    backbone = backbone_of(case, model, branch, reporter)
+                    backbone = backbone_of(case, model, branch, reporter, steps)
         for frequency in case.force_sweeps:
             with curves.next(f"{frequency:g} Hz"), reporter.stage("force sweep"):
-                sweeps.append(force_sweep(case, model, frequency, reporter))
+                sweeps.append(force_sweep(case, model, frequency, reporter, steps))
     return VibrationOutcome(
         case,
         model.rig.labels,

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from sa_solver.steps import Steps
 from wear.nodes import NodalState
 from wear.steppers import HeunStepper
 from workflow.analyses.specimens.case import SpecimensCase
@@ -30,7 +31,9 @@ from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
 
-def wear_specimens(case: FrictionRigWearCase, reporter: Reporter) -> VibrationWearOutcome:
+def wear_specimens(
+    case: FrictionRigWearCase, reporter: Reporter, steps: Steps
+) -> VibrationWearOutcome:
     """All that is kept of a run."""
     wear = case.wear
     unworn = VibrationModel.of(case.unworn, reporter)
@@ -40,17 +43,18 @@ def wear_specimens(case: FrictionRigWearCase, reporter: Reporter) -> VibrationWe
     with reporter.stage("wear"):
         pads.at(state)
 
-    def describe(state: NodalState, cycles: float, steps: int, error: float) -> WornState:
+    def describe(state: NodalState, cycles: float, taken: int, error: float) -> WornState:
         if error > wear.tolerance:
             reporter.warn(
                 f"{cycles:g} cycles: steps of the shortest length left an error of "
                 f"{error:.2g}, above wear.tolerance {wear.tolerance:g}: raise "
                 "resolution.samples or resolution.harmonics"
             )
-        return _worn_state(case.unworn, pads.at(state), state, (cycles, steps), reporter)
+        reached = cycles, taken
+        return _worn_state(case.unworn, pads.at(state), state, reached, reporter, steps)
 
     stepper = HeunStepper(wear.tolerance)
-    states = worn_states(wear.cycles, stepper, state, pads.contact_at, describe, reporter)
+    states = worn_states(wear.cycles, stepper, state, pads.contact_at, describe, reporter, steps)
     rig = unworn.rig
     places = {
         "x": Dataset(rig.places[:, 0], "mm", "of each node on the contact plane"),
@@ -66,15 +70,16 @@ def _worn_state(
     state: NodalState,
     reached: tuple[float, int],
     reporter: Reporter,
+    steps: Steps,
 ) -> WornState:
     """The pads in a state, ``reached`` by so many cycles in all and steps since the last."""
-    cycles, steps = reached
+    cycles, taken = reached
     loop = loop_of(case, cycle.model, cycle.motion)
-    error, responses = responses_to_all(case, cycle.model, cycle.motion, reporter)
+    error, responses = responses_to_all(case, cycle.model, cycle.motion, reporter, steps)
     depth, slope = state.surfaces.depth, loop.numbers["stiffness"]
     numbers: dict[str, Any] = {
         "cycles": cycles,
-        "steps": steps,
+        "steps": taken,
         "energy": state.energy,
         "volume": float(depth @ cycle.areas),
         "depth": float(depth.max()),
@@ -87,7 +92,7 @@ def _worn_state(
         **cycle.model.numbers(),
     }
     reporter.log(
-        f"{cycles:g} cycles: {steps} steps, {numbers['touching']} nodes touch, "
+        f"{cycles:g} cycles: {taken} steps, {numbers['touching']} nodes touch, "
         f"stroke {numbers['stroke']:.4g} mm"
     )
     return WornState(cycles, numbers, _fields(cycle, state, loop), responses)

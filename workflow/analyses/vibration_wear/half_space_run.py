@@ -7,11 +7,13 @@ on those after them: their error estimate covers what the motion changes, and se
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from fe_models.dynamics.harmonics import Resolution
+from sa_solver.steps import Steps
 from sa_solver.tangential_loop import TangentialLoop
 from wear.joints.jenkins import Jenkins
 from wear.moving import LARGE_STROKE
@@ -46,7 +48,9 @@ from workflow.shell.reporter import Reporter
 PARTIAL = 0.5
 
 
-def wear_half_space(case: VibrationWearCase, reporter: Reporter) -> VibrationWearOutcome:
+def wear_half_space(
+    case: VibrationWearCase, reporter: Reporter, steps: Steps
+) -> VibrationWearOutcome:
     """All that is kept of a run.
 
     Raises UserError where contact or rig cannot be what the case says, and what contact problems
@@ -56,13 +60,13 @@ def wear_half_space(case: VibrationWearCase, reporter: Reporter) -> VibrationWea
     rig, wear = row_of_masses(case.structure, case.mass or 1), case.wear
     resolution = Resolution(tuple(case.resolution.harmonics), case.resolution.samples)
     contact = VibratingContact(bodies, rig, wear.force, wear.frequency, resolution)
-    stepper = SubcyclingStepper(stepper_of(bodies.wear), contact.alike_cycles)
+    stepper = SubcyclingStepper(stepper_of(bodies.wear), contact.alike_cycles, steps)
     with reporter.stage("contact, first cycle"):
         state = contact.unworn()
         first = first_cycles(contact.wearing(state), state, wear.cycles[-1])
         state = replace(state, next_cycles=first)
-    describe = _Description(case, contact, reporter)
-    states = worn_states(wear.cycles, stepper, state, contact.wearing, describe, reporter)
+    describe = _Description(case, contact, reporter, steps)
+    states = worn_states(wear.cycles, stepper, state, contact.wearing, describe, reporter, steps)
     return VibrationWearOutcome(case, states, grid=contact.grid)
 
 
@@ -73,16 +77,20 @@ class _Description:
     case: VibrationWearCase
     contact: VibratingContact
     reporter: Reporter
+    steps: Steps
 
     def __call__(self, state: WearState, cycles: float, steps: int, _: float) -> WornState:
         """The contact after so many cycles, in ``steps`` since the last, and the rig on it."""
         cycle = self.contact.at(state)
         with self.reporter.stage("half-space loops"):
-            loop = self.contact.loop(cycle, 0.5 * cycle.stroke)
-            partial = self.contact.loop(cycle, PARTIAL * cycle.full_slip)
+            amplitudes = 0.5 * cycle.stroke, PARTIAL * cycle.full_slip
+            loop, partly = (
+                self.steps("half-space loop", partial(self.contact.loop, cycle, amplitude))
+                for amplitude in amplitudes
+            )
         numbers = {"cycles": cycles, "steps": steps} | self._numbers(cycle)
         numbers["loop_error"] = _energy_error(cycle, loop)
-        numbers["partial_loop_error"] = _energy_error(cycle, partial)
+        numbers["partial_loop_error"] = _energy_error(cycle, partly)
         self._warn(cycle, worn=cycles > 0.0)
         numbers["error"], responses, linear = self._responses(cycle)
         self.reporter.log(
@@ -99,7 +107,7 @@ class _Description:
         resolution = Resolution(case.harmonics, case.resolution.samples)
         problem = self.contact.problem(cycle.sliders, resolution)
         model = VibrationModel(rig, Jenkins(stiffness, friction, load), problem)
-        error, responses = responses_to_all(case, model, cycle.motion, self.reporter)
+        error, responses = responses_to_all(case, model, cycle.motion, self.reporter, self.steps)
         return error, responses, {"free": rig.free(), **rig.modes(model.law)}
 
     def _numbers(self, cycle: ContactCycle) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from workflow.analyses.vibration_wear.results import (
     write_vibration_wear_output,
 )
 from workflow.errors import MethodFailed, UserError
+from workflow.shell.steps import kept_steps
 
 
 def run_vibration_wear(run: VibrationWearRun) -> None:
@@ -24,12 +25,12 @@ def run_vibration_wear(run: VibrationWearRun) -> None:
     where rest, a contact problem or a motion is not found.
     """
     case, reporter = run.case, run.reporter
-    reporter.say(f"run: {case.title}")
     try:
-        if isinstance(case, VibrationWearCase):
-            outcome = wear_half_space(case, reporter)
-        else:
-            outcome = wear_specimens(case, reporter)
+        with kept_steps(run) as steps:
+            if isinstance(case, VibrationWearCase):
+                outcome = wear_half_space(case, reporter, steps)
+            else:
+                outcome = wear_specimens(case, reporter, steps)
     except (ContactFailure, NormalContactError) as error:
         raise MethodFailed(str(error)) from error
     except JointError as error:

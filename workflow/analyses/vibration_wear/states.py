@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.resolution_error import resolution_error
+from sa_solver.steps import Steps
 from wear.steppers import Contact, Stepper, advance_cycles
 from wear.worn import State
 from workflow.analyses.vibration.case import VibrationCase
@@ -26,6 +28,7 @@ def worn_states(
     contact_at: Callable[[State], Contact],
     describe: Callable[[State, float, int, float], WornState],
     reporter: Reporter,
+    steps: Steps,
 ) -> tuple[WornState, ...]:
     """The states after so many cycles each, the unworn one before them.
 
@@ -36,26 +39,32 @@ def worn_states(
     states = []
     with reporter.course("vibration and wear"):
         for cycles in reporter.parts((0.0, *numbers), lambda cycles: f"{cycles:.4g} cycles"):
-            steps = 0
+            count = 0
             if cycles > 0.0:
+                stretch, left = cycles - done, total - done
                 with reporter.part(0.0, WEAR, "wear"), reporter.stage("wear"):
-                    worn = advance_cycles(stepper, state, cycles - done, total - done, contact_at)
+                    worn = advance_cycles(stepper, state, stretch, left, contact_at, steps)
                 state, done, error = worn.state, cycles, max(error, worn.error)
-                steps = worn.spent.steps
-            with reporter.part(WEAR if steps else 0.0, 1.0):
-                states.append(describe(state, cycles, steps, error))
+                count = worn.spent.steps
+            name = "worn state" if count else "unworn state"
+            with reporter.part(WEAR if count else 0.0, 1.0):
+                states.append(steps(name, partial(describe, state, cycles, count, error)))
     return tuple(states)
 
 
 def responses_to_all(
-    case: VibrationCase, model: VibrationModel, motion: HarmonicSolution, reporter: Reporter
+    case: VibrationCase,
+    model: VibrationModel,
+    motion: HarmonicSolution,
+    reporter: Reporter,
+    steps: Steps,
 ) -> tuple[float, tuple[Response, ...]]:
     """The error of the ``motion`` that wears, and what its state does under each force."""
     error = resolution_error(model.problem.refined(motion.resolution), motion).largest
     warn_of_error("the motion that wears", error, case, reporter)
     with reporter.stage("response"):
         responses = [
-            response_under(case, model, force, reporter)[0]
+            response_under(case, model, force, reporter, steps)[0]
             for force in reporter.parts(case.forces, "{:g} N".format)
         ]
     return error, tuple(responses)

@@ -126,7 +126,10 @@ class VibratingContact:
         return replace(unworn, starts=starts, depth_rate=depth_rate, volume_rate=volume_rate)
 
     def at(self, state: WearState) -> ContactCycle:
-        """The contact in a state. Raises ContactFailure where contact or motion are not found."""
+        """The contact in a state, its motion solved for from that which wore to it.
+
+        Raises ContactFailure where contact or motion are not found.
+        """
         for solved in self._solved:
             same = solved.state.surfaces is state.surfaces
             if same and solved.state.energy == state.energy:
@@ -192,17 +195,19 @@ class VibratingContact:
             raise ContactFailure(str(error)) from error
         friction = self._case.friction.at(state.energy)
         sliders = Jenkins(slipping.slider_stiffness, friction, slipping.slider_load)
-        motion = self._motion(sliders)
+        motion = self._motion(sliders, state.start)
         at = motion.resolution
         cycle = ParallelSliders(sliders).settle(motion.coefficients, at.basis, at.weights, at.lead)
         path, adjusted = self._path(slipping, sliders, cycle.by_slider)
-        wearing = WearingContact(self._contact, self._laws, friction, self._cycle(path), tolerance)
+        wearing = WearingContact(
+            self._contact, self._laws, friction, self._cycle(path), tolerance, start=motion
+        )
         return ContactCycle(
             state, friction, slipping, sliders, motion, cycle.by_slider, path, adjusted, wearing
         )
 
-    def _motion(self, sliders: Jenkins) -> HarmonicSolution:
-        start = self._solved[-1].motion if self._solved else None
+    def _motion(self, sliders: Jenkins, start: object) -> HarmonicSolution:
+        assert start is None or isinstance(start, HarmonicSolution)
         problem = self.problem(sliders, self._resolution)
         motion = problem.solve(self._frequency, self._force, start)
         if not motion.converged:

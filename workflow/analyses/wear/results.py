@@ -186,7 +186,6 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
         *(f"  {loops_sentence(name, loop, source.line)}" for name, loop in loops.items()),
     ]
     finish(run, summary, lines)
-    folder.discard(folder.jumps.name)
 
 
 def _stresses(outcome: Outcome, reporter: Reporter) -> list[InterfaceStress]:

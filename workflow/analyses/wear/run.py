@@ -58,7 +58,6 @@ def run_wear(run: Run[WearCase]) -> None:
 def _compute(run: Run[WearCase]) -> Outcome:
     """The run up to its end, without its files."""
     case, reporter = run.case, run.reporter
-    reporter.say(f"{'resume' if run.resume else 'run'}: {case.title}")
     # First, so that a state that cannot be gone on from is told before anything is computed.
     kept = checkpoint.restored(run, run.kept) if run.kept else None
     source = structure_of(case).source(case)

@@ -1,0 +1,283 @@
+"""Long runs of every kind that are killed go on as if nothing had happened: to the last byte."""
+
+import json
+import os
+import random
+import re
+import subprocess
+import sys
+import time
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pytest
+import yaml
+
+from tests.marks import slow
+from tests.workflow.conftest import invoke
+from tests.workflow.test_friction_rig import RIG as PADS
+from tests.workflow.test_friction_rig import SPECIMENS
+from tests.workflow.test_friction_rig_wear import WORN
+from tests.workflow.test_specimens_case import SMALL
+from tests.workflow.test_time_cases import HAMMER, JOINT
+from tests.workflow.test_time_cases import RIG as RIG_IN_TIME
+from tests.workflow.test_vibration_wear import RIG as WEARING_RIG
+from tests.workflow.test_vibration_wear import WEAR as BALL
+from workflow.shell import steps
+from workflow.shell.lock import LOCK
+from workflow.shell.steps import RunSteps
+from workflow.shell.store import read_arrays
+
+# Files that say when something happened, how long it took, or what was kept: no results. Who is
+# killed when all of them are written leaves the latter.
+NOT_RESULTS = {LOCK, "run.log", "checkpoint.h5", "manifest.json", "summary.json"}
+QUIET = "output={figures: false, paraview: false}"
+# Seconds within which a run must have ended.
+PATIENCE = 300.0
+# Kills of every kind, more than 50 in all, the most that one run takes, and runs at most.
+KILLS, IN_ONE_RUN, MOST_RUNS = 7, 4, 20
+
+VIBRATION = """\
+title: Slider that shakes
+analysis: vibration
+structure:
+  kind: rig
+  masses: [21.152 kg, 1.189 kg]
+  springs: [1.3469e3 N/mm, 273e3 N/mm]
+  damping_ratio: 0.01
+joint: {law: jenkins, normal_load: 60 N, friction: 0.88, stiffness: 45 N/um}
+forces: [5 N, 30 N]
+frequencies: [60 Hz, 300 Hz]
+resolution: {tolerance: 5 %}
+backbone: true
+force_sweeps: [120 Hz]
+loops: {frequency: 120 Hz, harmonics: [3, 7]}
+"""
+PADS_THAT_WEAR = yaml.safe_dump(yaml.safe_load(PADS) | WORN)
+
+
+@dataclass(frozen=True)
+class LongRun:
+    """A case in ``text``, with ``files`` that it names and ``overrides``."""
+
+    text: str
+    overrides: tuple[str, ...] = ()
+    files: tuple[tuple[str, str], ...] = ()
+
+    def command(self, folder: Path, out: Path) -> list[object]:
+        """The command that runs it, its files being in a folder."""
+        for name, text in (("case.yaml", self.text), *self.files):
+            (folder / name).write_text(text, encoding="utf-8")
+        settings = [part for entry in (QUIET, *self.overrides) for part in ("--set", entry)]
+        return ["run", folder / "case.yaml", "--out", out, *settings]
+
+
+IN_A_ROW = "excitation={kind: harmonic, force: 50 N, frequency: 80 Hz, steady: 1e-7}"
+RECORD = "time [s], force [N]\n" + "".join(
+    f"{1e-3 * n:.3f}, {60.0 * np.sin(0.5 * n) * np.sin(0.07 * n):.6f}\n" for n in range(1500)
+)
+RUNS = {
+    "specimens": LongRun(SMALL, ("wear.energy=3 kJ",)),
+    "joint": LongRun(JOINT, ("energies=[0.2 J, 0.5 J]", "ageing.tolerance=1e-9")),
+    "steady": LongRun(RIG_IN_TIME, (IN_A_ROW, "ageing.energy=20 J", "integration.step=20 us")),
+    "hammer": LongRun(
+        RIG_IN_TIME, (HAMMER, "integration={step: 20 us, tolerance: 1e-5}", "energies=[0 J, 5 J]")
+    ),
+    "recorded": LongRun(
+        RIG_IN_TIME,
+        ("excitation={kind: recorded, file: record.csv}", "integration.step=20 us"),
+        (("record.csv", RECORD),),
+    ),
+    "vibration": LongRun(VIBRATION),
+    "half-space wear": LongRun(WEARING_RIG, ("forces=[40 N]",), (("wear.yaml", BALL),)),
+    "pad wear": LongRun(PADS_THAT_WEAR, ("forces=[20 N]",), (("specimens.yaml", SPECIMENS),)),
+}
+
+
+def results_of(out: Path) -> dict[str, object]:
+    """All that a run leaves, but for what is different in every run."""
+    summary = json.loads((out / "summary.json").read_text("utf-8"))
+    del summary["seconds"], summary["digests"]["summary.json"]
+    written = {
+        path.relative_to(out).as_posix(): path.read_bytes()
+        for path in out.rglob("*")
+        if path.is_file() and path.name not in NOT_RESULTS and path.parent.name != "jumps"
+    }
+    assert "results.h5" in written
+    return written | {"summary.json": summary}
+
+
+def counted(out: Path) -> tuple[int, int]:
+    """Steps that the last process of a run has computed, and taken as kept."""
+    told = re.findall(r"steps: (\d+) computed, (\d+) taken", (out / "run.log").read_text("utf-8"))
+    return int(told[-1][0]), int(told[-1][1])
+
+
+def kept_in(out: Path) -> int:
+    """Steps up to the last that a killed run has kept."""
+    path = out / "checkpoint.h5"
+    return int(read_arrays(path)[1]["steps"]) if path.exists() else 0
+
+
+# --- cut off in this process ----------------------------------------------------------------------
+
+
+class CutOff(BaseException):
+    """Ends a run where it is."""
+
+
+def run_here(command: list[object]) -> None:
+    ended = invoke(*command)
+    assert ended.exit_code == 0, ended.stderr
+
+
+def cut(command: list[object], number: int) -> None:
+    """Run, but for the end of so many steps."""
+    keep, left = RunSteps._keep, [number]
+
+    def keeping(*arguments):
+        left[0] -= 1
+        if left[0] == 0:
+            raise CutOff
+        return keep(*arguments)
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(RunSteps, "_keep", keeping)
+        with pytest.raises(CutOff):
+            invoke(*command)
+
+
+EVERY_KIND = ["joint", *(slow(kind) for kind in RUNS if kind != "joint")]
+
+
+@pytest.mark.parametrize("kind", EVERY_KIND)
+def test_every_step_can_be_the_last(kind, tmp_path):
+    """Wherever a run is cut off, the next one computes what is left and nothing again."""
+    whole, parts = tmp_path / "whole", tmp_path / "parts"
+    run_here(RUNS[kind].command(tmp_path, whole))
+    reference, (total, _) = results_of(whole), counted(whole)
+    dice, reached, command = random.Random(7), 0, RUNS[kind].command(tmp_path, parts)
+    for _ in range(3):
+        further = dice.randint(1, max((total - reached) // 2, 1))
+        cut(command, further)
+        assert kept_in(parts) == reached + further - 1
+        reached, command = reached + further - 1, ["resume", parts]
+    run_here(command)
+    assert counted(parts) == (total - reached, reached)
+    assert results_of(parts) == reference
+
+
+# --- killed --------------------------------------------------------------------------------------
+
+posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+# With how often steps are brought to the disk: as shipped, or each of them.
+START = "from workflow.shell import steps; steps.SHARE, steps.FIRST_SAVE = {share}, {first}; "
+AS_SHIPPED = START.format(share=steps.SHARE, first=steps.FIRST_SAVE)
+EVERY_STEP = START.format(share="float('inf')", first=0.0)
+
+
+@dataclass(frozen=True)
+class Kill:
+    """What a kill has hit: steps that were ``kept`` then, and ``before`` by earlier processes.
+
+    ``lost`` are the seconds since the last of them was kept.
+    """
+
+    before: int
+    kept: int
+    lost: float
+
+
+def killed(command: list[object], out: Path, seconds: float, code: str) -> Kill | None:
+    """Run as a process, and kill it so long after it has begun; None if it has ended by then.
+
+    It has begun with the first step that it keeps, or if few are kept once its log says so.
+    """
+    log, path, before = out / "run.log", out / "checkpoint.h5", kept_in(out)
+    mark = path if code == EVERY_STEP else log
+    written = mark.stat().st_mtime_ns if mark.exists() else 0
+    arguments = [sys.executable, "-c", f"{code}from workflow.cli import main; main()"]
+    process = subprocess.Popen(
+        [*arguments, *map(str, command)], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+    )
+    end = time.monotonic() + PATIENCE
+    while process.poll() is None and not (mark.exists() and mark.stat().st_mtime_ns > written):
+        assert time.monotonic() < end
+        time.sleep(0.01)
+    begun = time.time()
+    try:
+        process.wait(seconds)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
+    else:
+        assert process.returncode == 0
+        return None
+    moment, kept = time.time(), kept_in(out)
+    last = max(begun, path.stat().st_mtime) if path.exists() else begun
+    return Kill(before, kept, moment - last)
+
+
+def kill_at_random(
+    command: list[object], out: Path, dice: random.Random, whole: float, code: str, most: int
+) -> list[Kill]:
+    """Kill a run and its resumptions at random moments of the ``whole`` seconds; it then ends."""
+    kills: list[Kill] = []
+    for _ in range(most):
+        kill = killed(command, out, dice.uniform(0.0, whole), code)
+        if kill is None:
+            break
+        # Nothing that was kept is lost again.
+        assert kill.kept >= kill.before
+        kills.append(kill)
+        command = ["resume", out] if (out / "case.yaml").exists() else command
+    if not (out / "summary.json").exists():
+        run_here(command)
+        assert not list(out.rglob("*.part.*"))
+        assert not (out / "jumps").exists()
+    return kills
+
+
+def kills_of(kind: str, folder: Path, most: int) -> list[Kill]:
+    """Kill runs of a kind so often, each step kept as it ends, or as seldom as without a test.
+
+    What they leave in the end is that of one that nobody has killed.
+    """
+    dice, kills, whole = random.Random(20), [], folder / "whole"
+    begun = time.monotonic()
+    run_here(RUNS[kind].command(folder, whole))
+    seconds = time.monotonic() - begun
+    reference, (total, _) = results_of(whole), counted(whole)
+    for number in range(MOST_RUNS):
+        if len(kills) >= most:
+            break
+        # The first step that is kept has the start behind it.
+        code, share = (AS_SHIPPED, 1.0) if number % 3 == 2 else (EVERY_STEP, 0.5)
+        out = folder / str(number)
+        most_now = min(IN_ONE_RUN, most - len(kills))
+        command = RUNS[kind].command(folder, out)
+        new = kill_at_random(command, out, dice, share * seconds, code, most_now)
+        assert results_of(out) == reference
+        computed, kept = counted(out)
+        # Nothing that was kept has been computed again.
+        assert computed + kept == total
+        # By the process after the last kill, or that one if it was all but at its end.
+        assert not new or kept in (new[-1].kept, new[-1].before)
+        kills += new
+    return kills
+
+
+@posix_only
+def test_a_killed_run_goes_on(tmp_path):
+    assert len(kills_of("joint", tmp_path, 2)) == 2
+
+
+@posix_only
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", list(RUNS))
+def test_random_kills_lose_nothing_but_the_last_step(kind, tmp_path):
+    kills = kills_of(kind, tmp_path, KILLS)
+    assert len(kills) == KILLS
+    # Most of them after the process had gone further than those before it.
+    assert sum(kill.kept > kill.before for kill in kills) > KILLS / 2
