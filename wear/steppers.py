@@ -261,9 +261,9 @@ ContactAt = Callable[[WearState], WearingContact]
 class _HalfSpaceStepper(ABC):
     """Steps of a half-space contact: as long as asked for, or as ``control`` lets them be.
 
-    Each is taken in two halves, and as a whole by the companion of the state. The last one of a run
-    is always of second order: after a long step of first order pressure peaks at the edges that it
-    has worn, up to twice what is left of it once it is worn off.
+    Each is taken in two halves, and as a whole by the companion of the state. Where surfaces move
+    over each other the last one of a run is of second order: long steps of first order wear edges
+    at which pressure peaks, up to twice as high as what is left of it by short ones.
     """
 
     control: ErrorControl | None = None
@@ -288,7 +288,8 @@ class _HalfSpaceStepper(ABC):
 
         def trial(cycles: float) -> _Trial[WearState]:
             half, last = 0.5 * cycles, cycles >= left * (1.0 - ROUNDING)
-            advance = _second_order if last else self._advance
+            smoothed = last and contact.sliding.passages is not None
+            advance = _second_order if smoothed else self._advance
             first = advance(state, half, contact, contact_at)
             second = advance(first.state, half, contact_at(first.state), contact_at)
             whole = advance(companion, cycles, with_companion, contact_at)
