@@ -237,7 +237,8 @@ def test_case_that_is_no_text_is_of_another_run(left):
 
 def test_files_are_found_in_cases_that_cases_name(finished, tmp_path):
     """So a joint that follows the wear of a contact knows the loads of that."""
-    wear, loads = finished / "wear.yaml", finished / "loads.csv"
+    wear, loads = finished / "with_loops.yaml", finished / "loads.csv"
+    wear.write_text(ROLLER_WEAR + "loops: {amplitude: 1 um}\n", encoding="utf-8")
     invoke("new", "joint", tmp_path / "joint.yaml")
     joint = load_case(tmp_path / "joint.yaml", (f"evolution={{file: {wear}}}",))
     folder = OutputFolder(tmp_path / "out")

@@ -83,5 +83,5 @@ def test_what_is_no_table_is_refused_in_one_line(tmp_path, text, complaint):
 
 
 def test_missing_file_is_refused(tmp_path):
-    with pytest.raises(UserError, match="cannot be read"):
+    with pytest.raises(UserError, match="no such file"):
         read_loop_table(tmp_path / "none.csv")
