@@ -254,6 +254,24 @@ def root_mean_square(field: Array, depth: Array) -> float:
     return float(np.sqrt(np.vdot(field, field) / worn))
 
 
+def step_errors(state: WearState) -> dict[str, float] | None:
+    """What wear steps leave of ``depth`` (root mean square) and ``volume``, relative.
+
+    Those of the body with the larger error; None where nothing has worn or they are not known.
+    """
+    bodies = [
+        (error, depth)
+        for error, depth in zip(state.errors, state.surfaces.depths, strict=True)
+        if depth.any()
+    ]
+    if not bodies or state.coarse is None:
+        return None
+    return {
+        "depth": max(root_mean_square(e, d) / root_mean_square(d, d) for e, d in bodies),
+        "volume": max(abs(float(e.sum())) / float(d.sum()) for e, d in bodies),
+    }
+
+
 ContactAt = Callable[[WearState], WearingContact]
 
 

@@ -17,7 +17,7 @@ from sa_solver.steps import Steps
 from sa_solver.tangential_loop import TangentialLoop
 from wear.joints.jenkins import Jenkins
 from wear.moving import LARGE_STROKE
-from wear.steppers import SubcyclingStepper, first_cycles
+from wear.steppers import SubcyclingStepper, first_cycles, step_errors
 from wear.stepping import WearState
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.vibration.model import VibrationModel
@@ -44,6 +44,8 @@ from workflow.shell.dataset import Dataset
 from workflow.shell.few_cells import check_cells
 from workflow.shell.reporter import Reporter
 
+# What wear steps have left before the first.
+NOTHING_WORN = {"depth": 0.0}
 # Of the motion at which all of the contact slides: where loops in partial slip are compared.
 PARTIAL = 0.5
 
@@ -119,6 +121,7 @@ class _Description:
             "depth": float(surfaces.depth.max()),
             "area": float(np.count_nonzero(normal.pressure)) * area,
             "peak_pressure": float(normal.pressure.max()),
+            "step_error": max((step_errors(cycle.state) or NOTHING_WORN).values()),
             "friction": cycle.friction,
             "stiffness": cycle.slipping.stiffness,
             "full_slip": cycle.full_slip,

@@ -78,6 +78,7 @@ class VibrationWearOutcome:
             "area": ("mm^2", "in contact at rest"),
             "touching": ("1", "nodes in contact at rest"),
             "peak_pressure": ("MPa", "at rest"),
+            "step_error": ("1", "that wear steps leave of depth or volume, the larger"),
             "friction": ("1", "coefficient"),
             "stiffness": ("N/mm", "of the stuck contact; between targets, that of the loop"),
             "full_slip": ("mm", "motion of the joint from rest at which all of it slides"),

@@ -14,7 +14,7 @@ from sa_solver.types import Array, LoadHistory
 from wear.coupled import KINETICS, CoupledState
 from wear.interface import CycleTractions, FaceLoads, FirstContact, InterfaceState
 from wear.kinetics import LinearRegime, linear_regime
-from wear.steppers import root_mean_square
+from wear.steppers import root_mean_square, step_errors
 from workflow.analyses.contact.datasets import LOADS, pressure_field, traction_fields
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.comparison import comparison_summary, write_comparison
@@ -107,27 +107,17 @@ class InterfaceOutcome:
 
     @cached_property
     def step_error(self) -> dict[str, float] | None:
-        """What wear steps leave of depth (root mean square), volume and pressure, relative.
+        """What wear steps leave of depth, volume and pressure, relative; None where nobody knows.
 
-        Depth and volume are those of the body with the larger error. Of the pressure it is the
-        largest change anywhere in a cycle for steps of twice the length, over the largest pressure:
-        next to a worn edge it has no order. None where nothing has worn or it is not known.
+        Of the pressure it is the largest change anywhere in a cycle for steps of twice the length,
+        over the largest pressure: next to a worn edge it has no order.
         """
-        companion, surfaces = self.state.coarse, self.state.surfaces
-        bodies = [
-            (error, depth)
-            for error, depth in zip(self.state.errors, surfaces.depths, strict=True)
-            if depth.any()
-        ]
-        if not bodies or not isinstance(companion, InterfaceState):
+        left, companion = step_errors(self.state), self.state.coarse
+        if left is None or not isinstance(companion, InterfaceState):
             return None
         worn = self.stage.tractions(self.state) if self.worn is None else self.worn
         change = np.abs(worn.pressure - self.stage.tractions(companion).pressure)
-        return {
-            "depth": max(root_mean_square(e, d) / root_mean_square(d, d) for e, d in bodies),
-            "volume": max(abs(float(e.sum())) / float(d.sum()) for e, d in bodies),
-            "pressure": float(change.max() / worn.pressure.max()),
-        }
+        return left | {"pressure": float(change.max() / worn.pressure.max())}
 
 
 @dataclass(frozen=True)
