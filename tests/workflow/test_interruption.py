@@ -360,10 +360,12 @@ assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 class Process:
-    """The command as a process with its own group."""
+    """The command as a process with its own group; Ctrl-C ends it whoever started the tests."""
 
     def __init__(self, *arguments: object) -> None:
-        code = "from workflow.cli import main; main()"
+        # What is started in the background of a shell is born deaf to it.
+        hearing = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+        code = f"{hearing}from workflow.cli import main; main()"
         command = [sys.executable, "-c", code, *map(str, arguments)]
         self._process = subprocess.Popen(
             command, stderr=subprocess.PIPE, text=True, start_new_session=True

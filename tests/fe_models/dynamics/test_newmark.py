@@ -89,7 +89,7 @@ def test_what_is_done_is_told(tolerance):
     """Also where a first run in whole steps finds how large the motion is."""
     rig, start, shares = two_mass_rig((21.2e-3, 1.2e-3), (1.4e3, 273e3)), Start(np.ones(2)), []
     control = TimeStepControl(1e-4, tolerance)
-    integrate(rig, None, None, 0.3, control, start, shares.append)
+    integrate(rig, None, None, 0.3, control, start, reached=shares.append)
     assert np.all(np.diff(shares) > 0.0)
     assert shares[0] < 0.5
     assert shares[-1] == 1.0
