@@ -18,6 +18,13 @@ from workflow.runs import jobs
 from workflow.runs.job import Job
 from workflow.runs.run import bring_to_end
 
+AS_PROCESS = (
+    # What is started in the background of a shell is born deaf to Ctrl-C.
+    "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
+    "from workflow.cli import main; main()"
+)
+"""The command line as the code of a process that Ctrl-C ends, whoever has started the tests."""
+
 
 def invoke(*arguments: object) -> Result:
     """``fretscale`` with these arguments; anything but an exit is raised."""

@@ -18,6 +18,7 @@ import pytest
 
 import wear.coupled
 import workflow.analyses.wear.run
+from tests.workflow.commands import AS_PROCESS
 from workflow.analyses.wear import contact_workers
 from workflow.analyses.wear.recording import Recorder
 from workflow.shell import processes as workers
@@ -360,13 +361,10 @@ assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
 
 
 class Process:
-    """The command as a process with its own group; Ctrl-C ends it whoever started the tests."""
+    """The command as a process with its own group."""
 
     def __init__(self, *arguments: object) -> None:
-        # What is started in the background of a shell is born deaf to it.
-        hearing = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler); "
-        code = f"{hearing}from workflow.cli import main; main()"
-        command = [sys.executable, "-c", code, *map(str, arguments)]
+        command = [sys.executable, "-c", AS_PROCESS, *map(str, arguments)]
         self._process = subprocess.Popen(
             command, stderr=subprocess.PIPE, text=True, start_new_session=True
         )

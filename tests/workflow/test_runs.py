@@ -195,7 +195,8 @@ def test_cores_are_shared_out(contact, tmp_path, monkeypatch):
 # --- interruptions --------------------------------------------------------------------------------
 
 RUN = """
-import sys
+import signal, sys
+signal.signal(signal.SIGINT, signal.default_int_handler)  # also where tests run in the background
 from pathlib import Path
 from workflow.runs.job import Job
 from workflow.runs.jobs import run_jobs

@@ -13,7 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.workflow.commands import invoke, jobs_here
+from tests.workflow.commands import AS_PROCESS, invoke, jobs_here
 from tests.workflow.scenes import BALL
 from workflow.errors import CaseError
 from workflow.runs.job import Finished
@@ -302,8 +302,7 @@ def test_ctrl_c_keeps_what_is_done(tmp_path):
         tmp_path, f"case: contact.yaml\nvary:\n  load_path.legs.0.P: {{values: [{values}]}}\n"
     )
     out = tmp_path / "out"
-    code = "from workflow.cli import main; main()"
-    command = [sys.executable, "-c", code, "sweep", path, "--out", out, "--processes", "1"]
+    command = [sys.executable, "-c", AS_PROCESS, "sweep", path, "--out", out, "--processes", "1"]
     process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True, start_new_session=True)
     end = time.monotonic() + PATIENCE
     while len(list(out.glob("runs/*/summary.json"))) < 2 and time.monotonic() < end:

@@ -20,7 +20,7 @@ from workflow.errors import CaseError
 
 KeyPath = tuple[str | int, ...]
 # Keys that a message has as they are.
-WORD = r"[\w -]{1,60}"
+WORD = r"\w(?:[\w -]{0,58}\w)?"
 
 LARGEST_FILE = 1_000_000  # bytes; cases have a few thousand
 MOST_ENTRIES = 10_000  # after expanding YAML aliases, which can grow without bound
