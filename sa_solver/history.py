@@ -30,7 +30,7 @@ from sa_solver.types import Array
 
 Method = Literal["full", "reversals", "ciavarella_jaeger"]
 Progress = Callable[[int, ContactState, float], None]
-"""States at all rows of a path, its increments passed in so many parts."""
+"""Told the row of a path, the state that it has got to, and how much of the whole is behind."""
 
 STRAIGHT = 1e-9
 """How far two increments of the shear load may be from parallel: rounding of a straight leg."""

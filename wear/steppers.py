@@ -354,8 +354,10 @@ class SecondOrderStepper(_HalfSpaceStepper):
 def _second_order(
     state: WearState, cycles: float, contact: WearingContact, contact_at: ContactAt
 ) -> WearStep[WearState]:
-    """A contact whose slips come from the half-space is worn once with those of the start, and
-    again with the mean of those and the ones at its end.
+    """So many cycles by a step of second order, also where slip changes with wear.
+
+    A contact whose slips come from the half-space is worn once with those of the start, and again
+    with the mean of those and the ones at its end.
     """
     step = contact.second_order_step(state, cycles)
     following = contact_at(step.state)

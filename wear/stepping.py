@@ -30,7 +30,7 @@ import numpy as np
 from sa_solver.errors import ConvergenceError
 from sa_solver.influence import Z
 from sa_solver.normal import NormalContact, NormalStart, NormalState
-from sa_solver.ties import first_largest
+from sa_solver.ties import SAME, first_largest
 from sa_solver.types import Array, Grid, LoadHistory, Tilt
 from wear.laws import SlidingConditions, WearLaw
 from wear.moving import Passage, TravelError
@@ -220,7 +220,9 @@ class WearingContact:
         return 2.0 * softest / fastest if fastest > 0.0 else np.inf
 
     def comparable_cycles(self, state: WearState) -> float:
-        """Step of second order, or half of one of first, whose error shows in that of its halves.
+        """How long a step of second order may be for two halves of it to tell its error.
+
+        One of first order may be twice as long.
 
         Increments wear one after the other. A step in which one of them presses away waves as long
         as the contact leaves the surfaces to the last one, whatever its length: with the compliance
@@ -232,7 +234,10 @@ class WearingContact:
         working, sliding = self.dissipating, self.sliding
         wear, loads = np.add(*self.depth_per_pressure(state)), sliding.loads
         imposed = (values[working] for values in (loads.P, loads.Mx, loads.My, wear))
-        alike = sliding.passages is None and all((v == v[:1]).all() for v in imposed)
+        alike = sliding.passages is None and all(
+            np.allclose(values, values[:1], rtol=SAME, atol=SAME * np.abs(values).max(initial=0.0))
+            for values in imposed
+        )
         if alike or not wear.any():
             return np.inf
         pressures = [start.pressure for start in state.starts.values()]

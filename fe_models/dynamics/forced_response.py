@@ -177,6 +177,7 @@ def finer_for(
     """The resolution that a motion of known error asks for, None if that of the problem will do."""
     if accuracy is None or motion.error is None:
         return None
+    # An error that was estimated in an earlier run let the richer problem grow; this one must too.
     richer_problem(problem, motion)
     return finer_resolution(problem.resolution, motion.error, accuracy)
 

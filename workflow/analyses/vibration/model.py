@@ -76,6 +76,10 @@ class VibrationModel:
             )
         return rest
 
+    def time_share(self, motion: HarmonicSolution, state: int) -> float:
+        """Share of the cycle in which joints that touch at rest have a state."""
+        return float((motion.cycle.states[:, self.touching] == state).mean())
+
     @property
     def resting(self) -> Array | None:
         """Displacements ``(j, d)`` of joints by the static load, if a load presses them [mm]."""

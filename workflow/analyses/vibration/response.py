@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 from typing import Any
@@ -27,13 +26,10 @@ from fe_models.dynamics.phase_resonance import along_phase_resonance
 from fe_models.dynamics.resolution_error import resolution_error
 from sa_solver.steps import Steps
 from sa_solver.types import Array
-from wear.joints.friction_contact import FrictionContact
-from wear.joints.jenkins import Jenkins
-from wear.joints.loop_record import MeasuredLoopError
-from wear.joints.measured_loops import measure_loops
-from wear.joints.periodic import SEPARATED, SLIP, STICK
+from wear.joints.periodic import SEPARATED, SLIP
 from wear.moving import LARGE_STROKE
 from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.loops import loop_of
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Curves, Response
 from workflow.errors import MethodFailed
@@ -44,12 +40,8 @@ from workflow.shell.reporter import Reporter
 TIMES = 1024
 # Of the frequency at which the amplitude is largest.
 RESONANCE_TOLERANCE = 1e-6
-# A loop is that of stuck joints where it loses less than this share of stroke times force range.
-STUCK_LOOP = 1e-4
 # Error of a motion by its harmonics and samples that is warned of where no tolerance is given.
 LARGEST_ERROR = 0.05
-# Times that a loop is repeated: the record then holds whole cycles wherever it begins.
-REPEATED = 3
 # Points of a curve, usually, where the frequency or the force grows by a factor of e; this counts
 # until so large a share of the curve is known.
 POINTS, BEGUN = 50, 0.2
@@ -241,8 +233,8 @@ def _numbers(
         "first_amplitude": float(max(amplitudes[0], curves["amplitude"].values[:, 0].max())),
         "energy_per_cycle": float(resonance.cycle.dissipated.sum()),
         "damping": damping_ratio(problem, resonance),
-        "slip": share_of(model, resonance, SLIP),
-        "separated": share_of(model, resonance, SEPARATED),
+        "slip": model.time_share(resonance, SLIP),
+        "separated": model.time_share(resonance, SEPARATED),
         "points": len(branch.solutions),
         "folds": [float(branch.curve.parameters[place]) for place in branch.curve.folds],
         "error": max(motion.error.largest for motion in every if motion.error is not None),
@@ -284,8 +276,8 @@ def _motion_columns(
         "phase": column(lambda motion: _phase(motion, model.rig.seen[-1]), "rad", lag),
         "energy_per_cycle": column(lambda motion: motion.cycle.dissipated.sum(), "N mm", energy),
         "damping": column(lambda motion: damping_ratio(problem, motion), "1", lost),
-        "slip": column(lambda motion: share_of(model, motion, SLIP), "1", slips),
-        "separated": column(lambda motion: share_of(model, motion, SEPARATED), "1", apart),
+        "slip": column(lambda motion: model.time_share(motion, SLIP), "1", slips),
+        "separated": column(lambda motion: model.time_share(motion, SEPARATED), "1", apart),
         "left_out": column(lambda motion: motion.left_out, "1", beyond),
     }
 
@@ -300,11 +292,6 @@ def amplitudes_of(model: VibrationModel, solution: HarmonicSolution) -> Array:
     """Half of the way to and fro ``(k,)`` of what is seen [mm]."""
     seen = replace(solution, motion=solution.motion @ model.rig.seen.T)
     return np.asarray(0.5 * np.ptp(seen.displacement(TIMES), axis=0))
-
-
-def share_of(model: VibrationModel, solution: HarmonicSolution, state: int) -> float:
-    """Share of the cycle in which joints that touch at rest have a state."""
-    return float((solution.cycle.states[:, model.touching] == state).mean())
 
 
 def _nodes(branch: ResponseBranch) -> dict[str, Dataset]:
@@ -422,7 +409,7 @@ def _loops(
         if not motion.converged:
             reporter.warn(f"{start.force:g} N: no loop at {frequency:g} Hz: {motion.message}")
             continue
-        loops.append(loop_of(case, model, motion))
+        loops.append(loop_of(model, motion, case.joint.normal_load))
         start = motion
     return tuple(loops)
 
@@ -433,74 +420,3 @@ def _known(problem: HarmonicBalance, frequency: float, near: HarmonicSolution) -
     if not motion.converged:
         return motion
     return replace(motion, error=resolution_error(problem, motion))
-
-
-def loop_of(case: VibrationCase, model: VibrationModel, motion: HarmonicSolution) -> Curves:
-    """The loop of all joints together in a motion."""
-    rig = model.rig
-    if rig.stretch is None:
-        mean = motion.coefficients[:, :, rig.along].mean(axis=0)
-        displacement = motion.resolution.basis @ mean
-    else:
-        between = replace(motion, motion=(motion.motion @ rig.stretch)[:, None])
-        displacement = between.displacement(motion.resolution.samples)[:, 0]
-    force = motion.cycle.samples[:, :, rig.along].sum(axis=1)
-    total = motion.cycle.force[:, :, rig.along].sum(axis=0)
-    expansion = motion.resolution.basis @ total
-    moved = "between the targets, or the mean of the joints, in a cycle"
-    datasets = {
-        "displacement": Dataset(closed(displacement), "mm", moved),
-        "force": Dataset(closed(force), "N", "of all joints together along it"),
-        "expansion": Dataset(
-            closed(expansion), "N", "the same in the harmonics of the motion alone"
-        ),
-    }
-    half = 0.5 * float(np.ptp(force))
-    numbers = {
-        "frequency": motion.frequency,
-        "harmonics": list(motion.resolution.harmonics),
-        "stroke": float(np.ptp(displacement)),
-        "force_range": float(np.ptp(force)),
-        "energy": float(motion.cycle.dissipated.sum()),
-        "slip": share_of(model, motion, SLIP),
-        "error": None if motion.error is None else motion.error.largest,
-        # Largest force that the harmonics leave out, over half of the range of the force.
-        "deformation": float(np.abs(force - expansion).max()) / half if half > 0.0 else 0.0,
-        **_slopes(model, motion, displacement, force, case.joint.normal_load),
-    }
-    return Curves(datasets, numbers)
-
-
-def closed(values: Array) -> Array:
-    """Values ``(t,)`` of a cycle, the first repeated at the end."""
-    return np.append(values, values[:1])
-
-
-def _slopes(
-    model: VibrationModel, motion: HarmonicSolution, displacement: Array, force: Array, load: float
-) -> dict[str, float | None]:
-    """Stick slope and friction of a loop; no friction where it does not slide."""
-    slope, friction = _stick_slope(model, motion, displacement, force), None
-    with suppress(MeasuredLoopError):
-        loop = measure_loops(np.tile(displacement, REPEATED), np.tile(force, REPEATED))
-        if loop.energy.mean() > STUCK_LOOP * np.ptp(displacement) * np.ptp(force):
-            slope = float(loop.stick_stiffness.mean()) if slope is None else slope
-            if loop.slides and load > 0.0:
-                friction = float(loop.friction_force.mean()) / load
-    return {"stiffness": slope, "friction": friction}
-
-
-def _stick_slope(
-    model: VibrationModel, motion: HarmonicSolution, displacement: Array, force: Array
-) -> float | None:
-    """Slope over the increments in which all joints that touch at rest stick; None without any.
-
-    A state is that at the end of an increment: a joint with one slider that sticks then has stuck
-    throughout. Joints of many sliders have no such increments but in a loop without slip.
-    """
-    sticks = (motion.cycle.states[:, model.touching] == STICK).all(axis=1)
-    if not isinstance(model.law, FrictionContact | Jenkins) and not sticks.all():
-        return None
-    moved, pulled = ((curve - np.roll(curve, 1))[sticks] for curve in (displacement, force))
-    square = float(moved @ moved)
-    return float(moved @ pulled) / square if square > 0.0 else None

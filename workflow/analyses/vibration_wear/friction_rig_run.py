@@ -11,9 +11,9 @@ from wear.nodes import NodalState
 from wear.steppers import HeunStepper
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.vibration.case import VibrationCase
+from workflow.analyses.vibration.loops import loop_of
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Curves
-from workflow.analyses.vibration.response import loop_of
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase
 from workflow.analyses.vibration_wear.outcome import (
     LOOP,
@@ -74,7 +74,7 @@ def _worn_state(
 ) -> WornState:
     """The pads in a state, ``reached`` by so many cycles in all and steps since the last."""
     cycles, taken = reached
-    loop = loop_of(case, cycle.model, cycle.motion)
+    loop = loop_of(cycle.model, cycle.motion, case.joint.normal_load)
     error, responses = responses_to_all(case, cycle.model, cycle.motion, reporter, steps)
     depth, slope = state.surfaces.depth, loop.numbers["stiffness"]
     numbers: dict[str, Any] = {

@@ -20,9 +20,9 @@ from wear.moving import LARGE_STROKE
 from wear.steppers import SubcyclingStepper, first_cycles, step_errors
 from wear.stepping import WearState
 from workflow.analyses.rig.building import row_of_masses
+from workflow.analyses.vibration.loops import closed
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration.outcome import Response
-from workflow.analyses.vibration.response import closed
 from workflow.analyses.vibration_wear.case import VibrationWearCase
 from workflow.analyses.vibration_wear.outcome import (
     CONTACT,

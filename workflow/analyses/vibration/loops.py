@@ -1,0 +1,95 @@
+"""The loop of all joints together in a periodic motion, with its stick slope and friction."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import replace
+
+import numpy as np
+
+from fe_models.dynamics.harmonic_solution import HarmonicSolution
+from sa_solver.types import Array
+from wear.joints.friction_contact import FrictionContact
+from wear.joints.jenkins import Jenkins
+from wear.joints.loop_record import MeasuredLoopError
+from wear.joints.measured_loops import measure_loops
+from wear.joints.periodic import SLIP, STICK
+from workflow.analyses.vibration.model import VibrationModel
+from workflow.analyses.vibration.outcome import Curves
+from workflow.shell.dataset import Dataset
+
+# A loop is that of stuck joints where it loses less than this share of stroke times force range.
+STUCK_LOOP = 1e-4
+# Times that a loop is repeated: the record then holds whole cycles wherever it begins.
+REPEATED = 3
+
+
+def loop_of(model: VibrationModel, motion: HarmonicSolution, load: float) -> Curves:
+    """The loop of all joints together in a motion, under a normal ``load`` [N]."""
+    rig = model.rig
+    if rig.stretch is None:
+        mean = motion.coefficients[:, :, rig.along].mean(axis=0)
+        displacement = motion.resolution.basis @ mean
+    else:
+        between = replace(motion, motion=(motion.motion @ rig.stretch)[:, None])
+        displacement = between.displacement(motion.resolution.samples)[:, 0]
+    force = motion.cycle.samples[:, :, rig.along].sum(axis=1)
+    total = motion.cycle.force[:, :, rig.along].sum(axis=0)
+    expansion = motion.resolution.basis @ total
+    moved = "between the targets, or the mean of the joints, in a cycle"
+    datasets = {
+        "displacement": Dataset(closed(displacement), "mm", moved),
+        "force": Dataset(closed(force), "N", "of all joints together along it"),
+        "expansion": Dataset(
+            closed(expansion), "N", "the same in the harmonics of the motion alone"
+        ),
+    }
+    half = 0.5 * float(np.ptp(force))
+    numbers = {
+        "frequency": motion.frequency,
+        "harmonics": list(motion.resolution.harmonics),
+        "stroke": float(np.ptp(displacement)),
+        "force_range": float(np.ptp(force)),
+        "energy": float(motion.cycle.dissipated.sum()),
+        "slip": model.time_share(motion, SLIP),
+        "error": None if motion.error is None else motion.error.largest,
+        # Largest force that the harmonics leave out, over half of the range of the force.
+        "deformation": float(np.abs(force - expansion).max()) / half if half > 0.0 else 0.0,
+        **_slopes(model, motion, displacement, force, load),
+    }
+    return Curves(datasets, numbers)
+
+
+def closed(values: Array) -> Array:
+    """Values ``(t,)`` of a cycle, the first repeated at the end."""
+    return np.append(values, values[:1])
+
+
+def _slopes(
+    model: VibrationModel, motion: HarmonicSolution, displacement: Array, force: Array, load: float
+) -> dict[str, float | None]:
+    """Stick slope and friction of a loop; no friction where it does not slide."""
+    slope, friction = _stick_slope(model, motion, displacement, force), None
+    with suppress(MeasuredLoopError):
+        loop = measure_loops(np.tile(displacement, REPEATED), np.tile(force, REPEATED))
+        if loop.energy.mean() > STUCK_LOOP * np.ptp(displacement) * np.ptp(force):
+            slope = float(loop.stick_stiffness.mean()) if slope is None else slope
+            if loop.slides and load > 0.0:
+                friction = float(loop.friction_force.mean()) / load
+    return {"stiffness": slope, "friction": friction}
+
+
+def _stick_slope(
+    model: VibrationModel, motion: HarmonicSolution, displacement: Array, force: Array
+) -> float | None:
+    """Slope over the increments in which all joints that touch at rest stick; None without any.
+
+    A state is that at the end of an increment: a joint with one slider that sticks then has stuck
+    throughout. Joints of many sliders have no such increments but in a loop without slip.
+    """
+    sticks = (motion.cycle.states[:, model.touching] == STICK).all(axis=1)
+    if not isinstance(model.law, FrictionContact | Jenkins) and not sticks.all():
+        return None
+    moved, pulled = ((curve - np.roll(curve, 1))[sticks] for curve in (displacement, force))
+    square = float(moved @ moved)
+    return float(moved @ pulled) / square if square > 0.0 else None
