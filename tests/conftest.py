@@ -22,3 +22,10 @@ def dovetail_path() -> Path:
 def dovetail_text(dovetail_path: Path) -> str:
     """Its text."""
     return dovetail_path.read_text(encoding="utf-8")
+
+
+@pytest.fixture
+def reads_here(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Mesh and CAD files are read by the process of the test, which is quicker."""
+    name = "fe_models.geometry.imported.read_apart"
+    monkeypatch.setattr(name, lambda read, *arguments: read(*arguments))

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from fe_models.geometry.abaqus import read_abaqus
+from fe_models.geometry.apart import read_apart
 from fe_models.geometry.cad import BEGINNINGS, read_cad
 from fe_models.geometry.checked import checked_body, vector
 from fe_models.geometry.gmsh_file import read_msh
@@ -22,7 +22,6 @@ from sa_solver.types import Array, Indices
 PLANE = 1e-9
 # Closed surfaces have no mean normal: theirs is rounding, below this share of the area.
 CLOSED = 1e-9
-READERS: dict[str, Callable[[Path], GroupedMesh]] = {".inp": read_abaqus, ".msh": read_msh}
 # Files of programs whose own formats nothing here reads.
 EXPORTABLE = {
     ".cdb": "Ansys", ".db": "Ansys", ".odb": "Abaqus", ".cae": "Abaqus", ".mph": "COMSOL",
@@ -89,10 +88,12 @@ def _grouped(path: Path, size: float | None) -> GroupedMesh:
     if suffix in BEGINNINGS:
         if size is None:
             raise MeshError(f"{path}: a CAD file needs a mesh size [mm]")
-        return read_cad(path, size)
+        return read_apart(read_cad, path, size)
     if size is not None:
         raise MeshError(f"{path}: is a mesh already; a mesh size is for {', '.join(BEGINNINGS)}")
-    return READERS.get(suffix, read_meshio)(path)
+    if suffix == ".msh":
+        return read_apart(read_msh, path)
+    return read_abaqus(path) if suffix == ".inp" else read_meshio(path)
 
 
 def describe_bodies(imported: ImportedMesh) -> list[str]:

@@ -38,6 +38,7 @@ def read_meshio(path: Path) -> GroupedMesh:
         np.asarray(block.data, dtype=np.int64)[:, : CORNERS[shape]]
         for block, shape in zip(mesh.cells, shapes, strict=True)
     ]
+    _refuse_missing(path, len(mesh.points), [*cells, *map(np.asarray, mesh.point_sets.values())])
     members = _members(path, mesh, [DIMENSION[shape] for shape in shapes])
     top = max((DIMENSION[shape] for shape in shapes), default=0)
     named: list[dict[str, Blocks]] = [{}, {}, {}, {}]
@@ -150,6 +151,12 @@ def _refuse_ungrouped(path: Path, count: int, groups: CellGroups) -> None:
     left = count - len(np.unique(np.concatenate(list(groups.values()))))
     if left:
         raise MeshError(f"{path}: {left} elements are in no group; put them into one")
+
+
+def _refuse_missing(path: Path, count: int, nodes: list[Indices]) -> None:
+    """All nodes that are named are among the file's ``count``."""
+    if any(some.size and not 0 <= some.min() <= some.max() < count for some in nodes):
+        raise MeshError(f"{path}: has elements or sets of nodes that are not in it: damaged?")
 
 
 def _node_sets(mesh: Any, lower: list[dict[str, Blocks]]) -> dict[str, Indices]:

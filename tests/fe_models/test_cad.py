@@ -10,6 +10,8 @@ from fe_models.gmsh_session import gmsh_model
 from fe_models.mesh import MeshError
 from fe_models.remesh import element_volumes
 
+pytestmark = pytest.mark.usefixtures("reads_here")
+
 
 def volume(body):
     return np.abs(element_volumes(body.mesh)).sum()

@@ -11,6 +11,8 @@ from fe_models.gmsh_session import gmsh_model
 from fe_models.mesh import MeshError, write_msh
 from fe_models.remesh import element_volumes
 
+pytestmark = pytest.mark.usefixtures("reads_here")
+
 # Two boxes that touch at z = 1, and their faces there, tagged 1 to 4; neither shares nodes.
 LOWER, UPPER = ((0.0, 0.0, 0.0), (2.0, 1.0, 1.0)), ((0.5, 0.0, 1.0), (1.5, 1.0, 1.5))
 TAGS = {"lower": (1, 3), "upper": (2, 3), "lower_top": (3, 2), "upper_bottom": (4, 2)}
@@ -468,3 +470,11 @@ def test_what_cannot_be_read_is_refused(tmp_path, name, size, message):
         path.write_text("")
     with pytest.raises(MeshError, match=message):
         read_bodies(path, size)
+
+
+def test_nodes_that_are_not_in_the_file(tmp_path):
+    cells = [("tetra", np.array([[0, 1, 2, 3], [0, 1, 2, 2**40]]))]
+    path = tmp_path / "damaged.vtu"
+    meshio.write(path, meshio.Mesh(np.eye(4, 3), cells))
+    with pytest.raises(MeshError, match="nodes that are not in it"):
+        read_bodies(path)

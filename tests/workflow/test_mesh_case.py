@@ -21,6 +21,8 @@ from workflow.analyses.wear.structures.mesh.model import MeshModel
 from workflow.errors import MethodFailed
 from workflow.kinds import load_case, template
 
+pytestmark = pytest.mark.usefixtures("reads_here")
+
 STEEL = {"young": "200 GPa", "poisson": 0.3, "density": "7800 kg/m^3"}
 WEAR = {
     "law": "energy",

@@ -1,0 +1,87 @@
+"""Files of other programs are read in a process of their own.
+
+A damaged one can end the process that reads it: gmsh and OpenCASCADE follow what a file says. The
+process ends with whoever started it, and leaves Ctrl-C to it.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+
+from fe_models.geometry.grouped import GroupedMesh
+from fe_models.mesh import MeshError
+
+COMMAND = "from fe_models.geometry.apart import main; main()"
+# Exit code of a process that got signal 9, as the system sends it where memory runs out.
+KILLED = -9
+
+
+def read_apart(read: Callable[..., GroupedMesh], path: Path, *arguments: float) -> GroupedMesh:
+    """What ``read`` makes of a file and of the ``arguments`` behind it, in another process.
+
+    Raises what it raises; :class:`MeshError` where the process dies of the file.
+    """
+    # Its stdin stays open as long as this process lives; what it says besides is no answer.
+    with subprocess.Popen(
+        [sys.executable, "-c", COMMAND],
+        bufsize=0,
+        stdin=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.DEVNULL,
+        start_new_session=True,
+    ) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        try:
+            with suppress(BrokenPipeError):
+                pickle.dump((read, path, arguments), process.stdin)
+            answer = process.stdout.read()
+            process.wait()
+        except BaseException:
+            process.kill()
+            raise
+    if process.returncode or not answer:
+        raise MeshError(f"{path}: {_ending(process.returncode)}")
+    mesh = pickle.loads(answer)
+    if isinstance(mesh, Exception):
+        raise mesh
+    assert isinstance(mesh, GroupedMesh)
+    return mesh
+
+
+def _ending(code: int) -> str:
+    """What became of a process that has given no answer."""
+    if code == KILLED:
+        return "the process that read it was killed: for its memory?"
+    how = signal.strsignal(-code) if code < 0 else f"exit code {code}"
+    return f"gmsh broke down as it read it ({how}): damaged? repair it, or export it again"
+
+
+def main() -> None:
+    """Read the file that stdin names, and write what was read, or raised, to stdout."""
+    # Whatever a library prints is no part of the answer.
+    answer = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    read, path, arguments = pickle.load(sys.stdin.buffer)
+    threading.Thread(target=_end_with_parent, daemon=True).start()
+    mesh: GroupedMesh | Exception
+    try:
+        mesh = read(path, *arguments)
+    except Exception as error:
+        mesh = error
+    with answer:
+        pickle.dump(mesh, answer, protocol=pickle.HIGHEST_PROTOCOL)
+
+
+def _end_with_parent() -> None:
+    """End when the other end of stdin closes: nothing more is written to it."""
+    os.read(0, 1)
+    os._exit(1)

@@ -1,0 +1,81 @@
+"""Damaged files end the process that reads them at most, and leave one line."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from fe_models.geometry.apart import read_apart
+from fe_models.geometry.imported import read_bodies
+from fe_models.gmsh_session import gmsh_model
+from fe_models.mesh import MeshError
+
+posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+PATIENCE = 60.0
+
+
+@pytest.fixture(scope="module")
+def boxes(tmp_path_factory):
+    path = tmp_path_factory.mktemp("cad") / "boxes.step"
+    with gmsh_model("cad") as gmsh:
+        gmsh.model.occ.addBox(0.0, 0.0, 0.0, 2.0, 1.0, 1.0)
+        gmsh.model.occ.synchronize()
+        gmsh.write(str(path))
+    return path
+
+
+def test_what_is_read_apart_is_what_is_read_here(boxes, reads_here, monkeypatch):
+    here = read_bodies(boxes, 1.0)
+    monkeypatch.undo()
+    apart = read_bodies(boxes, 1.0)
+    assert (apart.bodies["solid_1"].points == here.bodies["solid_1"].points).all()
+    assert (apart.bodies["solid_1"].mesh.t == here.bodies["solid_1"].mesh.t).all()
+
+
+def test_a_damaged_solid_is_one_line(boxes, tmp_path):
+    """OpenCASCADE follows an entity that is none, into the end of its process."""
+    damaged = tmp_path / "damaged.step"
+    damaged.write_text(boxes.read_text().replace("FACE_BOUND", "FACE_BO ND", 1))
+    with pytest.raises(MeshError) as told:
+        read_bodies(damaged, 1.0)
+    assert str(told.value).startswith(f"{damaged}: gmsh ")
+    assert "\n" not in str(told.value)
+
+
+@posix_only
+@pytest.mark.parametrize(
+    ("ending", "number", "words"),
+    [
+        (signal.raise_signal, 11, r"gmsh broke down as it read it \(Segmentation fault\): damaged"),
+        (signal.raise_signal, 9, "the process that read it was killed: for its memory"),
+        (os._exit, 3, r"gmsh broke down as it read it \(exit code 3\)"),
+    ],
+)
+def test_the_end_of_the_process_is_told(ending, number, words):
+    with pytest.raises(MeshError, match=f"^{number}: {words}"):
+        read_apart(ending, number)
+
+
+@posix_only
+@pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
+def test_the_process_ends_with_whoever_reads():
+    """However that one ends."""
+    code = (
+        "import time; from fe_models.geometry.apart import read_apart; read_apart(time.sleep, 99)"
+    )
+    with subprocess.Popen([sys.executable, "-c", f"import time; {reading}"]) as process:
+        below = Path(f"/proc/{process.pid}/task/{process.pid}/children")
+        end = time.monotonic() + PATIENCE
+        while not (children := below.read_text().split()) and time.monotonic() < end:
+            time.sleep(0.01)
+        (child,) = children
+        process.kill()
+    # One that nobody has waited for yet is a zombie.
+    state = Path(f"/proc/{child}/stat")
+    while time.monotonic() < end and state.exists() and ") Z " not in state.read_text():
+        time.sleep(0.01)
+    assert not state.exists() or ") Z " in state.read_text()
