@@ -64,9 +64,7 @@ def test_the_end_of_the_process_is_told(ending, number, words):
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
 def test_the_process_ends_with_whoever_reads():
     """However that one ends."""
-    code = (
-        "import time; from fe_models.geometry.apart import read_apart; read_apart(time.sleep, 99)"
-    )
+    reading = "from fe_models.geometry.apart import read_apart; read_apart(time.sleep, 99)"
     with subprocess.Popen([sys.executable, "-c", f"import time; {reading}"]) as process:
         below = Path(f"/proc/{process.pid}/task/{process.pid}/children")
         end = time.monotonic() + PATIENCE

@@ -10,6 +10,7 @@ from typing import Any
 
 from workflow.case.sections import Case
 from workflow.shell.folder import OutputFolder
+from workflow.shell.store import read_bytes
 
 # Sections of a case that the structural stages do not look at.
 NOT_STRUCTURAL = {"title", "contact", "wear", "coupling", "stress", "output", "assumed", "expect"}
@@ -53,7 +54,7 @@ def costs(
     That is the longest of all runs of the same structure.
     """
     stages = [
-        stage_seconds(OutputFolder(folder).log.read_text(encoding="utf-8", errors="replace"))
+        stage_seconds(read_bytes(OutputFolder(folder).log).decode("utf-8", "replace"))
         for folder in folders
     ]
     cold: dict[tuple[str, str], float] = {}

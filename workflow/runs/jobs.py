@@ -16,6 +16,7 @@ from workflow.errors import Ending, one_line
 from workflow.runs.cluster import run_on_cluster
 from workflow.runs.job import Finished, Job, finished, run_job
 from workflow.runs.run import kept_in
+from workflow.shell.folder import OutputFolder
 
 
 def run_jobs(
@@ -53,7 +54,9 @@ def run_jobs(
         except Ending as error:
             end(job, one_line(error))
             continue
-        if kept_in(out / job.name, case) == "finished":
+        root = out / job.name
+        # What one had no time to remove is removed by whoever would take it up.
+        if kept_in(root, case) == "finished" and not OutputFolder(root).has_leftovers:
             end(job, "")
         else:
             left.append((job, case))

@@ -21,6 +21,7 @@ from workflow.shell.checkpoint import Checkpoint
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
 from workflow.shell.lock import locked
 from workflow.shell.reporter import Reporter
+from workflow.shell.store import read_bytes
 
 # Seconds in which a process that was cut off, or whoever started it, has come to its end.
 PATIENCE = 60.0
@@ -38,13 +39,20 @@ def run_case(case: Case, out: Path, force: bool) -> None:
 
 
 def resume_run(out: Path) -> bool:
-    """Continue the run in a folder from its last whole jump; False if it is finished already."""
+    """Continue the run in a folder from its last whole jump; False if it is finished already.
+
+    What a finished one had no time to remove is removed.
+    """
     folder = OutputFolder(out)
     if not folder.case.exists():
         raise UserError(f"{out}: no run of fretscale here (case.yaml is missing)")
     case = load_case(folder.case)
     if folder.summary.exists():
         folder.check_finished(case_values(folder))
+        if folder.has_leftovers:
+            with _working(case, out):
+                folder.check_finished(case_values(folder))
+                folder.clear_leftovers()
         return False
     with _working(case, out) as gone:
         _go_on(case, folder, gone)
@@ -62,6 +70,7 @@ def bring_to_end(case: Case, root: Path, take_over: bool = False) -> bool:
         OutputFolder(root).refuse_foreign()
         (kept, damaged), folder = _kept_and_damaged(root, case), OutputFolder(root)
         if kept == "finished":
+            folder.clear_leftovers()
             return False
         if kept == "unfinished":
             _go_on(load_case(folder.case), folder, gone)
@@ -238,7 +247,7 @@ def _told(reporter: Reporter) -> Iterator[None]:
 
 def _is_case(path: Path, case: Case) -> bool:
     """Whether the file says this case, perhaps in the words of another version."""
-    if path.read_bytes() == dump_case(case).encode("utf-8"):
+    if read_bytes(path) == dump_case(case).encode("utf-8"):
         return True
     try:
         return load_case(path) == case

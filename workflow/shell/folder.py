@@ -21,7 +21,14 @@ from workflow.case.sections import Case
 from workflow.case.writing import dump_case
 from workflow.errors import UserError
 from workflow.shell.lock import LOCK, locked
-from workflow.shell.store import PARTIAL_NAME, file_digest, json_digest, write_json, write_text
+from workflow.shell.store import (
+    PARTIAL_NAME,
+    file_digest,
+    json_digest,
+    read_bytes,
+    write_json,
+    write_text,
+)
 
 MANIFEST = "manifest.json"
 # Key of the manifest below which it lists what is ours: other programs have such files too.
@@ -70,7 +77,7 @@ class OutputFolder:
     def _manifests(self) -> dict[str, dict[str, str]]:
         """The same of all kinds."""
         try:
-            ours = json.loads((self.root / MANIFEST).read_text(encoding="utf-8"))[OURS]
+            ours = json.loads(read_bytes(self.root / MANIFEST))[OURS]
             return {kind: {name: str(ours[kind][name]) for name in ours[kind]} for kind in ours}
         except (OSError, ValueError, TypeError, LookupError):
             return {}
@@ -133,12 +140,26 @@ class OutputFolder:
         self.reserve(STATE, "what the run has found so far, until it ends").mkdir(exist_ok=True)
 
     def discard_state(self) -> None:
-        """Remove what the run has found on the way, and the name of a state that it never kept."""
+        """Remove what the run has found on the way, and the name of a state that it never kept.
+
+        The name of what it has found goes last: it tells that this was cut off.
+        """
         listed = self.manifest or {}
-        if self.jumps.name in listed:
-            self.discard(self.jumps.name)
         if self.checkpoint.name in listed and not self.checkpoint.exists():
             self.discard(self.checkpoint.name)
+        if self.jumps.name in listed:
+            self.discard(self.jumps.name)
+
+    @property
+    def has_leftovers(self) -> bool:
+        """Whether a finished run was cut off before it had removed all that it removes."""
+        lock = os.path.lexists(self.root / LOCK)
+        return lock or STATE in (self.manifest or {}) or any(True for _ in self._partial())
+
+    def clear_leftovers(self) -> None:
+        """Remove what a finished run had no time to remove, but for its lock."""
+        self.clear_partial()
+        self.discard_state()
 
     @property
     def lists_state(self) -> bool:
@@ -169,7 +190,7 @@ class OutputFolder:
     def read_summary(self) -> dict[str, Any]:
         """The summary of a finished run. Raises UserError unless it is as it was written."""
         try:
-            summary = json.loads(self.summary.read_bytes())
+            summary = json.loads(read_bytes(self.summary))
             kept = summary[DIGESTS].pop("summary.json")
         except (ValueError, LookupError, TypeError, AttributeError):
             kept = None
@@ -199,7 +220,7 @@ class OutputFolder:
         """What was chosen for the case, of a run that is not finished yet; None for nothing."""
         path = self.jumps / CHOICE
         try:
-            return json.loads(path.read_bytes()) if path.exists() else None
+            return json.loads(read_bytes(path)) if path.exists() else None
         except ValueError as error:
             raise UserError(f"{path}: damaged; {self.again}") from error
 
@@ -230,12 +251,15 @@ class OutputFolder:
 
     def clear_partial(self) -> None:
         """Remove what a run that was killed had begun to write."""
+        for path in list(self._partial()):
+            path.unlink()
+
+    def _partial(self) -> Iterator[Path]:
+        """The files that it had begun to write."""
         listed = [self.root / name for name in self.manifest or {} if not self._is_run(name)]
         walks = map(os.walk, [path for path in listed if not path.is_symlink()])
         for folder in [self.root, *(Path(place) for place, _, _ in chain.from_iterable(walks))]:
-            for path in folder.glob(".*"):
-                if PARTIAL_NAME.fullmatch(path.name):
-                    path.unlink()
+            yield from (p for p in folder.glob(".*") if PARTIAL_NAME.fullmatch(p.name))
 
     def _clear(self, keep_runs: bool) -> None:
         """Remove what an earlier run wrote, but for runs of their own; list what of it stays."""
@@ -298,7 +322,7 @@ class OutputFolder:
 
     def _holds(self, case: Case) -> bool:
         """Whether the folder was claimed for this case."""
-        return self.case.exists() and self.case.read_bytes() == dump_case(case).encode("utf-8")
+        return self.case.exists() and read_bytes(self.case) == dump_case(case).encode("utf-8")
 
 
 def _is_entry(name: str) -> bool:

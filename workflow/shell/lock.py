@@ -18,6 +18,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from workflow.errors import UserError
+from workflow.shell.store import check_regular
 
 if sys.platform != "win32":
     import fcntl
@@ -66,6 +67,7 @@ def _opened(path: Path, patience: float) -> tuple[int, bool]:
     end = time.monotonic() + patience
     while True:
         path.parent.mkdir(parents=True, exist_ok=True)
+        check_regular(path)
         try:
             file = os.open(path, FLAGS, 0o666)
         except FileNotFoundError:  # its last holder has just removed the folder, left empty

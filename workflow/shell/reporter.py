@@ -14,6 +14,7 @@ from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedCo
 
 from workflow.shell.forecast import Forecast, in_words
 from workflow.shell.run_time import RunTime
+from workflow.shell.store import check_regular
 
 T = TypeVar("T")
 NOTHING_EXPECTED = RunTime(after=0.0)
@@ -40,11 +41,13 @@ class Reporter:
     """Times stages, logs lines, collects warnings, and forecasts how long the run will take.
 
     What comes after its long part takes as much longer than ``expected`` as what came before it.
+    Raises UserError where a pipe, say, is in the place of its ``log``.
     """
 
     def __init__(
         self, log: Path, append: bool = False, expected: RunTime = NOTHING_EXPECTED
     ) -> None:
+        check_regular(log)
         self._log = log.open("a" if append else "w", encoding="utf-8")
         self._console = Console(stderr=True, highlight=False)
         self._begin, self._expected, self._after = time.perf_counter(), expected, 0.0

@@ -155,9 +155,30 @@ def read_arrays(path: Path) -> tuple[dict[str, Any], dict[str, Any]]:
         return arrays, dict(file.attrs)
 
 
+def check_regular(path: Path) -> None:
+    """Raise :class:`DamagedFile` where a pipe, say, is in the place of a file of ours.
+
+    It would be waited for; a device may have no end.
+    """
+    if path.exists() and not path.is_file() and not path.is_dir():
+        raise DamagedFile(f"{path}: not a file: a pipe or a device")
+
+
+def opened(path: Path) -> BinaryIO:
+    """A file of ours, open to be read. Raises OSError; :class:`DamagedFile` for what is none."""
+    check_regular(path)
+    return path.open("rb")
+
+
+def read_bytes(path: Path) -> bytes:
+    """All of a file of ours. Raises OSError; :class:`DamagedFile` for what is none."""
+    with opened(path) as file:
+        return file.read()
+
+
 def checked_digest(path: Path) -> str:
     """The digest of a file of arrays. Raises :class:`DamagedFile` if it is not what was written."""
-    with path.open("rb") as raw:
+    with opened(path) as raw:
         kept = raw.read(SEAL).rstrip(b"\0").decode("ascii", "replace")
         if _digest(raw, path.name) != kept:
             raise DamagedFile(f"{path}: damaged: not what was written there")
@@ -165,9 +186,12 @@ def checked_digest(path: Path) -> str:
 
 
 def file_digest(path: Path) -> str:
-    """SHA-256 of any file; empty for one that cannot be read."""
+    """SHA-256 of any file; empty for one that cannot be read.
+
+    Raises :class:`DamagedFile` for what is no file.
+    """
     try:
-        with path.open("rb") as raw:
+        with opened(path) as raw:
             return hashlib.file_digest(raw, "sha256").hexdigest()
     except OSError:
         return ""
