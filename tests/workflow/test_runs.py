@@ -342,6 +342,55 @@ def test_a_scheduler_that_is_killed_is_one_line(contact, tmp_path, caplog):
     assert not caplog.records
 
 
+@pytest.fixture
+def impatient(monkeypatch):
+    """Seconds in place of minutes and hours."""
+    from workflow.runs import cluster
+
+    for name, seconds in {"WORKERS_LOOK": 0.1, "TELL": 0.5, "TELL_AGAIN": 60, "GIVE_UP": 3}.items():
+        monkeypatch.setattr(cluster, name, float(seconds))
+
+
+@pytest.mark.slow
+def test_the_first_worker_may_come_late(contact, tmp_path, impatient, caplog):
+    """Later than those who have gone are waited for: a queue may be long."""
+    distributed = pytest.importorskip("distributed")
+    options = {"n_workers": 0, "processes": False, "dashboard_address": None}
+    with distributed.LocalCluster(**options) as cluster:
+        threading.Timer(5.0, cluster.scale, (1,)).start()
+        address = cluster.scheduler_address
+        (done,) = run_jobs([Job("one", contact)], tmp_path / "out", dask=address)
+    assert not done.error
+    (told,) = (record.getMessage() for record in caplog.records if record.name[:8] == "workflow")
+    assert told == (
+        f"--dask {address}: no worker yet, 1 of 1 runs wait for one; Ctrl-C ends it, what is done "
+        "is kept"
+    )
+
+
+@pytest.mark.slow
+@posix_only
+def test_workers_that_have_all_gone_are_told_and_given_up(wear, tmp_path, impatient, caplog):
+    """What they have kept is there to go on from."""
+    distributed = pytest.importorskip("distributed")
+    out = tmp_path / "out"
+    options = {"n_workers": 1, "threads_per_worker": 1, "dashboard_address": None}
+
+    def leave():
+        wait_until((out / "one/jumps/00005.h5").exists)
+        cluster.scale(0)
+
+    job = Job("one", wear, (MANY,))
+    with distributed.LocalCluster(**options) as cluster, ThreadPoolExecutor() as beside:
+        gone = beside.submit(leave)
+        with pytest.raises(MethodFailed, match=r"no worker for .*, 1 of 1 runs not known to have"):
+            run_jobs([job], out, dask=cluster.scheduler_address)
+        gone.result()
+    (told,) = (record.getMessage() for record in caplog.records if record.name[:8] == "workflow")
+    assert "no worker is left, 1 of 1 runs wait for one; given up after a few seconds" in told
+    assert kept_in(out / "one", job.load()) == "unfinished"
+
+
 @pytest.mark.slow
 def test_a_cluster_finds_what_local_processes_find(contact, tmp_path):
     distributed = pytest.importorskip("distributed")

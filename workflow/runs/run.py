@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import logging
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
@@ -20,7 +19,7 @@ from workflow.shell.analysis import Analysis, Run
 from workflow.shell.checkpoint import Checkpoint
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
 from workflow.shell.lock import locked
-from workflow.shell.reporter import Reporter
+from workflow.shell.reporter import Reporter, telling
 from workflow.shell.store import read_bytes
 
 # Seconds in which a process that was cut off, or whoever started it, has come to its end.
@@ -219,30 +218,8 @@ def _run(
             draw=draw,
         )
         reporter.say(f"{'resume' if resume else 'run'}: {case.title}")
-        with _told(reporter):
+        with telling(reporter):
             analysis.run(run)
-
-
-class _Telling(logging.Handler):
-    """Hands what is logged deep below to the reporter of a run."""
-
-    def __init__(self, reporter: Reporter) -> None:
-        super().__init__()
-        self._reporter = reporter
-
-    def emit(self, record: logging.LogRecord) -> None:
-        self._reporter.say(record.getMessage())
-
-
-@contextmanager
-def _told(reporter: Reporter) -> Iterator[None]:
-    """What our modules log goes to the reporter."""
-    ours, telling = logging.getLogger("workflow"), _Telling(reporter)
-    ours.addHandler(telling)
-    try:
-        yield
-    finally:
-        ours.removeHandler(telling)
 
 
 def _is_case(path: Path, case: Case) -> bool:

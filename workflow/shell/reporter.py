@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, nullcontext
@@ -153,3 +154,25 @@ class Reporter:
             where = ", ".join(filter(None, (course.name, at)))
             (self.say if before is None else self.log)(f"{where}: {told}")
             course.told = whole
+
+
+class _Telling(logging.Handler):
+    """Hands what is logged deep below to the reporter of a run."""
+
+    def __init__(self, reporter: Reporter) -> None:
+        super().__init__()
+        self._reporter = reporter
+
+    def emit(self, record: logging.LogRecord) -> None:
+        self._reporter.say(record.getMessage())
+
+
+@contextmanager
+def telling(reporter: Reporter) -> Iterator[None]:
+    """What our modules log goes to the reporter."""
+    ours, handler = logging.getLogger("workflow"), _Telling(reporter)
+    ours.addHandler(handler)
+    try:
+        yield
+    finally:
+        ours.removeHandler(handler)

@@ -18,7 +18,7 @@ from workflow.runs.jobs import run_jobs
 from workflow.runs.run import kept_in
 from workflow.shell.folder import OutputFolder
 from workflow.shell.lock import locked
-from workflow.shell.reporter import Reporter
+from workflow.shell.reporter import Reporter, telling
 from workflow.shell.store import write_text
 from workflow.shell.versions import versions
 from workflow.sweep.design import Run, runs_of
@@ -127,7 +127,7 @@ def _run(
 
     try:
         out = folder.root / RUNS
-        with reporter.course("runs"):
+        with reporter.course("runs"), telling(reporter):
             run_jobs(list(jobs.values()), out, processes=processes, dask=dask, report=report)
     finally:
         rows = [Row(run, ended[run.name]) for run in runs if run.name in ended]

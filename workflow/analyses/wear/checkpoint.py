@@ -23,6 +23,8 @@ HISTORIES = ("cycles", "kinetics", "drift", "solved_resultants")
 # What the state of one interface has: parts of arrays, arrays, numbers.
 PARTS: dict[str, Any] = {"surfaces": Surfaces, "loads": LoadHistory}
 ARRAYS = ("slip", "ends")
+# Where it has what solves start from: the increments, and of all of them these fields.
+INCREMENTS, START = "starts/increments", ("pressure", "displacement")
 # Where it has its companion.
 COARSE = "coarse"
 SCALARS = ("energy", "depth_rate", "volume_rate", "next_cycles", "order")
@@ -47,9 +49,12 @@ def _arrays_of(interface: InterfaceState, group: str) -> dict[str, object]:
     }
     arrays |= {f"{group}/{name}": getattr(interface, name) for name in ARRAYS}
     arrays[f"{group}/scalars"] = np.array([getattr(interface, name) for name in SCALARS])
-    for increment, start in interface.starts.items():
-        arrays[f"{group}/starts/{increment}/pressure"] = start.pressure
-        arrays[f"{group}/starts/{increment}/displacement"] = start.displacement
+    # Each dataset takes as long as a field: those of all increments are one.
+    if interface.starts:
+        arrays[f"{group}/{INCREMENTS}"] = np.array(list(interface.starts))
+        for name in START:
+            fields_of_all = [getattr(start, name) for start in interface.starts.values()]
+            arrays[f"{group}/starts/{name}"] = np.stack(fields_of_all)
     if isinstance(interface.coarse, InterfaceState):
         arrays |= _arrays_of(interface.coarse, f"{group}/{COARSE}")
     return arrays
@@ -79,13 +84,10 @@ def _restored(arrays: Mapping[str, Any], attributes: Mapping[str, Any]) -> Coupl
 
 
 def _load_interface(arrays: Mapping[str, Any], group: str) -> InterfaceState:
-    prefix = f"{group}/starts/"
-    increments = sorted(
-        {int(n[len(prefix) :].split("/")[0]) for n in arrays if n.startswith(prefix)}
-    )
+    increments = arrays.get(f"{group}/{INCREMENTS}", np.empty(0)).tolist()
     starts = {
-        t: NormalStart(arrays[f"{prefix}{t}/pressure"], arrays[f"{prefix}{t}/displacement"])
-        for t in increments
+        increment: NormalStart(*(arrays[f"{group}/starts/{name}"][number] for name in START))
+        for number, increment in enumerate(increments)
     }
     companion = f"{group}/{COARSE}"
     coarse = _load_interface(arrays, companion) if f"{companion}/scalars" in arrays else None
