@@ -164,7 +164,7 @@ def check_regular(path: Path) -> None:
         raise DamagedFile(f"{path}: not a file: a pipe or a device")
 
 
-def opened(path: Path) -> BinaryIO:
+def opened(path: Path) -> io.BufferedReader:
     """A file of ours, open to be read. Raises OSError; :class:`DamagedFile` for what is none."""
     check_regular(path)
     return path.open("rb")
