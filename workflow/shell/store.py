@@ -12,8 +12,9 @@ import io
 import json
 import os
 import re
+import stat
 from collections.abc import Iterator, Mapping
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -160,8 +161,11 @@ def check_regular(path: Path) -> None:
 
     It would be waited for; a device may have no end.
     """
-    if path.exists() and not path.is_file() and not path.is_dir():
-        raise DamagedFile(f"{path}: not a file: a pipe or a device")
+    # Looked at once: another process may remove its lock meanwhile.
+    with suppress(OSError):
+        mode = path.stat().st_mode
+        if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+            raise DamagedFile(f"{path}: not a file: a pipe or a device")
 
 
 def opened(path: Path) -> io.BufferedReader:
