@@ -1,11 +1,10 @@
 """Estimates of error that no other test holds against the truth: see docs/estimates.md."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
-from fe_models.dynamics.motion import Start
+from fe_models.dynamics.excitation import HammerBlow, HarmonicForce
+from fe_models.dynamics.motion import Start, quadratic
 from fe_models.dynamics.newmark import TimeStepControl, integrate
 from fe_models.dynamics.rig import Link, lumped_rig
 from fe_models.reduced_contact import FrettingConditions, ReducedPair
@@ -13,8 +12,11 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.reference.hertz import HertzSphere
 from sa_solver.types import ElasticPair, Grid, Material
+from tests.oracles.event_driven import SliderJoints, integrate_exactly
+from tests.oracles.two_mass_rig import two_mass_rig
 from tests.reduced_pads import FRICTION, STROKE, coarse_pads
 from tests.workflow.test_time_cases import RIG, run
+from wear.joints.jenkins import Jenkins
 from workflow.analyses.specimens.run import QUARTER
 from workflow.shell.convergence import richardson
 
@@ -22,29 +24,43 @@ from workflow.shell.convergence import richardson
 
 
 @pytest.mark.parametrize("per_period", [20, 60])
-def test_the_error_of_a_step_in_time_is_that_of_one_step(per_period):
-    """A free mass on a spring, each step begun on the closed form: (ωh)³/12 of the amplitude.
-
-    The whole motion has the errors of all of its steps: its period is longer by (ωh)²/12.
-    """
+def test_the_error_of_steps_in_time_is_that_of_the_whole_motion(per_period):
+    """A free mass on a spring, whose period is longer by (ωh)²/12, and on from where it is left."""
     rig = lumped_rig({"a": 2e-3}, {Link("a"): 400.0}, [[Link("a")]], 0.0)
-    periods, circular = 3, np.sqrt(400.0 / 2e-3)
-    step = 2.0 * np.pi / circular / per_period
-    times = step * np.arange(periods * per_period + 1)
-    exact, velocity = np.cos(circular * times), -circular * np.sin(circular * times)
+    circular = np.sqrt(400.0 / 2e-3)
+    period = 2.0 * np.pi / circular
+    control, end = TimeStepControl(period / per_period), Start(np.ones(1))
+    for _ in range(3):
+        motion = integrate(rig, None, None, 3.0 * period, control, end)
+        exact, end = np.cos(circular * motion.times), motion.end
+        true = np.abs(motion.displacement[:, 0] - exact).max()
+        assert true / 3.0 < motion.error < 3.0 * true
 
-    def moved(x, v, duration):
-        start = Start(np.array([x]), np.array([v]))
-        return integrate(rig, None, None, duration, TimeStepControl(step), start)
 
-    one = max(
-        abs(moved(x, v, step).displacement[-1, 0] - after)
-        for (x, after), v in zip(pairwise(exact), velocity[:-1], strict=True)
-    )
-    motion = moved(1.0, 0.0, times[-1])
-    whole = np.abs(motion.displacement[:, 0] - exact).max()
-    assert motion.error == pytest.approx(one, rel=0.01)
-    assert motion.error * motion.steps == pytest.approx(whole, rel=0.15)
+@pytest.mark.parametrize("tolerance", [None, 1e-5])
+@pytest.mark.parametrize(("force", "step"), [("blow", 2e-5), ("blow", 4e-5), ("shaken", 1e-4)])
+def test_with_friction_too(force, step, tolerance):
+    """Two masses on a slider, hit or shaken, against the same from event to event.
+
+    Friction excites their second mode, 16 and more steps long, which is soon out of phase.
+    """
+    rig, driven = two_mass_rig((21.2e-3, 1.2e-3), (1.4e3, 273e3), 1e-3), np.array([1.0, 0.0])
+    forces = {"blow": HammerBlow(driven, 100.0, 4e-4), "shaken": HarmonicForce(driven, 75.0, 100.0)}
+    joints = SliderJoints(np.array([27.3e3]), np.array([30.0]), np.array([880.0]))
+    law, duration, row = Jenkins(27.3e3, 0.5, 60.0, 880.0), 0.05, 4e-4
+    exact = integrate_exactly(rig, joints, forces[force], duration, row)
+    control = TimeStepControl(step, tolerance, every=round(row / step))
+    motion = integrate(rig, law, forces[force], duration, control)
+    apart = np.sqrt(quadratic(rig.mass, motion.displacement - exact.displacement))
+    true = (apart / np.sqrt(quadratic(rig.mass, exact.displacement)).max()).max()
+    assert true / 3.0 < motion.error < 3.0 * true
+
+
+def test_the_error_of_a_single_step_is_its_own():
+    rig = lumped_rig({"a": 2e-3}, {Link("a"): 400.0}, [[Link("a")]], 0.0)
+    motion = integrate(rig, None, None, 1e-3, TimeStepControl(1e-3), Start(np.ones(1)))
+    true = abs(motion.displacement[-1, 0] - np.cos(np.sqrt(400.0 / 2e-3) * 1e-3))
+    assert true / 3.0 < motion.error < 3.0 * true
 
 
 # --- ladders --------------------------------------------------------------------------------------
@@ -92,7 +108,7 @@ def test_the_coupled_cycle_says_what_the_uncoupled_one_leaves(curved):
 
 @pytest.mark.slow
 def test_steady_states_of_an_ageing_rig_are_as_many_as_it_takes(tmp_path):
-    """What is told is the change by the last doubling: more than the more of them leave."""
+    """What is told is what they leave, within a factor of three."""
     stiffer = "\nevolution: {stiffness: {kind: arrhenius, change: 3, scale: 5 J}}\n"
     loud = "excitation.force=150 N", "excitation.steady=1e-6", "excitation.periods=400"
     few, many = (
@@ -101,5 +117,6 @@ def test_steady_states_of_an_ageing_rig_are_as_many_as_it_takes(tmp_path):
     )
     told = few["ageing"]["relative_error"]
     assert few["ageing"]["steady_states"] < many["ageing"]["steady_states"]
-    assert 1e-3 < told <= 3e-2
-    assert abs(few["cycles"] / many["cycles"] - 1.0) < told
+    true = abs(few["cycles"] / many["cycles"] - 1.0)
+    print(told, true, few["ageing"], many["ageing"])
+    assert true / 3.0 < told < 3.0 * true

@@ -30,7 +30,7 @@ from sa_solver.errors import InputError
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 from wear.stepping import WearingContact, WearState
-from wear.worn import Spent, State, WearStep
+from wear.worn import Spent, State, WearStep, WornState
 
 FIRST_STEP, FIRST_SHARE = 8.0, 0.1
 """First automatic step over the explicit limit, and its largest share of the run: short enough to
@@ -133,13 +133,15 @@ class ExplicitStepper:
 class HeunStepper:
     """Heun's method, of second order: at the mean of the contact before and after an explicit step.
 
-    Steps of at most a ``share`` of the stability limit, and such that the explicit step differs by
-    no more than ``tolerance`` of what is worn, in root mean square. Those much shorter than the
-    limit are not tried again: something other than their length is wrong, and their error says so.
+    Each is taken in two halves, and as a whole by the companion of the state. Halves are at most a
+    ``share`` of the stability limit, so that the companion presses errors away as well, and such
+    that the explicit step differs by no more than ``tolerance`` of what they wear, in root mean
+    square. Those much shorter than the limit are not tried again: something other than their length
+    is wrong.
     """
 
     tolerance: float
-    share: float = 0.5
+    share: float = 0.375
 
     def step(
         self,
@@ -148,38 +150,51 @@ class HeunStepper:
         left: float,
         contact_at: Callable[[State], AveragedContact[State]],
     ) -> WearStep[State]:
-        contact = contact_at(state)
-        first = _stable(contact, state, min(most, state.next_cycles), self.share)
+        contact, companion = contact_at(state), state.companion
+        with_companion = contact if companion is state else contact_at(companion)
+        first = 2.0 * _stable(contact, state, 0.5 * min(most, state.next_cycles), self.share)
 
         def trial(cycles: float) -> _Trial[State]:
-            predicted = contact.explicit_step(state, cycles)
-            following = contact_at(predicted.state)
-            step = contact.averaged(following).explicit_step(state, cycles)
-            worn = step.state.surfaces.depth - state.surfaces.depth
-            missed = step.state.surfaces.depth - predicted.state.surfaces.depth
-            size = root_mean_square(worn, worn)
-            error = root_mean_square(missed, worn) / size if size > 0.0 else 0.0
-            change = GROWTH
+            half = 0.5 * cycles
+            begun, error_1, end_1 = _heuns(state, half, contact, contact_at)
+            done, error_2, end_2 = _heuns(begun.state, half, contact_at(begun.state), contact_at)
+            whole, _, _ = _heuns(companion, cycles, with_companion, contact_at)
+            error, change = max(error_1, error_2), GROWTH
             if error > 0.0:
                 change = float(np.clip(SAFETY * self.tolerance / error, SHRINKAGE, GROWTH))
             further = cycles * change
             if cycles == first < state.next_cycles:
                 # It was cut short, by the end or by stability, not by its error.
                 further = max(further, state.next_cycles)
-            ends = contact.stable_cycles(state), following.stable_cycles(predicted.state)
+            after = replace(done.state, next_cycles=further, coarse=whole.state, order=2.0)
+            spent = replace(begun.spent + done.spent + whole.spent, steps=2)
+            shortest = _shortest(self.share * min(contact.stable_cycles(state), end_1, end_2))
             return _Trial(
-                replace(
-                    step,
-                    state=replace(step.state, next_cycles=further),
-                    spent=replace(predicted.spent + step.spent, steps=1),
-                    error=error,
-                ),
+                WearStep(after, cycles, spent),
                 fits=error <= self.tolerance,
                 shorter=cycles * change,
-                shortest=_shortest(self.share * min(ends)),
+                shortest=2.0 * shortest,
             )
 
         return _accepted(trial, first)
+
+
+def _heuns(
+    state: State,
+    cycles: float,
+    contact: AveragedContact[State],
+    contact_at: Callable[[State], AveragedContact[State]],
+) -> tuple[WearStep[State], float, float]:
+    """A step of Heun's method, what the explicit one misses of it, and its limit at the end."""
+    predicted = contact.explicit_step(state, cycles)
+    following = contact_at(predicted.state)
+    step = contact.averaged(following).explicit_step(state, cycles)
+    worn = step.state.surfaces.depth - state.surfaces.depth
+    missed = step.state.surfaces.depth - predicted.state.surfaces.depth
+    size = root_mean_square(worn, worn)
+    error = root_mean_square(missed, worn) / size if size > 0.0 else 0.0
+    spent = predicted.spent + step.spent
+    return replace(step, spent=spent), error, following.stable_cycles(predicted.state)
 
 
 def _stable(contact: ExplicitContact[State], state: State, most: float, fraction: float) -> float:
@@ -254,10 +269,11 @@ def root_mean_square(field: Array, depth: Array) -> float:
     return float(np.sqrt(np.vdot(field, field) / worn))
 
 
-def step_errors(state: WearState) -> dict[str, float] | None:
+def step_errors(state: WornState, areas: Array | float = 1.0) -> dict[str, float] | None:
     """What wear steps leave of ``depth`` (root mean square) and ``volume``, relative.
 
     Those of the body with the larger error; None where nothing has worn or they are not known.
+    ``areas`` are those of cells or nodes, if they differ.
     """
     bodies = [
         (error, depth)
@@ -268,7 +284,7 @@ def step_errors(state: WearState) -> dict[str, float] | None:
         return None
     return {
         "depth": max(root_mean_square(e, d) / root_mean_square(d, d) for e, d in bodies),
-        "volume": max(abs(float(e.sum())) / float(d.sum()) for e, d in bodies),
+        "volume": max(abs(float((areas * e).sum())) / float((areas * d).sum()) for e, d in bodies),
     }
 
 
@@ -464,8 +480,7 @@ def advance_cycles(
         if not most > 0.0:
             return None
         step = stepper.step(worn.state, most, left - worn.cycles, contact_at)
-        spent, error = worn.spent + step.spent, max(worn.error, step.error)
-        return WearStep(step.state, worn.cycles + step.cycles, spent, error=error)
+        return WearStep(step.state, worn.cycles + step.cycles, worn.spent + step.spent)
 
     worn = marched_by.march("wear step", WearStep(state, 0.0, Spent()), further)
     return replace(worn, cycles=cycles)

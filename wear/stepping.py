@@ -110,33 +110,11 @@ class WearState(WornState):
     """What the wear of a half-space contact must remember between two steps.
 
     Fields are ``(nx, ny)``, one value per cell; ``starts`` are the contact solver's, by increment,
-    and ``start`` is that of whoever found the cycle that led to it. ``coarse`` is the state that
-    steps of twice the length have led to, None before the first one and where none have been taken;
-    ``order`` that of the error of all these steps.
+    and ``start`` is that of whoever found the cycle that led to it.
     """
 
     starts: Starts = field(default_factory=dict)
     start: object = None
-    coarse: WearState | None = None
-    order: float = 1.0
-
-    @property
-    def companion(self) -> WearState:
-        """Where steps of twice the length go on from."""
-        return self if self.coarse is None else self.coarse
-
-    @property
-    def errors(self) -> tuple[Array, Array]:
-        """Estimated errors of the depth of body 1 and body 2 ``(nx, ny)`` [mm]: 0 if unknown.
-
-        Those of a run by steps of order p are the difference to steps twice as long, over 2^p - 1.
-        """
-        fine, coarse, share = self.surfaces, self.companion.surfaces, 1.0 / (2.0**self.order - 1.0)
-        error_1, error_2 = (
-            share * (longer - shorter)
-            for longer, shorter in zip(coarse.depths, fine.depths, strict=True)
-        )
-        return error_1, error_2
 
 
 @dataclass(frozen=True, eq=False)

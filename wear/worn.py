@@ -33,7 +33,9 @@ class WornState:
 
     ``energy`` is what the contact has dissipated so far [N mm]; ``depth_rate`` the largest depth
     [mm] and ``volume_rate`` the volume of both bodies [mm³] worn per cycle of the last step;
-    ``next_cycles`` how far a step that chooses its own length would go next.
+    ``next_cycles`` how far a step that chooses its own length would go next. ``coarse`` is the
+    state that steps of twice the length have led to, None before the first one and where none have
+    been taken; ``order`` that of the error of all these steps.
     """
 
     surfaces: Surfaces
@@ -41,6 +43,8 @@ class WornState:
     depth_rate: float
     volume_rate: float
     next_cycles: float
+    coarse: Self | None = None
+    order: float = 1.0
 
     @classmethod
     def unworn(cls, gap: Array, **further: Any) -> Self:
@@ -50,19 +54,32 @@ class WornState:
         """
         return cls(Surfaces.unworn(gap), 0.0, 0.0, 0.0, np.inf, **further)
 
+    @property
+    def companion(self) -> Self:
+        """Where steps of twice the length go on from."""
+        return self if self.coarse is None else self.coarse
+
+    @property
+    def errors(self) -> tuple[Array, Array]:
+        """Estimated errors of the depth of body 1 and body 2 [mm], by cell or node: 0 if unknown.
+
+        Those of a run by steps of order p are the difference to steps twice as long, over 2^p - 1.
+        """
+        fine, coarse, share = self.surfaces, self.companion.surfaces, 1.0 / (2.0**self.order - 1.0)
+        error_1, error_2 = (
+            share * (longer - shorter)
+            for longer, shorter in zip(coarse.depths, fine.depths, strict=True)
+        )
+        return error_1, error_2
+
 
 State = TypeVar("State", bound=WornState)
 
 
 @dataclass(frozen=True)
 class WearStep(Generic[State]):
-    """A step, or several one after the other: the ``state`` after it, its ``cycles``, what it took.
-
-    ``error`` is what a step whose length is judged by itself may have got wrong, over what it
-    wears; of several steps the largest.
-    """
+    """A step, or several one after the other: ``state`` after it, ``cycles``, and what it took."""
 
     state: State
     cycles: float
     spent: Spent
-    error: float = 0.0

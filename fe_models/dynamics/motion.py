@@ -15,13 +15,15 @@ class Start:
     """State at the first time: at rest in every respect unless given.
 
     ``displacement`` and ``velocity`` ``(n,)`` [mm, mm/s]. Without a ``joint_state`` ``(j, k)`` the
-    joints have been loaded from rest straight to the displacement.
+    joints have been loaded from rest straight to the displacement. ``companion`` is where the same
+    motion is by steps of twice the length, if not there.
     """
 
     displacement: Array | None = None
     velocity: Array | None = None
     joint_state: Array | None = None
     time: float = 0.0
+    companion: Start | None = None
 
     def motion(self, size: int) -> Array:
         """Displacements, then velocities ``(2 n,)``."""
@@ -68,11 +70,11 @@ class Motion:
 
     ``displacement``, ``velocity`` and ``acceleration`` ``(t, n)`` [mm, s]; of the joints
     ``joint_displacement`` [mm] and the resisting ``joint_force`` [N] ``(t, j, d)``, and
-    ``joint_state`` ``(j, k)`` at the end. ``error`` is the largest error of displacement that one
-    step is estimated to add, relative to the largest displacement, both as norms weighted by mass;
-    ``residual`` the largest residual of the joints' equilibrium, relative to their largest force;
-    ``steps`` counts all steps, and ``message`` is empty unless the integration has stopped early:
-    then it says why and what to try.
+    ``joint_state`` ``(j, k)`` and ``companion`` at the end. ``error`` estimates the largest error
+    of displacement that the steps leave, those before the start included, relative to the largest
+    displacement, both as norms weighted by mass; ``residual`` is the largest residual of the
+    joints' equilibrium, relative to their largest force; ``steps`` counts all steps, and
+    ``message`` is empty unless the integration has stopped early: then it says why and what to try.
     """
 
     times: Array
@@ -82,6 +84,7 @@ class Motion:
     joint_displacement: Array
     joint_force: Array
     joint_state: Array
+    companion: Start | None
     energies: Energies
     error: float
     residual: float
@@ -96,7 +99,11 @@ class Motion:
     def end(self) -> Start:
         """The last state, to go on from."""
         return Start(
-            self.displacement[-1], self.velocity[-1], self.joint_state, float(self.times[-1])
+            self.displacement[-1],
+            self.velocity[-1],
+            self.joint_state,
+            float(self.times[-1]),
+            self.companion,
         )
 
 

@@ -14,7 +14,10 @@ so that Newton's method has only the joints' displacements u as unknowns, howeve
 A step in which it fails, where a joint's force is not smooth, is taken again as two halves.
 
 An error of displacement of h³/12 x''' arises in one step, which the change of acceleration shows
-as h²/12 Δa: it chooses the steps where a tolerance is given, and is reported where not.
+as h²/12 Δa: it chooses the steps where a tolerance is given. What all steps together leave is told
+by a companion, the same motion by steps of twice the length, from the start on: global
+extrapolation (Shampine & Watts 1976, doi:10.1145/355666.355671). It takes half as much work again.
+Where both step over what happens, the largest error of one step is told.
 
 Source: Newmark 1959, Journal of the Engineering Mechanics Division (ASCE) 85(3), 67.
 """
@@ -22,7 +25,7 @@ Source: Newmark 1959, Journal of the Engineering Mechanics Division (ASCE) 85(3)
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -37,8 +40,10 @@ from sa_solver.types import Array
 MAX_HALVED = 12
 # A step is doubled when its error is this share of what is allowed: doubling multiplies it by 8.
 DOUBLE_BELOW = 1.0 / 16.0
+# So much more may a step of twice the length add: its error goes with the third power.
+TWICE_AS_LONG = 8.0
 # Of the work of a motion whose steps are chosen, about what its first run in whole steps is.
-WHOLE_STEPS = 0.2
+WHOLE_STEPS = 0.15
 # Steps held in full before their energies are summed and the rows not asked for dropped.
 BLOCK = 1024
 
@@ -97,14 +102,23 @@ def integrate(
     begin = start or Start()
     allowed, before = np.inf, 0.0
     if control.tolerance is not None:
-        whole, before = _March(model, laws, forcing, control, begin, np.inf), WHOLE_STEPS
-        rough = _followed(whole, count, count, steps, lambda share: reached(before * share))
+        whole, before = _March(model, laws, forcing, control.step, begin, np.inf), WHOLE_STEPS
+        rough = _followed(whole, None, count, count, steps, lambda share: reached(before * share))
         allowed = control.tolerance * rough.largest_displacement
-    march = _March(model, laws, forcing, control, begin, allowed)
+    march = _March(model, laws, forcing, control.step, begin, allowed)
+    twice = TWICE_AS_LONG * allowed
+    start_of_companion = replace(begin.companion or begin, time=begin.time)
+    companion = _March(model, laws, forcing, 2.0 * control.step, start_of_companion, twice)
     record = _followed(
-        march, count, control.every, steps, lambda share: reached(before + (1.0 - before) * share)
+        march,
+        companion,
+        count,
+        control.every,
+        steps,
+        lambda share: reached(before + (1.0 - before) * share),
     )
-    return record.motion(march.message)
+    together = march.taken == 2 * companion.taken and count % control.every == 0
+    return record.motion(march.message or companion.message, companion.end if together else None)
 
 
 @dataclass(frozen=True)
@@ -176,19 +190,25 @@ class _March:
         model: DynamicModel,
         joints: Joints,
         excitation: Callable[[Array], Array],
-        control: TimeStepControl,
+        step: float,
         start: Start,
         allowed: float,
     ) -> None:
         self.model, self.directions = model, joints.directions
         self._joints, self._excitation = joints, excitation
-        self._step, self._allowed = control.step, allowed
+        self._step, self._allowed = step, allowed
         self._operators: dict[int, tuple[_Operators, JointEquilibrium]] = {}
         self._start_time, self.taken, self.message = start.time, 0, ""
         self.at = self._start(start)
         self._halved, self._missed = 0, 0.0
         self._largest_force = largest_entry(self.at.response.force)
         self._inverse_mass = np.linalg.inv(model.mass)
+
+    @property
+    def end(self) -> Start:
+        """Where it is, to go on from."""
+        displacement, velocity = np.split(self.at.motion, 2)
+        return Start(displacement, velocity, self.at.response.state, self.at.time)
 
     @property
     def reached(self) -> _Reached:
@@ -329,17 +349,29 @@ class _March:
 
 
 def _followed(
-    march: _March, count: int, every: int, steps: Steps, reached: Callable[[float], None]
+    march: _March,
+    companion: _March | None,
+    count: int,
+    every: int,
+    steps: Steps,
+    reached: Callable[[float], None],
 ) -> MotionRecord:
-    """The record of a march until it has taken so many steps, or says why it has not."""
+    """The record of a march until it has taken so many steps, or says why it has not.
+
+    Its ``companion``, by steps of twice the length, is to follow it.
+    """
     record = MotionRecord(march.model, march.directions, every, march.at)
+    marches = [march] if companion is None else [march, companion]
 
-    def block() -> tuple[RecordedSteps | None, _Reached]:
+    def block() -> tuple[RecordedSteps | None, list[_Reached]]:
         points = march.block(min(BLOCK, count - march.taken))
-        return record.recorded(points), march.reached
+        beside = companion.block(march.taken // 2 - companion.taken) if companion else []
+        return record.recorded(points, beside), [each.reached for each in marches]
 
-    while march.taken < count and not march.message:
-        recorded, march.reached = steps("steps in time", block)
+    while march.taken < count and not any(each.message for each in marches):
+        recorded, reached_by = steps("steps in time", block)
+        for each, at in zip(marches, reached_by, strict=True):
+            each.reached = at
         if recorded is not None:
             record.add(recorded)
         reached(march.taken / count)

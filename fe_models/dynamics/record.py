@@ -12,8 +12,13 @@ from typing import NamedTuple
 import numpy as np
 
 from fe_models.dynamics.model import DynamicModel, IncrementResponse
-from fe_models.dynamics.motion import Energies, Motion, accelerations, quadratic
+from fe_models.dynamics.motion import Energies, Motion, Start, accelerations, quadratic
 from sa_solver.types import Array
+
+# Distance of a companion by steps of twice the length over the error: 2² - 1 of second order, and 1
+# where friction lasts that depends on a mode which the steps do not resolve. In between, both are
+# told within a factor of three.
+COMPANION = 2.0
 
 
 class StepState(NamedTuple):
@@ -38,8 +43,9 @@ class RecordedSteps:
 
     ``last`` is the point that they end with, ``sums`` ``(3 + j,)`` the energies until there, and
     ``kept`` the point of the last row so far. They are so many whole steps, of ``points`` in all;
-    ``jump`` and ``moved`` are the largest squared error that one adds and the largest squared
-    displacement, both as half of their norm weighted by mass, ``residual`` the largest one.
+    ``missed`` is the largest distance from the companion, ``jump`` the largest error that one step
+    adds and ``moved`` the largest displacement, all as half of the square of their norm weighted by
+    mass, ``residual`` the largest one.
     """
 
     rows: tuple[Array, Array, Array, Array, Array] | None
@@ -48,6 +54,7 @@ class RecordedSteps:
     kept: StepState
     whole_steps: int
     points: int
+    missed: float
     jump: float
     moved: float
     residual: float
@@ -61,17 +68,22 @@ class MotionRecord:
         self._before, self._kept = first, first
         sums = np.zeros((1, 3 + len(model.connection) // directions))
         self._sums, self._rows = sums[0], [(*_columns([first]), sums)]
-        self._largest_jump = self._largest_motion = self._residual = 0.0
+        self._missed = self._largest_jump = self._largest_motion = self._residual = 0.0
         self._taken = self._steps = 0
 
-    def recorded(self, block: list[list[StepState]]) -> RecordedSteps | None:
-        """What is to be added of whole steps, each of one or more points; None without any."""
+    def recorded(
+        self, block: list[list[StepState]], companion: list[list[StepState]]
+    ) -> RecordedSteps | None:
+        """What is to be added of whole steps, each of one or more points; None without any.
+
+        Beside them, those of the ``companion``, each for two of them.
+        """
         points = [point for whole in block for point in whole]
         if not points:
             return None
         ends = np.cumsum([len(whole) for whole in block]) - 1
         kept = ends[(self._taken + 1 + np.arange(len(block))) % self._every == 0]
-        flows, jump, moved = self._flows([self._before, *points])
+        flows, jump = self._flows([self._before, *points])
         sums, rows = self._sums + np.cumsum(flows, axis=0), None
         if len(kept):
             rows = (*_columns([points[row] for row in kept]), sums[kept])
@@ -82,8 +94,9 @@ class MotionRecord:
             kept=points[kept[-1]] if len(kept) else self._kept,
             whole_steps=len(block),
             points=len(points),
+            missed=self._distance(block[1::2], companion),
             jump=jump,
-            moved=moved,
+            moved=self._largest(np.array([point.motion for point in points])),
             residual=max(point.residual for point in points),
         )
 
@@ -94,14 +107,26 @@ class MotionRecord:
         self._before, self._kept, self._sums = recorded.last, recorded.kept, recorded.sums
         self._taken += recorded.whole_steps
         self._steps += recorded.points
+        self._missed = max(self._missed, recorded.missed)
         self._largest_jump = max(self._largest_jump, recorded.jump)
         self._largest_motion = max(self._largest_motion, recorded.moved)
         self._residual = max(self._residual, recorded.residual)
 
-    def _flows(self, points: list[StepState]) -> tuple[Array, float, float]:
+    def _distance(self, block: list[list[StepState]], companion: list[list[StepState]]) -> float:
+        """Largest distance of whole steps that end at the same times, as half of its square."""
+        pairs = zip(block, companion, strict=False)
+        apart = [whole[-1].motion - other[-1].motion for whole, other in pairs]
+        return self._largest(np.array(apart)) if apart else 0.0
+
+    def _largest(self, motion: Array) -> float:
+        """Largest displacement of motions ``(t, 2 n)``, as half of its square."""
+        displacement = motion[:, : len(self._model.mass)]
+        return float(quadratic(self._model.mass, displacement).max())
+
+    def _flows(self, points: list[StepState]) -> tuple[Array, float]:
         """Energies of each step ``(s, 3 + j)``: brought in, damped, into joints, lost in each.
 
-        Beside them the largest squares of :class:`RecordedSteps`.
+        Beside them ``jump`` of :class:`RecordedSteps`.
         """
         model = self._model
         _, motion, force, joint_force = _columns(points)
@@ -114,26 +139,28 @@ class MotionRecord:
             (0.5 * (joint_force[1:] + joint_force[:-1]), travel @ model.connection.T),
         )
         works = np.stack([np.einsum("ti,ti->t", *pair) for pair in pairs], axis=1)
-        jumps = steps**2 / 12.0 * np.diff(accelerations(model, motion, force, joint_force), axis=0)
-        displacement = motion[:, : len(model.mass)]
-        jump, moved = (float(quadratic(model.mass, part).max()) for part in (jumps, displacement))
         dissipated = np.array([point.response.dissipated for point in points[1:]])
-        return np.hstack([works, dissipated]), jump, moved
+        jumps = steps**2 / 12.0 * np.diff(accelerations(model, motion, force, joint_force), axis=0)
+        jump = float(quadratic(model.mass, jumps).max())
+        return np.hstack([works, dissipated]), jump
 
     @property
     def largest_displacement(self) -> float:
         """As a norm weighted by mass [t^0.5 mm]."""
         return float(np.sqrt(2.0 * self._largest_motion))
 
-    def motion(self, message: str) -> Motion:
-        """All rows kept so far; ``message`` says why they end early, if they do."""
+    def motion(self, message: str, companion: Start | None) -> Motion:
+        """All rows kept so far; ``message`` says why they end early, if they do.
+
+        ``companion`` is where that is at the last of them.
+        """
         model, directions = self._model, self._directions
         times, motion, force, joint_force, sums = (
             np.concatenate(parts) for parts in zip(*self._rows, strict=True)
         )
         displacement, velocity = np.split(motion, 2, axis=1)
         shape = (len(motion), len(model.connection) // directions, directions)
-        moved = self._largest_motion
+        missed, moved = max(self._missed / COMPANION**2, self._largest_jump), self._largest_motion
         return Motion(
             times=times,
             displacement=displacement,
@@ -142,6 +169,7 @@ class MotionRecord:
             joint_displacement=(displacement @ model.connection.T).reshape(shape),
             joint_force=joint_force.reshape(shape),
             joint_state=self._kept.response.state,
+            companion=companion,
             energies=Energies(
                 kinetic=quadratic(model.mass, velocity),
                 elastic=quadratic(model.stiffness, displacement),
@@ -150,7 +178,7 @@ class MotionRecord:
                 joint_work=sums[:, 2],
                 joints=sums[:, 3:],
             ),
-            error=float(np.sqrt(self._largest_jump / moved)) if moved > 0.0 else 0.0,
+            error=float(np.sqrt(missed / moved)) if moved > 0.0 else 0.0,
             residual=self._residual,
             steps=self._steps,
             message=message,

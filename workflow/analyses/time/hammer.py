@@ -23,7 +23,13 @@ from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.time.case import RigCase, joules
 from workflow.analyses.time.joint import evolution_curve
 from workflow.analyses.time.joint_model import JointModel
-from workflow.analyses.time.motion import motion_curves, motion_numbers, motion_of, step_control
+from workflow.analyses.time.motion import (
+    motion_curves,
+    motion_numbers,
+    motion_of,
+    step_control,
+    warn_of_steps,
+)
 from workflow.analyses.time.outcome import MOTION, RESPONSE, RING_DOWN, State, TimeOutcome
 from workflow.errors import MethodFailed
 from workflow.shell.dataset import Dataset, Datasets
@@ -61,6 +67,7 @@ def run_hammer(
                 motion = motion_of(
                     rig, joint, energy, blow, hammer.record, control, steps=steps, reached=tell
                 )
+            warn_of_steps(energy, motion.error, reporter)
             with reporter.stage("signals"):
                 states.append(_state(hammer, blow, rig, joint, energy, motion, reporter))
     curve = evolution_curve(joint, case.energies[-1])

@@ -16,6 +16,10 @@ from workflow.analyses.time.case import RigCase, joules
 from workflow.analyses.time.joint_model import JointModel
 from workflow.errors import MethodFailed
 from workflow.shell.dataset import Dataset
+from workflow.shell.reporter import Reporter
+
+# Of the largest displacement, what steps may leave without a warning.
+STEPS_LEAVE = 0.05
 
 
 def step_control(case: RigCase) -> TimeStepControl:
@@ -45,6 +49,15 @@ def motion_of(
     if not motion.converged:
         raise MethodFailed(f"motion at {joules(energy)}: {motion.message}")
     return motion
+
+
+def warn_of_steps(energy: float, error: float, reporter: Reporter) -> None:
+    """Warn where the steps leave much of a motion at so much ``energy`` [N mm]."""
+    if error > STEPS_LEAVE:
+        reporter.warn(
+            f"at {joules(energy)} the steps of time leave an error of {error:.1%} of the largest "
+            "displacement: lower integration.step"
+        )
 
 
 def motion_numbers(rig: RigModel, motion: Motion) -> dict[str, Any]:

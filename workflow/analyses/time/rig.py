@@ -23,7 +23,13 @@ from workflow.analyses.time.hammer import run_hammer
 from workflow.analyses.time.joint import aged, energies_within, evolution_curve, extracted, test_end
 from workflow.analyses.time.joint_model import JointModel
 from workflow.analyses.time.memory import memory
-from workflow.analyses.time.motion import motion_curves, motion_numbers, motion_of, step_control
+from workflow.analyses.time.motion import (
+    motion_curves,
+    motion_numbers,
+    motion_of,
+    step_control,
+    warn_of_steps,
+)
 from workflow.analyses.time.outcome import LOOP, MOTION, State, TimeOutcome, loop_curves
 from workflow.errors import MethodFailed
 from workflow.shell.reporter import Reporter
@@ -32,8 +38,9 @@ from workflow.shell.reporter import Reporter
 # while a slow mode turns.
 IN_A_ROW = 3
 # Steady states that an ageing is first built on, beside that of no energy, and at most. Doubled
-# until the cycles agree.
-FEWEST_STATES, MOST_STATES = 6, 48
+# until the cycles agree; what a doubling changes is 2³ - 1 times the error that it leaves: cubics
+# between them are of order 3 to 4.
+FEWEST_STATES, MOST_STATES, CHANGE = 6, 48, 7.0
 # The first state that is settled takes as long as so many others, which begin from one nearby.
 FROM_REST = 4
 # The first of them, as a share of the last energy: friction that rises as ln E changes early.
@@ -46,7 +53,7 @@ class SteadyCycle:
 
     ``amplitudes`` ``(k,)`` of what is seen [mm]; of the joints ``stretch`` [mm] and ``force`` [N]
     ``(t,)``, ``energy`` [N mm] that they dissipate, and how they press, ``contact``. ``change`` is
-    that of energy and stroke from the cycle before, ``error`` what one step may add to the
+    that of energy and stroke from the cycle before, ``error`` what the steps leave of the
     displacement, both relative.
     """
 
@@ -93,6 +100,7 @@ def _run_recorded(
                 motion = motion_of(rig, joint, energy, force, duration, control, begin, steps, tell)
             largest = {"largest_force": float(np.abs(rig.loop(motion)[1]).max())}
             numbers = rig.modes(joint.at(energy)) | motion_numbers(rig, motion) | largest
+            warn_of_steps(energy, motion.error, reporter)
             curves = {MOTION: motion_curves(rig, motion, force)}
             states.append(State(energy, None, joint.parameters(energy), numbers, curves))
     return TimeOutcome(case, tuple(states), evolution_curve(joint, case.energies[-1]))
@@ -121,6 +129,8 @@ def _run_harmonic(
                 _steady_state(rig, joint, energy, steady.at(energy, expected), reached)
                 for energy, reached in zip(energies, cycles, strict=True)
             )
+    for state in states:
+        warn_of_steps(state.energy, state.numbers["step_error"], reporter)
     return TimeOutcome(case, states, evolution_curve(joint, energies[-1], test, rate), numbers)
 
 
@@ -193,7 +203,8 @@ class _SteadyStates:
     def _settle(self, energy: float, start: Start | None) -> SteadyCycle:
         excitation, rig, period = self.excitation, self.rig, 1.0 / self.excitation.frequency
         force = HarmonicForce(rig.driven, excitation.force, excitation.frequency)
-        steps = int(np.ceil(1.0 / (excitation.frequency * self.integration.step) - 1e-9))
+        # An even number, which a companion by steps of twice the length ends with.
+        steps = 2 * int(np.ceil(0.5 * period / self.integration.step - 1e-9))
         control = TimeStepControl(period / steps, self.integration.tolerance)
         if start is not None:
             # Where a period begins, whatever came before: times must not lose their digits.
@@ -259,7 +270,7 @@ def _aged(
 ) -> tuple[Callable[[float], float], LongTest, dict[str, Any]]:
     """Energy per cycle between steady states, the test that it makes, and its numbers.
 
-    Steady states are added between those there are until they no longer change the cycles.
+    Steady states are added between those there are until the cycles are as good as asked for.
     """
     ageing, breaks = case.ageing, joint.evolution.breaks
     end = ageing.energy or _energy_of(ageing, steady)
@@ -274,18 +285,18 @@ def _aged(
         cycles = test.total_cycles
         # By energy the cycles change, by cycles the energy.
         now = cycles if ageing.energy is not None else last
-        change = abs(now - before) / now
-        if change <= ageing.tolerance or len(nodes) > MOST_STATES:
+        error = abs(now - before) / now / CHANGE
+        if error <= ageing.tolerance or len(nodes) > MOST_STATES:
             break
         before = now
         inner = np.sqrt(np.multiply(nodes[1:-1], nodes[2:])).tolist()
         nodes = sorted({*nodes, *inner, max(last, nodes[-1])})
-    if change > ageing.tolerance:
+    if error > ageing.tolerance:
         reporter.warn(
-            f"ageing: {len(nodes)} steady states leave an error of about {change:.1e}, above "
+            f"ageing: {len(nodes)} steady states leave an error of about {error:.1e}, above "
             f"ageing.tolerance {ageing.tolerance:g}"
         )
-    numbers = {"relative_error": change, "steady_states": len(nodes)}
+    numbers = {"relative_error": error, "steady_states": len(nodes)}
     return rate, test, {"cycles": cycles, "energy": last, "ageing": numbers}
 
 

@@ -22,6 +22,7 @@ from workflow.analyses.vibration_wear.outcome import (
     WornState,
     depth_fields,
     path_field,
+    step_error,
     wearing_loop,
 )
 from workflow.analyses.vibration_wear.pads import PadCycle, WearingPads
@@ -43,15 +44,16 @@ def wear_specimens(
     with reporter.stage("wear"):
         pads.at(state)
 
-    def describe(state: NodalState, cycles: float, taken: int, error: float) -> WornState:
-        if error > wear.tolerance:
+    def describe(state: NodalState, cycles: float, taken: int) -> WornState:
+        reached = cycles, taken
+        worn = _worn_state(case.unworn, pads.at(state), state, reached, reporter, steps)
+        if worn.numbers["step_error"] > wear.tolerance:
             reporter.warn(
-                f"{cycles:g} cycles: steps of the shortest length left an error of "
-                f"{error:.2g}, above wear.tolerance {wear.tolerance:g}: raise "
+                f"{cycles:g} cycles: wear steps leave an error of {worn.numbers['step_error']:.2g} "
+                f"of depth or volume, above wear.tolerance {wear.tolerance:g}: lower it, or raise "
                 "resolution.samples or resolution.harmonics"
             )
-        reached = cycles, taken
-        return _worn_state(case.unworn, pads.at(state), state, reached, reporter, steps)
+        return worn
 
     stepper = HeunStepper(wear.tolerance)
     states = worn_states(wear.cycles, stepper, state, pads.contact_at, describe, reporter, steps)
@@ -83,6 +85,7 @@ def _worn_state(
         "energy": state.energy,
         "volume": float(depth @ cycle.areas),
         "depth": float(depth.max()),
+        "step_error": step_error(state, cycle.areas),
         "friction": float(np.max(cycle.law.friction)),
         # None where no increment of the loop sticks.
         "stiffness": np.nan if slope is None else slope,

@@ -17,7 +17,7 @@ from sa_solver.steps import Steps
 from sa_solver.tangential_loop import TangentialLoop
 from wear.joints.jenkins import Jenkins
 from wear.moving import LARGE_STROKE
-from wear.steppers import SubcyclingStepper, first_cycles, step_errors
+from wear.steppers import SubcyclingStepper, first_cycles
 from wear.stepping import WearState
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.vibration.loops import closed
@@ -33,6 +33,7 @@ from workflow.analyses.vibration_wear.outcome import (
     WornState,
     depth_fields,
     path_field,
+    step_error,
     wearing_loop,
 )
 from workflow.analyses.vibration_wear.states import responses_to_all, worn_states
@@ -44,8 +45,6 @@ from workflow.shell.dataset import Dataset
 from workflow.shell.few_cells import check_cells
 from workflow.shell.reporter import Reporter
 
-# What wear steps have left before the first.
-NOTHING_WORN = {"depth": 0.0}
 # Of the motion at which all of the contact slides: where loops in partial slip are compared.
 PARTIAL = 0.5
 
@@ -81,7 +80,7 @@ class _Description:
     reporter: Reporter
     steps: Steps
 
-    def __call__(self, state: WearState, cycles: float, steps: int, _: float) -> WornState:
+    def __call__(self, state: WearState, cycles: float, steps: int) -> WornState:
         """The contact after so many cycles, in ``steps`` since the last, and the rig on it."""
         cycle = self.contact.at(state)
         with self.reporter.stage("half-space loops"):
@@ -121,7 +120,7 @@ class _Description:
             "depth": float(surfaces.depth.max()),
             "area": float(np.count_nonzero(normal.pressure)) * area,
             "peak_pressure": float(normal.pressure.max()),
-            "step_error": max((step_errors(cycle.state) or NOTHING_WORN).values()),
+            "step_error": step_error(cycle.state),
             "friction": cycle.friction,
             "stiffness": cycle.slipping.stiffness,
             "full_slip": cycle.full_slip,

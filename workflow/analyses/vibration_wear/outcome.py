@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from sa_solver.types import Array, Grid
+from wear import worn
+from wear.steppers import step_errors
 from workflow.analyses.vibration.outcome import Response
 from workflow.analyses.vibration_wear.case import VibrationWearCaseBase
 from workflow.shell.dataset import Dataset, Datasets
@@ -19,6 +21,8 @@ LOOP, HALF_SPACE = "loop", "half_space_loop"
 # The same of specimens, whose contact is at nodes, and the group of what does not wear.
 NODES, PLACES = "nodes", "places"
 WORN, EVOLUTION = "worn", "evolution"
+# What wear steps have left before the first.
+NOTHING_WORN = {"depth": 0.0}
 
 
 @dataclass(frozen=True)
@@ -93,6 +97,11 @@ class VibrationWearOutcome:
             for name, described in columns.items()
             if name in rows[0]
         }
+
+
+def step_error(state: worn.WornState, areas: Array | float = 1.0) -> float:
+    """What wear steps leave of depth or volume, the larger; ``areas`` as for ``step_errors``."""
+    return max((step_errors(state, areas) or NOTHING_WORN).values())
 
 
 def depth_fields(depth_1: Array, depth_2: Array) -> dict[str, Dataset]:

@@ -26,16 +26,15 @@ def worn_states(
     stepper: Stepper[State, Contact],
     state: State,
     contact_at: Callable[[State], Contact],
-    describe: Callable[[State, float, int, float], WornState],
+    describe: Callable[[State, float, int], WornState],
     reporter: Reporter,
     steps: Steps,
 ) -> tuple[WornState, ...]:
     """The states after so many cycles each, the unworn one before them.
 
-    ``describe`` makes them, of a state, its cycles, the steps since the last one, and the largest
-    error of a step so far.
+    ``describe`` makes them, of a state, its cycles, and the steps since the last one.
     """
-    total, done, error = numbers[-1], 0.0, 0.0
+    total, done = numbers[-1], 0.0
     states = []
     with reporter.course("vibration and wear"):
         for cycles in reporter.parts((0.0, *numbers), lambda cycles: f"{cycles:.4g} cycles"):
@@ -44,11 +43,11 @@ def worn_states(
                 stretch, left = cycles - done, total - done
                 with reporter.part(0.0, WEAR, "wear"), reporter.stage("wear"):
                     worn = advance_cycles(stepper, state, stretch, left, contact_at, steps)
-                state, done, error = worn.state, cycles, max(error, worn.error)
+                state, done = worn.state, cycles
                 count = worn.spent.steps
             name = "worn state" if count else "unworn state"
             with reporter.part(WEAR if count else 0.0, 1.0):
-                states.append(steps(name, partial(describe, state, cycles, count, error)))
+                states.append(steps(name, partial(describe, state, cycles, count)))
     return tuple(states)
 
 
