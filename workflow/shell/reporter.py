@@ -23,6 +23,8 @@ NOTHING_EXPECTED = RunTime(after=0.0)
 # Seconds of work before a forecast is told, those of a single step, of which some may be loading,
 # and those of a run for which none is needed.
 FIRST_WORK, FIRST_STEP, SHORT_RUN = 1.0, 10.0, 10.0
+# Share of the work at which what it has taken tells as much of the rest as what was expected.
+LITTLE = 0.05
 # A forecast is told again when that of the whole time has changed by this factor.
 CHANGED = 1.5
 
@@ -123,6 +125,18 @@ class Reporter:
         finally:
             self._span, self._names = around
 
+    def _blended(self, measured: float, share: float) -> float:
+        """Time to the end of the course, as the ``share`` that is done tells, and as expected [s].
+
+        The less is done, the less is known of what the rest will take: harmonics and contacts grow
+        on the way.
+        """
+        expected = self._expected.course * (1.0 - share)
+        if not measured * expected > 0.0:
+            return measured
+        trust = share / (share + LITTLE)
+        return float(measured**trust * expected ** (1.0 - trust))
+
     def parts(self, items: Sequence[T], name: Callable[[T], str]) -> Iterator[T]:
         """Items one after the other, each an equal :meth:`part` of the work, by its name."""
         for number, item in enumerate(items):
@@ -143,7 +157,7 @@ class Reporter:
         course.bar.update(course.task, completed=course.forecast.share)
         if course.forecast.left is None:
             return
-        to_go = course.forecast.left + self._after
+        to_go = self._blended(course.forecast.left, course.forecast.share) + self._after
         at, told = f"{self._names}{text}".rstrip(": "), f"about {in_words(to_go)} to go"
         course.bar.update(course.task, at=at, left=told)
         whole, before = time.perf_counter() - self._begin + to_go, course.told

@@ -11,7 +11,7 @@ from workflow.case.loading import load_case
 from workflow.shell.run_time import RunTime
 
 # A step of a rig in time; of a reduced body [s]. Chosen steps are parts of what the case gives.
-STEP, REDUCED_STEP, CHOSEN = 5e-5, 7e-4, 5.0
+STEP, REDUCED_STEP, CHOSEN = 8e-5, 1e-3, 5.0
 # Periods to a steady state, and steady states that an ageing is built on.
 PERIODS, AGEING = 30, 20
 # A joint alone, aged at its stroke [s].
