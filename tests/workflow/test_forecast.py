@@ -107,6 +107,20 @@ def test_a_first_step_may_be_loading(clock: Clock, tmp_path: Path) -> None:
     assert told == "motions, step 17: about 1 min to go\n"
 
 
+@pytest.mark.parametrize(("rate", "told"), [(1e-5, "3 min"), (5e-2, "40 s")])
+def test_of_little_work_it_is_told_what_was_expected(
+    clock: Clock, tmp_path: Path, rate: float, told: str
+) -> None:
+    """200 s expected: 2e-5 of the work in 2 s tells nothing (28 h), a tenth (20 s) a good deal."""
+    reporter = Reporter(tmp_path / "log", expected=RunTime(course=200.0, after=0.0))
+    with reporter.course("motions"):
+        for step in (1, 2, 3):
+            clock.now += 1.0
+            reporter.reached(rate * step)
+    lines = (tmp_path / "log").read_text().splitlines()
+    assert lines[0][9:] == f"motions: about {told} to go", lines
+
+
 def test_what_comes_after_is_as_slow_as_what_came_before(clock: Clock, tmp_path: Path) -> None:
     """40 s in place of 7 + 3 until the long part: 20 s more of it and 80 of pictures, not 20."""
     reporter = Reporter(tmp_path / "log", expected=RunTime(before=7.0, after=20.0))
