@@ -46,7 +46,8 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
     responses: list[Response] = []
     backbone = None
     sweeps = []
-    curves = _Curves(len(case.forces) + case.backbone + len(case.force_sweeps), reporter)
+    count = len(case.forces) + case.backbone + len(case.force_sweeps)
+    curves = _Curves(count, reporter, growing=case.resolution.tolerance is not None)
     with reporter.course("vibration"):
         for force in case.forces:
             with curves.next(f"{force:g} N"), reporter.stage("response"):
@@ -73,18 +74,27 @@ def _outcome(case: VibrationCase, reporter: Reporter, steps: Steps) -> Vibration
 
 @dataclass
 class _Curves:
-    """So many curves, taken as equal parts of the work."""
+    """So many curves, taken as equal parts of the work.
+
+    Where resolutions are ``growing`` with the force, the second is taken as twice the first, ...
+    """
 
     count: int
     reporter: Reporter
+    growing: bool
     begun: int = 0
 
     def next(self, name: str) -> AbstractContextManager[None]:
         """The next one is followed."""
         begin, self.begun = self.begun, min(self.begun + 1, self.count)
         return self.reporter.part(
-            min(begin, self.count - 1) / self.count, self.begun / self.count, name
+            self._share(min(begin, self.count - 1)), self._share(self.begun), name
         )
+
+    def _share(self, begun: int) -> float:
+        """Of the work, what so many curves are."""
+        equal = begun / self.count
+        return equal * (begun + 1) / (self.count + 1) if self.growing else equal
 
 
 def _across(responses: list[Response]) -> dict[str, Any]:

@@ -14,7 +14,7 @@ from workflow.shell.run_time import RunTime
 # Points of a curve, usually, where the frequency or the force grows by a factor of e.
 POINTS = 50
 # A point of a rig with one joint; the same where harmonics grow to a tolerance [s].
-POINT, GROWING_POINT = 5e-3, 2e-2
+POINT, GROWING_POINT = 5e-3, 3e-2
 # A point of so many unknowns, and the linear limits of so many directions, of joints [s].
 MANY, MANY_UNKNOWNS, MANY_POWER = 0.37, 4000.0, 1.5
 LIMITS, DIRECTIONS, CUBE = 25.0, 363.0, 3
