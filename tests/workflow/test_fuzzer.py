@@ -9,10 +9,11 @@ import json
 import math
 import re
 import shutil
-import subprocess
+import signal
 import sys
 import time
 from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -33,7 +34,9 @@ BLOCK, QUICK, ALL = 50, 4, 80
 # What a line may be long, of any text that somebody may write.
 LONGEST = 600
 # Of runs: those looked at, and seconds after which one has shown enough.
-RUNS, ENOUGH = 25, 20.0
+RUNS, ENOUGH = 25, 10
+
+posix_only = pytest.mark.skipif(sys.platform == "win32", reason="has no alarm")
 
 
 @pytest.fixture(scope="module")
@@ -94,33 +97,37 @@ def _of_an_accepted_one(mutant: Mutant, path: Path, said: str) -> Iterator[str]:
         yield "another case once it is written"
 
 
-@pytest.mark.skipif(sys.platform == "win32", reason="has no alarm")
+@posix_only
 @pytest.mark.parametrize("block", [block if block < QUICK else slow(block) for block in range(ALL)])
-def test_whatever_is_wrong_is_told_in_its_place(
-    block: int, folder: Path, mutants: Mutants, alarm: None
-) -> None:
+def test_whatever_is_wrong_is_told_in_its_place(block: int, folder: Path, mutants: Mutants) -> None:
     for number in range(block * BLOCK, (block + 1) * BLOCK):
         mutant = mutants[number]
         try:
-            found = list(faults(mutant, folder / "mutant.yaml"))
-        except Exception as error:
+            with alarm(ENDLESS):
+                found = list(faults(mutant, folder / "mutant.yaml"))
+        except (Exception, TooLong) as error:
             raise AssertionError(f"mutant {number}: {mutant.told}") from error
         assert not found, f"mutant {number}: {mutant.told}"
 
 
-@pytest.fixture
-def alarm() -> Iterator[None]:
-    """Raises TimeoutError in a test that seems endless."""
-    import signal
+class TooLong(BaseException):
+    """Ends what takes too long; no error that a command would make a line of."""
+
+
+@contextmanager
+def alarm(seconds: int) -> Iterator[None]:
+    """Raises TooLong in what takes longer."""
 
     def late(*_: object) -> None:
-        raise TimeoutError("endless")
+        raise TooLong
 
     before = signal.signal(signal.SIGALRM, late)
-    signal.alarm(ENDLESS)
-    yield
-    signal.alarm(0)
-    signal.signal(signal.SIGALRM, before)
+    signal.alarm(seconds)
+    try:
+        yield
+    finally:
+        signal.alarm(0)
+        signal.signal(signal.SIGALRM, before)
 
 
 # --- runs -----------------------------------------------------------------------------------------
@@ -136,6 +143,7 @@ def _numbers(summary: Any) -> Iterator[float]:
         yield from _numbers(value)
 
 
+@posix_only
 @pytest.mark.slow
 def test_what_is_accepted_runs_or_says_why_not(tmp_path: Path) -> None:
     """Small cases that ``check`` takes: an exit code of ours, one line, no NaN in the summary."""
@@ -149,14 +157,15 @@ def test_what_is_accepted_runs_or_says_why_not(tmp_path: Path) -> None:
         if mutant.overrides or checked(mutant, path).exit_code:
             continue
         told, looked_at = f"mutant {number}: {mutant.told}", looked_at + 1
-        run = "from workflow.cli import main; main()"
-        arguments = [sys.executable, "-c", run, "run", str(path), "--out", str(out)]
         try:
-            ended = subprocess.run(arguments, capture_output=True, text=True, timeout=ENOUGH)
-        except subprocess.TimeoutExpired:
+            with alarm(ENOUGH):
+                ended = command("run", path, "--out", out)
+        except TooLong:
             continue
-        assert ended.returncode in (0, 2, 3, 4), (told, ended.stderr)
+        except Exception as error:
+            raise AssertionError(told) from error
+        assert ended.exit_code in (0, 2, 3, 4), (told, ended.stderr)
         assert "Traceback" not in ended.stderr, (told, ended.stderr)
-        if ended.returncode == 0:
+        if ended.exit_code == 0:
             summary = json.loads((out / "summary.json").read_bytes())
             assert all(map(math.isfinite, _numbers(summary))), told
