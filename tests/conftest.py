@@ -12,6 +12,19 @@ for name in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
 CASES = Path(__file__).parent.parent / "cases"
 
 
+@pytest.hookimpl(trylast=True)  # of the tests that are selected
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Bring long tests to the front of both halves, with which two workers begin.
+
+    They take short ones from each other in the end: no core is left idle while a long one ends.
+    """
+    long = [item for item in items if item.get_closest_marker("long")]
+    short = [item for item in items if not item.get_closest_marker("long")]
+    first, second = long[::2], long[1::2]
+    rest = len(items) // 2 - len(first)
+    items[:] = [*first, *short[:rest], *second, *short[rest:]]
+
+
 @pytest.fixture(scope="session")
 def dovetail_path() -> Path:
     """The default case."""

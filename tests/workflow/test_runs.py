@@ -403,13 +403,17 @@ def test_a_cluster_finds_what_local_processes_find(contact, tmp_path):
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @posix_only
 @pytest.mark.skipif(not Path("/proc").exists(), reason="looks for processes in /proc")
 def test_a_worker_killed_at_work_changes_nothing(contact, wear, tmp_path):
     """Two worker processes, one killed: all runs end, bit for bit as local processes find them."""
     distributed = pytest.importorskip("distributed")
-    coefficients = [(MANY, f"wear.body_1.coefficient={value} um^3/J") for value in (5e3, 1e4, 2e4)]
-    jobs = [Job(f"run{number}", wear, entries) for number, entries in enumerate(coefficients)]
+    coefficients = [f"wear.body_1.coefficient={value} um^3/J" for value in (5e3, 1e4, 2e4)]
+    jobs = [
+        Job(f"run{number}", wear, (MANY, "wear.cycles=4e4", entry))
+        for number, entry in enumerate(coefficients)
+    ]
     jobs.append(Job("slides", contact, ("load_path.legs.0.P=100 N",)))
     out, told = tmp_path / "cluster", []
     cluster = distributed.LocalCluster(

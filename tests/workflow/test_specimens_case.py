@@ -414,6 +414,7 @@ class TestCase:
 
 
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", ["specimens_flat", "specimens_curved"])
 def test_shipped_cases_meet_their_expectations(name, tmp_path):
     assert load_case(CASES / f"{name}.yaml").expect
