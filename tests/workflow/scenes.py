@@ -45,3 +45,12 @@ P [N/mm], Qx [N/mm], My [N], Edx [mJ/mm]
 400, -150, 0, 3
 400, 150, 0, 3
 """
+
+# The rig of two masses of `cases/rig_two_dof.yaml`, which several analyses shake.
+RIG_OF_THESIS = """\
+structure:
+  kind: rig
+  masses: [21.152 kg, 1.189 kg]
+  springs: [1.3469e3 N/mm, 273e3 N/mm]
+  damping_ratio: 0.01
+"""

@@ -29,6 +29,8 @@ MANY = "wear.step.cycles=1500", "coupling.drift=2e-4"
 JUMPS = 20
 # Seconds a run of these needs; kills come at any moment of it, and some too late.
 RUN_SECONDS = 6.0
+# Kills of it at random moments; test_kills.py has seven of every kind of run.
+KILLS = 8
 # Seconds within which everything must have ended.
 PATIENCE = 60.0
 
@@ -480,10 +482,12 @@ def test_three_kills_lose_nothing(small_path, resume, reference, separate_proces
 
 @posix_only
 @pytest.mark.slow
-def test_twenty_kills_lose_nothing(small_path, resume, reference, separate_processes, tmp_path):
+def test_kills_at_random_moments_lose_nothing(
+    small_path, resume, reference, separate_processes, tmp_path
+):
     """At random moments of the run, of its output and of its start."""
     dice, kills, number = random.Random(20), 0, 0
-    while kills < 20:
+    while kills < KILLS:
         folder = tmp_path / f"out{number}"
         moments = [(None, dice.uniform(0.2, RUN_SECONDS)) for _ in range(4)]
         kills += kill_and_resume(small_path, folder, moments)

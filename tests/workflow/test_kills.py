@@ -16,6 +16,7 @@ import yaml
 
 from tests.marks import slow
 from tests.workflow.conftest import invoke
+from tests.workflow.scenes import RIG_OF_THESIS
 from tests.workflow.test_friction_rig import RIG as PADS
 from tests.workflow.test_friction_rig import SPECIMENS
 from tests.workflow.test_friction_rig_wear import WORN
@@ -38,14 +39,11 @@ PATIENCE = 300.0
 # Kills of every kind, more than 50 in all, the most that one run takes, and runs at most.
 KILLS, IN_ONE_RUN, MOST_RUNS = 7, 4, 20
 
-VIBRATION = """\
+VIBRATION = (
+    RIG_OF_THESIS
+    + """\
 title: Slider that shakes
 analysis: vibration
-structure:
-  kind: rig
-  masses: [21.152 kg, 1.189 kg]
-  springs: [1.3469e3 N/mm, 273e3 N/mm]
-  damping_ratio: 0.01
 joint: {law: jenkins, normal_load: 60 N, friction: 0.88, stiffness: 45 N/um}
 forces: [5 N, 30 N]
 frequencies: [60 Hz, 300 Hz]
@@ -54,6 +52,7 @@ backbone: true
 force_sweeps: [120 Hz]
 loops: {frequency: 120 Hz, harmonics: [3, 7]}
 """
+)
 PADS_THAT_WEAR = yaml.safe_dump(yaml.safe_load(PADS) | WORN)
 
 
@@ -75,14 +74,14 @@ class LongRun:
 
 IN_A_ROW = "excitation={kind: harmonic, force: 50 N, frequency: 80 Hz, steady: 1e-7}"
 RECORD = "time [s], force [N]\n" + "".join(
-    f"{1e-3 * n:.3f}, {60.0 * np.sin(0.5 * n) * np.sin(0.07 * n):.6f}\n" for n in range(1500)
+    f"{1e-3 * n:.3f}, {60.0 * np.sin(0.5 * n) * np.sin(0.07 * n):.6f}\n" for n in range(600)
 )
 RUNS = {
     "specimens": LongRun(SMALL, ("wear.energy=3 kJ",)),
     "joint": LongRun(JOINT, ("energies=[0.2 J, 0.5 J]", "ageing.tolerance=1e-9")),
     "steady": LongRun(RIG_IN_TIME, (IN_A_ROW, "ageing.energy=20 J", "integration.step=20 us")),
     "hammer": LongRun(
-        RIG_IN_TIME, (HAMMER, "integration={step: 20 us, tolerance: 1e-5}", "energies=[0 J, 5 J]")
+        RIG_IN_TIME, (HAMMER, "integration={step: 50 us, tolerance: 1e-5}", "energies=[0 J, 5 J]")
     ),
     "recorded": LongRun(
         RIG_IN_TIME,
@@ -90,7 +89,9 @@ RUNS = {
         (("record.csv", RECORD),),
     ),
     "vibration": LongRun(VIBRATION),
-    "half-space wear": LongRun(WEARING_RIG, ("forces=[40 N]",), (("wear.yaml", BALL),)),
+    "half-space wear": LongRun(
+        WEARING_RIG, ("forces=[40 N]", "frequencies=[100 Hz, 250 Hz]"), (("wear.yaml", BALL),)
+    ),
     "wear": LongRun(BALL, ("wear.step={kind: implicit, cycles: 100}", "contact.grid=[48, 48]")),
     "pad wear": LongRun(PADS_THAT_WEAR, ("forces=[20 N]",), (("specimens.yaml", SPECIMENS),)),
 }
@@ -288,6 +289,7 @@ def test_a_killed_run_goes_on(tmp_path):
 
 @posix_only
 @pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("kind", list(RUNS))
 def test_random_kills_lose_nothing_but_the_last_step(kind, tmp_path):
     kills = kills_of(kind, tmp_path, KILLS)

@@ -11,6 +11,7 @@ import pytest
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import Resolution
 from tests.workflow.conftest import invoke
+from tests.workflow.scenes import RIG_OF_THESIS
 from wear.joints.periodic import PeriodicMarch
 from wear.steppers import ErrorControl, ImplicitStepper, advance_cycles, first_cycles
 from workflow.analyses.rig.building import row_of_masses
@@ -40,14 +41,11 @@ wear:
   tolerance: 10 %
 output: {paraview: false, figures: false}
 """
-RIG = """\
+RIG = (
+    RIG_OF_THESIS
+    + """\
 title: Rig that wears its contact
 analysis: vibration
-structure:
-  kind: rig
-  masses: [21.152 kg, 1.189 kg]
-  springs: [1.3469e3 N/mm, 273e3 N/mm]
-  damping_ratio: 0.01
 contact: {file: wear.yaml}
 wear: {force: 75 N, frequency: 100 Hz, cycles: [100, 2e4]}
 forces: [5 N, 40 N]
@@ -55,6 +53,7 @@ frequencies: [60 Hz, 350 Hz]
 resolution: {harmonics: 3, samples: 64}
 output: {paraview: false, figures: false}
 """
+)
 MASSES, SPRINGS, DAMPING = (21.152e-3, 1.189e-3), (1346.9, 273e3), 0.001
 RESOLUTION = Resolution((1, 3, 5, 7, 9), 256)
 # Motions found by Newton's method to 1e-10, and sums over the cells.
