@@ -19,18 +19,27 @@ OLD_PROCESSOR = {
     "GLIBC_TUNABLES": "glibc.cpu.hwcaps=-AVX512F,-AVX512VL,-AVX2,-AVX,-FMA,-FMA4",
 }
 PERTURBED = ("-p", "tests.perturbed")
-SOLVERS = [
-    "tests/sa_solver",
-    "tests/fe_models",
-    "tests/wear",
-    "tests/workflow/test_specimens_case.py",
+
+
+def modules(package, *names):
+    return [f"tests/{package}/test_{name}.py" for name in names]
+
+
+# Where comparisons of rounded numbers decide: what touches, sticks or has converged, which of equal
+# things is told, when a step ends. Elsewhere rounding stays rounding. The compiled joints and the
+# branches of vibrations would double the time.
+CONTACTS = [
+    *modules("sa_solver", "contact", "coupled", "friction_limit", "gross_slip", "history"),
+    *modules("sa_solver", "normal", "normal_control", "normal_properties", "partial_slip"),
+    *modules("sa_solver", "subsurface", "tangential", "tangential_loop"),
+    *modules("fe_models", "friction", "friction_independent", "joint", "linear_solver"),
+    *modules("fe_models", "mortar_contact", "reduced_contact"),
 ]
-# The compiled joints and the branches of vibrations would double the time.
-SOLVERS += [f"--ignore=tests/{path}" for path in ("fe_models/dynamics", "wear/joints")]
-CLOSED_FORMS = [
-    f"tests/sa_solver/test_{name}.py"
-    for name in ("convergence", "tangential_dense", "gross_slip", "friction_limit")
-]
+WEAR = modules("wear", "coupled", "full_cycle", "life", "moving", "steppers", "stepping", "tilt")
+EIGENPROBLEMS = modules("workflow", "specimens_case")
+CLOSED_FORMS = modules(
+    "sa_solver", "convergence", "tangential_dense", "gross_slip", "friction_limit"
+)
 
 
 def run_tests(*arguments, **environment):
@@ -51,11 +60,13 @@ def test_closed_forms_are_met_by_perturbed_matrices():
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_solvers_do_not_notice_perturbed_matrices():
-    run_tests(*PERTURBED, *SOLVERS)
+    run_tests(*PERTURBED, *CONTACTS)
 
 
 @pytest.mark.slow
+@pytest.mark.long
 def test_solvers_do_not_notice_another_processor(tmp_path):
     # What is compiled for it is kept apart.
-    run_tests(*SOLVERS, **OLD_PROCESSOR, NUMBA_CACHE_DIR=str(tmp_path))
+    run_tests(*CONTACTS, *WEAR, *EIGENPROBLEMS, **OLD_PROCESSOR, NUMBA_CACHE_DIR=str(tmp_path))
