@@ -33,7 +33,7 @@ CONTACTS = [
     *modules("sa_solver", "normal", "normal_control", "normal_properties", "partial_slip"),
     *modules("sa_solver", "subsurface", "tangential", "tangential_loop"),
     *modules("fe_models", "friction", "friction_independent", "joint", "linear_solver"),
-    *modules("fe_models", "mortar_contact", "reduced_contact"),
+    *modules("fe_models", "mortar_contact", "mortar_frames", "reduced_contact"),
 ]
 WEAR = modules("wear", "coupled", "full_cycle", "life", "moving", "steppers", "stepping", "tilt")
 EIGENPROBLEMS = modules("workflow", "specimens_case")

@@ -6,140 +6,28 @@ from functools import cache
 import numpy as np
 import pytest
 import scipy.sparse as sp
-from skfem import MeshTet, MeshTri
+from skfem import MeshTri
 
 from fe_models.constraints import Constraints
 from fe_models.dovetail import dovetail_structure
 from fe_models.elasticity import ElasticBody
 from fe_models.friction import FrictionalJoint
 from fe_models.joint import join
-from fe_models.mesh import AXES, Body, MeshError
+from fe_models.mesh import AXES, Body
 from fe_models.mortar import frame_of_faces, mortar_interface
 from fe_models.supported_body import SupportedBody, interface_nodes
-from sa_solver.types import Frame, Material
-
-LINE, SURFACE = 2, 3
-DIMENSIONS = [LINE, SURFACE]
-ORDERS = [1, 2]
-STEEL, TITANIUM = Material(200e3, 0.3), Material(115e3, 0.3)
-# What the friction solver leaves of the forces; the projection itself is exact to rounding.
-SOLVER = 1e-6
-
-# Two blocks pressed on each other, with meshes that have nothing in common.
-LOW, MIDDLE, HIGH = (0.0, 0.0, 0.0), 1.5, (2.0, 3.0, 4.0)
-
-
-def block(counts, low, high, material, order, shake, seed):
-    """A box, or a rectangle in the plane (X, Z), of irregular elements; boundaries x0 ... z1."""
-    axes = AXES[len(counts)]
-    steps = [
-        np.linspace(low[axis], high[axis], n + 1) for axis, n in zip(axes, counts, strict=True)
-    ]
-    mesh = (MeshTri if len(counts) == LINE else MeshTet).init_tensor(*steps)
-    points = mesh.p.copy()
-    rng = np.random.default_rng(seed)
-    for axis, step in enumerate(steps):
-        inside = (mesh.p[axis] > step[0]) & (mesh.p[axis] < step[-1])
-        points[axis, inside] += rng.uniform(-shake, shake, inside.sum()) * (step[1] - step[0])
-    faces = {
-        f"{'xyz'[axis]}{end}": (lambda x, k=k, value=value: np.isclose(x[k], value))
-        for k, axis in enumerate(axes)
-        for end, value in enumerate((low[axis], high[axis]))
-    }
-    mesh = type(mesh)(points, mesh.t).with_boundaries(faces)
-    return ElasticBody(Body("block", mesh), material, order)
-
-
-def isostatic(elastic):
-    """Constraints that only keep the body from moving as a whole."""
-    low, high = elastic.nodes.min(axis=0), elastic.nodes.max(axis=0)
-    corners = [low] + [np.where(np.arange(3) == axis, high, low) for axis in range(2)]
-    origin, along_x, along_y = (
-        np.linalg.norm(elastic.nodes - corner, axis=1).argmin() for corner in corners
-    )
-    constraints = Constraints(len(elastic.nodes), elastic.dimension)
-    constraints.hold(np.array([origin]))
-    if elastic.dimension == LINE:
-        constraints.slide(np.array([along_x]), np.array([[0.0, 1.0]]))
-    else:
-        x, _, z = np.eye(3)
-        constraints.slide(np.array([along_x, along_y, along_y]), np.array([z, z, x]))
-    return constraints
-
-
-def boundary_load(elastic, stress, contact):
-    """Forces ``(size,)`` of a stress field ``(3, 3)`` on all faces but the contact.
-
-    ``stress`` gives it at points ``(3, ...)``.
-    """
-    load = np.zeros(elastic.size)
-    for axis in elastic.body.axes:
-        for end, sense in enumerate((-1.0, 1.0)):
-            name = f"{'xyz'[axis]}{end}"
-            if name == contact:
-                continue
-            for component in elastic.body.axes:
-                load += elastic.traction_load(
-                    name,
-                    lambda x, a=axis, c=component, s=sense: s * stress(x)[a][c] + 0.0 * x[0],
-                    np.eye(3)[component],
-                )
-    return load
-
-
-class Pressed:
-    """A held block, one that floats on it, and their interface; both under a stress field."""
-
-    def __init__(
-        self, dimension, order, materials, stress, cells=((2, 3, 2), (3, 4, 3)), shake=0.2
-    ):
-        self.dimension = dimension
-        top, bottom = (*HIGH[:2], MIDDLE), (*LOW[:2], MIDDLE)
-        ends = (LOW, top), (bottom, HIGH)
-        self.elastic = [
-            block([cells[k][axis] for axis in AXES[dimension]], *ends[k], material, order, shake, k)
-            for k, material in enumerate(materials)
-        ]
-        contact = "z1", "z0"
-        frame = Frame(np.array([1.0, 1.5 * (dimension == SURFACE), MIDDLE]), np.eye(3))
-        bodies = [elastic.body for elastic in self.elastic]
-        self.interface = mortar_interface("joint", bodies[0], "z1", bodies[1], "z0", frame)
-        self.projection = sp.kron(self.interface.projection, sp.identity(dimension), format="csr")
-        constraints = isostatic(self.elastic[0]), Constraints(self.count(1), dimension)
-        self.bodies = []
-        for k, elastic in enumerate(self.elastic):
-            constraints[k].average(*elastic.midsides(contact[k]))
-            placed = interface_nodes([self.interface], k + 1, elastic.body)
-            load = boundary_load(elastic, stress, contact[k])[:, None]
-            self.bodies.append(SupportedBody(elastic, constraints[k], *placed, load))
-        self.joint = join(*(body.condense() for body in self.bodies), self.projection)
-
-    def count(self, number):
-        return len(self.elastic[number].nodes)
-
-    def glued(self):
-        """Contact forces ``(n, d)`` on body 2 without relative displacement."""
-        return self.joint.loads[:, 0].reshape(-1, self.dimension)
-
-    def rubbing(self, friction):
-        """Contact forces and relative displacements ``(n, d)`` with Coulomb friction."""
-        frictional = FrictionalJoint(self.joint.resolvent(), friction)
-        (state,) = frictional.march(np.ones((1, 1)), self.interface.gap)
-        assert state.converged
-        axes = list(AXES[self.dimension])
-        return state.force[axes].T, state.displacement[axes].T
-
-    def stresses(self, force, relative):
-        """Stresses ``(6, elements)`` of both bodies."""
-        one = np.ones(1)
-        first, at_1 = self.bodies[0].respond(-self.projection.T @ force.ravel(), one)
-        second = self.bodies[1].recover(self.projection @ at_1 + relative.ravel(), one)
-        return [e.stress(u) for e, u in zip(self.elastic, (first, second), strict=True)]
-
-    @property
-    def areas(self):
-        """Nodal areas of body 2's face; it is covered whole."""
-        return self.interface.nodal_areas
+from sa_solver.types import Frame
+from tests.fe_models.pressed_blocks import (
+    DIMENSIONS,
+    LINE,
+    ORDERS,
+    SOLVER,
+    STEEL,
+    SURFACE,
+    TITANIUM,
+    Pressed,
+    block,
+)
 
 
 def uniform(dimension, zz, zx, zy=0.0, xx=0.0):
@@ -370,93 +258,6 @@ def test_curved_faces_press_as_hertz_says(ratio):
     assert mean[1] < 0.012
     assert np.log2(mean[0] / mean[1]) > 2.0
     assert abs(peak[1]) < 0.005
-
-
-def turned(dimension, seed):
-    """A rotation of space, in the plane about Y."""
-    if dimension == SURFACE:
-        axes, _ = np.linalg.qr(np.random.default_rng(seed).standard_normal((3, 3)))
-        return axes * np.sign(np.linalg.det(axes))
-    angle = 0.4 + seed
-    return np.array(
-        [[np.cos(angle), 0, np.sin(angle)], [0, 1, 0], [-np.sin(angle), 0, np.cos(angle)]]
-    )
-
-
-def moved(body, rotation, shift, bend=0.0):
-    """The body bent upwards by an angle on either side of x = 1, then turned and shifted."""
-    points = body.points.copy()
-    points[:, 2] += np.tan(bend) * np.abs(points[:, 0] - 1.0)
-    points = points @ rotation.T + shift
-    return Body(body.name, replace(body.mesh, doflocs=points[:, body.axes].T.copy()))
-
-
-def stacked(dimension, rotation=None, shift=0.0, bend=0.0):
-    """A wide lower block and an upper one that overhangs it at x = 2, both irregular."""
-    cells = [(4, 3, 2), (3, 4, 2)]
-    ends = [((0.0, 0.0, 0.0), (2.0, 3.0, 1.0)), ((0.8, 0.0, 1.0), (2.6, 3.0, 2.0))]
-    return [
-        moved(
-            block([n[axis] for axis in AXES[dimension]], *end, STEEL, 1, 0.0, k).body,
-            np.eye(3) if rotation is None else rotation,
-            shift,
-            bend,
-        )
-        for k, (n, end) in enumerate(zip(cells, ends, strict=True))
-    ]
-
-
-@pytest.mark.parametrize("dimension", DIMENSIONS)
-@pytest.mark.parametrize("seed", range(3))
-def test_frame_follows_the_bodies(dimension, seed):
-    """Its origin is the middle of what the faces share; x is turned into the plane."""
-    rotation, shift = turned(dimension, seed), np.array([5.0, 0.0, -3.0])
-    lower, upper = stacked(dimension, rotation, shift)
-    given = rotation @ np.array([2.0, 0.0, 0.7])
-    frame, angle = frame_of_faces(lower, "z1", upper, "z0", given)
-    np.testing.assert_allclose(frame.axes, rotation.T, atol=1e-12)
-    centre = np.array([1.4, 1.5 if dimension == SURFACE else 0.0, 1.0])
-    np.testing.assert_allclose(frame.origin, rotation @ centre + shift, atol=1e-12)
-    assert angle < 1e-12
-
-    face = mortar_interface("joint", lower, "z1", upper, "z0", frame)
-    assert len(face.nodes_2) < len(upper.vertices("z0"))
-    assert face.nodal_areas.min() > 0.0
-    assert face.facets.max() == len(face) - 1
-    np.testing.assert_allclose(face.gap, 0.0, atol=1e-12)
-    place = frame.coordinates(upper.points[face.nodes_2])[:, :2]
-    np.testing.assert_array_equal(place, face.coordinates)
-    np.testing.assert_allclose(
-        face.projection @ face.face_1.coordinates, face.coordinates, atol=1e-12
-    )
-
-
-@pytest.mark.parametrize("dimension", DIMENSIONS)
-def test_bent_faces_report_their_angle(dimension):
-    lower, upper = stacked(dimension, bend=0.1)
-    frame, angle = frame_of_faces(lower, "z1", upper, "z0", np.array([1.0, 0.0, 0.0]))
-    np.testing.assert_allclose(frame.axes, np.eye(3), atol=1e-12)
-    assert angle == pytest.approx(0.1, rel=1e-9)
-
-
-@pytest.mark.parametrize("dimension", DIMENSIONS)
-def test_faces_that_share_less_than_a_facet_are_refused(dimension):
-    lower, upper = stacked(dimension, shift=0.0)
-    aside = moved(upper, np.eye(3), np.array([1.15, 0.0, 0.0]))
-    with pytest.raises(MeshError, match="share less than a facet of z0: refine it"):
-        mortar_interface("joint", lower, "z1", aside, "z0", Frame(np.zeros(3), np.eye(3)))
-
-
-@pytest.mark.parametrize("dimension", DIMENSIONS)
-def test_faces_without_a_frame_are_refused(dimension):
-    lower, upper = stacked(dimension)
-    x, _, z = np.eye(3)
-    with pytest.raises(MeshError, match=r"x_direction .* is normal to face z1"):
-        frame_of_faces(lower, "z1", upper, "z0", z)
-    with pytest.raises(MeshError, match="do not face each other"):
-        frame_of_faces(lower, "z1", upper, "z1", x)
-    with pytest.raises(MeshError, match="do not face each other"):
-        frame_of_faces(lower, "z1", upper, "x0", x)
 
 
 def overhang_work(below, above):

@@ -5,304 +5,37 @@ One that several sections inherit, or that stands in several places, is the same
 tried once, in the first of its places.
 """
 
-import functools
-import inspect
 import math
 import shutil
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path as Folder
-from typing import Any, Literal, get_args, get_origin
+from typing import Literal, get_origin
 
 import numpy as np
 import pytest
 from pydantic import BaseModel
 
-from fe_models.reduction import ReducedModel, save_reduced
+from fe_models.reduction import save_reduced
 from tests.conftest import CASES
+from tests.workflow.case_leaves import (
+    BODY,
+    CAD,
+    CELLS,
+    EXPECT,
+    LEAVES,
+    PARSED,
+    PLACES,
+    SECTIONS,
+    TEMPLATE,
+    VARIANTS,
+    declaring,
+    each_section,
+)
 from workflow.analyses.contact.load_table import FORCES, MOTIONS
 from workflow.case import source
 from workflow.case.fields import File, Path, Quantity, Text, Whole
-from workflow.case.sections import Section, entry_of, sections_of
+from workflow.case.sections import entry_of
 from workflow.errors import CaseError
-from workflow.kinds import kinds, load_case, parse_case, template
-
-BODY = ReducedModel(
-    kept=np.arange(1),
-    stiffness=np.eye(1),
-    mass=np.eye(1),
-    loads=np.zeros((1, 0)),
-    mode_shapes=np.zeros((1, 0)),
-    frequencies=np.zeros(0),
-    names=("pad 1 x",),
-)
-LENGTHS = {"cycles": 1e5, "step": {"kind": "implicit", "cycles": 5000}}
-ARCHARD_BODY = {"coefficient": 1e-4, "hardness": "3.5 GPa"}
-ENERGY_BODY = {"coefficient": "1e4 um^3/J"}
-ROUNDED = {"shape": "rounded", "edge_width": 1, "edge_radius": 30, "end_width": 1, "end_radius": 30}
-GAPS = {
-    "paraboloid": {"shape": "paraboloid", "radius_x": "1 m", "radius_y": "1 m"},
-    "heights": {"shape": "heights", "file": "gap.npy"},
-}
-INTERFACE = {
-    "name": "interface",
-    "size": [11, 60],
-    "gap": ROUNDED,
-    "frame": {"origin": [15, 0, 245], "x": [-1, 0, 1], "normal": [-1, 0, -1]},
-    "nodes": {"body_1": "nodes_1.csv", "body_2": "nodes_2.csv"},
-}
-EXPECT = [
-    {"quantity": "a.b", "value": "3 um", "tolerance": "1 %", "kind": "earlier", "source": "a test"}
-]
-REPORTED = [{"normal_force": "17 N", "steady": "stiffness", "cycles": 1e6}]
-ALWAYS = ""  # in place of a kind: for sections of one kind alone
-FRICTION = {"friction.evolution": {ALWAYS: {"energy": [0, 1e6], "factor": [1, 2]}}}
-EVOLUTIONS = {
-    "local": {"scope": "local", "energy": [0, 1000], "factor": [1, 2], "threshold": 10},
-    "global": {"scope": "global", "energy": [0, 1e6], "factor": [1, 2], "threshold": 1e4},
-}
-
-
-def laws(lengths, *bodies):
-    """The laws and evolutions that the templates do not have, for bodies of these names."""
-    by_law = {
-        "archard": {"law": "archard", **lengths, **dict.fromkeys(bodies, ARCHARD_BODY)},
-        "energy_amplitude": {
-            "law": "energy_amplitude",
-            "reference_amplitude": "75 um",
-            **lengths,
-            **dict.fromkeys(bodies, ENERGY_BODY),
-        },
-    }
-    return {"wear": by_law} | {f"wear.{body}.evolution": EVOLUTIONS for body in bodies}
-
-
-def wear(*bodies):
-    """The same of wear cases, whose friction may change too."""
-    return FRICTION | laws(LENGTHS, *bodies)
-
-
-def with_path(**loads):
-    """Loads of a mesh by kind, each pulled once and let go."""
-    return {kind: {"kind": kind, "path": [1, 0], **load} for kind, load in loads.items()}
-
-
-# Sections that the templates do not have: kind of case, key of the section, its own kinds.
-GIVEN = {
-    "dovetail": {"load_path.mix": {ALWAYS: [{"share": 1}]}, **wear("blade", "disk")},
-    "mesh": {
-        "load_path.mix": {ALWAYS: [{"share": 1, "factors": [1]}]},
-        "structure.contacts.0.gap": GAPS,
-        "structure.loads.0": with_path(
-            force={"group": "blade_top", "force": [0, 0, -100]},
-            displacement={"group": "blade_top", "displacement": [0.01, 0, 0]},
-            rotation={"axis": [0, 1, 0], "through": [0, 0, 0], "speed": "6000 rpm"},
-            acceleration={"acceleration": [0, 0, 9810]},
-        ),
-        **wear("body_1", "body_2"),
-    },
-    "resultants": {
-        "structure.gap": GAPS,
-        "structure.interfaces": {
-            **{shape: [{**INTERFACE, "gap": gap}] for shape, gap in GAPS.items()},
-            ALWAYS: [INTERFACE],
-        },
-        **wear("body_1", "body_2"),
-    },
-    "specimens": {
-        "structure.form": {ALWAYS: {"along": "1 m", "across": "50 mm"}},
-        "wear.reported": {ALWAYS: REPORTED},
-        **laws({"cycles": 1e5}, "body_1", "body_2"),
-    },
-    "bodies": {
-        "structure": {
-            "ellipsoid": {"kind": "bodies", "shape": "ellipsoid", "radius_x": 1, "radius_y": 2},
-            "heights": {"kind": "bodies", "shape": "heights", "file": "gap.npy"},
-        }
-    },
-    "line": {
-        "structure": {
-            "flat_rounded": {
-                "kind": "bodies",
-                "shape": "flat_rounded",
-                "half_width": 1,
-                "edge_radius": 2,
-            },
-            "heights": {"kind": "bodies", "shape": "heights", "file": "gap.npy"},
-        }
-    },
-}
-FLAT = {"kind": "bodies", "shape": "flat", "half_width": 0.1, "step": 0.1}
-FLATS = {"bodies": FLAT | {"half_length": 0.1}, "line": FLAT}
-# Two bodies that wear may have the shapes of those that do not, or be flat.
-GIVEN |= {
-    f"{kind}_wear": wear("body_1", "body_2")
-    | {"structure": GIVEN[kind]["structure"] | {"flat": flat}}
-    for kind, flat in FLATS.items()
-}
-# Cases in time: other joints, factors of their parameters, and other excitations.
-JOINT = {"normal_load": 60, "friction": 0.1, "stiffness": 1e4}
-JOINTS = {law: {"law": law, **JOINT} for law in ("jenkins", "uniform_iwan", "four_parameter_iwan")}
-TOLD = [{"quantity": "a.b", "value": "3 um", "source": "a test"}]
-JOINTS["four_parameter_iwan"] |= {"chi": -0.5, "beta": 1.0}
-FACTORS = {
-    "logarithmic": {"kind": "logarithmic", "change": 0.1, "rate": 1},
-    "arrhenius": {"kind": "arrhenius", "change": 0.1, "scale": 1},
-    "linear": {"kind": "linear", "slope": 0},
-    "exponential": {"kind": "exponential", "final": 1, "rate": 1},
-    "table": {"kind": "table", "energy": [0, 1000], "factor": [1, 1]},
-}
-EVOLUTION = {
-    f"evolution.{name}": FACTORS
-    for name in ("friction", "stiffness", "residual_stiffness", "normal_load")
-}
-GIVEN["joint"] = {"joint": JOINTS, **EVOLUTION, "reported": {ALWAYS: TOLD}}
-GIVEN["vibration_wear"] = GIVEN["friction_rig_wear"] = {}
-CONTACT = {"law": "friction_contact", **JOINT, "normal_load": 0, "normal_stiffness": 1e4}
-REDUCED = {
-    "kind": "reduced",
-    "file": "body_2.h5",
-    "joints": [{"points": "pad", "direction": "-z"}],
-    "masses": [{"points": "ring", "mass": 1}],
-    "springs": [{"points": "ring", "direction": "x", "stiffness": 1}],
-    "damping_ratio": 0.1,
-    "driven": {"points": "ring", "direction": "x"},
-    "seen": {"points": "pad", "direction": "x"},
-}
-FRICTION_RIG = {
-    "kind": "friction_rig",
-    "specimens": "specimens_rig.yaml",
-    "masses": [1, 1],
-    "springs": [1, 1],
-    "damping_ratio": 0.1,
-}
-GIVEN["vibration"] = {
-    "structure": {"reduced": REDUCED, "friction_rig": FRICTION_RIG},
-    "joint": JOINTS | {"friction_contact": CONTACT},
-    "loops": {ALWAYS: {"frequency": "100 Hz"}},
-}
-GIVEN["rig"] = GIVEN["joint"] | {
-    "structure": {"reduced": REDUCED},
-    "joint": JOINTS | {"friction_contact": CONTACT},
-    "ageing": {ALWAYS: {"cycles": 1000}},
-    "excitation": {
-        "hammer": {
-            "kind": "hammer",
-            "force": 1,
-            "duration": 4e-4,
-            "record": 1,
-            "band": [1, 500],
-        },
-        "recorded": {"kind": "recorded", "file": "force.csv"},
-    },
-}
-# A CAD file in the place of the template's mesh; gmsh writes no names into it.
-CAD = [
-    "structure.file=joint.step",
-    "structure.body_1=solid_1",
-    "structure.body_2=solid_2",
-    "structure.contacts.0.face_1=solid_1.face_6",
-    "structure.contacts.0.face_2=solid_2.face_5",
-    "structure.supports.0.group=solid_1.face_5",
-    "structure.loads.0.group=solid_2.face_6",
-]
-# Cells of the templates that may take heights.
-CELLS = {"mesh": (128, 256), "resultants": (128, 256)}
-CELLS |= dict.fromkeys(("bodies", "bodies_wear"), (128, 128))
-CELLS |= dict.fromkeys(("line", "line_wear"), (512,))
-
-
-@dataclass(frozen=True)
-class Leaf:
-    """An entry in one of its places: a kind of case, a dotted key there, the kinds of sections.
-
-    ``declared`` is the section that declares it, be it for those that inherit from it.
-    """
-
-    kind: str
-    key: str
-    tags: tuple[str, ...]
-    field: Any
-    declared: type[Section]
-
-    def __str__(self) -> str:
-        return ":".join((self.kind, self.key, *self.tags))
-
-    @property
-    def name(self) -> str:
-        return self.key.rpartition(".")[2]
-
-    @property
-    def needed(self) -> list[str]:
-        """Overrides that make the template have it."""
-        overrides = []
-        for section, given in ({"expect": {ALWAYS: EXPECT}} | GIVEN.get(self.kind, {})).items():
-            if self.key.startswith(f"{section}."):
-                chosen = [given[tag] for tag in (*self.tags, ALWAYS) if tag in given]
-                overrides += [f"{section}={value}" for value in chosen[:1]]
-        if "friction_contact" in self.tags:
-            overrides.append(f"structure={REDUCED}")
-        if "friction_rig" in self.tags:
-            overrides.append(f"joint={CONTACT | {'normal_load': 60}}")
-        return overrides
-
-    @property
-    def is_list(self) -> bool:
-        return "tuple" in str(self.field.annotation)
-
-    def listed(self, first, last):
-        """A list as long as the example, its last value another than those before."""
-        return f"[{', '.join([first] * (len(self.field.examples[0]) - 1) + [last])}]"
-
-
-def declaring(model: type[Section], name: str) -> type[Section]:
-    """The section that declares an entry which ``model`` has or inherits."""
-    return next(base for base in model.__mro__ if name in inspect.get_annotations(base))
-
-
-def leaves(model, path=(), tags=()):
-    """``(path, tags, field, declaring section)`` of every leaf, in every place.
-
-    Lists are entered at 0, unions at all their kinds.
-    """
-    for name, field in model.model_fields.items():
-        sections = list(sections_of(field.annotation))
-        index = (0,) if get_origin(field.annotation) is tuple and sections else ()
-        for section in sections:
-            choices = [section.model_fields[key] for key in ("law", "shape", "kind", "scope")
-                       if key in section.model_fields and len(sections) > 1]  # fmt: skip
-            tag = [get_args(choice.annotation)[0] for choice in choices[:1]]
-            yield from leaves(section, (*path, name, *index), (*tags, *tag))
-        if not sections:
-            yield (*path, name), tags, field, declaring(model, name)
-
-
-def in_all_places() -> Iterator[Leaf]:
-    for kind, model in kinds().items():
-        for path, tags, field, declared in leaves(model):
-            yield Leaf(kind, ".".join(map(str, path)), tags, field, declared)
-
-
-def first_of_each(places: list[Leaf]) -> list[Leaf]:
-    """Every declared entry, in the first of its places."""
-    first: dict[tuple[type[Section], str], Leaf] = {}
-    for leaf in places:
-        first.setdefault((leaf.declared, leaf.name), leaf)
-    return list(first.values())
-
-
-PARSED = functools.cache(source.parse_yaml)
-TEMPLATE = functools.cache(template)
-PLACES = list(in_all_places())
-LEAVES = first_of_each(PLACES)
-SECTIONS: dict[type[Section], list[Leaf]] = {}
-for _leaf in LEAVES:
-    SECTIONS.setdefault(_leaf.declared, []).append(_leaf)
-each_section = pytest.mark.parametrize(
-    "entries", SECTIONS.values(), ids=[section.__name__ for section in SECTIONS]
-)
-# Every set of sections that some entry needs.
-VARIANTS = {(leaf.kind, *leaf.needed): leaf for leaf in PLACES}
+from workflow.kinds import kinds, load_case, parse_case
 
 
 @pytest.fixture(autouse=True)

@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 
-from tests.workflow.test_time_cases import refused, run
+from tests.workflow.time_scenes import refused, run
 
 SPECIMENS = """\
 title: Coarse specimens

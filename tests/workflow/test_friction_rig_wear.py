@@ -12,7 +12,7 @@ import yaml
 from fe_models.dynamics.rig import natural_frequencies
 from tests.workflow.conftest import invoke, manifest_has_all
 from tests.workflow.test_friction_rig import NODES, RIG, SPECIMENS
-from tests.workflow.test_time_cases import refused
+from tests.workflow.time_scenes import refused
 from wear.evolution import EnergyTable
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw
 from wear.steppers import ExplicitStepper, HeunStepper, advance_cycles, step_errors

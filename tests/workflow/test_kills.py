@@ -21,10 +21,10 @@ from tests.workflow.test_friction_rig import RIG as PADS
 from tests.workflow.test_friction_rig import SPECIMENS
 from tests.workflow.test_friction_rig_wear import WORN
 from tests.workflow.test_specimens_case import SMALL
-from tests.workflow.test_time_cases import HAMMER, JOINT
-from tests.workflow.test_time_cases import RIG as RIG_IN_TIME
 from tests.workflow.test_vibration_wear import RIG as WEARING_RIG
 from tests.workflow.test_vibration_wear import WEAR as BALL
+from tests.workflow.time_scenes import HAMMER, JOINT
+from tests.workflow.time_scenes import RIG as RIG_IN_TIME
 from workflow.shell import steps
 from workflow.shell.lock import LOCK
 from workflow.shell.steps import RunSteps

@@ -1,182 +1,23 @@
-"""Mesh cases through the whole road: against our own dovetail, files of all kinds, refusals."""
+"""Mesh cases through the whole road: files of all kinds, in space and in the plane, refusals."""
 
 import json
-from pathlib import Path
 
 import h5py
 import numpy as np
 import pytest
-from ruamel.yaml import YAML
 
 from fe_models import friction
 from fe_models.geometry.imported import patch, read_bodies
 from fe_models.gmsh_session import gmsh_model
-from fe_models.mesh import write_msh
 from fe_models.structure import CLOSED
-from tests.marks import slow
 from tests.workflow.commands import invoke
+from tests.workflow.mesh_scenes import refused, run, write_case
 from workflow.analyses.wear.structure_stage import StructureStage
-from workflow.analyses.wear.structures.dovetail.model import DovetailModel
 from workflow.analyses.wear.structures.mesh.model import MeshModel
 from workflow.errors import MethodFailed
 from workflow.kinds import load_case, template
 
 pytestmark = pytest.mark.usefixtures("reads_here")
-
-STEEL = {"young": "200 GPa", "poisson": 0.3, "density": "7800 kg/m^3"}
-WEAR = {
-    "law": "energy",
-    "body_1": {"coefficient": "1e3 um^3/J"},
-    "body_2": {"coefficient": "1e3 um^3/J"},
-    "cycles": 1e3,
-    "step": {"kind": "implicit", "cycles": 500},
-}
-# Corners of the faces S1 to S4 of Abaqus' tetrahedron.
-ABAQUS_FACES = ((0, 1, 2), (0, 3, 1), (1, 3, 2), (2, 3, 0))
-
-
-def write_case(path, structure, legs, mu=0.5, grid=(16, 16), **changes):
-    """A case file of the given structure, steel on steel."""
-    case = {
-        "title": "Bodies of a mesh file",
-        "analysis": "wear",
-        "structure": {"kind": "mesh", **structure},
-        "materials": {"body_1": STEEL, "body_2": STEEL},
-        "friction": {"coefficient": mu},
-        "load_path": legs,
-        "contact": {"grid": list(grid)},
-        "wear": WEAR,
-        "stress": {"section": "none", "life": {"parameter": "none"}},
-        "output": {"paraview": False, "figures": False},
-        **changes,
-    }
-    with path.open("w", encoding="utf-8") as stream:
-        YAML().dump(json.loads(json.dumps(case)), stream)
-    return path
-
-
-def settings(overrides):
-    return [part for entry in overrides for part in ("--set", entry)]
-
-
-def refused(path, *overrides):
-    """The one line that refuses a case, after its ``fretscale: ``."""
-    ending = invoke("check", path, *settings(overrides))
-    assert ending.exit_code == 2, ending.output
-    (line,) = ending.stderr.splitlines()
-    return line.removeprefix("fretscale: ")
-
-
-def run(case, out, *overrides):
-    """The summary of a run."""
-    ending = invoke("run", case, "--out", out, *settings(overrides))
-    assert ending.exit_code == 0, ending.stderr
-    return json.loads((out / "summary.json").read_text("utf-8"))
-
-
-# --- our own dovetail, as a file ------------------------------------------------------------------
-
-
-def write_inp(path: Path, mesh) -> None:
-    """Both bodies in a flat Abaqus file, with element sets and element surfaces."""
-    nodes, cells, surfaces = ["*NODE"], [], []
-    node, element = 1, 1
-    for body in (mesh.body_1, mesh.body_2):
-        corners = body.mesh.t.T
-        for number, (x, y, z) in enumerate(body.points.tolist(), node):
-            nodes.append(f"{number}, {x!r}, {y!r}, {z!r}")
-        cells.append(f"*ELEMENT, TYPE=C3D4, ELSET={body.name}")
-        for number, vertices in enumerate(corners + node, element):
-            cells.append(f"{number}, {', '.join(map(str, vertices))}")
-        for name, index in body.mesh.boundaries.items():
-            surfaces.append(f"*SURFACE, TYPE=ELEMENT, NAME={body.name}_{name}")
-            for facet in index:
-                cell = body.mesh.f2t[0, facet]
-                places = [corners[cell].tolist().index(v) for v in body.mesh.facets[:, facet]]
-                side = [set(face) for face in ABAQUS_FACES].index(set(places))
-                surfaces.append(f"{element + cell}, S{side + 1}")
-        node, element = node + len(body.points), element + len(corners)
-    path.write_text("\n".join([*nodes, *cells, *surfaces, ""]), encoding="utf-8")
-
-
-def dovetail_as_mesh(folder, dovetail, ending):
-    """The dovetail's own mesh in a file, and the case that describes it.
-
-    Every increment is a leg of its own: the pull follows the square of the speed.
-    """
-    model = DovetailModel(dovetail)
-    mesh = model.mesh()
-    file = folder / f"joint{ending}"
-    (write_msh if ending == ".msh" else write_inp)(file, mesh)
-    path, shape = dovetail.load_path, dovetail.structure
-    speeds = np.sqrt(model.missions[0].amplitudes[:, 0]) / path.rotation_speed
-    pull = path.airfoil_mass * path.airfoil_radius * path.rotation_speed**2
-    widths = ("edge_width", "edge_radius", "end_width", "end_radius")
-    rounded = {"shape": "rounded"} | {name: getattr(shape, name) for name in widths}
-    contacts = [
-        {
-            "name": face.name,
-            "face_1": f"disk_{face.name}",
-            "face_2": f"blade_{face.name}",
-            "x": face.frame.axes[0].tolist(),
-            "gap": rounded,
-        }
-        for face in mesh.interfaces
-    ]
-    spin = {"kind": "rotation", "axis": [0.0, 1.0, 0.0], "through": [0.0, 0.0, 0.0]}
-    spin |= {"speed": path.rotation_speed, "path": speeds.tolist()}
-    airfoil = {"kind": "force", "group": "blade_shank_top", "force": [0.0, 0.0, pull]}
-    structure = {
-        "file": file.name,
-        "body_1": "disk",
-        "body_2": "blade",
-        "contacts": contacts,
-        "supports": [
-            {"group": "disk_inner", "hold": "all"},
-            {"group": "disk_sides", "hold": "normal"},
-            {"group": "blade_root_bottom", "hold": "mean_y"},
-        ],
-        "loads": [spin, airfoil | {"path": (speeds**2).tolist()}],
-    }
-    materials = {
-        f"body_{n}": {"young": m.young, "poisson": m.poisson, "density": m.density}
-        for n, m in ((1, dovetail.material(1)), (2, dovetail.material(2)))
-    }
-    legs = {"increments": [1] * len(speeds), "peak_leg": path.peak_at}
-    mu = dovetail.friction.coefficient
-    return write_case(folder / "joint.yaml", structure, legs, mu, materials=materials)
-
-
-@pytest.mark.parametrize("ending", [".msh", slow(".inp")])
-def test_dovetail_as_a_mesh_is_the_dovetail(tmp_path, small_path, ending, monkeypatch):
-    """Loads, slips and energies of every increment, to the solver's accuracy."""
-    monkeypatch.setattr(friction, "TOLERANCE", 1e-11)
-    monkeypatch.setenv("FRETSCALE_CACHE", str(tmp_path / "cache"))
-    dovetail = load_case(small_path)
-    ours = StructureStage(DovetailModel(dovetail))
-    theirs = StructureStage(MeshModel(load_case(dovetail_as_mesh(tmp_path, dovetail, ending))))
-    assert theirs.peak == ours.peak
-    for one, two in zip(ours.unworn(), theirs.unworn(), strict=True):
-        assert one.interface.name == two.interface.name
-        here, there = one.interface.coordinates, two.interface.coordinates
-        order = [int(np.argmin(np.linalg.norm(there - place, axis=1))) for place in here]
-        np.testing.assert_allclose(there[order], here, atol=1e-9)
-        np.testing.assert_allclose(two.interface.gap[order], one.interface.gap, atol=1e-12)
-        load, size = one.loads.P.max(), np.abs(here).max()
-        work = one.loads.Edx.max()
-        scales = {"P": load, "Qx": load, "Qy": load, "Edx": work, "Edy": work}
-        for name, scale in (scales | dict.fromkeys(("Mx", "My", "Mz"), load * size)).items():
-            values = getattr(one.loads, name), getattr(two.loads, name)
-            np.testing.assert_allclose(values[1], values[0], atol=1e-6 * scale, err_msg=name)
-        np.testing.assert_array_equal(two.loads.sliding, one.loads.sliding)
-        np.testing.assert_allclose(
-            two.slip[..., order], one.slip, atol=1e-6 * np.abs(one.slip).max()
-        )
-    face, original = theirs.faces[0], ours.faces[0]
-    np.testing.assert_allclose(face.size, original.size, rtol=1e-9)
-    x, y = np.linspace(-5.0, 5.0, 7)[:, None], np.linspace(-28.0, 28.0, 5)[None, :]
-    np.testing.assert_allclose(face.gap(x, y), original.gap(x, y), atol=1e-9)
-
 
 # --- files of all kinds, run ----------------------------------------------------------------------
 

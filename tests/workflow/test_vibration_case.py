@@ -8,7 +8,7 @@ import pytest
 import scipy.linalg as sl
 
 from tests.workflow.conftest import invoke
-from tests.workflow.test_time_cases import MASS, STIFF, linear_rig, receptance, refused, run
+from tests.workflow.time_scenes import MASS, STIFF, linear_rig, receptance, refused, run
 from wear.joints.jenkins import Jenkins
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.memory import memory

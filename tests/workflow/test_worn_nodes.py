@@ -6,7 +6,7 @@ import pytest
 from fe_models.mesh import Face
 from fe_models.transfer import FaceTransfer
 from sa_solver.types import Frame, Grid
-from tests.workflow.test_resultants_files import SIZE, flank, write
+from tests.workflow.contact_loads import SIZE, flank, write
 from workflow.analyses.wear.structures.resultants.faces import FaceError, facets_over
 from workflow.analyses.wear.worn_nodes import (
     nodal_depths,

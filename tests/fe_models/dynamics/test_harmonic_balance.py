@@ -11,38 +11,30 @@ from fe_models.dynamics import harmonic_balance
 from fe_models.dynamics.cycle_energy import energy_lost
 from fe_models.dynamics.excitation import HarmonicForce
 from fe_models.dynamics.forced_response import Accuracy, along_force, along_frequency
-from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonic_balance import PeriodicLoad
 from fe_models.dynamics.harmonic_jacobian import HarmonicJacobian
 from fe_models.dynamics.harmonics import HarmonicBalanceError, Resolution
-from fe_models.dynamics.model import DynamicModel
 from fe_models.dynamics.receptance import Receptance, ReceptanceError
 from fe_models.dynamics.resolution_error import resolution_error
 from fe_models.dynamics.rig import Link, lumped_rig, natural_frequencies, unit_force
+from tests.fe_models.dynamics.harmonic_rigs import (
+    EXACT,
+    KT,
+    LOAD,
+    MU,
+    ODD,
+    REACH,
+    balance,
+    contact_rig,
+    pressed,
+    rig,
+    sine,
+)
 from tests.oracles.cubic_springs import CubicSprings
 from tests.oracles.event_driven import SliderJoints, integrate_exactly
-from tests.oracles.two_mass_rig import two_mass_rig
 from wear.joints.friction_contact import FrictionContact
 from wear.joints.jenkins import Jenkins
-from wear.joints.periodic import SEPARATED, SLIP, STICK, PeriodicMarch
-
-EXACT = 1e-9
-KT, MU, LOAD = 45e3, 0.88, 60.0
-REACH = MU * LOAD / KT
-JENKINS = PeriodicMarch(Jenkins(KT, MU, LOAD))
-ODD = tuple(range(1, 16, 2))
-
-
-def rig(ratio=0.001):
-    """The thesis's rig."""
-    return two_mass_rig((21.152e-3, 1.189e-3), (1.3469e3, 273e3), ratio)
-
-
-def sine(model, name="m1"):
-    return PeriodicLoad({1: -1j * unit_force(model, name)})
-
-
-def balance(model, joints=JENKINS, harmonics=ODD, samples=256, load=None):
-    return HarmonicBalance(model, joints, load or sine(model), Resolution(harmonics, samples))
+from wear.joints.periodic import STICK, PeriodicMarch
 
 
 def mixed_rig():
@@ -430,88 +422,6 @@ def test_resonance_falls_from_stuck_to_sliding_as_the_force_grows():
     assert peaks[0] == pytest.approx(214.38, abs=0.5)
     assert peaks[-1] == pytest.approx(39.08, abs=0.1)
     assert 0 < np.argmin(heights) < len(heights) - 1
-
-
-# --- Contacts in three dimensions
-
-
-def contact_rig():
-    """A mass free but for its contact along z, on springs along x and y."""
-    return lumped_rig(
-        {"x": 2e-3, "y": 2e-3, "z": 2e-3},
-        {Link("x"): 500.0, Link("y"): 700.0},
-        [[Link("x"), Link("y"), Link("z")]],
-        0.01,
-    )
-
-
-def pressed(model, load, tangential, normal=0.0):
-    waves = {1: tangential * unit_force(model, "x") + normal * unit_force(model, "z")}
-    return PeriodicLoad(waves, load * unit_force(model, "z"))
-
-
-def test_preload_alone_closes_the_gap():
-    """z is held by the contact only: gap plus load over kn, whatever the frequency."""
-    model, law = contact_rig(), FrictionContact(300.0, 400.0, 0.5, gap=0.01)
-    problem = balance(model, PeriodicMarch(law), (0, 1, 2, 3), 64, pressed(model, 8.0, 1.0))
-    still = problem.solve(30.0, 0.0)
-    assert still.converged
-    assert still.coefficients[0, 0, 2] == pytest.approx(0.01 + 8.0 / 400.0, rel=EXACT)
-    stuck = problem.solve(30.0, 0.5)
-    omega = 2.0 * np.pi * 30.0
-    model_damping = model.damping[0, 0]
-    wanted = 0.5 / (800.0 - 2e-3 * omega**2 + 1j * omega * model_damping)
-    assert stuck.amplitude(0) == pytest.approx(wanted, rel=1e-8)
-    assert np.all(stuck.cycle.states == STICK)
-    slipping = problem.solve(30.0, 30.0)
-    assert slipping.converged
-    assert np.any(slipping.cycle.states == SLIP)
-
-
-def test_contact_that_opens_and_closes_balances_in_the_mean():
-    """All that carries the mean load is the contact: its mean force is the load."""
-    model, law = contact_rig(), FrictionContact(300.0, 400.0, 0.5)
-    load = pressed(model, 8.0, 12.0, 2.0)
-    problem = balance(model, PeriodicMarch(law), tuple(range(12)), 512, load)
-    branch = along_force(problem, 40.0, (0.0, 3.0))
-    assert branch.message == ""
-    last = branch.solutions[-1]
-    assert {SLIP, SEPARATED} <= set(np.unique(last.cycle.states))
-    assert last.cycle.samples[:, 0, 2].mean() == pytest.approx(8.0, rel=1e-8)
-    np.testing.assert_allclose(
-        last.cycle.force[0], problem.resolution.weights @ last.cycle.samples[:, 0], atol=1e-12
-    )
-    assert last.cycle.samples[:, 0, 2].min() == 0.0
-
-
-def test_an_open_contact_leaves_the_structure_linear():
-    model = replace(contact_rig(), stiffness=np.diag([500.0, 700.0, 900.0]))
-    law = FrictionContact(300.0, 400.0, 0.5, gap=1.0)
-    problem = balance(
-        model, PeriodicMarch(law), (0, 1, 3), 64, PeriodicLoad({1: unit_force(model, "x")})
-    )
-    solution = problem.solve(60.0, 2.0)
-    omega = 2.0 * np.pi * 60.0
-    wanted = 2.0 / (500.0 - 2e-3 * omega**2 + 1j * omega * model.damping[0, 0])
-    assert solution.amplitude(0) == pytest.approx(wanted, rel=EXACT)
-    assert np.all(solution.cycle.states == SEPARATED)
-
-
-def test_joints_apart_do_not_see_each_other():
-    """Two rigs in one model move as each alone, with its own load."""
-    one = rig(0.02)
-    pair = DynamicModel(
-        *(np.kron(np.eye(2), part) for part in (one.mass, one.damping, one.stiffness)),
-        np.kron(np.eye(2), one.connection),
-        ("a1", "a2", "b1", "b2"),
-    )
-    load = PeriodicLoad({1: -1j * np.array([1.0, 0.0, 0.6, 0.0])})
-    both = balance(pair, harmonics=(1, 3, 5), load=load).solve(100.0, 70.0)
-    for place, force in ((0, 70.0), (2, 42.0)):
-        alone = balance(one, harmonics=(1, 3, 5)).solve(100.0, force)
-        np.testing.assert_allclose(
-            both.motion[:, place : place + 2], alone.motion, rtol=1e-7, atol=1e-12
-        )
 
 
 # --- Mistakes

@@ -1,0 +1,44 @@
+"""Rigs whose steady vibration is balanced by more than one test module."""
+
+from __future__ import annotations
+
+from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
+from fe_models.dynamics.harmonics import Resolution
+from fe_models.dynamics.rig import Link, lumped_rig, unit_force
+from tests.oracles.two_mass_rig import two_mass_rig
+from wear.joints.jenkins import Jenkins
+from wear.joints.periodic import PeriodicMarch
+
+EXACT = 1e-9
+KT, MU, LOAD = 45e3, 0.88, 60.0
+REACH = MU * LOAD / KT
+JENKINS = PeriodicMarch(Jenkins(KT, MU, LOAD))
+ODD = tuple(range(1, 16, 2))
+
+
+def rig(ratio=0.001):
+    """The thesis's rig."""
+    return two_mass_rig((21.152e-3, 1.189e-3), (1.3469e3, 273e3), ratio)
+
+
+def sine(model, name="m1"):
+    return PeriodicLoad({1: -1j * unit_force(model, name)})
+
+
+def balance(model, joints=JENKINS, harmonics=ODD, samples=256, load=None):
+    return HarmonicBalance(model, joints, load or sine(model), Resolution(harmonics, samples))
+
+
+def contact_rig():
+    """A mass free but for its contact along z, on springs along x and y."""
+    return lumped_rig(
+        {"x": 2e-3, "y": 2e-3, "z": 2e-3},
+        {Link("x"): 500.0, Link("y"): 700.0},
+        [[Link("x"), Link("y"), Link("z")]],
+        0.01,
+    )
+
+
+def pressed(model, load, tangential, normal=0.0):
+    waves = {1: tangential * unit_force(model, "x") + normal * unit_force(model, "z")}
+    return PeriodicLoad(waves, load * unit_force(model, "z"))

@@ -1,0 +1,33 @@
+"""What tests of interrupted runs look for."""
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from workflow.shell.store import read_arrays
+
+# Seconds within which everything must have ended.
+PATIENCE = 60.0
+
+posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+
+
+def assert_equal(run, reference):
+    """Same surfaces and kinetics, bit for bit."""
+    assert run.ending.exit_code == 0, run.ending.stderr
+    heights, expected = run.heights(), reference.heights()
+    assert heights.keys() == expected.keys()
+    for name, height in expected.items():
+        np.testing.assert_array_equal(heights[name], height, err_msg=name)
+    assert run.summary["kinetics"] == reference.summary["kinetics"]
+    structure, other = run.summary["structure"], reference.summary["structure"]
+    assert structure["solutions"] == other["solutions"]
+    assert structure["drift"] == other["drift"]
+
+
+def jumps_kept(folder: Path) -> int:
+    """Whole jumps in the checkpoint."""
+    path = folder / "checkpoint.h5"
+    return len(read_arrays(path)[0]["jumps"]) - 1 if path.exists() else -1
