@@ -417,5 +417,9 @@ class TestCase:
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["specimens_flat", "specimens_curved"])
 def test_shipped_cases_meet_their_expectations(name, tmp_path):
-    assert load_case(CASES / f"{name}.yaml").expect
-    assert invoke("verify", CASES / f"{name}.yaml", "--out", tmp_path).exit_code == 0
+    text = (CASES / f"{name}.yaml").read_text(encoding="utf-8")
+    path = tmp_path / f"{name}.yaml"
+    path.write_text(f"{text}\noutput: {{paraview: false, figures: false}}\n", encoding="utf-8")
+    assert load_case(path).expect
+    done = invoke("verify", path, "--out", tmp_path / "out")
+    assert done.exit_code == 0, (done.stdout, done.stderr)
