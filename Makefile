@@ -23,7 +23,7 @@ test: $(TESTABLE)
 	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 --dist worksteal
 
 test-full: test
-	@echo 'fretscale: the tests of more than a few seconds: about 16 minutes on two cores.'
+	@echo 'fretscale: the tests of more than a few seconds: about 17 minutes on two cores.'
 	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 --dist worksteal -m slow
 
 lint: $(TESTABLE)

@@ -30,7 +30,7 @@ from workflow.kinds import load_case, parse_case
 # Seconds of a processor that a check may take, and after which it is taken for endless.
 LIMIT, ENDLESS = 5.0, 60
 # Numbers of mutants in a test; tests of the quick part, and of all.
-BLOCK, QUICK, ALL = 50, 4, 80
+BLOCK, QUICK, ALL = 50, 4, 50
 # What a line may be long, of any text that somebody may write.
 LONGEST = 600
 # Of runs: those looked at, and seconds after which one has shown enough.
