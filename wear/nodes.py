@@ -1,8 +1,9 @@
 """Wear of contacts at nodes, whose cycle is known at once: what each node is pressed and slips by.
 
 A reduced structure finds the pressures and slips of a whole cycle on given surfaces, and no solver
-can be asked on the way: nodes wear by explicit steps, or at the mean of two cycles (Heun). Laws are
-those of :mod:`wear.laws`, with nodes in the place of cells.
+can be asked on the way: nodes wear by explicit steps, at the mean of two cycles (Heun), or by steps
+of many stages (:mod:`wear.stabilised`). Laws are those of :mod:`wear.laws`, with nodes in the place
+of cells.
 """
 
 from __future__ import annotations
@@ -94,17 +95,29 @@ class NodalContact:
             limits.append(cycle.stable_cycles((wear_1 + wear_2).sum(axis=0)))
         return min(limits)
 
-    def explicit_step(self, state: NodalState, cycles: float) -> WearStep[NodalState]:
-        """Wear ``cycles`` cycles at these pressures and slips."""
-        (depth_1, depth_2), work = self.wear(state, cycles), self.work
-        after = replace(
+    def comparable_cycles(self, state: NodalState) -> float:
+        """Any step: all increments wear together (:mod:`wear.stepping` has them in turn)."""
+        return np.inf
+
+    def rates(self, state: NodalState, cycles: float = 0.0) -> Array:
+        """Depths that both bodies lose in a cycle of a step [mm], and energy per area ``(3, n)``."""
+        return np.stack([*self.wear(state, cycles), self.work])
+
+    def worn(self, state: NodalState, lost: Array, cycles: float) -> NodalState:
+        """The state in which nodes have lost so much ``(3, n)``, as :meth:`rates` has it."""
+        depth_1, depth_2, work = lost
+        return replace(
             state,
-            surfaces=state.surfaces.worn(*(cycles * f for f in (depth_1, depth_2, work, work))),
-            energy=state.energy + cycles * self.energy,
-            depth_rate=float(max(depth_1.max(), depth_2.max())),
-            volume_rate=float((depth_1 + depth_2) @ self.areas),
+            surfaces=state.surfaces.worn(depth_1, depth_2, work, work),
+            energy=state.energy + float(work @ self.areas),
+            depth_rate=float(lost[:2].max()) / cycles,
+            volume_rate=float((depth_1 + depth_2) @ self.areas) / cycles,
             start=self.cycles[-1].start,
         )
+
+    def explicit_step(self, state: NodalState, cycles: float) -> WearStep[NodalState]:
+        """Wear ``cycles`` cycles at these pressures and slips."""
+        after = self.worn(state, cycles * self.rates(state, cycles), cycles)
         # One cycle has been solved for it: of a mean, the other one was before.
         return WearStep(after, cycles, Spent(1, 0, 1))
 

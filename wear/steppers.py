@@ -22,7 +22,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
-from typing import Generic, Protocol, Self, TypeVar
+from typing import Any, Generic, Protocol, Self, TypeVar
 
 import numpy as np
 
@@ -240,7 +240,7 @@ def _shortest(stable: float) -> float:
     return SHORTEST * stable if np.isfinite(stable) else 0.0
 
 
-# --- steps that solve the contact on the way ------------------------------------------------------
+# --- steps held against others of twice the length ------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -288,45 +288,53 @@ def step_errors(state: WornState, areas: Array | float = 1.0) -> dict[str, float
     }
 
 
-ContactAt = Callable[[WearState], WearingContact]
+class ComparedContact(Protocol[Contact]):
+    """What limits steps: see :class:`wear.stepping.WearingContact`."""
+
+    def stable_cycles(self, state: Contact) -> float: ...
+    def comparable_cycles(self, state: Contact) -> float: ...
+
+
+Compared = TypeVar("Compared", bound=ComparedContact[Any])
 
 
 @dataclass(frozen=True)
-class _HalfSpaceStepper(ABC):
-    """Steps of a half-space contact: as long as asked for, or as ``control`` lets them be.
+class ComparingStepper(ABC, Generic[State, Compared]):
+    """Steps as long as asked for, or as ``control`` lets them be.
 
-    Each is taken in two halves, and as a whole by the companion of the state. Where surfaces move
-    over each other the last one of a run is of second order: long steps of first order wear edges
-    at which pressure peaks, up to twice as high as what is left of it by short ones.
+    Each is taken in two halves, and as a whole by the companion of the state.
     """
 
     control: ErrorControl | None = None
 
     @abstractmethod
     def _advance(
-        self, state: WearState, cycles: float, contact: WearingContact, contact_at: ContactAt
-    ) -> WearStep[WearState]:
-        """So many cycles at once from ``state``, whose contact is given."""
+        self,
+        state: State,
+        cycles: float,
+        contact: Compared,
+        contact_at: Callable[[State], Compared],
+        last: bool,
+    ) -> WearStep[State]:
+        """So many cycles at once from ``state``, whose contact is given; to the end if ``last``."""
 
     @abstractmethod
-    def _order(self, contact: WearingContact) -> float:
+    def _order(self, contact: Compared) -> float:
         """Of the error in the length of the steps."""
 
     def step(
-        self, state: WearState, most: float, left: float, contact_at: ContactAt
-    ) -> WearStep[WearState]:
+        self, state: State, most: float, left: float, contact_at: Callable[[State], Compared]
+    ) -> WearStep[State]:
         """A step, tried again until ``control`` agrees with its error."""
         contact, control, companion = contact_at(state), self.control, state.companion
         with_companion = contact if companion is state else contact_at(companion)
         order = self._order(contact)
 
-        def trial(cycles: float) -> _Trial[WearState]:
+        def trial(cycles: float) -> _Trial[State]:
             half, last = 0.5 * cycles, cycles >= left * (1.0 - ROUNDING)
-            smoothed = last and contact.sliding.passages is not None
-            advance = _second_order if smoothed else self._advance
-            first = advance(state, half, contact, contact_at)
-            second = advance(first.state, half, contact_at(first.state), contact_at)
-            whole = advance(companion, cycles, with_companion, contact_at)
+            first = self._advance(state, half, contact, contact_at, last)
+            second = self._advance(first.state, half, contact_at(first.state), contact_at, last)
+            whole = self._advance(companion, cycles, with_companion, contact_at, last)
             after = replace(second.state, coarse=whole.state, order=order)
             shortest = 2.0 * _shortest(min(contact.stable_cycles(end) for end in (state, after)))
             fits, proposed = True, cycles
@@ -341,13 +349,30 @@ class _HalfSpaceStepper(ABC):
         return _accepted(trial, longest if control is None else min(longest, state.next_cycles))
 
 
+# --- steps that solve the contact on the way ------------------------------------------------------
+
+
+ContactAt = Callable[[WearState], WearingContact]
+
+
 @dataclass(frozen=True)
-class ImplicitStepper(_HalfSpaceStepper):
-    """Implicit Euler."""
+class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
+    """Implicit Euler.
+
+    Where surfaces move over each other the last step is of second order: long ones of first order
+    wear edges at which pressure peaks, up to twice as high as what is left of it by short ones.
+    """
 
     def _advance(
-        self, state: WearState, cycles: float, contact: WearingContact, contact_at: ContactAt
+        self,
+        state: WearState,
+        cycles: float,
+        contact: WearingContact,
+        contact_at: ContactAt,
+        last: bool,
     ) -> WearStep[WearState]:
+        if last and contact.sliding.passages is not None:
+            return _second_order(state, cycles, contact, contact_at)
         return contact.implicit_step(state, cycles)
 
     def _order(self, contact: WearingContact) -> float:
@@ -355,11 +380,16 @@ class ImplicitStepper(_HalfSpaceStepper):
 
 
 @dataclass(frozen=True)
-class SecondOrderStepper(_HalfSpaceStepper):
+class SecondOrderStepper(ComparingStepper[WearState, WearingContact]):
     """Second order in the step, also where slip changes with wear."""
 
     def _advance(
-        self, state: WearState, cycles: float, contact: WearingContact, contact_at: ContactAt
+        self,
+        state: WearState,
+        cycles: float,
+        contact: WearingContact,
+        contact_at: ContactAt,
+        last: bool,
     ) -> WearStep[WearState]:
         return _second_order(state, cycles, contact, contact_at)
 
@@ -384,7 +414,7 @@ def _second_order(
 
 
 def _judged(
-    control: ErrorControl, before: WearState, after: WearState, to_go: float
+    control: ErrorControl, before: WornState, after: WornState, to_go: float
 ) -> tuple[bool, float]:
     """Whether the error after a step will do, and the change of length that fills what it may be.
 
@@ -416,7 +446,7 @@ def _judged(
     return fits, min(changes)
 
 
-def first_cycles(contact: WearingContact, state: WearState, total: float) -> float:
+def first_cycles(contact: ComparedContact[Contact], state: Contact, total: float) -> float:
     """How far the first automatic step of a run of ``total`` cycles goes."""
     return min(FIRST_STEP * contact.stable_cycles(state), FIRST_SHARE * total)
 
