@@ -88,6 +88,16 @@ class JointResolvent:
     loads: Array
     rigid_modes: int
 
+    def normal_stiffness(self, nodes: int) -> Array:
+        """H between the normal displacements of so many nodes ``(nodes, nodes)`` [N/mm]."""
+        every = np.asarray(self.inverse)
+        free = np.flatnonzero(np.diag(every))
+        stiffness = np.zeros_like(every)
+        stiffness[np.ix_(free, free)] = np.linalg.inv(every[np.ix_(free, free)])
+        stiffness[free, free] -= self.rho
+        normal = slice(len(self.loads) // nodes - 1, None, len(self.loads) // nodes)
+        return np.asarray(stiffness[normal, normal])
+
 
 def join(
     condensed_1: Condensed,

@@ -213,9 +213,11 @@ class CoupledState:
         """Volume that all bodies have lost [mm³]."""
         return _volume(self.kinetics[-1])
 
-    def record(self, cycles: float, cell_areas: list[float], drift: float) -> CoupledState:
+    def record(
+        self, cycles: float, contacts: Sequence[InterfaceContact], drift: float
+    ) -> CoupledState:
         """The state with a row of kinetics added."""
-        row = _kinetics(self.interfaces, cell_areas)
+        row = _kinetics(self.interfaces, contacts)
         return replace(
             self,
             cycles=np.append(self.cycles, cycles),
@@ -270,7 +272,7 @@ class CoupledWear:
             solutions=1,
             spent=sum((first.spent for _, first in begun), Spent()),
         )
-        return state.record(0.0, self._areas, 0.0), [first for _, first in begun]
+        return state.record(0.0, self.contacts.contacts, 0.0), [first for _, first in begun]
 
     def march(self, state: CoupledState) -> Iterator[CoupledState]:
         """The states after every jump from ``state``, until cycles are over or a stop is met."""
@@ -314,7 +316,7 @@ class CoupledWear:
             cycles = max(1.0, shorter)
         state = replace(state, interfaces=interfaces, spent=state.spent + spent)
         state, drift = self._follow_drift(state)
-        return state.record(float(state.cycles[-1]) + cycles, self._areas, drift)
+        return state.record(float(state.cycles[-1]) + cycles, self.contacts.contacts, drift)
 
     def _jump_cycles(self, state: CoupledState) -> float:
         """Cycles of the next jump, by the size that is asked for at the present rates."""
@@ -343,7 +345,7 @@ class CoupledWear:
 
     def _share_to_stop(self, before: CoupledState, interfaces: Sequence[InterfaceState]) -> float:
         """Share of a jump at which it came to a stop that it went past; else 1."""
-        after, stop, share = _kinetics(interfaces, self._areas), self.settings.stop, 1.0
+        after, stop, share = _kinetics(interfaces, self.contacts.contacts), self.settings.stop, 1.0
         for limit, then, now in (
             (stop.depth, before.depth, _depth(after)),
             (stop.volume, before.volume, _volume(after)),
@@ -382,10 +384,6 @@ class CoupledWear:
         friction = self.settings.friction
         return None if friction is None else [friction(worn.energy) for worn in interfaces]
 
-    @property
-    def _areas(self) -> list[float]:
-        return [contact.grid.cell_area for contact in self.contacts.contacts]
-
 
 def _depth(kinetics: Array) -> float:
     """Largest depth of any body [mm] in a row of kinetics ``(interfaces, 5)``."""
@@ -397,12 +395,12 @@ def _volume(kinetics: Array) -> float:
     return float(kinetics[:, 2:4].sum(axis=1).sum())
 
 
-def _kinetics(interfaces: Sequence[InterfaceState], cell_areas: Sequence[float]) -> Array:
+def _kinetics(interfaces: Sequence[InterfaceState], contacts: Sequence[InterfaceContact]) -> Array:
     """Depths, volumes and energy of all interfaces ``(interfaces, 5)``."""
     rows = []
-    for interface, area in zip(interfaces, cell_areas, strict=True):
+    for interface, contact in zip(interfaces, contacts, strict=True):
         depths = interface.surfaces.depths
-        volumes = (float(depth.sum()) * area for depth in depths)
+        volumes = map(contact.volume, depths)
         rows.append([*(float(depth.max()) for depth in depths), *volumes, interface.energy])
     return np.array(rows)
 

@@ -32,6 +32,7 @@ from wear.stepping import (
     WearingContact,
     WearState,
 )
+from wear.surfaces import Surfaces
 from wear.worn import Spent
 
 
@@ -273,6 +274,14 @@ class InterfaceContact:
     def stable_cycles(self, state: InterfaceState) -> float:
         """Longest explicit step that is stable."""
         return self._loaded(state).contact.stable_cycles(state)
+
+    def on_grid(self, state: InterfaceState) -> Surfaces:
+        """The surfaces on the cells of the grid."""
+        return state.surfaces
+
+    def volume(self, depth: Array) -> float:
+        """Volume of a worn ``depth``, as the surfaces of states have it [mm³]."""
+        return float(depth.sum()) * self.grid.cell_area
 
     def nodal_depth(self, state: InterfaceState) -> Array:
         """Worn depth of both bodies together at the nodes of the face ``(n,)`` [mm]."""

@@ -100,7 +100,7 @@ class NodalContact:
         return np.inf
 
     def rates(self, state: NodalState, cycles: float = 0.0) -> Array:
-        """Depths that both bodies lose in a cycle of a step [mm], and energy per area ``(3, n)``."""
+        """What a cycle of a step takes ``(3, n)``: depths of both bodies [mm], energy per area."""
         return np.stack([*self.wear(state, cycles), self.work])
 
     def worn(self, state: NodalState, lost: Array, cycles: float) -> NodalState:

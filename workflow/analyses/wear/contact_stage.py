@@ -80,7 +80,7 @@ def _interface(case: WearCase, contact: ContactFace, transfer: FaceTransfer) -> 
         laws=(case.wear_of(1).described(), case.wear_of(2).described()),
         friction=case.friction.at,
         stepper=stepper_of(case.wear),
-        method=settings.method,
+        method="full" if settings.method == "full" else "normal",
         gross_slip=settings.gross_slip,
         driven=contact.driven,
         tilt=contact.tilt,
@@ -108,11 +108,16 @@ def stepper_of(wear: Duration) -> Stepper[WearState, WearingContact]:
     step = wear.step
     if step.kind == "explicit":
         return ExplicitStepper(step.fraction)
-    control = None
-    if step.automatic:
-        relative = wear.tolerance if wear.depth_tolerance is None else None
-        control = ErrorControl(relative, wear.depth_tolerance)
+    control = error_control(wear)
     return ImplicitStepper(control) if step.kind == "implicit" else SecondOrderStepper(control)
+
+
+def error_control(wear: Duration) -> ErrorControl | None:
+    """What chooses the length of steps, None where the case does."""
+    if not wear.step.automatic:
+        return None
+    relative = wear.tolerance if wear.depth_tolerance is None else None
+    return ErrorControl(relative, wear.depth_tolerance)
 
 
 def _check_section(stress: ContactStress, grid: Grid) -> None:

@@ -7,7 +7,7 @@ from contextlib import AbstractContextManager
 from functools import partial
 from typing import Any
 
-from wear.coupled import Contacts
+from wear.coupled import Contacts, CoupledState
 from wear.interface import ContactFields, CycleTractions, InterfaceState
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_loops import WornLoop
@@ -34,15 +34,16 @@ def _worker(case: WearCase, face: ContactFace) -> Callable[..., Any]:
     return answer
 
 
-class ContactProcesses(Contacts):
-    """Contacts that wear side by side; what is quick is done here, by ``stages`` like theirs."""
+class StagedContacts(Contacts):
+    """The contacts of all faces of a case, as ``stages`` describe them."""
 
-    def __init__(self, stages: list[ContactStage], team: Workers) -> None:
+    def __init__(self, stages: list[ContactStage]) -> None:
         super().__init__(stages)
-        self.stages, self._team = stages, team
+        self.stages = stages
 
-    def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
-        return self._team.call(method, *arguments)
+    def restored(self, state: CoupledState) -> CoupledState:
+        """A state that was kept on the disk, with what had not to be."""
+        return state
 
     @property
     def names(self) -> list[str]:
@@ -59,3 +60,14 @@ class ContactProcesses(Contacts):
     def tractions(self, states: Sequence[InterfaceState]) -> list[CycleTractions]:
         """Tractions of a cycle on the present surfaces."""
         return self.call("tractions", states)
+
+
+class ContactProcesses(StagedContacts):
+    """Contacts that wear side by side; what is quick is done here, by ``stages`` like theirs."""
+
+    def __init__(self, stages: list[ContactStage], team: Workers) -> None:
+        super().__init__(stages)
+        self._team = team
+
+    def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
+        return self._team.call(method, *arguments)

@@ -14,7 +14,7 @@ from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_loops import kept_loops, loops_due
 from workflow.analyses.wear.contact_stage import ContactStage
-from workflow.analyses.wear.contact_workers import ContactProcesses
+from workflow.analyses.wear.contact_workers import StagedContacts
 from workflow.analyses.wear.warnings import warn_of_growth, warn_of_instability
 from workflow.shell.analysis import Run
 from workflow.shell.store import write_arrays
@@ -36,7 +36,8 @@ class RunLog(Observer):
             warn_of_instability(self.stages, state, cycles, self.run.reporter)
 
     def jumped(self, before: CoupledState, after: CoupledState) -> None:
-        warn_of_growth(self.stages, after, self.run.reporter)
+        if self.run.case.contact.method != "nodes":
+            warn_of_growth(self.stages, after, self.run.reporter)
         drift, spent = after.drift[-1], after.spent - before.spent
         if after.solutions > before.solutions:
             self.run.reporter.log(f"drift {drift:.2%}: resultants computed again")
@@ -59,7 +60,7 @@ class Recorder(Observer):
     run: Run[WearCase]
     settings: CoupledSettings
     peak: int
-    contacts: ContactProcesses
+    contacts: StagedContacts
     jumps: list[str]
 
     def begin(self, state: CoupledState) -> None:
@@ -75,9 +76,10 @@ class Recorder(Observer):
         with self.run.reporter.stage("checkpoints"):
             recorded = self.contacts.fields(state.interfaces, self.peak)
             arrays: dict[str, Array] = {}
-            names = self.contacts.names
-            for name, interface, fields in zip(names, state.interfaces, recorded, strict=True):
-                for body, height in enumerate(interface.surfaces.heights, start=1):
+            stages = self.contacts.stages
+            for stage, interface, fields in zip(stages, state.interfaces, recorded, strict=True):
+                name = stage.name
+                for body, height in enumerate(stage.on_grid(interface).heights, start=1):
                     arrays[f"surfaces/{name}/body_{body}"] = height
                 arrays |= {f"contact/{name}/{k}": field for k, field in vars(fields).items()}
             attributes = {"cycles": float(state.cycles[-1])}

@@ -94,7 +94,9 @@ class InterfaceOutcome:
     @property
     def worn_area(self) -> float:
         """Area that has worn by the end [mm²]."""
-        return np.count_nonzero(self.state.surfaces.depth > 0.0) * self.stage.grid.cell_area
+        return (
+            np.count_nonzero(self.stage.on_grid(self.state).depth > 0.0) * self.stage.grid.cell_area
+        )
 
     @property
     def slip_per_cycle(self) -> float:

@@ -12,9 +12,14 @@ from wear.stepping import ContactFailure
 from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_stage import ContactStage
-from workflow.analyses.wear.contact_workers import ContactProcesses, contact_workers
+from workflow.analyses.wear.contact_workers import (
+    ContactProcesses,
+    StagedContacts,
+    contact_workers,
+)
 from workflow.analyses.wear.fidelity.choosing import report_choice
 from workflow.analyses.wear.load_source import ContactFace, LoadSource
+from workflow.analyses.wear.nodal_contacts import NodalContacts
 from workflow.analyses.wear.recording import Recorder, RunLog
 from workflow.analyses.wear.results import InterfaceOutcome, Outcome, write_output
 from workflow.analyses.wear.structure_stage import StructureStage
@@ -30,6 +35,7 @@ from workflow.analyses.wear.warnings import (
 from workflow.analyses.wear.worn_structure import nonlinearity_sentence
 from workflow.errors import MethodFailed, UserError
 from workflow.shell.analysis import Run
+from workflow.shell.processes import Workers
 from workflow.shell.reporter import Reporter
 
 # Jumps of a run whose explicit steps are too short to be recorded one by one.
@@ -62,7 +68,8 @@ def _compute(run: Run[WearCase]) -> Outcome:
     kept = checkpoint.restored(run, run.kept) if run.kept else None
     source = structure_of(case).source(case)
     faces = meshed_faces(case, source, reporter)
-    with contact_workers(case, faces) as workers:
+    nodal = case.contact.method == "nodes"
+    with contact_workers(case, () if nodal else faces) as workers:
         with reporter.stage("condensation"):
             source.prepare()
         with reporter.stage("structural friction"):
@@ -72,14 +79,13 @@ def _compute(run: Run[WearCase]) -> Outcome:
         if isinstance(source, ResultantsSource):
             warn_of_file(source, reporter)
         with reporter.stage("contact set-up"):
-            stages = [ContactStage(case, face) for face in faces]
-        contacts = ContactProcesses(stages, workers)
+            contacts = _contacts(case, source, faces, workers)
         state, first = _march(run, source, contacts, unworn, kept)
         worn: Sequence[CycleTractions | None] = contacts.each(None)
         if case.stress.wanted:
             with reporter.stage("stress under the contacts"):
                 worn = contacts.tractions(state.interfaces)
-    columns = stages, unworn, first, state.interfaces, worn
+    columns = contacts.stages, unworn, first, state.interfaces, worn
     interfaces = [
         InterfaceOutcome(*column, state.cycles, state.kinetics[:, number])
         for number, column in enumerate(zip(*columns, strict=True))
@@ -87,10 +93,20 @@ def _compute(run: Run[WearCase]) -> Outcome:
     return Outcome(case, source, state, interfaces)
 
 
+def _contacts(
+    case: WearCase, source: LoadSource, faces: Sequence[ContactFace], workers: Workers
+) -> StagedContacts:
+    """What wears: half-spaces in the workers, or the nodes of the structure here."""
+    if case.contact.method == "nodes":
+        assert isinstance(source, StructureStage)
+        return NodalContacts(case, faces, source)
+    return ContactProcesses([ContactStage(case, face) for face in faces], workers)
+
+
 def _march(
     run: Run[WearCase],
     source: LoadSource,
-    contacts: ContactProcesses,
+    contacts: StagedContacts,
     unworn: Sequence[FaceLoads],
     kept: CoupledState | None,
 ) -> tuple[CoupledState, list[FirstContact]]:
@@ -101,7 +117,7 @@ def _march(
     loop = CoupledWear(settings, source, contacts, (RunLog(run, contacts.stages), recorder))
     state, first = loop.begin(unworn)
     warn_of_contact(case, source.peak, contacts.stages, state, first, reporter)
-    end = kept or state
+    end = contacts.restored(kept) if kept else state
     begun = end.jump
     with reporter.course("wear"):
         for end in loop.march(end):  # noqa: B020 - each from the one before

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, Protocol, TypeVar
 
 import numpy as np
+from scipy.linalg import eigvalsh
 
 from fe_models.friction import FrictionalJoint, FrictionState
 from fe_models.joint import JointResolvent
@@ -226,10 +227,20 @@ class StructureStage:
         return self.unworn_cycle.histories
 
     def worn_cycle(
-        self, depths: list[Array], friction: Sequence[float] | None = None
+        self,
+        depths: list[Array],
+        friction: Sequence[float] | None = None,
+        after: CycleSolution | None = None,
     ) -> CycleSolution:
-        """The cycle that follows the unworn one when the gaps are wider by the worn depths."""
-        pairs = zip(self.model.missions, self._unworn_missions, strict=True)
+        """The cycle that follows the unworn one when the gaps are wider by the worn depths.
+
+        Of a single mission it may follow one ``after`` which the gaps were less wide: found sooner.
+        """
+        missions = self._unworn_missions
+        if after is not None:
+            (unworn,) = missions
+            missions = (replace(after, cycles=unworn.cycles),)
+        pairs = zip(self.model.missions, missions, strict=True)
         cycles = [self._cycle(mission, depths, unworn, friction) for mission, unworn in pairs]
         return self._mixed(cycles)
 
@@ -252,6 +263,14 @@ class StructureStage:
         joint, gap = self._joint_of(nodal), self._gap(depths)
         amplitudes, preload = mission.amplitudes, mission.preload
         return _converged(self.structure.solve_cycle(joint, amplitudes, gap, nodal, after, preload))
+
+    def stiffest(self, areas: Array) -> float:
+        """Most that a change of gap raises pressures by, at nodes of such ``areas`` [MPa/mm]."""
+        scale = np.divide(1.0, np.sqrt(areas), out=np.zeros_like(areas), where=areas > 0.0)
+        stiffness = self._resolvent.normal_stiffness(len(areas))
+        last = len(areas) - 1
+        (largest,) = eigvalsh(scale[:, None] * stiffness * scale, subset_by_index=[last, last])
+        return float(largest)
 
     def user_faces(self, number: int) -> tuple[UserFace, ...]:
         """The nodes of the faces of a mesh of the user's own."""

@@ -121,8 +121,7 @@ def uniformity(
     carried = sections(stage.transfer, history, peak)
     if _middle(carried.P) <= 0.0:
         return None
-    surfaces = state.surfaces
-    worn = np.sum(surfaces.depth, axis=0)
+    worn = np.sum(stage.on_grid(state).depth, axis=0)
     deviations = [_deviation(values) for values in (carried.P, carried.slip, worn)]
     y = np.abs(stage.grid.y.ravel())
     half = 0.5 * stage.grid.size[1]

@@ -79,6 +79,8 @@ def warn_of_contact(
                 f"{stage.name}: the pressure reaches {highest:.0f} MPa, above the yield stress of "
                 f"{yield_stress:.0f} MPa: the elastic solution is no longer valid there"
             )
+        if case.contact.method == "nodes":
+            continue  # the grid only shows them
         structural, on_grid = interface.loads.mean_energy, float(result.energy.sum())
         apart = abs(on_grid - structural) > ENERGIES_APART * max(on_grid, structural)
         if apart and not result.cycle:
@@ -108,7 +110,7 @@ def warn_of_instability(
 
 
 def warn_of_growth(stages: list[ContactStage], state: CoupledState, reporter: Reporter) -> None:
-    """Contacts that have grown to the border of their grid: they have worn there."""
+    """Half-spaces in contact that have grown to the border of their grid: they have worn there."""
     for stage, interface in zip(stages, state.interfaces, strict=True):
         worn = interface.surfaces.depth
         if worn[[0, -1], :].any() or (not stage.grid.line and worn[:, [0, -1]].any()):

@@ -55,7 +55,7 @@ def write_worn_faces(
 
 def _worn_nodes(face: UserFace, stage: ContactStage, state: InterfaceState) -> NodalDepths:
     """What the user's nodes lose: those of the contact's own face, or at places of their own."""
-    depth = state.surfaces.depths[face.body - 1]
+    depth = stage.on_grid(state).depths[face.body - 1]
     if face.points is not None:
         return nodal_depths(face.points, face.frame, stage.grid, depth)
     nodal = stage.depths_of_bodies(state)[face.body - 1]

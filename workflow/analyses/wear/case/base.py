@@ -5,6 +5,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import ClassVar, Literal
 
+from pydantic import model_validator
+
 from sa_solver.types import Material as ElasticMaterial
 from workflow.analyses.wear.case.evolution import EvolvingFriction
 from workflow.analyses.wear.case.loops import Loops
@@ -67,6 +69,32 @@ class WearCase(Case):
         worn: Worn = getattr(self.wear, self.bodies[number - 1])
         return worn
 
+    @model_validator(mode="after")
+    def _nodes_can_wear(self) -> WearCase:
+        """Refuse what wear of the mesh's own nodes knows nothing of."""
+        if self.contact.method != "nodes":
+            return self
+        if not isinstance(self, FiniteElementCase):
+            raise disagreement("nodes: nothing is meshed; allowed: normal, full", "contact.method")
+        evolutions = [getattr(self.wear_of(body), "evolution", None) for body in (1, 2)]
+        worn_by_all = any(e is not None and e.scope == "global" for e in evolutions)
+        mixed = bool(getattr(getattr(self, "load_path", None), "mix", ()))
+        wrong = {
+            "wear.step.kind": (self.wear.step.kind != "second_order", "second_order"),
+            "wear.motion": (self.wear.motion == "follow", "auto, neglect"),
+            "wear": (worn_by_all, "evolution with scope: local"),
+            "friction.evolution": (self.friction.evolution is not None, "leave it out"),
+            "load_path.mix": (mixed, "one mission"),
+            "loops": (self.loops.wanted, "leave them out: they are those of a half-space"),
+            "fidelity": (getattr(self, "fidelity", "fixed") != "fixed", "fixed"),
+        }
+        for key, (given, allowed) in wrong.items():
+            if given:
+                raise disagreement(
+                    f"not where nodes wear (contact.method: nodes); allowed: {allowed}", key
+                )
+        return self
+
     @abstractmethod
     def loads_outline(self) -> list[tuple[str, str]]:
         """What structure and loads would run, in a few rows of name and text."""
@@ -96,4 +124,5 @@ class FiniteElementCase(WearCase):
 
     @property
     def recoupling(self) -> Coupling:
-        return self.coupling
+        # Where nodes wear, all of the structure is solved in every step.
+        return super().recoupling if self.contact.method == "nodes" else self.coupling

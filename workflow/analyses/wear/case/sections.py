@@ -97,8 +97,9 @@ class Contact(Section):
     grid: tuple[GridCells, GridCells] = entry(
         "cells along x, along y of every face", [128, 256], default=(128, 256)
     )
-    method: Literal["normal", "full"] = entry(
-        "normal: pressure of the half-space, slips of the structure; full: both of the half-space",
+    method: Literal["normal", "full", "nodes"] = entry(
+        "normal: pressure of the half-space, slips of the structure; full: both of the half-space; "
+        "nodes: finite elements alone, whose nodes wear: without a half-space, slow on fine meshes",
         "normal",
         default="normal",
     )

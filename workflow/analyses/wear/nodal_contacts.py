@@ -1,0 +1,283 @@
+"""Finite elements alone: the nodes of a structure's contact faces wear, without a half-space.
+
+Every cycle of the wear is one of the structure, on the surfaces at hand. An increment wears by its
+slip times the mean pressure of both its ends: half the slip before a solved state and half the slip
+after it count at its pressure, which is of second order in the increments. What is written lies on
+the contact grid, like a half-space's: means of the nodal fields over its cells.
+"""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from fe_models.structure import CycleSolution, InterfaceHistory
+from fe_models.transfer import FaceTransfer
+from sa_solver.types import Array
+from wear.coupled import CoupledState
+from wear.interface import ContactFields, CycleTractions, FaceLoads, FirstContact, InterfaceState
+from wear.nodes import NodalContact, NodalState
+from wear.stabilised import StabilisedStepper
+from wear.steppers import advance_cycles, first_cycles
+from wear.surfaces import Surfaces
+from wear.worn import Spent
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.contact_stage import ContactStage, error_control
+from workflow.analyses.wear.contact_workers import StagedContacts
+from workflow.analyses.wear.load_source import ContactFace
+from workflow.analyses.wear.structure_stage import StructureStage
+
+# Cycles that are kept: those before and after a jump, and the same of its companion.
+KEPT = 4
+
+
+@dataclass(frozen=True)
+class StructureCycle:
+    """A closed cycle as the nodes of all interfaces feel it: see :class:`wear.nodes.NodalCycle`.
+
+    ``stiffness`` [MPa/mm] is the most that the pressure of a node answers to its gap.
+    """
+
+    solution: CycleSolution
+    friction: float
+    areas: Array
+    stiffness: float
+    start: None = None
+
+    @property
+    def slip(self) -> Array:
+        """Half of that before and half of that after each solved state ``(t, n)`` [mm]."""
+        size = np.hypot(*self.solution.fields()["slip"].transpose(1, 0, 2))
+        halves: Array = 0.5 * (size + np.roll(size, -1, axis=0))
+        return halves
+
+    @property
+    def pressure(self) -> Array:
+        """At the end of each increment ``(t, n)`` [MPa]."""
+        force = self.solution.fields()["force"][:, 2]
+        return np.divide(force, self.areas, out=np.zeros_like(force), where=self.areas > 0.0)
+
+    def stable_cycles(self, depth_per_pressure: Array) -> float:
+        """2 / (k w): k bounds the stiffness of the nodes that touch, w is the largest wear."""
+        fastest = self.stiffness * float(depth_per_pressure.max())
+        return 2.0 / fastest if fastest > 0.0 else np.inf
+
+
+class NodalStage(ContactStage):
+    """One face whose nodes wear. The surfaces of its states are nodal, ``(n,)``.
+
+    ``start`` of a state is the depth of the nodes of all faces, by which their cycle is found.
+    """
+
+    def __init__(self, case: WearCase, face: ContactFace, cycles: _Cycles, number: int) -> None:
+        super().__init__(case, face)
+        self._cycles, self._number = cycles, number
+
+    def history(self, state: InterfaceState) -> InterfaceHistory:
+        """What the face does in a cycle on the surfaces of a state."""
+        assert isinstance(state.start, np.ndarray)
+        return self._cycles.at(state.start).histories[self._number]
+
+    # -- surfaces --------------------------------------------------------------------------------
+    def on_grid(self, state: InterfaceState) -> Surfaces:
+        worn = state.surfaces
+        fields = (worn.depth_1, worn.depth_2, worn.work_1, worn.work_2)
+        return Surfaces(self.settings.gap, *map(self.transfer.to_cells, fields))
+
+    def volume(self, depth: Array) -> float:
+        return float(depth @ self.face.nodal_areas)
+
+    def nodal_depth(self, state: InterfaceState) -> Array:
+        return state.surfaces.depth
+
+    def depths_of_bodies(self, state: InterfaceState) -> tuple[Array, Array]:
+        depth_1, depth_2 = state.surfaces.depths
+        if (face_1 := self.face_of(1)) is not self.face:
+            to_1 = FaceTransfer.between(face_1, self.grid)
+            depth_1 = to_1.to_nodes(self.transfer.to_cells(depth_1))
+        return depth_1, depth_2
+
+    # -- tractions -------------------------------------------------------------------------------
+    def fields(self, state: InterfaceState, increment: int) -> ContactFields:
+        tractions = self.tractions(state)
+        pressure, shear, slip = tractions.pressure, tractions.shear, tractions.slip
+        return ContactFields(pressure[increment], shear[increment], slip[increment])
+
+    def tractions(self, state: InterfaceState) -> CycleTractions:
+        return _on_cells(self, self.history(state))
+
+    def unworn_tractions(self, history: FaceLoads, first: FirstContact) -> CycleTractions:
+        assert isinstance(history, InterfaceHistory)
+        return _on_cells(self, history)
+
+
+class _Cycles:
+    """The structure's cycles on worn surfaces, each a function of these alone."""
+
+    def __init__(self, source: StructureStage) -> None:
+        self._source = source
+        self._ends = np.cumsum([len(interface) for interface in source.mesh.interfaces])[:-1]
+        self._solved: deque[tuple[Array, CycleSolution]] = deque(maxlen=KEPT)
+
+    def split(self, nodal: Array) -> list[Array]:
+        """By interface, fields ``(..., n)`` of all nodes."""
+        return np.split(nodal, self._ends, axis=-1)
+
+    def at(self, depth: Array) -> CycleSolution:
+        """That of surfaces which have lost a ``depth`` ``(n,)`` [mm], both bodies together."""
+        if not depth.any():
+            return self._source.unworn_cycle
+        for known, solution in self._solved:
+            if np.array_equal(known, depth):
+                return solution
+        solution = self._source.worn_cycle(self.split(depth))
+        self._solved.append((depth, solution))
+        return solution
+
+    def near(self, depth: Array, other: CycleSolution) -> CycleSolution:
+        """The same where surfaces differ little from those of ``other``: sooner solved."""
+        return self._source.worn_cycle(self.split(depth), after=other)
+
+
+class NodalContacts(StagedContacts):
+    """The faces of a structure that wear at their nodes, all of them together."""
+
+    def __init__(
+        self, case: WearCase, faces: Sequence[ContactFace], source: StructureStage
+    ) -> None:
+        self._cycles = _Cycles(source)
+        super().__init__(
+            [NodalStage(case, face, self._cycles, number) for number, face in enumerate(faces)]
+        )
+        self._laws, self._friction = self.stages[0].settings.laws, source.model.friction
+        self._gap = source.structure.gap()
+        self._areas = np.concatenate([stage.face.nodal_areas for stage in self.stages])
+        self._stiffness = source.stiffest(self._areas)
+        self._stepper = StabilisedStepper(error_control(case.wear))
+
+    def begin(
+        self, histories: Sequence[FaceLoads], cycles: float
+    ) -> list[tuple[InterfaceState, FirstContact]]:
+        state = NodalState.unworn(self._gap)
+        solution = self._cycles.at(state.surfaces.depth)
+        contact = self._contact(solution)
+        state = replace(state, next_cycles=first_cycles(contact, state, cycles))
+        begun = self._of_interfaces(state, contact.rates(state))
+        firsts = self._first_contacts(solution, contact.stable_cycles(state))
+        return list(zip(begun, firsts, strict=True))
+
+    def jump(
+        self, states: Sequence[InterfaceState], cycles: float, left: float
+    ) -> list[tuple[InterfaceState, Spent]]:
+        state = self._together(states)
+        begun = self._cycles.at(state.surfaces.depth)
+
+        def contact_at(worn: NodalState) -> NodalContact:
+            depth = worn.surfaces.depth
+            alike = np.array_equal(depth, state.surfaces.depth)
+            return self._contact(begun if alike else self._cycles.near(depth, begun))
+
+        result = advance_cycles(self._stepper, state, cycles, left, contact_at)
+        spent = result.spent
+        spent = replace(spent, contact_solves=spent.contact_solves * len(begun.states))
+        lost = _fields(result.state.surfaces) - _fields(state.surfaces)
+        worn = self._of_interfaces(result.state, lost / cycles)
+        # All faces wear together: what that has taken counts once.
+        return [(face, Spent() if number else spent) for number, face in enumerate(worn)]
+
+    def restored(self, state: CoupledState) -> CoupledState:
+        return replace(state, interfaces=self._found(state.interfaces))
+
+    def _contact(self, solution: CycleSolution) -> NodalContact:
+        cycle = StructureCycle(solution, self._friction, self._areas, self._stiffness)
+        return NodalContact(self._laws, (cycle,))
+
+    # -- states of all nodes, and by interface -----------------------------------------------------
+    def _together(self, states: Sequence[InterfaceState]) -> NodalState:
+        """The state of all nodes; its companion too, where every face has one."""
+        fields = np.concatenate([_fields(state.surfaces) for state in states], axis=-1)
+        companions = [state.coarse for state in states if state.coarse is not None]
+        first = states[0]
+        return NodalState(
+            surfaces=Surfaces.unworn(self._gap).worn(*fields[[0, 1, 2, 2]]),
+            energy=sum(state.energy for state in states),
+            depth_rate=max(state.depth_rate for state in states),
+            volume_rate=sum(state.volume_rate for state in states),
+            next_cycles=first.next_cycles,
+            coarse=self._together(companions) if companions else None,
+            order=first.order,
+        )
+
+    def _of_interfaces(self, state: NodalState, rates: Array) -> tuple[InterfaceState, ...]:
+        """The states of the faces, which lose so much in a cycle ``(3, n)``."""
+        split, depth = self._cycles.split, state.surfaces.depth
+        coarse: Sequence[InterfaceState | None] = [None] * len(self.stages)
+        if state.coarse is not None:
+            coarse = self._of_interfaces(state.coarse, rates)
+        histories = self._cycles.at(depth).histories
+        parts = map(split, (self._gap, _fields(state.surfaces), rates, self._areas))
+        faces = []
+        for gap, worn, rate, areas, history, companion in zip(
+            *parts, histories, coarse, strict=True
+        ):
+            faces.append(
+                InterfaceState(
+                    surfaces=Surfaces.unworn(gap).worn(*worn[[0, 1, 2, 2]]),
+                    energy=float(worn[2] @ areas),
+                    depth_rate=float(rate[:2].max()),
+                    volume_rate=float(rate[:2].sum(axis=0) @ areas),
+                    next_cycles=state.next_cycles,
+                    coarse=companion,
+                    order=state.order,
+                    start=depth,
+                    loads=history.loads,
+                    slip=history.slip,
+                    ends=np.empty((0, 2, 2)),
+                )
+            )
+        return tuple(faces)
+
+    def _found(self, states: Sequence[InterfaceState]) -> tuple[InterfaceState, ...]:
+        """States with the depth of all nodes, by which their cycle is found."""
+        depth = np.concatenate([state.surfaces.depth for state in states])
+        companions = [state.coarse for state in states if isinstance(state.coarse, InterfaceState)]
+        coarse: Sequence[InterfaceState | None] = [None] * len(states)
+        if companions:
+            coarse = self._found(companions)
+        pairs = zip(states, coarse, strict=True)
+        return tuple(replace(state, start=depth, coarse=other) for state, other in pairs)
+
+    def _first_contacts(self, solution: CycleSolution, stable: float) -> list[FirstContact]:
+        cycle = StructureCycle(solution, self._friction, self._areas, self._stiffness)
+        work = self._friction * cycle.slip * cycle.pressure * self._areas
+        firsts = []
+        columns = zip(self.stages, solution.histories, self._cycles.split(work), strict=True)
+        for number, (stage, history, dissipated) in enumerate(columns):
+            firsts.append(
+                FirstContact(
+                    energy=dissipated.sum(axis=1),
+                    pressure=_on_cells(stage, history).pressure,
+                    touches_border=False,  # there the body itself ends
+                    largest_residual=solution.residual,
+                    spent=Spent() if number else Spent(len(history.slip)),
+                    stable_cycles=stable,
+                    cycle=(),
+                )
+            )
+        return firsts
+
+
+def _fields(surfaces: Surfaces) -> Array:
+    """Depths of both bodies and energy per area ``(3, n)``, which is one for both."""
+    return np.stack([surfaces.depth_1, surfaces.depth_2, surfaces.work_2])
+
+
+def _on_cells(stage: ContactStage, history: InterfaceHistory) -> CycleTractions:
+    """A cycle of a face on the cells of its grid."""
+    areas, force = history.interface.nodal_areas, history.force
+    traction = np.divide(force, areas, out=np.zeros_like(force), where=areas > 0.0)
+    on_cells, slip = map(stage.transfer.to_cells, (traction, history.slip))
+    return CycleTractions(on_cells[:, 2], on_cells[:, :2], slip, np.zeros(len(slip)))
