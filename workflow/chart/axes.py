@@ -32,6 +32,9 @@ DRIFTS = 0.2, 0.1, 0.05, 0.02, 0.01
 # Condensing the structure takes about the fourth power of the refinement in 3-D.
 MESHES_3D = 0.5, 0.5**0.5, 1.0, 2.0**0.5
 MESHES_2D = 0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0, 2.0**1.5, 4.0
+# Of finite elements alone, whose nodes carry the contact: refinements, and where their order is.
+MESHES_ALONE = 1.0, 2.0, 4.0, 8.0
+ORDERS = "mesh.order", "structure.order"
 JUMPS = 5, 10, 20, 40, 80, 160
 ERRORS = 0.1, 0.03, 0.01, 3e-3, 1e-3
 EXPLICIT = 0.9, 0.45
@@ -200,12 +203,17 @@ def _cycle(case: Case) -> Iterator[Rung]:
     if increments is None:
         return
     for factor in INCREMENTS_2D if _is_line(case) else INCREMENTS:
-        legs = (increments,) if isinstance(increments, int) else increments
-        counts = [max(1, round(factor * count)) for count in legs]
-        overrides = [f"load_path.increments={counts[0] if isinstance(increments, int) else counts}"]
-        if peak is not None:
-            overrides.append(f"load_path.peak_at={round(factor * peak)}")
-        yield Rung(f"{sum(counts)} increments", tuple(overrides), 1.0 / factor)
+        yield _in_increments(increments, peak, factor)
+
+
+def _in_increments(increments: int | Sequence[int], peak: int | None, factor: float) -> Rung:
+    """Loads in so many times the increments of a cycle, the peak among them."""
+    legs = (increments,) if isinstance(increments, int) else increments
+    counts = [max(1, round(factor * count)) for count in legs]
+    overrides = [f"load_path.increments={counts[0] if isinstance(increments, int) else counts}"]
+    if peak is not None:
+        overrides.append(f"load_path.peak_at={round(factor * peak)}")
+    return Rung(f"{sum(counts)} increments", tuple(overrides), 1.0 / factor)
 
 
 def _legs(case: Case) -> Iterator[Rung]:
@@ -308,7 +316,12 @@ def _dimensions(case: Case) -> Iterator[Rung]:
 
 
 def _meshes(case: Case) -> Iterator[Rung]:
-    for factor in MESHES_2D if _is_line(case) else MESHES_3D:
+    yield from _refined(case, MESHES_2D if _is_line(case) else MESHES_3D)
+
+
+def _refined(case: Case, factors: Sequence[float]) -> Iterator[Rung]:
+    """Elements as much finer, where the case says how fine they are."""
+    for factor in factors:
         if (nodes := entry_at(case, "mesh.flank_nodes")) is not None:
             counts = [max(3, 1 + round(factor * (count - 1))) for count in nodes]
             size = entry_at(case, "mesh.size") / factor
@@ -325,10 +338,32 @@ def _meshes(case: Case) -> Iterator[Rung]:
 
 
 def _orders(case: Case) -> Iterator[Rung]:
-    for entry in ("mesh.order", "structure.order"):
+    for entry in ORDERS:
         if entry_at(case, entry) is not None:
             for order in (1, 2):
                 yield Rung(f"order {order}", (f"{entry}={order}",))
+
+
+def _alone(case: Case) -> Iterator[Rung]:
+    """The half-space's methods, and finite elements alone on finer and finer meshes.
+
+    Those are of second order, in elements and in twice the increments.
+    """
+    kind = entry_at(case, "structure.kind")
+    plane = kind == "mesh" and entry_at(case, "structure").mesh().interfaces[0].line
+    if not plane and not (kind == "dovetail" and _is_line(case)):
+        return
+    yield from _methods(case)
+    orders = [entry for entry in ORDERS if entry_at(case, entry) is not None]
+    further = ["contact.method=nodes", "wear.step={kind: second_order}"]
+    further += [f"{entry}=2" for entry in orders]
+    increments, peak = (entry_at(case, f"load_path.{key}") for key in ("increments", "peak_at"))
+    if increments is not None:
+        further += _in_increments(increments, peak, 2.0).overrides
+    meshes = list(_refined(case, MESHES_ALONE)) or [Rung("its mesh", ())]
+    for mesh in meshes:
+        overrides = (*further, *mesh.overrides)
+        yield Rung(f"{mesh.name} alone", overrides, mesh.step, branch="alone")
 
 
 # Orders: pressures that end like a square root keep a grid from second order, slips that follow a
@@ -343,6 +378,7 @@ AXES = (
     Axis("history", "increments of the load path", _histories, order=1.0, moves_states=True),
     Axis("mesh", "finite elements of the structure", _meshes, order=2.0),
     Axis("order", "order of the finite elements", _orders),
+    Axis("alone", "half-space, or finite elements alone", _alone, order=1.0),
     Axis("step", "step of the motion in time", _time_steps, order=2.0),
     Axis("harmonics", "odd harmonics of the motion", _harmonics, order=2.0),
     Axis("samples", "samples of a period", _samples, order=2.0),

@@ -35,6 +35,8 @@ STABLE = 1.16
 ITERATIONS, ENTRY, INVERSE = 24, 5e-10, 1e-10
 # Cycles until that of the structure is closed.
 CYCLES = 2
+# Those in a step of finite elements alone.
+CYCLES_IN_A_STEP = 5
 # Branches of a tangential loop that are marched until it is closed, each problem soon solved.
 BRANCHES = 4
 # Stress under a contact, of a cell in an increment: on a face, and by a search for the worst plane.
@@ -76,6 +78,8 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
         worn += solves(steps * extent.increments, cells, FRICTIONAL)
     if case.loops.wanted:
         worn += solves(jumps * BRANCHES * case.loops.increments, cells, NORMAL)
+    if case.contact.method == "nodes":
+        begun, worn = 0.0, steps * CYCLES_IN_A_STEP * _structural_cycle(extent)
     worn += jumps * JUMP
     again = {"constant": 0.0, "drift": 1.0, "every": jumps}[case.recoupling.resultants]
     cycle = _structural_cycle(extent)
