@@ -1,0 +1,185 @@
+"""Finite elements alone: nodes of a structure that wear, against balances and finer meshes."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+
+from sa_solver.types import Array
+from tests.conftest import CASES
+from wear.coupled import CoupledState, CoupledWear
+from wear.steppers import step_errors
+from workflow.analyses.wear.nodal_contacts import NodalContacts, StructureCycle
+from workflow.analyses.wear.run import coupled_settings
+from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.analyses.wear.structures import structure_of
+from workflow.chart.axes import axes_of
+from workflow.errors import CaseError
+from workflow.kinds import load_case
+
+PLANE = CASES / "dovetail_2d.yaml"
+NODES = "contact.method=nodes", "wear.step={kind: second_order}", "contact.grid=[64, 64]"
+COARSE = (
+    *("mesh.flank_nodes=[12, 10]", "mesh.size=8 mm"),
+    *("load_path.increments=6", "load_path.peak_at=3", "wear.cycles=1e5"),
+)
+ALPHA, FRICTION, LOAD = 1e-8, 0.4, 1301.33
+
+
+@dataclass
+class Wearing:
+    """The loop of a case whose nodes wear."""
+
+    source: StructureStage
+    contacts: NodalContacts
+    loop: CoupledWear
+
+    @classmethod
+    def of(cls, *overrides: str) -> "Wearing":
+        case = load_case(PLANE, (*NODES, *overrides))
+        source = structure_of(case).source(case)
+        assert isinstance(source, StructureStage)
+        contacts = NodalContacts(case, source.faces, source)
+        return cls(source, contacts, CoupledWear(coupled_settings(case), source, contacts))
+
+    def states(self) -> Iterator[CoupledState]:
+        state, _ = self.loop.begin(self.source.unworn())
+        yield state
+        yield from self.loop.march(state)
+
+    def worn(self, state: CoupledState) -> tuple[Array, Array, Array]:
+        """Places along a flank, depth of both bodies there, and pressure at peak load."""
+        stage, face = self.contacts.stages[0], state.interfaces[0]
+        x = stage.face.coordinates[:, 0]
+        order = np.argsort(x)
+        pressure = self.contacts.stages[0].history(face).pressure[self.source.peak]
+        return x[order], face.surfaces.depth[order], pressure[order]
+
+
+@pytest.fixture(scope="module")
+def coarse() -> tuple[Wearing, list[CoupledState]]:
+    wearing = Wearing.of(*COARSE)
+    return wearing, list(wearing.states())
+
+
+def test_volume_is_energy_and_flanks_wear_alike(coarse) -> None:
+    _, states = coarse
+    (one, two), rows = states[-1].interfaces, states[-1].kinetics[-1]
+    assert states[-1].cycles[-1] == 1e5
+    for face, (_, _, volume_1, volume_2, energy) in zip((one, two), rows, strict=True):
+        assert volume_1 == pytest.approx(ALPHA * energy, rel=1e-12)
+        assert volume_2 == pytest.approx(ALPHA * energy, rel=1e-12)
+        assert energy == face.energy > 0.0
+    np.testing.assert_allclose(rows[0], rows[1], rtol=1e-4)
+    errors = step_errors(one)
+    assert errors is not None
+    assert max(errors.values()) < 0.01  # wear.tolerance
+
+
+def test_forces_stay_those_of_the_balance(coarse) -> None:
+    """Also on the cells that are written, which lose no volume either."""
+    wearing, states = coarse
+    state = states[-1]
+    tractions = wearing.contacts.tractions(state.interfaces)
+    for stage, face, on_cells in zip(
+        wearing.contacts.stages, state.interfaces, tractions, strict=True
+    ):
+        peak, area = wearing.source.peak, stage.grid.cell_area
+        assert face.loads.P[peak] == pytest.approx(LOAD, rel=2e-4)
+        assert on_cells.pressure[peak].sum() * area == pytest.approx(LOAD, rel=2e-4)
+        assert on_cells.shear[peak, 0].sum() * area == pytest.approx(-FRICTION * LOAD, rel=2e-4)
+        depth = stage.on_grid(face).depth
+        assert depth.sum() * area == pytest.approx(stage.volume(face.surfaces.depth), rel=1e-12)
+
+
+def test_a_cycle_dissipates_as_finely_divided_ones_do() -> None:
+    """Half the slip before a solved state and half after it: 4 to 8 times nearer."""
+
+    def energies(increments: int, peak: int) -> tuple[float, float]:
+        wearing = Wearing.of(
+            *COARSE[:2], f"load_path.increments={increments}", f"load_path.peak_at={peak}"
+        )
+        history = wearing.source.unworn_cycle.histories[0]
+        areas = np.concatenate([stage.face.nodal_areas for stage in wearing.contacts.stages])
+        cycle = StructureCycle(wearing.source.unworn_cycle, FRICTION, areas, 1.0)
+        means = 0.5 * FRICTION * float((cycle.slip * cycle.pressure).sum(axis=0) @ areas)
+        return means, history.loads.mean_energy
+
+    fine = energies(88, 32)[0]
+    means, ends = energies(11, 4)
+    assert abs(means / fine - 1.0) < 0.015
+    assert abs(ends / fine - 1.0) > 0.1
+
+
+def test_a_run_goes_on_from_what_the_disk_keeps(coarse) -> None:
+    """That is all of a state but where its cycle is found; bit for bit."""
+    _, states = coarse
+
+    def kept(face):
+        other = None if face.coarse is None else kept(face.coarse)
+        return replace(face, start=None, coarse=other)
+
+    middle = states[len(states) // 2]
+    middle = replace(middle, interfaces=tuple(map(kept, middle.interfaces)))
+    again = Wearing.of(*COARSE)
+    *_, end = again.loop.march(again.contacts.restored(middle))
+    for one, two in zip(end.interfaces, states[-1].interfaces, strict=True):
+        np.testing.assert_array_equal(one.surfaces.depth, two.surfaces.depth)
+    np.testing.assert_array_equal(end.kinetics, states[-1].kinetics)
+
+
+@pytest.mark.parametrize(
+    ("override", "allowed"),
+    [
+        ("wear.step={kind: implicit}", "second_order"),
+        ("wear.motion=follow", "auto, neglect"),
+        ("loops={amplitude: 1 um}", "leave them out"),
+        ("friction.evolution={energy: [0, 1], factor: [1, 2]}", "leave it out"),
+        ("load_path.mix=[{share: 0.5}, {share: 0.5}]", "one mission"),
+        ("fidelity=auto", "fixed"),
+        (
+            "wear.blade={coefficient: 1e4 um^3/J, evolution: {scope: global}}",
+            "evolution with scope: local",
+        ),
+    ],
+)
+def test_what_nodes_know_nothing_of_is_refused(override: str, allowed: str) -> None:
+    with pytest.raises(CaseError, match=rf"not where nodes wear .*; allowed: {allowed}"):
+        load_case(PLANE, (*NODES, override))
+
+
+def test_loads_of_a_file_have_no_nodes_that_wear() -> None:
+    with pytest.raises(CaseError, match="allowed: .normal. or .full."):
+        load_case(CASES / "cylinder_wear.yaml", ("contact.method=nodes",))
+
+
+def test_a_chart_ends_with_the_finest_elements_alone() -> None:
+    (settings,) = axes_of(PLANE, (), ("alone",)).values()
+    names = [setting.rung.name for setting in settings]
+    assert names[:3] == ["normal", "full", "20 x 34 nodes alone"]
+    finest = settings[-1].case
+    assert finest.contact.method == "nodes"
+    assert (finest.mesh.order, finest.load_path.increments) == (2, 44)
+    slot = CASES / "dovetail_small.yaml"
+    assert "alone" not in {axis.name for axis in axes_of(slot, (), ())}
+
+
+@pytest.mark.slow
+def test_elements_alone_converge() -> None:
+    """Depth after 3e5 cycles and inner pressure against twice the nodes and increments."""
+    found = []
+    for finer in (1, 2):
+        wearing = Wearing.of(
+            f"mesh={{flank_nodes: [{finer * 30}, 34], order: 2}}",
+            f"load_path.increments={22 * finer}",
+            f"load_path.peak_at={8 * finer}",
+        )
+        *_, end = wearing.states()
+        found.append(wearing.worn(end))
+    (x, depth, pressure), (there, *finest) = found
+    depths, pressures = (np.interp(x, there, field) for field in finest)
+    inner = np.abs(x) < 3.5
+    missed = (pressure - pressures)[inner]
+    assert np.sqrt(np.mean((depth - depths) ** 2)) < 0.015 * depths.max()
+    assert np.sqrt(np.mean(missed**2)) < 0.005 * pressures[inner].mean()
