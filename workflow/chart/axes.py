@@ -378,7 +378,7 @@ AXES = (
     Axis("history", "increments of the load path", _histories, order=1.0, moves_states=True),
     Axis("mesh", "finite elements of the structure", _meshes, order=2.0),
     Axis("order", "order of the finite elements", _orders),
-    Axis("alone", "half-space, or finite elements alone", _alone, order=1.0),
+    Axis("reference", "half-space, or finite elements alone", _alone, order=1.0),
     Axis("step", "step of the motion in time", _time_steps, order=2.0),
     Axis("harmonics", "odd harmonics of the motion", _harmonics, order=2.0),
     Axis("samples", "samples of a period", _samples, order=2.0),
