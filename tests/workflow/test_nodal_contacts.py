@@ -150,7 +150,7 @@ def test_what_nodes_know_nothing_of_is_refused(override: str, allowed: str) -> N
 
 
 def test_loads_of_a_file_have_no_nodes_that_wear() -> None:
-    with pytest.raises(CaseError, match="allowed: .normal. or .full."):
+    with pytest.raises(CaseError, match="allowed: 'normal' or 'full'"):
         load_case(CASES / "cylinder_wear.yaml", ("contact.method=nodes",))
 
 

@@ -9,6 +9,11 @@ MOMENTS = "unworn", "worn"
 EXTRAPOLATION = 2.0
 
 
+def energy_name(nodes: bool) -> str:
+    """The energies dissipated in a cycle by what wears: nodes, or a half-space."""
+    return "energy_nodes" if nodes else "energy_half_space"
+
+
 def jump_name(number: int) -> str:
     """The group of a jump, below that of its interface."""
     return f"{number:05d}"
@@ -21,10 +26,10 @@ class Contents:
     ``bodies`` are the names of body 1 and 2, ``jumps`` how many there are beside the unworn state.
     ``line`` contacts have forces and energies per length, a ``mix`` of missions has the share of
     each. A ``structure`` of finite elements gives tractions at its nodes, and both bodies unworn
-    and worn. ``coarse`` are the interfaces with a solution on a coarse grid. The rest is there
-    where a case asks for it: a ``comparison`` of half-space and structure, tangential ``loops``,
-    ``sections`` of the stress under the contacts, and the interfaces with maps of fretting
-    ``life``.
+    and worn; its ``nodes`` wear, or half-spaces. ``coarse`` are the interfaces with a solution on a
+    coarse grid. The rest is there where a case asks for it: a ``comparison`` of half-space and
+    structure, tangential ``loops``, ``sections`` of the stress under the contacts, and the
+    interfaces with maps of fretting ``life``.
     """
 
     names: tuple[str, ...]
@@ -33,6 +38,7 @@ class Contents:
     line: bool = False
     mix: bool = False
     structure: bool = False
+    nodes: bool = False
     coarse: tuple[str, ...] = ()
     comparison: bool = False
     loops: bool = False
@@ -49,6 +55,11 @@ class Contents:
         """Unworn and worn, each with its jump: both with the only one where nothing wore."""
         names = self.jump_names
         return [("unworn", names[0]), ("worn", names[-1])]
+
+    @property
+    def wears(self) -> str:
+        """What wears, in words."""
+        return "nodes" if self.nodes else "half-space"
 
     @property
     def per(self) -> str:

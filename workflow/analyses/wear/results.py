@@ -32,7 +32,7 @@ from workflow.analyses.wear.datasets import (
     put_face,
     surface_heights,
 )
-from workflow.analyses.wear.layout import EXTRAPOLATION, Contents
+from workflow.analyses.wear.layout import EXTRAPOLATION, Contents, energy_name
 from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.uniformity import uniformities
@@ -206,16 +206,18 @@ def _write_results(
         "bodies": list(case.bodies),
     }
     coarse: list[str] = []
+    nodes = case.contact.method == "nodes"
+    by = "nodal" if nodes else "half-space"
     with run_results(run, case, attributes, source.line) as writer:
         for contact in outcome.interfaces:
             stage, first, loads = contact.stage, contact.first, contact.unworn.loads
             writer.put_grid(f"grid/{stage.name}", stage.grid, stage.face.frame)
             tilt = stage.settings.tilt
             put_face(writer, f"structure/{stage.name}", stage.face, contact.unworn, tilt)
-            if _write_coarse(writer, stage, loads, source.peak):
+            if not nodes and _write_coarse(writer, stage, loads, source.peak):
                 coarse.append(stage.name)
-            dissipated = "energy dissipated in each increment, half-space pressure"
-            energy = {"energy_half_space": Dataset(first.energy, "N mm", dissipated)}
+            dissipated = f"energy dissipated in each increment, {by} pressure"
+            energy = {energy_name(nodes): Dataset(first.energy, "N mm", dissipated)}
             writer.put(f"contact/{stage.name}", energy | _holding_moments(contact))
             if first.cycle:
                 write_comparison(writer, stage.name, first.cycle, loads, source.peak)
@@ -233,6 +235,7 @@ def _write_results(
         line=source.line,
         mix=outcome.interfaces[0].unworn.loads.mixed,
         structure=structure is not None,
+        nodes=nodes,
         coarse=tuple(coarse),
         comparison=case.contact.method == "full",
         loops=case.loops.wanted,
@@ -345,13 +348,14 @@ def _summary(
 
 def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str, Any]:
     first, loads = contact.first, contact.carried["unworn"]
+    wearing = "nodes" if outcome.case.contact.method == "nodes" else "half_space"
     return {
         **dict(zip(KINETICS, contact.kinetics[-1].tolist(), strict=True)),
         "peak_load": {"unworn": resultants_at(loads, outcome.source.peak)},
         **_tilt_summary(contact),
         "slip_per_cycle": contact.slip_per_cycle,
         "energy_per_cycle": {
-            "half_space": float(first.energy.sum()),
+            wearing: float(first.energy.sum()),
             "structure": loads.mean_energy,
         },
         **({"by_increment": comparison_summary(first.cycle, loads)} if first.cycle else {}),

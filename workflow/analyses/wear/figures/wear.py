@@ -17,7 +17,7 @@ from workflow.analyses.wear.figures.comparison import half_space_and_structure, 
 from workflow.analyses.wear.figures.loops import loops
 from workflow.analyses.wear.figures.structure_stress import structure_stress
 from workflow.analyses.wear.figures.subsurface import fretting_life, subsurface_stress
-from workflow.analyses.wear.layout import EXTRAPOLATION, Contents
+from workflow.analyses.wear.layout import EXTRAPOLATION, Contents, energy_name
 from workflow.pictures.fields import (
     MAP_PERCENTILE,
     MAX_PROFILES,
@@ -84,8 +84,8 @@ def resultants(file: h5py.File, contents: Contents) -> Figure:
         # As the half-space's, that of an increment of a mix is per mean cycle.
         share = history["share"] if contents.mix else 1.0
         energy = share * (history["Edx"] + history["Edy"])
-        half_space = file["contact"][name]["energy_half_space"][()]
-        _draw_energy(column[2], increments, energy, half_space, per)
+        wearing = file["contact"][name][energy_name(contents.nodes)][()]
+        _draw_energy(column[2], increments, energy, wearing, contents)
         column[2].set_xlabel("increment")
     labels = f"P [kN{per}]", f"Qx [kN{per}]", f"energy per\nincrement [N mm{per}]"
     for axis, label in zip(axes[:, 0], labels, strict=True):
@@ -145,14 +145,15 @@ def _ranges(numbers: Iterable[Any]) -> str:
 
 
 def _draw_energy(
-    axis: Axes, increments: Array, structure: Array, half_space: Array, per: str
+    axis: Axes, increments: Array, structure: Array, wearing: Array, contents: Contents
 ) -> None:
-    coarse, fine = (f"{energy.sum():.4g} N mm{per}" for energy in (structure, half_space))
+    per, wears = contents.per, contents.wears
+    coarse, fine = (f"{energy.sum():.4g} N mm{per}" for energy in (structure, wearing))
     axis.bar(increments, structure, width=0.8, color="#9DC3DE", label=f"finite elements: {coarse}")
-    look: dict[str, Any] = {"color": ORANGE, "markersize": 5, "label": f"half-space: {fine}"}
-    axis.plot(increments, half_space, "D", **look)
-    change = _change(structure.sum(), half_space.sum())
-    axis.set_title(f"energy over the cycle: half-space {change} against FE")
+    look: dict[str, Any] = {"color": ORANGE, "markersize": 5, "label": f"{wears}: {fine}"}
+    axis.plot(increments, wearing, "D", **look)
+    change = _change(structure.sum(), wearing.sum())
+    axis.set_title(f"energy over the cycle: {wears} {change} against FE")
     axis.legend(loc="best")
 
 
@@ -207,7 +208,8 @@ def _draw_profile(
     """Pressure along x (``direction`` 0) or y (1) through the middle."""
     contact, grid = file["contact"][interface], grid_of(file["grid"][interface])
     for jump, colour in zip(_ends(contents), (BLUE, ORANGE), strict=False):
-        label = f"half-space {_cells(grid)}, {_cycles(file, interface, jump)}"
+        on = " on" if contents.nodes else ""
+        label = f"{contents.wears}{on} {_cells(grid)}, {_cycles(file, interface, jump)}"
         profile = middle(contact[jump]["pressure"][()], direction)
         axis.plot(centres(grid, direction), profile, color=colour, label=label)
     if interface in contents.coarse:
