@@ -297,6 +297,34 @@ def test_round_foot_in_the_plane_presses_as_hertz_says(section, tmp_path):
     assert summary["foot"]["peak_pressure"]["unworn"] == pytest.approx(hertz, rel=0.02)
 
 
+@pytest.mark.slow
+def test_nodes_under_a_sliding_foot_wear_to_its_shape(section, tmp_path):
+    """Worn many times deeper than pressed, the block conforms: δ - x²/2R, of volume 2a³/3R."""
+    loads = [
+        SECTION["loads"][0] | {"pressure": "10 MPa", "path": [1, 1, 1, 1]},
+        {"kind": "displacement", "group": "lid", "displacement": [0.05, 0, 0],
+         "path": [0, 1, -1, 0]},
+    ]  # fmt: skip
+    structure = SECTION | {"supports": [{"group": "base", "hold": "all"}], "loads": loads}
+    wear = WEAR | {
+        "body_1": {"coefficient": "3.2e7 um^3/J"},
+        "body_2": {"coefficient": "0 um^3/J"},
+        "cycles": 1e4,
+        "step": {"kind": "second_order"},
+    }
+    legs = {"increments": [2, 4, 8, 4], "cycle_from": 2, "peak_leg": 4}
+    case = tmp_path / "slide.yaml"
+    write_case(case, structure, legs, mu=0.01, grid=(128, 8), wear=wear)  # which hardly tilts it
+    foot = run(case, tmp_path / "out", "contact.method=nodes")["foot"]
+    assert foot["volume_1"] == pytest.approx(3.2e-5 * foot["energy"], rel=1e-12)
+    # Of the way there and back the bodies' own shear takes some.
+    sliding = 3.2e-5 * 0.01 * 80.0 * 4.0 * 0.05 * 1e4
+    assert 0.97 * sliding < foot["volume_1"] < sliding
+    half = np.cbrt(1.5 * RADIUS * foot["volume_1"])
+    assert foot["depth_1"] == pytest.approx(half**2 / (2.0 * RADIUS), rel=0.015)
+    assert foot["depth_2"] == 0.0
+
+
 # --- refusals -------------------------------------------------------------------------------------
 
 
