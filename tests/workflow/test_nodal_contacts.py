@@ -170,7 +170,7 @@ def test_elements_alone_converge() -> None:
     found = []
     for finer in (1, 2):
         wearing = Wearing.of(
-            f"mesh={{flank_nodes: [{finer * 30}, 34], order: 2}}",
+            f"mesh={{flank_nodes: [{finer * 40}, 34], order: 2}}",
             f"load_path.increments={22 * finer}",
             f"load_path.peak_at={8 * finer}",
         )
@@ -180,5 +180,5 @@ def test_elements_alone_converge() -> None:
     depths, pressures = (np.interp(x, there, field) for field in finest)
     inner = np.abs(x) < 3.5
     missed = (pressure - pressures)[inner]
-    assert np.sqrt(np.mean((depth - depths) ** 2)) < 0.015 * depths.max()
-    assert np.sqrt(np.mean(missed**2)) < 0.005 * pressures[inner].mean()
+    assert np.sqrt(np.mean((depth - depths) ** 2)) < 0.02 * depths.max()
+    assert np.sqrt(np.mean(missed**2)) < 0.007 * pressures[inner].mean()
