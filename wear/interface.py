@@ -279,6 +279,11 @@ class InterfaceContact:
         """The surfaces on the cells of the grid."""
         return state.surfaces
 
+    @property
+    def areas(self) -> Array | float:
+        """Of what the surfaces of states consist of: cells, or nodes ``(n,)`` [mm²]."""
+        return self.grid.cell_area
+
     def volume(self, depth: Array) -> float:
         """Volume of a worn ``depth``, as the surfaces of states have it [mm³]."""
         return float(depth.sum()) * self.grid.cell_area

@@ -29,21 +29,19 @@ MARGIN = 1.1
 """λ may grow by so much within a step, where slip does."""
 
 
+ContactAt = Callable[[NodalState], NodalContact]
+
+
 @dataclass(frozen=True)
 class StabilisedStepper(ComparingStepper[NodalState, NodalContact]):
     """Steps of as many stages as their length asks for."""
 
     def _advance(
-        self,
-        state: NodalState,
-        cycles: float,
-        contact: NodalContact,
-        contact_at: Callable[[NodalState], NodalContact],
-        last: bool,
+        self, state: NodalState, cycles: float, contact: NodalContact, at: ContactAt, last: bool
     ) -> WearStep[NodalState]:
         def rate(lost: Array) -> Array:
             stage = contact.worn(state, lost, cycles)
-            return contact_at(stage).rates(stage)
+            return at(stage).rates(stage)
 
         # Explicit Euler is stable up to 2/λ.
         stages = stages_for(2.0 * MARGIN * cycles / contact.stable_cycles(state))

@@ -296,25 +296,18 @@ class ComparedContact(Protocol[Contact]):
 
 
 Compared = TypeVar("Compared", bound=ComparedContact[Any])
+At = Callable[[State], Compared]
 
 
 @dataclass(frozen=True)
 class ComparingStepper(ABC, Generic[State, Compared]):
-    """Steps as long as asked for, or as ``control`` lets them be.
-
-    Each is taken in two halves, and as a whole by the companion of the state.
-    """
+    """Steps, as long as asked for or as ``control`` lets them be, and their companion's."""
 
     control: ErrorControl | None = None
 
     @abstractmethod
     def _advance(
-        self,
-        state: State,
-        cycles: float,
-        contact: Compared,
-        contact_at: Callable[[State], Compared],
-        last: bool,
+        self, state: State, cycles: float, contact: Compared, at: At[State, Compared], last: bool
     ) -> WearStep[State]:
         """So many cycles at once from ``state``, whose contact is given; to the end if ``last``."""
 
@@ -323,7 +316,7 @@ class ComparingStepper(ABC, Generic[State, Compared]):
         """Of the error in the length of the steps."""
 
     def step(
-        self, state: State, most: float, left: float, contact_at: Callable[[State], Compared]
+        self, state: State, most: float, left: float, contact_at: At[State, Compared]
     ) -> WearStep[State]:
         """A step, tried again until ``control`` agrees with its error."""
         contact, control, companion = contact_at(state), self.control, state.companion
@@ -364,15 +357,10 @@ class ImplicitStepper(ComparingStepper[WearState, WearingContact]):
     """
 
     def _advance(
-        self,
-        state: WearState,
-        cycles: float,
-        contact: WearingContact,
-        contact_at: ContactAt,
-        last: bool,
+        self, state: WearState, cycles: float, contact: WearingContact, at: ContactAt, last: bool
     ) -> WearStep[WearState]:
         if last and contact.sliding.passages is not None:
-            return _second_order(state, cycles, contact, contact_at)
+            return _second_order(state, cycles, contact, at)
         return contact.implicit_step(state, cycles)
 
     def _order(self, contact: WearingContact) -> float:
@@ -384,14 +372,9 @@ class SecondOrderStepper(ComparingStepper[WearState, WearingContact]):
     """Second order in the step, also where slip changes with wear."""
 
     def _advance(
-        self,
-        state: WearState,
-        cycles: float,
-        contact: WearingContact,
-        contact_at: ContactAt,
-        last: bool,
+        self, state: WearState, cycles: float, contact: WearingContact, at: ContactAt, last: bool
     ) -> WearStep[WearState]:
-        return _second_order(state, cycles, contact, contact_at)
+        return _second_order(state, cycles, contact, at)
 
     def _order(self, contact: WearingContact) -> float:
         return 2.0 if contact.sliding.passages is None else MOVING

@@ -11,7 +11,7 @@ from fe_models.geometry.imported import patch, read_bodies
 from fe_models.gmsh_session import gmsh_model
 from fe_models.structure import CLOSED
 from tests.workflow.commands import invoke
-from tests.workflow.mesh_scenes import refused, run, write_case
+from tests.workflow.mesh_scenes import WEAR, refused, run, write_case
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.mesh.model import MeshModel
 from workflow.errors import MethodFailed

@@ -87,8 +87,12 @@ class NodalStage(ContactStage):
         fields = (worn.depth_1, worn.depth_2, worn.work_1, worn.work_2)
         return Surfaces(self.settings.gap, *map(self.transfer.to_cells, fields))
 
+    @property
+    def areas(self) -> Array:
+        return self.face.nodal_areas
+
     def volume(self, depth: Array) -> float:
-        return float(depth @ self.face.nodal_areas)
+        return float(depth @ self.areas)
 
     def nodal_depth(self, state: InterfaceState) -> Array:
         return state.surfaces.depth

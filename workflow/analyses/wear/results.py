@@ -114,7 +114,7 @@ class InterfaceOutcome:
         Of the pressure it is the largest change anywhere in a cycle for steps of twice the length,
         over the largest pressure: next to a worn edge it has no order.
         """
-        left, companion = step_errors(self.state), self.state.coarse
+        left, companion = step_errors(self.state, self.stage.areas), self.state.coarse
         if left is None or not isinstance(companion, InterfaceState):
             return None
         worn = self.stage.tractions(self.state) if self.worn is None else self.worn
