@@ -169,7 +169,7 @@ class NodalContacts(StagedContacts):
         solution = self._cycles.at(state.surfaces.depth)
         contact = self._contact(solution)
         state = replace(state, next_cycles=first_cycles(contact, state, cycles))
-        begun = self._of_interfaces(state, contact.rates(state))
+        begun = self._of_interfaces(state, contact.rates(state), solution)
         firsts = self._first_contacts(solution, contact.stable_cycles(state))
         return list(zip(begun, firsts, strict=True))
 
@@ -188,7 +188,8 @@ class NodalContacts(StagedContacts):
         spent = result.spent
         spent = replace(spent, contact_solves=spent.contact_solves * len(begun.states))
         lost = _fields(result.state.surfaces) - _fields(state.surfaces)
-        worn = self._of_interfaces(result.state, lost / cycles)
+        after = self._cycles.at(result.state.surfaces.depth)
+        worn = self._of_interfaces(result.state, lost / cycles, after)
         # All faces wear together: what that has taken counts once.
         return [(face, Spent() if number else spent) for number, face in enumerate(worn)]
 
@@ -215,13 +216,18 @@ class NodalContacts(StagedContacts):
             order=first.order,
         )
 
-    def _of_interfaces(self, state: NodalState, rates: Array) -> tuple[InterfaceState, ...]:
-        """The states of the faces, which lose so much in a cycle ``(3, n)``."""
+    def _of_interfaces(
+        self, state: NodalState, rates: Array, solution: CycleSolution
+    ) -> tuple[InterfaceState, ...]:
+        """The states of the faces, which lose so much in a cycle ``(3, n)``.
+
+        ``solution`` is their cycle, and stands for the companion's, whose loads nobody asks for.
+        """
         split, depth = self._cycles.split, state.surfaces.depth
         coarse: Sequence[InterfaceState | None] = [None] * len(self.stages)
         if state.coarse is not None:
-            coarse = self._of_interfaces(state.coarse, rates)
-        histories = self._cycles.at(depth).histories
+            coarse = self._of_interfaces(state.coarse, rates, solution)
+        histories = solution.histories
         parts = map(split, (self._gap, _fields(state.surfaces), rates, self._areas))
         faces = []
         for gap, worn, rate, areas, history, companion in zip(
