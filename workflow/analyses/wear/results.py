@@ -186,7 +186,7 @@ def _stresses(outcome: Outcome, reporter: Reporter) -> list[InterfaceStress]:
     for contact in outcome.interfaces:
         assert contact.worn is not None
         unworn = contact.stage.unworn_tractions(contact.unworn, contact.first)
-        cycles.append((contact.stage, (unworn, contact.worn), contact.unworn.loads.share))
+        cycles.append((contact.stage, (unworn, contact.worn)))
     return contact_stresses(outcome.case, outcome.source.peak, cycles, reporter)
 
 
