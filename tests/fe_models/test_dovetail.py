@@ -160,7 +160,7 @@ def test_energy_is_never_negative_and_adds_up(solved, mission):
         np.testing.assert_allclose(total[:-1], lost[:-1], rtol=1e-12)
         assert total[-1] == 0.0  # the bodies part
         slides = total > 0.0
-        more = slides & (history.loads.P > np.roll(history.loads.P, 1))
+        more = slides & (np.roll(history.loads.P, 1) < history.loads.P)
         assert (total[more] < nodal.sum(axis=1)[more]).all()
         assert (total[slides & ~more] > nodal.sum(axis=1)[slides & ~more]).all()
 
