@@ -59,22 +59,24 @@ def dissipated(limit: Array, slip: Array) -> Array:
 
 def error_of_sums(
     pressure: Array, slip: Array, loaded: Array, missions: Sequence[slice] = EVERY
-) -> Array:
+) -> Array | None:
     """Estimated error ``(...)`` of Σ (p_{t-1} + p_t)/2 |Δs_t| over ``slip`` ``(t, 2, ...)``.
 
     What these sums are too large by, of three causes. Pressure over slip that bends: a third of
     what two increments along one way change when they are taken as one (Richardson), half in each.
     Slip that begins within an increment: a sixth of the change of pressure, the mean over all times
     at which it may. Bodies that part: half of what the pressure before would do over the last slip.
+    None where no two increments go along one way: nothing then tells how pressure bends.
     """
-    return sum(
-        (_error(pressure[mission], slip[mission], loaded[mission]) for mission in missions),
-        np.zeros(pressure.shape[1:]),
-    )
+    error, known = np.zeros(pressure.shape[1:]), False
+    for mission in missions:
+        of_mission, pairs = _error(pressure[mission], slip[mission], loaded[mission])
+        error, known = error + of_mission, known or pairs
+    return error if known else None
 
 
-def _error(pressure: Array, slip: Array, loaded: Array) -> Array:
-    """The same of one cycle."""
+def _error(pressure: Array, slip: Array, loaded: Array) -> tuple[Array, bool]:
+    """The same of one cycle, and whether two of its increments go along one way."""
     by_place = (-1, *[1] * (pressure.ndim - 1))
     slip = np.where(loaded.reshape(-1, *[1] * (slip.ndim - 1)), slip, 0.0)
     size, p_last = np.hypot(slip[:, 0], slip[:, 1]), np.roll(pressure, 1, axis=0)
@@ -93,4 +95,4 @@ def _error(pressure: Array, slip: Array, loaded: Array) -> Array:
     begun = np.where(begins & (p_last > 0.0), -size * rise / 6.0, 0.0)
     parts = (~loaded & np.roll(loaded, 1)).reshape(by_place)
     parted = np.where(parts, -0.5 * p_last * size_last, 0.0)
-    return np.asarray(np.sum(bent + begun + parted, axis=0))
+    return np.asarray(np.sum(bent + begun + parted, axis=0)), bool(pair.any())

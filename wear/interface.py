@@ -173,7 +173,7 @@ class CycleTractions:
     def increments_error(self) -> dict[str, float] | None:
         """What the increments leave of ``depth`` (root mean square) and ``energy``, relative.
 
-        The depth is that of what is rubbed by one cycle; None where nothing is.
+        The depth is that of what is rubbed by one cycle; None where nothing is, or nobody knows.
         """
         loads = self.loads
         often = loads.share[:, None, None]
@@ -182,6 +182,8 @@ class CycleTractions:
             return None
         limit = self.friction * often * self.pressure
         error = error_of_sums(limit, self.slip, loads.P > 0.0, loads.missions)
+        if error is None:
+            return None
         return {
             "depth": float(np.sqrt(np.vdot(error, error) / np.vdot(rubbed, rubbed))),
             "energy": abs(float(error.sum())) / float(rubbed.sum()),

@@ -2,8 +2,8 @@
 
 The grid goes with body 2, which carries the form of the contact. With body 2 at an offset s from
 its mean position, the cell at x of the grid lies over the point x + s of body 1, whose surface is
-kept in the frame of that mean position. On a way, as from half an increment before a state to half
-an increment after it,
+kept in the frame of that mean position. Each state of a cycle acts from half an increment before
+its place to half an increment after it (:mod:`sa_solver.increments`). On such a way,
 
     carried  c_i = Σ_k w_k f_{i+k}          deposited  d_{i+k} = Σ_i w_k p_i
 
@@ -13,6 +13,11 @@ path: w_k = ∫₀¹ Λ(s_x/dx - k_x) Λ(s_y/dy - k_y) dt with the hat Λ(u) = m
 or more and their sum is 1, so that constants stay, nothing rises that only falls, and depositing
 keeps volume. Between the places where the path passes into the next cell the integrand is a
 quadratic of t, which two Gauss points integrate exactly.
+
+To let each state act, ever less, as far as the states next to it would pass pressure on evenly, but
+blurs twice as much: of a cylinder over 50 µm of a scar of 0.17 mm, 1, 2, 4 and 8 increments each
+way leave 1.2, 0.7, 0.2 and 0.06 % of the depth of the flat, and would leave 3, 1.5, 0.5 and 0.13 %.
+Its worn peak pressure needs more of them: 162, 121, 92 and 84 MPa with 2, 4, 8 and 16.
 
 Cells blur what they carry. Against the motion they stand for, the second moment of the weights is
 too large by dx²/6 for a long path, and for one of length L < 2 dx about its middle by L dx/4 -

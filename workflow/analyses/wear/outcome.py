@@ -83,12 +83,12 @@ class InterfaceOutcome:
 
     @cached_property
     def increments_error(self) -> dict[str, float] | None:
-        """What increments leave of a cycle's depth and energy, the larger unworn and worn."""
+        """What increments leave of a cycle's depth and energy, the mean of first and last cycle."""
         unworn = self.stage.unworn_tractions(self.unworn, self.first).increments_error
         worn = self._end.increments_error
         if unworn is None or worn is None:
             return unworn or worn
-        return {name: max(unworn[name], worn[name]) for name in unworn}
+        return {name: 0.5 * (unworn[name] + worn[name]) for name in unworn}
 
     @cached_property
     def _end(self) -> CycleTractions:
