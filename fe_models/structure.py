@@ -12,6 +12,7 @@ from fe_models.friction import LOAD_FLOOR, FrictionalJoint, FrictionState
 from fe_models.joint import JointResolvent, JointStiffness, join, join_halves
 from fe_models.mesh import Face, Interface, StructureMesh
 from fe_models.supported_body import SupportedBody
+from sa_solver.increments import dissipated, mean_of_ends
 from sa_solver.types import Array, LoadHistory, resultants
 
 # A face slides as a whole when nodes that stick carry less than this share of its load.
@@ -294,15 +295,18 @@ def load_history(
 ) -> LoadHistory:
     """Resultants and energies of nodal ``force`` ``(t, 3, n)`` and ``slip`` ``(t, 2, n)``.
 
+    Those of one closed cycle; energies are of second order (:mod:`sa_solver.increments`).
     ``friction`` is µ, one or by node ``(n,)``.
     """
     x, y = interface.coordinates.T
     columns = np.array([resultants(f, x, y) for f in force]).T
-    energy = -np.einsum("tan,tan->at", force[:, :2], slip)
     shear = np.hypot(force[:, 0], force[:, 1])
     sticks = shear < LIMIT_SHARE * friction * force[:, 2]
     load = columns[0]
-    columns[:, load < UNLOADED_SHARE * load.max()] = 0.0
+    apart = load < UNLOADED_SHARE * load.max()
+    columns[:, apart] = 0.0
+    energy = dissipated(friction * mean_of_ends(force[:, 2]), slip).sum(axis=2).T
+    energy[:, apart] = 0.0
     sliding = np.sum(force[:, 2] * sticks, axis=1) < STICKING_SHARE * load
     P, Qx, Qy, Mx, My, Mz = columns
     Edx, Edy = energy

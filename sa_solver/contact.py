@@ -25,6 +25,7 @@ from sa_solver.errors import InputError
 from sa_solver.friction_limit import largest_share
 from sa_solver.gross_slip import SlidingRule, gross_slip, sliding_direction
 from sa_solver.half_space import HalfSpace
+from sa_solver.increments import dissipated
 from sa_solver.normal import NormalContact, NormalStart, NormalState
 from sa_solver.rigid_modes import NORMAL, PLANAR, PlanarModes
 from sa_solver.tangential import (
@@ -162,7 +163,7 @@ class FrictionalContact:
         offset, area = self.offset(before, load), self.grid.cell_area
         sliding = self._slides(limit, load)
         if sliding:
-            tangential, creeps = self._slide(limit, offset, load)
+            tangential, creeps = self._slide(before, limit, offset, load)
             held = self._held(before, limit, offset, load) if creeps else None
             tangential, sliding = (tangential, True) if held is None else (held, False)
         elif self.two_normal_problems(before, load) and abs(load.values[1]) < limit.sum() * area:
@@ -245,7 +246,7 @@ class FrictionalContact:
         return state if state.converged else None
 
     def _slide(
-        self, limit: Array, offset: Array, load: ContactLoad
+        self, before: ContactState, limit: Array, offset: Array, load: ContactLoad
     ) -> tuple[TangentialState, bool]:
         """Gross slip by the energy of ``load``, and whether it creeps."""
         shear = limit * sliding_direction(load.values[1:3])[:, None, None]
@@ -258,13 +259,13 @@ class FrictionalContact:
                 limit, offset, shift_x=x, shift_y=y, **twist, tolerance=tolerance, start=start
             )
 
-        carried = float(limit.sum()) * self.grid.cell_area
-        return self._by_energy(solve, carried, shear, offset, load)
+        return self._by_energy(solve, lambda state: limit, before, shear, offset, load)
 
     def _by_energy(
         self,
         solve: Callable[[Array, float, _State | None], _State],
-        carried: float,
+        limit_of: Callable[[_State], Array],
+        before: ContactState,
         shear: Array,
         offset: Array,
         load: ContactLoad,
@@ -272,7 +273,7 @@ class FrictionalContact:
         """Gross slip by the energy of ``load``, and whether it creeps.
 
         ``solve`` finds the state for a motion (Δδx, Δδy), to a tolerance, from the last one;
-        ``shear`` ``(2, nx, ny)`` is about that of sliding, ``carried`` µP [N].
+        ``limit_of`` gives its µp, and ``shear`` ``(2, nx, ny)`` is about that of sliding.
         """
         assert load.energy is not None
         last: deque[_State] = deque(maxlen=1)
@@ -284,10 +285,11 @@ class FrictionalContact:
             last.append(state)
             spent += state.convolutions
             force = state.shear.sum(axis=(1, 2)) * self.grid.cell_area
-            return force, self._dissipated(state.shear, state.slip)
+            return force, self._dissipated(before, limit_of(state), state.slip)
 
         stored = float(np.vdot(shear, self.half_space.shear(shear) + offset)) * self.grid.cell_area
         force = load.values[1:3]
+        carried = 0.5 * self.friction * float(before.resultants[0] + load.values[0])
         slip = gross_slip(slide, carried, load.energy, force, self.tolerance, self._sliding, stored)
         message = last[0].message or slip.message
         state = replace(last[0], convolutions=spent, converged=not message, message=message)
@@ -341,7 +343,7 @@ class FrictionalContact:
             resultants=resultants,
             rigid=rigid,
             strain=load.strain,
-            energy=self._dissipated(tangential.shear, tangential.slip),
+            energy=self._dissipated(before, self.friction * normal.pressure, tangential.slip),
             sliding=sliding,
             residual=max(normal.residuals.largest, tangential.residuals.largest),
             converged=normal.converged and tangential.converged,
@@ -350,10 +352,11 @@ class FrictionalContact:
             border_load=normal.border_load,
         )
 
-    def _dissipated(self, shear: Array, slip: Array) -> Array:
-        """-Σ q Δs S in x and in y [N mm]."""
-        dissipated: Array = -np.sum(shear * slip, axis=(1, 2)) * self.grid.cell_area
-        return dissipated
+    def _dissipated(self, before: ContactState, limit: Array, slip: Array) -> Array:
+        """Energy in x and in y [N mm], where the increment ends with µp = ``limit``."""
+        mean = 0.5 * (self.friction * before.pressure + limit)
+        work = dissipated(mean.ravel(), slip.reshape(2, -1))
+        return np.asarray(work.sum(axis=1) * self.grid.cell_area)
 
     # -- dissimilar bodies --------------------------------------------------------------------
     @cached_property
@@ -389,7 +392,7 @@ class FrictionalContact:
             resultants=state.resultants,
             rigid=rigid,
             strain=load.strain,
-            energy=self._dissipated(state.shear, state.slip),
+            energy=self._dissipated(before, limit, state.slip),
             sliding=sliding,
             residual=state.residuals.largest,
             converged=state.converged,
@@ -415,5 +418,7 @@ class FrictionalContact:
                 height, offset, values, motion, tolerance=tolerance, start=start
             )
 
-        carried = self.friction * float(load.values[0])
-        return self._by_energy(solve, carried, shear, offset, load)[0]
+        def limit_of(state: CoupledState) -> Array:
+            return np.asarray(self.friction * state.pressure)
+
+        return self._by_energy(solve, limit_of, before, shear, offset, load)[0]

@@ -4,10 +4,10 @@ The normal load stays while body 1 is moved relative to body 2, by an imposed mo
 x or y; it does not turn and does not move across. After first loading whole cycles are marched,
 until one closes.
 
-Energy is taken from slip, Ed = -Σ q·Δs S. Where the pressure stays and slip keeps its direction
-during a branch (line contacts; areas with ν = 0) a cell slips only while |q| = µp, so this is that
-of the grid whatever the number of increments; the loop's area by trapezoids is less by
-½ Σ (q_n - q_n-1)·Δs S, which is of second order in their size.
+Energy is taken from slip, at the mean pressure of both ends of an increment. Where pressure stays
+and slip keeps its direction during a branch (line contacts; areas with ν = 0) a cell slips only
+while |q| = µp, so this is that of the grid whatever the number of increments; the loop's area by
+trapezoids is less by ½ Σ (q_n - q_n-1)·Δs S, which is of second order in their size.
 
 Stiffness is that of the contact with all pressed cells stuck: the slope right after a reversal, at
 which nothing slips (Mindlin 1949). Measuring it from the first increments would add what already

@@ -18,7 +18,7 @@ Tractions and resultants are those that body 1 exerts on body 2: pressure ``p >=
 Rigid motions ``(δx, δy, δz, φx, φy, φz)`` are those of body 1 relative to body 2 far from the
 contact, conjugate to the resultants, so that the gap is ``g = h + u_z - δz - φx y + φy x``. Slip is
 the motion of body 2's surface relative to body 1's; friction opposes it, and the energy of an
-increment is ``Ed = -Σ q·Δs S >= 0``.
+increment is ``Ed = Σ µ p |Δs| S >= 0`` with the mean pressure of its ends.
 """
 
 from __future__ import annotations

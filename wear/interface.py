@@ -18,6 +18,7 @@ import numpy as np
 from sa_solver.contact import ContactState, FrictionalContact
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
+from sa_solver.increments import error_of_sums, mean_of_ends, slip_of_states
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Tilt
 from wear.full_cycle import march_cycle
@@ -120,13 +121,13 @@ class InterfaceState(WearState):
     """What an interface must remember between two jumps.
 
     ``loads`` and nodal ``slip`` ``(t, 2, n)`` are those of the last solution of the source;
-    ``ends`` ``(t, 2, 2)`` [mm] are where body 2 is before and after each increment, none where its
-    motion is too little to follow (:func:`wear.moving.followed`).
+    ``paths`` ``(t, 3, 2)`` [mm] lead body 2 round its place in each state, none where its motion is
+    too little to follow (:func:`wear.moving.followed`).
     """
 
     loads: LoadHistory
     slip: Array
-    ends: Array
+    paths: Array
 
 
 # --- what it says of itself -----------------------------------------------------------------------
@@ -151,13 +152,43 @@ class CycleTractions:
     ``pressure`` ``(t, nx, ny)`` and ``shear`` ``(t, 2, nx, ny)`` on body 2 [MPa] are those at the
     end of an increment, ``slip`` ``(t, 2, nx, ny)`` [mm] that during it. Where slip is that of the
     loads (method normal), shear is µp against it and, unknown where nothing slips, 0 there:
-    ``unknown`` ``(t,)`` is the share of the normal force on such cells.
+    ``unknown`` ``(t,)`` is the share of the normal force on such cells. ``friction`` is µ.
     """
 
+    loads: LoadHistory
+    friction: float
     pressure: Array
     shear: Array
     slip: Array
     unknown: Array
+
+    @property
+    def work(self) -> Array:
+        """Friction work per area of each increment ``(t, nx, ny)`` [N/mm]."""
+        mean = mean_of_ends(self.pressure, self.loads.missions)
+        work = self.friction * mean * np.hypot(self.slip[:, 0], self.slip[:, 1])
+        work[self.loads.P == 0.0] = 0.0
+        return np.asarray(work)
+
+    @property
+    def increments_error(self) -> dict[str, float] | None:
+        """What the increments leave of ``depth`` (root mean square) and ``energy``, relative.
+
+        The depth is that of what is rubbed by one cycle; None where nothing is, or nobody knows.
+        """
+        loads = self.loads
+        often = loads.share[:, None, None]
+        rubbed = np.sum(often * self.work, axis=0)
+        if not rubbed.any():
+            return None
+        limit = self.friction * often * self.pressure
+        error = error_of_sums(limit, self.slip, loads.P > 0.0, loads.missions)
+        if error is None:
+            return None
+        return {
+            "depth": float(np.sqrt(np.vdot(error, error) / np.vdot(rubbed, rubbed))),
+            "energy": abs(float(error.sum())) / float(rubbed.sum()),
+        }
 
 
 @dataclass(frozen=True)
@@ -185,6 +216,15 @@ def failures_of(name: str) -> Iterator[None]:
         yield
     except ContactFailure as error:
         raise ContactFailure(f"{name}: {error}") from error
+
+
+def acting_slip(slip: Array, loads: LoadHistory) -> Array:
+    """Size of the slip over which each state of a cycle acts ``(t, ...)`` [mm].
+
+    ``slip`` ``(t, 2, ...)`` [mm] is that of the increments; see :mod:`sa_solver.increments`.
+    """
+    sizes = np.hypot(slip[:, 0], slip[:, 1])
+    return slip_of_states(sizes, loads.P > 0.0, loads.missions)
 
 
 # --- the contact ----------------------------------------------------------------------------------
@@ -223,7 +263,7 @@ class InterfaceContact:
         At every loaded increment. Raises :class:`MotionError`.
         """
         state = InterfaceState.unworn(
-            self.settings.gap, loads=history.loads, slip=history.slip, ends=np.empty((0, 2, 2))
+            self.settings.gap, loads=history.loads, slip=history.slip, paths=np.empty((0, 3, 2))
         )
         before, loaded = self._spent, self._loaded(state)
         result = loaded.contact.cycle(state, np.flatnonzero(history.loads.P > 0.0).tolist())
@@ -234,13 +274,14 @@ class InterfaceContact:
             depth_rate=depth_rate,
             volume_rate=volume_rate,
             starts=starts,
-            ends=self._ends(loaded.slip, starts, history.loads),
+            paths=self._paths(loaded.slip, starts, history.loads),
         )
         first_step = first_cycles(loaded.contact, state, cycles)
-        states = result.states.values()
+        states, pressure = result.states.values(), self._pressure(result)
+        work = self._unworn_tractions(history, pressure, loaded.cycle).work.sum(axis=(1, 2))
         return replace(state, next_cycles=first_step), FirstContact(
-            energy=result.energy,
-            pressure=self._pressure(result),
+            energy=history.loads.share * work * self.grid.cell_area,
+            pressure=pressure,
             touches_border=any(s.touches_border for s in states),
             largest_residual=max((s.residuals.largest for s in states), default=0.0),
             spent=self._spent - before + Spent(len(states), result.convolutions),
@@ -256,8 +297,8 @@ class InterfaceContact:
         state = replace(state, loads=history.loads, slip=history.slip, starts=starts)
         if self.settings.method == "full":
             return state  # body 2 goes on as the half-space's own slip has it
-        ends = self._ends(self.transfer.to_cells(history.slip), starts, history.loads)
-        return replace(state, ends=ends)
+        paths = self._paths(self.transfer.to_cells(history.slip), starts, history.loads)
+        return replace(state, paths=paths)
 
     def jump(
         self, state: InterfaceState, cycles: float, left: float
@@ -307,15 +348,20 @@ class InterfaceContact:
         """Tractions of a cycle on the present surfaces."""
         loaded = self._loaded(state)
         if loaded.cycle:
-            return _half_space_tractions(loaded.cycle)
+            return self._half_space_tractions(state.loads, loaded.cycle, state.energy)
         result = loaded.contact.cycle(state, np.flatnonzero(state.loads.P > 0.0).tolist())
-        return self._given_tractions(state.slip, self._pressure(result), state.energy)
+        return self._given_tractions(state, self._pressure(result), state.energy)
 
     def unworn_tractions(self, history: FaceLoads, first: FirstContact) -> CycleTractions:
         """Tractions of the first cycle, solved already."""
-        if first.cycle:
-            return _half_space_tractions(first.cycle)
-        return self._given_tractions(history.slip, first.pressure, 0.0)
+        return self._unworn_tractions(history, first.pressure, first.cycle)
+
+    def _unworn_tractions(
+        self, history: FaceLoads, pressure: Array, cycle: tuple[ContactState, ...]
+    ) -> CycleTractions:
+        if cycle:
+            return self._half_space_tractions(history.loads, cycle, 0.0)
+        return self._given_tractions(history, pressure, 0.0)
 
     def carried(self, loads: LoadHistory, pressure: Array) -> LoadHistory:
         """``loads``, where tilt is held with the moments of ``pressure`` ``(t, nx, ny)`` [MPa]."""
@@ -349,20 +395,19 @@ class InterfaceContact:
         """
         settings, friction = self.settings, self.settings.friction(state.energy)
         columns = np.array([*vars(state.loads).values()], dtype=float)
-        key: tuple[Array, ...] = columns, state.slip, state.ends, np.array([friction])
+        key: tuple[Array, ...] = columns, state.slip, state.paths, np.array([friction])
         if settings.method == "full":
             key = *key, state.surfaces.gap, state.surfaces.depth_1
         if self._current is not None and all(map(np.array_equal, self._current[0], key)):
             return self._current[1]
-        slip, ways = self.transfer.to_cells(state.slip), passages(self.grid, state.ends)
-        sizes, tilt = np.hypot(slip[:, 0], slip[:, 1]), settings.tilt
-        sliding = SlidingCycle(state.loads, sizes, None, ways, tilt)
+        slip, ways = self.transfer.to_cells(state.slip), passages(self.grid, state.paths)
+        acting = acting_slip(slip, state.loads)
+        sliding = SlidingCycle(state.loads, acting, None, ways, settings.tilt)
         cycle: tuple[ContactState, ...] = ()
         if settings.method == "full":
             cycle = self._half_space_cycle(state, sliding)
             slip = np.stack([increment.slip for increment in cycle])
-            sizes = np.hypot(slip[:, 0], slip[:, 1])
-            sliding = replace(sliding, slip=sizes)
+            sliding = replace(sliding, slip=acting_slip(slip, state.loads))
             if not self.pair.similar:
                 lift = self._contact.half_space.normal_under_shear
                 sliding = replace(sliding, uplift=np.stack([lift(t.shear) for t in cycle]))
@@ -383,18 +428,18 @@ class InterfaceContact:
         self._spent += Spent(len(cycle), sum(increment.convolutions for increment in cycle))
         return cycle
 
-    def _ends(self, slip: Array, starts: Starts, loads: LoadHistory) -> Array:
-        """Where body 2 is before and after each increment, if its motion is to be followed."""
+    def _paths(self, slip: Array, starts: Starts, loads: LoadHistory) -> Array:
+        """The ways of body 2 over which the states act, if its motion is to be followed."""
         pressure = sum((start.pressure for start in starts.values()), np.zeros(self.grid.shape))
         law = self.settings.laws[0]
-        ends = followed(self.grid, slip, pressure, loads.missions, self.settings.follow)
-        if len(ends) and isinstance(law, EvolvingLaw) and law.scope == "local":
+        paths = followed(self.grid, slip, pressure, loads.missions, self.settings.follow)
+        if len(paths) and isinstance(law, EvolvingLaw) and law.scope == "local":
             raise MotionError(
                 "the surfaces move over each other, and that of body 1 changes from place to "
                 "place, which no wear step follows: neglect the motion, or let the law change with "
                 "the energy of the whole contact"
             )
-        return ends
+        return paths
 
     # -- tractions of given slips ------------------------------------------------------------------
     def _pressure(self, result: CycleResult) -> Array:
@@ -404,15 +449,29 @@ class InterfaceContact:
             pressure[t] = state.pressure
         return pressure
 
-    def _given_tractions(self, nodal_slip: Array, pressure: Array, energy: float) -> CycleTractions:
+    def _given_tractions(
+        self, history: FaceLoads, pressure: Array, energy: float
+    ) -> CycleTractions:
         """Those where slip is the loads', once so much ``energy`` [N mm] is dissipated."""
-        slip = self.transfer.to_cells(nodal_slip)
+        slip = self.transfer.to_cells(history.slip)
         stuck = ~slip.any(axis=1)
         force = pressure.sum(axis=(1, 2))
         held = np.where(stuck, pressure, 0.0).sum(axis=(1, 2))
         unknown = np.divide(held, force, out=np.zeros_like(force), where=force > 0.0)
         shear = self._sliding_shear(pressure, slip, energy)
-        return CycleTractions(pressure, shear, slip, unknown)
+        friction = self.settings.friction(energy)
+        return CycleTractions(history.loads, friction, pressure, shear, slip, unknown)
+
+    def _half_space_tractions(
+        self, loads: LoadHistory, cycle: tuple[ContactState, ...], energy: float
+    ) -> CycleTractions:
+        """Tractions where the half-space has its own friction: known everywhere."""
+        pressure, shear, slip = (
+            np.stack([getattr(increment, name) for increment in cycle])
+            for name in ("pressure", "shear", "slip")
+        )
+        friction = self.settings.friction(energy)
+        return CycleTractions(loads, friction, pressure, shear, slip, np.zeros(len(cycle)))
 
     def _sliding_shear(self, pressure: Array, slip: Array, energy: float) -> Array:
         """µp against ``slip`` ``(..., 2, nx, ny)``; 0 where nothing slips."""
@@ -420,12 +479,3 @@ class InterfaceContact:
         opposing = np.divide(-slip, size, out=np.zeros_like(slip), where=size > 0.0)
         shear: Array = self.settings.friction(energy) * pressure[..., None, :, :] * opposing
         return shear
-
-
-def _half_space_tractions(cycle: tuple[ContactState, ...]) -> CycleTractions:
-    """Tractions where the half-space has its own friction: known everywhere."""
-    pressure, shear, slip = (
-        np.stack([getattr(increment, name) for increment in cycle])
-        for name in ("pressure", "shear", "slip")
-    )
-    return CycleTractions(pressure, shear, slip, np.zeros(len(cycle)))

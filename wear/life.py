@@ -74,24 +74,16 @@ class Ruiz:
         return self.tension * self.friction_parameter
 
 
-def ruiz(stress: Array, shear: Array, slip: Array, share: Array | None = None) -> Ruiz:
+def ruiz(stress: Array, work: Array) -> Ruiz:
     """Ruiz's parameters from what happens at the surface.
 
     ``stress`` ``(t, 6, nx, ny)`` is that of one body at its surface, bulk stress included [MPa];
-    ``shear`` ``(t, 2, nx, ny)`` [MPa] and ``slip`` ``(t, 2, nx, ny)`` [mm] are those at the end of
-    and during each increment, as in :mod:`sa_solver.types`, which happens ``share`` ``(t,)`` times
-    per mean cycle, once if not given. The tension is the largest principal
-    stress in the plane of the surface. Raises StressHistoryError where lengths differ.
+    ``work`` ``(nx, ny)`` that of friction per area in a mean cycle [N/mm]. The tension is the
+    largest principal stress in the plane of the surface.
     """
     _check(stress)
-    if not len(stress) == len(shear) == len(slip):
-        raise StressHistoryError(
-            f"{len(stress)} stresses, {len(shear)} shears, {len(slip)} slips: must be as many"
-        )
     xx, yy, xy = stress[:, 0], stress[:, 1], stress[:, 3]
     principal = 0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy)
-    often = np.ones(len(slip)) if share is None else share
-    work = -np.einsum("t,ti...,ti...->...", often, shear, slip)
     return Ruiz(work, np.maximum(0.0, principal.max(axis=0)))
 
 

@@ -2,7 +2,8 @@
 
 The grid goes with body 2, which carries the form of the contact. With body 2 at an offset s from
 its mean position, the cell at x of the grid lies over the point x + s of body 1, whose surface is
-kept in the frame of that mean position. Over an increment that leads straight from s0 to s1,
+kept in the frame of that mean position. Each state of a cycle acts from half an increment before
+its place to half an increment after it (:mod:`sa_solver.increments`). On such a way,
 
     carried  c_i = Σ_k w_k f_{i+k}          deposited  d_{i+k} = Σ_i w_k p_i
 
@@ -12,6 +13,11 @@ path: w_k = ∫₀¹ Λ(s_x/dx - k_x) Λ(s_y/dy - k_y) dt with the hat Λ(u) = m
 or more and their sum is 1, so that constants stay, nothing rises that only falls, and depositing
 keeps volume. Between the places where the path passes into the next cell the integrand is a
 quadratic of t, which two Gauss points integrate exactly.
+
+To let each state act, ever less, as far as the states next to it would pass pressure on evenly, but
+blurs twice as much: of a cylinder over 50 µm of a scar of 0.17 mm, 1, 2, 4 and 8 increments each
+way leave 1.2, 0.7, 0.2 and 0.06 % of the depth of the flat, and would leave 3, 1.5, 0.5 and 0.13 %.
+Its worn peak pressure needs more of them: 162, 121, 92 and 84 MPa with 2, 4, 8 and 16.
 
 Cells blur what they carry. Against the motion they stand for, the second moment of the weights is
 too large by dx²/6 for a long path, and for one of length L < 2 dx about its middle by L dx/4 -
@@ -24,9 +30,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from sa_solver.errors import InputError
 from sa_solver.ties import exceeds
@@ -53,32 +59,30 @@ class TravelError(InputError):
 
 @dataclass(frozen=True)
 class Passage:
-    """Body 2 on its straight way from offset ``before`` to ``after`` (x, y) [mm] of its mean place.
+    """Body 2 on its way along ``path`` ``(k, 2)`` [mm], straight from one offset to the next.
 
-    In a line contact motion along y changes nothing and is left out.
+    Offsets (x, y) are those from its mean place. In a line contact motion along y changes nothing
+    and is left out.
     """
 
     grid: Grid
-    before: ArrayLike
-    after: ArrayLike
+    path: Array
 
     @cached_property
     def _weights(self) -> Array:
-        """Weight w_k of each shift k in cells ``(2 m + 1, 2 n + 1)``, no shift in the middle."""
-        start, end = (np.array(offset) / self.grid.pitch for offset in (self.before, self.after))
+        """Weight w_k of each shift k in cells ``(2 m + 1, 2 n + 1)``, no shift in the middle.
+
+        The mean over the path, by the length of its legs.
+        """
+        path = self.path / self.grid.pitch
         if self.grid.line:
-            start[1] = end[1] = 0.0
-        reach = np.floor(np.abs([start, end]).max(axis=0)).astype(int) + 1
+            path[:, 1] = 0.0
+        reach = np.floor(np.abs(path).max(axis=0)).astype(int) + 1
+        lengths = np.hypot(*np.diff(path * self.grid.pitch, axis=0).T)
+        shares = lengths / lengths.sum() if lengths.any() else np.ones_like(lengths) / len(lengths)
         weights = np.zeros(2 * reach + 1)
-        times = _crossings(start, end)
-        for begin, length in zip(times[:-1], np.diff(times), strict=True):
-            for point in GAUSS:
-                shift = start + (begin + point * length) * (end - start)
-                # It lies over two cells along either axis, with these shares.
-                cell = np.floor(shift).astype(int)
-                (u, v), (i, j) = shift - cell, reach + cell
-                shares = np.outer([1.0 - u, u], [1.0 - v, v])
-                weights[i : i + 2, j : j + 2] += 0.5 * length * shares
+        for share, leg in zip(shares, pairwise(path), strict=True):
+            _add_leg(weights, share, *leg)
         return weights
 
     def carry(self, field: Array) -> Array:
@@ -110,6 +114,20 @@ class Passage:
                     f"{name}: make the grid (contact.size) longer by "
                     f"{2 * beyond * self.grid.pitch[axis]:.3g} mm or more"
                 )
+
+
+def _add_leg(weights: Array, share: float, start: Array, end: Array) -> None:
+    """Add the ``share`` of a path that leads straight from ``start`` to ``end`` [cells]."""
+    reach = np.array(weights.shape) // 2
+    times = _crossings(start, end)
+    for begin, length in zip(times[:-1], np.diff(times), strict=True):
+        for point in GAUSS:
+            shift = start + (begin + point * length) * (end - start)
+            # It lies over two cells along either axis, with these shares.
+            cell = np.floor(shift).astype(int)
+            (u, v), (i, j) = shift - cell, reach + cell
+            shares = np.outer([1.0 - u, u], [1.0 - v, v])
+            weights[i : i + 2, j : j + 2] += 0.5 * share * length * shares
 
 
 def _weighted(field: Array, weights: Array) -> Array:
@@ -170,9 +188,10 @@ def followed(
     missions: Sequence[slice] = (slice(None),),
     forced: bool | None = None,
 ) -> Array:
-    """Offsets of body 2 before and after each increment ``(t, 2, 2)`` [mm], if they count.
+    """Paths of body 2 over which each state of a cycle acts ``(t, 3, 2)`` [mm], if they count.
 
-    ``(0, 2, 2)`` where the motion does not count. ``slip`` ``(t, 2, nx, ny)`` [mm] is that of the
+    From half way before its offset over that to half way after; ``(0, 3, 2)`` where the motion does
+    not count. ``slip`` ``(t, 2, nx, ny)`` [mm] is that of the
     increments and ``pressure`` ``(nx, ny)`` that of the whole cycle, see :func:`offsets`;
     ``missions`` are the increments of each closed cycle of a mix. Motion that counts in one
     (:func:`moves`) is followed in all; ``forced`` says instead whether to follow it.
@@ -181,15 +200,24 @@ def followed(
     if forced is None:
         forced = any(moves(path, pressure > 0.0, grid) for path in paths)
     if not forced:
-        return np.empty((0, 2, 2))
-    return np.concatenate([np.stack([path[:-1], path[1:]], axis=1) for path in paths])
+        return np.empty((0, 3, 2))
+    return np.concatenate([ways_of_states(path) for path in paths])
 
 
-def passages(grid: Grid, ends: Array) -> tuple[Passage, ...] | None:
-    """The passages between offsets ``ends`` ``(t, 2, 2)`` [mm]; None where there are none."""
-    if not len(ends):
+def ways_of_states(path: Array) -> Array:
+    """Ways over which the states at the offsets of a closed ``path`` ``(t + 1, 2)`` [mm] act.
+
+    ``(t, 3, 2)``: from half way before each over it to half way after it.
+    """
+    middles = 0.5 * (path[1:] + path[:-1])
+    return np.stack([middles, path[1:], np.roll(middles, -1, axis=0)], axis=1)
+
+
+def passages(grid: Grid, paths: Array) -> tuple[Passage, ...] | None:
+    """The passages along ``paths`` ``(t, k, 2)`` [mm]; None where there are none."""
+    if not len(paths):
         return None
-    return tuple(Passage(grid, before, after) for before, after in ends)
+    return tuple(Passage(grid, path) for path in paths)
 
 
 def stroke_of(path: Array) -> tuple[float, Array]:

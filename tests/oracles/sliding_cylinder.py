@@ -53,25 +53,27 @@ def wear_without_tilt(
 ) -> tuple[Array, Array]:
     """Depths of the flat and of the slider after so many cycles' worth of ``steps``.
 
-    The slider passes ``cells`` in each of the ``increments`` there and back, about the middle, and
-    either body loses ``rate`` [mm/MPa] times its pressure in an increment of a step. Under one
-    increment the flat is worn where the slider passes: at its two ends half as much as between.
+    The slider passes ``cells``, an even number, in each of the ``increments`` there and back, about
+    the middle. It presses where an increment ends, and either body loses ``rate`` [mm/MPa] times
+    that pressure from half an increment before that place to half an increment after it. The flat
+    is worn where the slider passes meanwhile: at the ends of that way half as much as between.
     """
     compliance = strip_compliance(len(gap), pitch, modulus)
-    first = cells * np.arange(increments) - cells * increments // 2
-    weights = np.ones(cells + 1)
-    weights[[0, -1]] = 0.5
-    weights /= cells
+    half = cells * increments // 2
     flat, slider = np.zeros_like(gap), np.zeros_like(gap)
     for _ in range(steps):
         worn_flat, worn_slider = np.zeros_like(gap), np.zeros_like(gap)
-        for begin in first:
-            places = begin + np.arange(cells + 1)
-            seen = sum(w * np.roll(flat, -k) for w, k in zip(weights, places, strict=True))
+        for place in range(-half, half + 1, cells):
+            begin, end = max(place - cells // 2, -half), min(place + cells // 2, half)
+            weights = np.ones(end - begin + 1)
+            weights[[0, -1]] = 0.5
+            # There and back press alike; where it turns it comes once, and goes back the same way.
+            weights *= 2.0 / cells
+            passed = list(zip(weights, range(begin, end + 1), strict=True))
+            seen = sum(w * np.roll(flat, -k) for w, k in passed) / weights.sum()
             worn = rate * press(compliance, gap + seen + slider, load, pitch)
-            # There and back press alike.
-            worn_slider += 2.0 * worn
-            for w, k in zip(weights, places, strict=True):
-                worn_flat += 2.0 * w * np.roll(worn, k)
+            worn_slider += weights.sum() * worn
+            for w, k in passed:
+                worn_flat += w * np.roll(worn, k)
         flat, slider = flat + worn_flat, slider + worn_slider
     return flat, slider

@@ -1,5 +1,7 @@
 """Increments of a frictional contact: normal, tangential and sliding states, one from another."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -25,7 +27,10 @@ def load(P, Qx=0.0, Qy=0.0, Mz=0.0, **more):
 
 
 def test_resultants_motions_and_energy_add_up():
-    """Over increments with changing pressure: Σ Ed = Σ Q·Δδ + Mz Δφz - Σ q·Δu S each time."""
+    """Over increments with changing pressure: -Σ q·Δs S = Σ Q·Δδ + Mz Δφz - Σ q·Δu S each time.
+
+    What is dissipated takes the mean pressure of both ends of the increment instead.
+    """
     solver = contact()
     state = solver.apart(HEIGHT)
     for P, Qx, Qy, Mz in [
@@ -43,9 +48,29 @@ def test_resultants_motions_and_energy_add_up():
         change = state.displacement[:2] - before.displacement[:2]
         elastic = np.sum(state.shear * change) * GRID.cell_area
         expected = float(wanted[[1, 2, 5]] @ moved) - elastic
-        assert state.energy.sum() == pytest.approx(expected, rel=1e-7, abs=1e-9)
-        assert state.energy.sum() >= 0.0
+        against = -np.sum(state.shear * state.slip) * GRID.cell_area
+        assert against == pytest.approx(expected, rel=1e-7, abs=1e-9)
+        mean = 0.5 * FRICTION * (before.pressure + state.pressure)
+        lost = float(np.vdot(mean, np.hypot(*state.slip))) * GRID.cell_area
+        assert state.energy.sum() == pytest.approx(lost, rel=1e-7, abs=1e-9)
         assert np.all(np.hypot(*state.shear) <= FRICTION * state.pressure * (1.0 + 1e-12))
+
+
+def test_energy_is_of_second_order_in_the_increments():
+    """Shear there and back while the pressure rises and falls."""
+    solver = contact()
+    energies = []
+    for count in (2, 4, 8, 16):
+        state, energy = solver.advance(solver.apart(HEIGHT), HEIGHT, load(200.0, -30.0)), 0.0
+        for (P, Q), (P_to, Q_to) in pairwise([(200.0, -30.0), (400.0, 130.0), (200.0, -50.0)]):
+            for share in np.linspace(0.0, 1.0, count + 1)[1:]:
+                to = load(P + share * (P_to - P), Q + share * (Q_to - Q))
+                state = solver.advance(state, HEIGHT, to)
+                energy += state.energy.sum()
+        energies.append(energy)
+    changes = np.abs(np.diff(energies))
+    assert np.log2(changes[:-1] / changes[1:]).mean() > 1.5
+    assert changes[-1] < 1e-2 * energies[-1]
 
 
 def test_motions_bring_the_same_state_as_their_forces():

@@ -94,7 +94,7 @@ def test_forces_stay_those_of_the_balance(coarse) -> None:
 
 
 def test_a_cycle_dissipates_as_finely_divided_ones_do() -> None:
-    """Half the slip before a solved state and half after it: 4 to 8 times nearer."""
+    """Half the slip before a solved state and half after it, or the mean pressure of both ends."""
 
     def energies(increments: int, peak: int) -> tuple[float, float]:
         wearing = Wearing.of(
@@ -103,13 +103,14 @@ def test_a_cycle_dissipates_as_finely_divided_ones_do() -> None:
         history = wearing.source.unworn_cycle.histories[0]
         areas = np.concatenate([stage.face.nodal_areas for stage in wearing.contacts.stages])
         cycle = StructureCycle(wearing.source.unworn_cycle, FRICTION, areas, 1.0)
-        means = 0.5 * FRICTION * float((cycle.slip * cycle.pressure).sum(axis=0) @ areas)
-        return means, history.loads.mean_energy
+        by_state = 0.5 * FRICTION * float((cycle.slip * cycle.pressure).sum(axis=0) @ areas)
+        return by_state, history.loads.mean_energy
 
     fine = energies(88, 32)[0]
-    means, ends = energies(11, 4)
-    assert abs(means / fine - 1.0) < 0.015
-    assert abs(ends / fine - 1.0) > 0.1
+    by_state, by_increment = energies(11, 4)
+    assert by_state == pytest.approx(fine, rel=0.015)
+    # Of one flank; the other is its mirror image but for the mesh.
+    assert by_state == pytest.approx(by_increment, rel=1e-4)
 
 
 def test_a_run_goes_on_from_what_the_disk_keeps(coarse) -> None:

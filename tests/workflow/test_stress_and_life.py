@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from sa_solver.subsurface import SubsurfaceStress
-from sa_solver.types import Array, Grid, Material
+from sa_solver.types import Array, Grid, LoadHistory, Material
 from tests.marks import slow
 from tests.workflow.conftest import contents_of
 from wear.interface import CycleTractions
@@ -119,11 +119,14 @@ def test_each_body_is_pulled_at_its_end(normal: Any) -> None:
 
 
 def test_wear_takes_the_peaks_off(normal: Any) -> None:
+    """Of the pressure at once; stress moves on to where the edge has moved, and falls later."""
     for flank in FLANKS:
+        peaks = normal.summary[flank]["peak_pressure"]
+        assert 0.9 < peaks["worn"] / peaks["unworn"] < 0.95
         for name in BODIES.values():
             stress = normal.summary[flank]["stress"]["von_mises"][name]
             assert np.isfinite(stress["worn"]["value"])
-            assert 0.5 < stress["ratio"] < 1.0
+            assert stress["ratio"] == pytest.approx(1.0, abs=0.02)
 
 
 # --- balance ------------------------------------------------------------------------------------
@@ -159,7 +162,8 @@ def reversed_cycle(grid: Grid) -> CycleTractions:
     slip = np.stack([along, 0.0 * along], axis=1)
     both = np.stack([pressure, pressure])
     shear = np.stack([-0.5 * way * both, 0.0 * both], axis=1)
-    return CycleTractions(both, shear, slip, np.zeros(2))
+    loads = LoadHistory(both.sum(axis=(1, 2)), *np.zeros((7, 2)), sliding=np.ones(2, dtype=bool))
+    return CycleTractions(loads, 0.5, both, shear, slip, np.zeros(2))
 
 
 def test_symmetric_load_fares_both_flanks_alike(normal: Any) -> None:

@@ -175,7 +175,7 @@ def test_sections_are_forces_and_energies_per_length():
     """p = 10 + y: P per length 4 (10 + y), Qx = -µP, energy µP Σ|Δs|, slip Σ|Δs|, all exact."""
     history = history_of(lambda y: 20.0 + y)
     transfer = FaceTransfer.between(history.interface, Grid.covering(SIZE, (7, 30)))
-    rows = sections(transfer, history, 0)
+    rows = sections(transfer, history, 0, FRICTION)
     expected = SIZE[0] * (20.0 + transfer.grid.y.ravel())
     np.testing.assert_allclose(rows.P, expected, rtol=1e-12)
     np.testing.assert_allclose(rows.Qx, -FRICTION * expected, rtol=1e-12)
@@ -188,7 +188,7 @@ def test_sections_are_forces_and_energies_per_length():
 def test_sections_add_up_to_the_resultants():
     history = history_of(lambda y: 20.0 + np.cos(y))
     grid = Grid.covering(SIZE, (7, 30))
-    rows = sections(FaceTransfer.between(history.interface, grid), history, 0)
+    rows = sections(FaceTransfer.between(history.interface, grid), history, 0, FRICTION)
     loads = history.loads
     for per_length, whole in (
         (rows.P, loads.P[0]),
@@ -225,7 +225,7 @@ def test_uniformity_of_a_slot(slot):
     assert one.mean_load == pytest.approx(two.mean_load, rel=1e-4)
     assert one.wear == 0.0  # nothing has worn yet
     transfer = stages[0].transfer
-    rows = sections(transfer, source.unworn()[0], source.peak)
+    rows = sections(transfer, source.unworn()[0], source.peak, FRICTION)
     middle = np.abs(transfer.grid.y.ravel()) <= 0.25 * stages[0].grid.size[1]
     assert one.pressure == pytest.approx(np.abs(rows.P / rows.middle["P"] - 1.0)[middle].max())
     mean = source.unworn()[0].loads.P[source.peak] / stages[0].grid.size[1]
@@ -395,7 +395,8 @@ def in_the_middle(run: Run, name: str) -> dict[str, float]:
     source = structure_of(case).source(case)
     faces = {face.face.name: number for number, face in enumerate(source.faces)}
     stage = ContactStage(case, source.faces[faces[name]])
-    middle = sections(stage.transfer, source.unworn()[faces[name]], source.peak).middle
+    unworn, friction = source.unworn()[faces[name]], case.friction.at(0.0)
+    middle = sections(stage.transfer, unworn, source.peak, friction).middle
     with h5py.File(run.folder / "results.h5") as file:
         surfaces = file[f"surfaces/{name}"]
         first, last = (surfaces[sorted(surfaces)[end]] for end in (0, -1))

@@ -22,7 +22,7 @@ from workflow.shell.checkpoint import Checkpoint, save
 HISTORIES = ("cycles", "kinetics", "drift", "solved_resultants")
 # What the state of one interface has: parts of arrays, arrays, numbers.
 PARTS: dict[str, Any] = {"surfaces": Surfaces, "loads": LoadHistory}
-ARRAYS = ("slip", "ends")
+ARRAYS = ("slip", "paths")
 # Where it has what solves start from: the increments, and of all of them these fields.
 INCREMENTS, START = "starts/increments", ("pressure", "displacement")
 # Where it has its companion.

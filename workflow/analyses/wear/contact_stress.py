@@ -172,15 +172,14 @@ class InterfaceStress:
 def contact_stresses(
     case: WearCase,
     peak: int,
-    contacts: Sequence[tuple[ContactStage, tuple[CycleTractions, CycleTractions], Array]],
+    contacts: Sequence[tuple[ContactStage, tuple[CycleTractions, CycleTractions]]],
     reporter: Reporter,
 ) -> list[InterfaceStress]:
     """Stress under all ``contacts`` as the case asks for it.
 
-    Each has its tractions in an unworn and a worn cycle, and the share ``(t,)`` of each increment
-    in a mean cycle; ``peak`` is the increment of peak load.
+    Each has its tractions in an unworn and a worn cycle; ``peak`` is the increment of peak load.
     """
-    unknown = [cycle.unknown for _, cycles, _ in contacts for cycle in cycles]
+    unknown = [cycle.unknown for _, cycles in contacts for cycle in cycles]
     _report_stick(np.array(unknown), peak, reporter)
     return [_interface_stress(case, peak, *contact) for contact in contacts]
 
@@ -190,7 +189,6 @@ def _interface_stress(
     peak: int,
     stage: ContactStage,
     cycles: tuple[CycleTractions, CycleTractions],
-    share: Array,
 ) -> InterfaceStress:
     planes = Planes(case.stress, stage.grid)
     materials = case.material(1), case.material(2)
@@ -202,7 +200,7 @@ def _interface_stress(
         body_1, body_2 = (
             BodyStress(
                 planes.section(solver, _traction(cycle, peak)),
-                life_maps(case.stress.life, solver, material, cycle, known, share),
+                life_maps(case.stress.life, solver, material, cycle, known),
             )
             for solver, material in zip(solvers, materials, strict=True)
         )
@@ -231,13 +229,11 @@ def life_maps(
     material: Material,
     cycle: CycleTractions,
     known: np.ndarray,
-    share: Array | None = None,
 ) -> dict[str, Dataset]:
     """Maps of the parameter and of what it is made of, at the critical distance, by name.
 
     Stress is that of the ``known`` ``(t,)`` increments, of all cycles of a mix together; friction
-    work that of all, by the ``share`` ``(t,)`` of each in a mean cycle. Where no increment is known
-    there is no map.
+    work that of all in a mean cycle. Where no increment is known there is no map.
     """
     if life.parameter == "none" or not known.any():
         return {}
@@ -246,7 +242,7 @@ def life_maps(
         history[t] = solver.at_depth(_traction(cycle, int(t)), life.depth)
     if life.parameter == "ruiz":
         # Without stress, an increment adds its work and leaves the largest tension as it is.
-        return _ruiz_maps(ruiz(history, cycle.shear, cycle.slip, share))
+        return _ruiz_maps(ruiz(history, np.tensordot(cycle.loads.share, cycle.work, 1)))
     if life.parameter == "findley":
         plane = findley(history[known], life.sensitivity)
         what = "shear stress amplitude plus k largest normal stress, worst plane"

@@ -1,9 +1,8 @@
 """Finite elements alone: the nodes of a structure's contact faces wear, without a half-space.
 
-Every cycle of the wear is one of the structure, on the surfaces at hand. An increment wears by its
-slip times the mean pressure of both its ends: half the slip before a solved state and half the slip
-after it count at its pressure, which is of second order in the increments. What is written lies on
-the contact grid, like a half-space's: means of the nodal fields over its cells.
+Every cycle of the wear is one of the structure, on the surfaces at hand: half the slip before a
+solved state and half the slip after it count at its pressure (:mod:`sa_solver.increments`). What is
+written lies on the contact grid, like a half-space's: means of the nodal fields over its cells.
 """
 
 from __future__ import annotations
@@ -18,7 +17,14 @@ from fe_models.structure import CycleSolution, InterfaceHistory
 from fe_models.transfer import FaceTransfer
 from sa_solver.types import Array
 from wear.coupled import CoupledState
-from wear.interface import ContactFields, CycleTractions, FaceLoads, FirstContact, InterfaceState
+from wear.interface import (
+    ContactFields,
+    CycleTractions,
+    FaceLoads,
+    FirstContact,
+    InterfaceState,
+    acting_slip,
+)
 from wear.nodes import NodalContact, NodalState
 from wear.stabilised import StabilisedStepper
 from wear.steppers import advance_cycles, first_cycles
@@ -50,9 +56,8 @@ class StructureCycle:
     @property
     def slip(self) -> Array:
         """Half of that before and half of that after each solved state ``(t, n)`` [mm]."""
-        size = np.hypot(*self.solution.fields()["slip"].transpose(1, 0, 2))
-        halves: Array = 0.5 * (size + np.roll(size, -1, axis=0))
-        return halves
+        histories = self.solution.histories
+        return np.concatenate([acting_slip(h.slip, h.loads) for h in histories], axis=1)
 
     @property
     def pressure(self) -> Array:
@@ -245,7 +250,7 @@ class NodalContacts(StagedContacts):
                     start=depth,
                     loads=history.loads,
                     slip=history.slip,
-                    ends=np.empty((0, 2, 2)),
+                    paths=np.empty((0, 3, 2)),
                 )
             )
         return tuple(faces)
@@ -261,14 +266,12 @@ class NodalContacts(StagedContacts):
         return tuple(replace(state, start=depth, coarse=other) for state, other in pairs)
 
     def _first_contacts(self, solution: CycleSolution, stable: float) -> list[FirstContact]:
-        cycle = StructureCycle(solution, self._friction, self._areas, self._stiffness)
-        work = self._friction * cycle.slip * cycle.pressure * self._areas
         firsts = []
-        columns = zip(self.stages, solution.histories, self._cycles.split(work), strict=True)
-        for number, (stage, history, dissipated) in enumerate(columns):
+        columns = zip(self.stages, solution.histories, strict=True)
+        for number, (stage, history) in enumerate(columns):
             firsts.append(
                 FirstContact(
-                    energy=dissipated.sum(axis=1),
+                    energy=history.loads.Edx + history.loads.Edy,
                     pressure=_on_cells(stage, history).pressure,
                     touches_border=False,  # there the body itself ends
                     largest_residual=solution.residual,
@@ -290,4 +293,5 @@ def _on_cells(stage: ContactStage, history: InterfaceHistory) -> CycleTractions:
     areas, force = history.interface.nodal_areas, history.force
     traction = np.divide(force, areas, out=np.zeros_like(force), where=areas > 0.0)
     on_cells, slip = map(stage.transfer.to_cells, (traction, history.slip))
-    return CycleTractions(on_cells[:, 2], on_cells[:, :2], slip, np.zeros(len(slip)))
+    unknown, friction = np.zeros(len(slip)), stage.settings.friction(0.0)
+    return CycleTractions(history.loads, friction, on_cells[:, 2], on_cells[:, :2], slip, unknown)

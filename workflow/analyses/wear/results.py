@@ -4,17 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from sa_solver.normal import NormalContactError
-from sa_solver.types import Array, LoadHistory
-from wear.coupled import KINETICS, CoupledState
-from wear.interface import CycleTractions, FaceLoads, FirstContact, InterfaceState
-from wear.kinetics import LinearRegime, linear_regime
-from wear.steppers import root_mean_square, step_errors
+from sa_solver.types import LoadHistory
+from wear.coupled import KINETICS
+from wear.kinetics import LinearRegime
 from workflow.analyses.contact.datasets import LOADS, pressure_field, traction_fields
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.comparison import comparison_summary, write_comparison
@@ -33,7 +30,8 @@ from workflow.analyses.wear.datasets import (
     surface_heights,
 )
 from workflow.analyses.wear.layout import EXTRAPOLATION, Contents, energy_name
-from workflow.analyses.wear.load_source import LoadSource
+from workflow.analyses.wear.outcome import InterfaceOutcome, Outcome
+from workflow.analyses.wear.run_errors import left_sentence, warn_of_errors
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.uniformity import uniformities
 from workflow.analyses.wear.worn_faces import write_worn_faces
@@ -48,88 +46,8 @@ from workflow.shell.summary import finish
 
 # What the file of a jump has of each interface.
 JUMP_FIELDS = {"surfaces": ("body_1", "body_2"), "contact": ("pressure", "shear", "slip")}
-# What wear steps may leave of depth and volume where nobody has asked for less, and of the peak
-# pressure.
-UNASKED, PEAK = 0.05, 0.1
 # What the kinetics have of each linear regime; not numbers where there is none.
 REGIME_ATTRIBUTES = {"linear_from": "start", "rate": "rate", "trend": "trend", "scatter": "scatter"}
-
-
-@dataclass(frozen=True)
-class InterfaceOutcome:
-    """What a wear run found of one contact.
-
-    ``unworn`` are its loads before wear and ``first`` the contact of that cycle; ``state`` and
-    ``worn`` are its surfaces at the end and the tractions of a cycle on them, None where no stress
-    is asked for. ``kinetics`` ``(j, 5)`` are those at ``cycles`` ``(j,)``.
-    """
-
-    stage: ContactStage
-    unworn: FaceLoads
-    first: FirstContact
-    state: InterfaceState
-    worn: CycleTractions | None
-    cycles: Array
-    kinetics: Array
-
-    @cached_property
-    def regimes(self) -> dict[str, LinearRegime | None]:
-        """Linear regimes of depth and volume, both bodies together."""
-        columns = {"depth": self.kinetics[:, :2], "volume": self.kinetics[:, 2:4]}
-        return {
-            name: linear_regime(self.cycles, values.sum(axis=1)) for name, values in columns.items()
-        }
-
-    @cached_property
-    def carried(self) -> dict[str, LoadHistory]:
-        """Loads, unworn and worn, with the moments that hold the tilt where it is held."""
-        worn = np.zeros_like(self.first.pressure)
-        for t, start in self.state.starts.items():
-            worn[t] = start.pressure  # that the last wear step has left
-        return {
-            "unworn": self.stage.carried(self.unworn.loads, self.first.pressure),
-            "worn": self.stage.carried(self.state.loads, worn),
-        }
-
-    @property
-    def worn_area(self) -> float:
-        """Area that has worn by the end [mm²]."""
-        return (
-            np.count_nonzero(self.stage.on_grid(self.state).depth > 0.0) * self.stage.grid.cell_area
-        )
-
-    @property
-    def slip_per_cycle(self) -> float:
-        """Largest path of slip [mm] in an unworn cycle; of the half-space if loads have none."""
-        slip = self.unworn.slip
-        if self.first.cycle and not slip.any():
-            slip = np.stack([state.slip for state in self.first.cycle])
-        path = np.hypot(slip[:, 0], slip[:, 1])
-        return float(np.tensordot(self.unworn.loads.share, path, 1).max())
-
-    @cached_property
-    def step_error(self) -> dict[str, float] | None:
-        """What wear steps leave of depth, volume and pressure, relative; None where nobody knows.
-
-        Of the pressure it is the largest change anywhere in a cycle for steps of twice the length,
-        over the largest pressure: next to a worn edge it has no order.
-        """
-        left, companion = step_errors(self.state, self.stage.areas), self.state.coarse
-        if left is None or not isinstance(companion, InterfaceState):
-            return None
-        worn = self.stage.tractions(self.state) if self.worn is None else self.worn
-        change = np.abs(worn.pressure - self.stage.tractions(companion).pressure)
-        return left | {"pressure": float(change.max() / worn.pressure.max())}
-
-
-@dataclass(frozen=True)
-class Outcome:
-    """Everything a wear run found: its ``state`` at the end, and the contact of every interface."""
-
-    case: WearCase
-    source: LoadSource
-    state: CoupledState
-    interfaces: list[InterfaceOutcome]
 
 
 @dataclass(frozen=True)
@@ -164,7 +82,7 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
     worn_nodes = write_worn_faces(source, stages, state.interfaces, folder, reporter)
     loops = write_loop_tables(folder, source.line)
     warn_of_border(loops, case.loops, reporter)
-    _warn_of_steps(outcome, reporter)
+    warn_of_errors(case.wear, outcome.interfaces, reporter)
     summary = _summary(outcome, structure, stresses, recorded)
     uniform = uniformities(source, stages, state.interfaces)
     uniformity = {name: vars(alike) for name, alike in uniform.items()}
@@ -188,7 +106,7 @@ def _stresses(outcome: Outcome, reporter: Reporter) -> list[InterfaceStress]:
     for contact in outcome.interfaces:
         assert contact.worn is not None
         unworn = contact.stage.unworn_tractions(contact.unworn, contact.first)
-        cycles.append((contact.stage, (unworn, contact.worn), contact.unworn.loads.share))
+        cycles.append((contact.stage, (unworn, contact.worn)))
     return contact_stresses(outcome.case, outcome.source.peak, cycles, reporter)
 
 
@@ -360,6 +278,7 @@ def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str,
         },
         **({"by_increment": comparison_summary(first.cycle, loads)} if first.cycle else {}),
         "step_error": contact.step_error,
+        "increments_error": contact.increments_error,
         "explicit_limit": first.stable_cycles if np.isfinite(first.stable_cycles) else None,
         "contact_residual": first.largest_residual,
         "convolutions": first.spent.convolutions,
@@ -392,33 +311,6 @@ def _regime_summary(regime: LinearRegime) -> dict[str, Any]:
     }
 
 
-def _warn_of_steps(outcome: Outcome, reporter: Reporter) -> None:
-    """Wear steps that leave more than was asked for, or than may pass without being asked for."""
-    wear = outcome.case.wear
-    for contact in outcome.interfaces:
-        left, name = contact.step_error, contact.stage.name
-        if left is None:
-            continue
-        error, asked = max(left["depth"], left["volume"]), UNASKED
-        if wear.step.automatic:
-            asked = wear.tolerance
-            if wear.depth_tolerance is not None:
-                depths = contact.state.surfaces.depths
-                asked = wear.depth_tolerance / max(root_mean_square(d, d) for d in depths)
-        if error > asked:
-            what = "was asked for (wear.tolerance)" if wear.step.automatic else "may pass"
-            reporter.warn(
-                f"{name}: wear steps leave an estimated error of {error:.2%} of depth and volume "
-                f"where {asked:.2%} {what}: try wear.step.kind: second_order, or shorter steps"
-            )
-        if left["pressure"] > PEAK:
-            reporter.warn(
-                f"{name}: wear steps leave an estimated error of {left['pressure']:.0%} of the "
-                "peak pressure on the worn surfaces, and of what follows from it (fretting life): "
-                "try wear.step.kind: second_order, or shorter steps"
-            )
-
-
 def _lines(outcome: Outcome, summary: dict[str, Any]) -> Iterator[str]:
     """The end of the run in a few lines."""
     yield f"{summary['cycles']:.6g} cycles in {summary['jumps']} jumps"
@@ -431,15 +323,5 @@ def _lines(outcome: Outcome, summary: dict[str, Any]) -> Iterator[str]:
             f"  {name}: worn {numbers['depth_1'] * 1e3:.3g} um ({name_1}), "
             f"{numbers['depth_2'] * 1e3:.3g} um ({name_2}); {numbers['volume_1']:.3g}, "
             f"{numbers['volume_2']:.3g} {unit}; peak pressure {peaks['unworn']:.0f} -> "
-            f"{peaks['worn']:.0f} MPa; tilt {numbers['tilt']}{_left(numbers['step_error'])}"
+            f"{peaks['worn']:.0f} MPa; tilt {numbers['tilt']}{left_sentence(contact)}"
         )
-
-
-def _left(error: dict[str, float] | None) -> str:
-    """What wear steps leave, where it is known."""
-    if error is None:
-        return ""
-    return (
-        f"; wear steps leave {max(error['depth'], error['volume']):.1%} of depth and volume, "
-        f"{error['pressure']:.1%} of the peak pressure"
-    )

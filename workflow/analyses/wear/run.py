@@ -20,8 +20,9 @@ from workflow.analyses.wear.contact_workers import (
 from workflow.analyses.wear.fidelity.choosing import report_choice
 from workflow.analyses.wear.load_source import ContactFace, LoadSource
 from workflow.analyses.wear.nodal_contacts import NodalContacts
+from workflow.analyses.wear.outcome import InterfaceOutcome, Outcome
 from workflow.analyses.wear.recording import Recorder, RunLog
-from workflow.analyses.wear.results import InterfaceOutcome, Outcome, write_output
+from workflow.analyses.wear.results import write_output
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource

@@ -15,6 +15,7 @@ import numpy as np
 
 from fe_models.structure import InterfaceHistory
 from fe_models.transfer import FaceTransfer
+from sa_solver.increments import mean_of_ends
 from sa_solver.types import Array
 from wear.interface import InterfaceState
 from workflow.analyses.wear.contact_stage import ContactStage
@@ -49,7 +50,9 @@ class Sections:
         return {name: _middle(values) for name, values in vars(self).items()}
 
 
-def sections(transfer: FaceTransfer, history: InterfaceHistory, peak: int) -> Sections:
+def sections(
+    transfer: FaceTransfer, history: InterfaceHistory, peak: int, friction: float
+) -> Sections:
     """Sections of a structure's contact, one per row of the transfer's grid."""
     grid = transfer.grid
     covered = np.asarray(transfer.shared.sum(axis=1)).reshape(grid.shape) / grid.pitch[1]
@@ -61,9 +64,11 @@ def sections(transfer: FaceTransfer, history: InterfaceHistory, peak: int) -> Se
     traction = history.force / history.interface.nodal_areas
     pressure = traction[peak, 2]
     share = history.loads.share
-    path = share @ np.hypot(history.slip[:, 0], history.slip[:, 1])
+    slip_size = np.hypot(history.slip[:, 0], history.slip[:, 1])
+    path = share @ slip_size
     normal = per_length(pressure)
-    energy = -np.einsum("t,tan,tan->n", share, traction[:, :2], history.slip)
+    mean = mean_of_ends(traction[:, 2], history.loads.missions)
+    energy = friction * np.einsum("t,tn,tn->n", share * (history.loads.P > 0.0), mean, slip_size)
     weighted = per_length(pressure * path)
     slip = np.divide(weighted, normal, out=np.zeros_like(normal), where=normal > 0.0)
     return Sections(normal, per_length(traction[peak, 0]), per_length(energy), slip)
@@ -118,7 +123,7 @@ def uniformity(
     stage: ContactStage, history: InterfaceHistory, state: InterfaceState, peak: int
 ) -> Uniformity | None:
     """Uniformity of the unworn contact and of the wear so far; None without load in the middle."""
-    carried = sections(stage.transfer, history, peak)
+    carried = sections(stage.transfer, history, peak, stage.settings.friction(0.0))
     if _middle(carried.P) <= 0.0:
         return None
     worn = np.sum(stage.on_grid(state).depth, axis=0)

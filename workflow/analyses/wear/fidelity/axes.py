@@ -1,8 +1,7 @@
 """The axes of fidelity after the dimension: how fine each setting must be for its share of error.
 
-Shares are large where accuracy is dear: increments cost in proportion to 1/error, meshes more. They
-add up to 1; errors of all axes are taken to have one sign. Estimates are of the largest depth and
-the volume of either flank.
+Shares are large where accuracy is dear. They add up to 1; errors of all axes are taken to have one
+sign. Estimates are of the largest depth and the volume of either flank.
 """
 
 from __future__ import annotations
@@ -28,8 +27,8 @@ from workflow.analyses.wear.fidelity.probe import (
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.case.changing import changed
 
-# Structural friction is first order in the increment; meshes and grids are at most second order.
-FRICTION_ORDER, GRID_ORDER = 1.0, 2.0
+# What increments, meshes and grids are of at most.
+ORDER = 2.0
 # Doublings of the fewest increments that are probed, and the most that are ever chosen.
 DOUBLINGS, MOST_INCREMENTS = 2, 1500
 # Elements across a flank: fewer say nothing, and so many take seconds to condense in the plane.
@@ -64,7 +63,7 @@ def choose_increments(case: DovetailCase, allowed: float) -> Decision:
     first = increments(case, INCREMENTS)["load_path.increments"]
     counts = [first * 2**k for k in range(DOUBLINGS + 1)]
     values = [life(changed(section, increments(case, count))) for count in counts]
-    estimated = estimate(values, [1.0 / count for count in counts], FRICTION_ORDER)
+    estimated = estimate(values, [1.0 / count for count in counts], ORDER)
     needed = max(first, ceil(counts[-1] * estimated.refinement(allowed) * (1.0 - ROUNDING)))
     settings = increments(case, min(needed, MOST_INCREMENTS))
     count = settings["load_path.increments"]
@@ -175,7 +174,7 @@ def _climb(rungs: Sequence[_Rung], worn: Callable[[_Rung], Numbers], allowed: fl
         if len(values) < min(LEAST_RUNGS, len(rungs)):
             continue
         steps = [1.0 / rung.size for rung in rungs[: len(values)]]
-        estimated = estimate(values, steps, GRID_ORDER)
+        estimated = estimate(values, steps, ORDER)
         errors = estimated.errors
         enough = [k for k, error in enumerate(errors) if rungs[k].offered and error <= allowed]
         if enough:
@@ -241,7 +240,7 @@ def choose_drift(case: DovetailCase, allowed: float) -> Decision:
 
 def _effect(apart: Numbers, coupled: Numbers) -> float:
     """Largest relative difference of two lives."""
-    pair = estimate([apart, coupled], [2.0, 1.0], GRID_ORDER)
+    pair = estimate([apart, coupled], [2.0, 1.0], ORDER)
     # Of two rungs the last one's error is their difference, and the first one's twice that.
     return pair.errors[-1]
 

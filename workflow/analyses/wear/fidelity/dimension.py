@@ -66,7 +66,8 @@ def _mid_slot(case: DovetailCase, dimension: int) -> Numbers:
     middles = {}
     for contact, history in zip(stage.faces, stage.unworn(), strict=True):
         transfer = FaceTransfer.between(contact.face, contact.grid(contact.coarse))
-        middles[contact.face.name] = sections(transfer, history, stage.peak).middle
+        rows = sections(transfer, history, stage.peak, case.friction.at(0.0))
+        middles[contact.face.name] = rows.middle
     return middles
 
 

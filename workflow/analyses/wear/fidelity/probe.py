@@ -17,6 +17,7 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, resultant_change
 from wear.coupled import Contacts, CoupledSettings, CoupledState, CoupledWear, JumpSize
+from wear.interface import acting_slip
 from wear.steppers import ImplicitStepper, advance_cycles
 from wear.stepping import SlidingCycle, WearingContact, WearState
 from workflow.analyses.wear.case.sections import Contact, ContactStress, Life, Step
@@ -146,7 +147,7 @@ def end_life(case: DovetailCase, cells: int) -> Numbers:
     numbers = {}
     for face, history in zip(structure.faces, structure.unworn(), strict=True):
         loads = _along(history.loads, length / width)
-        slip = np.hypot(history.slip[:, 0], history.slip[:, 1]).mean(axis=1)
+        slip = acting_slip(history.slip, history.loads).mean(axis=1)
         sliding = SlidingCycle(loads, np.multiply.outer(slip, np.ones(grid.shape)))
         gap = geometry.flank_gap(np.zeros_like(grid.x), grid.x, SIDES[face.face.name])
         wearing = WearingContact(contact, laws, case.friction.at(0.0), sliding, TOLERANCE)

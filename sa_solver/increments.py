@@ -1,0 +1,98 @@
+"""What slips dissipate and wear over the increments of closed cycles, to second order.
+
+The states at the ends of the increments are solved; between two of them pressure is taken to change
+evenly with slip. An increment of slip Δs then dissipates µ (p before + p after)/2 |Δs|, or, summed
+the other way round, each state acts over half the slip before it and half the slip after it:
+
+    Σ_t (p_{t-1} + p_t)/2 |Δs_t| = Σ_t p_t (|Δs_t| + |Δs_{t+1}|)/2      (cycles are closed)
+
+Taking the pressure at the end alone is of first order: 6 % too much on a dovetail of 22 increments,
+where this leaves 0.3 %. Where bodies part altogether within an increment nothing says how far they
+had slid by then: it counts for none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from sa_solver.types import Array, Mask
+
+EVERY = (slice(None),)
+"""All increments are those of one closed cycle."""
+
+STICKS = 1e-6
+"""Slips below this share of the largest are what solvers leave where bodies stick."""
+
+
+def before(values: Array, missions: Sequence[slice] = EVERY) -> Array:
+    """Values ``(t, ...)`` of the state before each increment, that of a cycle's first its last."""
+    return np.concatenate([np.roll(values[mission], 1, axis=0) for mission in missions])
+
+
+def mean_of_ends(values: Array, missions: Sequence[slice] = EVERY) -> Array:
+    """Mean of ``values`` ``(t, ...)`` before and after each increment."""
+    mean: Array = 0.5 * (values + before(values, missions))
+    return mean
+
+
+def slip_of_states(slip: Array, loaded: Mask, missions: Sequence[slice] = EVERY) -> Array:
+    """Slip ``(t, ...)`` over which each state acts, of the sizes ``slip`` of the increments' own.
+
+    ``loaded`` ``(t,)`` says which increments end with the bodies in contact.
+    """
+    counts = np.where(loaded.reshape(-1, *[1] * (slip.ndim - 1)), slip, 0.0)
+    after = np.concatenate([np.roll(counts[mission], -1, axis=0) for mission in missions])
+    return np.asarray(0.5 * (counts + after))
+
+
+def dissipated(limit: Array, slip: Array) -> Array:
+    """Work ``(..., 2, n)`` of friction along x and y in slips ``(..., 2, n)``.
+
+    ``limit`` ``(..., n)`` is µ times the mean pressure or force of both ends; friction opposes it.
+    """
+    size = np.hypot(slip[..., 0, :], slip[..., 1, :])[..., None, :]
+    work = limit[..., None, :] * slip**2
+    return np.divide(work, size, out=np.zeros_like(work), where=size > 0.0)
+
+
+def error_of_sums(
+    pressure: Array, slip: Array, loaded: Mask, missions: Sequence[slice] = EVERY
+) -> Array | None:
+    """Estimated error ``(...)`` of Σ (p_{t-1} + p_t)/2 |Δs_t| over ``slip`` ``(t, 2, ...)``.
+
+    What these sums are too large by, of three causes. Pressure over slip that bends: a third of
+    what two increments along one way change when they are taken as one (Richardson), half in each.
+    Slip that begins within an increment: a sixth of the change of pressure, the mean over all times
+    at which it may. Bodies that part: half of what the pressure before would do over the last slip.
+    None where no two increments go along one way: nothing then tells how pressure bends.
+    """
+    error, known = np.zeros(pressure.shape[1:]), False
+    for mission in missions:
+        of_mission, pairs = _error(pressure[mission], slip[mission], loaded[mission])
+        error, known = error + of_mission, known or pairs
+    return error if known else None
+
+
+def _error(pressure: Array, slip: Array, loaded: Mask) -> tuple[Array, bool]:
+    """The same of one cycle, and whether two of its increments go along one way."""
+    by_place = (-1, *[1] * (pressure.ndim - 1))
+    slip = np.where(loaded.reshape(-1, *[1] * (slip.ndim - 1)), slip, 0.0)
+    size, p_last = np.hypot(slip[:, 0], slip[:, 1]), np.roll(pressure, 1, axis=0)
+    size_last, last = np.roll(size, 1, axis=0), np.roll(slip, 1, axis=0)
+    rise = pressure - p_last
+    slips = size > STICKS * size.max(initial=0.0)
+    begins = slips & ~np.roll(slips, 1, axis=0)
+    # Two increments along one way, and what they share if taken as one.
+    pair = (np.sum(slip * last, axis=1) > 0.0) & slips & ~np.roll(begins, 1, axis=0)
+    turned = 0.5 * (rise * size_last - np.roll(rise, 1, axis=0) * size)
+    share, count = (
+        values + np.roll(values, -1, axis=0)
+        for values in (np.where(pair, turned / 6.0, 0.0), pair.astype(float))
+    )
+    bent = share / np.maximum(count, 1.0)
+    begun = np.where(begins & (p_last > 0.0), -size * rise / 6.0, 0.0)
+    parts = (~loaded & np.roll(loaded, 1)).reshape(by_place)
+    parted = np.where(parts, -0.5 * p_last * size_last, 0.0)
+    return np.asarray(np.sum(bent + begun + parted, axis=0)), bool(pair.any())

@@ -1,0 +1,90 @@
+"""Sums over increments: both orders of summation, the rate of convergence, and what they leave."""
+
+import numpy as np
+import pytest
+
+from sa_solver.increments import (
+    before,
+    dissipated,
+    error_of_sums,
+    mean_of_ends,
+    slip_of_states,
+)
+from sa_solver.types import Array
+
+PLACES = np.linspace(0.0, 1.0, 101)
+MISSIONS = [slice(0, 3), slice(3, 7)]
+
+
+def test_a_cycle_begins_where_it_ends() -> None:
+    values = np.arange(7.0)
+    np.testing.assert_array_equal(before(values, MISSIONS), [2, 0, 1, 6, 3, 4, 5])
+    np.testing.assert_array_equal(before(values), [6, 0, 1, 2, 3, 4, 5])
+
+
+def test_increments_and_states_add_up_to_the_same() -> None:
+    """Also where bodies part on the way, which counts for none on either side."""
+    rng = np.random.default_rng(3)
+    pressure, slip = rng.random((2, 7, 5))
+    loaded = np.array([1, 1, 0, 1, 1, 1, 1], dtype=bool)
+    pressure[~loaded] = 0.0
+    by_increment = mean_of_ends(pressure, MISSIONS)[loaded] * slip[loaded]
+    by_state = pressure * slip_of_states(slip, loaded, MISSIONS)
+    np.testing.assert_allclose(by_state.sum(axis=0), by_increment.sum(axis=0), rtol=1e-14)
+
+
+def test_work_is_against_the_slip() -> None:
+    work = dissipated(np.array([10.0, 5.0]), np.array([[0.3, 0.0], [-0.4, 0.0]]))
+    np.testing.assert_allclose(work, [[1.8, 0.0], [3.2, 0.0]], rtol=1e-14)
+
+
+def cycle(count: int, begins: float = 0.0) -> tuple[Array, Array, Array]:
+    """Pressure, slip and exact Σ p |ds| of places that slide out and back in ``count`` increments.
+
+    On the way out, from 0 to 1, a place slides from t = ``begins`` times its own number on; on the
+    way back all the time. Pressure is 1 + t² on the way out, and falls the same way back.
+    """
+    half = count // 2
+    t = np.linspace(0.0, 1.0, half + 1)[:, None]
+    start = begins * PLACES[None]
+    out = np.maximum(t - start, 0.0)
+    path = np.concatenate([out[1:], out[-1] * (1.0 - t[1:])])
+    rising = np.concatenate([1.0 + t[1:] ** 2, 1.0 + (1.0 - t[1:]) ** 2])
+    pressure = np.broadcast_to(rising, path.shape)
+    slip = np.stack([np.diff(path, axis=0, prepend=path[-1:]), np.zeros_like(path)], axis=1)
+    exact = (1.0 - start[0]) + (1.0 - start[0] ** 3) / 3.0 + (1.0 - start[0]) * 4.0 / 3.0
+    return pressure, slip, exact
+
+
+def summed(pressure: Array, slip: Array) -> Array:
+    return np.asarray(np.sum(mean_of_ends(pressure) * np.abs(slip[:, 0]), axis=0))
+
+
+@pytest.mark.parametrize("begins", [0.3, 0.9])
+def test_second_order(begins: float) -> None:
+    errors = []
+    for count in (8, 16, 32, 64):
+        pressure, slip, exact = cycle(count, begins)
+        errors.append(float(np.mean(summed(pressure, slip) - exact)))
+    rates = np.log2(np.abs(errors[:-1]) / np.abs(errors[1:]))
+    assert rates.min() > 1.6
+    assert rates.mean() > 1.9
+    # The pressure at the end alone: first order, of several times the error.
+    at_end = np.sum(pressure * np.abs(slip[:, 0]), axis=0)
+    assert abs(np.mean(at_end - exact)) > 5.0 * abs(errors[-1])
+
+
+@pytest.mark.parametrize("begins", [0.0, 0.3, 0.9])
+@pytest.mark.parametrize("count", [8, 16, 64])
+def test_the_estimate_is_near_the_error(begins: float, count: int) -> None:
+    pressure, slip, exact = cycle(count, begins)
+    error = error_of_sums(pressure, slip, np.ones(count, dtype=bool))
+    assert error is not None
+    told = float(error.mean())
+    true = float(np.mean(summed(pressure, slip) - exact))
+    assert 1.0 / 3.0 < told / true < 3.0
+
+
+def test_increments_that_all_turn_tell_nothing() -> None:
+    pressure, slip, _ = cycle(2)
+    assert error_of_sums(pressure, slip, np.ones(2, dtype=bool)) is None

@@ -1,0 +1,107 @@
+"""What a wear run found, before any of it is written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from sa_solver.types import Array, LoadHistory
+from wear.coupled import CoupledState
+from wear.interface import CycleTractions, FaceLoads, FirstContact, InterfaceState
+from wear.kinetics import LinearRegime, linear_regime
+from wear.steppers import step_errors
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.load_source import LoadSource
+
+
+@dataclass(frozen=True)
+class InterfaceOutcome:
+    """What a wear run found of one contact.
+
+    ``unworn`` are its loads before wear and ``first`` the contact of that cycle; ``state`` and
+    ``worn`` are its surfaces at the end and the tractions of a cycle on them, None where no stress
+    is asked for. ``kinetics`` ``(j, 5)`` are those at ``cycles`` ``(j,)``.
+    """
+
+    stage: ContactStage
+    unworn: FaceLoads
+    first: FirstContact
+    state: InterfaceState
+    worn: CycleTractions | None
+    cycles: Array
+    kinetics: Array
+
+    @cached_property
+    def regimes(self) -> dict[str, LinearRegime | None]:
+        """Linear regimes of depth and volume, both bodies together."""
+        columns = {"depth": self.kinetics[:, :2], "volume": self.kinetics[:, 2:4]}
+        return {
+            name: linear_regime(self.cycles, values.sum(axis=1)) for name, values in columns.items()
+        }
+
+    @cached_property
+    def carried(self) -> dict[str, LoadHistory]:
+        """Loads, unworn and worn, with the moments that hold the tilt where it is held."""
+        worn = np.zeros_like(self.first.pressure)
+        for t, start in self.state.starts.items():
+            worn[t] = start.pressure  # that the last wear step has left
+        return {
+            "unworn": self.stage.carried(self.unworn.loads, self.first.pressure),
+            "worn": self.stage.carried(self.state.loads, worn),
+        }
+
+    @property
+    def worn_area(self) -> float:
+        """Area that has worn by the end [mm²]."""
+        worn = self.stage.on_grid(self.state).depth > 0.0
+        return np.count_nonzero(worn) * self.stage.grid.cell_area
+
+    @property
+    def slip_per_cycle(self) -> float:
+        """Largest path of slip [mm] in an unworn cycle; of the half-space if loads have none."""
+        slip = self.unworn.slip
+        if self.first.cycle and not slip.any():
+            slip = np.stack([state.slip for state in self.first.cycle])
+        path = np.hypot(slip[:, 0], slip[:, 1])
+        return float(np.tensordot(self.unworn.loads.share, path, 1).max())
+
+    @cached_property
+    def step_error(self) -> dict[str, float] | None:
+        """What wear steps leave of depth, volume and pressure, relative; None where nobody knows.
+
+        Of the pressure it is the largest change anywhere in a cycle for steps of twice the length,
+        over the largest pressure: next to a worn edge it has no order.
+        """
+        left, companion = step_errors(self.state, self.stage.areas), self.state.coarse
+        if left is None or not isinstance(companion, InterfaceState):
+            return None
+        pressure = self._end.pressure
+        change = np.abs(pressure - self.stage.tractions(companion).pressure)
+        return left | {"pressure": float(change.max() / pressure.max())}
+
+    @cached_property
+    def increments_error(self) -> dict[str, float] | None:
+        """What increments leave of a cycle's depth and energy, the mean of first and last cycle."""
+        unworn = self.stage.unworn_tractions(self.unworn, self.first).increments_error
+        worn = self._end.increments_error
+        if unworn is None or worn is None:
+            return unworn or worn
+        return {name: 0.5 * (unworn[name] + worn[name]) for name in unworn}
+
+    @cached_property
+    def _end(self) -> CycleTractions:
+        """The tractions of a cycle at the end, of whatever is asked for."""
+        return self.stage.tractions(self.state) if self.worn is None else self.worn
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """Everything a wear run found: its ``state`` at the end, and the contact of every interface."""
+
+    case: WearCase
+    source: LoadSource
+    state: CoupledState
+    interfaces: list[InterfaceOutcome]
