@@ -9,9 +9,11 @@ integrals where the grid covers the face.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.ndimage import map_coordinates
 from scipy.spatial import cKDTree
 
 from fe_models.mesh import Face
@@ -27,11 +29,13 @@ ROUNDING = 1e-12
 class FaceTransfer:
     """Transfer between the ``n`` nodes of a face and a grid's ``(nx, ny)`` cells.
 
-    ``shared`` ``(nx ny, n)`` holds the areas W and ``areas`` ``(n,)`` those of the nodes [mm²];
+    ``face`` has the nodes. ``shared`` ``(nx ny, n)`` holds the areas W and ``areas`` ``(n,)`` those
+    of the nodes [mm²];
     ``nearest`` ``(nx ny,)`` is the node next to each cell, which stands in where the face does not
     cover the cell.
     """
 
+    face: Face
     grid: Grid
     shared: sp.csr_matrix
     nearest: Array
@@ -43,18 +47,65 @@ class FaceTransfer:
         x, y = np.broadcast_arrays(grid.x, grid.y)
         _, nearest = cKDTree(face.coordinates).query(np.stack([x.ravel(), y.ravel()], 1))
         if face.line:
-            return cls(grid, _shared_lengths(face, grid), nearest, face.facet_shares)
-        return cls(grid, _shared_areas(face, grid), nearest, face.facet_shares)
+            return cls(face, grid, _shared_lengths(face, grid), nearest, face.facet_shares)
+        return cls(face, grid, _shared_areas(face, grid), nearest, face.facet_shares)
+
+    @property
+    def nodes(self) -> Array:
+        """Coordinates ``(n, 2)`` of the nodes [mm]."""
+        return self.face.coordinates
+
+    @property
+    def opposed(self) -> Array:
+        """What the other body's face covers of the areas of the nodes ``(n,)`` [mm²]."""
+        return self.face.nodal_areas
+
+    def spacing(self, region: Array) -> Array:
+        """Distance of neighbouring nodes along x and along y ``(2,)`` [mm]; 0 along y on a line.
+
+        As facets usually are in a ``region`` ``(2, 2)``, between least and largest x and y.
+        """
+        corners = self.face.coordinates[self.face.facets]
+        middles = corners.mean(axis=1)
+        within = np.all((middles >= region[0]) & (middles <= region[1]), axis=1)
+        near = corners[within] if within.any() else corners
+        spacing: Array = np.median(np.ptp(near, axis=1), axis=0)
+        return spacing
+
+    @cached_property
+    def places(self) -> Array:
+        """Where each cell lies on the face ``(2, nx, ny)`` [mm]; off it, the node next to it."""
+        cells = np.stack(np.broadcast_arrays(self.grid.x, self.grid.y)).reshape(2, -1)
+        places = np.where(self._covered > 0.0, cells, self.nodes[self.nearest].T)
+        return places.reshape(2, *self.grid.shape)
+
+    @cached_property
+    def _covered(self) -> Array:
+        """Area of each cell that the face covers ``(nx ny,)`` [mm²]."""
+        return np.asarray(self.shared.sum(axis=1)).ravel()
 
     def to_cells(self, nodal: Array) -> Array:
         """Cell means ``(..., nx, ny)`` of nodal values ``(..., n)``."""
-        covered = np.asarray(self.shared.sum(axis=1)).ravel()
         rows = nodal.reshape(-1, nodal.shape[-1])
         means = (self.shared @ rows.T).T
-        inside = covered > 0.0
+        inside = self._covered > 0.0
         cells = rows[:, self.nearest]
-        cells[:, inside] = means[:, inside] / covered[inside]
+        cells[:, inside] = means[:, inside] / self._covered[inside]
         return cells.reshape(*nodal.shape[:-1], *self.grid.shape)
+
+    def spread(self, forces: Array) -> Array:
+        """Tractions ``(..., nx, ny)`` [MPa] of nodal ``forces`` ``(..., n)`` [N], sums kept."""
+        rows = forces.reshape(-1, forces.shape[-1]) / self.areas
+        cells = (self.shared @ rows.T).T / self.grid.cell_area
+        return cells.reshape(*forces.shape[:-1], *self.grid.shape)
+
+    def sample(self, cells: Array) -> Array:
+        """Values ``(..., n)`` of fields ``(..., nx, ny)`` at the nodes, linear between cells."""
+        pitch, shape = np.array(self.grid.pitch), np.array(self.grid.shape)
+        at = (self.nodes / pitch + 0.5 * (shape - 1)).T
+        fields = cells.reshape(-1, *self.grid.shape)
+        values = [map_coordinates(field, at, order=1, mode="nearest") for field in fields]
+        return np.reshape(values, (*cells.shape[:-2], -1))
 
     def to_nodes(self, cells: Array) -> Array:
         """Nodal values ``(n,)`` of cell values ``(nx, ny)``, zero beyond the grid."""

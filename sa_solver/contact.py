@@ -62,13 +62,16 @@ class ContactLoad:
     ``values`` (6,) are (P, Qx, Qy, Mx, My, Mz) [N, N mm; per mm on line grids] or, where
     ``motion`` (6,) says so, the motions (δz, δx, δy, φx, φy, φz) [mm, rad] since the bodies were
     apart. ``strain`` is the mismatch ε_2 - ε_1 along x of the unloaded surfaces (bulk stress).
-    ``energy`` (2,) [N mm], if known, is what the increment dissipates in x and in y.
+    ``along`` ``(2, nx, ny)`` [mm] is what these have moved relative to each other beside that,
+    tractions and rigid motions apart. ``energy`` (2,) [N mm], if known, is what the increment
+    dissipates in x and in y.
     """
 
     values: Array
     motion: tuple[bool, ...] = (False,) * 6
     strain: float = 0.0
     energy: Array | None = None
+    along: Array | None = None
 
 
 @dataclass(frozen=True)
@@ -78,10 +81,11 @@ class ContactState:
     Fields: ``traction`` ``(3, nx, ny)`` ordered qx, qy, p [MPa], its ``displacement`` K t
     ``(3, nx, ny)`` [mm], ``slip`` ``(2, nx, ny)`` of the increment [mm], ``gap`` ``(nx, ny)`` [mm],
     ``sticking`` ``(nx, ny)``. ``resultants`` (6,) and ``rigid`` (6,) are ordered as in
-    :class:`ContactLoad`; ``rigid`` counts from the bodies apart. ``energy`` (2,) is dissipated in
-    the increment in x and y [N mm]. ``sliding`` says that the whole contact slipped by its energy:
-    then the Q in ``resultants`` follows, and need not be the one given. ``residual`` is the largest
-    of the residuals of the problems solved; ``message`` is empty when ``converged``.
+    :class:`ContactLoad`, of which ``strain`` and ``along`` are; ``rigid`` counts from the bodies
+    apart. ``energy`` (2,) is dissipated in the increment in x and y [N mm]. ``sliding`` says that
+    the whole contact slipped by its energy: then the Q in ``resultants`` follows, and need not be
+    the one given. ``residual`` is the largest of the residuals of the problems solved; ``message``
+    is empty when ``converged``.
     """
 
     traction: Array
@@ -94,6 +98,7 @@ class ContactState:
     energy: Array
     converged: bool
     strain: float = 0.0
+    along: Array | None = None
     sliding: bool = False
     residual: float = 0.0
     message: str = ""
@@ -135,8 +140,11 @@ class FrictionalContact:
         self.friction, self.tolerance, self._sliding = friction, tolerance, sliding
         self._modes = PlanarModes.on(self.grid)
 
-    def apart(self, height: Array) -> ContactState:
-        """The bodies before they touch, at the gap ``height`` ``(nx, ny)`` [mm]."""
+    def apart(self, height: Array, along: Array | None = None) -> ContactState:
+        """The bodies before they touch, at the gap ``height`` ``(nx, ny)`` [mm].
+
+        Their surfaces may have moved ``along`` each other: see :class:`ContactLoad`.
+        """
         field = np.zeros((3, *self.grid.shape))
         return ContactState(
             traction=field,
@@ -148,6 +156,7 @@ class FrictionalContact:
             rigid=np.zeros(6),
             energy=np.zeros(2),
             converged=True,
+            along=along,
         )
 
     def advance(self, before: ContactState, height: Array, load: ContactLoad) -> ContactState:
@@ -178,13 +187,18 @@ class FrictionalContact:
         """Whether the shear follows from two normal problems: first loading of a line contact."""
         along_x = load.values[1] != 0.0 and load.values[2] == 0.0
         by_force = not any(load.motion[k] for k in (0, 1, 2, 4))
-        fresh = not before.shear.any() and load.strain == before.strain
+        moved = load.along is not None or before.along is not None
+        fresh = not before.shear.any() and load.strain == before.strain and not moved
         return self.grid.line and self.friction > 0.0 and along_x and by_force and fresh
 
     def offset(self, before: ContactState, load: ContactLoad) -> Array:
         """Tangential displacement ``(2, nx, ny)`` [mm] of the increment without its tractions."""
         offset = -before.displacement[:2]
         offset[0] += (load.strain - before.strain) * self.grid.x
+        if load.along is not None:
+            offset += load.along
+        if before.along is not None:
+            offset -= before.along
         return offset
 
     # -- similar bodies -----------------------------------------------------------------------
@@ -343,6 +357,7 @@ class FrictionalContact:
             resultants=resultants,
             rigid=rigid,
             strain=load.strain,
+            along=load.along,
             energy=self._dissipated(before, self.friction * normal.pressure, tangential.slip),
             sliding=sliding,
             residual=max(normal.residuals.largest, tangential.residuals.largest),
@@ -392,6 +407,7 @@ class FrictionalContact:
             resultants=state.resultants,
             rigid=rigid,
             strain=load.strain,
+            along=load.along,
             energy=self._dissipated(before, limit, state.slip),
             sliding=sliding,
             residual=state.residuals.largest,

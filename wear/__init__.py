@@ -72,10 +72,12 @@ if TYPE_CHECKING:
         Stop,
     )
     from wear.evolution import EnergyTable
-    from wear.interface import CellNodes, CycleLoads, InterfaceContact, InterfaceSettings
+    from wear.face_loads import CycleLoads
+    from wear.interface import InterfaceContact, InterfaceSettings
     from wear.kinetics import linear_regime
     from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
     from wear.life import findley, ruiz, smith_watson_topper
+    from wear.link import CellNodes
     from wear.steppers import (
         ErrorControl,
         ExplicitStepper,
@@ -124,10 +126,12 @@ __getattr__, __dir__ = lazy_names(
             *("CoupledWear", "JumpSize", "Observer", "Stop"),
         ),
         "evolution": ("EnergyTable",),
-        "interface": ("CellNodes", "CycleLoads", "InterfaceContact", "InterfaceSettings"),
+        "face_loads": ("CycleLoads",),
+        "interface": ("InterfaceContact", "InterfaceSettings"),
         "kinetics": ("linear_regime",),
         "laws": ("ArchardLaw", "EnergyAmplitudeLaw", "EnergyLaw", "EvolvingLaw", "WearLaw"),
         "life": ("findley", "ruiz", "smith_watson_topper"),
+        "link": ("CellNodes",),
         "steppers": (
             *("ErrorControl", "ExplicitStepper", "HeunStepper", "ImplicitStepper"),
             "SecondOrderStepper",

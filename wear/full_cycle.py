@@ -7,6 +7,8 @@ imposed instead of the tangential force.
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from sa_solver.contact import ContactLoad, ContactState, FrictionalContact
@@ -22,6 +24,7 @@ def march_cycle(
     loads: LoadHistory,
     motion: Array | None = None,
     tilt: Tilt = "free",
+    moved: Array | None = None,
 ) -> list[ContactState]:
     """States at the ends of the increments of one closed cycle, on surfaces that do not change.
 
@@ -30,7 +33,9 @@ def march_cycle(
     twice, and the second pass counts. In a mix every mission is such a cycle of its own, begun with
     the bodies apart. ``motion`` ``(t, 2)`` [mm] of body 2 over body 1 in each increment, far from
     the contact, is imposed in the place of Qx, Qy and Mz, without twist; the bodies meet in the
-    middle of it. A ``tilt`` that is held is imposed in the place of Mx and My.
+    middle of it. A ``tilt`` that is held is imposed in the place of Mx and My. What the bodies'
+    own deformation has ``moved`` ``(t, 3, nx, ny)`` [mm] at the end of an increment lies along the
+    surfaces in its first two components; the third is part of ``height``.
 
     Raises :class:`ContactFailure` where an increment does not converge, or its load is more than
     the contact can carry.
@@ -40,6 +45,9 @@ def march_cycle(
     path = _path(loads, motion, held=tilt == "held")
     for mission in loads.missions:
         increments = [path.load(t) for t in range(mission.start, mission.stop)]
+        if moved is not None:
+            pairs = zip(increments, moved[mission, :2], strict=True)
+            increments = [replace(load, along=along) for load, along in pairs]
         states += _closed_cycle(contact, heights[mission], increments, mission.start)
     return states
 
@@ -48,7 +56,8 @@ def _closed_cycle(
     contact: FrictionalContact, heights: Array, loads: list[ContactLoad], first: int
 ) -> list[ContactState]:
     """States of one closed cycle, whose first increment is number ``first`` of all."""
-    state = contact.apart(heights[0])
+    # Bodies apart at the end are so at the beginning: what their surfaces have moved is the same.
+    state = contact.apart(heights[-1], loads[-1].along)
     for _ in range(1 if loads[-1].values[0] == 0.0 else 2):
         states = []
         for t, (height, load) in enumerate(zip(heights, loads, strict=True), first):
@@ -89,7 +98,7 @@ def _advance(
     contact: FrictionalContact, before: ContactState, height: Array, load: ContactLoad, t: int
 ) -> ContactState:
     if load.values[0] <= 0.0:
-        return contact.apart(height)
+        return contact.apart(height, load.along)
     try:
         state = contact.advance(before, height, load)
     except ContactProblemError as error:

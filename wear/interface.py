@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
@@ -20,9 +20,12 @@ from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.increments import error_of_sums, mean_of_ends, slip_of_states
 from sa_solver.normal import NormalContact
+from sa_solver.ties import first_largest
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Tilt
+from wear.face_loads import FaceLoads
 from wear.full_cycle import march_cycle
 from wear.laws import EvolvingLaw, WearLaw
+from wear.link import Link, Transfer, linked
 from wear.moving import followed, passages
 from wear.steppers import Stepper, advance_cycles, first_cycles
 from wear.stepping import (
@@ -44,48 +47,6 @@ class MotionError(InputError):
 # --- what an interface is -------------------------------------------------------------------------
 
 
-class Transfer(Protocol):
-    """Fields between the ``n`` nodes of a face and the ``(nx, ny)`` cells of the grid over it."""
-
-    def to_cells(self, nodal: Array) -> Array:
-        """Cell values ``(..., nx, ny)`` of nodal values ``(..., n)``."""
-        ...
-
-    def to_nodes(self, cells: Array) -> Array:
-        """Nodal values ``(n,)`` of cell values ``(nx, ny)``, volumes kept."""
-        ...
-
-
-@dataclass(frozen=True)
-class CellNodes:
-    """The transfer of a face whose nodes are the cells of its ``grid``, in the order of C."""
-
-    grid: Grid
-
-    def to_cells(self, nodal: Array) -> Array:
-        return nodal.reshape(*nodal.shape[:-1], *self.grid.shape)
-
-    def to_nodes(self, cells: Array) -> Array:
-        return cells.ravel()
-
-
-class FaceLoads(Protocol):
-    """What one face carries over a cycle: ``slip`` ``(t, 2, n)`` [mm] is that of its nodes."""
-
-    @property
-    def loads(self) -> LoadHistory: ...
-    @property
-    def slip(self) -> Array: ...
-
-
-@dataclass(frozen=True)
-class CycleLoads:
-    """The same as plain data."""
-
-    loads: LoadHistory
-    slip: Array
-
-
 @dataclass(frozen=True)
 class InterfaceSettings:
     """One interface and how it wears.
@@ -97,7 +58,9 @@ class InterfaceSettings:
     imposed as the motion of its bodies, in the place of the tangential force. A ``tilt`` that is
     held stays that of the unworn bodies, in the place of the loads' Mx and My. ``follow`` says
     whether surfaces that move over each other are followed; None: where that counts
-    (:func:`wear.moving.moves`). ``tolerance`` is the contact solver's.
+    (:func:`wear.moving.moves`). The ``link`` to the structure of the loads is corrected for what
+    its bodies do beyond half-spaces (:mod:`wear.link`), where they say it at their nodes, or they
+    are taken for half-spaces. ``tolerance`` is the contact solver's.
     """
 
     name: str
@@ -113,6 +76,7 @@ class InterfaceSettings:
     driven: bool = False
     tilt: Tilt = "free"
     follow: bool | None = None
+    link: Literal["corrected", "half_space"] = "corrected"
     tolerance: float = 1e-8
 
 
@@ -120,13 +84,17 @@ class InterfaceSettings:
 class InterfaceState(WearState):
     """What an interface must remember between two jumps.
 
-    ``loads`` and nodal ``slip`` ``(t, 2, n)`` are those of the last solution of the source;
-    ``paths`` ``(t, 3, 2)`` [mm] lead body 2 round its place in each state, none where its motion is
-    too little to follow (:func:`wear.moving.followed`).
+    ``loads``, nodal ``slip`` ``(t, 2, n)`` and ``link`` are those of the last solution of the
+    source, ``pressed`` ``(n,)`` how the largest of ``loads`` was shared out over the nodes then,
+    none where the source does not know its nodes; ``paths`` ``(t, 3, 2)`` [mm] lead body 2 round
+    its place in each state, none where its motion is too little to follow
+    (:func:`wear.moving.followed`).
     """
 
     loads: LoadHistory
     slip: Array
+    link: Link
+    pressed: Array
     paths: Array
 
 
@@ -196,8 +164,8 @@ class FirstContact:
     """What the contact of the unworn cycle says: see :class:`wear.stepping.CycleResult`.
 
     ``energy`` ``(t,)`` [N mm]; ``pressure`` ``(t, nx, ny)`` [MPa]; ``stable_cycles`` the longest
-    stable explicit step; ``cycle`` the states at its increments where the half-space has its own
-    friction (method full), else empty.
+    stable explicit step; ``link`` is that to the unworn structure; ``cycle`` the states at its
+    increments where the half-space has its own friction (method full), else empty.
     """
 
     energy: Array
@@ -206,6 +174,7 @@ class FirstContact:
     largest_residual: float
     spent: Spent
     stable_cycles: float
+    link: Link
     cycle: tuple[ContactState, ...]
 
 
@@ -262,10 +231,16 @@ class InterfaceContact:
 
         At every loaded increment. Raises :class:`MotionError`.
         """
+        before = self._spent
         state = InterfaceState.unworn(
-            self.settings.gap, loads=history.loads, slip=history.slip, paths=np.empty((0, 3, 2))
+            self.settings.gap,
+            loads=history.loads,
+            slip=history.slip,
+            link=self._link(history),
+            pressed=np.empty(0),
+            paths=np.empty((0, 3, 2)),
         )
-        before, loaded = self._spent, self._loaded(state)
+        loaded = self._loaded(state)
         result = loaded.contact.cycle(state, np.flatnonzero(history.loads.P > 0.0).tolist())
         depth_rate, volume_rate = result.per_cycle(self.grid.cell_area)
         starts = {t: solved.start for t, solved in result.states.items()}
@@ -274,6 +249,7 @@ class InterfaceContact:
             depth_rate=depth_rate,
             volume_rate=volume_rate,
             starts=starts,
+            pressed=self._pressed(starts, history),
             paths=self._paths(loaded.slip, starts, history.loads),
         )
         first_step = first_cycles(loaded.contact, state, cycles)
@@ -286,15 +262,22 @@ class InterfaceContact:
             largest_residual=max((s.residuals.largest for s in states), default=0.0),
             spent=self._spent - before + Spent(len(states), result.convolutions),
             stable_cycles=loaded.contact.stable_cycles(state),
+            link=state.link,
             cycle=loaded.cycle,
         )
 
-    def follow(self, state: InterfaceState, history: FaceLoads) -> InterfaceState:
-        """The state under the loads of a new solution. Raises :class:`MotionError`."""
+    def follow(self, state: InterfaceState, history: FaceLoads) -> tuple[InterfaceState, Spent]:
+        """The state under the loads of a new solution, and what it took. Raises MotionError."""
+        before, link = self._spent, self._link(history)
+        return self._followed(state, history, link), self._spent - before
+
+    def _followed(self, state: InterfaceState, history: FaceLoads, link: Link) -> InterfaceState:
         if isinstance(state.coarse, InterfaceState):
-            state = replace(state, coarse=self.follow(state.coarse, history))
+            state = replace(state, coarse=self._followed(state.coarse, history, link))
         starts = {t: start for t, start in state.starts.items() if history.loads.P[t] > 0.0}
-        state = replace(state, loads=history.loads, slip=history.slip, starts=starts)
+        pressed = self._pressed(starts, history)
+        state = replace(state, loads=history.loads, slip=history.slip, link=link, starts=starts)
+        state = replace(state, pressed=pressed)
         if self.settings.method == "full":
             return state  # body 2 goes on as the half-space's own slip has it
         paths = self._paths(self.transfer.to_cells(history.slip), starts, history.loads)
@@ -328,6 +311,13 @@ class InterfaceContact:
     def volume(self, depth: Array) -> float:
         """Volume of a worn ``depth``, as the surfaces of states have it [mm³]."""
         return float(depth.sum()) * self.grid.cell_area
+
+    def moved(self, state: InterfaceState) -> float:
+        """Share of the load that wear has moved since the last solution; 0 without known nodes."""
+        if not state.pressed.size:
+            return 0.0
+        now = self._shared_out(state.starts, state.loads)
+        return 0.5 * float(np.abs(now - state.pressed).sum())
 
     def nodal_depth(self, state: InterfaceState) -> Array:
         """Worn depth of both bodies together at the nodes of the face ``(n,)`` [mm]."""
@@ -384,6 +374,17 @@ class InterfaceContact:
         return self._frictional
 
     # -- loads -------------------------------------------------------------------------------------
+    def _link(self, history: FaceLoads) -> Link:
+        """What the structure of the loads adds to the half-space."""
+        settings, force, displacement = self.settings, history.force, history.displacement
+        if settings.link == "half_space" or force is None or displacement is None:
+            return Link.none()
+        half_space, shear = self._contact.half_space, settings.method == "full"
+        before = half_space.count
+        link = linked(half_space, self.transfer, history.loads, force, displacement, shear)
+        self._spent += Spent(0, half_space.count - before)
+        return link.level() if settings.tilt == "free" else link
+
     def _contact_at(self, state: WearState) -> WearingContact:
         assert isinstance(state, InterfaceState)
         return self._loaded(state).contact
@@ -396,21 +397,25 @@ class InterfaceContact:
         settings, friction = self.settings, self.settings.friction(state.energy)
         columns = np.array([*vars(state.loads).values()], dtype=float)
         key: tuple[Array, ...] = columns, state.slip, state.paths, np.array([friction])
+        key = *key, state.link.coefficients, state.link.region
         if settings.method == "full":
             key = *key, state.surfaces.gap, state.surfaces.depth_1
         if self._current is not None and all(map(np.array_equal, self._current[0], key)):
             return self._current[1]
         slip, ways = self.transfer.to_cells(state.slip), passages(self.grid, state.paths)
         acting = acting_slip(slip, state.loads)
-        sliding = SlidingCycle(state.loads, acting, None, ways, settings.tilt)
+        moved = state.link.fields(self.transfer.places) if state.link.corrects else None
+        uplift = None if moved is None else moved[:, 2]
+        sliding = SlidingCycle(state.loads, acting, uplift, ways, settings.tilt)
         cycle: tuple[ContactState, ...] = ()
         if settings.method == "full":
-            cycle = self._half_space_cycle(state, sliding)
+            cycle = self._half_space_cycle(state, sliding, moved)
             slip = np.stack([increment.slip for increment in cycle])
             sliding = replace(sliding, slip=acting_slip(slip, state.loads))
             if not self.pair.similar:
                 lift = self._contact.half_space.normal_under_shear
-                sliding = replace(sliding, uplift=np.stack([lift(t.shear) for t in cycle]))
+                lifted = np.stack([lift(increment.shear) for increment in cycle])
+                sliding = replace(sliding, uplift=lifted if uplift is None else uplift + lifted)
         contact = WearingContact(
             self._contact, settings.laws, friction, sliding, settings.tolerance
         )
@@ -418,13 +423,13 @@ class InterfaceContact:
         return self._current[1]
 
     def _half_space_cycle(
-        self, state: InterfaceState, sliding: SlidingCycle
+        self, state: InterfaceState, sliding: SlidingCycle, moved: Array | None
     ) -> tuple[ContactState, ...]:
-        """The closed cycle with the half-space's own friction, on the present surfaces."""
+        """The closed cycle with its own friction, on surfaces ``moved`` ``(t, 3, nx, ny)`` [mm]."""
         gaps = np.stack([sliding.gap(state.surfaces, t) for t in range(len(state.loads))])
         motion = state.slip.mean(axis=2) if self.settings.driven else None
         contact, tilt = self.frictional(state.energy), self.settings.tilt
-        cycle = tuple(march_cycle(contact, gaps, state.loads, motion, tilt))
+        cycle = tuple(march_cycle(contact, gaps, state.loads, motion, tilt, moved))
         self._spent += Spent(len(cycle), sum(increment.convolutions for increment in cycle))
         return cycle
 
@@ -440,6 +445,19 @@ class InterfaceContact:
                 "the energy of the whole contact"
             )
         return paths
+
+    def _pressed(self, starts: Starts, history: FaceLoads) -> Array:
+        """See :class:`InterfaceState`."""
+        return np.empty(0) if history.force is None else self._shared_out(starts, history.loads)
+
+    def _shared_out(self, starts: Starts, loads: LoadHistory) -> Array:
+        """Share of the largest of ``loads`` on every node ``(n,)``; 0 without load."""
+        start = starts.get(first_largest(loads.P))
+        if start is None:
+            return np.zeros(len(self.transfer.areas))
+        forces = self.transfer.to_nodes(start.pressure) * self.transfer.areas
+        shares: Array = forces / forces.sum()
+        return shares
 
     # -- tractions of given slips ------------------------------------------------------------------
     def _pressure(self, result: CycleResult) -> Array:

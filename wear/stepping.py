@@ -212,9 +212,10 @@ class WearingContact:
         working, sliding = self.dissipating, self.sliding
         wear, loads = np.add(*self.depth_per_pressure(state)), sliding.loads
         imposed = (values[working] for values in (loads.P, loads.Mx, loads.My, wear))
+        lifts = () if sliding.uplift is None else (sliding.uplift[working],)
         alike = sliding.passages is None and all(
             np.allclose(values, values[:1], rtol=SAME, atol=SAME * np.abs(values).max(initial=0.0))
-            for values in imposed
+            for values in (*imposed, *lifts)
         )
         if alike or not wear.any():
             return np.inf

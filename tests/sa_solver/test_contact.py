@@ -1,5 +1,6 @@
 """Increments of a frictional contact: normal, tangential and sliding states, one from another."""
 
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
@@ -150,6 +151,22 @@ def test_strain_is_that_of_body_2_over_body_1():
     assert stretched.shear[0].sum() == pytest.approx(0.0, abs=1e-8 * abs(right))
     again = solver.advance(stretched, HEIGHT, load(300.0, strain=1e-4))
     np.testing.assert_allclose(again.shear, stretched.shear, atol=1e-6 * abs(right))
+
+
+@pytest.mark.parametrize("second", [TITANIUM, Material(200e3, 0.3)], ids=["alike", "unlike"])
+def test_surfaces_that_move_evenly_along_x_are_strained(second):
+    """Displacements ε x of the surfaces before they touch, and after, are the strain ε."""
+    solver = FrictionalContact(HalfSpace(GRID, ElasticPair(TITANIUM, second)), FRICTION)
+    stretch = np.stack([1e-4 * np.broadcast_to(GRID.x, GRID.shape), np.zeros(GRID.shape)])
+    moved, strained = solver.apart(HEIGHT, along=-stretch), solver.apart(HEIGHT)
+    for share, P in ((-0.5, 200.0), (1.0, 300.0), (0.2, 250.0)):
+        given = load(P, strain=1e-4 * (1.0 + share))
+        strained = solver.advance(strained, HEIGHT, given)
+        given = replace(load(P), along=share * stretch)
+        moved = solver.advance(moved, HEIGHT, given)
+        tolerance = 1e-6 * moved.pressure.max()
+        np.testing.assert_allclose(moved.traction, strained.traction, atol=tolerance)
+        assert moved.shear.any()
 
 
 @settings(max_examples=15, deadline=None, derandomize=True)

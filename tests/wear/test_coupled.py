@@ -34,15 +34,10 @@ from wear.coupled import (
     Stop,
 )
 from wear.evolution import EnergyTable
-from wear.interface import (
-    CellNodes,
-    CycleLoads,
-    InterfaceContact,
-    InterfaceSettings,
-    InterfaceState,
-    MotionError,
-)
+from wear.face_loads import CycleLoads
+from wear.interface import InterfaceContact, InterfaceSettings, InterfaceState, MotionError
 from wear.laws import EnergyLaw, EvolvingLaw
+from wear.link import CellNodes
 from wear.steppers import ErrorControl, ImplicitStepper
 from wear.stepping import ContactFailure
 
@@ -384,7 +379,7 @@ def numbers(state: InterfaceState) -> dict[str, object]:
     """All that a state is, by name."""
     parts: dict[str, object] = {}
     for name, value in vars(state).items():
-        if name in ("surfaces", "loads"):
+        if name in ("surfaces", "loads", "link"):
             parts |= {f"{name}.{part}": field for part, field in vars(value).items()}
         elif name == "starts":
             for t, start in value.items():

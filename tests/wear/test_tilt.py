@@ -8,9 +8,11 @@ from sa_solver.normal import NormalContact
 from sa_solver.partial_slip import partial_slip_curve
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material, Tilt
 from tests.oracles.sliding_cylinder import wear_without_tilt
+from wear.face_loads import CycleLoads
 from wear.full_cycle import march_cycle
-from wear.interface import CellNodes, CycleLoads, InterfaceContact, InterfaceSettings
+from wear.interface import InterfaceContact, InterfaceSettings
 from wear.laws import EnergyLaw
+from wear.link import CellNodes
 from wear.steppers import (
     ErrorControl,
     ExplicitStepper,

@@ -52,8 +52,9 @@ def face_history(seed: int = 0, line: bool = False) -> InterfaceHistory:
     numbers = rng.permutation(10 * n)[: 2 * n].reshape(2, n)
     interface = Interface("f", flank(), coordinates, facets, *numbers, rng.random(n))
     slip = rng.standard_normal((len(loads), 2, n)) / 300.0
-    force = np.zeros((len(loads), 3, n))
-    return InterfaceHistory(interface, loads, force, force, slip)
+    shares = rng.random(n)
+    force = loads.resultants[:, [1, 2, 0], None] * (shares / shares.sum())
+    return InterfaceHistory(interface, loads, force, rng.random(force.shape), slip)
 
 
 def table(rows: list[dict], header: dict[str, str] | None = None) -> str:

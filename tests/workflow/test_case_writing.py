@@ -51,6 +51,7 @@ def test_dump_has_every_default(dovetail_path, dovetail_text):
     assert written["contact"] == {
         "grid": [128, 256],
         "method": "normal",
+        "link": "corrected",
         "gross_slip": "force",
         "tolerance": 1e-8,
     }

@@ -188,10 +188,12 @@ class StampCase(WearCase):
 
 @dataclass(frozen=True)
 class Sliding:
-    """What the foot carries over a cycle: ``slip`` ``(t, 2, n)`` [mm]."""
+    """What the foot carries over a cycle: ``slip`` ``(t, 2, n)`` [mm]; it does not deform."""
 
     loads: LoadHistory
     slip: Array
+    force: None = None
+    displacement: None = None
 
 
 def rounded(radius: float, x: Array, y: Array) -> Array:

@@ -70,6 +70,8 @@ def test_hdf5_reads_back_bit_for_bit(tmp_path, line):
         assert_same(read.loads, history.loads)
         pairs = {
             "slip": history.slip,
+            "force": history.force,
+            "displacement": history.displacement,
             "coordinates": face.coordinates,
             "facets": face.facets,
             "nodes_1": face.nodes_1,
@@ -81,6 +83,26 @@ def test_hdf5_reads_back_bit_for_bit(tmp_path, line):
             np.testing.assert_array_equal(getattr(read, key), written, err_msg=key, strict=True)
         np.testing.assert_array_equal(read.frame.origin, face.frame.origin)
         np.testing.assert_array_equal(read.frame.axes, face.frame.axes)
+
+
+@pytest.mark.parametrize(
+    ("name", "factor", "refused"),
+    [
+        ("force", None, "displacement: given alone; allowed: force and displacement, or neither"),
+        ("displacement", None, "force: given alone; allowed: force and displacement, or neither"),
+        ("force", 1.02, "force: increment [1-6]: the nodes add up to .* allowed: Qx, Qy and P of"),
+        ("force", -1.0, "force: increment [1-6]: the nodes add up to .* allowed: Qx, Qy and P of"),
+    ],
+)
+def test_nodal_forces_that_are_not_those_of_the_loads_are_refused(tmp_path, name, factor, refused):
+    write_resultants_h5(tmp_path / "loads.h5", {"f": face_history()})
+    with h5py.File(tmp_path / "loads.h5", "a") as file:
+        if factor is None:
+            del file["f"][name]
+        else:
+            file["f"][name][...] *= factor
+    with pytest.raises(InputFileError, match=f"/f/{refused}"):
+        read_resultants(tmp_path / "loads.h5")
 
 
 def marched_cycle(history: InterfaceHistory) -> CycleSolution:
@@ -204,10 +226,13 @@ def test_units_of_datasets_are_converted(tmp_path):
     write_resultants_h5(path, {"f": history})
     with h5py.File(path, "a") as file:
         file["f/load_history/P"].attrs["unit"] = "kN"
+        for name in ("load_history/Qx", "load_history/Qy", "force"):
+            file[f"f/{name}"].attrs["unit"] = "kN"
         file["f/slip"].attrs["unit"] = np.bytes_("um")
         del file["f/nodal_height"].attrs["unit"]
     imported = read_resultants(path)["f"]
     np.testing.assert_allclose(imported.loads.P, 1e3 * history.loads.P, rtol=1e-15)
+    np.testing.assert_allclose(imported.force, 1e3 * history.force, rtol=1e-15)
     np.testing.assert_allclose(imported.slip, 1e-3 * history.slip, rtol=1e-15)
     np.testing.assert_array_equal(imported.nodal_height, history.interface.gap)
     with h5py.File(path, "a") as file:

@@ -7,13 +7,13 @@ import h5py
 import numpy as np
 import pytest
 
+from sa_solver.types import LoadHistory
 from tests.workflow.contact_loads import (
     COLUMNS,
     FRICTION,
     GOOD,
     SIZE,
     face_history,
-    random_loads,
     table,
     write,
 )
@@ -224,7 +224,13 @@ def test_hdf5_without_interfaces_is_refused(tmp_path):
 
 def test_hdf5_interfaces_must_have_as_many_increments(tmp_path):
     path, longer = tmp_path / "loads.h5", face_history()
-    shorter = replace(longer, loads=random_loads(0, count=5), slip=longer.slip[:5])
+    shorter = replace(
+        longer,
+        loads=LoadHistory(**{name: column[:5] for name, column in vars(longer.loads).items()}),
+        force=longer.force[:5],
+        displacement=longer.displacement[:5],
+        slip=longer.slip[:5],
+    )
     write_resultants_h5(path, {"a": longer, "b": shorter})
     with pytest.raises(InputFileError, match="increments differ: a 7, b 5; allowed: as many"):
         read_resultants(path)

@@ -12,6 +12,7 @@ from sa_solver.normal import NormalStart
 from sa_solver.types import LoadHistory
 from wear.coupled import CoupledState
 from wear.interface import InterfaceState
+from wear.link import Link
 from wear.surfaces import Surfaces
 from wear.worn import Spent
 from workflow.errors import UserError
@@ -21,8 +22,8 @@ from workflow.shell.checkpoint import Checkpoint, save
 # What the state has of all jumps.
 HISTORIES = ("cycles", "kinetics", "drift", "solved_resultants")
 # What the state of one interface has: parts of arrays, arrays, numbers.
-PARTS: dict[str, Any] = {"surfaces": Surfaces, "loads": LoadHistory}
-ARRAYS = ("slip", "paths")
+PARTS: dict[str, Any] = {"surfaces": Surfaces, "loads": LoadHistory, "link": Link}
+ARRAYS = ("slip", "pressed", "paths")
 # Where it has what solves start from: the increments, and of all of them these fields.
 INCREMENTS, START = "starts/increments", ("pressure", "displacement")
 # Where it has its companion.

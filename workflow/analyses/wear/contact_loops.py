@@ -67,16 +67,18 @@ def worn_loop(
     state: InterfaceState,
     peak: int,
     tilt: Tilt = "free",
+    lift: Array | float = 0.0,
 ) -> WornLoop:
     """The loop of the contact ``name`` in its present state, under its loads at ``peak``.
 
-    Its ``tilt`` is held, or free under their moments. A normal force of one's own acts along the
-    same line. Raises ContactFailure if it does not converge or friction cannot carry it, UserError
-    for a contact without load.
+    These widen the gap by ``lift`` ``(nx, ny)`` [mm]. Its ``tilt`` is held, or free under their
+    moments. A normal force of one's own acts along the same line, and lifts by its share. Raises
+    ContactFailure if it does not converge or friction cannot carry it, UserError for a contact
+    without load.
     """
     path = loop_path(loops, name, state, peak, tilt)
     try:
-        loop = march_loop(contact, state.surfaces.gap, path)
+        loop = march_loop(contact, state.surfaces.gap + _share(path.P, state, peak) * lift, path)
     except (LoopFailure, ContactProblemError) as error:
         raise ContactFailure(
             f"tangential loop: {error}; allowed: lower loops.force or loops.amplitude"
@@ -113,12 +115,18 @@ def loop_path(
             f"loops: {name} carries nothing at peak load; allowed: loops.normal_force above 0"
         )
     force = P if loops.normal_force is None else loops.normal_force
-    share = force / P if P > 0.0 else 0.0
+    share = _share(force, state, peak)
     amplitude = loops.amplitude if loops.force is None else loops.force
     assert amplitude is not None, "loops that are not wanted"
     drive: Literal["motion", "force"] = "motion" if loops.force is None else "force"
     moments = None if tilt == "held" else (share * Mx, share * My)
     return LoopPath(force, amplitude, drive, loops.increments, loops.axis, moments)
+
+
+def _share(force: float, state: InterfaceState, peak: int) -> float:
+    """A normal force over that at peak load; 0 where that is none."""
+    P = float(state.loads.P[peak])
+    return force / P if P > 0.0 else 0.0
 
 
 def kept_loops(names: Sequence[str], loops: Sequence[WornLoop]) -> dict[str, Array]:

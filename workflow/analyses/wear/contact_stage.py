@@ -12,6 +12,7 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
 from wear.interface import InterfaceContact, InterfaceSettings, InterfaceState
+from wear.link import Link
 from wear.steppers import (
     ErrorControl,
     ExplicitStepper,
@@ -43,10 +44,12 @@ class ContactStage(InterfaceContact):
         self.remedy, self.coarse_grid = contact.remedy, contact.grid(contact.coarse)
         super().__init__(_interface(case, contact, FaceTransfer.between(contact.face, grid)))
 
-    def coarse_pressure(self, loads: LoadHistory, peak: int) -> Array:
+    def coarse_pressure(self, loads: LoadHistory, link: Link, peak: int) -> Array:
         """Unworn peak pressure on a grid as coarse as the mesh of the structure."""
         contact = NormalContact(HalfSpace(self.coarse_grid, self.pair))
-        gap = gap_on(self._contact_face, self.coarse_grid)
+        grid = self.coarse_grid
+        places = np.stack(np.broadcast_arrays(grid.x, grid.y))
+        gap = gap_on(self._contact_face, grid) + link.lift(peak, places)
         load = loads.pressing(peak, self.settings.tilt)
         return contact.solve(gap, **load, start=None, compliance=None).pressure
 
@@ -63,9 +66,9 @@ class ContactStage(InterfaceContact):
 
     def loop(self, state: InterfaceState, peak: int) -> WornLoop:
         """The tangential loop that the case asks for, on the present surfaces."""
-        contact = self.frictional(state.energy)
+        contact, lift = self.frictional(state.energy), state.link.lift(peak, self.transfer.places)
         tilt = self.settings.tilt
-        return worn_loop(contact, self._case.loops, self.name, state, peak, tilt)
+        return worn_loop(contact, self._case.loops, self.name, state, peak, tilt, lift)
 
 
 def _interface(case: WearCase, contact: ContactFace, transfer: FaceTransfer) -> InterfaceSettings:
@@ -85,6 +88,7 @@ def _interface(case: WearCase, contact: ContactFace, transfer: FaceTransfer) -> 
         driven=contact.driven,
         tilt=contact.tilt,
         follow=_follow(case),
+        link=settings.link,
         tolerance=settings.tolerance,
     )
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from fe_models.mesh import Face
 from sa_solver.types import Array, Tilt
-from wear.interface import FaceLoads
+from wear.face_loads import FaceLoads
 from workflow.analyses.contact.datasets import (
     load_columns,
     pressure_field,
@@ -30,7 +30,7 @@ def face_mesh(face: Face) -> dict[str, Dataset]:
 def put_face(
     writer: ResultsWriter, group: str, face: Face, carried: FaceLoads, tilt: Tilt = "free"
 ) -> None:
-    """A contact face over a cycle; nodal pressure and shear where a structure gives them.
+    """A contact face over a cycle; forces, tractions and displacements where these are known.
 
     Where the ``tilt`` is held, the loads have no moments of the pressure.
     """
@@ -39,10 +39,20 @@ def put_face(
         del columns["Mx"], columns["My"]
     writer.put(f"{group}/load_history", columns)
     writer.put(group, face_mesh(face) | {"slip": slip_field(carried.slip)})
-    force = getattr(carried, "force", None)
-    if force is not None:
+    force, displacement = carried.force, carried.displacement
+    if force is not None and displacement is not None:
         pressure, shear = force[:, 2] / face.nodal_areas, force[:, :2] / face.nodal_areas
         writer.put(group, {"pressure": pressure_field(pressure), "shear": shear_field(shear)})
+        writer.put(group, nodal_solution(force, displacement))
+
+
+def nodal_solution(force: Array, displacement: Array) -> dict[str, Dataset]:
+    """Forces and displacements ``(t, 3, n)`` at the nodes of a face."""
+    moved = "of body 2 relative to body 1 since both were unloaded and unworn, x, y and z"
+    return {
+        "force": Dataset(force, "N", "of body 1 on body 2 at the nodes, x, y and z"),
+        "displacement": Dataset(displacement, "mm", moved),
+    }
 
 
 def surface_heights(body_1: Array, body_2: Array) -> dict[str, Dataset]:

@@ -12,7 +12,7 @@ import numpy as np
 from fe_models.mesh import Face
 from sa_solver.types import Array, Frame, Grid, Indices, Tilt
 from wear import coupled
-from wear.interface import CycleLoads, FaceLoads
+from wear.face_loads import CycleLoads, FaceLoads
 
 BODIES: tuple[Literal[1, 2], ...] = (1, 2)
 # Without a mesh, the grid that shows what a coarse one misses has cells so many times larger.

@@ -17,14 +17,9 @@ from fe_models.structure import CycleSolution, InterfaceHistory
 from fe_models.transfer import FaceTransfer
 from sa_solver.types import Array
 from wear.coupled import CoupledState
-from wear.interface import (
-    ContactFields,
-    CycleTractions,
-    FaceLoads,
-    FirstContact,
-    InterfaceState,
-    acting_slip,
-)
+from wear.face_loads import FaceLoads
+from wear.interface import ContactFields, CycleTractions, FirstContact, InterfaceState, acting_slip
+from wear.link import Link
 from wear.nodes import NodalContact, NodalState
 from wear.stabilised import StabilisedStepper
 from wear.steppers import advance_cycles, first_cycles
@@ -250,6 +245,8 @@ class NodalContacts(StagedContacts):
                     start=depth,
                     loads=history.loads,
                     slip=history.slip,
+                    link=Link.none(),
+                    pressed=np.empty(0),
                     paths=np.empty((0, 3, 2)),
                 )
             )
@@ -277,6 +274,7 @@ class NodalContacts(StagedContacts):
                     largest_residual=solution.residual,
                     spent=Spent() if number else Spent(len(history.slip)),
                     stable_cycles=stable,
+                    link=Link.none(),
                     cycle=(),
                 )
             )

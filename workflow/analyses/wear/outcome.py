@@ -9,7 +9,8 @@ import numpy as np
 
 from sa_solver.types import Array, LoadHistory
 from wear.coupled import CoupledState
-from wear.interface import CycleTractions, FaceLoads, FirstContact, InterfaceState
+from wear.face_loads import FaceLoads
+from wear.interface import CycleTractions, FirstContact, InterfaceState
 from wear.kinetics import LinearRegime, linear_regime
 from wear.steppers import step_errors
 from workflow.analyses.wear.case.base import WearCase

@@ -40,7 +40,7 @@ class RunLog(Observer):
             warn_of_growth(self.stages, after, self.run.reporter)
         drift, spent = after.drift[-1], after.spent - before.spent
         if after.solutions > before.solutions:
-            self.run.reporter.log(f"drift {drift:.2%}: resultants computed again")
+            self.run.reporter.log(f"drift {drift:.2%}: loads computed again")
         depths = ", ".join(f"{depth * 1e3:.3f}" for depth in after.kinetics[-1, :, :2].ravel())
         self.run.reporter.log(
             f"jump {after.jump}: {after.cycles[-1]:.6g} cycles, depths {depths} um, "

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from sa_solver.normal import NormalContactError
-from sa_solver.types import LoadHistory
 from wear.coupled import KINETICS
 from wear.kinetics import LinearRegime
 from workflow.analyses.contact.datasets import LOADS, pressure_field, traction_fields
@@ -21,7 +20,6 @@ from workflow.analyses.wear.contact_loops import (
     write_loop_tables,
     write_loops,
 )
-from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.contact_stress import InterfaceStress, contact_stresses
 from workflow.analyses.wear.datasets import (
     cycles_column,
@@ -30,6 +28,7 @@ from workflow.analyses.wear.datasets import (
     surface_heights,
 )
 from workflow.analyses.wear.layout import EXTRAPOLATION, Contents, energy_name
+from workflow.analyses.wear.link_report import link_summary
 from workflow.analyses.wear.outcome import InterfaceOutcome, Outcome
 from workflow.analyses.wear.run_errors import left_sentence, warn_of_errors
 from workflow.analyses.wear.structure_stage import StructureStage
@@ -132,7 +131,7 @@ def _write_results(
             writer.put_grid(f"grid/{stage.name}", stage.grid, stage.face.frame)
             tilt = stage.settings.tilt
             put_face(writer, f"structure/{stage.name}", stage.face, contact.unworn, tilt)
-            if not nodes and _write_coarse(writer, stage, loads, source.peak):
+            if not nodes and _write_coarse(writer, contact, source.peak):
                 coarse.append(stage.name)
             dissipated = f"energy dissipated in each increment, {by} pressure"
             energy = {energy_name(nodes): Dataset(first.energy, "N mm", dissipated)}
@@ -176,16 +175,15 @@ def _holding_moments(contact: InterfaceOutcome) -> dict[str, Dataset]:
     }
 
 
-def _write_coarse(
-    writer: ResultsWriter, stage: ContactStage, loads: LoadHistory, peak: int
-) -> bool:
+def _write_coarse(writer: ResultsWriter, contact: InterfaceOutcome, peak: int) -> bool:
     """The peak load on a grid as coarse as the mesh, to compare with; whether there is one.
 
     None where the moments put that load outside the middles of the coarse cells: no reason to lose
     the run.
     """
+    stage = contact.stage
     try:
-        pressure = stage.coarse_pressure(loads, peak)
+        pressure = stage.coarse_pressure(contact.unworn.loads, contact.first.link, peak)
     except NormalContactError:
         return False
     grid = stage.coarse_grid
@@ -281,6 +279,7 @@ def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str,
         "increments_error": contact.increments_error,
         "explicit_limit": first.stable_cycles if np.isfinite(first.stable_cycles) else None,
         "contact_residual": first.largest_residual,
+        "link": link_summary(first.link),
         "convolutions": first.spent.convolutions,
         "linear_regime": {
             name: None if regime is None else _regime_summary(regime)

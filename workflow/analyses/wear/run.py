@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from fe_models.mesh import MeshError
 from sa_solver.normal import NormalContactError
 from wear.coupled import CoupledSettings, CoupledState, CoupledWear, JumpSize, Stop
-from wear.interface import CycleTractions, FaceLoads, FirstContact, MotionError
+from wear.face_loads import FaceLoads
+from wear.interface import CycleTractions, FirstContact, MotionError
 from wear.stepping import ContactFailure
 from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.case.base import WearCase

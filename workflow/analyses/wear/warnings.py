@@ -7,6 +7,7 @@ from wear.coupled import CoupledState
 from wear.interface import FirstContact
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.link_report import report_link
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.structures.resultants.source import ResultantsSource
@@ -67,12 +68,16 @@ def warn_of_contact(
     """
     pair = stages[0].pair
     if case.contact.method == "normal" and not pair.similar:
+        linked = all(result.link.corrects for result in first)
+        has = "has only as far as the mesh resolves it" if linked else "leaves out"
         reporter.warn(
             f"the materials differ (Dundurs' beta {pair.dundurs_beta:.2g}): shear then moves the "
-            "surfaces normally, which contact.method: normal leaves out; use full"
+            f"surfaces normally, which contact.method: normal {has}; use full"
         )
     yield_stress = min(case.material(number).yield_stress for number in (1, 2))
     for stage, interface, result in zip(stages, state.interfaces, first, strict=True):
+        if case.contact.method != "nodes":
+            report_link(stage.name, result.link, stage.grid.line, reporter)
         highest = result.pressure.max()
         if highest > yield_stress:
             reporter.warn(

@@ -103,6 +103,12 @@ class Contact(Section):
         "normal",
         default="normal",
     )
+    link: Literal["corrected", "half_space"] = entry(
+        "corrected: the bodies deform as the structure says, where it says it at its nodes; "
+        "half_space: as half-spaces",
+        "corrected",
+        default="corrected",
+    )
     gross_slip: Literal["force", "energies"] = entry(
         "direction in which a face slides as a whole (method full): force: with the structure's "
         "shear force; energies: sharing the structure's energy between x and y",
@@ -291,7 +297,10 @@ class Coupling(Section):
         default="drift",
     )
     drift: Ratio = entry(
-        "change that asks for new resultants, when they may drift [1]", "2 %", default=0.02
+        "change of resultants, or half the share of the load that wear moves over a face, that "
+        "asks for new ones, when they may drift [1]",
+        "2 %",
+        default=0.02,
     )
 
 

@@ -101,6 +101,7 @@ OneRow = Annotated[int, Whole(1, 1)]
 METHODS = (
     "normal: every cell slides by all of the stroke; full: slips of the half-space, over the stroke"
 )
+LINK = "there is no structure to link the contact to: both bodies are half-spaces"
 
 
 class WearGrid(Contact):
@@ -115,6 +116,7 @@ class WearGrid(Contact):
         "of the grid along x, along y, room for the stroke included [mm]", ["1 mm", "1 mm"]
     )
     method: Literal["normal", "full"] = entry(METHODS, "normal", default="normal")
+    link: Literal["half_space"] = entry(LINK, "half_space", default="half_space")
 
 
 class LineWearGrid(Contact):
@@ -127,6 +129,7 @@ class LineWearGrid(Contact):
     )
     size: Length = entry("of the grid along x, room for the stroke included [mm]", "2 mm")
     method: Literal["normal", "full"] = entry(METHODS, "normal", default="normal")
+    link: Literal["half_space"] = entry(LINK, "half_space", default="half_space")
 
 
 # --- cases --------------------------------------------------------------------------------------

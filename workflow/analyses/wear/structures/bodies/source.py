@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from sa_solver.types import Array, Grid, LoadHistory
-from wear.interface import CycleLoads
+from wear.face_loads import CycleLoads
 from workflow.analyses.contact.case import Heights, Shape
 from workflow.analyses.wear.gaps import GapFunction, GridHeights
 from workflow.analyses.wear.load_source import (

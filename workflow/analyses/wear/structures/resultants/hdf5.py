@@ -26,12 +26,16 @@ from workflow.analyses.wear.structures.resultants.imported import (
 from workflow.case import units
 from workflow.case.input_files import InputFileError, open_hdf5
 from workflow.case.table_file import check_unit
+from workflow.shell.dataset import unit_in
 from workflow.shell.results import frame_of
 
 LOADS = "load_history"
 # In a group beside the loads: what is read, and what our results hold besides.
-NODAL = ("coordinates", "facets", "slip", "nodes_1", "nodes_2", "nodal_height", "height")
+ON_NODES = (*("facets", "slip", "force", "displacement", "nodes_1", "nodes_2", "nodal_height"),)
+NODAL = ("coordinates", *ON_NODES, "height")
 IGNORED = ("pressure", "shear")
+# How far nodal forces may be from adding up to those of the loads, in shares of the largest P.
+ADD_UP = 0.01
 # How far the axes of a frame may be from perpendicular and from length 1: six printed digits.
 ORTHONORMAL = 1e-6
 
@@ -128,16 +132,19 @@ def _read(group: Group, bounds: Bounds, line: bool) -> ImportedLoads:
     frame = _frame(group)
     closure, coordinates = _closure(group), _coordinates(group, line)
     if coordinates is None:
-        for name in ("facets", "slip", "nodes_1", "nodes_2", "nodal_height"):
+        for name in ON_NODES:
             if name in group.group:
                 raise group.error(name, "given without coordinates", "both or neither")
         return ImportedLoads(loads, tilt, closure, frame=frame, height=height)
     count = len(coordinates)
+    force, displacement = _solution(group, loads, count, line)
     return ImportedLoads(
         loads,
         tilt,
         closure,
         slip=group.shaped("slip", "mm", (len(loads), 2, count)),
+        force=force,
+        displacement=displacement,
         coordinates=coordinates,
         facets=_facets(group, coordinates, line),
         frame=frame,
@@ -180,6 +187,27 @@ def _loads(group: Group, bounds: Bounds) -> LoadHistory:
         raise group.error("sliding", "neither yes nor no", "0 or 1")
     sliding = None if marks is None else marks == 1.0
     return checked_loads(columns, sliding, mix, bounds, refusal)
+
+
+def _solution(
+    group: Group, loads: LoadHistory, count: int, line: bool
+) -> tuple[Array | None, Array | None]:
+    """Nodal forces and displacements ``(t, 3, n)``, both or neither."""
+    shape, unit = (len(loads), 3, count), unit_in(line, "N")
+    force = group.shaped("force", unit, shape)
+    displacement = group.shaped("displacement", "mm", shape)
+    if force is None or displacement is None:
+        for name in ("force", "displacement"):
+            if name in group.group:
+                raise group.error(name, "given alone", "force and displacement, or neither")
+        return None, None
+    apart = np.abs(force.sum(axis=2) - loads.resultants[:, [1, 2, 0]]).max(axis=1)
+    worst = int(np.argmax(apart))
+    if apart[worst] > ADD_UP * loads.P.max():
+        sums = ", ".join(f"{value:.6g}" for value in force[worst].sum(axis=1))
+        wrong = f"increment {worst + 1}: the nodes add up to {sums} along x, y and z"
+        raise group.error("force", wrong, "Qx, Qy and P of load_history")
+    return force, displacement
 
 
 def _closure(group: Group) -> float | None:

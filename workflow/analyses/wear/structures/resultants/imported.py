@@ -28,7 +28,9 @@ class ImportedLoads:
 
     ``loads`` are those of one closed cycle; without moments the ``tilt`` is held. ``closure`` is by
     how much that changed the contact forces of the cycle before it, over the largest. With the
-    nodes of the face: ``slip`` ``(t, 2, n)`` of each increment [mm], ``coordinates`` ``(n, 2)`` in
+    nodes of the face: ``slip`` ``(t, 2, n)`` of each increment [mm], at its end ``force``
+    ``(t, 3, n)`` on body 2 [N] and ``displacement`` ``(t, 3, n)`` [mm] relative to body 1, both or
+    neither, ``coordinates`` ``(n, 2)`` in
     the interface frame [mm], ``facets`` ``(m, 3)`` or, in a line contact, ``(m, 2)``, the ``frame``
     in the user's axes, the user's node numbers on body 1 and body 2 ``(n,)``, and the gap of the
     unloaded, unworn faces [mm]: ``nodal_height`` ``(n,)`` at these nodes, ``height`` ``(nx, ny)``
@@ -39,6 +41,8 @@ class ImportedLoads:
     tilt: Tilt = "free"
     closure: float | None = None
     slip: Array | None = None
+    force: Array | None = None
+    displacement: Array | None = None
     coordinates: Array | None = None
     facets: Indices | None = None
     frame: Frame | None = None

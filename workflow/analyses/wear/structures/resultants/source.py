@@ -10,7 +10,7 @@ import numpy as np
 from fe_models.mesh import Face
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Frame, Grid
-from wear.interface import CycleLoads
+from wear.face_loads import CycleLoads
 from workflow.analyses.wear.gaps import gap_over
 from workflow.analyses.wear.load_source import (
     BODIES,
@@ -56,7 +56,12 @@ class ResultantsSource(UncoupledSource):
 
     def unworn(self) -> tuple[CycleLoads, ...]:
         return tuple(
-            CycleLoads(imported.loads, _slip(imported, len(contact.face)))
+            CycleLoads(
+                imported.loads,
+                _slip(imported, len(contact.face)),
+                imported.force,
+                imported.displacement,
+            )
             for imported, contact in zip(self.imported.values(), self.faces, strict=True)
         )
 

@@ -13,7 +13,7 @@ from fe_models.mesh import Interface
 from fe_models.structure import CycleSolution, InterfaceHistory
 from sa_solver.types import Array, LoadHistory
 from workflow.analyses.contact.datasets import load_columns, slip_field
-from workflow.analyses.wear.datasets import face_mesh
+from workflow.analyses.wear.datasets import face_mesh, nodal_solution
 from workflow.analyses.wear.structures.resultants.consistency import MIX
 from workflow.analyses.wear.structures.resultants.imported import CLOSURE, base_units
 from workflow.shell.dataset import Dataset
@@ -64,7 +64,7 @@ def write_resultants_h5(
     heights: Mapping[str, Array] | None = None,
     cycle: CycleSolution | None = None,
 ) -> None:
-    """Write loads and slip of every interface with its face, frame and node numbers.
+    """Write what every interface carries, with its face, frame and node numbers.
 
     ``heights`` ``(nx, ny)`` [mm] are the unworn gaps on the grid of the case, by interface. Loads
     are those of a ``cycle``, where one was marched.
@@ -75,6 +75,7 @@ def write_resultants_h5(
             face = history.interface
             writer.put(f"{name}/load_history", load_columns(history.loads))
             datasets = face_mesh(face) | {"slip": slip_field(history.slip)}
+            datasets |= nodal_solution(history.force, history.displacement)
             if heights is not None:
                 datasets["height"] = Dataset(heights[name], "mm", "gap before loading")
             if isinstance(face, Interface):
