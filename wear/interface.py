@@ -468,17 +468,17 @@ class InterfaceContact:
         return pressure
 
     def _given_tractions(
-        self, history: FaceLoads, pressure: Array, energy: float
+        self, loads: FaceLoads | InterfaceState, pressure: Array, energy: float
     ) -> CycleTractions:
         """Those where slip is the loads', once so much ``energy`` [N mm] is dissipated."""
-        slip = self.transfer.to_cells(history.slip)
+        slip = self.transfer.to_cells(loads.slip)
         stuck = ~slip.any(axis=1)
         force = pressure.sum(axis=(1, 2))
         held = np.where(stuck, pressure, 0.0).sum(axis=(1, 2))
         unknown = np.divide(held, force, out=np.zeros_like(force), where=force > 0.0)
         shear = self._sliding_shear(pressure, slip, energy)
         friction = self.settings.friction(energy)
-        return CycleTractions(history.loads, friction, pressure, shear, slip, unknown)
+        return CycleTractions(loads.loads, friction, pressure, shear, slip, unknown)
 
     def _half_space_tractions(
         self, loads: LoadHistory, cycle: tuple[ContactState, ...], energy: float
