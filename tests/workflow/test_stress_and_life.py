@@ -119,14 +119,14 @@ def test_each_body_is_pulled_at_its_end(normal: Any) -> None:
 
 
 def test_wear_takes_the_peaks_off(normal: Any) -> None:
-    """Of the pressure at once; stress moves on to where the edge has moved, and falls later."""
+    """Of the pressure at once; stress moves on to where the edge has moved, and falls less."""
     for flank in FLANKS:
         peaks = normal.summary[flank]["peak_pressure"]
         assert 0.9 < peaks["worn"] / peaks["unworn"] < 0.95
         for name in BODIES.values():
             stress = normal.summary[flank]["stress"]["von_mises"][name]
             assert np.isfinite(stress["worn"]["value"])
-            assert stress["ratio"] == pytest.approx(1.0, abs=0.02)
+            assert peaks["worn"] / peaks["unworn"] - 0.01 < stress["ratio"] < 1.02
 
 
 # --- balance ------------------------------------------------------------------------------------
