@@ -407,7 +407,7 @@ def in_the_middle(run: Run, name: str) -> dict[str, float]:
 
 
 # What the middle section of 60 mm differs by: see cases/dovetail_2d.yaml.
-DIFFERENCES = {"P": 0.04, "Qx": 0.04, "slip": 0.01, "energy": 0.05, "depth": 0.075, "area": 0.09}
+DIFFERENCES = {"P": 0.04, "Qx": 0.04, "slip": 0.01, "energy": 0.05, "depth": 0.03, "area": 0.04}
 
 
 @pytest.mark.slow
@@ -415,7 +415,13 @@ DIFFERENCES = {"P": 0.04, "Qx": 0.04, "slip": 0.01, "energy": 0.05, "depth": 0.0
 def test_plane_strain_is_the_middle_of_the_slot(plane_path, tmp_path):
     """Discretisation alike in both; what is left is the slot's ends, in the sense they must have:
     the middle carries less than the mean."""
-    alike = "mesh.flank_nodes=[14, 24]", "mesh.size=7", "contact.grid=[64, 128]", *QUIET
+    alike = (
+        "mesh.flank_nodes=[14, 24]",
+        "mesh.size=7",
+        "mesh.order=1",
+        "contact.grid=[64, 128]",
+        *QUIET,
+    )
     section = run_case(plane_path, tmp_path / "section", *alike)
     run = run_case(plane_path, tmp_path / "slot", *alike, "structure.dimension=3")
     assert section.ending.exit_code == run.ending.exit_code == 0, run.ending.stderr
