@@ -12,7 +12,7 @@ from fe_models.friction import LOAD_FLOOR, FrictionalJoint, FrictionState
 from fe_models.joint import JointResolvent, JointStiffness, join, join_halves
 from fe_models.mesh import Face, Interface, StructureMesh
 from fe_models.supported_body import SupportedBody
-from sa_solver.increments import dissipated, mean_of_ends
+from sa_solver.increments import dissipated, in_rows, mean_of_ends
 from sa_solver.types import Array, LoadHistory, resultants
 
 # A face slides as a whole when nodes that stick carry less than this share of its load.
@@ -305,8 +305,8 @@ def load_history(
     load = columns[0]
     apart = load < UNLOADED_SHARE * load.max()
     columns[:, apart] = 0.0
-    energy = dissipated(friction * mean_of_ends(force[:, 2]), slip).sum(axis=2).T
-    energy[:, apart] = 0.0
+    limit = friction * mean_of_ends(force[:, 2])
+    energy = dissipated(limit, in_rows(slip, ~apart)).sum(axis=2).T
     sliding = np.sum(force[:, 2] * sticks, axis=1) < STICKING_SHARE * load
     P, Qx, Qy, Mx, My, Mz = columns
     Edx, Edy = energy

@@ -30,9 +30,8 @@ class FaceTransfer:
     """Transfer between the ``n`` nodes of a face and a grid's ``(nx, ny)`` cells.
 
     ``face`` has the nodes. ``shared`` ``(nx ny, n)`` holds the areas W and ``areas`` ``(n,)`` those
-    of the nodes [mm²];
-    ``nearest`` ``(nx ny,)`` is the node next to each cell, which stands in where the face does not
-    cover the cell.
+    of the nodes [mm²]; ``nearest`` ``(nx ny,)`` is the node next to each cell, which stands in
+    where the face does not cover the cell.
     """
 
     face: Face
@@ -44,8 +43,7 @@ class FaceTransfer:
     @classmethod
     def between(cls, face: Face, grid: Grid) -> FaceTransfer:
         """Measure the shared areas of a face's facets and a grid in the same frame."""
-        x, y = np.broadcast_arrays(grid.x, grid.y)
-        _, nearest = cKDTree(face.coordinates).query(np.stack([x.ravel(), y.ravel()], 1))
+        _, nearest = cKDTree(face.coordinates).query(grid.centres.reshape(2, -1).T)
         if face.line:
             return cls(face, grid, _shared_lengths(face, grid), nearest, face.facet_shares)
         return cls(face, grid, _shared_areas(face, grid), nearest, face.facet_shares)
@@ -75,12 +73,12 @@ class FaceTransfer:
     @cached_property
     def places(self) -> Array:
         """Where each cell lies on the face ``(2, nx, ny)`` [mm]; off it, the node next to it."""
-        cells = np.stack(np.broadcast_arrays(self.grid.x, self.grid.y)).reshape(2, -1)
-        places = np.where(self._covered > 0.0, cells, self.nodes[self.nearest].T)
+        cells = self.grid.centres.reshape(2, -1)
+        places = np.where(self.covered > 0.0, cells, self.nodes[self.nearest].T)
         return places.reshape(2, *self.grid.shape)
 
     @cached_property
-    def _covered(self) -> Array:
+    def covered(self) -> Array:
         """Area of each cell that the face covers ``(nx ny,)`` [mm²]."""
         return np.asarray(self.shared.sum(axis=1)).ravel()
 
@@ -88,9 +86,9 @@ class FaceTransfer:
         """Cell means ``(..., nx, ny)`` of nodal values ``(..., n)``."""
         rows = nodal.reshape(-1, nodal.shape[-1])
         means = (self.shared @ rows.T).T
-        inside = self._covered > 0.0
+        inside = self.covered > 0.0
         cells = rows[:, self.nearest]
-        cells[:, inside] = means[:, inside] / self._covered[inside]
+        cells[:, inside] = means[:, inside] / self.covered[inside]
         return cells.reshape(*nodal.shape[:-1], *self.grid.shape)
 
     def spread(self, forces: Array) -> Array:

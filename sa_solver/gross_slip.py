@@ -70,9 +70,9 @@ def gross_slip(
     """Slide a contact until it dissipates ``energy`` (Edx, Edy) [N mm], their sum above 0.
 
     ``slide`` solves it for a motion (Δδx, Δδy) [mm] to a tolerance and gives its shear force (Qx,
-    Qy) [N] and energy (Edx, Edy) [N mm]: its last state is the one sought. ``carried`` is µP [N]
-    and ``force`` the given (Qx, Qy) [N]. ``stored`` [N mm] is the work that the shear of sliding
-    does on its own displacement, about: it makes the first guess a good one.
+    Qy) [N] and energy (Edx, Edy) [N mm]: its last state is the one sought. ``carried`` is µP [N],
+    P the mean of both ends, and ``force`` the given (Qx, Qy) [N]. ``stored`` [N mm] is the work
+    that the shear of sliding does on its own displacement, about: it makes the first guess good.
 
     While all slips, a longer motion dissipates µP more per length, and a turned one turns force and
     shares of energy with it: both are corrected at once by what is missing.

@@ -37,14 +37,30 @@ def mean_of_ends(values: Array, missions: Sequence[slice] = EVERY) -> Array:
     return mean
 
 
+def in_rows(values: Array, rows: Mask) -> Array:
+    """``values`` ``(t, ...)`` in the ``rows`` ``(t,)`` that are marked, 0 in the others."""
+    return np.where(rows.reshape(-1, *[1] * (values.ndim - 1)), values, 0.0)
+
+
 def slip_of_states(slip: Array, loaded: Mask, missions: Sequence[slice] = EVERY) -> Array:
     """Slip ``(t, ...)`` over which each state acts, of the sizes ``slip`` of the increments' own.
 
     ``loaded`` ``(t,)`` says which increments end with the bodies in contact.
     """
-    counts = np.where(loaded.reshape(-1, *[1] * (slip.ndim - 1)), slip, 0.0)
+    counts = in_rows(slip, loaded)
     after = np.concatenate([np.roll(counts[mission], -1, axis=0) for mission in missions])
     return np.asarray(0.5 * (counts + after))
+
+
+def friction_work(
+    limit: Array, slip: Array, loaded: Mask, missions: Sequence[slice] = EVERY
+) -> Array:
+    """Work ``(t, ...)`` of each increment in a ``slip`` ``(t, 2, ...)``; ``limit`` µp at its end.
+
+    ``loaded`` as for :func:`slip_of_states`.
+    """
+    size = in_rows(np.hypot(slip[:, 0], slip[:, 1]), loaded)
+    return mean_of_ends(limit, missions) * size
 
 
 def dissipated(limit: Array, slip: Array) -> Array:
@@ -77,8 +93,7 @@ def error_of_sums(
 
 def _error(pressure: Array, slip: Array, loaded: Mask) -> tuple[Array, bool]:
     """The same of one cycle, and whether two of its increments go along one way."""
-    by_place = (-1, *[1] * (pressure.ndim - 1))
-    slip = np.where(loaded.reshape(-1, *[1] * (slip.ndim - 1)), slip, 0.0)
+    slip = in_rows(slip, loaded)
     size, p_last = np.hypot(slip[:, 0], slip[:, 1]), np.roll(pressure, 1, axis=0)
     size_last, last = np.roll(size, 1, axis=0), np.roll(slip, 1, axis=0)
     rise = pressure - p_last
@@ -93,6 +108,5 @@ def _error(pressure: Array, slip: Array, loaded: Mask) -> tuple[Array, bool]:
     )
     bent = share / np.maximum(count, 1.0)
     begun = np.where(begins & (p_last > 0.0), -size * rise / 6.0, 0.0)
-    parts = (~loaded & np.roll(loaded, 1)).reshape(by_place)
-    parted = np.where(parts, -0.5 * p_last * size_last, 0.0)
+    parted = in_rows(-0.5 * p_last * size_last, ~loaded & np.roll(loaded, 1))
     return np.asarray(np.sum(bent + begun + parted, axis=0)), bool(pair.any())

@@ -180,6 +180,11 @@ class Grid:
         """Cell centres along y, shape ``(1, ny)`` [mm]."""
         return _centres(self.shape[1], self.pitch[1])[None, :]
 
+    @property
+    def centres(self) -> Array:
+        """x and y of all cell centres ``(2, nx, ny)`` [mm]."""
+        return np.stack(np.broadcast_arrays(self.x, self.y))
+
 
 def _centres(count: int, pitch: float) -> Array:
     """Centres of ``count`` cells about zero."""

@@ -18,7 +18,7 @@ import numpy as np
 from sa_solver.contact import ContactState, FrictionalContact
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
-from sa_solver.increments import error_of_sums, mean_of_ends, slip_of_states
+from sa_solver.increments import error_of_sums, friction_work, slip_of_states
 from sa_solver.normal import NormalContact
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Tilt
@@ -133,10 +133,8 @@ class CycleTractions:
     @property
     def work(self) -> Array:
         """Friction work per area of each increment ``(t, nx, ny)`` [N/mm]."""
-        mean = mean_of_ends(self.pressure, self.loads.missions)
-        work = self.friction * mean * np.hypot(self.slip[:, 0], self.slip[:, 1])
-        work[self.loads.P == 0.0] = 0.0
-        return np.asarray(work)
+        loads, limit = self.loads, self.friction * self.pressure
+        return friction_work(limit, self.slip, loads.P > 0.0, loads.missions)
 
     @property
     def increments_error(self) -> dict[str, float] | None:
@@ -275,9 +273,14 @@ class InterfaceContact:
         if isinstance(state.coarse, InterfaceState):
             state = replace(state, coarse=self._followed(state.coarse, history, link))
         starts = {t: start for t, start in state.starts.items() if history.loads.P[t] > 0.0}
-        pressed = self._pressed(starts, history)
-        state = replace(state, loads=history.loads, slip=history.slip, link=link, starts=starts)
-        state = replace(state, pressed=pressed)
+        state = replace(
+            state,
+            loads=history.loads,
+            slip=history.slip,
+            link=link,
+            pressed=self._pressed(starts, history),
+            starts=starts,
+        )
         if self.settings.method == "full":
             return state  # body 2 goes on as the half-space's own slip has it
         paths = self._paths(self.transfer.to_cells(history.slip), starts, history.loads)

@@ -121,7 +121,7 @@ class CellNodes:
 
     @property
     def places(self) -> Array:
-        return np.stack(np.broadcast_arrays(self.grid.x, self.grid.y))
+        return self.grid.centres
 
     def spread(self, forces: Array) -> Array:
         return self.to_cells(forces) / self.grid.cell_area

@@ -191,10 +191,10 @@ def followed(
     """Paths of body 2 over which each state of a cycle acts ``(t, 3, 2)`` [mm], if they count.
 
     From half way before its offset over that to half way after; ``(0, 3, 2)`` where the motion does
-    not count. ``slip`` ``(t, 2, nx, ny)`` [mm] is that of the
-    increments and ``pressure`` ``(nx, ny)`` that of the whole cycle, see :func:`offsets`;
-    ``missions`` are the increments of each closed cycle of a mix. Motion that counts in one
-    (:func:`moves`) is followed in all; ``forced`` says instead whether to follow it.
+    not count. ``slip`` ``(t, 2, nx, ny)`` [mm] is that of the increments and ``pressure``
+    ``(nx, ny)`` that of the whole cycle, see :func:`offsets`; ``missions`` are the increments of
+    each closed cycle of a mix. Motion that counts in one (:func:`moves`) is followed in all;
+    ``forced`` says instead whether to follow it.
     """
     paths = [offsets(slip[mission], pressure) for mission in missions]
     if forced is None:

@@ -70,11 +70,6 @@ class NodalContact:
         return _mean([c.friction * (c.slip * c.pressure).sum(axis=0) for c in self.cycles])
 
     @property
-    def energy(self) -> float:
-        """Energy of a cycle [N mm]."""
-        return float(self.work @ self.areas)
-
-    @property
     def areas(self) -> Array:
         """Of the nodes ``(n,)`` [mm²]."""
         return self.cycles[0].areas

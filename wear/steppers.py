@@ -54,8 +54,8 @@ second that they have at rest and the first of very short ones (:mod:`wear.stepp
 ROUNDING = 1e-9
 """Steps that add up to the cycles asked for but for this share leave none over."""
 
-
 Contact = TypeVar("Contact", contravariant=True)
+Worn = TypeVar("Worn", contravariant=True)
 
 
 class StabilityError(InputError):
@@ -288,11 +288,11 @@ def step_errors(state: WornState, areas: Array | float = 1.0) -> dict[str, float
     }
 
 
-class ComparedContact(Protocol[Contact]):
+class ComparedContact(Protocol[Worn]):
     """What limits steps: see :class:`wear.stepping.WearingContact`."""
 
-    def stable_cycles(self, state: Contact) -> float: ...
-    def comparable_cycles(self, state: Contact) -> float: ...
+    def stable_cycles(self, state: Worn) -> float: ...
+    def comparable_cycles(self, state: Worn) -> float: ...
 
 
 Compared = TypeVar("Compared", bound=ComparedContact[Any])
@@ -429,7 +429,7 @@ def _judged(
     return fits, min(changes)
 
 
-def first_cycles(contact: ComparedContact[Contact], state: Contact, total: float) -> float:
+def first_cycles(contact: ComparedContact[Worn], state: Worn, total: float) -> float:
     """How far the first automatic step of a run of ``total`` cycles goes."""
     return min(FIRST_STEP * contact.stable_cycles(state), FIRST_SHARE * total)
 

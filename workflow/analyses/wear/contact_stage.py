@@ -48,8 +48,7 @@ class ContactStage(InterfaceContact):
         """Unworn peak pressure on a grid as coarse as the mesh of the structure."""
         contact = NormalContact(HalfSpace(self.coarse_grid, self.pair))
         grid = self.coarse_grid
-        places = np.stack(np.broadcast_arrays(grid.x, grid.y))
-        gap = gap_on(self._contact_face, grid) + link.lift(peak, places)
+        gap = gap_on(self._contact_face, grid) + link.lift(peak, grid.centres)
         load = loads.pressing(peak, self.settings.tilt)
         return contact.solve(gap, **load, start=None, compliance=None).pressure
 

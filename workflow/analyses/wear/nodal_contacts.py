@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -48,13 +49,13 @@ class StructureCycle:
     stiffness: float
     start: None = None
 
-    @property
+    @cached_property
     def slip(self) -> Array:
         """Half of that before and half of that after each solved state ``(t, n)`` [mm]."""
         histories = self.solution.histories
         return np.concatenate([acting_slip(h.slip, h.loads) for h in histories], axis=1)
 
-    @property
+    @cached_property
     def pressure(self) -> Array:
         """At the end of each increment ``(t, n)`` [MPa]."""
         force = self.solution.fields()["force"][:, 2]

@@ -15,7 +15,7 @@ import numpy as np
 
 from fe_models.structure import InterfaceHistory
 from fe_models.transfer import FaceTransfer
-from sa_solver.increments import mean_of_ends
+from sa_solver.increments import friction_work
 from sa_solver.types import Array
 from wear.interface import InterfaceState
 from workflow.analyses.wear.contact_stage import ContactStage
@@ -55,7 +55,7 @@ def sections(
 ) -> Sections:
     """Sections of a structure's contact, one per row of the transfer's grid."""
     grid = transfer.grid
-    covered = np.asarray(transfer.shared.sum(axis=1)).reshape(grid.shape) / grid.pitch[1]
+    covered = transfer.covered.reshape(grid.shape) / grid.pitch[1]
 
     def per_length(nodal: Array) -> Array:
         total: Array = np.sum(transfer.to_cells(nodal) * covered, axis=0)
@@ -63,15 +63,13 @@ def sections(
 
     traction = history.force / history.interface.nodal_areas
     pressure = traction[peak, 2]
-    share = history.loads.share
-    slip_size = np.hypot(history.slip[:, 0], history.slip[:, 1])
-    path = share @ slip_size
+    loads, limit = history.loads, friction * traction[:, 2]
+    path = loads.share @ np.hypot(history.slip[:, 0], history.slip[:, 1])
     normal = per_length(pressure)
-    mean = mean_of_ends(traction[:, 2], history.loads.missions)
-    energy = friction * np.einsum("t,tn,tn->n", share * (history.loads.P > 0.0), mean, slip_size)
+    work = friction_work(limit, history.slip, loads.P > 0.0, loads.missions)
     weighted = per_length(pressure * path)
     slip = np.divide(weighted, normal, out=np.zeros_like(normal), where=normal > 0.0)
-    return Sections(normal, per_length(traction[peak, 0]), per_length(energy), slip)
+    return Sections(normal, per_length(traction[peak, 0]), per_length(loads.share @ work), slip)
 
 
 @dataclass(frozen=True)

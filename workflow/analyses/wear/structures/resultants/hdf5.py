@@ -31,7 +31,7 @@ from workflow.shell.results import frame_of
 
 LOADS = "load_history"
 # In a group beside the loads: what is read, and what our results hold besides.
-ON_NODES = (*("facets", "slip", "force", "displacement", "nodes_1", "nodes_2", "nodal_height"),)
+ON_NODES = ("facets", "slip", "force", "displacement", "nodes_1", "nodes_2", "nodal_height")
 NODAL = ("coordinates", *ON_NODES, "height")
 IGNORED = ("pressure", "shear")
 # How far nodal forces may be from adding up to those of the loads, in shares of the largest P.

@@ -30,11 +30,10 @@ class ImportedLoads:
     how much that changed the contact forces of the cycle before it, over the largest. With the
     nodes of the face: ``slip`` ``(t, 2, n)`` of each increment [mm], at its end ``force``
     ``(t, 3, n)`` on body 2 [N] and ``displacement`` ``(t, 3, n)`` [mm] relative to body 1, both or
-    neither, ``coordinates`` ``(n, 2)`` in
-    the interface frame [mm], ``facets`` ``(m, 3)`` or, in a line contact, ``(m, 2)``, the ``frame``
-    in the user's axes, the user's node numbers on body 1 and body 2 ``(n,)``, and the gap of the
-    unloaded, unworn faces [mm]: ``nodal_height`` ``(n,)`` at these nodes, ``height`` ``(nx, ny)``
-    on the grid of the case. None where not given.
+    neither, ``coordinates`` ``(n, 2)`` in the interface frame [mm], ``facets`` ``(m, 3)`` or, in a
+    line contact, ``(m, 2)``, the ``frame`` in the user's axes, the user's node numbers on body 1
+    and body 2 ``(n,)``, and the gap of the unloaded, unworn faces [mm]: ``nodal_height`` ``(n,)``
+    at these nodes, ``height`` ``(nx, ny)`` on the grid of the case. None where not given.
     """
 
     loads: LoadHistory
