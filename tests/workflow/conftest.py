@@ -146,6 +146,13 @@ def put_kinetics(file: h5py.File, name: str, grid: Grid) -> None:
         group.attrs["depth_rate"] = group.attrs["depth_linear_from"] = np.nan
 
 
+def put_errors(file: h5py.File, name: str) -> None:
+    """Parts of the error of two results, one of them not known."""
+    parts = np.array([0.004, np.nan, 0.006, 0.001, 0.003, 0.0])
+    put(file.create_group(f"error/{name}"), depth=parts, volume=0.5 * parts)
+    file[f"error/{name}"].attrs["accuracy"] = 0.05
+
+
 def put_bodies(file: h5py.File) -> None:
     """Two boxes of tetrahedra, stretched along Z."""
     import pyvista as pv
@@ -177,6 +184,7 @@ def fabricate(path: Path, shape: tuple[int, int] = (24, 40)) -> Path:
             put_contact(file, name, load, grid)
             put_comparison(file, name, load, grid)
             put_kinetics(file, name, grid)
+            put_errors(file, name)
         put(file["kinetics"], cycles=JUMPS)
         put_bodies(file)
     return path
@@ -328,11 +336,11 @@ def separate_processes(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session")
 def start(small_path: Path) -> Runner:
-    """Runs the small case with overrides and without pictures, in this process."""
+    """Runs the small case with overrides, without pictures and companions, in this process."""
 
     def run(folder: Path, *overrides: str, force: bool = False) -> Run:
-        quiet = "output.paraview=false", "output.figures=false"
-        settings = [part for entry in (*quiet, *overrides) for part in ("--set", entry)]
+        lean = "output.paraview=false", "output.figures=false", "error_budget=known"
+        settings = [part for entry in (*lean, *overrides) for part in ("--set", entry)]
         forced = ["--force"] if force else []
         return Run(invoke("run", small_path, "--out", folder, *forced, *settings), folder)
 

@@ -22,6 +22,7 @@ NAMES = {
     "pressure_profiles",
     "worn_profiles",
     "kinetics",
+    "error_budget",
     "structure_stress",
     "half_space_and_structure",
 }

@@ -59,7 +59,7 @@ def test_folder_holds_what_it_promises(whole):
     assert whole.summary["jumps"] == 3
     assert whole.summary["kinetics"]["cycles"] == [0.0, 1e4, 2e4, 3e4]
     # Eight nodes across a flank are few, and it says so.
-    assert all("link to the structure" in warning for warning in whole.summary["warnings"])
+    assert all("link" in warning for warning in whole.summary["warnings"])
     assert "Traceback" not in whole.ending.stderr
 
 
@@ -103,7 +103,7 @@ def test_explicit_run_with_a_law_for_each_body_and_its_overrides_on_record(start
         *("wear.disk.coefficient=500 um^3/J", "wear.blade.coefficient=2000 um^3/J"),
     )
     assert run.ending.exit_code == 0
-    assert all("link to the structure" in warning for warning in run.summary["warnings"])
+    assert all("link" in warning for warning in run.summary["warnings"])
     balances(run, {1: 500 * UM3_PER_J, 2: 2000 * UM3_PER_J})
     recorded = load_case(run.folder / "case.yaml")
     assert (recorded.wear.step.kind, recorded.wear.cycles) == ("explicit", 6000.0)

@@ -19,8 +19,11 @@ MIDDLE = "middle"
 MIDDLE_ROWS = 1
 # Name of the difference of worn depth anywhere.
 PROFILE = "depth anywhere"
-# Overrides that leave out what only quantities below ``stress`` need.
-WITHOUT_STRESS = {"stress": ("stress.section=none", "stress.life.parameter=none")}
+# Overrides that leave out what only quantities below these entries need.
+PLAIN = {
+    "stress": ("stress.section=none", "stress.life.parameter=none"),
+    "error": ("error_budget=known",),
+}
 
 
 def quantities(case: WearCase, summary: Summary) -> list[str]:
@@ -138,7 +141,7 @@ COMPARISON: Comparison[WearCase] = Comparison(
     quantities=quantities,
     extras=extra_quantities,
     sections=middle_quantities,
-    plain=WITHOUT_STRESS,
+    plain=PLAIN,
     measured=_measured,
     apart=_apart,
 )

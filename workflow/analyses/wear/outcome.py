@@ -79,7 +79,7 @@ class InterfaceOutcome:
         left, companion = step_errors(self.state, self.stage.areas), self.state.coarse
         if left is None or not isinstance(companion, InterfaceState):
             return None
-        pressure = self._end.pressure
+        pressure = self.end.pressure
         change = np.abs(pressure - self.stage.tractions(companion).pressure)
         return left | {"pressure": float(change.max() / pressure.max())}
 
@@ -87,13 +87,13 @@ class InterfaceOutcome:
     def increments_error(self) -> dict[str, float] | None:
         """What increments leave of a cycle's depth and energy, the mean of first and last cycle."""
         unworn = self.stage.unworn_tractions(self.unworn, self.first).increments_error
-        worn = self._end.increments_error
+        worn = self.end.increments_error
         if unworn is None or worn is None:
             return unworn or worn
         return {name: 0.5 * (unworn[name] + worn[name]) for name in unworn}
 
     @cached_property
-    def _end(self) -> CycleTractions:
+    def end(self) -> CycleTractions:
         """The tractions of a cycle at the end, of whatever is asked for."""
         return self.stage.tractions(self.state) if self.worn is None else self.worn
 

@@ -12,6 +12,8 @@ from sa_solver.normal import NormalContactError
 from wear.coupled import KINETICS
 from wear.kinetics import LinearRegime
 from workflow.analyses.contact.datasets import LOADS, pressure_field, traction_fields
+from workflow.analyses.wear.budget.finding import error_budget
+from workflow.analyses.wear.budget.report import Budget, datasets_of, sentence, summary_of
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.comparison import comparison_summary, write_comparison
 from workflow.analyses.wear.contact_loops import (
@@ -30,7 +32,7 @@ from workflow.analyses.wear.datasets import (
 from workflow.analyses.wear.layout import EXTRAPOLATION, Contents, energy_name
 from workflow.analyses.wear.link_report import link_summary
 from workflow.analyses.wear.outcome import InterfaceOutcome, Outcome
-from workflow.analyses.wear.run_errors import left_sentence, warn_of_errors
+from workflow.analyses.wear.run_errors import warn_of_errors
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.uniformity import uniformities
 from workflow.analyses.wear.worn_faces import write_worn_faces
@@ -75,14 +77,15 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
         structure = worn_structure(source, stages, state, case.friction, folder, reporter)
     with reporter.stage("stress under the contacts"):
         stresses = _stresses(outcome, reporter)
+    budget = error_budget(outcome, reporter)
     with reporter.stage("results"):
-        recorded, contents = _write_results(outcome, structure, stresses, run)
+        recorded, contents = _write_results(outcome, structure, stresses, budget, run)
     run.draw(contents)
     worn_nodes = write_worn_faces(source, stages, state.interfaces, folder, reporter)
     loops = write_loop_tables(folder, source.line)
     warn_of_border(loops, case.loops, reporter)
-    warn_of_errors(case.wear, outcome.interfaces, reporter)
-    summary = _summary(outcome, structure, stresses, recorded)
+    warn_of_errors(case, outcome.interfaces, budget, reporter)
+    summary = _summary(outcome, structure, stresses, budget, recorded)
     uniform = uniformities(source, stages, state.interfaces)
     uniformity = {name: vars(alike) for name, alike in uniform.items()}
     further = {"worn_nodes": worn_nodes, "loops": loops, "uniformity": uniformity}
@@ -90,7 +93,7 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
         for name, numbers in by_interface.items():
             summary[name][key] = numbers
     lines = [
-        *_lines(outcome, summary),
+        *_lines(outcome, summary, budget),
         *(f"  {alike.sentence(name)}" for name, alike in uniform.items()),
         *(f"  {loops_sentence(name, loop, source.line)}" for name, loop in loops.items()),
     ]
@@ -113,6 +116,7 @@ def _write_results(
     outcome: Outcome,
     structure: WornStructure | None,
     stresses: list[InterfaceStress],
+    budget: Budget,
     run: Run[WearCase],
 ) -> tuple[dict[str, PeakHistory], Contents]:
     """Write ``results.h5``; what the jumps recorded, by interface, and what is there."""
@@ -145,6 +149,8 @@ def _write_results(
             structure.write(writer)
         for stress in stresses:
             stress.write(writer)
+        for name, errors in budget.items():
+            writer.put(f"error/{name}", datasets_of(errors), accuracy=case.accuracy)
     contents = Contents(
         names=tuple(sorted(contact.stage.name for contact in outcome.interfaces)),
         bodies=case.bodies,
@@ -233,6 +239,7 @@ def _summary(
     outcome: Outcome,
     structure: WornStructure | None,
     stresses: list[InterfaceStress],
+    budget: Budget,
     recorded: dict[str, PeakHistory],
 ) -> dict[str, Any]:
     state, contacts = outcome.state, outcome.interfaces
@@ -248,7 +255,7 @@ def _summary(
             | (structure.interface_summary(number) if structure else {})
             | recorded[name].summary()
             | stress.get(name, {})
-            | {"worn_area": contact.worn_area}
+            | {"worn_area": contact.worn_area, "error": summary_of(budget[name])}
             for number, (name, contact) in enumerate(zip(recorded, contacts, strict=True))
         },
         "kinetics": {
@@ -310,7 +317,7 @@ def _regime_summary(regime: LinearRegime) -> dict[str, Any]:
     }
 
 
-def _lines(outcome: Outcome, summary: dict[str, Any]) -> Iterator[str]:
+def _lines(outcome: Outcome, summary: dict[str, Any], budget: Budget) -> Iterator[str]:
     """The end of the run in a few lines."""
     yield f"{summary['cycles']:.6g} cycles in {summary['jumps']} jumps"
     name_1, name_2 = outcome.case.bodies
@@ -322,5 +329,6 @@ def _lines(outcome: Outcome, summary: dict[str, Any]) -> Iterator[str]:
             f"  {name}: worn {numbers['depth_1'] * 1e3:.3g} um ({name_1}), "
             f"{numbers['depth_2'] * 1e3:.3g} um ({name_2}); {numbers['volume_1']:.3g}, "
             f"{numbers['volume_2']:.3g} {unit}; peak pressure {peaks['unworn']:.0f} -> "
-            f"{peaks['worn']:.0f} MPa; tilt {numbers['tilt']}{left_sentence(contact)}"
+            f"{peaks['worn']:.0f} MPa; tilt {numbers['tilt']}"
         )
+        yield f"  {name}: estimated errors: {sentence(budget[name])}"

@@ -1,17 +1,19 @@
-"""Errors that a wear run knows of: what its steps and its increments leave, told and warned of."""
+"""Errors that a wear run knows of, warned of where they are more than was asked for."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
 from wear.steppers import root_mean_square
+from workflow.analyses.wear.budget.report import Budget, warning_of
+from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import Duration
 from workflow.analyses.wear.outcome import InterfaceOutcome
+from workflow.analyses.wear.structures import structure_of
 from workflow.shell.reporter import Reporter
 
-# What steps and increments may leave of depth and volume where nobody has asked for less, and of
-# the peak pressure.
-UNASKED, PEAK = 0.05, 0.1
+# What steps may leave of the peak pressure: more may be edges that only long steps wear.
+PEAK = 0.1
 # Increments of a cycle of surfaces that move over each other, fewer than which leave the worn peak
 # pressure a fifth too large and more: on a cylinder over a third of its scar 4, 8, 16 and 32 left
 # 110, 60, 20 and 10 %.
@@ -19,12 +21,18 @@ FEW_INCREMENTS = 32
 
 
 def warn_of_errors(
-    wear: Duration, contacts: Sequence[InterfaceOutcome], reporter: Reporter
+    case: WearCase, contacts: Sequence[InterfaceOutcome], budget: Budget, reporter: Reporter
 ) -> None:
-    """Steps and increments that leave more than was asked for, or may pass without being asked."""
+    """Results farther off than the case's accuracy, and steps than was asked for.
+
+    And few increments of surfaces that move over each other, which no estimate knows of.
+    """
+    settings = structure_of(case).settings
     for contact in contacts:
-        _warn_of_steps(wear, contact, reporter)
-        left, name, state = contact.increments_error, contact.stage.name, contact.state
+        name, state = contact.stage.name, contact.state
+        _warn_of_steps(case.wear, contact, reporter)
+        if beyond := warning_of(name, budget[name], case.accuracy, settings):
+            reporter.warn(beyond)
         fewest = min(mission.stop - mission.start for mission in state.loads.missions)
         if len(state.paths) and fewest < FEW_INCREMENTS:
             reporter.warn(
@@ -32,29 +40,21 @@ def warn_of_errors(
                 "wear edges into each other at which the worn peak pressure is too large, by a "
                 f"fifth with 16 and more with fewer; take {FEW_INCREMENTS}"
             )
-        if left is not None and max(left.values()) > UNASKED:
-            reporter.warn(
-                f"{name}: the increments of the cycle leave an estimated error of "
-                f"{max(left.values()):.1%} of depth and energy where {UNASKED:.0%} may pass: "
-                "divide the cycle into more of them"
-            )
 
 
 def _warn_of_steps(wear: Duration, contact: InterfaceOutcome, reporter: Reporter) -> None:
     left, name = contact.step_error, contact.stage.name
     if left is None:
         return
-    error, asked = max(left["depth"], left["volume"]), UNASKED
-    if wear.step.automatic:
-        asked = wear.tolerance
-        if wear.depth_tolerance is not None:
-            depths = contact.state.surfaces.depths
-            asked = wear.depth_tolerance / max(root_mean_square(d, d) for d in depths)
-    if error > asked:
-        what = "was asked for (wear.tolerance)" if wear.step.automatic else "may pass"
+    error, asked = max(left["depth"], left["volume"]), wear.tolerance
+    if wear.depth_tolerance is not None:
+        depths = contact.state.surfaces.depths
+        asked = wear.depth_tolerance / max(root_mean_square(d, d) for d in depths)
+    if wear.step.automatic and error > asked:
         reporter.warn(
             f"{name}: wear steps leave an estimated error of {error:.2%} of depth and volume "
-            f"where {asked:.2%} {what}: try wear.step.kind: second_order, or shorter steps"
+            f"where {asked:.2%} was asked for (wear.tolerance): try wear.step.kind: second_order, "
+            "or shorter steps"
         )
     if left["pressure"] > PEAK:
         reporter.warn(
@@ -62,16 +62,3 @@ def _warn_of_steps(wear: Duration, contact: InterfaceOutcome, reporter: Reporter
             "peak pressure on the worn surfaces, and of what follows from it (fretting life): "
             "try wear.step.kind: second_order, or shorter steps"
         )
-
-
-def left_sentence(contact: InterfaceOutcome) -> str:
-    """What wear steps and increments leave, where it is known."""
-    sentence, steps, increments = "", contact.step_error, contact.increments_error
-    if steps is not None:
-        sentence = (
-            f"; wear steps leave {max(steps['depth'], steps['volume']):.1%} of depth and volume, "
-            f"{steps['pressure']:.1%} of the peak pressure"
-        )
-    if increments is not None:
-        sentence += f"; increments leave {max(increments.values()):.1%} of depth and energy"
-    return sentence

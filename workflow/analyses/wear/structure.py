@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass, field
 from math import prod
 from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
@@ -13,6 +13,7 @@ from workflow.shell.analysis import as_written
 from workflow.shell.memory import Memory, factor_bytes
 
 if TYPE_CHECKING:
+    from workflow.analyses.wear.budget.companions import Companions
     from workflow.analyses.wear.contact_stage import ContactStage
     from workflow.analyses.wear.load_source import LoadSource
 
@@ -22,6 +23,16 @@ AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
 SPECTRA = 300
 # Dense interface matrices alive at once while a joint is condensed.
 DENSE_MATRICES = 6
+
+# What makes each part of the error of a run smaller.
+SETTINGS = {
+    "link": "contact.link and the mesh of the contact faces",
+    "mesh": "the mesh of the structure",
+    "increments": "load_path.increments",
+    "grid": "contact.grid",
+    "steps": "wear.step (kind: second_order) and wear.tolerance",
+    "solver": "contact.tolerance",
+}
 
 
 def memory(
@@ -48,7 +59,8 @@ class WearStructure(Generic[AnyWearCase]):
     how many they are, by which the time of a run is told, and ``memory`` what a run needs, given
     the nodes of both bodies and of all interfaces (0: unknown). ``choose`` gives the case with the
     settings that it leaves open, and a record of why; ``warnings`` are about the unworn contact of
-    a stage under a peak load [N].
+    a stage under a peak load [N]. ``companions`` tell what its mesh and its grid leave, and
+    ``settings`` what makes the parts of the error smaller.
     """
 
     name: str
@@ -58,3 +70,5 @@ class WearStructure(Generic[AnyWearCase]):
     memory: Callable[[AnyWearCase, int, int], Memory] = memory
     choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = as_written
     warnings: Callable[[AnyWearCase, ContactStage, float], Iterable[str]] = lambda *_: ()
+    companions: Callable[[AnyWearCase], Companions[AnyWearCase] | None] = lambda _: None
+    settings: Mapping[str, str] = field(default_factory=lambda: dict(SETTINGS))

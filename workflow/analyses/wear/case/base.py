@@ -16,6 +16,7 @@ from workflow.analyses.wear.case.sections import (
     ContactStress,
     Coupling,
     Nonlinearity,
+    Ratio,
 )
 from workflow.analyses.wear.case.worn_bodies import Worn
 from workflow.case.fields import shown
@@ -58,6 +59,18 @@ class WearCase(Case):
         "tangential loops on the worn contacts, where amplitude or force is given", default=Loops()
     )
     stress: ContactStress = entry("under the contacts, unworn and worn", default=ContactStress())
+    accuracy: Ratio = entry(
+        "of the main results: a run warns of those that it estimates to be farther off, and of "
+        "pressure and fretting parameter at worn edges by five times as much [1]",
+        "5 %",
+        default=0.05,
+    )
+    error_budget: Literal["probed", "known"] = entry(
+        "probed: short lives on a finer mesh and a coarser grid tell what these leave; known: only "
+        "what the run knows of itself",
+        "probed",
+        default="probed",
+    )
 
     def material(self, number: int) -> ElasticMaterial:
         """Material of body ``number``, 1 or 2."""

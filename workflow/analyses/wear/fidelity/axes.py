@@ -12,12 +12,12 @@ from functools import partial
 from math import ceil
 from typing import Any
 
+from workflow.analyses.wear.budget.lives import STEPS
 from workflow.analyses.wear.case.sections import SIZES
 from workflow.analyses.wear.fidelity.decision import Axis, Decision
 from workflow.analyses.wear.fidelity.estimate import Numbers, estimate
 from workflow.analyses.wear.fidelity.probe import (
     INCREMENTS,
-    STEPS,
     coupled_life,
     end_life,
     increments,

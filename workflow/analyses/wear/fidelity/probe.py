@@ -9,18 +9,18 @@ from __future__ import annotations
 
 from functools import lru_cache
 from math import ceil, gcd
-from typing import Literal
 
 import numpy as np
 
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, resultant_change
-from wear.coupled import Contacts, CoupledSettings, CoupledState, CoupledWear, JumpSize
+from wear.coupled import CoupledState
 from wear.interface import acting_slip
 from wear.steppers import ImplicitStepper, advance_cycles
 from wear.stepping import SlidingCycle, WearingContact, WearState
-from workflow.analyses.wear.case.sections import Contact, ContactStress, Life, Step
+from workflow.analyses.wear.budget.lives import STEPS, TOLERANCE, live, shortened
+from workflow.analyses.wear.case.sections import Contact
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.fidelity.estimate import Numbers
 from workflow.analyses.wear.structure_stage import StructureStage
@@ -29,20 +29,14 @@ from workflow.analyses.wear.structures.dovetail.model import SIDES, DovetailMode
 from workflow.case.changing import changed
 from workflow.errors import MethodFailed
 
-# Implicit steps of a probe's life. On the default joint 3 and 8 give the same errors of increments
-# and meshes within 2 %, and of grids within 20 % of these errors.
-STEPS = 3
 # Settings of a probe along the axes that it does not vary: strips across a flank, nodes across it,
 # and increments of the cycle at least. Differences along one axis hardly depend on the others.
 STRIPS, NODES, INCREMENTS = 64, 10, 10
-# Of the contact solver: a thousandth of the differences that probes resolve.
-TOLERANCE = 1e-5
 
 
 def plane_section(case: DovetailCase) -> DovetailCase:
     """The section of a case in plane strain, as probes run it: slips are the structure's."""
-    cycles = case.wear.cycles / STEPS
-    return changed(
+    return shortened(
         case,
         {
             "structure.dimension": 2,
@@ -51,10 +45,7 @@ def plane_section(case: DovetailCase) -> DovetailCase:
             "mesh.size": case.structure.face_width / 2.0,
             "contact.grid": (STRIPS, STRIPS),
             "contact.method": "normal",
-            "contact.tolerance": TOLERANCE,
-            "wear.step": Step.model_construct(kind="implicit", cycles=cycles),
             "wear.motion": "neglect",
-            "stress": ContactStress(section="none", life=Life(parameter="none")),
             **increments(case, INCREMENTS),
         },
     )
@@ -85,7 +76,7 @@ def life(case: DovetailCase) -> Numbers:
     The loads are those of the unworn structure. Raises what structure and contact raise, and
     MethodFailed where nothing wears.
     """
-    stages, (*_, end) = _run(case, "constant")
+    stages, (*_, end) = live(case, _structure(case))
     return _wearing(_worn_by_flank(stages, end))
 
 
@@ -94,23 +85,10 @@ def coupled_life(case: DovetailCase) -> tuple[Numbers, float]:
 
     The drift is that of the resultants in the end, as a run measures it.
     """
-    stages, (first, *_, end) = _run(case, "every")
+    stages, (first, *_, end) = live(case, _structure(case), "every")
     sizes = np.array([stage.grid.size for stage in stages])
     drift = resultant_change(end.solved_resultants, first.solved_resultants, sizes)
     return _worn_by_flank(stages, end), float(np.abs(drift).max())
-
-
-def _run(
-    case: DovetailCase, resultants: Literal["constant", "every"]
-) -> tuple[list[ContactStage], list[CoupledState]]:
-    """The contacts of a life, and its states, the unworn one first."""
-    structure = _structure(case)
-    stages = [ContactStage(case, contact) for contact in structure.faces]
-    cycles = case.wear.cycles
-    settings = CoupledSettings(cycles, JumpSize(cycles / STEPS), resultants=resultants)
-    loop = CoupledWear(settings, structure, Contacts(stages))
-    state, _ = loop.begin(structure.unworn())
-    return stages, [state, *loop.march(state)]
 
 
 def _worn_by_flank(stages: list[ContactStage], state: CoupledState) -> Numbers:

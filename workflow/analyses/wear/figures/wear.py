@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 from sa_solver.types import Array, Grid
 from wear.kinetics import LinearRegime
 from workflow.analyses.wear.figures.comparison import half_space_and_structure, nodes_on_middle
+from workflow.analyses.wear.figures.error_budget import error_budget
 from workflow.analyses.wear.figures.loops import loops
 from workflow.analyses.wear.figures.structure_stress import structure_stress
 from workflow.analyses.wear.figures.subsurface import fretting_life, subsurface_stress
@@ -56,6 +57,7 @@ def figures_of(contents: Contents) -> Figures:
         "pressure_profiles": (pressure_profiles, True),
         "worn_profiles": (worn_profiles, True),
         "kinetics": (kinetics, True),
+        "error_budget": (error_budget, True),
         "structure_stress": (structure_stress, contents.structure),
         "half_space_and_structure": (half_space_and_structure, contents.comparison),
         "loops": (loops, contents.loops),

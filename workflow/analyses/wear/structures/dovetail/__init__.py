@@ -7,11 +7,12 @@ from math import pi, prod
 from typing import TYPE_CHECKING, Any
 
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
-from workflow.analyses.wear.structure import SPECTRA, WearStructure, memory
+from workflow.analyses.wear.structure import SETTINGS, SPECTRA, WearStructure, memory
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
+    from workflow.analyses.wear.budget.companions import Companions
     from workflow.analyses.wear.contact_stage import ContactStage
     from workflow.analyses.wear.load_source import LoadSource
 
@@ -70,6 +71,12 @@ def _warnings(case: DovetailCase, stage: ContactStage, load: float) -> Iterator[
     return warnings(case, stage, load)
 
 
+def _companions(case: DovetailCase) -> Companions[DovetailCase]:
+    from workflow.analyses.wear.structures.dovetail.companions import companions
+
+    return companions(case)
+
+
 STRUCTURE = WearStructure(
     name="dovetail",
     case=DovetailCase,
@@ -78,4 +85,6 @@ STRUCTURE = WearStructure(
     memory=_memory,
     choose=_choose,
     warnings=_warnings,
+    companions=_companions,
+    settings=SETTINGS | {"mesh": "mesh.order, mesh.flank_nodes and mesh.size"},
 )

@@ -13,7 +13,6 @@ from workflow.analyses.wear.case.gaps import check_arcs
 from workflow.analyses.wear.case.sections import (
     BladeAndDiskMaterials,
     DovetailWear,
-    Ratio,
     Share,
     check_shares,
 )
@@ -236,9 +235,6 @@ class DovetailCase(FiniteElementCase):
     load_path: LoadPath = entry("one cycle")
     mesh: Mesh = entry("finite elements of the structure", default=Mesh())
     wear: DovetailWear = entry("law, length of the run and step")
-    accuracy: Ratio = entry(
-        "of depth and volume in mid-slot, when fidelity is auto [1]", "5 %", default=0.05
-    )
     fidelity: Literal["fixed", "auto"] = entry(
         "fixed: as written; auto: dimension, increments, mesh, grid, tolerances, wear steps and "
         "drift as coarse as probes show that the accuracy allows",

@@ -5,10 +5,11 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
-from workflow.analyses.wear.structure import WearStructure
+from workflow.analyses.wear.structure import SETTINGS, WearStructure
 from workflow.analyses.wear.structures.mesh.case import MeshCase
 
 if TYPE_CHECKING:
+    from workflow.analyses.wear.budget.companions import Companions
     from workflow.analyses.wear.load_source import LoadSource
 
 
@@ -33,4 +34,17 @@ def _extent(case: MeshCase) -> Extent:
     )
 
 
-STRUCTURE = WearStructure(name="mesh", case=MeshCase, source=_source, extent=_extent)
+def _companions(case: MeshCase) -> Companions[MeshCase]:
+    from workflow.analyses.wear.structures.mesh.companions import companions
+
+    return companions(case)
+
+
+STRUCTURE = WearStructure(
+    name="mesh",
+    case=MeshCase,
+    source=_source,
+    extent=_extent,
+    companions=_companions,
+    settings=SETTINGS | {"mesh": "structure.order or a finer mesh"},
+)

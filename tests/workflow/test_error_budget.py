@@ -1,0 +1,164 @@
+"""The error budget of wear runs: its parts, what is told of them, and how true they are."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.marks import slow
+from tests.workflow.commands import invoke
+from tests.workflow.mesh_scenes import settings
+from workflow.analyses.wear.budget.companions import Companions
+from workflow.analyses.wear.budget.lives import live
+from workflow.analyses.wear.budget.parts import PARTS, ResultError, peak_left
+from workflow.analyses.wear.budget.report import datasets_of, sentence, summary_of, warning_of
+from workflow.analyses.wear.structure import SETTINGS
+from workflow.analyses.wear.structures import structure_of
+from workflow.case.changing import changed
+from workflow.kinds import load_case
+
+CASES = Path(__file__).parents[2] / "cases"
+QUIET = ("output.figures=false", "output.paraview=false", "stress.section=none")
+
+
+# --- parts ----------------------------------------------------------------------------------------
+
+
+def test_a_smooth_peak_is_all_but_what_it_is_on_cells_of_twice_the_size() -> None:
+    """Hertz's p0 sqrt(1 - (x/a)²): halfway between two cells it falls by h²/8 p'' = 1 / (2 k²)."""
+    across = 41
+    x = 2.0 * (np.arange(across) - across // 2) / across
+    assert peak_left(np.sqrt(1.0 - x**2)[:, None]) == pytest.approx(1.0 / across**2, rel=0.02)
+
+
+def test_a_peak_without_a_limit_is_told_by_its_cells() -> None:
+    """Means of x^-1/2 over [0, h] and [0, 2h] are as 1 to 1/√2, however small h is."""
+    edges = np.linspace(0.0, 1.0, 65)
+    means = np.diff(2.0 * np.sqrt(edges)) / np.diff(edges)
+    assert peak_left(means[:, None]) == pytest.approx(1.0 - 1.0 / np.sqrt(2.0), rel=1e-12)
+    in_plane = means[:, None] * np.ones((1, 7))
+    assert peak_left(in_plane) == pytest.approx(peak_left(means[:, None]), rel=1e-12)
+
+
+def test_nothing_pressed_has_no_peak() -> None:
+    assert peak_left(np.zeros((4, 3))) == 0.0
+
+
+# --- what is told ---------------------------------------------------------------------------------
+
+ERROR = ResultError({"link": 0.004, "mesh": 0.03, "increments": None, "steps": 0.012})
+
+
+def test_parts_add_up_and_unknown_ones_are_named() -> None:
+    assert ERROR.total == pytest.approx(0.046)
+    assert summary_of({"depth": ERROR})["depth"] == {**ERROR.parts, "sum": ERROR.total}
+    said = sentence({"depth": ERROR})
+    assert said == "depth 4.6% (mesh 3.0%, steps 1.2%, increments unknown)"
+    (written,) = (data.values for data in datasets_of({"depth": ERROR}).values())
+    known = {part: value for part, value in zip(PARTS, written, strict=True) if value == value}
+    assert known == {"link": 0.004, "mesh": 0.03, "grid": 0.0, "steps": 0.012, "solver": 0.0}
+
+
+def test_a_result_beyond_the_accuracy_is_a_warning_that_names_the_setting() -> None:
+    errors = {"depth": ERROR, "worn_peak_pressure": ERROR}
+    assert warning_of("pad", errors, 0.05, SETTINGS) is None
+    line = warning_of("pad", errors, 0.04, SETTINGS)
+    assert line is not None
+    assert "depth 4.6%" in line
+    assert "worn" not in line.partition("): ")[2]  # edges may be farther off
+    assert SETTINGS["mesh"] in line
+
+
+# --- lives ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def section():
+    """The section of the default joint on a coarse mesh of first order."""
+    coarse = "mesh.flank_nodes=[12, 12]", "mesh.size=8 mm", "contact.grid=[64, 64]"
+    return load_case(CASES / "dovetail_2d.yaml", [*coarse, "mesh.order=1"])
+
+
+def test_companions_differ_in_one_thing_each(section) -> None:
+    companions = structure_of(section).companions(section)
+    own, finer, coarser = companions.own, companions.finer, companions.coarser
+    assert companions.linked is None
+    assert changed(finer, {"mesh": own.mesh}) == own
+    assert changed(coarser, {"contact.grid": own.contact.grid}) == own
+    assert (finer.mesh.flank_nodes[0] - 1, finer.mesh.size) == (2 * 11, 4.0)
+    assert coarser.contact.grid[0] == own.contact.grid[0] // 2
+
+
+def test_a_joint_in_space_is_judged_by_its_section() -> None:
+    case = load_case(CASES / "dovetail.yaml")
+    companions = structure_of(case).companions(case)
+    assert not companions.same
+    assert companions.own.structure.dimension == companions.finer.structure.dimension == 2
+    assert companions.own.mesh == case.mesh
+
+
+def test_half_spaces_have_a_companion_that_is_linked(section) -> None:
+    case = changed(section, {"contact.link": "half_space"})
+    companions = structure_of(case).companions(case)
+    assert companions.linked is not None
+    assert companions.linked.contact.link == "corrected"
+
+
+@slow
+def test_lives_tell_what_the_mesh_leaves(section) -> None:
+    """Of two orders and sizes, against a mesh so fine that what it leaves does not count."""
+    structure = structure_of(section)
+    companions = structure.companions(section)
+    told = companions.errors(structure.source(section), structure.source)["mesh"]["intrados"]
+
+    fine = {"mesh.flank_nodes": (61, 61), "mesh.size": 1.5, "mesh.order": 2}
+    truth = changed(companions.own, fine)
+    (own, exact) = (
+        live(case, structure.source(case), "every")[1][-1].interfaces[0].surfaces.depth
+        for case in (companions.own, truth)
+    )
+    for name, true in (
+        ("depth", abs(own.max() / exact.max() - 1.0)),
+        ("volume", abs(own.sum() / exact.sum() - 1.0)),
+    ):
+        assert 0.5 < told[name] / true < 2.0, (name, told[name], true)
+
+
+def test_grids_are_compared_by_their_order() -> None:
+    """A body without a structure: the sphere's scar on half as many cells."""
+    case = load_case(CASES / "sphere_wear.yaml")
+    companions: Companions = structure_of(case).companions(case)
+    assert companions.cells == case.contact.grid[0] / companions.own.contact.grid[0]
+    assert companions.finer is None
+
+
+# --- runs -----------------------------------------------------------------------------------------
+
+
+@slow
+def test_a_run_tells_its_errors(tmp_path) -> None:
+    """Against a run finer in everything, the parts add up to the error of depth and volume."""
+    coarse = "mesh.flank_nodes=[14, 14]", "mesh.size=7 mm", "mesh.order=1", "contact.grid=[64, 64]"
+    coarse += "load_path.increments=11", "load_path.peak_at=4"
+    fine = "mesh.flank_nodes=[61, 61]", "mesh.size=2 mm", "mesh.order=2", "contact.grid=[128, 128]"
+    fine += "load_path.increments=44", "load_path.peak_at=16", "wear.tolerance=0.3 %"
+    fine += "coupling.drift=0.5 %", "wear.step.kind=second_order", "error_budget=known"
+    own, exact = (
+        _summary(tmp_path / name, *overrides)["intrados"]
+        for name, overrides in (("own", coarse), ("exact", fine))
+    )
+    for result, name in (("depth", "depth_1"), ("volume", "volume_1")):
+        true = abs(own[name] / exact[name] - 1.0)
+        assert 0.5 < own["error"][result]["sum"] / true < 2.0
+    assert exact["error"]["depth"]["mesh"] is None
+
+
+def _summary(folder, *overrides):
+    import json
+
+    case = CASES / "dovetail_2d.yaml"
+    ending = invoke("run", case, "--out", folder, *settings((*QUIET, *overrides)))
+    assert ending.exit_code == 0, ending.stderr
+    return json.loads((folder / "summary.json").read_text("utf-8"))

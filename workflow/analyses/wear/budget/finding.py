@@ -1,0 +1,52 @@
+"""The error budget of a finished run, with what short lives of companions tell beside it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from fe_models.mesh import MeshError
+from sa_solver.normal import NormalContactError
+from wear.interface import MotionError
+from wear.stepping import ContactFailure
+from workflow.analyses.wear.budget.companions import Companions
+from workflow.analyses.wear.budget.parts import Errors, errors_of
+from workflow.analyses.wear.outcome import Outcome
+from workflow.analyses.wear.structures import structure_of
+from workflow.errors import MethodFailed, UserError
+from workflow.shell.reporter import Reporter
+
+Lives = dict[str, dict[str, dict[str, float]]]  # by part, interface and result
+
+
+def error_budget(outcome: Outcome, reporter: Reporter) -> dict[str, Errors]:
+    """Errors of the main results by interface, each by what leaves them."""
+    with reporter.stage("error budget"):
+        lives = _lives(outcome, reporter)
+        return {
+            contact.stage.name: errors_of(
+                outcome.case,
+                contact,
+                outcome.source.peak,
+                {part: by_name[contact.stage.name] for part, by_name in lives.items()},
+            )
+            for contact in outcome.interfaces
+        }
+
+
+def _lives(outcome: Outcome, reporter: Reporter) -> Lives:
+    """What companions tell; nothing where there are none, or they fail."""
+    case = outcome.case
+    if case.error_budget == "known" or case.contact.method == "nodes":
+        return {}
+    structure = structure_of(case)
+    companions: Companions[Any] | None = structure.companions(case)
+    if companions is None:
+        return {}
+    try:
+        return companions.errors(outcome.source, structure.source)
+    except (
+        *(MeshError, NormalContactError, ContactFailure, MotionError),
+        *(MethodFailed, UserError),
+    ) as error:
+        reporter.log(f"error budget: mesh and grid stay unknown, a short life failed: {error}")
+        return {}

@@ -1,0 +1,54 @@
+"""Short lives of a case: what its structure and contacts make of all cycles in a few steps.
+
+Lives on settings that differ in one thing share the error of their few steps, nearly, and leave the
+difference that this one thing makes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, Literal, TypeVar
+
+from wear.coupled import Contacts, CoupledSettings, CoupledState, CoupledWear, JumpSize
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.case.sections import ContactStress, Life, Step
+from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.load_source import LoadSource
+from workflow.case.changing import changed
+
+AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
+
+# Implicit steps of a life. On the default joint 3 and 8 give the same errors of increments and
+# meshes within 2 %, and of grids within 20 % of these errors.
+STEPS = 3
+# Of the contact solver: a thousandth of the differences that lives resolve.
+TOLERANCE = 1e-5
+
+
+def shortened(case: AnyWearCase, settings: Mapping[str, Any]) -> AnyWearCase:
+    """A case whose life is short, with other ``settings`` by their dotted paths."""
+    step = Step.model_construct(kind="implicit", cycles=case.wear.cycles / STEPS)
+    return changed(
+        case,
+        {
+            "contact.tolerance": TOLERANCE,
+            "wear.step": step,
+            "stress": ContactStress(section="none", life=Life(parameter="none")),
+            **settings,
+        },
+    )
+
+
+def live(
+    case: WearCase, source: LoadSource, resultants: Literal["constant", "every"] = "constant"
+) -> tuple[list[ContactStage], list[CoupledState]]:
+    """The contacts of a life under the loads of ``source``, and its states, the unworn one first.
+
+    Raises what structure and contact raise.
+    """
+    stages = [ContactStage(case, face) for face in source.faces]
+    cycles = case.wear.cycles
+    settings = CoupledSettings(cycles, JumpSize(cycles / STEPS), resultants=resultants)
+    loop = CoupledWear(settings, source, Contacts(stages))
+    state, _ = loop.begin(source.unworn())
+    return stages, [state, *loop.march(state)]

@@ -1,0 +1,138 @@
+"""What each approximation of a run is estimated to leave of its main results.
+
+Errors are relative, of one sign as far as anybody knows: their sum is the estimate of a result. A
+part that nobody knows is None, one that a run does not have is left out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from sa_solver.types import Array
+from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.outcome import InterfaceOutcome
+
+PARTS = ("link", "mesh", "increments", "grid", "steps", "solver")
+# What is worn and pressures, by their names in the summary and in words.
+WORN = {"depth": "depth", "volume": "volume"}
+PRESSURES = {
+    "peak_pressure": "unworn peak pressure",
+    "worn_peak_pressure": "worn peak pressure",
+}
+RESULTS = WORN | PRESSURES | {"life": "fretting parameter", "notch_stress": "notch stress"}
+# How often the energy and the pressure count in a fretting parameter: Ruiz's is work times tension,
+# that of Smith, Watson and Topper stress times strain, that of Findley a stress.
+POWERS = {"ruiz": (1, 1), "smith_watson_topper": (0, 2), "findley": (0, 1)}
+# The contact solver's tolerance leaves so much of itself: at most 0.35 of depth and volume was
+# found, for tolerances from 1e-3 to 1e-6 on two dovetails' flanks.
+LEFT_BY_TOLERANCE = 0.5
+
+
+@dataclass(frozen=True)
+class ResultError:
+    """Estimated error of one result by its ``parts``, relative."""
+
+    parts: Mapping[str, float | None]
+
+    @property
+    def total(self) -> float:
+        """Sum of all parts that are known."""
+        return sum(part or 0.0 for part in self.parts.values())
+
+    @property
+    def unknown(self) -> list[str]:
+        """Parts of which nothing is known."""
+        return [name for name, part in self.parts.items() if part is None]
+
+    @property
+    def largest(self) -> list[tuple[str, float]]:
+        """Known parts, the largest first."""
+        known = [(name, part) for name, part in self.parts.items() if part is not None]
+        return sorted(known, key=lambda pair: -pair[1])
+
+
+Errors = dict[str, ResultError]  # by result
+Probed = Mapping[str, Mapping[str, float]]  # by part and result
+ByResult = Mapping[str, float | None]
+
+
+def errors_of(case: WearCase, contact: InterfaceOutcome, peak: int, probed: Probed) -> Errors:
+    """Errors of one contact; ``probed`` are those that lives of companions told of some parts."""
+    solver = LEFT_BY_TOLERANCE * case.contact.tolerance
+    parts: dict[str, ByResult] = {
+        "link": _link(contact, probed),
+        "mesh": _told(probed, "mesh", WORN | PRESSURES),
+        "increments": _by_result(contact.increments_error, "depth", "energy", "depth"),
+        "grid": _grid(contact, peak, probed),
+        "steps": _by_result(contact.step_error, "depth", "volume", "pressure"),
+        "solver": dict.fromkeys(WORN | PRESSURES, solver),
+    }
+    if contact.stage.settings.driven:  # half-spaces are the model
+        del parts["link"], parts["mesh"]
+    if case.contact.method == "nodes":
+        del parts["link"], parts["grid"]
+    errors = {
+        result: ResultError({part: by[result] for part, by in parts.items() if result in by})
+        for result in (*WORN, *PRESSURES)
+    }
+    if case.stress.life.parameter in POWERS:
+        of_work, of_stress = POWERS[case.stress.life.parameter]
+        work, stress = errors["depth"].parts, errors["worn_peak_pressure"].parts
+        errors["life"] = ResultError(
+            {part: _sum(of_work, work[part], of_stress, stress.get(part, 0.0)) for part in work}
+        )
+    return errors
+
+
+def _link(contact: InterfaceOutcome, probed: Probed) -> ByResult:
+    """What the half-space makes else of the structure's loads: energies, and what a fit leaves."""
+    link = contact.first.link
+    if not link.corrects:
+        return _told(probed, "link", WORN | PRESSURES)
+    structural, on_grid = contact.unworn.loads.mean_energy, float(contact.first.energy.sum())
+    apart = abs(on_grid - structural) / structural if structural > 0.0 else 0.0
+    if "mesh" in probed:  # which has the misfit in it
+        return dict.fromkeys(WORN, apart)
+    return {**dict.fromkeys(WORN, apart), **dict.fromkeys(PRESSURES, float(link.quality[1]))}
+
+
+def _grid(contact: InterfaceOutcome, peak: int, probed: Probed) -> ByResult:
+    pressures = contact.first.pressure[peak], contact.end.pressure[peak]
+    left = {name: peak_left(p) for name, p in zip(PRESSURES, pressures, strict=True)}
+    return {**_told(probed, "grid", WORN), **left}
+
+
+def _told(probed: Probed, part: str, results: Mapping[str, str]) -> ByResult:
+    """What lives have told of a part."""
+    return {result: probed[part][result] if part in probed else None for result in results}
+
+
+def _by_result(left: Mapping[str, float] | None, *names: str) -> ByResult:
+    """Estimates by the names that they have for depth, volume and worn peak pressure."""
+    results = (*WORN, "worn_peak_pressure")
+    return {r: None if left is None else left[name] for r, name in zip(results, names, strict=True)}
+
+
+def _sum(n: int, first: float | None, m: int, second: float | None) -> float | None:
+    """So many times one and so many times the other; None where one of them is not known."""
+    if (n and first is None) or (m and second is None):
+        return None
+    return n * (first or 0.0) + m * (second or 0.0)
+
+
+def peak_left(pressure: Array) -> float:
+    """By how much cells of twice the size would show less of the peak of a ``pressure`` (nx, ny).
+
+    A smooth peak has nearly the same mean over them; one at an edge, which has no limit, is told by
+    it. 0 where nothing is pressed.
+    """
+    means = pressure
+    for axis in (0, 1):
+        if pressure.shape[axis] > 1:
+            first, last = np.delete(means, 0, axis), np.delete(means, -1, axis)
+            means = 0.5 * (first + last)
+    peak = float(pressure.max())
+    return 1.0 - float(means.max()) / peak if peak > 0.0 else 0.0

@@ -1,0 +1,69 @@
+"""The error budget as a run tells it: in a few lines, in warnings, in the summary and results."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from workflow.analyses.wear.budget.parts import PARTS, RESULTS, ResultError
+from workflow.shell.dataset import Dataset
+
+Budget = Mapping[str, Mapping[str, ResultError]]  # by interface or body, and result
+
+# Pressure at the edges that wear makes, and stress below them, may be so many times farther off:
+# the finer the cells, the larger they are.
+AT_EDGES, EDGES = 5.0, ("worn_peak_pressure", "life")
+# Parts below this share of the sum are not worth a word in a line.
+WORTH_TELLING = 0.1
+
+
+def summary_of(errors: Mapping[str, ResultError]) -> dict[str, Any]:
+    """By result, its parts and their ``sum``; None for what nobody knows."""
+    return {name: {**error.parts, "sum": error.total} for name, error in errors.items()}
+
+
+def datasets_of(errors: Mapping[str, ResultError]) -> dict[str, Dataset]:
+    """By result, its parts in the order of ``PARTS``; not numbers where nobody knows them."""
+    what = f"estimated relative errors by {', '.join(PARTS)}"
+    return {
+        name: Dataset(np.array([_number(error.parts.get(part, 0.0)) for part in PARTS]), "1", what)
+        for name, error in errors.items()
+    }
+
+
+def _number(part: float | None) -> float:
+    return np.nan if part is None else part
+
+
+def sentence(errors: Mapping[str, ResultError]) -> str:
+    """What is left of every result, and by what."""
+    return "; ".join(f"{RESULTS[name]} {_shown(error)}" for name, error in errors.items())
+
+
+def _shown(error: ResultError) -> str:
+    worth = [(name, part) for name, part in error.largest if part >= WORTH_TELLING * error.total]
+    parts = [f"{name} {part:.1%}" for name, part in worth if part > 0.0]
+    parts += [f"{name} unknown" for name in error.unknown]
+    return f"{error.total:.1%}" + (f" ({', '.join(parts)})" if parts else "")
+
+
+def warning_of(
+    name: str, errors: Mapping[str, ResultError], accuracy: float, settings: Mapping[str, str]
+) -> str | None:
+    """Results that are farther off than the ``accuracy``, and the setting of the largest part."""
+    allowed = {name: accuracy * (AT_EDGES if name in EDGES else 1.0) for name in errors}
+    beyond = {name: error for name, error in errors.items() if error.total > allowed[name]}
+    if not beyond:
+        return None
+    shares = {
+        part: sum((error.parts.get(part) or 0.0) / allowed[name] for name, error in beyond.items())
+        for part in PARTS
+    }
+    most = max(shares, key=shares.__getitem__)
+    listed = ", ".join(f"{RESULTS[name]} {error.total:.1%}" for name, error in beyond.items())
+    return (
+        f"{name}: estimated errors beyond the accuracy of {accuracy:.3g} ({AT_EDGES:g} times that "
+        f"at worn edges): {listed}; mostly by {most}: {settings[most]}"
+    )
