@@ -1,4 +1,7 @@
-"""The worn shape in the mesh: flank nodes lowered, the inside moved after them."""
+"""Shapes put into the mesh: worn faces, and the form that bodies have beside their flat faces.
+
+Nodes of the faces move along the normal of the interface, the inside follows a harmonic field.
+"""
 
 from __future__ import annotations
 
@@ -6,16 +9,19 @@ from dataclasses import replace
 from math import factorial
 
 import numpy as np
+from scipy.spatial import cKDTree
 from skfem import Basis, BilinearForm, MeshTet, MeshTri
 from skfem.helpers import dot, grad
 
 from fe_models.elasticity import ELEMENTS
 from fe_models.linear_solver import prepare
-from fe_models.mesh import Body, Interface, MeshError, StructureMesh
+from fe_models.mesh import MATCHING_TOLERANCE, Body, Interface, MeshError, StructureMesh
 from sa_solver.types import Array
 
 # An element that keeps less than this share of its volume is too flat to trust its stress.
 SMALLEST_VOLUME_SHARE = 0.1
+# Boundaries beside a face follow its form over so many times its depth: no steeper than 1 in 5.
+FOLLOWING = 5.0
 
 
 def worn_mesh(mesh: StructureMesh, depths: list[tuple[Array, Array]]) -> StructureMesh:
@@ -33,8 +39,50 @@ def worn_mesh(mesh: StructureMesh, depths: list[tuple[Array, Array]]) -> Structu
         for interface, pair in zip(mesh.interfaces, depths, strict=True):
             inwards = {1: -1.0, 2: 1.0}[number] * interface.frame.axes[2]
             prescribed[interface.nodes(number)] += np.outer(pair[number - 1], inwards)
-        bodies.append(_moved(body, prescribed[:, body.axes]))
+        worn = _moved(body, _followed(body.mesh, prescribed[:, body.axes]))
+        if _crushed(body, worn):
+            raise MeshError(
+                f"the worn depth crushes elements of the {body.name}: use larger elements at the "
+                "flank (mesh.flank_nodes) or stop at a smaller depth"
+            )
+        bodies.append(worn)
     return StructureMesh(bodies[0], bodies[1], mesh.interfaces)
+
+
+def form_of(mesh: StructureMesh) -> Array:
+    """Displacements ``(n, dim)`` of body 2's vertices that give it the form of its faces [mm].
+
+    What the gaps of the interfaces are wider than the meshed faces are apart, such as rounded
+    edges: body 2 has it and body 1 is as it is meshed, as in :class:`wear.surfaces.Surfaces`. Where
+    body 1 covers nothing of a face its form goes on as at the nearest node; boundaries beside it
+    follow over a few times its depth, and stay farther away.
+    """
+    body = mesh.body_2
+    points, form, faces = body.points, np.zeros_like(body.points), []
+    for interface in mesh.interfaces:
+        face, nodes, z = body.vertices(interface.name), interface.nodes_2, interface.frame.axes[2]
+        nearest = cKDTree(points[nodes]).query(points[face])[1]
+        form[face] += np.outer(_unmeshed_gap(mesh, interface)[nearest], z)
+        faces.append(face)
+    reach = FOLLOWING * float(np.linalg.norm(form, axis=1).max())
+    if reach == 0.0:
+        return form[:, body.axes]
+    held = np.unique(np.concatenate(faces))
+    beside = np.setdiff1d(body.mesh.boundary_nodes(), held)
+    distance, nearest = cKDTree(points[held]).query(points[beside])
+    form[beside] = np.maximum(1.0 - distance / reach, 0.0)[:, None] * form[held[nearest]]
+    return _followed(body.mesh, form[:, body.axes])
+
+
+def formed_mesh(mesh: StructureMesh, form: Array) -> StructureMesh:
+    """The mesh with body 2 in its ``form``, of :func:`form_of` or 0 [mm].
+
+    Raises :class:`MeshError` if that crushes an element.
+    """
+    body_2 = _moved(mesh.body_2, form)
+    if _crushed(mesh.body_2, body_2):
+        raise MeshError(f"elements of the {body_2.name} are too small for the form of its faces")
+    return replace(mesh, body_2=body_2)
 
 
 def worn_volume(before: Body, after: Body, interface: Interface, number: int) -> float:
@@ -54,21 +102,36 @@ def element_volumes(mesh: MeshTet | MeshTri) -> Array:
     return np.linalg.det(edges) / factorial(mesh.dim())
 
 
-def _moved(body: Body, prescribed: Array) -> Body:
-    mesh = body.mesh
+def _unmeshed_gap(mesh: StructureMesh, interface: Interface) -> Array:
+    """What of its gap ``(n,)`` [mm] the meshed faces of an interface do not have."""
+    height_1, height_2 = (
+        interface.frame.coordinates(body.points[interface.nodes(number)])[:, 2]
+        for number, body in enumerate((mesh.body_1, mesh.body_2), start=1)
+    )
+    below = height_1 if interface.projection is None else interface.projection @ height_1
+    form = interface.gap - (height_2 - below)
+    form[np.abs(form) < MATCHING_TOLERANCE * np.ptp(interface.coordinates)] = 0.0
+    return np.asarray(form)
+
+
+def _followed(mesh: MeshTet | MeshTri, prescribed: Array) -> Array:
+    """Displacements ``(n, dim)``, inside a harmonic field of those prescribed on the boundary."""
     boundary = mesh.boundary_nodes()
     inner = np.setdiff1d(np.arange(mesh.nvertices), boundary)
-    laplace = BilinearForm(lambda u, v, w: dot(grad(u), grad(v))).assemble(
-        Basis(mesh, ELEMENTS[mesh.dim(), 1]())
-    )
     displacement = prescribed.copy()
     if len(inner) > 0:
+        laplace = BilinearForm(lambda u, v, w: dot(grad(u), grad(v))).assemble(
+            Basis(mesh, ELEMENTS[mesh.dim(), 1]())
+        )
         load = -(laplace[inner][:, boundary] @ prescribed[boundary])
         displacement[inner] = prepare(laplace[inner][:, inner].tocsr())(load)
-    moved = replace(mesh, doflocs=mesh.p + displacement.T)
-    if np.min(element_volumes(moved) / element_volumes(mesh)) < SMALLEST_VOLUME_SHARE:
-        raise MeshError(
-            f"the worn depth crushes elements of the {body.name}: use larger elements at the flank "
-            "(mesh.flank_nodes) or stop at a smaller depth"
-        )
-    return Body(body.name, moved)
+    return displacement
+
+
+def _moved(body: Body, displacement: Array) -> Body:
+    return Body(body.name, replace(body.mesh, doflocs=body.mesh.p + displacement.T))
+
+
+def _crushed(before: Body, after: Body) -> bool:
+    shares = element_volumes(after.mesh) / element_volumes(before.mesh)
+    return bool(np.min(shares) < SMALLEST_VOLUME_SHARE)

@@ -1,10 +1,15 @@
 """Worn meshes: the flank goes where the depth says, its volume is the depth's, nothing folds."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from skfem import MeshTri
 
-from fe_models.mesh import MeshError
-from fe_models.remesh import element_volumes, worn_mesh, worn_volume
+from fe_models.mesh import Body, MeshError, StructureMesh
+from fe_models.mortar import mortar_interface
+from fe_models.remesh import element_volumes, form_of, formed_mesh, worn_mesh, worn_volume
+from sa_solver.types import Frame
 
 
 def bowls(face, depth):
@@ -104,3 +109,82 @@ def test_depth_that_crushes_elements_is_refused(coarse_mesh, number, name):
         depths.append(tuple(pair))
     with pytest.raises(MeshError, match=f"crushes elements of the {name}"):
         worn_mesh(coarse_mesh, depths)
+
+
+# --- the form of the faces ------------------------------------------------------------------------
+
+
+def opening(mesh, face):
+    """How far the faces of an interface are apart, seen along its normal ``(n,)`` [mm]."""
+    low, high = (
+        face.frame.coordinates(body.points[face.nodes(number)])[:, 2]
+        for number, body in enumerate(bodies(mesh), start=1)
+    )
+    return high - (low if face.projection is None else face.projection @ low)
+
+
+def test_flanks_are_as_far_apart_as_gap_and_wear(coarse_mesh, worn):
+    """Rounded edges and ends on the blade; the disk and the wear are as without them."""
+    depths, after = worn
+    form = form_of(coarse_mesh)
+    unworn, shown = (formed_mesh(mesh, form) for mesh in (coarse_mesh, after))
+    assert unworn.body_1 is coarse_mesh.body_1
+    assert shown.body_1 is after.body_1
+    for face, pair in zip(coarse_mesh.interfaces, depths, strict=True):
+        assert face.gap.max() > 0.03
+        np.testing.assert_allclose(opening(unworn, face), face.gap, atol=1e-12)
+        np.testing.assert_allclose(opening(shown, face), face.gap + sum(pair), atol=1e-12)
+        for number in (1, 2):
+            body, before = bodies(shown)[number - 1], bodies(unworn)[number - 1]
+            volume = worn_volume(before, body, face, number)
+            assert volume == pytest.approx(face.nodal_areas @ pair[number - 1], rel=1e-10)
+    blade = coarse_mesh.body_2
+    ratio = element_volumes(shown.body_2.mesh) / element_volumes(blade.mesh)
+    assert ratio.min() > 0.5
+    for name in ("root_bottom", "shank_top"):
+        np.testing.assert_array_equal(form[blade.vertices(name)], 0.0)
+
+
+def test_edges_finer_than_their_form_blend_into_the_sides(dovetail):
+    """Edges that are rounded by more than elements are large: these are not crushed."""
+    section = replace(dovetail, edge_radius=10.0).mesh((160, 2), 8.0, dimension=2)
+    shown = formed_mesh(section, form_of(section))
+    ratio = element_volumes(shown.body_2.mesh) / element_volumes(section.body_2.mesh)
+    assert section.interfaces[0].gap.max() > 1.5 * dovetail.flank_width / 159.0
+    assert ratio.min() > 0.5
+
+
+def test_faces_meshed_apart_move_by_what_is_not_meshed():
+    """A crowned pad of nodes of its own, overhanging, with the gap of a groove beside it."""
+    z = np.array([0.0, 1.0])
+    low = MeshTri.init_tensor(np.linspace(0.0, 5.0, 11), z)
+    high = MeshTri.init_tensor(np.linspace(-1.0, 5.0, 14), 1.0 + z)
+    crowned = high.p + (high.p[1] == 1.0) * [np.zeros(len(high.p[0])), 0.01 * high.p[0] ** 2]
+    pair = [
+        Body(name, mesh.with_boundaries({"pad": lambda x: np.isclose(x[1], 1.0, atol=0.3)}))
+        for name, mesh in (("base", low), ("pad", replace(high, doflocs=crowned)))
+    ]
+    frame = Frame(np.array([2.0, 0.0, 1.0]), np.eye(3))
+    face = mortar_interface("pad", pair[0], "pad", pair[1], "pad", frame)
+    none = StructureMesh(*pair, (face,))
+    np.testing.assert_array_equal(form_of(none), 0.0)
+    groove = replace(face, gap=face.gap + 0.1 * np.cos(face.coordinates[:, 0]) ** 2)
+    mesh = StructureMesh(*pair, (groove,))
+    shown = formed_mesh(mesh, form_of(mesh))
+    np.testing.assert_allclose(opening(shown, groove), groove.gap, atol=1e-12)
+    # Beyond the base's end the pad goes on as it is above that.
+    (end,) = np.flatnonzero((high.p[0] == -1.0) & (high.p[1] == 1.0))
+    nearest = np.argmin(groove.coordinates[:, 0])
+    form = groove.gap[nearest] - face.gap[nearest]
+    assert form_of(mesh)[end, 1] == pytest.approx(form, rel=1e-12)
+
+
+def test_form_that_crushes_elements_is_refused(coarse_mesh):
+    """A groove deeper than the elements are large, from one node to the next."""
+    faces = []
+    for face in coarse_mesh.interfaces:
+        spike = np.where(np.arange(len(face)) == np.hypot(*face.coordinates.T).argmin(), 3.0, 0.0)
+        faces.append(replace(face, gap=spike))
+    mesh = replace(coarse_mesh, interfaces=tuple(faces))
+    with pytest.raises(MeshError, match="elements of the blade are too small"):
+        formed_mesh(mesh, form_of(mesh))

@@ -404,6 +404,20 @@ def test_heights_are_those_of_the_paraboloid(blocks):
     np.testing.assert_allclose(two.gap, one.gap, atol=(1.0 / 16.0) ** 2 / 20.0)
 
 
+@pytest.mark.slow
+def test_gap_that_the_mesh_cannot_show_costs_no_run(blocks, tmp_path):
+    """A hole under the middle node of the foot, deeper than its elements are large."""
+    gap = np.zeros((16, 16))
+    gap[7:9, 7:9] = 0.9
+    np.save(blocks.with_name("gap.npy"), gap)
+    hole = "structure.contacts.0.gap={shape: heights, file: gap.npy}"
+    summary = run(blocks, tmp_path / "out", hole)
+    assert any("show what is worn alone" in line for line in summary["warnings"])
+    with h5py.File(tmp_path / "out" / "results.h5") as file:
+        low = file["bodies/Foot-1/unworn/points"][:, 2].min()
+    assert low == 2.0
+
+
 def test_contact_cut_by_a_plane_of_symmetry_is_warned_of(tmp_path):
     """Half of the blocks: the structure halves its loads, the contact stage cannot."""
     text = cube("base", 2.0) + cube("foot", 1.0) + ASSEMBLY.replace("0.5, 0.5, 2.", "0.5, 0., 2.")

@@ -6,6 +6,7 @@ import h5py
 import numpy as np
 import pytest
 
+from fe_models.geometry.imported import read_bodies
 from tests.marks import slow
 from tests.workflow.commands import invoke
 from tests.workflow.conftest import Run, contents_of, manifest_has_all
@@ -14,6 +15,7 @@ from workflow.analyses.wear.figures.wear import figures_of
 from workflow.kinds import load_case
 from workflow.pictures.style import write_figures
 from workflow.shell import memory
+from workflow.shell.results import frame_of
 
 UM3_PER_J = 1e-12
 # Few and quick increments for the odd cases, where a run is only to end well.
@@ -88,6 +90,35 @@ def test_worn_mesh_holds_the_worn_volume(whole):
         flank = whole.summary[name]
         for body in (1, 2):
             assert flank[f"mesh_volume_{body}"] == pytest.approx(flank[f"volume_{body}"], rel=1e-3)
+
+
+def test_written_bodies_are_as_far_apart_as_their_surfaces(whole):
+    """The blade has its rounded edges and ends, the disk is flat; worn, both lie deeper."""
+    structure = load_case(whole.folder / "case.yaml").structure
+    worn_bodies = read_bodies(whole.folder / "worn.msh").bodies
+    with h5py.File(whole.folder / "results.h5") as file:
+        for name in ("intrados", "extrados"):
+            frame = frame_of(file[f"grid/{name}"])
+            for body, into in (("disk", -1.0), ("blade", 1.0)):
+                flank = worn_bodies[body].vertices(f"{body}_{name}")
+                points = [file[f"bodies/{body}/{when}/points"][()] for when in ("unworn", "worn")]
+                np.testing.assert_allclose(worn_bodies[body].points, points[1], atol=1e-12)
+                unworn, worn = (frame.coordinates(places[flank]) for places in points)
+                across, along = np.abs(unworn[:, :2]).T
+                height = arc(across - 0.5 * structure.flank_length, structure.edge_radius)
+                flat = 0.5 * structure.slot_length - structure.end_width
+                height += arc(along - flat, structure.end_radius)
+                expected = height if body == "blade" else 0.0
+                np.testing.assert_allclose(unworn[:, 2], expected, atol=1e-12)
+                np.testing.assert_allclose(worn[:, :2], unworn[:, :2], atol=1e-12)
+                depth = into * (worn - unworn)[:, 2]
+                assert depth.min() > -1e-12
+                assert depth.max() > 1e-4
+
+
+def arc(along, radius):
+    """Height of a circle so far along its tangent [mm]."""
+    return radius - np.sqrt(radius**2 - np.maximum(along, 0.0) ** 2)
 
 
 def test_symmetric_load_wears_both_flanks_alike(whole):

@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.mesh import Body, StructureMesh, write_msh
+from fe_models.mesh import Body, MeshError, StructureMesh, write_msh
 from fe_models.nonlinear import NonlinearCheck
-from fe_models.remesh import worn_mesh, worn_volume
+from fe_models.remesh import form_of, formed_mesh, worn_mesh, worn_volume
 from fe_models.stress import StressField
 from fe_models.structure import CycleSolution
 from sa_solver.types import LoadHistory
@@ -32,13 +32,14 @@ MEASURES = ("slip_change", "slide", "largest_strain", "largest_rotation", "face_
 
 @dataclass(frozen=True)
 class WornStructure:
-    """The structure before and after: ``cycle`` and ``mesh`` are the worn ones.
+    """The structure before and after: ``cycle`` is the worn one.
 
-    ``stresses`` are those of both bodies at peak load, unworn and worn.
+    ``meshes`` are those written, unworn and worn, body 2 in the form of its faces, and ``stresses``
+    those of both bodies at peak load, of the same vertices before they have that form.
     """
 
     stage: StructureStage
-    mesh: StructureMesh
+    meshes: dict[str, StructureMesh]
     cycle: CycleSolution
     stresses: dict[str, tuple[StressField, ...]]
 
@@ -49,7 +50,7 @@ class WornStructure:
             put_face(writer, f"structure_worn/{name}", history.interface, history)
             put_closure(writer, f"structure_worn/{name}", self.cycle)
             put_closure(writer, f"structure/{name}", self.stage.unworn_cycle)
-        for moment, mesh in (("unworn", self.stage.mesh), ("worn", self.mesh)):
+        for moment, mesh in self.meshes.items():
             bodies = zip((mesh.body_1, mesh.body_2), self.stresses[moment], strict=True)
             for body, field in bodies:
                 writer.put(f"bodies/{body.name}/{moment}", _body(body, field))
@@ -57,7 +58,7 @@ class WornStructure:
     def summary(self, state: CoupledState) -> dict[str, Any]:
         """What the solver says of itself, and the largest stresses."""
         stage, unworn = self.stage, self.stage.unworn_cycle
-        bodies = self.mesh.body_1, self.mesh.body_2
+        bodies = stage.mesh.body_1, stage.mesh.body_2
         return {
             "from_cache": stage.from_cache,
             "nodes": {body.name: int(body.mesh.nvertices) for body in bodies},
@@ -86,7 +87,7 @@ class WornStructure:
         """Volumes in the mesh and resultants at peak load, unworn and worn."""
         stage, interface = self.stage, self.stage.mesh.interfaces[number]
         unworn, worn = (cycle.histories[number].loads for cycle in (stage.unworn_cycle, self.cycle))
-        before, after = stage.mesh, self.mesh
+        before, after = self.meshes["unworn"], self.meshes["worn"]
         return {
             "mesh_volume_1": worn_volume(before.body_1, after.body_1, interface, 1),
             "mesh_volume_2": worn_volume(before.body_2, after.body_2, interface, 2),
@@ -102,7 +103,7 @@ def _body(body: Body, field: StressField) -> dict[str, Dataset]:
     corners = "corner vertices of the tetrahedra, or of the triangles in the plane"
     principal = "largest principal stress at peak load"
     return {
-        "points": Dataset(body.points, "mm", "vertices"),
+        "points": Dataset(body.points, "mm", "vertices, the faces of body 2 in their form"),
         "elements": Dataset(body.mesh.t.T, "1", corners),
         "displacement": Dataset(field.displacement, "mm", "displacement at peak load"),
         "von_mises": Dataset(field.von_mises, "MPa", "von Mises stress at peak load"),
@@ -131,14 +132,29 @@ def worn_structure(
         mesh = worn_mesh(
             stage.mesh, [contact.depths_of_bodies(interface) for contact, interface in pairs]
         )
+        meshes = _formed({"unworn": stage.mesh, "worn": mesh}, reporter)
         with replacing(folder.reserve("worn.msh", "the mesh with the worn faces")) as partial:
-            write_msh(partial, mesh)
+            write_msh(partial, meshes["worn"])
     with reporter.stage("stress"):
         stresses = {
             "unworn": stage.stress(stage.mesh, stage.unworn_cycle),
             "worn": stage.stress(mesh, cycle),
         }
-    return WornStructure(stage, mesh, cycle, stresses)
+    return WornStructure(stage, meshes, cycle, stresses)
+
+
+def _formed(meshes: dict[str, StructureMesh], reporter: Reporter) -> dict[str, StructureMesh]:
+    """The unworn mesh, first, and others of the same vertices in the form that their faces have.
+
+    Stress is not solved in it: a form as low as gaps are moves free surfaces by less than what
+    meshes leave of their curvature.
+    """
+    form = form_of(meshes["unworn"])
+    try:
+        return {moment: formed_mesh(mesh, form) for moment, mesh in meshes.items()}
+    except MeshError as error:
+        reporter.warn(f"{error}: worn.msh, points and ParaView files show what is worn alone")
+        return meshes
 
 
 def resultants_at(loads: LoadHistory, increment: int) -> dict[str, float]:
