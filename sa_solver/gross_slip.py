@@ -29,6 +29,10 @@ LOOSEST = 1e-3
 LOOSER = 0.01
 """Tolerance of the first contact problem, and of the others over the error before them."""
 
+FLATTEST = 0.05
+"""Least of µP that a longer motion is taken to dissipate more per length, as the contact begins to
+slide: where the last two motions say less, they are too near each other to say anything."""
+
 ITERATIONS = 30
 """Contact problems solved; 3 to 8 are usual."""
 
@@ -75,22 +79,27 @@ def gross_slip(
     that the shear of sliding does on its own displacement, about: it makes the first guess good.
 
     While all slips, a longer motion dissipates µP more per length, and a turned one turns force and
-    shares of energy with it: both are corrected at once by what is missing.
+    shares of energy with it: both are corrected at once by what is missing. Where some cells still
+    stick it dissipates less, as much as the last two motions tell.
     """
     total = float(energy.sum())
     wanted = angle = _angle(force if direction == "force" else np.sqrt(energy.clip(0.0)))
     length = max(0.0, total + stored) / carried
-    inner = LOOSEST
+    inner, slope, last = LOOSEST, carried, (length, 0.0)
     for _ in range(ITERATIONS):
         shear, spent = slide(length * sliding_direction(force, angle), max(inner, tolerance))
         measured = _angle(shear if direction == "force" else np.sqrt(spent.clip(0.0)))
         missing = total - float(spent.sum())
+        longer, more = length - last[0], last[1] - missing
+        if longer * more > 0.0:
+            slope = min(max(more / longer, FLATTEST * carried), carried)
+        last = length, missing
         turned = float(np.clip(angle + wanted - measured, 0.0, 0.5 * np.pi))
         change = max(abs(missing) / total, abs(turned - angle))
         if change <= ACCURACY and inner <= tolerance:
             break
         inner = max(tolerance, LOOSER * min(change, inner))
-        length = max(0.0, length + missing / carried)
+        length = max(0.0, length + missing / slope)
         angle = turned
     lacking = abs(missing) / total
     creeps = length == 0.0 and missing < -ACCURACY * total

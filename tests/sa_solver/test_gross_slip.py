@@ -101,6 +101,14 @@ def test_solves_stay_few(monkeypatch):
     assert slide(BALL, (5.0, 2.0), (1.0, 1.0)).error < 1e-5
 
 
+@pytest.mark.parametrize("energy", [0.1, 0.01])
+def test_a_contact_that_begins_to_slide_meets_its_energy(energy):
+    """Where a sixth or a third of the cells still stick, a motion dissipates far less than µP."""
+    slid = slide(BALL, (energy, 0.0), (1.0, 0.0))
+    assert energies(slid.state).sum() == pytest.approx(energy, rel=1e-6)
+    assert slid.state.sticking[BALL > 0.0].any()
+
+
 def test_the_force_keeps_its_direction():
     """Whatever the shares of the energy are; their sum is met."""
     state = slide(BALL, (2.0, 3.0), (40.0, -10.0), direction="force").state
