@@ -1,9 +1,12 @@
 """A rigid cylinder on an elastic layer, by its compliance in closed form: plane strain.
 
-A layer of thickness h that slides without friction on a rigid base answers a pressure cos kx with
-the displacement of a half-plane times F(kh), F(α) = (cosh 2α - 1) / (sinh 2α + 2α) (Johnson 1985,
-Contact Mechanics, section 5.8). Pressure is piecewise linear between nodes or constant on strips;
-its transform is known, that of the displacement is integrated numerically.
+A layer of thickness h on a rigid base answers a pressure cos kx with the displacement of a
+half-plane times F(α), α = kh. Where it slides on the base without friction, as the middle of a
+strip of twice the thickness between two cylinders does, F = (cosh 2α - 1) / (sinh 2α + 2α); where
+it sticks to it, with κ = 3 - 4ν, F = (2κ sinh 2α - 4α) / (2κ cosh 2α + 4α² + κ² + 1) (Meijers 1968,
+doi:10.1007/BF00411551; Johnson 1985, Contact Mechanics, section 5.8). Pressure is piecewise linear
+between nodes or constant on strips; its transform is known, that of the displacement is integrated
+numerically. ``test_elastic_layer.py`` holds it against the equations of elasticity.
 """
 
 import numpy as np
@@ -14,17 +17,30 @@ from sa_solver.types import Array
 LONGEST, SHORTEST, WAVES = 1e-3, 4e3, 20_000
 
 
-def layer_compliance(x: Array, spacing: float, modulus: float, depth: float, hats: bool) -> Array:
+def softness(alpha: Array, stuck: float | None = None) -> Array:
+    """F at wave numbers over the thickness; ``stuck`` is ν of a layer that sticks to its base."""
+    alpha = np.minimum(alpha, 300.0)
+    sinh, cosh = np.sinh(2.0 * alpha), np.cosh(2.0 * alpha)
+    if stuck is None:
+        return (cosh - 1.0) / (sinh + 2.0 * alpha)
+    kappa = 3.0 - 4.0 * stuck
+    return (2.0 * kappa * sinh - 4.0 * alpha) / (
+        2.0 * kappa * cosh + 4.0 * alpha**2 + kappa**2 + 1.0
+    )
+
+
+def layer_compliance(
+    x: Array, spacing: float, modulus: float, depth: float, hats: bool, stuck: float | None = None
+) -> Array:
     """Displacement at ``x`` ``(n,)`` [mm] under 1 MPa at each of them ``(n, n)`` [mm/MPa].
 
-    Pressure there is a hat over two spacings, or a strip one wide; ``modulus`` is E* [MPa].
+    Pressure there is a hat over two spacings, or a strip one wide; ``modulus`` is E* [MPa], and
+    ``stuck`` as for :func:`softness`.
     """
     edges = np.geomspace(LONGEST, SHORTEST, WAVES + 1)
     k, dk = np.sqrt(edges[1:] * edges[:-1]), np.diff(edges)
-    alpha = np.minimum(k * depth, 300.0)
-    softer = (np.cosh(2.0 * alpha) - 1.0) / (np.sinh(2.0 * alpha) + 2.0 * alpha)
     shape = spacing * np.sinc(0.5 * k * spacing / np.pi) ** (2 if hats else 1)
-    weights = 2.0 * softer / (modulus * k) * shape * dk / np.pi
+    weights = 2.0 * softness(k * depth, stuck) / (modulus * k) * shape * dk / np.pi
     distances = spacing * np.arange(len(x))
     kernel = np.array([weights @ np.cos(k * distance) for distance in distances])
     return kernel[np.abs(np.subtract.outer(range(len(x)), range(len(x))))]
