@@ -32,16 +32,17 @@ MEASURES = ("slip_change", "slide", "largest_strain", "largest_rotation", "face_
 
 @dataclass(frozen=True)
 class WornStructure:
-    """The structure before and after: ``cycle`` is the worn one.
+    """The structure before and after: ``cycle`` and ``mesh`` are the worn ones.
 
-    ``meshes`` are those written, unworn and worn, body 2 in the form of its faces, and ``stresses``
-    those of both bodies at peak load, of the same vertices before they have that form.
+    ``stresses`` are those of both bodies at peak load, unworn and worn; ``written`` the meshes as
+    they are shown then, with body 2 in the form of its faces.
     """
 
     stage: StructureStage
-    meshes: dict[str, StructureMesh]
+    mesh: StructureMesh
     cycle: CycleSolution
     stresses: dict[str, tuple[StressField, ...]]
+    written: dict[str, StructureMesh]
 
     def write(self, writer: ResultsWriter) -> None:
         """Load histories of the worn faces, and both bodies unworn and worn."""
@@ -50,7 +51,7 @@ class WornStructure:
             put_face(writer, f"structure_worn/{name}", history.interface, history)
             put_closure(writer, f"structure_worn/{name}", self.cycle)
             put_closure(writer, f"structure/{name}", self.stage.unworn_cycle)
-        for moment, mesh in self.meshes.items():
+        for moment, mesh in self.written.items():
             bodies = zip((mesh.body_1, mesh.body_2), self.stresses[moment], strict=True)
             for body, field in bodies:
                 writer.put(f"bodies/{body.name}/{moment}", _body(body, field))
@@ -58,7 +59,7 @@ class WornStructure:
     def summary(self, state: CoupledState) -> dict[str, Any]:
         """What the solver says of itself, and the largest stresses."""
         stage, unworn = self.stage, self.stage.unworn_cycle
-        bodies = stage.mesh.body_1, stage.mesh.body_2
+        bodies = self.mesh.body_1, self.mesh.body_2
         return {
             "from_cache": stage.from_cache,
             "nodes": {body.name: int(body.mesh.nvertices) for body in bodies},
@@ -87,7 +88,7 @@ class WornStructure:
         """Volumes in the mesh and resultants at peak load, unworn and worn."""
         stage, interface = self.stage, self.stage.mesh.interfaces[number]
         unworn, worn = (cycle.histories[number].loads for cycle in (stage.unworn_cycle, self.cycle))
-        before, after = self.meshes["unworn"], self.meshes["worn"]
+        before, after = stage.mesh, self.mesh
         return {
             "mesh_volume_1": worn_volume(before.body_1, after.body_1, interface, 1),
             "mesh_volume_2": worn_volume(before.body_2, after.body_2, interface, 2),
@@ -132,15 +133,15 @@ def worn_structure(
         mesh = worn_mesh(
             stage.mesh, [contact.depths_of_bodies(interface) for contact, interface in pairs]
         )
-        meshes = _formed({"unworn": stage.mesh, "worn": mesh}, reporter)
+        written = _formed({"unworn": stage.mesh, "worn": mesh}, reporter)
         with replacing(folder.reserve("worn.msh", "the mesh with the worn faces")) as partial:
-            write_msh(partial, meshes["worn"])
+            write_msh(partial, written["worn"])
     with reporter.stage("stress"):
         stresses = {
             "unworn": stage.stress(stage.mesh, stage.unworn_cycle),
             "worn": stage.stress(mesh, cycle),
         }
-    return WornStructure(stage, meshes, cycle, stresses)
+    return WornStructure(stage, mesh, cycle, stresses, written)
 
 
 def _formed(meshes: dict[str, StructureMesh], reporter: Reporter) -> dict[str, StructureMesh]:
