@@ -147,8 +147,8 @@ def worn_structure(
 def _formed(meshes: dict[str, StructureMesh], reporter: Reporter) -> dict[str, StructureMesh]:
     """The unworn mesh, first, and others of the same vertices in the form that their faces have.
 
-    Stress is not solved in it: a form as low as gaps are moves free surfaces by less than what
-    meshes leave of their curvature.
+    Stress is not solved in it: a form ends with its face, and what is beside it would begin with a
+    corner, a notch that is none of the body's.
     """
     form = form_of(meshes["unworn"])
     try:
