@@ -29,7 +29,7 @@ from workflow.kinds import load_case
 from workflow.runs.run import run_case
 
 FRICTION = 0.4
-COARSE = "mesh.flank_nodes=[9, 9]", "mesh.size=8", "contact.grid=[64, 64]"
+COARSE = "mesh={flank_nodes: [9, 9], size: 8 mm, order: 1}", "contact.grid=[64, 64]"
 QUIET = (
     *("output.paraview=false", "output.figures=false"),
     *("stress.section=none", "stress.life.parameter=none"),

@@ -43,8 +43,8 @@ def test_what_a_fit_leaves_is_warned_of(tmp_path, quality, told) -> None:
 
 
 def flank(path, nodes: int, *settings: str) -> tuple[InterfaceHistory, ContactStage, FirstContact]:
-    """The unworn intrados of the section, with so many nodes across it."""
-    case = load_case(path, [f"mesh.flank_nodes=[{nodes}, 34]", *settings])
+    """The unworn intrados of the section, so many nodes of first-order elements across it."""
+    case = load_case(path, [f"mesh.flank_nodes=[{nodes}, 34]", "mesh.order=1", *settings])
     source = structure_of(case).source(case)
     stage = ContactStage(case, source.faces[0])
     history = source.unworn()[0]

@@ -158,7 +158,7 @@ def test_loads_of_a_file_have_no_nodes_that_wear() -> None:
 def test_a_chart_ends_with_the_finest_elements_alone() -> None:
     ((axis, settings),) = axes_of(PLANE, (), ("reference",)).items()
     names = [setting.rung.name for setting in settings]
-    assert names[:3] == ["normal", "full", "20 x 34 nodes alone"]
+    assert names[:3] == ["normal", "full", "40 x 34 nodes alone"]
     finest = settings[-1].case
     assert finest.contact.method == "nodes"
     assert (finest.mesh.order, finest.load_path.increments) == (2, 44)

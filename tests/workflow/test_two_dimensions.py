@@ -356,7 +356,7 @@ def test_check_says_that_a_probe_decides(plane_path):
     assert "2-D or 3-D and how fine, by probes: 4 %" in told
     fixed = invoke("check", plane_path).stdout
     assert "fidelity" not in fixed
-    assert "dovetail in 2-D, 20 nodes on a flank" in fixed
+    assert "dovetail in 2-D, 40 nodes on a flank" in fixed
     assert "128 strips" in fixed
 
 
