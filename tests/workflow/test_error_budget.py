@@ -7,7 +7,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tests.marks import slow
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import settings
 from workflow.analyses.wear.budget.companions import Companions
@@ -106,7 +105,7 @@ def test_half_spaces_have_a_companion_that_is_linked(section) -> None:
     assert companions.linked.contact.link == "corrected"
 
 
-@slow
+@pytest.mark.slow
 def test_lives_tell_what_the_mesh_leaves(section) -> None:
     """Of two orders and sizes, against a mesh so fine that what it leaves does not count."""
     structure = structure_of(section)
@@ -137,7 +136,7 @@ def test_grids_are_compared_by_their_order() -> None:
 # --- runs -----------------------------------------------------------------------------------------
 
 
-@slow
+@pytest.mark.slow
 def test_a_run_tells_its_errors(tmp_path) -> None:
     """Against a run finer in everything, the parts add up to the error of depth and volume."""
     coarse = "mesh.flank_nodes=[14, 14]", "mesh.size=7 mm", "mesh.order=1", "contact.grid=[64, 64]"
