@@ -63,7 +63,8 @@ def warning_of(
     }
     most = max(shares, key=shares.__getitem__)
     listed = ", ".join(f"{RESULTS[name]} {error.total:.1%}" for name, error in beyond.items())
+    asked = f"{100.0 * accuracy:g} % ({AT_EDGES:g} times that at worn edges)"
     return (
-        f"{name}: estimated errors beyond the accuracy of {accuracy:.3g} ({AT_EDGES:g} times that "
-        f"at worn edges): {listed}; mostly by {most}: {settings[most]}"
+        f"{name}: estimated errors beyond the accuracy of {asked}: {listed}; mostly by {most}: "
+        f"{settings[most]}"
     )
