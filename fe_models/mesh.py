@@ -69,9 +69,21 @@ class Body:
         edge = corners[:, 1] - corners[:, 0]
         other = 0.5 * (corners[:, 2] - corners[:, 0]) if corners.shape[1] == 3 else [0.0, 1.0, 0.0]
         normals = np.cross(edge, other)
-        cells = self.mesh.t[:, self.mesh.f2t[0, self.mesh.boundaries[boundary]]].T
-        out = corners.mean(axis=1) - self.points[cells].mean(axis=1)
+        out = corners.mean(axis=1) - self.points[self._behind(boundary)].mean(axis=1)
         return normals * np.sign(np.einsum("ma,ma->m", normals, out))[:, None]
+
+    def depth(self, boundary: str) -> float:
+        """How deep the elements of a boundary usually reach below it [mm]."""
+        normals = self.outward(boundary)
+        normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+        corners = self.points[self.facets(boundary)]
+        below = corners[:, :1] - self.points[self._behind(boundary)]
+        return float(np.median(np.einsum("mia,ma->mi", below, normals).max(axis=1)))
+
+    def _behind(self, boundary: str) -> Indices:
+        """Vertices of the elements that the facets of a boundary belong to, ``(m, dim + 1)``."""
+        cells: Indices = self.mesh.t[:, self.mesh.f2t[0, self.mesh.boundaries[boundary]]].T
+        return cells
 
     def vertices(self, boundary: str) -> Indices:
         """Vertices on a named boundary, sorted, ``(n,)``."""

@@ -1,24 +1,50 @@
-"""Displacements and stresses of both bodies at one state of the joint."""
+"""Displacements and stresses of both bodies at a state of the joint, and over a cycle."""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from fe_models.elasticity import maximum_principal, von_mises
-from fe_models.mesh import in_space
+from fe_models.mesh import Body, in_space
 from fe_models.structure import Structure
-from sa_solver.types import Array
+from sa_solver.subsurface_influence import INDICES
+from sa_solver.types import Array, Frame, Indices
+
+# A point this share of an element outside of it is on its border.
+ON_BORDER = 1e-9
 
 
 @dataclass(frozen=True)
 class StressField:
-    """At the vertices of one body: displacement ``(n, 3)`` [mm], stresses ``(n,)`` [MPa]."""
+    """At the vertices of one ``body``: ``displacement`` ``(n, 3)`` [mm], ``stress`` ``(6, n)``.
 
+    Stress [MPa] is ordered xx, yy, zz, xy, yz, zx of the global axes.
+    """
+
+    body: Body
     displacement: Array
-    von_mises: Array
-    maximum_principal: Array
+    stress: Array
+
+    @cached_property
+    def von_mises(self) -> Array:
+        """Equivalent stress ``(n,)`` [MPa]."""
+        return von_mises(self.stress)
+
+    @cached_property
+    def maximum_principal(self) -> Array:
+        """Largest principal stress ``(n,)`` [MPa]."""
+        return maximum_principal(self.stress)
+
+    def at(self, points: Array, frame: Frame) -> Array:
+        """Stress ``(6, n)`` along the axes of a ``frame`` at points ``(n, 3)`` there [MPa].
+
+        Linear between the vertices, not a number outside the body.
+        """
+        corners, weights = _in_elements(self.body, frame.to_global(points) + frame.origin)
+        return turned(np.einsum("cin,in->cn", self.stress[:, corners.T], weights), frame)
 
 
 def stress_state(
@@ -29,14 +55,7 @@ def stress_state(
     ``force`` ``(3, n)`` on body 2 and ``relative`` displacement ``(3, n)`` over all interfaces, in
     their frames; ``amplitudes`` of the load cases.
     """
-    displacements = deformation(structure, force, relative, amplitudes)
-    fields = []
-    for body, displacement in zip(structure.bodies, displacements, strict=True):
-        stress = body.elastic.at_vertices(body.elastic.stress(displacement))
-        nodal = displacement.reshape(-1, body.elastic.dimension)
-        vertices = in_space(nodal[: body.elastic.body.mesh.nvertices])
-        fields.append(StressField(np.array(vertices), von_mises(stress), maximum_principal(stress)))
-    return fields[0], fields[1]
+    return _fields(structure, deformation(structure, force, relative, amplitudes))
 
 
 def deformation(
@@ -46,11 +65,97 @@ def deformation(
 
     Body 1 carries the forces, body 2 follows it at the relative displacements.
     """
+    every, _, follows = _motion(structure, force[None], relative[None], amplitudes[None])
+    return every[:, 0], structure.body_2.recover(follows[:, 0], amplitudes)
+
+
+@dataclass(frozen=True)
+class CycleStress:
+    """Both bodies over a cycle: their ``fields`` at one increment, and how their faces move.
+
+    ``faces`` are displacements ``(t, 3, n)`` [mm] of body 1 and body 2, by interface, in the frame
+    and at the nodes of that.
+    """
+
+    fields: tuple[StressField, StressField]
+    faces: tuple[tuple[Array, Array], ...]
+
+
+def cycle_stress(
+    structure: Structure, force: Array, relative: Array, amplitudes: Array, at: int
+) -> CycleStress:
+    """Stress in increment ``at``, and the motion of the faces in every one.
+
+    ``force`` ``(t, 3, n)``, ``relative`` ``(t, 3, n)`` and ``amplitudes`` ``(t, cases)`` as in
+    :func:`stress_state`.
+    """
+    every, leads, follows = _motion(structure, force, relative, amplitudes)
+    displacements = every[:, at], structure.body_2.recover(follows[:, at], amplitudes[at])
+    dimension = structure.body_1.elastic.dimension
+    ends = np.cumsum([len(interface) for interface in structure.mesh.interfaces])[:-1]
+    faces_1, faces_2 = (
+        np.split(in_space(moved.T.reshape(len(force), -1, dimension)).swapaxes(1, 2), ends, axis=2)
+        for moved in (leads, follows)
+    )
+    return CycleStress(_fields(structure, displacements), tuple(zip(faces_1, faces_2, strict=True)))
+
+
+def _motion(
+    structure: Structure, force: Array, relative: Array, amplitudes: Array
+) -> tuple[Array, Array, Array]:
+    """All displacements of body 1 ``(size, t)``, and those of body 1's and body 2's interfaces.
+
+    Those ``(d n, t)`` are at the interfaces' nodes.
+    """
     axes = structure.mesh.body_1.axes
-    forces, gaps = force[axes, :].T.ravel(), relative[axes, :].T.ravel()
+    forces, gaps = (
+        field[:, axes, :].transpose(2, 1, 0).reshape(-1, len(force)) for field in (force, relative)
+    )
     projection = structure.projection
     on_body_1 = forces if projection is None else projection.T @ forces
-    displacement_1, interface_1 = structure.body_1.respond(-on_body_1, amplitudes)
+    every, leads = structure.body_1.respond(-on_body_1, amplitudes.T)
     if projection is not None:
-        interface_1 = projection @ interface_1
-    return displacement_1, structure.body_2.recover(interface_1 + gaps, amplitudes)
+        leads = projection @ leads
+    return every, leads, leads + gaps
+
+
+def _fields(
+    structure: Structure, displacements: tuple[Array, Array]
+) -> tuple[StressField, StressField]:
+    fields = []
+    for body, displacement in zip(structure.bodies, displacements, strict=True):
+        elastic = body.elastic
+        nodal = displacement.reshape(-1, elastic.dimension)
+        vertices = in_space(nodal[: elastic.body.mesh.nvertices])
+        stress = elastic.at_vertices(elastic.stress(displacement))
+        fields.append(StressField(elastic.body, np.array(vertices), stress))
+    return fields[0], fields[1]
+
+
+def turned(stress: Array, frame: Frame) -> Array:
+    """Stress ``(6, n)`` of the global axes along those of a ``frame``."""
+    xx, yy, zz, xy, yz, zx = stress
+    tensors = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
+    local = np.einsum("ai,ijn,bj->abn", frame.axes, tensors, frame.axes)
+    return np.array([local[a, b] for a, b in INDICES])
+
+
+def _in_elements(body: Body, points: Array) -> tuple[Indices, Array]:
+    """Vertices ``(n, d + 1)`` of the elements that hold ``points`` ``(n, 3)``, and their weights.
+
+    The weights ``(d + 1, n)`` are not numbers where no element does.
+    """
+    mesh, places = body.mesh, points[:, body.axes]
+    low, high = (pick(mesh.p[:, mesh.t], axis=1) for pick in (np.min, np.max))
+    first, last = places.min(axis=0)[:, None], places.max(axis=0)[:, None]
+    near = np.flatnonzero(np.all((low <= last) & (high >= first), axis=0))
+    corners = np.zeros((len(points), len(mesh.t)), dtype=np.int64)
+    weights = np.full((len(mesh.t), len(points)), np.nan)
+    for element in near:
+        vertices = mesh.t[:, element]
+        edges = (mesh.p[:, vertices[1:]] - mesh.p[:, vertices[:1]]).T
+        inner = np.linalg.solve(edges.T, (places - mesh.p[:, vertices[0]]).T)
+        shares = np.concatenate([1.0 - inner.sum(axis=0, keepdims=True), inner])
+        held = np.all(shares >= -ON_BORDER, axis=0)
+        corners[held], weights[:, held] = vertices, shares[:, held]
+    return corners, weights

@@ -128,12 +128,15 @@ class SupportedBody:
         return self._all(displacement, amplitudes)
 
     def respond(self, interface_forces: Array, amplitudes: Array) -> tuple[Array, Array]:
-        """All displacements and the interface's, of a held body under interface forces."""
+        """All displacements and the interface's, of a held body under interface forces.
+
+        ``interface_forces`` ``(d n, ...)`` and ``amplitudes`` ``(cases, ...)`` may have columns.
+        """
         stiffness, loads = self._reduced()
         rhs = loads @ amplitudes
         rhs[self._interface] += interface_forces[self._free]
         displacement = prepare(stiffness, self._soft_motions())(rhs)
-        interface = np.zeros(len(self.held))
+        interface = np.zeros((len(self.held), *displacement.shape[1:]))
         interface[self._free] = displacement[self._interface]
         return self._all(displacement, amplitudes), interface
 

@@ -23,7 +23,7 @@ from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
-from numpy.polynomial.legendre import legvander
+from numpy.polynomial.legendre import legder, legvander
 
 from sa_solver.half_space import HalfSpace
 from sa_solver.ties import first_largest
@@ -181,18 +181,33 @@ class Link:
         rows = self.coefficients.reshape(-1, basis.shape[1]) @ basis.T
         return rows.reshape(len(self.coefficients), 3, *places.shape[1:])
 
+    def derivative(self, places: Array, orders: tuple[int, int]) -> Array:
+        """Derivatives of d of such ``orders`` along x and y ``(t, 3, nx, ny)`` [mm^(1 - orders)].
+
+        At ``places`` ``(2, nx, ny)`` [mm]; beyond the region those at its border.
+        """
+        size = self.region[1] - self.region[0]
+        scaled = np.clip(_scaled(places.reshape(2, -1).T, self.region), -1.0, 1.0).T
+        along_x, along_y = map(_derived, scaled, self.degrees, size, orders)
+        basis = (along_x[:, :, None] * along_y[:, None, :]).reshape(len(along_x), -1)
+        rows = self.coefficients.reshape(-1, basis.shape[1]) @ basis.T
+        return rows.reshape(len(self.coefficients), 3, *places.shape[1:])
+
     def level(self) -> Link:
         """The same without what merely tilts the bodies."""
         coefficients = self.coefficients.copy()
         coefficients[:, 2, 1:2, :1] = coefficients[:, 2, :1, 1:2] = 0.0
         return replace(self, coefficients=coefficients)
 
+    def increment(self, t: int) -> Link:
+        """That of increment ``t`` alone."""
+        return replace(self, coefficients=self.coefficients[t : t + 1])
+
     def lift(self, increment: int, places: Array) -> Array:
         """What it adds to the gap in an increment ``(nx, ny)`` [mm], at ``places``."""
         if not self.corrects:
             return np.zeros(places.shape[1:])
-        one = replace(self, coefficients=self.coefficients[increment : increment + 1])
-        lift: Array = one.fields(places)[0, 2]
+        lift: Array = self.increment(increment).fields(places)[0, 2]
         return lift
 
 
@@ -275,9 +290,7 @@ def _products(points: Array, region: Array, degrees: tuple[int, int]) -> Array:
 
     Constant beyond the ``region`` but for the two that are linear: bodies turn as a whole.
     """
-    size = region[1] - region[0]
-    scaled = np.zeros_like(points)
-    np.divide(2.0 * (points - region[0]) - size, size, out=scaled, where=size > 0.0)
+    scaled = _scaled(points, region)
     along_x, along_y = (
         legvander(values, degree)
         for values, degree in zip(np.clip(scaled, -1.0, 1.0).T, degrees, strict=True)
@@ -285,6 +298,24 @@ def _products(points: Array, region: Array, degrees: tuple[int, int]) -> Array:
     products: Array = along_x[:, :, None] * along_y[:, None, :]
     products[:, 1:2, 0], products[:, 0, 1:2] = scaled[:, :1], scaled[:, 1:]
     return products.reshape(len(points), -1)
+
+
+def _scaled(points: Array, region: Array) -> Array:
+    """Points ``(n, 2)`` with -1 and 1 at the ends of the region, 0 where it has no width."""
+    size = region[1] - region[0]
+    scaled = np.zeros_like(points)
+    np.divide(2.0 * (points - region[0]) - size, size, out=scaled, where=size > 0.0)
+    return scaled
+
+
+def _derived(scaled: Array, degree: int, size: float, order: int) -> Array:
+    """Derivatives ``(n, degree + 1)`` of Legendre's polynomials over a length of so much [mm]."""
+    if order == 0:
+        return legvander(scaled, degree)
+    if order > degree:
+        return np.zeros((len(scaled), degree + 1))
+    derived: Array = legvander(scaled, degree - order) @ legder(np.eye(degree + 1), order)
+    return (2.0 / size) ** order * derived
 
 
 def _quality(face: Transfer, near: Array, d: Array, deflection: Array, residual: Array) -> Array:

@@ -1,9 +1,9 @@
 """Stress under the contacts, and where fretting cracks would start, on unworn and worn surfaces.
 
-Both follow from the tractions of the half-space, with each body as a separate half-space: the
-stress that the structure carries past the contact is not in them. The surface itself is left out,
-since stress there hangs on the grid where shear starts at a slipping edge: sections begin, and maps
-lie, at the case's critical distance.
+Both follow from the tractions of the half-space, with each body as a separate half-space, and from
+what a structure of finite elements carries past the contact: without one that is not in them, and
+they say so. The surface itself is left out, since stress there hangs on the grid where shear starts
+at a slipping edge: sections begin, and maps lie, at the case's critical distance.
 """
 
 from __future__ import annotations
@@ -15,11 +15,12 @@ from typing import Any
 import numpy as np
 
 from fe_models.elasticity import von_mises
-from sa_solver.subsurface import COMPONENTS, SubsurfaceStress
+from sa_solver.subsurface import COMPONENTS
 from sa_solver.ties import first_largest
-from sa_solver.types import Array, Grid, Material
+from sa_solver.types import Array, Material
 from wear.interface import CycleTractions
 from wear.life import Ruiz, findley, ruiz, smith_watson_topper
+from workflow.analyses.wear.body_stress import Planes, StressedBody, StressedCycle
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Life
 from workflow.analyses.wear.contact_stage import ContactStage
@@ -56,34 +57,14 @@ class BodyStress:
 class ContactMoment:
     """Both bodies under one contact, unworn or worn.
 
+    ``bulk`` says whether the stress that a structure carries past the contact is in theirs;
     ``left_out`` are the increments, counted from 0, whose shear is not known (see
     :class:`wear.interface.CycleTractions`) and that the maps do without.
     """
 
     bodies: tuple[BodyStress, BodyStress]
+    bulk: bool
     left_out: np.ndarray
-
-
-class Planes:
-    """Where the stress of a contact is looked at: the section's points and the depth of maps."""
-
-    def __init__(self, settings: ContactStress, grid: Grid) -> None:
-        self.settings = settings
-        self.grid = grid
-        centres = grid.x.ravel(), grid.y.ravel()
-        along = 1 if settings.section == "y" else 0
-        across = centres[1 - along]
-        self.along = centres[along]
-        self.at = float(across[np.argmin(np.abs(across - settings.at))])
-        first, share = settings.life.depth, np.linspace(0.0, 1.0, settings.points)
-        self.depths: Array = first + (settings.depth - first) * share**2
-
-    def section(self, stress: SubsurfaceStress, traction: Array) -> Array | None:
-        """Stress ``(6, n, k)`` in the section under ``traction`` ``(3, nx, ny)``."""
-        axis = self.settings.section
-        if axis == "none":
-            return None
-        return stress.section(traction, axis, self.at, self.depths)
 
 
 @dataclass(frozen=True)
@@ -95,6 +76,11 @@ class InterfaceStress:
     planes: Planes
     moments: dict[str, ContactMoment]
     convolutions: int
+
+    @property
+    def bulk(self) -> bool:
+        """Whether the stress that a structure carries past the contact is in all of it."""
+        return all(moment.bulk for moment in self.moments.values())
 
     @property
     def mapped(self) -> bool:
@@ -115,13 +101,15 @@ class InterfaceStress:
             "depths": Dataset(planes.depths, "mm", "of the section's points below the surface"),
         }
         attributes = {"axis": planes.settings.section, "at": planes.at, "components": COMPONENTS}
+        attributes["bulk_stress"] = self.bulk
         limits = {n: self.case.material(n).yield_stress for n in BODIES}
         attributes |= {f"yield_stress_{n}": y for n, y in limits.items() if np.isfinite(y)}
         writer.put(group, axes, **attributes)
         for moment, contact in self.moments.items():
             for number, body in enumerate(contact.bodies, start=1):
                 assert body.section is not None
-                writer.put(f"{group}/{moment}/body_{number}", _section(body.section))
+                section = _section(body.section, contact.bulk)
+                writer.put(f"{group}/{moment}/body_{number}", section)
 
     def _write_life(self, writer: ResultsWriter, group: str) -> None:
         for moment, contact in self.moments.items():
@@ -133,7 +121,7 @@ class InterfaceStress:
 
     def summary(self) -> dict[str, Any]:
         """Largest values, where they are, and worn over unworn, by body."""
-        numbers: dict[str, Any] = {"convolutions": self.convolutions}
+        numbers: dict[str, Any] = {"convolutions": self.convolutions, "bulk": self.bulk}
         if self.planes.settings.section != "none":
             numbers["von_mises"] = self._of_bodies(self._largest_von_mises)
         if not self.mapped:
@@ -156,7 +144,8 @@ class InterfaceStress:
 
     def _largest_von_mises(self, body: BodyStress) -> dict[str, float]:
         assert body.section is not None
-        values, planes = von_mises(body.section), self.planes
+        # Outside the body it is not a number.
+        values, planes = np.nan_to_num(von_mises(body.section)), self.planes
         i, k = np.unravel_index(first_largest(values), values.shape)
         along, across = ("y", "x") if planes.settings.section == "y" else ("x", "y")
         place = {along: float(planes.along[i]), across: planes.at, "depth": float(planes.depths[k])}
@@ -172,77 +161,96 @@ class InterfaceStress:
 def contact_stresses(
     case: WearCase,
     peak: int,
-    contacts: Sequence[tuple[ContactStage, tuple[CycleTractions, CycleTractions]]],
+    contacts: Sequence[tuple[ContactStage, tuple[StressedCycle, StressedCycle]]],
     reporter: Reporter,
 ) -> list[InterfaceStress]:
     """Stress under all ``contacts`` as the case asks for it.
 
-    Each has its tractions in an unworn and a worn cycle; ``peak`` is the increment of peak load.
+    Each has what is known of an unworn and a worn cycle; ``peak`` is the increment of peak load.
     """
-    unknown = [cycle.unknown for _, cycles in contacts for cycle in cycles]
+    unknown = [cycle.tractions.unknown for _, cycles in contacts for cycle in cycles]
     _report_stick(np.array(unknown), peak, reporter)
-    return [_interface_stress(case, peak, *contact) for contact in contacts]
+    stresses = [_interface_stress(case, peak, *contact) for contact in contacts]
+    for stress, (stage, cycles) in zip(stresses, contacts, strict=True):
+        if not stress.bulk and cycles[0].faces is not None:
+            reporter.warn(
+                f"{stage.name}: too few nodes near the contact to tell what the structure carries "
+                "past it: the stress under it is that of its tractions alone; refine the mesh there"
+            )
+    return stresses
 
 
 def _interface_stress(
     case: WearCase,
     peak: int,
     stage: ContactStage,
-    cycles: tuple[CycleTractions, CycleTractions],
+    cycles: tuple[StressedCycle, StressedCycle],
 ) -> InterfaceStress:
     planes = Planes(case.stress, stage.grid)
-    materials = case.material(1), case.material(2)
-    # Each keeps the symbols of a depth: one per body serves both moments.
-    solvers = [SubsurfaceStress(stage.grid, materials[n - 1], n) for n in BODIES]
-    moments = {}
-    for moment, cycle in zip(MOMENTS, cycles, strict=True):
-        known = cycle.unknown <= STUCK_SHARE
-        body_1, body_2 = (
-            BodyStress(
-                planes.section(solver, _traction(cycle, peak)),
-                life_maps(case.stress.life, solver, material, cycle, known),
-            )
-            for solver, material in zip(solvers, materials, strict=True)
-        )
-        moments[moment] = ContactMoment((body_1, body_2), np.flatnonzero(~known))
-    convolutions = sum(solver.count for solver in solvers)
+    bodies = [StressedBody(stage, case.material(n), n) for n in BODIES]
+    moments = {
+        moment: _moment(case.stress, peak, planes, bodies, cycle)
+        for moment, cycle in zip(MOMENTS, cycles, strict=True)
+    }
+    convolutions = sum(body.convolutions for body in bodies)
     return InterfaceStress(stage.name, case, planes, moments, convolutions)
 
 
-def _section(stress: Array) -> dict[str, Dataset]:
+def _moment(
+    settings: ContactStress,
+    peak: int,
+    planes: Planes,
+    bodies: Sequence[StressedBody],
+    cycle: StressedCycle,
+) -> ContactMoment:
+    known = cycle.tractions.unknown <= STUCK_SHARE
+    bulks = [body.bulk(cycle) for body in bodies]
+    bulk = None not in bulks
+    stresses = []
+    for body, carried in zip(bodies, bulks, strict=True):
+        section, maps = None, {}
+        if settings.section != "none":
+            section = body.section(cycle, carried, planes, peak)
+        if settings.life.parameter != "none" and known.any():
+            history = body.history(cycle, carried, settings.life.depth, known)
+            maps = life_maps(settings.life, history, body.material, cycle.tractions, known, bulk)
+        stresses.append(BodyStress(section, maps))
+    return ContactMoment((stresses[0], stresses[1]), bulk, np.flatnonzero(~known))
+
+
+def _whose(bulk: bool) -> str:
+    """Whose stress it is, in words."""
+    alone = "under the contact's tractions alone"
+    return "of the contact and of what the structure carries past it" if bulk else alone
+
+
+def _section(stress: Array, bulk: bool) -> dict[str, Dataset]:
     """Stress ``(6, n, k)`` in a section, and its equivalent."""
-    what = "xx, yy, zz, xy, yz, zx in the section at peak load under the contact's tractions alone"
+    what = f"xx, yy, zz, xy, yz, zx in the section at peak load, {_whose(bulk)}"
     return {
         "stress": Dataset(stress, "MPa", what),
         "von_mises": Dataset(von_mises(stress), "MPa", "von Mises stress at peak load"),
     }
 
 
-def _traction(cycle: CycleTractions, t: int) -> Array:
-    """Tractions qx, qy, p of an increment ``(3, nx, ny)``."""
-    return np.concatenate([cycle.shear[t], cycle.pressure[t, None]])
-
-
 def life_maps(
     life: Life,
-    solver: SubsurfaceStress,
+    history: Array,
     material: Material,
     cycle: CycleTractions,
     known: np.ndarray,
+    bulk: bool,
 ) -> dict[str, Dataset]:
     """Maps of the parameter and of what it is made of, at the critical distance, by name.
 
-    Stress is that of the ``known`` ``(t,)`` increments, of all cycles of a mix together; friction
-    work that of all in a mean cycle. Where no increment is known there is no map.
+    Stress is the ``history`` ``(t, 6, nx, ny)`` of the ``known`` ``(t,)`` increments, 0 in others,
+    of all cycles of a mix together, with or without ``bulk`` stress; friction work that of all
+    increments in a mean cycle.
     """
-    if life.parameter == "none" or not known.any():
-        return {}
-    history = np.zeros((len(known), 6, *solver.grid.shape))
-    for t in np.flatnonzero(known & cycle.pressure.any(axis=(1, 2))):
-        history[t] = solver.at_depth(_traction(cycle, int(t)), life.depth)
     if life.parameter == "ruiz":
         # Without stress, an increment adds its work and leaves the largest tension as it is.
-        return _ruiz_maps(ruiz(history, np.tensordot(cycle.loads.share, cycle.work, 1)))
+        work = np.tensordot(cycle.loads.share, cycle.work, 1)
+        return _ruiz_maps(ruiz(history, work), bulk)
     if life.parameter == "findley":
         plane = findley(history[known], life.sensitivity)
         what = "shear stress amplitude plus k largest normal stress, worst plane"
@@ -252,7 +260,7 @@ def life_maps(
         what = "largest normal stress times strain amplitude, worst plane"
         amplitude = "strain_amplitude", "1", "amplitude of the normal strain on the worst plane"
     name, unit, of_amplitude = amplitude
-    largest = "largest normal stress over a cycle on the worst plane"
+    largest = f"largest normal stress over a cycle on the worst plane, {_whose(bulk)}"
     normal = "unit normal of the worst plane, in the interface frame"
     return {
         life.parameter: Dataset(plane.value, "MPa", what),
@@ -262,9 +270,9 @@ def life_maps(
     }
 
 
-def _ruiz_maps(parameters: Ruiz) -> dict[str, Dataset]:
+def _ruiz_maps(parameters: Ruiz, bulk: bool) -> dict[str, Dataset]:
     work = "Ruiz's F1: a quarter of the friction work of a cycle per area"
-    tension = "largest tension along the surface over a cycle, under the contact's tractions alone"
+    tension = f"largest tension along the surface over a cycle, {_whose(bulk)}"
     cracking = "Ruiz's F2: F1 times tension"
     return {
         "friction_parameter": Dataset(parameters.friction_parameter, "N/mm", work),
@@ -283,7 +291,7 @@ def _report_stick(unknown: Array, peak: int, reporter: Reporter) -> None:
             f"stress.life that increment's stress: {why}"
         )
     if count := int((worst > STUCK_SHARE).sum()):
-        reporter.log(
+        reporter.warn(
             f"stress.life leaves out the stress of {count} of {len(worst)} increments, in which up "
             f"to {worst.max():.0%} of the load sticks: {why}"
         )

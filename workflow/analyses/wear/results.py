@@ -12,6 +12,7 @@ from sa_solver.normal import NormalContactError
 from wear.coupled import KINETICS
 from wear.kinetics import LinearRegime
 from workflow.analyses.contact.datasets import LOADS, pressure_field, traction_fields
+from workflow.analyses.wear.body_stress import StressedCycle, with_known_shear
 from workflow.analyses.wear.budget.finding import error_budget
 from workflow.analyses.wear.budget.report import Budget, datasets_of, sentence, summary_of
 from workflow.analyses.wear.case.base import WearCase
@@ -29,7 +30,7 @@ from workflow.analyses.wear.datasets import (
     put_face,
     surface_heights,
 )
-from workflow.analyses.wear.layout import EXTRAPOLATION, Contents, energy_name
+from workflow.analyses.wear.layout import EXTRAPOLATION, MOMENTS, Contents, energy_name
 from workflow.analyses.wear.link_report import link_summary
 from workflow.analyses.wear.outcome import InterfaceOutcome, Outcome
 from workflow.analyses.wear.run_errors import warn_of_errors
@@ -76,7 +77,7 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
     if isinstance(source, StructureStage):
         structure = worn_structure(source, stages, state, case.friction, folder, reporter)
     with reporter.stage("stress under the contacts"):
-        stresses = _stresses(outcome, reporter)
+        stresses = _stresses(outcome, structure, reporter)
     budget = error_budget(outcome, reporter)
     with reporter.stage("results"):
         recorded, contents = _write_results(outcome, structure, stresses, budget, run)
@@ -100,15 +101,28 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
     finish(run, summary, lines)
 
 
-def _stresses(outcome: Outcome, reporter: Reporter) -> list[InterfaceStress]:
+def _stresses(
+    outcome: Outcome, structure: WornStructure | None, reporter: Reporter
+) -> list[InterfaceStress]:
     """Stress under every contact as the case asks for it; empty if it does not."""
     if not outcome.case.stress.wanted:
         return []
     cycles = []
-    for contact in outcome.interfaces:
+    for number, contact in enumerate(outcome.interfaces):
         assert contact.worn is not None
-        unworn = contact.stage.unworn_tractions(contact.unworn, contact.first)
-        cycles.append((contact.stage, (unworn, contact.worn)))
+        stage, worn = contact.stage, contact.unworn
+        if structure is not None:
+            worn = structure.cycle.histories[number]
+        found = stage.unworn_tractions(contact.unworn, contact.first), contact.worn
+        unworn, after = (
+            StressedCycle(
+                with_known_shear(stage, tractions, loads),
+                loads,
+                *(structure.under(moment, number) if structure else ()),
+            )
+            for moment, tractions, loads in zip(MOMENTS, found, (contact.unworn, worn), strict=True)
+        )
+        cycles.append((stage, (unworn, after)))
     return contact_stresses(outcome.case, outcome.source.peak, cycles, reporter)
 
 

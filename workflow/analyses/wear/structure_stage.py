@@ -20,7 +20,7 @@ from fe_models.relinearised import (
     relinearised,
     stress_stiffened,
 )
-from fe_models.stress import StressField, deformation, stress_state
+from fe_models.stress import CycleStress, cycle_stress, deformation
 from fe_models.structure import CycleSolution, InterfaceHistory, Structure, mixed
 from sa_solver.types import Array, Indices
 from workflow.analyses.wear.case.sections import Nonlinearity
@@ -316,19 +316,23 @@ class StructureStage:
         return FrictionalJoint(self._resolvent, friction)
 
     @property
+    def _amplitudes(self) -> Array:
+        """Amplitudes of the load cases in all increments ``(t, cases)``."""
+        return np.concatenate([mission.amplitudes for mission in self.model.missions])
+
+    @property
     def _peak_amplitudes(self) -> Array:
         """Amplitudes of the load cases at peak load ``(cases,)``."""
-        amplitudes = np.concatenate([mission.amplitudes for mission in self.model.missions])
-        peak: Array = amplitudes[self.peak]
+        peak: Array = self._amplitudes[self.peak]
         return peak
 
-    def stress(self, mesh: StructureMesh, solution: CycleSolution) -> tuple[StressField, ...]:
+    def stress(self, mesh: StructureMesh, solution: CycleSolution) -> CycleStress:
         """Stress of both bodies at peak load, on the unworn or the worn mesh."""
         worn = mesh is not self.mesh
         structure = self._prestressed(self.model.structure(mesh)) if worn else self.structure
-        fields = {name: values[self.peak] for name, values in solution.fields().items()}
-        amplitudes = self._peak_amplitudes
-        return stress_state(structure, fields["force"], fields["displacement"], amplitudes)
+        fields = solution.fields()
+        force, relative = fields["force"], fields["displacement"]
+        return cycle_stress(structure, force, relative, self._amplitudes, self.peak)
 
     def _gap(self, depths: list[Array]) -> Array:
         return self.structure.gap() + np.concatenate(depths)

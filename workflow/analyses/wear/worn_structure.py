@@ -10,9 +10,9 @@ import numpy as np
 from fe_models.mesh import Body, MeshError, StructureMesh, write_msh
 from fe_models.nonlinear import NonlinearCheck
 from fe_models.remesh import form_of, formed_mesh, worn_mesh, worn_volume
-from fe_models.stress import StressField
+from fe_models.stress import CycleStress, StressField
 from fe_models.structure import CycleSolution
-from sa_solver.types import LoadHistory
+from sa_solver.types import Array, LoadHistory
 from wear.coupled import CoupledState
 from workflow.analyses.wear.case.evolution import EvolvingFriction
 from workflow.analyses.wear.contact_stage import ContactStage
@@ -34,15 +34,22 @@ MEASURES = ("slip_change", "slide", "largest_strain", "largest_rotation", "face_
 class WornStructure:
     """The structure before and after: ``cycle`` and ``mesh`` are the worn ones.
 
-    ``stresses`` are those of both bodies at peak load, unworn and worn; ``written`` the meshes as
-    they are shown then, with body 2 in the form of its faces.
+    ``stresses`` are those of both bodies, unworn and worn; ``written`` the meshes as they are shown
+    then, with body 2 in the form of its faces.
     """
 
     stage: StructureStage
     mesh: StructureMesh
     cycle: CycleSolution
-    stresses: dict[str, tuple[StressField, ...]]
+    stresses: dict[str, CycleStress]
     written: dict[str, StructureMesh]
+
+    def under(
+        self, moment: str, number: int
+    ) -> tuple[tuple[Array, Array], tuple[StressField, StressField]]:
+        """Motions of both bodies' faces under interface ``number``, and stress at peak load."""
+        stress = self.stresses[moment]
+        return stress.faces[number], stress.fields
 
     def write(self, writer: ResultsWriter) -> None:
         """Load histories of the worn faces, and both bodies unworn and worn."""
@@ -52,7 +59,7 @@ class WornStructure:
             put_closure(writer, f"structure_worn/{name}", self.cycle)
             put_closure(writer, f"structure/{name}", self.stage.unworn_cycle)
         for moment, mesh in self.written.items():
-            bodies = zip((mesh.body_1, mesh.body_2), self.stresses[moment], strict=True)
+            bodies = zip((mesh.body_1, mesh.body_2), self.stresses[moment].fields, strict=True)
             for body, field in bodies:
                 writer.put(f"bodies/{body.name}/{moment}", _body(body, field))
 
@@ -78,9 +85,9 @@ class WornStructure:
                         "von_mises": float(field.von_mises.max()),
                         "maximum_principal": float(field.maximum_principal.max()),
                     }
-                    for body, field in zip(bodies, fields, strict=True)
+                    for body, field in zip(bodies, stress.fields, strict=True)
                 }
-                for moment, fields in self.stresses.items()
+                for moment, stress in self.stresses.items()
             },
         }
 

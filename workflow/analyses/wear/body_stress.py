@@ -1,0 +1,154 @@
+"""Stress of one body under its contact: a section at peak load, a history at a depth.
+
+Tractions on the fine grid stress a half-space; a structure adds what it carries past the contact.
+On the face and just below that is told by the motion of its nodes (:mod:`wear.bulk_stress`), from
+one element's depth on by the stress of its mesh, less that of half-spaces under its nodal forces:
+there the stress is the mesh's, to which fine tractions differ from nodal forces by nothing much.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from fe_models.stress import StressField
+from sa_solver.subsurface import SubsurfaceStress
+from sa_solver.types import Array, Grid, Material
+from wear.bulk_stress import SIDE, BodyFace, BulkStress
+from wear.face_loads import FaceLoads
+from wear.interface import CycleTractions
+from wear.sticking import with_sticking_shear
+from workflow.analyses.wear.case.sections import ContactStress
+from workflow.analyses.wear.contact_stage import ContactStage
+
+
+class Planes:
+    """Where the stress of a contact is looked at: the section's points and the depth of maps."""
+
+    def __init__(self, settings: ContactStress, grid: Grid) -> None:
+        self.settings = settings
+        self.grid = grid
+        centres = grid.x.ravel(), grid.y.ravel()
+        self._along = 1 if settings.section == "y" else 0
+        self.along, across = centres[self._along], centres[1 - self._along]
+        self._row = int(np.argmin(np.abs(across - settings.at)))
+        self.at = float(across[self._row])
+        first, share = settings.life.depth, np.linspace(0.0, 1.0, settings.points)
+        self.depths: Array = first + (settings.depth - first) * share**2
+
+    def section(self, stress: SubsurfaceStress, traction: Array, depths: Array) -> Array:
+        """Stress ``(6, n, k)`` in the section at ``depths`` under ``traction`` ``(3, nx, ny)``."""
+        return stress.section(traction, "y" if self._along else "x", self.at, depths)
+
+    def row(self, places: Array) -> Array:
+        """Those of the section ``(2, n, 1)`` of the places of cells ``(2, nx, ny)``."""
+        return places.take(self._row, axis=2 - self._along)[..., None]
+
+    def points(self, heights: Array) -> Array:
+        """The section's points at such ``heights`` ``(k,)``, ``(n k, 3)`` in the frame [mm]."""
+        along, z = (axis.ravel() for axis in np.meshgrid(self.along, heights, indexing="ij"))
+        across = np.full_like(along, self.at)
+        return np.stack([across, along, z] if self._along else [along, across, z], axis=1)
+
+
+@dataclass(frozen=True)
+class StressedCycle:
+    """What is known of one contact over a cycle.
+
+    ``tractions`` on its grid and the ``loads`` that they go with. Of a structure too the
+    displacements ``(t, 3, n)`` [mm] of the ``faces`` of both bodies in these, and the ``fields`` of
+    stress in both at peak load.
+    """
+
+    tractions: CycleTractions
+    loads: FaceLoads
+    faces: tuple[Array, Array] | None = None
+    fields: tuple[StressField, StressField] | None = None
+
+    def traction(self, t: int) -> Array:
+        """Tractions qx, qy, p of increment ``t`` ``(3, nx, ny)`` [MPa]."""
+        return np.concatenate([self.tractions.shear[t], self.tractions.pressure[t, None]])
+
+
+def with_known_shear(
+    stage: ContactStage, cycle: CycleTractions, loads: FaceLoads
+) -> CycleTractions:
+    """The tractions with shear where the contact sticks, if the nodes of the loads know it."""
+    if loads.force is None or not cycle.unknown.any():
+        return cycle
+    spread = stage.transfer.spread(loads.force[:, :2])
+    return with_sticking_shear(cycle, spread, stage.grid.cell_area)
+
+
+class StressedBody:
+    """One body under the contact of a ``stage``."""
+
+    def __init__(self, stage: ContactStage, material: Material, body: Literal[1, 2]) -> None:
+        self.material = material
+        self._stage, self._body = stage, body
+        # Each keeps the symbols of a depth, or its own: one per body serves both moments.
+        self._solver = SubsurfaceStress(stage.grid, material, body)
+        self._face = BodyFace(stage.grid, stage.transfer, material, body)
+
+    @property
+    def convolutions(self) -> int:
+        """Done so far."""
+        return self._solver.count + self._face.half_space.count
+
+    def bulk(self, cycle: StressedCycle) -> BulkStress | None:
+        """What a structure carries past the contact; None without one that tells."""
+        if cycle.faces is None or cycle.loads.force is None:
+            return None
+        moved = cycle.faces[self._body - 1]
+        return self._face.bulk_stress(cycle.loads.loads, cycle.loads.force, moved)
+
+    def history(
+        self, cycle: StressedCycle, bulk: BulkStress | None, depth: float, known: np.ndarray
+    ) -> Array:
+        """Stress ``(t, 6, nx, ny)`` at ``depth``; 0 in increments that are not ``known`` ``(t,)``.
+
+        Without a structure it is that of the contact alone.
+        """
+        pressed = cycle.tractions.pressure.any(axis=(1, 2))
+        stress = np.zeros((len(known), 6, *self._stage.grid.shape))
+        if bulk is not None:
+            stress += bulk.at(self._stage.transfer.places, depth)
+        for t in np.flatnonzero(known & pressed).tolist():
+            stress[t] += self._solver.at_depth(cycle.traction(t), depth)
+        stress[~known] = 0.0
+        return stress
+
+    def section(
+        self, cycle: StressedCycle, bulk: BulkStress | None, planes: Planes, peak: int
+    ) -> Array:
+        """Stress ``(6, n, k)`` in the section at peak load; not a number outside the body.
+
+        Without a structure it is that of the contact alone.
+        """
+        contact = planes.section(self._solver, cycle.traction(peak), planes.depths)
+        if bulk is None:
+            return contact
+        return contact + self._carried(cycle, bulk.increment(peak), planes, peak)
+
+    def _carried(self, cycle: StressedCycle, bulk: BulkStress, planes: Planes, peak: int) -> Array:
+        """Stress ``(6, n, k)`` in the section that is not the contact's own.
+
+        From one element's depth h on, that of the mesh less that of its nodal forces; above, as on
+        the face, with its slope there and the mesh's value at h.
+        """
+        assert cycle.fields is not None
+        assert cycle.loads.force is not None
+        face, field = self._stage.face, cycle.fields[self._body - 1]
+        whole = field.body.depth(face.name)
+        near, below = np.split(planes.depths, [np.searchsorted(planes.depths, whole)])
+        below = np.append(whole, below)
+        nodal = self._stage.transfer.spread(cycle.loads.force[peak])
+        mesh = field.at(planes.points(SIDE[self._body] * below), face.frame)
+        mesh = mesh.reshape(6, -1, len(below)) - planes.section(self._solver, nodal, below)
+        row = planes.row(self._stage.transfer.places)
+        shallow = bulk.at(row, np.append(near, whole))[0]
+        # Where the mesh ends above that depth, nothing but the face tells.
+        bend = np.nan_to_num(mesh[..., :1] - shallow[..., -1:]) * (near / whole) ** 2
+        return np.concatenate([shallow[..., :-1] + bend, mesh[..., 1:]], axis=2)
