@@ -78,8 +78,8 @@ def with_known_shear(
     """The tractions with shear where the contact sticks, if the nodes of the loads know it."""
     if loads.force is None or not cycle.unknown.any():
         return cycle
-    spread = stage.transfer.spread(loads.force[:, :2])
-    return with_sticking_shear(cycle, spread, stage.grid.cell_area)
+    nodal = stage.transfer.spread(loads.force)
+    return with_sticking_shear(cycle, nodal, stage.grid.cell_area)
 
 
 class StressedBody:
@@ -125,30 +125,25 @@ class StressedBody:
     ) -> Array:
         """Stress ``(6, n, k)`` in the section at peak load; not a number outside the body.
 
-        Without a structure it is that of the contact alone.
+        Without a structure it is that of the contact alone. From one element's depth h on it is
+        that of the mesh, and that of half-spaces under what fine tractions have beside nodal
+        forces. Above, what is not the contact's own is as on the face, with its slope there and the
+        value that it has at h.
         """
-        contact = planes.section(self._solver, cycle.traction(peak), planes.depths)
-        if bulk is None:
-            return contact
-        return contact + self._carried(cycle, bulk.increment(peak), planes, peak)
-
-    def _carried(self, cycle: StressedCycle, bulk: BulkStress, planes: Planes, peak: int) -> Array:
-        """Stress ``(6, n, k)`` in the section that is not the contact's own.
-
-        From one element's depth h on, that of the mesh less that of its nodal forces; above, as on
-        the face, with its slope there and the mesh's value at h.
-        """
-        assert cycle.fields is not None
-        assert cycle.loads.force is not None
+        fine = cycle.traction(peak)
+        if bulk is None or cycle.fields is None or cycle.loads.force is None:
+            return planes.section(self._solver, fine, planes.depths)
         face, field = self._stage.face, cycle.fields[self._body - 1]
         whole = field.body.depth(face.name)
         near, below = np.split(planes.depths, [np.searchsorted(planes.depths, whole)])
-        below = np.append(whole, below)
+        heights = SIDE[self._body] * np.append(whole, below)
+        mesh = field.at(planes.points(heights), face.frame).reshape(6, -1, len(heights))
         nodal = self._stage.transfer.spread(cycle.loads.force[peak])
-        mesh = field.at(planes.points(SIDE[self._body] * below), face.frame)
-        mesh = mesh.reshape(6, -1, len(below)) - planes.section(self._solver, nodal, below)
         row = planes.row(self._stage.transfer.places)
-        shallow = bulk.at(row, np.append(near, whole))[0]
+        surface = bulk.increment(peak).at(row, np.append(whole, near))[0]
+        at_whole = mesh[..., :1] - planes.section(self._solver, nodal, np.array([whole]))
         # Where the mesh ends above that depth, nothing but the face tells.
-        bend = np.nan_to_num(mesh[..., :1] - shallow[..., -1:]) * (near / whole) ** 2
-        return np.concatenate([shallow[..., :-1] + bend, mesh[..., 1:]], axis=2)
+        bend = np.nan_to_num(at_whole - surface[..., :1]) * (near / whole) ** 2
+        shallow = planes.section(self._solver, fine, near) + surface[..., 1:] + bend
+        deep = planes.section(self._solver, fine - nodal, below) + mesh[..., 1:]
+        return np.concatenate([shallow, deep], axis=2)

@@ -37,7 +37,8 @@ def subsurface_stress(file: h5py.File, contents: Contents) -> Figure:
     sections = file["stress/section"]
     # By moment, both bodies together.
     fields = {name: _values(group, "von_mises").swapaxes(0, 1) for name, group in sections.items()}
-    largest = {name: field.max(axis=(1, 2, 3)) for name, field in fields.items()}
+    # Outside a body stress is not a number.
+    largest = {name: np.nanmax(field, axis=(1, 2, 3)) for name, field in fields.items()}
     top = float(max(moments.max() for moments in largest.values()))
     title = f"Von Mises stress under the contact at peak load: {changes(largest, '.0f', ' MPa')}"
     figure = new_figure(title, 9.0)
@@ -46,14 +47,15 @@ def subsurface_stress(file: h5py.File, contents: Contents) -> Figure:
         for axis, moment, field in zip(column, MOMENTS, fields[name], strict=True):
             colours = _draw_section(axis, group, field, top)
             _draw_yield(axis, group, field)
-            axis.set_title(f"{name}, {moment}: at most {field.max():.0f} MPa")
+            axis.set_title(f"{name}, {moment}: at most {np.nanmax(field):.0f} MPa")
         along = str(group.attrs["axis"])
         other = "x" if along == "y" else "y"
         column[-1].set_xlabel(f"{along} [mm], at {other} = {group.attrs['at']:.3g} mm")
     lower, upper = contents.bodies
     for axis in axes[:, 0]:
         axis.set_ylabel(f"z [mm]: {lower} below, {upper} above")
-    label = "von Mises stress of the contact alone [MPa]"
+    whole = all(group.attrs["bulk_stress"] for group in sections.values())
+    label = f"von Mises stress{'' if whole else ' of the contact alone'} [MPa]"
     figure.colorbar(colours, ax=axes, label=label, shrink=0.8, pad=0.01)
     return figure
 
@@ -90,7 +92,7 @@ def _draw_yield(axis: Axes, group: h5py.Group, field: Array) -> None:
     halo: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]
     for body, values in zip((1, 2), field, strict=True):
         limit = group.attrs.get(f"yield_stress_{body}", np.inf)
-        if values.max() > limit:
+        if np.nanmax(values) > limit:
             place = group["along"][()], _heights(group, body)
             lines = axis.contour(*place, values.T, levels=[limit], colors=BLUE, linewidths=1.5)
             lines.set_path_effects(halo)

@@ -1,0 +1,79 @@
+"""Stress that passes under a contact, from the motion of its face: closed forms, both bodies."""
+
+import numpy as np
+import pytest
+
+from sa_solver.half_space import HalfSpace
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from wear.bulk_stress import RIGID, SIDE, BodyFace
+from wear.link import CellNodes
+
+METAL = Material(115e3, 0.29)
+E, NU = METAL.young, METAL.poisson
+AREA, LINE = Grid.covering((2.0, 3.0), (16, 12)), Grid.strips(2.0, 32)
+DEPTH = 0.02
+
+
+def loaded(count: int, load: float) -> LoadHistory:
+    return LoadHistory(np.full(count, load), *np.zeros((7, count)), sliding=np.ones(count, bool))
+
+
+def rest(grid: Grid, body: int, motion: Array, tractions: Array) -> tuple[Array, Array]:
+    """Stress below the cells of a body that moves so, beside its half-space's own motion.
+
+    And the places of the cells; ``tractions`` ``(3, nx, ny)`` are known at the nodes.
+    """
+    pair = (METAL, RIGID) if body == 1 else (RIGID, METAL)
+    own = SIDE[body] * HalfSpace(grid, ElasticPair(*pair)).displacement(tractions)
+    nodes = CellNodes(grid)
+    face = BodyFace(grid, nodes, METAL, body)  # type: ignore[arg-type]
+    force, moved = tractions * grid.cell_area, motion + own
+    fields = (f.reshape(1, 3, -1) for f in (force, moved))
+    bulk = face.bulk_stress(loaded(1, 1.0), *fields)
+    assert bulk is not None
+    return bulk.at(nodes.places, DEPTH)[0], nodes.places
+
+
+@pytest.mark.parametrize("body", [1, 2])
+def test_bent_bar_with_a_contact_on_it(body: int) -> None:
+    """σ_xx = a + b z: u = a x + b x z, -ν (a + b z) y, ν b (y² - z²)/2 - ν a z - b x²/2, over E."""
+    a, b = 200.0, 70.0
+    pressed = np.maximum(0.0, 1.0 - AREA.x**2 - AREA.y**2)
+    tractions = np.stack([0.3 * pressed, -0.1 * pressed, pressed]) * 500.0
+    x, y = np.broadcast_arrays(AREA.x, AREA.y)
+    turned = np.stack([-2e-3 * y, 2e-3 * x, 1e-3 * x])  # no stress in a rigid rotation
+    motion = np.stack([a * x, -NU * a * y, 0.5 * b * (NU * y**2 - x**2)]) / E + turned
+    stress, _ = rest(AREA, body, motion, tractions)
+    expected = np.zeros_like(stress)
+    expected[0] = a + b * SIDE[body] * DEPTH
+    np.testing.assert_allclose(stress, expected, atol=1e-7 * a)
+
+
+@pytest.mark.parametrize("body", [1, 2])
+def test_shear_follows_from_tension_that_grows_along_the_face(body: int) -> None:
+    """σ_xx = c x, σ_zx = -c z in plane strain: u_x = (1 - ν²) c x²/2E and u_z = 0 on the face."""
+    c = 150.0
+    pressed = 300.0 * np.maximum(0.0, 1.0 - LINE.x**2)
+    tractions = np.stack([0.4 * pressed, 0.0 * pressed, pressed])
+    motion = np.zeros_like(tractions)
+    motion[0] = 0.5 * c * (1.0 - NU**2) * LINE.x**2 / E
+    stress, (x, _) = rest(LINE, body, motion, tractions)
+    expected = np.zeros_like(stress)
+    expected[0], expected[1] = c * x, NU * c * x
+    expected[5] = -c * SIDE[body] * DEPTH
+    np.testing.assert_allclose(stress, expected, atol=1e-7 * c)
+
+
+def test_a_half_space_has_nothing_to_add() -> None:
+    tractions = np.zeros((3, *AREA.shape))
+    tractions[:, 4:9, 3:8] = np.array([100.0, -50.0, 300.0])[:, None, None]
+    for body in (1, 2):
+        stress, _ = rest(AREA, body, np.zeros_like(tractions), tractions)
+        assert np.abs(stress).max() < 1e-7 * 300.0
+
+
+def test_few_nodes_tell_nothing() -> None:
+    grid = Grid.strips(1.0, 3)
+    nothing = np.zeros((1, 3, 3))
+    face = BodyFace(grid, CellNodes(grid), METAL, 2)
+    assert face.bulk_stress(loaded(1, 0.0), nothing, nothing) is None

@@ -1,0 +1,198 @@
+"""Stress of a body under its contact: its mesh, finer meshes, the other method, balances."""
+
+from dataclasses import dataclass
+
+import numpy as np
+import pytest
+
+from sa_solver.subsurface import SubsurfaceStress
+from sa_solver.types import Array
+from tests.conftest import CASES
+from wear.bulk_stress import SIDE
+from wear.life import smith_watson_topper
+from workflow.analyses.wear.body_stress import (
+    Planes,
+    StressedBody,
+    StressedCycle,
+    with_known_shear,
+)
+from workflow.analyses.wear.contact_stage import ContactStage
+from workflow.analyses.wear.structure_stage import StructureStage
+from workflow.analyses.wear.structures import structure_of
+from workflow.kinds import load_case
+
+PLANE = CASES / "dovetail_2d.yaml"
+COARSE = (
+    *("mesh.flank_nodes=[12, 10]", "mesh.size=8 mm", "contact.grid=[64, 64]"),
+    *("load_path.increments=8", "load_path.peak_at=3"),
+)
+FRICTION = 0.4
+DEPTH = 0.02
+
+
+@dataclass
+class Flank:
+    """The unworn intrados of the section."""
+
+    source: StructureStage
+    stage: ContactStage
+    cycle: StressedCycle
+    stuck: Array
+    planes: Planes
+    bodies: tuple[StressedBody, StressedBody]
+
+    @classmethod
+    def of(cls, *overrides: str) -> "Flank":
+        case = load_case(PLANE, overrides)
+        source = structure_of(case).source(case)
+        assert isinstance(source, StructureStage)
+        stress = source.stress(source.mesh, source.unworn_cycle)
+        stage, loads = ContactStage(case, source.faces[0]), source.unworn()[0]
+        given = stage.unworn_tractions(loads, stage.begin(loads, 1.0)[1])
+        known = with_known_shear(stage, given, loads)
+        cycle = StressedCycle(known, loads, stress.faces[0], stress.fields)
+        bodies = StressedBody(stage, case.material(1), 1), StressedBody(stage, case.material(2), 2)
+        return cls(source, stage, cycle, given.unknown, Planes(case.stress, stage.grid), bodies)
+
+    def history(self, body: int, cycle: StressedCycle | None = None) -> Array:
+        """Stress at the critical distance ``(t, 6, nx)``."""
+        cycle, stressed = cycle or self.cycle, self.bodies[body - 1]
+        known = np.ones(len(self.stuck), dtype=bool)
+        return stressed.history(cycle, stressed.bulk(cycle), DEPTH, known)[..., 0]
+
+
+@pytest.fixture(scope="module")
+def coarse() -> Flank:
+    return Flank.of(*COARSE)
+
+
+def bare(cycle: StressedCycle) -> StressedCycle:
+    """The same without what the structure knows of its bodies."""
+    return StressedCycle(cycle.tractions, cycle.loads)
+
+
+@pytest.mark.parametrize("body", [1, 2])
+def test_without_a_structure_it_is_that_of_the_tractions(coarse: Flank, body) -> None:
+    alone, peak, planes = bare(coarse.cycle), coarse.source.peak, coarse.planes
+    stressed = coarse.bodies[body - 1]
+    solver = SubsurfaceStress(coarse.stage.grid, stressed.material, body)
+    assert stressed.bulk(alone) is None
+    section = stressed.section(alone, None, planes, peak)
+    for depth, column in zip(planes.depths, np.moveaxis(section, 2, 0), strict=True):
+        direct = solver.at_depth(alone.traction(peak), float(depth))[..., 0]
+        np.testing.assert_allclose(column, direct, atol=1e-10 * np.abs(direct).max())
+    known = np.arange(len(coarse.stuck)) != peak
+    history = stressed.history(alone, None, DEPTH, known)
+    assert not history[peak].any()
+    direct = solver.at_depth(alone.traction(1), DEPTH)
+    np.testing.assert_allclose(history[1], direct, atol=1e-10 * np.abs(direct).max())
+
+
+@pytest.mark.parametrize("body", [1, 2])
+def test_below_one_element_it_is_that_of_the_mesh(coarse: Flank, body) -> None:
+    """Fine and nodal tractions differ by what balances itself over an element or two, of length h.
+
+    Within the contact such a traction stresses a half-space like exp(-2πz/h); at the edge, where
+    its moment does not vanish, like (h/z)² (Saint-Venant; Johnson 1985, 2.5).
+    """
+    stressed, peak, planes = coarse.bodies[body - 1], coarse.source.peak, coarse.planes
+    field, frame = coarse.cycle.fields[body - 1], coarse.stage.face.frame
+    whole = field.body.depth("intrados")
+    assert whole == pytest.approx(1.0, abs=0.15)  # 11 mm over 11 elements
+    planes = Planes(coarse.planes.settings, coarse.stage.grid)
+    planes.depths = whole * np.array([0.05, 1.01, 2.0])
+    section = stressed.section(coarse.cycle, stressed.bulk(coarse.cycle), planes, peak)
+    heights = SIDE[body] * planes.depths
+    mesh = field.at(planes.points(heights), frame).reshape(section.shape)
+    error = np.abs(section - mesh) / np.abs(mesh).max()
+    inside = np.abs(planes.along) < 2.0  # two elements from the edges
+    assert error[..., 0].max() > 0.3
+    assert error[:, inside, 1].max() < 0.03
+    assert error[..., 1].max() < 0.15
+    assert error[..., 2].max() < 0.3 * error[..., 1].max() + 0.01
+
+
+def test_nothing_jumps_at_the_depth_of_an_element(coarse: Flank) -> None:
+    settings = coarse.planes.settings
+    for body, stressed in zip((1, 2), coarse.bodies, strict=True):
+        whole = coarse.cycle.fields[body - 1].body.depth("intrados")
+        planes = Planes(settings, coarse.stage.grid)
+        planes.depths = whole * np.array([1.0 - 1e-6, 1.0 + 1e-6])
+        peak, bulk = coarse.source.peak, stressed.bulk(coarse.cycle)
+        above, below = np.moveaxis(stressed.section(coarse.cycle, bulk, planes, peak), 2, 0)
+        assert np.nanmax(np.abs(above - below)) < 1e-4 * np.nanmax(np.abs(above))
+
+
+def test_increments_that_stick_balance_their_shear(coarse: Flank) -> None:
+    tractions, loads = coarse.cycle.tractions, coarse.cycle.loads.loads
+    assert coarse.stuck.max() > 0.5
+    assert not tractions.unknown.any()
+    sheared = tractions.shear.sum(axis=(2, 3)).T * coarse.stage.grid.cell_area
+    scale = FRICTION * loads.P.max()
+    for t in np.flatnonzero(coarse.stuck > 0.1):
+        np.testing.assert_allclose(sheared[:, t], [loads.Qx[t], loads.Qy[t]], atol=1e-9 * scale)
+    size = np.hypot(tractions.shear[:, 0], tractions.shear[:, 1])
+    assert np.all(size <= FRICTION * tractions.pressure * (1.0 + 1e-9))
+
+
+def test_unloaded_flanks_are_not_stressed(coarse: Flank) -> None:
+    """The last increment of the mission: nothing spins."""
+    for body in (1, 2):
+        history = coarse.history(body)
+        assert np.abs(history[-1]).max() < 1e-9 * np.abs(history).max()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("settings", "bounds"),
+    [
+        (("mesh.flank_nodes=[20, 34]",), (0.05, 0.06)),
+        (("mesh.flank_nodes=[40, 34]",), (0.025, 0.035)),
+    ],
+    ids=["20 nodes", "40 nodes"],
+)
+def test_a_fine_mesh_finds_the_same_next_to_the_face(settings, bounds) -> None:
+    """Tension along the face at 0.1 mm, where 320 nodes of order 2 (0.035 mm apart) resolve it.
+
+    Of the largest, but for two cells at either edge of the contact: between these, and on to 0.2 mm
+    from the corners of the flank. Half-spaces miss it by half.
+    """
+    depth = 0.1
+    fine, found = Flank.of("mesh.flank_nodes=[320, 34]", "mesh.order=2"), Flank.of(*settings)
+    x, pitch = found.stage.grid.x[:, 0], found.stage.grid.pitch[0]
+    peak, frame = found.source.peak, found.stage.face.frame
+    edges = x[found.cycle.tractions.pressure[peak, :, 0] > 0.0][[0, -1]]
+    beside = np.all(np.abs(x[:, None] - edges) > 2.5 * pitch, axis=1)
+    contact = beside & (x > edges[0]) & (x < edges[1])
+    places = contact, beside & (np.abs(x) < 5.3)
+    for body in (1, 2):
+        points = np.stack([x, 0.0 * x, np.full_like(x, SIDE[body] * depth)], axis=1)
+        right = fine.cycle.fields[body - 1].at(points, frame)[0]
+        stressed = found.bodies[body - 1]
+        known = np.ones(len(found.stuck), dtype=bool)
+        errors = []
+        for cycle in (found.cycle, bare(found.cycle)):
+            tension = stressed.history(cycle, stressed.bulk(cycle), depth, known)[peak, 0, :, 0]
+            error = np.abs(tension - right) / np.abs(right).max()
+            errors += [error[place].max() for place in places]
+        assert errors[0] < bounds[0]
+        assert errors[1] < bounds[1]
+        assert errors[2] > 0.4
+
+
+@pytest.mark.slow
+def test_where_it_sticks_it_is_as_with_friction_of_the_half_space() -> None:
+    """An independent method: shear below the resolution of the mesh is its own there.
+
+    Critical planes live from the extremes of a cycle, when the flank slides: 0.2 %.
+    """
+    nodes = Flank.of()
+    own = Flank.of("contact.method=full")
+    assert nodes.stuck.max() > 0.9
+    assert not own.stuck.any()
+    for body in (1, 2):
+        values = [
+            smith_watson_topper(flank.history(body), flank.bodies[0].material).value
+            for flank in (nodes, own)
+        ]
+        assert values[0].max() == pytest.approx(values[1].max(), rel=2e-3)
