@@ -4,8 +4,11 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
+from fe_models.elasticity import von_mises
+from fe_models.mesh import Body
 from fe_models.remesh import element_volumes
-from fe_models.stress import stress_state
+from fe_models.stress import StressField, cycle_stress, stress_state
+from sa_solver.types import Frame
 
 PEAK = 7
 
@@ -124,3 +127,53 @@ def test_neck_stress_is_pull_over_area(structure, dovetail, peak):
     mass = 4.43e-9 * volume[inside].sum()
     shank = 0.5 * amplitudes[0] * mass * 0.5 * (low + high)
     assert mean == pytest.approx((airfoil + shank) / area, rel=2e-2)
+
+
+def test_faces_move_over_a_cycle_as_the_bodies_do(structure, solved, symmetric, peak):
+    """In every increment as far apart as given, and at peak load as all nodes of either body."""
+    fields = solved(0.4, symmetric).fields()
+    force, relative = fields["force"], fields["displacement"]
+    cycle = cycle_stress(structure, force, relative, symmetric.amplitudes(), PEAK)
+    start = 0
+    for interface, (of_1, of_2) in zip(structure.mesh.interfaces, cycle.faces, strict=True):
+        nodes = slice(start, start + len(interface))
+        np.testing.assert_allclose(of_2 - of_1, relative[:, :, nodes], atol=1e-12)
+        for number, faces in ((1, of_1), (2, of_2)):
+            moved = peak[3][number - 1].displacement[interface.nodes(number)]
+            expected = interface.frame.components(moved).T
+            np.testing.assert_allclose(faces[PEAK], expected, atol=1e-9)
+        start += len(interface)
+    for field, alone in zip(cycle.fields, peak[3], strict=True):
+        np.testing.assert_allclose(field.stress, alone.stress, atol=1e-6 * alone.von_mises.max())
+
+
+@pytest.mark.parametrize("kind", ["MeshTet", "MeshTri"])
+def test_stress_at_points_is_linear_and_turned(kind):
+    """Tension along global X that grows along it, in a frame turned by 45° about Y."""
+    import skfem
+
+    mesh = getattr(skfem, kind)().refined(2)
+    body = Body("block", mesh)
+    stress = np.zeros((6, mesh.nvertices))
+    stress[0] = 10.0 + 4.0 * mesh.p[0]
+    field = StressField(body, np.zeros((mesh.nvertices, 3)), stress)
+    half = np.sqrt(0.5)
+    axes = np.array([[half, 0.0, half], [0.0, 1.0, 0.0], [-half, 0.0, half]])
+    frame = Frame(np.array([0.5, 0.5 if mesh.dim() == 3 else 0.0, 0.5]), axes)
+    along = np.array([0.0, 0.3, -0.4, 2.0])
+    found = field.at(np.stack([along, 0.0 * along, 0.0 * along], axis=1), frame)
+    size = 10.0 + 4.0 * (0.5 + along[:3] * half)
+    expected = np.zeros((6, 3))
+    expected[0], expected[2], expected[5] = 0.5 * size, 0.5 * size, -0.5 * size
+    np.testing.assert_allclose(found[:, :3], expected, atol=1e-12 * 10.0)
+    assert np.isnan(found[:, 3]).all()
+    np.testing.assert_allclose(von_mises(found[:, :3]), size)
+
+
+def test_depth_of_elements_is_their_height_over_the_face(structure):
+    """Three times its volume by the area of its face, of a tetrahedron."""
+    body, name = structure.mesh.body_1, structure.mesh.interfaces[0].name
+    areas = np.linalg.norm(body.outward(name), axis=1)
+    cells = body.mesh.f2t[0, body.mesh.boundaries[name]]
+    heights = 3.0 * np.abs(element_volumes(body.mesh))[cells] / areas
+    assert body.depth(name) == pytest.approx(np.median(heights))
