@@ -311,7 +311,7 @@ def _scaled(points: Array, region: Array) -> Array:
 def _derived(scaled: Array, degree: int, size: float, order: int) -> Array:
     """Derivatives ``(n, degree + 1)`` of Legendre's polynomials over a length of so much [mm]."""
     if order == 0:
-        return legvander(scaled, degree)
+        return np.asarray(legvander(scaled, degree), dtype=np.float64)
     if order > degree:
         return np.zeros((len(scaled), degree + 1))
     derived: Array = legvander(scaled, degree - order) @ legder(np.eye(degree + 1), order)

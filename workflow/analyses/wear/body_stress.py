@@ -44,7 +44,7 @@ class Planes:
 
     def row(self, places: Array) -> Array:
         """Those of the section ``(2, n, 1)`` of the places of cells ``(2, nx, ny)``."""
-        return places.take(self._row, axis=2 - self._along)[..., None]
+        return np.expand_dims(np.take(places, self._row, axis=2 - self._along), -1)
 
     def points(self, heights: Array) -> Array:
         """The section's points at such ``heights`` ``(k,)``, ``(n k, 3)`` in the frame [mm]."""
