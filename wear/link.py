@@ -165,9 +165,14 @@ class Link:
         return self.coefficients.shape[2] - 1, self.coefficients.shape[3] - 1
 
     @property
+    def residual(self) -> float:
+        """What the fit leaves, relative to the deflection of the half-spaces."""
+        return float(np.hypot(*self.quality[1:]))
+
+    @property
     def coarse(self) -> bool:
         """Whether the fit leaves more than may pass: pressures are wrong by as much."""
-        return bool(np.hypot(*self.quality[1:]) > LARGEST_RESIDUAL)
+        return self.residual > LARGEST_RESIDUAL
 
     @property
     def grainy(self) -> bool:

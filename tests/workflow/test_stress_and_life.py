@@ -1,6 +1,7 @@
 """Stress under the contacts of a wear run, and the fretting parameter: files, balance, symmetry."""
 
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import h5py
@@ -12,10 +13,16 @@ from sa_solver.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Grid, LoadHistory, Material
 from tests.marks import slow
 from tests.workflow.conftest import contents_of
+from wear.bulk_stress import BulkStress
 from wear.interface import CycleTractions
+from wear.link import Link
 from workflow.analyses.wear.body_stress import Planes
 from workflow.analyses.wear.case.sections import ContactStress, Life
-from workflow.analyses.wear.contact_stress import _report_stick, life_maps
+from workflow.analyses.wear.contact_stress import (
+    _report_carried,
+    _report_stick,
+    life_maps,
+)
 from workflow.shell.results import grid_of
 
 FLANKS = ("intrados", "extrados")
@@ -265,6 +272,21 @@ def test_shear_that_nobody_knows_is_warned_of(share: float, count: int) -> None:
         assert [line[:13] for line in heard.said] == (
             ["up to 30% of "] * more + ["stress.life l"] * count
         )
+
+
+@pytest.mark.parametrize(
+    ("fits", "told"),
+    [([0.01, 0.02], ""), ([0.01, 0.04], "known but for 4.0%"), ([0.01], "too few nodes")],
+)
+def test_what_is_not_known_of_the_structure_is_warned_of(fits: list[float], told: str) -> None:
+    links = [Link(np.zeros((1, 3, 2, 1)), np.zeros((2, 2)), np.array([0.3, q, 0.0])) for q in fits]
+    carried = [BulkStress(link, METAL, 1) for link in links]
+    moment = SimpleNamespace(carried=carried)
+    stress: Any = SimpleNamespace(name="a", bulk=len(fits) == 2, moments={"unworn": moment})
+    heard: Any = Warnings()
+    _report_carried(stress, heard)
+    assert len(heard.said) == bool(told)
+    assert all(told in line for line in heard.said)
 
 
 # --- settings -----------------------------------------------------------------------------------

@@ -18,6 +18,7 @@ from fe_models.elasticity import von_mises
 from sa_solver.subsurface import COMPONENTS
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Material
+from wear.bulk_stress import BulkStress
 from wear.interface import CycleTractions
 from wear.life import Ruiz, findley, ruiz, smith_watson_topper
 from workflow.analyses.wear.body_stress import Planes, StressedBody, StressedCycle
@@ -57,14 +58,19 @@ class BodyStress:
 class ContactMoment:
     """Both bodies under one contact, unworn or worn.
 
-    ``bulk`` says whether the stress that a structure carries past the contact is in theirs;
+    ``carried`` is what a structure carries past the contact, where it tells;
     ``left_out`` are the increments, counted from 0, whose shear is not known (see
     :class:`wear.interface.CycleTractions`) and that the maps do without.
     """
 
     bodies: tuple[BodyStress, BodyStress]
-    bulk: bool
+    carried: tuple[BulkStress, ...]
     left_out: np.ndarray
+
+    @property
+    def bulk(self) -> bool:
+        """Whether the stress that a structure carries past the contact is in that of both."""
+        return len(self.carried) == len(self.bodies)
 
 
 @dataclass(frozen=True)
@@ -171,12 +177,9 @@ def contact_stresses(
     unknown = [cycle.tractions.unknown for _, cycles in contacts for cycle in cycles]
     _report_stick(np.array(unknown), peak, reporter)
     stresses = [_interface_stress(case, peak, *contact) for contact in contacts]
-    for stress, (stage, cycles) in zip(stresses, contacts, strict=True):
-        if not stress.bulk and cycles[0].faces is not None:
-            reporter.warn(
-                f"{stage.name}: too few nodes near the contact to tell what the structure carries "
-                "past it: the stress under it is that of its tractions alone; refine the mesh there"
-            )
+    for stress, (_, cycles) in zip(stresses, contacts, strict=True):
+        if cycles[0].faces is not None:
+            _report_carried(stress, reporter)
     return stresses
 
 
@@ -205,17 +208,18 @@ def _moment(
 ) -> ContactMoment:
     known = cycle.tractions.unknown <= STUCK_SHARE
     bulks = [body.bulk(cycle) for body in bodies]
-    bulk = None not in bulks
     stresses = []
-    for body, carried in zip(bodies, bulks, strict=True):
+    for body, bulk in zip(bodies, bulks, strict=True):
         section, maps = None, {}
         if settings.section != "none":
-            section = body.section(cycle, carried, planes, peak)
+            section = body.section(cycle, bulk, planes, peak)
         if settings.life.parameter != "none" and known.any():
-            history = body.history(cycle, carried, settings.life.depth, known)
-            maps = life_maps(settings.life, history, body.material, cycle.tractions, known, bulk)
+            history = body.history(cycle, bulk, settings.life.depth, known)
+            told = cycle.tractions, known, bulk is not None
+            maps = life_maps(settings.life, history, body.material, *told)
         stresses.append(BodyStress(section, maps))
-    return ContactMoment((stresses[0], stresses[1]), bulk, np.flatnonzero(~known))
+    carried = tuple(filter(None, bulks))
+    return ContactMoment((stresses[0], stresses[1]), carried, np.flatnonzero(~known))
 
 
 def _whose(bulk: bool) -> str:
@@ -294,4 +298,22 @@ def _report_stick(unknown: Array, peak: int, reporter: Reporter) -> None:
         reporter.warn(
             f"stress.life leaves out the stress of {count} of {len(worst)} increments, in which up "
             f"to {worst.max():.0%} of the load sticks: {why}"
+        )
+
+
+def _report_carried(stress: InterfaceStress, reporter: Reporter) -> None:
+    """Warn where what a structure carries past a contact is not known, or not well."""
+    if not stress.bulk:
+        reporter.warn(
+            f"{stress.name}: too few nodes near the contact to tell what the structure carries "
+            "past it: the stress under it is that of its tractions alone; refine the mesh there"
+        )
+        return
+    fits = [carried.rest for moment in stress.moments.values() for carried in moment.carried]
+    if any(fit.coarse for fit in fits):
+        left = max(fit.residual for fit in fits)
+        reporter.warn(
+            f"{stress.name}: what the structure carries past the contact is known but for "
+            f"{left:.1%} of what half-spaces deform, and the stress under it may be wrong by as "
+            "much, twice towards the ends of the face; refine the mesh of the contact face"
         )
