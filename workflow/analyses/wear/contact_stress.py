@@ -123,7 +123,8 @@ class InterfaceStress:
             for number, body in enumerate(contact.bodies, start=1):
                 writer.put(f"{group}/{moment}/body_{number}", body.maps)
         life = self.planes.settings.life
-        writer.put(group, {}, parameter=life.parameter, depth=life.depth)
+        attributes = {"parameter": life.parameter, "depth": life.depth, "bulk_stress": self.bulk}
+        writer.put(group, {}, **attributes)
 
     def summary(self) -> dict[str, Any]:
         """Largest values, where they are, and worn over unworn, by body."""
@@ -178,7 +179,9 @@ def contact_stresses(
     _report_stick(np.array(unknown), peak, reporter)
     stresses = [_interface_stress(case, peak, *contact) for contact in contacts]
     for stress, (_, cycles) in zip(stresses, contacts, strict=True):
-        if cycles[0].faces is not None:
+        if cycles[0].faces is None:
+            reporter.log(f"{stress.name}: the stress under it is that of its tractions alone")
+        else:
             _report_carried(stress, reporter)
     return stresses
 

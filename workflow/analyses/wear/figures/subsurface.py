@@ -113,8 +113,9 @@ def fretting_life(file: h5py.File, contents: Contents) -> Figure:
     largest = changes({name: field.max(axis=(0, 2, 3)) for name, field in fields.items()}, ".3g")
     depth = TO_MICRONS * float(life["depth"])
     title = f"{symbol} [{unit}] {depth:.3g} µm below the surface: {largest}"
+    label = f"{symbol}{'' if life['bulk_stress'] else ' of the contact alone'} [{unit}]"
     draw = _curves if contents.line else _maps
-    return draw(title, f"{symbol} [{unit}]", fields, grids, contents.bodies)
+    return draw(title, label, fields, grids, contents.bodies)
 
 
 def _maps(
