@@ -175,6 +175,9 @@ def test_a_fine_mesh_finds_the_same_next_to_the_face(settings, bounds) -> None:
             tension = stressed.history(cycle, stressed.bulk(cycle), depth, known)[peak, 0, :, 0]
             error = np.abs(tension - right) / np.abs(right).max()
             errors += [error[place].max() for place in places]
+        bulk = stressed.bulk(found.cycle)
+        assert bulk is not None
+        assert errors[0] / 3.0 < bulk.rest.residual < 3.0 * errors[0]
         assert errors[0] < bounds[0]
         assert errors[1] < bounds[1]
         assert errors[2] > 0.4
