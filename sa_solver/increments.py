@@ -73,25 +73,30 @@ def dissipated(limit: Array, slip: Array) -> Array:
     return np.divide(work, size, out=np.zeros_like(work), where=size > 0.0)
 
 
-def error_of_sums(
+def errors_of_increments(
     pressure: Array, slip: Array, loaded: Mask, missions: Sequence[slice] = EVERY
 ) -> Array | None:
-    """Estimated error ``(...)`` of Σ (p_{t-1} + p_t)/2 |Δs_t| over ``slip`` ``(t, 2, ...)``.
+    """Estimated errors ``(t, ...)`` of the terms of Σ (p_{t-1} + p_t)/2 |Δs_t|.
 
-    What these sums are too large by, of three causes. Pressure over slip that bends: a third of
-    what two increments along one way change when they are taken as one (Richardson), half in each.
-    Slip that begins within an increment: a sixth of the change of pressure, the mean over all times
-    at which it may. Bodies that part: half of what the pressure before would do over the last slip.
+    ``slip`` ``(t, 2, ...)`` is that of the increments. What their terms are too large by, of three
+    causes. Pressure over slip that bends: a third of what two increments along one way change when
+    they are taken as one (Richardson), half in each. Slip that begins within an increment: a sixth
+    of the change of pressure, the mean over all times at which it may. Bodies that part: half of
+    what the pressure before would do over the slip that is left to close the cycle.
     None where no two increments go along one way: nothing then tells how pressure bends.
     """
-    error, known = np.zeros(pressure.shape[1:]), False
-    for mission in missions:
-        of_mission, pairs = _error(pressure[mission], slip[mission], loaded[mission])
-        error, known = error + of_mission, known or pairs
-    return error if known else None
+    parts = [_errors(pressure[mission], slip[mission], loaded[mission]) for mission in missions]
+    if not any(known for _, known in parts):
+        return None
+    return np.concatenate([errors for errors, _ in parts])
 
 
-def _error(pressure: Array, slip: Array, loaded: Mask) -> tuple[Array, bool]:
+def depth_and_energy(work: Array, areas: Array | float = 1.0) -> Array:
+    """Size ``(2,)`` of what ``work`` ``(n,)`` per area wears: root of squares, and the sum."""
+    return np.array([np.sqrt(np.sum(areas * work**2)), abs(np.sum(areas * work))])
+
+
+def _errors(pressure: Array, slip: Array, loaded: Mask) -> tuple[Array, bool]:
     """The same of one cycle, and whether two of its increments go along one way."""
     slip = in_rows(slip, loaded)
     size, p_last = np.hypot(slip[:, 0], slip[:, 1]), np.roll(pressure, 1, axis=0)
@@ -108,5 +113,6 @@ def _error(pressure: Array, slip: Array, loaded: Mask) -> tuple[Array, bool]:
     )
     bent = share / np.maximum(count, 1.0)
     begun = np.where(begins & (p_last > 0.0), -size * rise / 6.0, 0.0)
-    parted = in_rows(-0.5 * p_last * size_last, ~loaded & np.roll(loaded, 1))
-    return np.asarray(np.sum(bent + begun + parted, axis=0)), bool(pair.any())
+    closing = np.linalg.norm(slip.sum(axis=0), axis=0)
+    parted = in_rows(-0.5 * p_last * closing, ~loaded & np.roll(loaded, 1))
+    return np.asarray(bent + begun + parted), bool(pair.any())

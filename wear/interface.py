@@ -18,7 +18,12 @@ import numpy as np
 from sa_solver.contact import ContactState, FrictionalContact
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
-from sa_solver.increments import error_of_sums, friction_work, slip_of_states
+from sa_solver.increments import (
+    depth_and_energy,
+    errors_of_increments,
+    friction_work,
+    slip_of_states,
+)
 from sa_solver.normal import NormalContact
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Tilt
@@ -148,13 +153,11 @@ class CycleTractions:
         if not rubbed.any():
             return None
         limit = self.friction * often * self.pressure
-        error = error_of_sums(limit, self.slip, loads.P > 0.0, loads.missions)
-        if error is None:
+        errors = errors_of_increments(limit, self.slip, loads.P > 0.0, loads.missions)
+        if errors is None:
             return None
-        return {
-            "depth": float(np.sqrt(np.vdot(error, error) / np.vdot(rubbed, rubbed))),
-            "energy": abs(float(error.sum())) / float(rubbed.sum()),
-        }
+        depth, energy = depth_and_energy(errors.sum(axis=0)) / depth_and_energy(rubbed)
+        return {"depth": float(depth), "energy": float(energy)}
 
 
 @dataclass(frozen=True)

@@ -1,22 +1,21 @@
 """Fidelity by probes: what each axis decides, and that the whole is as accurate as asked for."""
 
 import json
-from math import ceil
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from workflow.analyses.wear import ANALYSIS
+from workflow.analyses.wear.case.base import MOST_INCREMENTS
 from workflow.analyses.wear.case.sections import Coupling, Step
+from workflow.analyses.wear.choice import Decision
 from workflow.analyses.wear.fidelity import axes, choosing
-from workflow.analyses.wear.fidelity.decision import Decision
 from workflow.analyses.wear.fidelity.estimate import estimate
 from workflow.analyses.wear.fidelity.probe import (
     STEPS,
     coupled_life,
     end_life,
-    increments,
     life,
     plane_section,
 )
@@ -89,47 +88,23 @@ def test_a_flank_that_hardly_wears_is_measured_by_a_share_of_the_other():
 # --- increments -----------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("count", "peak"), [(22, 8), (12, 5), (97, 31), (40, 10)])
-def test_peak_stays_at_its_place(case, count, peak):
-    path = changed(case, {"load_path.increments": count, "load_path.peak_at": peak})
-    for least in (2, 10, 100, 333):
-        entries = increments(path, least)
-        n, at = entries["load_path.increments"], entries["load_path.peak_at"]
-        assert n >= least
-        assert n * peak == at * count
-
-
-@pytest.mark.parametrize(("allowed", "more"), [(0.05, False), (0.02, True), (0.002, True)])
-def test_increments_follow_their_share(case, monkeypatch, allowed, more):
-    """Of a first-order error of 1 over the number, as many as it takes, in whole peaks."""
-    monkeypatch.setattr(axes, "life", lambda case: both(1.0 + 1.0 / case.load_path.increments))
-    decision = axes.choose_increments(case, allowed)
-    scale = 1.0 + 1.0 / decision.probe["increments"][-1]
-    assert decision.value == 11 * ceil(1.0 / (allowed * scale) / 11)
-    assert decision.also == {"load_path.peak_at": decision.value * 8 // 22}
-    assert decision.error == pytest.approx(1.0 / decision.value / scale, rel=1e-9)
-    assert (decision.value > 22) == more == ("more than the case's own 22" in decision.why)
-    assert decision.met
-
-
-def test_increments_end_somewhere_and_say_so(case, monkeypatch):
-    monkeypatch.setattr(axes, "life", lambda case: both(1.0 + 1.0 / case.load_path.increments))
-    decision = axes.choose_increments(case, 1e-5)
-    assert decision.value == 11 * ceil(axes.MOST_INCREMENTS / 11)
-    assert not decision.met
-    assert decision.error > 1e-5
+def test_increments_are_those_of_the_section(case):
+    """Whatever the case has: of legs that are auto it knows none to compare with."""
+    fixed = axes.choose_increments(in_space(case), 0.02)
+    auto = axes.choose_increments(changed(case, {"load_path.increments": "auto"}), 0.02)
+    assert auto.chosen == fixed.chosen
+    assert fixed.why.startswith(f"{auto.why}; the case's own 22 leave 0.")
 
 
 @pytest.mark.slow
 def test_lives_of_increments_are_of_second_order(case):
     """Doubled once more they change a quarter as much or less."""
-    decision = axes.choose_increments(case, 0.02)
-    counts, values = decision.probe["increments"], decision.probe["values"]
-    assert counts == [11, 22, 44]
-    finer = life(changed(plane_section(case), increments(case, 88)))
-    for flank, quantities in finer.items():
+    section = plane_section(case)
+    legs = [(4 * k, 7 * k) for k in (1, 2, 4, 8)]
+    values = [life(changed(section, case.divided(counts))) for counts in legs]
+    for flank, quantities in values[-1].items():
         for name, value in quantities.items():
-            last, before = values[-1][flank][name], values[-2][flank][name]
+            before, last = values[-3][flank][name], values[-2][flank][name]
             assert 0.1 < (value - last) / (last - before) < 0.3
 
 
@@ -266,7 +241,7 @@ def cheap_probes(monkeypatch):
 
     def known(case):
         mesh, grid = case.mesh.flank_nodes[0], case.contact.grid[0]
-        return both(1.0 + 1.0 / case.load_path.increments + 0.5 / mesh**2 + 2.0 / grid**2)
+        return both(1.0 + 0.5 / mesh**2 + 2.0 / grid**2)
 
     def plane(case):
         return Decision("structure.dimension", 2, "as in a probe", error=0.043)
@@ -316,12 +291,11 @@ def test_a_probe_that_fails_leaves_the_setting_and_says_so(plane_path, monkeypat
     monkeypatch.setattr(axes, "life", fail)
     case = load_case(plane_path, ["fidelity=auto", *COARSE])
     chosen, record = ANALYSIS.choose(case)
-    assert chosen.load_path == case.load_path
     assert chosen.mesh == case.mesh
     assert chosen.contact.grid == case.contact.grid
     assert chosen.coupling == case.coupling
     failed = [decision for decision in record["decisions"] if "no convergence" in decision["why"]]
-    assert len(failed) == 4
+    assert len(failed) == 3
     assert not record["met"]
 
 
@@ -365,7 +339,7 @@ FINEST = {
 }
 # Increments of the finest rungs: too many to run in a test. Two runs of fewer give their limit, by
 # their second order.
-FEW = 22
+FEW = 8, 14
 
 
 @pytest.mark.slow
@@ -381,19 +355,18 @@ def test_accuracy_is_met_at_half_the_cost_or_less(name, dovetail_path, tmp_path)
     finest = changed(plain, axes.choose_mesh(plain, 1e-9).chosen)
     finest = changed(finest, axes.choose_grid(finest, 1e-9).chosen | FINEST)
     coarse, fine = (
-        summary_of(changed(finest, increments(finest, count)), tmp_path / f"{count}")
-        for count in (FEW, 2 * FEW)
+        summary_of(changed(finest, finest.divided(legs)), tmp_path / f"{sum(legs)}")
+        for legs in (FEW, [2 * count for count in FEW])
     )
     limit = (4.0 * worn(fine) - worn(coarse)) / 3.0
-    most = axes.choose_increments(plain, 1e-9).value
-    cost = fine["work"]["convolutions"] * most / (2 * FEW)
+    cost = fine["work"]["convolutions"] * MOST_INCREMENTS / (2 * sum(FEW))
     chosen = []
     for accuracy in (0.05, 0.01):
         case = load_case(path, (*settings, "fidelity=auto", f"accuracy={accuracy}"))
         summary = summary_of(case, tmp_path / f"{accuracy}")
         assert np.max(np.abs(worn(summary) / limit - 1.0)) <= accuracy
         assert summary["work"]["convolutions"] <= 0.5 * cost
-        chosen.append(summary["fidelity"]["chosen"])
+        chosen.append(summary["choice"]["chosen"])
     looser, tighter = chosen
     assert looser["structure.dimension"] == tighter["structure.dimension"]
     assert looser["structure.dimension"] == plain.structure.dimension

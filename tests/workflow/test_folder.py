@@ -49,7 +49,7 @@ def test_claim_removes_only_what_the_earlier_run_wrote(case, folder):
         (folder.root / name).write_text("mine")
     (folder.root / ".results.h5.123.part.h5").write_text("old")
     (folder.jumps / ".00002.h5.123.part.h5").write_text("old")
-    (folder.jumps / "fidelity.json").write_text("{}")
+    (folder.jumps / "choice.json").write_text("{}")
     assert folder.claim(case, force=False, resumable=True) == []
     assert files(folder) == ["case.yaml", "jumps", "loops_mine.csv", "manifest.json", "notes.txt"]
 

@@ -127,11 +127,11 @@ def rewritten(folder):
 
 
 def chosen_otherwise(folder):
-    (folder / "jumps/fidelity.json").write_text("{}")
+    (folder / "jumps/choice.json").write_text("{}")
 
 
 def chosen_unreadably(folder):
-    (folder / "jumps/fidelity.json").write_bytes(b"\xff{")
+    (folder / "jumps/choice.json").write_bytes(b"\xff{")
 
 
 @pytest.mark.parametrize(
@@ -146,8 +146,8 @@ def chosen_unreadably(folder):
         (lost, "jumps/00001.h5", "missing"),
         (exchanged, "jumps/00001.h5", "damaged"),
         (rewritten, "jumps/00001.h5", "of another run than"),
-        (chosen_otherwise, "jumps/fidelity.json", "has changed since the run was begun"),
-        (chosen_unreadably, "jumps/fidelity.json", "damaged"),
+        (chosen_otherwise, "jumps/choice.json", "has changed since the run was begun"),
+        (chosen_unreadably, "jumps/choice.json", "damaged"),
     ],
 )
 def test_what_is_not_of_the_run_is_one_line_before_it_computes(

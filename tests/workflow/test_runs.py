@@ -303,7 +303,7 @@ def test_a_chosen_case_is_known_by_the_case_that_was_asked_for(wear, here, tmp_p
     job = Job("one", wear)
     (done,) = run_jobs([job], tmp_path / "out")
     folder = OutputFolder(done.folder)
-    record = {"fidelity": {"chosen": {"contact.grid": [32, 8]}}}
+    record = {"choice": {"chosen": {"contact.grid": [32, 8]}}}
     folder.finish(done.summary | record, provenance_of(folder, job.load()))
     asked = load_case(wear, ("contact.grid=[64, 16]",))
     assert kept_in(done.folder, asked) == "finished"

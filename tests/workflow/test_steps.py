@@ -19,7 +19,7 @@ from workflow.shell.packing import PackingError, packed, unpacked
 from workflow.shell.reporter import Reporter
 from workflow.shell.steps import RunSteps, kept_steps
 
-PROVENANCE = {"case": {"title": "steps"}, "input_files": {}, "fidelity": None}
+PROVENANCE = {"case": {"title": "steps"}, "input_files": {}, "choice": None}
 
 
 class CutOff(BaseException):

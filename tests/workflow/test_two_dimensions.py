@@ -366,11 +366,11 @@ def test_run_writes_what_was_chosen_and_why(plane_path, tmp_path):
     settings = "fidelity=auto", "structure.dimension=3", "accuracy=5 %", "wear.cycles=3e4"
     run = run_case(plane_path, tmp_path / "out", *settings, *COARSE, *QUIET)
     assert run.ending.exit_code == 0, run.ending.stderr
-    assert "fidelity: structure.dimension: 2: in a coarse probe" in run.ending.stderr
+    assert "chosen: structure.dimension: 2: in a coarse probe" in run.ending.stderr
     case = load_case(run.folder / "case.yaml")
     assert case.structure.dimension == 2
     assert dump_case(case) == (run.folder / "case.yaml").read_text("utf-8")
-    chosen = run.summary["fidelity"]
+    chosen = run.summary["choice"]
     assert chosen["chosen"] == {"structure.dimension": 2}
     assert chosen["seconds"] > 0.0
     assert "uniformity" not in run.summary["intrados"]
@@ -378,7 +378,7 @@ def test_run_writes_what_was_chosen_and_why(plane_path, tmp_path):
 
 def test_run_in_space_says_how_uniform_it_is(whole):
     """The small case: its ends are rounded gently, its middle is nearly a section."""
-    assert "fidelity" not in whole.summary
+    assert "choice" not in whole.summary
     for name in ("intrados", "extrados"):
         uniformity = Uniformity(**whole.summary[name]["uniformity"])
         assert uniformity.sentence(name) in whole.ending.stderr

@@ -10,10 +10,10 @@ import math
 import os
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path as Pathname
-from typing import Any, Self
+from typing import Any, Literal, Self, get_args
 
 from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler, ValidationInfo
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
@@ -22,6 +22,8 @@ from workflow.case import units
 
 DOTTED = r"[\w-]+(\.[\w-]+)*"
 NO_CONTEXT: Mapping[str, Any] = {}
+Auto = Literal["auto"]  # of an entry that is chosen before the run
+AUTO: Auto = "auto"
 LONGEST_SHOWN = 60  # of a wrong value in a message, which must stay one readable line
 
 
@@ -188,6 +190,27 @@ class Whole(Entry):
 
     def json_schema(self) -> dict[str, Any]:
         return {"type": "integer", "minimum": self.at_least, "maximum": self.at_most}
+
+
+class OrAuto:
+    """What annotates ``X | Auto``: a value X as annotated, or the word auto."""
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        def parse(value: object, chosen: Callable[[object], Any]) -> Any:
+            if isinstance(value, str) and value != AUTO:
+                message = f"{shown(value)}: not known; allowed: {AUTO}, or whole numbers"
+                raise PydanticCustomError("entry", "{message}", {"message": message})
+            return AUTO if value == AUTO else chosen(value)
+
+        inner = handler.generate_schema(get_args(source)[0])
+        return core_schema.no_info_wrap_validator_function(parse, inner)
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        return {"anyOf": [handler(schema), {"const": AUTO}]}
 
 
 @dataclass(frozen=True)

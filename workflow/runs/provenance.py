@@ -23,7 +23,7 @@ def provenance_of(folder: OutputFolder, case: Case) -> dict[str, Any]:
     return {
         "case": case_values(folder),
         "input_files": dict(sorted(files.items())),
-        "fidelity": folder.choice,
+        "choice": folder.choice,
     }
 
 

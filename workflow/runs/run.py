@@ -93,7 +93,7 @@ def _kept_and_damaged(root: Path, case: Case) -> tuple[Kept, str]:
         return "nothing", ""
     finished = folder.summary.exists()
     try:
-        record = folder.read_summary().get("fidelity") if finished else folder.choice
+        record = folder.read_summary().get("choice") if finished else folder.choice
     except UserError as error:
         damaged = str(error)
     # As a run of it was claimed, after its open settings had been chosen.

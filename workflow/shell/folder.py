@@ -38,7 +38,7 @@ TELLING = ("summary.json", "checkpoint.h5", "jumps")
 # Ending of what was there before under a name that a run asks for.
 ASIDE = ".aside"
 # Record of the settings that were chosen for a case, so that a resumed run knows it.
-CHOICE = "fidelity.json"
+CHOICE = "choice.json"
 # Entry of the summary by which a finished run is known to be as it was left; not of what is written
 # to later, or by what a run knows itself.
 DIGESTS = "digests"

@@ -23,7 +23,7 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
             "title": run.case.title,
             "assumed": list(run.case.assumed),
             **numbers,
-            **({"fidelity": run.choice} if run.choice else {}),
+            **({"choice": run.choice} if run.choice else {}),
             "warnings": reporter.warnings,
             "seconds": seconds,
             "versions": versions(),

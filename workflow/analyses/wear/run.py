@@ -12,13 +12,13 @@ from wear.interface import CycleTractions, FirstContact, MotionError
 from wear.stepping import ContactFailure
 from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.choice import report_choice
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.contact_workers import (
     ContactProcesses,
     StagedContacts,
     contact_workers,
 )
-from workflow.analyses.wear.fidelity.choosing import report_choice
 from workflow.analyses.wear.load_source import ContactFace, LoadSource
 from workflow.analyses.wear.nodal_contacts import NodalContacts
 from workflow.analyses.wear.outcome import InterfaceOutcome, Outcome
@@ -47,7 +47,8 @@ RECORDS = 10
 def run_wear(run: Run[WearCase]) -> None:
     """Run a wear case to its end, from its last whole jump if it is to resume."""
     folder = run.folder
-    report_choice(run.choice, run.reporter)
+    if not run.resume:  # else it has been told
+        report_choice(run.choice, run.reporter)
     try:
         write_output(_compute(run), run)
     except (ContactFailure, NormalContactError, MethodFailed) as error:

@@ -206,6 +206,11 @@ class StructureStage:
         """The closed cycle from rest with unworn faces, of all missions one after the other."""
         return self._mixed(self._unworn_missions)
 
+    def cycle_under(self, missions: Sequence[MissionLoads]) -> CycleSolution:
+        """The same under other missions, whose load cases are those of the model."""
+        cycles = list(map(self._unworn_mission, missions))
+        return mixed(cycles, [mission.share for mission in missions])
+
     @cached_property
     def _unworn_missions(self) -> tuple[CycleSolution, ...]:
         return tuple(map(self._unworn_mission, self.model.missions))

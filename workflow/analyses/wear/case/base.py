@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import ClassVar, Literal
+from collections.abc import Sequence
+from math import ceil, sqrt
+from typing import Any, ClassVar, Literal
 
 from pydantic import model_validator
 
@@ -25,8 +27,11 @@ from workflow.case.sections import Case, Section, Title, disagreement, entry
 # What the summary and the results call their own entries.
 RESERVED = (
     *("title", "assumed", "per_length", "cycles", "jumps", "work", "structure", "kinetics"),
-    *("warnings", "seconds", "versions", "fidelity"),
+    *("warnings", "seconds", "versions", "choice"),
 )
+# Of increments that are auto: those of a leg that leave 1 %, more or less, for seven dovetails, and
+# the most of a cycle that are ever chosen.
+EXPECTED_INCREMENTS, MOST_INCREMENTS = 11, 1000
 
 
 def check_interface_name(name: str, key: str) -> None:
@@ -134,6 +139,32 @@ class FiniteElementCase(WearCase):
 
     nonlinearity: Nonlinearity = entry("geometric, of the structure", default=Nonlinearity())
     coupling: Coupling = entry("worn surfaces back to the structure", default=Coupling())
+
+    @property
+    @abstractmethod
+    def legs(self) -> tuple[int, ...]:
+        """Increments of each leg of a cycle; 0 where they are auto."""
+
+    @abstractmethod
+    def divided(self, legs: Sequence[int]) -> dict[str, Any]:
+        """Entries for so many increments in each leg of a cycle."""
+
+    @property
+    def expected_legs(self) -> tuple[int, ...]:
+        """Increments of each leg; where they are auto about as many as will be chosen."""
+        each = ceil(EXPECTED_INCREMENTS * sqrt(0.01 / self.wear.tolerance))
+        return tuple(count or each for count in self.legs)
+
+    @property
+    def increments_outline(self) -> str:
+        """How many increments a cycle has, in words."""
+        count = sum(self.expected_legs)
+        if any(self.legs):
+            return f"{count} increments"
+        return (
+            f"as many increments as leave {100 * self.wear.tolerance:g} % of depth, about "
+            f"{min(count, MOST_INCREMENTS)} and at most {MOST_INCREMENTS}"
+        )
 
     @property
     def recoupling(self) -> Coupling:

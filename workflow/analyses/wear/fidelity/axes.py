@@ -9,28 +9,25 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import partial
-from math import ceil
 from typing import Any
 
 from workflow.analyses.wear.budget.lives import STEPS
 from workflow.analyses.wear.case.sections import SIZES
-from workflow.analyses.wear.fidelity.decision import Axis, Decision
+from workflow.analyses.wear.choice import Decision
 from workflow.analyses.wear.fidelity.estimate import Numbers, estimate
 from workflow.analyses.wear.fidelity.probe import (
-    INCREMENTS,
     coupled_life,
     end_life,
-    increments,
     life,
     plane_section,
 )
+from workflow.analyses.wear.increments import decide_increments
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
+from workflow.analyses.wear.structures.dovetail.model import DovetailModel
 from workflow.case.changing import changed
 
-# What increments, meshes and grids are of at most.
+# What meshes and grids are of at most.
 ORDER = 2.0
-# Doublings of the fewest increments that are probed, and the most that are ever chosen.
-DOUBLINGS, MOST_INCREMENTS = 2, 1500
 # Elements across a flank: fewer say nothing, and so many take seconds to condense in the plane.
 # In space the time grows with the fourth power: a mesh is never made finer than the case has it.
 FEWEST_ELEMENTS, MOST_ELEMENTS = 7, 160
@@ -54,29 +51,24 @@ LEAST_DRIFT = 1e-4
 ROUNDING = 1e-9
 
 
+@dataclass(frozen=True)
+class Axis:
+    """An approximation: its main ``entry``, its ``share`` of the accuracy, and who decides.
+
+    ``decide`` is given the case as the axes before it left it, and the error that it may make.
+    """
+
+    entry: str
+    share: float
+    decide: Callable[[DovetailCase, float], Decision]
+
+
 # --- increments -----------------------------------------------------------------------------------
 
 
 def choose_increments(case: DovetailCase, allowed: float) -> Decision:
-    """As many increments as Richardson asks for, from three lives with doubled increments."""
-    section = plane_section(case)
-    first = increments(case, INCREMENTS)["load_path.increments"]
-    counts = [first * 2**k for k in range(DOUBLINGS + 1)]
-    values = [life(changed(section, increments(case, count))) for count in counts]
-    estimated = estimate(values, [1.0 / count for count in counts], ORDER)
-    needed = max(first, ceil(counts[-1] * estimated.refinement(allowed) * (1.0 - ROUNDING)))
-    settings = increments(case, min(needed, MOST_INCREMENTS))
-    count = settings["load_path.increments"]
-    error, as_written = (
-        estimated.beyond(n / counts[-1]) for n in (count, case.load_path.increments)
-    )
-    more = "more than" if count > case.load_path.increments else "against"
-    why = (
-        f"{error:.2%} of {allowed:.2%} allowed; {more} the case's own "
-        f"{case.load_path.increments}, which leave {as_written:.2%}"
-    )
-    probe = {"increments": counts, "values": values, "errors": estimated.errors, "own": as_written}
-    return _decision(settings, why, probe, allowed, error)
+    """As many increments as the cycle of the section asks for."""
+    return decide_increments(case, DovetailModel.in_plane, allowed)
 
 
 # --- ladders of meshes and grids ------------------------------------------------------------------

@@ -6,7 +6,7 @@ from math import ceil
 
 from fe_models.mesh import MeshError
 from fe_models.transfer import FaceTransfer
-from workflow.analyses.wear.fidelity.decision import Decision
+from workflow.analyses.wear.choice import Decision
 from workflow.analyses.wear.fidelity.estimate import Numbers, scales
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase

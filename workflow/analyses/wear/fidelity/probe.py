@@ -8,7 +8,6 @@ so that their error, some per cent of the depth, is nearly the same in all and l
 from __future__ import annotations
 
 from functools import lru_cache
-from math import ceil, gcd
 
 import numpy as np
 
@@ -30,8 +29,8 @@ from workflow.case.changing import changed
 from workflow.errors import MethodFailed
 
 # Settings of a probe along the axes that it does not vary: strips across a flank, nodes across it,
-# and increments of the cycle at least. Differences along one axis hardly depend on the others.
-STRIPS, NODES, INCREMENTS = 64, 10, 10
+# and increments to the peak and after it. Differences along one axis hardly depend on the others.
+STRIPS, NODES, LEGS = 64, 10, (4, 7)
 
 
 def plane_section(case: DovetailCase) -> DovetailCase:
@@ -46,18 +45,9 @@ def plane_section(case: DovetailCase) -> DovetailCase:
             "contact.grid": (STRIPS, STRIPS),
             "contact.method": "normal",
             "wear.motion": "neglect",
-            **increments(case, INCREMENTS),
+            **case.divided(LEGS),
         },
     )
-
-
-def increments(case: DovetailCase, least: int) -> dict[str, int]:
-    """Entries of the load path for so many increments or a few more, their peak at its place."""
-    path = case.load_path
-    unit = path.increments // gcd(path.increments, path.peak_at)
-    count = unit * ceil(least / unit)
-    peak = count * path.peak_at // path.increments
-    return {"load_path.increments": count, "load_path.peak_at": peak}
 
 
 def _structure(case: DovetailCase) -> StructureStage:

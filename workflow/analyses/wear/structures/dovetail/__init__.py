@@ -36,16 +36,16 @@ def _memory(case: DovetailCase, nodes: int = 0, interface_nodes: int = 0) -> Mem
     kept = SPECTRA
     if case.structure.dimension == 3:
         interface_nodes = 2 * prod(case.mesh.flank_nodes)
-        kept = 2 * len(case.load_path.shares) * case.load_path.increments * FIELDS
+        kept = 2 * len(case.load_path.shares) * sum(case.expected_legs) * FIELDS
     remedy = "lower mesh.flank_nodes, mesh.order or contact.grid, or raise mesh.size"
     return memory(case, nodes, interface_nodes, kept, remedy)
 
 
 def _extent(case: DovetailCase) -> Extent:
     """In space the nodes grow from the flanks into both bodies."""
-    (across, along), path = case.mesh.flank_nodes, case.load_path
+    across, along = case.mesh.flank_nodes
     structure, faces = case.structure, 2
-    increments = len(path.shares) * path.increments
+    increments = len(case.load_path.shares) * sum(case.expected_legs)
     if structure.dimension == 2:
         return Extent(increments, faces, 0.0, faces * across, dissipating=DISSIPATING)
     sector = 2.0 * pi * structure.rim_radius / structure.blades * structure.disk_height
@@ -58,11 +58,16 @@ def _extent(case: DovetailCase) -> Extent:
 
 
 def _choose(case: DovetailCase) -> tuple[DovetailCase, dict[str, Any] | None]:
-    if case.fidelity == "fixed":
-        return case, None
-    from workflow.analyses.wear.fidelity.choosing import choose
+    if case.fidelity == "auto":
+        from workflow.analyses.wear.fidelity.choosing import choose
 
-    return choose(case)
+        return choose(case)
+    if any(case.legs):
+        return case, None
+    from workflow.analyses.wear.increments import choose_increments
+    from workflow.analyses.wear.structures.dovetail.model import DovetailModel
+
+    return choose_increments(case, DovetailModel.in_plane)
 
 
 def _warnings(case: DovetailCase, stage: ContactStage, load: float) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from math import cos, pi, radians, sin, tan
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
@@ -16,7 +17,7 @@ from workflow.analyses.wear.case.sections import (
     Share,
     check_shares,
 )
-from workflow.case.fields import Quantity, Whole
+from workflow.case.fields import AUTO, Auto, OrAuto, Quantity, Whole
 from workflow.case.sections import Length, RoundingRadius, Section, disagreement, entry
 
 if TYPE_CHECKING:
@@ -166,8 +167,12 @@ class LoadPath(Section):
     Centrifugal force and aerodynamic moment follow the square of the speed.
     """
 
-    increments: Annotated[int, Whole(2, 10_000)] = entry("of one cycle", 22)
-    peak_at: Annotated[int, Whole(1, 10_000)] = entry("increment at which the speed peaks", 8)
+    increments: Annotated[Annotated[int, Whole(2, 10_000)] | Auto, OrAuto()] = entry(
+        "of one cycle; auto: peak_at too, as many as leave no more than wear.tolerance", 22
+    )
+    peak_at: Annotated[int, Whole(1, 10_000)] | None = entry(
+        "increment at which the speed peaks; not needed where increments are auto", 8, default=None
+    )
     rotation_speed: RotationSpeed = entry("at the peak [rad/s]", "6000 rpm")
     airfoil_mass: Mass = entry("of the blade outside the model [t]", "0.8 kg")
     airfoil_radius: Length = entry(
@@ -204,8 +209,19 @@ class LoadPath(Section):
         peaks = [(m["rotation_speed"], abs(m["aerodynamic_moment"])) for m in self.missions()]
         return peaks.index(max(peaks))
 
+    @property
+    def legs(self) -> tuple[int, int]:
+        """Increments up to the peak and after it, once they are chosen."""
+        assert isinstance(self.increments, int)
+        assert self.peak_at is not None
+        return self.peak_at, self.increments - self.peak_at
+
     @model_validator(mode="after")
     def _peak_inside_cycle(self) -> LoadPath:
+        if not isinstance(self.increments, int):
+            return self
+        if self.peak_at is None:
+            raise disagreement("missing; allowed: increment at which the speed peaks", "peak_at")
         if self.peak_at >= self.increments:
             raise disagreement(
                 f"{self.peak_at}: the peak comes after the cycle; "
@@ -242,13 +258,22 @@ class DovetailCase(FiniteElementCase):
         default="fixed",
     )
 
+    @property
+    def legs(self) -> tuple[int, ...]:
+        return (0, 0) if self.load_path.increments == AUTO else self.load_path.legs
+
+    def divided(self, legs: Sequence[int]) -> dict[str, Any]:
+        up, down = legs
+        return {"load_path.increments": up + down, "load_path.peak_at": up}
+
     def loads_outline(self) -> list[tuple[str, str]]:
         path, (across, along) = self.load_path, self.mesh.flank_nodes
         nodes = f"{across} x {along}" if self.structure.dimension == 3 else f"{across}"
         missions = f", {len(path.mix)} missions" if path.mix else ""
+        peak = f", peak at {path.peak_at}" if any(self.legs) else ""
         rows = [
             ("structure", f"dovetail in {self.structure.dimension}-D, {nodes} nodes on a flank"),
-            ("load path", f"{path.increments} increments, peak at {path.peak_at}{missions}"),
+            ("load path", f"{self.increments_outline}{peak}{missions}"),
         ]
         if self.fidelity == "auto":
             by_probes = f"2-D or 3-D and how fine, by probes: {100 * self.accuracy:g} %"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import partial
+from typing import Self
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from fe_models.structure import Structure
 from workflow.analyses.wear.load_source import ContactFace
 from workflow.analyses.wear.structure_stage import MissionLoads
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
+from workflow.case.changing import changed
 from workflow.shell.reporter import Reporter
 
 # The flank at X > 0 and the one at X < 0.
@@ -29,9 +31,14 @@ class DovetailModel:
         heaviest = case.load_path.heaviest
         self._mission = self._missions[heaviest]
         self.friction = case.friction.at(0.0)
-        self.peak = heaviest * case.load_path.increments + case.load_path.peak_at - 1
+        self.peak = heaviest * sum(case.legs) + case.legs[0] - 1
         self.nonlinearity = case.nonlinearity
         self.order = case.mesh.order
+
+    @classmethod
+    def in_plane(cls, case: DovetailCase) -> Self:
+        """The section of a case in plane strain, under the same missions."""
+        return cls(changed(case, {"structure.dimension": 2, "structure.skew": 0.0}))
 
     @property
     def key(self) -> tuple[object, ...]:

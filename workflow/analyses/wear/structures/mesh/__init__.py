@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
-from workflow.analyses.wear.structure import SETTINGS, WearStructure
+from workflow.analyses.wear.structure import SETTINGS, WearStructure, memory
 from workflow.analyses.wear.structures.mesh.case import MeshCase
+from workflow.errors import UserError
 
 if TYPE_CHECKING:
     from workflow.analyses.wear.budget.companions import Companions
@@ -23,10 +24,9 @@ def _source(case: MeshCase) -> LoadSource:
 
 def _extent(case: MeshCase) -> Extent:
     """As the file has it, which a check reads anyway."""
-    mesh, path = case.structure.mesh(), case.load_path
-    cycles = max(1, len(path.mix))
+    mesh, cycles = case.structure.mesh(), max(1, len(case.load_path.mix))
     return Extent(
-        cycles * sum(path.increments[path.cycle_from - 1 :]),
+        cycles * sum(case.expected_legs),
         len(mesh.interfaces),
         mesh.body_1.mesh.nvertices + mesh.body_2.mesh.nvertices,
         sum(len(interface) for interface in mesh.interfaces),
@@ -40,11 +40,27 @@ def _companions(case: MeshCase) -> Companions[MeshCase]:
     return companions(case)
 
 
+def _choose(case: MeshCase) -> tuple[MeshCase, dict[str, Any] | None]:
+    if any(case.legs):
+        return case, None
+    from fe_models.mesh import MeshError
+    from workflow.analyses.wear.increments import choose_increments
+    from workflow.analyses.wear.structures.mesh.model import MeshModel
+
+    extent = _extent(case)
+    memory(case, int(extent.nodes), int(extent.interface_nodes)).check()
+    try:
+        return choose_increments(case, MeshModel)
+    except MeshError as error:
+        raise UserError(f"structure: {error}") from error
+
+
 STRUCTURE = WearStructure(
     name="mesh",
     case=MeshCase,
     source=_source,
     extent=_extent,
+    choose=_choose,
     companions=_companions,
     settings=SETTINGS | {"mesh": "structure.order or a finer mesh"},
 )

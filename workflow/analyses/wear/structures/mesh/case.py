@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from pydantic import model_validator
@@ -27,7 +27,7 @@ from workflow.analyses.wear.structures.mesh.loads import (
     Load,
     Name,
 )
-from workflow.case.fields import File, Whole
+from workflow.case.fields import AUTO, Auto, File, OrAuto, Whole
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 if TYPE_CHECKING:
@@ -181,7 +181,9 @@ class CycleOfMix(Section):
 class Legs(Section):
     """Every load goes linearly from leg to leg; the last legs are one cycle."""
 
-    increments: tuple[Annotated[int, Whole(1, 10_000)], ...] = entry("of each leg", [8, 14])
+    increments: Annotated[tuple[Annotated[int, Whole(1, 10_000)], ...] | Auto, OrAuto()] = entry(
+        "of each leg; auto: as many as leave no more than wear.tolerance", [8, 14]
+    )
     cycle_from: Annotated[int, Whole(1, 1000)] = entry(
         "first leg of the cycle; those before it are passed once", 1, default=1
     )
@@ -194,18 +196,18 @@ class Legs(Section):
     )
 
     @model_validator(mode="after")
-    def _peak_is_a_leg(self) -> Legs:
+    def _are_some(self) -> Legs:
         if not self.increments:
             raise disagreement("none; allowed: one or more", "increments")
         if self.mix:
             check_shares([cycle.share for cycle in self.mix])
-        if not self.cycle_from <= self.peak_leg <= len(self.increments):
-            raise disagreement(
-                f"{self.peak_leg}: no leg of the cycle; "
-                f"allowed: {self.cycle_from} to {len(self.increments)}",
-                *("peak_leg", "cycle_from"),
-            )
         return self
+
+    @property
+    def legs(self) -> tuple[int, ...]:
+        """Increments of all legs, once they are chosen."""
+        assert isinstance(self.increments, tuple)
+        return self.increments
 
     def mixed(self, loads: int) -> list[tuple[tuple[float, ...], float]]:
         """Factors of all ``loads``, so many, and share of every cycle."""
@@ -225,25 +227,43 @@ class MeshCase(FiniteElementCase):
     def cores(self) -> int:
         return len(self.structure.contacts)
 
+    @property
+    def legs(self) -> tuple[int, ...]:
+        before = self.load_path.cycle_from - 1
+        if self.load_path.increments == AUTO:
+            return (0,) * (len(self.structure.loads[0].path) - before)
+        return self.load_path.legs[before:]
+
+    def divided(self, legs: Sequence[int]) -> dict[str, Any]:
+        """Of legs before the cycle, which are passed once, each has as many as the finest."""
+        before = (max(legs),) * (self.load_path.cycle_from - 1)
+        return {"load_path.increments": (*before, *legs)}
+
     def loads_outline(self) -> list[tuple[str, str]]:
-        structure, legs = self.structure, self.load_path.increments
-        cycles = f", {len(self.load_path.mix)} cycles mixed" if self.load_path.mix else ""
+        structure, path = self.structure, self.load_path
+        cycles = f", {len(path.mix)} cycles mixed" if path.mix else ""
+        before = f", those before it in {path.cycle_from - 1} legs" if path.cycle_from > 1 else ""
         mesh = structure.mesh()
         bodies = [f"{b.name} of {b.mesh.nvertices} nodes" for b in (mesh.body_1, mesh.body_2)]
         return [
             ("structure", f"{Path(structure.file).name}: {' and '.join(bodies)}"),
             *(("face", _outline_of(interface)) for interface in mesh.interfaces),
-            ("load path", f"{sum(legs)} increments in {len(legs)} legs{cycles}"),
+            ("load path", f"{self.increments_outline} in {len(self.legs)} legs{before}{cycles}"),
         ]
 
     @model_validator(mode="after")
     def _paths_fit_legs(self) -> MeshCase:
-        legs = len(self.load_path.increments)
+        path = self.load_path
+        legs = len(self.structure.loads[0].path if path.increments == AUTO else path.increments)
+        if not path.cycle_from <= path.peak_leg <= legs:
+            raise disagreement(
+                f"{path.peak_leg}: no leg of the cycle; allowed: {path.cycle_from} to {legs}",
+                *("load_path.peak_leg", "load_path.cycle_from"),
+            )
         for index, load in enumerate(self.structure.loads):
             if len(load.path) != legs:
                 raise disagreement(
-                    f"{len(load.path)} factors for {legs} legs of load_path; "
-                    "allowed: one for each leg",
+                    f"{len(load.path)} factors for {legs} legs; allowed: one for each leg",
                     f"structure.loads.{index}.path",
                 )
         loads = len(self.structure.loads)

@@ -35,8 +35,8 @@ class MeshModel:
         self.nonlinearity = case.nonlinearity
         self.order = case.structure.order
         path = case.load_path
-        self._increments_before = sum(path.increments[: path.cycle_from - 1])
-        self.peak = sum(path.increments[: path.peak_leg]) - 1 - self._increments_before
+        self._increments_before = sum(path.legs[: path.cycle_from - 1])
+        self.peak = sum(path.legs[: path.peak_leg]) - 1 - self._increments_before
 
     @property
     def key(self) -> tuple[object, ...]:
@@ -57,7 +57,7 @@ class MeshModel:
 
     def _path(self, factors: tuple[float, ...]) -> Array:
         """Amplitudes of the loads, ``(t, loads)``; squared where a load is a rotation."""
-        legs, loads = self._case.load_path.increments, self._case.structure.loads
+        legs, loads = self._case.load_path.legs, self._case.structure.loads
         ends = np.insert(np.cumsum(legs), 0, 0)
         steps = np.arange(1, ends[-1] + 1)
         columns = [

@@ -1,0 +1,178 @@
+"""As many increments of a structure's cycle as an error asks for (``load_path.increments: auto``).
+
+The structure's own cycle is solved, unworn, in few increments, and what each leg of them leaves of
+worn depth and energy is estimated (:func:`sa_solver.increments.errors_of_increments`). That is of
+second order: a leg of n increments leaves c/n². The fewest in all, Σ n, of a given Σ c/n² have n in
+proportion to the cubic root of c, so that legs along which much slips under pressures that bend
+get the most. Twice as many then say what these leave indeed (Richardson): where a front of slip
+passes node by node the estimate from one cycle is too low, by up to five on dovetails.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from itertools import pairwise
+from math import ceil, inf, sqrt
+from typing import Any, Generic, TypeVar
+
+import numpy as np
+
+from fe_models.structure import InterfaceHistory
+from sa_solver.increments import depth_and_energy, errors_of_increments, friction_work
+from sa_solver.types import Array, Mask
+from workflow.analyses.wear.case.base import MOST_INCREMENTS, FiniteElementCase
+from workflow.analyses.wear.choice import Decision, record_of, since
+from workflow.analyses.wear.fidelity.estimate import LESSER_FLANK
+from workflow.analyses.wear.structure_stage import StructureModel, StructureStage
+from workflow.case.changing import changed
+from workflow.errors import MethodFailed
+
+ENTRY = "load_path.increments"
+# Of a leg: two leave 6 % of the depth of a dovetail and are estimated to leave 0.2 %, since what
+# bends within an increment is seen by its neighbours.
+FEWEST = 4
+# Each try that is not the first is so much finer than the one before it, at least and at most.
+FINER, FINEST = 1.2, 2.0
+# Where something rubs, and nothing tells how pressures bend over slip.
+UNKNOWN = inf
+
+Counts = tuple[int, ...]
+Histories = Sequence[InterfaceHistory]
+AnyCase = TypeVar("AnyCase", bound=FiniteElementCase)
+
+
+def choose_increments(
+    case: AnyCase, model: Callable[[AnyCase], StructureModel]
+) -> tuple[AnyCase, dict[str, Any]]:
+    """The case with as many increments as leave ``wear.tolerance``, and a record of why.
+
+    ``model`` makes a structure of such a case. Raises what that raises.
+    """
+    begin, allowed = time.perf_counter(), case.wear.tolerance
+    decision = decide_increments(case, model, allowed)
+    seconds = since(begin)
+    record = record_of([replace(decision, seconds=seconds)], allowed, seconds)
+    return changed(case, decision.chosen), record
+
+
+def decide_increments(
+    case: AnyCase, model: Callable[[AnyCase], StructureModel], allowed: float
+) -> Decision:
+    """As many increments as leave no more than ``allowed`` of depth and energy, if there are."""
+    cycle = _Cycle(case, model)
+    counts = cycle.expected(allowed)
+    tried = [(counts, cycle.error(counts))]
+    while tried[-1][1] > allowed and sum(counts) < MOST_INCREMENTS:
+        factor = min(max(sqrt(tried[-1][1] / allowed), FINER), FINEST)
+        counts = _capped([ceil(factor * count) for count in counts])
+        tried.append((counts, cycle.error(counts)))
+    error, settings = tried[-1][1], case.divided(counts)
+    met = error <= allowed
+    why = (
+        f"{' + '.join(map(str, counts))} in the legs of a cycle leave {error:.2%} of "
+        f"{allowed:.2%} allowed{'' if met else ', the most that are offered'}"
+    )
+    if any(case.legs):
+        why += f"; the case's own {sum(case.legs)} leave {cycle.error(case.legs):.2%}"
+    probe = {"legs": [legs for legs, _ in tried], "errors": [left for _, left in tried]}
+    also = {entry: value for entry, value in settings.items() if entry != ENTRY}
+    return Decision(ENTRY, settings[ENTRY], why, probe, also, allowed, error, met)
+
+
+class _Cycle(Generic[AnyCase]):
+    """The unworn cycle of a structure in any number of increments."""
+
+    def __init__(self, case: AnyCase, model: Callable[[AnyCase], StructureModel]) -> None:
+        self._case, self._model, self._few = case, model, (FEWEST,) * len(case.legs)
+        self._stage = StructureStage(self._of(self._few))
+
+    def _of(self, counts: Counts) -> StructureModel:
+        return self._model(changed(self._case, self._case.divided(counts)))
+
+    def _solved(self, counts: Counts) -> Histories | None:
+        """What all faces do, None where so few increments do not converge; MethodFailed of many."""
+        try:
+            return self._stage.cycle_under(self._of(counts).missions).histories
+        except MethodFailed:
+            if sum(counts) >= MOST_INCREMENTS:
+                raise
+            return None
+
+    def expected(self, allowed: float) -> Counts:
+        """The fewest increments of each leg that are estimated, by cycles of few, to be enough."""
+        counts = self._few
+        while sum(counts) < MOST_INCREMENTS:
+            histories = self._solved(counts)
+            left = None if histories is None else left_by_legs(histories, counts)
+            if left is not None:
+                weights = [(error * n**2) ** (1 / 3) for error, n in zip(left, counts, strict=True)]
+                needed = [ceil(weight * sqrt(sum(weights) / allowed)) for weight in weights]
+                return _capped([max(FEWEST, count) for count in needed])
+            counts = _capped([2 * count for count in counts])
+        return counts
+
+    def error(self, counts: Counts) -> float:
+        """What so many increments leave, by as many again."""
+        coarse, fine = self._solved(counts), self._solved(tuple(2 * count for count in counts))
+        if coarse is None or fine is None:
+            return UNKNOWN
+        return 4.0 / 3.0 * difference(coarse, fine)
+
+
+def _capped(counts: Sequence[int]) -> Counts:
+    """No more than the most in all."""
+    share = min(1.0, MOST_INCREMENTS / sum(counts))
+    return tuple(max(1, ceil(share * count)) for count in counts)
+
+
+def left_by_legs(histories: Histories, counts: Counts) -> list[float] | None:
+    """Estimates of what a cycle of so many increments in each leg leaves, by leg; None: unknown.
+
+    Relative to depth and energy of a face, or to a share of another's that is rubbed much more.
+    """
+    works = [_work(history).sum(axis=0) for history in histories]
+    ends, left = np.cumsum((0, *counts)), np.zeros(len(counts))
+    for history, work, scale in zip(histories, works, _scales(histories, works), strict=True):
+        if not work.any():
+            continue
+        errors = errors_of_increments(*_rubbing(history))
+        if errors is None:
+            return None
+        of_cycle = errors.reshape(-1, ends[-1], errors.shape[1]).sum(axis=0)
+        parts = [of_cycle[begin:end].sum(axis=0) for begin, end in pairwise(ends)]
+        left = np.maximum(left, [np.max(_size(history, part) / scale) for part in parts])
+    return [float(error) for error in left]
+
+
+def difference(coarse: Histories, fine: Histories) -> float:
+    """Largest relative difference of what two cycles wear: depth or energy, of any face."""
+    works = [_work(history).sum(axis=0) for history in fine]
+    largest = 0.0
+    for history, before, work, scale in zip(fine, coarse, works, _scales(fine, works), strict=True):
+        if scale.all():
+            apart = _size(history, _work(before).sum(axis=0) - work) / scale
+            largest = max(largest, float(apart.max()))
+    return largest
+
+
+def _rubbing(history: InterfaceHistory) -> tuple[Array, Array, Mask, list[slice]]:
+    """Pressure times how often it acts, slip, and what else the sums over increments need."""
+    loads = history.loads
+    return loads.share[:, None] * history.pressure, history.slip, loads.P > 0.0, loads.missions
+
+
+def _work(history: InterfaceHistory) -> Array:
+    """Work of increments over µ, per area of each node ``(t, n)`` [N/mm]."""
+    return friction_work(*_rubbing(history))
+
+
+def _size(history: InterfaceHistory, work: Array) -> Array:
+    return depth_and_energy(work, history.interface.nodal_areas)
+
+
+def _scales(histories: Histories, works: Sequence[Array]) -> Array:
+    """What errors of each face are relative to ``(faces, 2)``."""
+    sizes = np.array([_size(*pair) for pair in zip(histories, works, strict=True)])
+    return np.asarray(np.maximum(sizes, LESSER_FLANK * sizes.max(axis=0)))
