@@ -340,7 +340,7 @@ def _check_steps(axis: Axis, settings: list) -> None:
             "dovetail",
             {
                 *("grid", "tolerance", "method", "stepper", "dimension"),
-                *("coupling", "history", "mesh", "order"),
+                *("coupling", "increments", "link", "mesh", "order"),
             },
         ),
         ("specimens_flat", {"grid", "tolerance", "mesh", "order"}),

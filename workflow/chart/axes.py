@@ -27,7 +27,7 @@ TOLERANCES = 1e-3, 1e-4, 1e-5, 1e-6
 # How far the finest rung of a tolerance is beyond that of the case.
 FINER_TOLERANCE = 1e-2
 INCREMENTS = 1 / 4, 1 / 2, 1.0, 2.0
-INCREMENTS_2D = 1 / 2, 1.0, 2.0, 4.0, 8.0
+INCREMENTS_2D = 1 / 4, 1 / 2, 1.0, 2.0, 4.0, 8.0
 DRIFTS = 0.2, 0.1, 0.05, 0.02, 0.01
 # Condensing the structure takes about the fourth power of the refinement in 3-D.
 MESHES_3D = 0.5, 0.5**0.5, 1.0, 2.0**0.5
@@ -35,6 +35,9 @@ MESHES_2D = 0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0, 2.0**1.5, 4.0
 # Of finite elements alone, whose nodes carry the contact: refinements, and where their order is.
 MESHES_ALONE = 1.0, 2.0, 4.0, 8.0
 ORDERS = "mesh.order", "structure.order"
+# Links to the structure, and its meshes to be linked to in the plane.
+LINKS = {"half_space": "half-space", "corrected": "corrected"}
+MESHES_LINKED = 0.5, 1.0, 2.0, 4.0
 JUMPS = 5, 10, 20, 40, 80, 160
 ERRORS = 0.1, 0.03, 0.01, 3e-3, 1e-3
 EXPLICIT = 0.9, 0.45
@@ -193,11 +196,9 @@ def _histories(case: Case) -> Iterator[Rung]:
     if entry_at(case, "contact.history") is not None:
         yield Rung("reversals", ("contact.history=reversals",), branch="reversals")
         yield from _legs(case)
-    else:
-        yield from _cycle(case)
 
 
-def _cycle(case: Case) -> Iterator[Rung]:
+def _increments(case: Case) -> Iterator[Rung]:
     """The loads of a wear cycle in fewer and in more increments."""
     increments, peak = (entry_at(case, f"load_path.{key}") for key in ("increments", "peak_at"))
     if increments is None:
@@ -344,6 +345,18 @@ def _orders(case: Case) -> Iterator[Rung]:
                 yield Rung(f"order {order}", (f"{entry}={order}",))
 
 
+def _links(case: Case) -> Iterator[Rung]:
+    """Half-spaces linked to the structure by forces alone, and by its nodes too, on its meshes."""
+    if entry_at(case, "contact.link") is None or entry_at(case, "contact.method") == "nodes":
+        return
+    factors = MESHES_LINKED if _is_line(case) else MESHES_3D
+    meshes = list(_refined(case, factors)) or [Rung("its mesh", ())]
+    for link, word in LINKS.items():
+        for mesh in meshes:
+            overrides = (f"contact.link={link}", *mesh.overrides)
+            yield Rung(f"{word}, {mesh.name}", overrides, mesh.step, branch=word)
+
+
 def _alone(case: Case) -> Iterator[Rung]:
     """The half-space's methods, and finite elements alone on finer and finer meshes.
 
@@ -366,8 +379,8 @@ def _alone(case: Case) -> Iterator[Rung]:
         yield Rung(f"{mesh.name} alone", overrides, mesh.step, branch="alone")
 
 
-# Orders: pressures that end like a square root keep a grid from second order, slips that follow a
-# path in increments are first order, and so is a residual in its tolerance.
+# Orders: pressures that end like a square root keep a grid from second order, friction that follows
+# a path in increments is first order, and so is a residual in its tolerance.
 AXES = (
     Axis("grid", "cells of the contact grid", _grids, order=2.0, closed_form=True),
     Axis("tolerance", "tolerance of the contact solver", _tolerances, order=1.0),
@@ -376,6 +389,8 @@ AXES = (
     Axis("dimension", "two dimensions or three", _dimensions, sections=True),
     Axis("coupling", "how often worn surfaces go back to the structure", _couplings),
     Axis("history", "increments of the load path", _histories, order=1.0, moves_states=True),
+    Axis("increments", "increments of a cycle", _increments, order=2.0),
+    Axis("link", "half-spaces, or corrected by the structure's nodes", _links, order=2.0),
     Axis("mesh", "finite elements of the structure", _meshes, order=2.0),
     Axis("order", "order of the finite elements", _orders),
     Axis("reference", "half-space, or finite elements alone", _alone, order=1.0),

@@ -7,6 +7,7 @@ as it is and an interrupted one goes on.
 
 from __future__ import annotations
 
+import json
 import re
 import time
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
@@ -17,6 +18,7 @@ from typing import Any
 
 from pydantic_core import PydanticCustomError
 
+from workflow.case.changing import changed
 from workflow.case.fields import Quantity
 from workflow.case.sections import Case
 from workflow.chart.axes import Axis, Setting, axes_of, entry_at
@@ -112,13 +114,18 @@ def chart_case(
 
 
 def _plain(case: Case, quantities: Sequence[str]) -> Iterator[str]:
-    """Overrides that leave out what no quantity needs, and any other choice of settings."""
+    """Overrides that leave out what no quantity needs, and any choice of settings but one."""
     yield from ("output.paraview=false", "output.figures=false")
     for entry, overrides in analysis_of(case).comparison.plain.items():
         if not any(f".{entry}." in path for path in quantities):
             yield from overrides
     if hasattr(case, "fidelity"):
         yield "fidelity=fixed"
+        case = changed(case, {"fidelity": "fixed"})
+    # What else is open is chosen for the case as it is written, and stays on all rungs.
+    _, record = analysis_of(case).choose(case)
+    for entry, value in (record or {"chosen": {}})["chosen"].items():
+        yield f"{entry}={json.dumps(value)}"
 
 
 def _claim(folder: OutputFolder, case: Case) -> None:

@@ -33,8 +33,9 @@ ENTRY = "load_path.increments"
 # Of a leg: two leave 6 % of the depth of a dovetail and are estimated to leave 0.2 %, since what
 # bends within an increment is seen by its neighbours.
 FEWEST = 4
-# Each try that is not the first is so much finer than the one before it, at least and at most.
-FINER, FINEST = 1.2, 2.0
+# Each try but the first is so much finer than the one before it, at least and at most: where fronts
+# of slip pass node by node the order is nearer to one than to two.
+FINER, FINEST = 1.4, 2.0
 # Where something rubs, and nothing tells how pressures bend over slip.
 UNKNOWN = inf
 
@@ -118,7 +119,7 @@ class _Cycle(Generic[AnyCase]):
         coarse, fine = self._solved(counts), self._solved(tuple(2 * count for count in counts))
         if coarse is None or fine is None:
             return UNKNOWN
-        return 4.0 / 3.0 * difference(coarse, fine)
+        return 4.0 / 3.0 * float(differences(coarse, fine).max())
 
 
 def _capped(counts: Sequence[int]) -> Counts:
@@ -146,14 +147,14 @@ def left_by_legs(histories: Histories, counts: Counts) -> list[float] | None:
     return [float(error) for error in left]
 
 
-def difference(coarse: Histories, fine: Histories) -> float:
-    """Largest relative difference of what two cycles wear: depth or energy, of any face."""
+def differences(coarse: Histories, fine: Histories) -> Array:
+    """Largest relative differences ``(2,)`` of what two cycles wear: depth and energy of a face."""
     works = [_work(history).sum(axis=0) for history in fine]
-    largest = 0.0
-    for history, before, work, scale in zip(fine, coarse, works, _scales(fine, works), strict=True):
+    largest = np.zeros(2)
+    for history, other, work, scale in zip(fine, coarse, works, _scales(fine, works), strict=True):
         if scale.all():
-            apart = _size(history, _work(before).sum(axis=0) - work) / scale
-            largest = max(largest, float(apart.max()))
+            apart = _size(history, _work(other).sum(axis=0) - work) / scale
+            largest = np.maximum(largest, apart)
     return largest
 
 

@@ -1,7 +1,8 @@
 """The axes of fidelity after the dimension: how fine each setting must be for its share of error.
 
-Shares are large where accuracy is dear. They add up to 1; errors of all axes are taken to have one
-sign. Estimates are of the largest depth and the volume of either flank.
+Shares are large where accuracy is dear: of increments and wear steps the cost goes with the root of
+the error, of meshes in space with its fourth power. They add up to 1; errors of all axes are taken
+to have one sign. Estimates are of the largest depth and the volume of either flank.
 """
 
 from __future__ import annotations
@@ -247,10 +248,10 @@ def _decision(
 
 
 AXES = (
-    Axis("load_path.increments", 0.31, choose_increments),
-    Axis("mesh.flank_nodes", 0.30, choose_mesh),
-    Axis("contact.grid", 0.10, choose_grid),
+    Axis("load_path.increments", 0.18, choose_increments),
+    Axis("mesh.flank_nodes", 0.38, choose_mesh),
+    Axis("contact.grid", 0.12, choose_grid),
     Axis("contact.tolerance", 0.02, choose_tolerance),
-    Axis("wear.tolerance", 0.15, choose_steps),
+    Axis("wear.tolerance", 0.18, choose_steps),
     Axis("coupling.drift", 0.12, choose_drift),
 )

@@ -255,17 +255,17 @@ class MeshCase(FiniteElementCase):
     def _paths_fit_legs(self) -> MeshCase:
         path = self.load_path
         legs = len(self.structure.loads[0].path if path.increments == AUTO else path.increments)
-        if not path.cycle_from <= path.peak_leg <= legs:
-            raise disagreement(
-                f"{path.peak_leg}: no leg of the cycle; allowed: {path.cycle_from} to {legs}",
-                *("load_path.peak_leg", "load_path.cycle_from"),
-            )
         for index, load in enumerate(self.structure.loads):
             if len(load.path) != legs:
                 raise disagreement(
                     f"{len(load.path)} factors for {legs} legs; allowed: one for each leg",
                     f"structure.loads.{index}.path",
                 )
+        if not path.cycle_from <= path.peak_leg <= legs:
+            raise disagreement(
+                f"{path.peak_leg}: no leg of the cycle; allowed: {path.cycle_from} to {legs}",
+                *("load_path.peak_leg", "load_path.cycle_from"),
+            )
         loads = len(self.structure.loads)
         for index, cycle in enumerate(self.load_path.mix):
             if len(cycle.factors) != loads:
