@@ -9,7 +9,8 @@ from typing import Any
 
 from fe_models.mesh import Interface, MeshError
 from fe_models.structure import InterfaceHistory
-from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.case.base import FiniteElementCase, WearCase
+from workflow.analyses.wear.choice import report_choice
 from workflow.analyses.wear.contact_stage import gap_on
 from workflow.analyses.wear.load_source import ContactFace
 from workflow.analyses.wear.run import meshed_faces
@@ -40,13 +41,15 @@ def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list
     ``name`` is that of the case in messages. Raises UserError, MethodFailed, OutOfMemory.
     """
     structure = structure_of(case)
-    source = structure.source(case)
-    if not isinstance(source, StructureStage):
+    if not isinstance(case, FiniteElementCase):
         raise UserError(
             f"{name}: structure.kind: {structure.name} has no finite elements "
             "to take loads from; allowed: a case with a structure of ours, such as dovetail"
         )
     structure.memory(case, 0, 0).check()
+    case, choice = structure.choose(case)
+    source = structure.source(case)
+    assert isinstance(source, StructureStage)
     with locked(out) as gone:
         folder = OutputFolder(out, "resultants")
         folder.replace(dict.fromkeys((TABLE, FIELDS, CASE), "loads of the contacts"), force)
@@ -54,6 +57,7 @@ def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list
         with closing(Reporter(log)) as reporter:
             if gone:
                 reporter.say(gone)
+            report_choice(choice, reporter)
             try:
                 _write(case, source, out, reporter)
             except MeshError as error:

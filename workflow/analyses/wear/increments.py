@@ -14,7 +14,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from itertools import pairwise
-from math import ceil, inf, sqrt
+from math import ceil, inf, isfinite, sqrt
 from typing import Any, Generic, TypeVar
 
 import numpy as np
@@ -77,7 +77,8 @@ def decide_increments(
     )
     if any(case.legs):
         why += f"; the case's own {sum(case.legs)} leave {cycle.error(case.legs):.2%}"
-    probe = {"legs": [legs for legs, _ in tried], "errors": [left for _, left in tried]}
+    known = [left if isfinite(left) else None for _, left in tried]
+    probe = {"legs": [legs for legs, _ in tried], "errors": known}
     also = {entry: value for entry, value in settings.items() if entry != ENTRY}
     return Decision(ENTRY, settings[ENTRY], why, probe, also, allowed, error, met)
 
