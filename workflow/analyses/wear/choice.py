@@ -55,14 +55,22 @@ def record_of(decisions: Sequence[Decision], accuracy: float, seconds: float) ->
     }
 
 
-def report_choice(record: Mapping[str, Any] | None, reporter: Reporter) -> None:
-    """What was chosen and why, a line for each entry, and whether all of it is accurate enough."""
+def report_choice(
+    record: Mapping[str, Any] | None, reporter: Reporter, again: bool = False
+) -> None:
+    """What was chosen and why, a line for each entry, and whether all of it is accurate enough.
+
+    That it is not is a warning, which a run that goes on has ``again``; the rest it has told.
+    """
     if record is None:
         return
-    for decision in record["decisions"]:
-        reporter.say(f"chosen: {decision['entry']}: {decision['value']}: {decision['why']}")
     estimated, seconds = record["estimated_error"], record["seconds"]
-    reporter.say(
-        f"chosen: estimated error {estimated:.2%} of {record['accuracy']:.2%} required, "
-        f"{'within' if record['met'] else 'not within'} every share; probes took {seconds:.1f} s"
-    )
+    error = f"chosen: estimated error {estimated:.2%} of {record['accuracy']:.2%} required"
+    if not again:
+        for decision in record["decisions"]:
+            reporter.say(f"chosen: {decision['entry']}: {decision['value']}: {decision['why']}")
+        if record["met"]:
+            reporter.say(f"{error}, within every share; probes took {seconds:.1f} s")
+    if not record["met"]:
+        missed = ", ".join(d["entry"] for d in record["decisions"] if not d["met"])
+        reporter.warn(f"{error}, not within every share: {missed}")

@@ -72,11 +72,11 @@ def decide_increments(
     error, settings = tried[-1][1], case.divided(counts)
     met = error <= allowed
     why = (
-        f"{' + '.join(map(str, counts))} in the legs of a cycle leave {error:.2%} of "
-        f"{allowed:.2%} allowed{'' if met else ', the most that are offered'}"
+        f"{' + '.join(map(str, counts))} in the legs of a cycle leave {100 * error:.2g} % of "
+        f"{100 * allowed:.2g} % allowed{'' if met else ', the most that are offered'}"
     )
     if any(case.legs):
-        why += f"; the case's own {sum(case.legs)} leave {cycle.error(case.legs):.2%}"
+        why += f"; the case's own {sum(case.legs)} leave {100 * cycle.error(case.legs):.2g} %"
     known = [left if isfinite(left) else None for _, left in tried]
     probe = {"legs": [legs for legs, _ in tried], "errors": known}
     also = {entry: value for entry, value in settings.items() if entry != ENTRY}
@@ -124,9 +124,12 @@ class _Cycle(Generic[AnyCase]):
 
 
 def _capped(counts: Sequence[int]) -> Counts:
-    """No more than the most in all."""
-    share = min(1.0, MOST_INCREMENTS / sum(counts))
-    return tuple(max(1, ceil(share * count)) for count in counts)
+    """These, or the most in all, shared out alike; the longest leg takes what rounding leaves."""
+    if sum(counts) <= MOST_INCREMENTS:
+        return tuple(counts)
+    capped = [max(1, MOST_INCREMENTS * count // sum(counts)) for count in counts]
+    capped[capped.index(max(capped))] += MOST_INCREMENTS - sum(capped)
+    return tuple(capped)
 
 
 def left_by_legs(histories: Histories, counts: Counts) -> list[float] | None:

@@ -47,8 +47,7 @@ RECORDS = 10
 def run_wear(run: Run[WearCase]) -> None:
     """Run a wear case to its end, from its last whole jump if it is to resume."""
     folder = run.folder
-    if not run.resume:  # else it has been told
-        report_choice(run.choice, run.reporter)
+    report_choice(run.choice, run.reporter, again=run.resume)
     try:
         write_output(_compute(run), run)
     except (ContactFailure, NormalContactError, MethodFailed) as error:
