@@ -233,6 +233,19 @@ def test_every_different_case_runs_once_and_the_own_one_first(
         assert (case.output.figures, case.stress.wanted, case.fidelity) == (False, False, "fixed")
 
 
+def test_increments_that_are_auto_are_chosen_once(
+    small_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    """And stay on the rungs of another axis, whatever these would ask for."""
+    auto = {"axes": ("increments", "mesh"), "overrides": ("load_path.increments=auto",)}
+    runs, ladders = made_up(monkeypatch, small_path, tmp_path, **auto)
+    own = runs.ran[0].load().load_path
+    meshes = [r.point.folder for r in ladders["mesh"].rungs]
+    assert {job.load().load_path for job in runs.ran if job.name in meshes} == {own}
+    counts = [job.load().load_path.increments for job in runs.ran]
+    assert {round(factor * own.increments) for factor in (0.5, 1.0, 2.0)} <= set(counts)
+
+
 @pytest.mark.slow
 def test_quantities_of_wear_and_what_they_cost(
     small_path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
