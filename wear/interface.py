@@ -18,12 +18,6 @@ import numpy as np
 from sa_solver.contact import ContactState, FrictionalContact
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
-from sa_solver.increments import (
-    depth_and_energy,
-    errors_of_increments,
-    friction_work,
-    slip_of_states,
-)
 from sa_solver.normal import NormalContact
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Tilt
@@ -42,6 +36,7 @@ from wear.stepping import (
     WearState,
 )
 from wear.surfaces import Surfaces
+from wear.tractions import ContactFields, CycleTractions, acting_slip
 from wear.worn import Spent
 
 
@@ -107,60 +102,6 @@ class InterfaceState(WearState):
 
 
 @dataclass(frozen=True)
-class ContactFields:
-    """One increment: ``pressure`` ``(nx, ny)``, ``shear`` on body 2 and ``slip`` ``(2, nx, ny)``.
-
-    In MPa and mm.
-    """
-
-    pressure: Array
-    shear: Array
-    slip: Array
-
-
-@dataclass(frozen=True)
-class CycleTractions:
-    """Tractions and slip of one contact over the increments of a closed cycle.
-
-    ``pressure`` ``(t, nx, ny)`` and ``shear`` ``(t, 2, nx, ny)`` on body 2 [MPa] are those at the
-    end of an increment, ``slip`` ``(t, 2, nx, ny)`` [mm] that during it. Where slip is that of the
-    loads (method normal), shear is µp against it and, unknown where nothing slips, 0 there:
-    ``unknown`` ``(t,)`` is the share of the normal force on such cells. ``friction`` is µ.
-    """
-
-    loads: LoadHistory
-    friction: float
-    pressure: Array
-    shear: Array
-    slip: Array
-    unknown: Array
-
-    @property
-    def work(self) -> Array:
-        """Friction work per area of each increment ``(t, nx, ny)`` [N/mm]."""
-        loads, limit = self.loads, self.friction * self.pressure
-        return friction_work(limit, self.slip, loads.P > 0.0, loads.missions)
-
-    @property
-    def increments_error(self) -> dict[str, float] | None:
-        """What the increments leave of ``depth`` (root mean square) and ``energy``, relative.
-
-        The depth is that of what is rubbed by one cycle; None where nothing is, or nobody knows.
-        """
-        loads = self.loads
-        often = loads.share[:, None, None]
-        rubbed = np.sum(often * self.work, axis=0)
-        if not rubbed.any():
-            return None
-        limit = self.friction * often * self.pressure
-        errors = errors_of_increments(limit, self.slip, loads.P > 0.0, loads.missions)
-        if errors is None:
-            return None
-        depth, energy = depth_and_energy(errors.sum(axis=0)) / depth_and_energy(rubbed)
-        return {"depth": float(depth), "energy": float(energy)}
-
-
-@dataclass(frozen=True)
 class FirstContact:
     """What the contact of the unworn cycle says: see :class:`wear.stepping.CycleResult`.
 
@@ -186,15 +127,6 @@ def failures_of(name: str) -> Iterator[None]:
         yield
     except ContactFailure as error:
         raise ContactFailure(f"{name}: {error}") from error
-
-
-def acting_slip(slip: Array, loads: LoadHistory) -> Array:
-    """Size of the slip over which each state of a cycle acts ``(t, ...)`` [mm].
-
-    ``slip`` ``(t, 2, ...)`` [mm] is that of the increments; see :mod:`sa_solver.increments`.
-    """
-    sizes = np.hypot(slip[:, 0], slip[:, 1])
-    return slip_of_states(sizes, loads.P > 0.0, loads.missions)
 
 
 # --- the contact ----------------------------------------------------------------------------------

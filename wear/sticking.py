@@ -11,7 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from sa_solver.types import Array
-from wear.interface import CycleTractions
+from wear.tractions import CycleTractions
 
 
 def with_sticking_shear(cycle: CycleTractions, nodal: Array, cell_area: float) -> CycleTractions:

@@ -14,8 +14,8 @@ from sa_solver.types import Array, Grid, LoadHistory, Material
 from tests.marks import slow
 from tests.workflow.conftest import contents_of
 from wear.bulk_stress import BulkStress
-from wear.interface import CycleTractions
 from wear.link import Link
+from wear.tractions import CycleTractions
 from workflow.analyses.wear.body_stress import Planes
 from workflow.analyses.wear.case.sections import ContactStress, Life
 from workflow.analyses.wear.contact_stress import (

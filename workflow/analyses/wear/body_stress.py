@@ -18,8 +18,8 @@ from sa_solver.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Grid, Material
 from wear.bulk_stress import SIDE, BodyFace, BulkStress
 from wear.face_loads import FaceLoads
-from wear.interface import CycleTractions
 from wear.sticking import with_sticking_shear
+from wear.tractions import CycleTractions
 from workflow.analyses.wear.case.sections import ContactStress
 from workflow.analyses.wear.contact_stage import ContactStage
 

@@ -19,8 +19,8 @@ from sa_solver.subsurface import COMPONENTS
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Material
 from wear.bulk_stress import BulkStress
-from wear.interface import CycleTractions
 from wear.life import Ruiz, findley, ruiz, smith_watson_topper
+from wear.tractions import CycleTractions
 from workflow.analyses.wear.body_stress import Planes, StressedBody, StressedCycle
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Life
@@ -60,7 +60,7 @@ class ContactMoment:
 
     ``carried`` is what a structure carries past the contact, where it tells;
     ``left_out`` are the increments, counted from 0, whose shear is not known (see
-    :class:`wear.interface.CycleTractions`) and that the maps do without.
+    :class:`wear.tractions.CycleTractions`) and that the maps do without.
     """
 
     bodies: tuple[BodyStress, BodyStress]

@@ -8,7 +8,8 @@ from functools import partial
 from typing import Any
 
 from wear.coupled import Contacts, CoupledState
-from wear.interface import ContactFields, CycleTractions, InterfaceState
+from wear.interface import InterfaceState
+from wear.tractions import ContactFields, CycleTractions
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_loops import WornLoop
 from workflow.analyses.wear.contact_stage import ContactStage

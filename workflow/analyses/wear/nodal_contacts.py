@@ -19,12 +19,13 @@ from fe_models.transfer import FaceTransfer
 from sa_solver.types import Array
 from wear.coupled import CoupledState
 from wear.face_loads import FaceLoads
-from wear.interface import ContactFields, CycleTractions, FirstContact, InterfaceState, acting_slip
+from wear.interface import FirstContact, InterfaceState
 from wear.link import Link
 from wear.nodes import NodalContact, NodalState
 from wear.stabilised import StabilisedStepper
 from wear.steppers import advance_cycles, first_cycles
 from wear.surfaces import Surfaces
+from wear.tractions import ContactFields, CycleTractions, acting_slip
 from wear.worn import Spent
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_stage import ContactStage, error_control

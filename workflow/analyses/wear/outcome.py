@@ -10,9 +10,10 @@ import numpy as np
 from sa_solver.types import Array, LoadHistory
 from wear.coupled import CoupledState
 from wear.face_loads import FaceLoads
-from wear.interface import CycleTractions, FirstContact, InterfaceState
+from wear.interface import FirstContact, InterfaceState
 from wear.kinetics import LinearRegime, linear_regime
 from wear.steppers import step_errors
+from wear.tractions import CycleTractions, increments_error
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.load_source import LoadSource
@@ -85,12 +86,8 @@ class InterfaceOutcome:
 
     @cached_property
     def increments_error(self) -> dict[str, float] | None:
-        """What increments leave of a cycle's depth and energy, the mean of first and last cycle."""
-        unworn = self.stage.unworn_tractions(self.unworn, self.first).increments_error
-        worn = self.end.increments_error
-        if unworn is None or worn is None:
-            return unworn or worn
-        return {name: 0.5 * (unworn[name] + worn[name]) for name in unworn}
+        """What increments leave of depth and energy of the first and the last cycle together."""
+        return increments_error([self.stage.unworn_tractions(self.unworn, self.first), self.end])
 
     @cached_property
     def end(self) -> CycleTractions:

@@ -8,8 +8,9 @@ from fe_models.mesh import MeshError
 from sa_solver.normal import NormalContactError
 from wear.coupled import CoupledSettings, CoupledState, CoupledWear, JumpSize, Stop
 from wear.face_loads import FaceLoads
-from wear.interface import CycleTractions, FirstContact, MotionError
+from wear.interface import FirstContact, MotionError
 from wear.stepping import ContactFailure
+from wear.tractions import CycleTractions
 from workflow.analyses.wear import checkpoint
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.choice import report_choice

@@ -15,9 +15,9 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, resultant_change
 from wear.coupled import CoupledState
-from wear.interface import acting_slip
 from wear.steppers import ImplicitStepper, advance_cycles
 from wear.stepping import SlidingCycle, WearingContact, WearState
+from wear.tractions import acting_slip
 from workflow.analyses.wear.budget.lives import STEPS, TOLERANCE, live, shortened
 from workflow.analyses.wear.case.sections import Contact
 from workflow.analyses.wear.contact_stage import ContactStage
