@@ -16,6 +16,9 @@ from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes
 from sa_solver.types import Array, Material
 
+# The boundary of the blade that the airfoil pulls at.
+TOP = "shank_top"
+
 
 @dataclass(frozen=True)
 class Mission:
@@ -82,7 +85,7 @@ def dovetail_structure(
     return Structure(
         mesh=mesh,
         body_1=SupportedBody(elastic_1, held, nodes_1, frames_1, loads_1),
-        body_2=SupportedBody(elastic_2, guided, nodes_2, frames_2, loads_2),
+        body_2=SupportedBody(elastic_2, guided, nodes_2, frames_2, loads_2, loaded=[TOP]),
     )
 
 
@@ -96,22 +99,21 @@ def dovetail_softening(
     disk, blade = structure.body_1.elastic, structure.body_2.elastic
     length = dovetail.slot_length if blade.dimension == 2 else 1.0
     centre = mission.airfoil_radius * dovetail.load_axis
-    airfoil = CarriedMass("shank_top", mission.airfoil_mass / length, centre)
+    airfoil = CarriedMass(TOP, mission.airfoil_mass / length, centre)
     speed = mission.rotation_speed
     return spin_softening(disk, speed), spin_softening(blade, speed, [airfoil])
 
 
 def _blade_loads(blade: ElasticBody, dovetail: Dovetail, mission: Mission) -> Array:
     """Load cases ``(size, 2)``: rotation at 1 rad/s with the airfoil's pull, and a unit moment."""
-    top = "shank_top"
     axis = dovetail.load_axis
     length = dovetail.slot_length if blade.dimension == 2 else 1.0
-    area = length * blade.boundary_integral(top, lambda x: np.ones_like(x[0]))
-    lever = length * blade.boundary_integral(top, lambda x: _lever(x, dovetail) ** 2)
+    area = length * blade.boundary_integral(TOP, lambda x: np.ones_like(x[0]))
+    lever = length * blade.boundary_integral(TOP, lambda x: _lever(x, dovetail) ** 2)
     pull = mission.airfoil_mass * mission.airfoil_radius / area
-    rotation = blade.traction_load(top, lambda x: np.full_like(x[0], pull), axis)
+    rotation = blade.traction_load(TOP, lambda x: np.full_like(x[0], pull), axis)
     # A moment about the slot, as a radial traction that is linear across the shank.
-    moment = blade.traction_load(top, lambda x: _lever(x, dovetail) / lever, axis)
+    moment = blade.traction_load(TOP, lambda x: _lever(x, dovetail) / lever, axis)
     return np.stack([rotation + blade.centrifugal_load(), moment], axis=1)
 
 

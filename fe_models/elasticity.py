@@ -55,6 +55,11 @@ class ElasticBody:
         return in_space(self._basis.doflocs.T)
 
     @property
+    def element_nodes(self) -> Indices:
+        """Nodes of the elements ``(k, elements)``, midsides included."""
+        return np.asarray(self._basis.element_dofs)
+
+    @property
     def size(self) -> int:
         """Number of displacements."""
         return int(self.dimension * self._basis.N)
@@ -174,19 +179,14 @@ class ElasticBody:
         for u, axis in zip(displacement.reshape(-1, self.dimension).T, self.body.axes, strict=True):
             field = np.asarray(self._basis.interpolate(u).grad)
             gradient[axis, list(self.body.axes)] = np.einsum("aeq,eq->ae", field, weights)
+        return self.cauchy(gradient)
+
+    def cauchy(self, gradient: Array) -> Array:
+        """Cauchy stress ``(6, n)`` [MPa] of displacement gradients ``(3, 3, n)``, ∂u_a/∂x_b."""
         strain = 0.5 * (gradient + gradient.transpose(1, 0, 2))
         trace = strain[0, 0] + strain[1, 1] + strain[2, 2]
         lame, shear = self.material.lame, self.material.shear_modulus
         return np.array([lame * trace * (a == b) + 2.0 * shear * strain[a, b] for a, b in INDICES])
-
-    def at_vertices(self, element_values: Array) -> Array:
-        """Volume-weighted means at the vertices of element values ``(..., elements)``."""
-        volume = self._basis.dx.sum(axis=1)
-        count, corners = len(self.body.mesh.t), self.body.mesh.t.ravel()
-        total = np.bincount(corners, np.tile(volume, count))
-        rows = np.atleast_2d(element_values)
-        means = [np.bincount(corners, np.tile(row * volume, count)) / total for row in rows]
-        return np.array(means).reshape(*element_values.shape[:-1], -1)
 
     def _facet_basis(self, boundary: str) -> FacetBasis:
         mesh = self.body.mesh

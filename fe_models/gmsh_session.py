@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import signal
 import threading
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from typing import Any, Literal
 
@@ -32,22 +32,25 @@ def gmsh_model(name: str) -> Iterator[Any]:
 def grow_from(
     gmsh: Any,
     kind: Literal["CurvesList", "SurfacesList"],
-    entities: list[int],
-    fine: float,
+    sources: Sequence[tuple[list[int], float, float]],
     coarse: float,
-    growth: float,
-) -> int:
-    """Mesh size: ``fine`` on the entities, up to ``coarse``, by ``growth`` times the distance.
+) -> list[int]:
+    """Mesh size: the least of what the sources ask for, up to ``coarse``.
 
-    Returns the number of the distance field, for further settings of it.
+    Each source is entities, the size on them, and the share of the distance from them by which it
+    grows. Returns the numbers of the distance fields, for further settings of them.
     """
     field = gmsh.model.mesh.field
-    distance = field.add("Distance")
-    field.setNumbers(distance, kind, entities)
-    growing = field.add("MathEval")
-    field.setString(growing, "F", f"{fine!r} + {growth!r} * F{distance}")
-    field.setAsBackgroundMesh(growing)
+    distances, growing = [], []
+    for entities, fine, growth in sources:
+        distances.append(field.add("Distance"))
+        field.setNumbers(distances[-1], kind, entities)
+        growing.append(field.add("MathEval"))
+        field.setString(growing[-1], "F", f"{fine!r} + {growth!r} * F{distances[-1]}")
+    least = field.add("Min")
+    field.setNumbers(least, "FieldsList", growing)
+    field.setAsBackgroundMesh(least)
     gmsh.option.setNumber("Mesh.MeshSizeMax", coarse)
     gmsh.option.setNumber("Mesh.MeshSizeExtendFromBoundary", 0)
     gmsh.option.setNumber("Mesh.MeshSizeFromPoints", 0)
-    return int(distance)
+    return distances

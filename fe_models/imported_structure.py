@@ -332,7 +332,7 @@ def _supported(
     free, supported_motions = constraints.free, constraints.transformation()
     imposed = np.zeros((elastic.size, len(loads)))
     forces = np.zeros((elastic.size, len(loads)))
-    moved = []
+    moved, loaded = [], []
     for case, load in enumerate(loads):
         if isinstance(load, Displacement):
             if load.boundary in groups:
@@ -340,6 +340,7 @@ def _supported(
                 imposed[:, case] = _impose(constraints, elastic, load)
         elif _boundary(load) is None or _boundary(load) in groups:
             forces[:, case] = load.forces(elastic)
+            loaded += [name for name in (_boundary(load),) if name is not None]
     _check_against_supports(loads, imposed, supported_motions @ imposed[free])
     _check_against_each_other(elastic, moved)
     for interface in mesh.interfaces:
@@ -348,7 +349,7 @@ def _supported(
     placed = interface_nodes(mesh.interfaces, number, body)
     moving = imposed if imposed.any() else None
     try:
-        supported = SupportedBody(elastic, constraints, *placed, forces, moving)
+        supported = SupportedBody(elastic, constraints, *placed, forces, moving, loaded)
     except ValueError as error:
         raise MeshError(f"body {body.name}: {error}") from error
     if len(constraints.free) <= np.sum(~supported.held):

@@ -65,11 +65,15 @@ class Body:
 
         In the plane a facet goes on along Y for 1 mm.
         """
-        corners = self.points[self.facets(boundary)]
+        return self.outward_of(self.mesh.boundaries[boundary])
+
+    def outward_of(self, facets: Indices) -> Array:
+        """The same of facets of the surface, by their numbers."""
+        corners = self.points[self.mesh.facets[:, facets].T]
         edge = corners[:, 1] - corners[:, 0]
         other = 0.5 * (corners[:, 2] - corners[:, 0]) if corners.shape[1] == 3 else [0.0, 1.0, 0.0]
         normals = np.cross(edge, other)
-        out = corners.mean(axis=1) - self.points[self._behind(boundary)].mean(axis=1)
+        out = corners.mean(axis=1) - self.points[self._behind(facets)].mean(axis=1)
         return normals * np.sign(np.einsum("ma,ma->m", normals, out))[:, None]
 
     def depth(self, boundary: str) -> float:
@@ -77,12 +81,12 @@ class Body:
         normals = self.outward(boundary)
         normals /= np.linalg.norm(normals, axis=1, keepdims=True)
         corners = self.points[self.facets(boundary)]
-        below = corners[:, :1] - self.points[self._behind(boundary)]
+        below = corners[:, :1] - self.points[self._behind(self.mesh.boundaries[boundary])]
         return float(np.median(np.einsum("mia,ma->mi", below, normals).max(axis=1)))
 
-    def _behind(self, boundary: str) -> Indices:
-        """Vertices of the elements that the facets of a boundary belong to, ``(m, dim + 1)``."""
-        cells: Indices = self.mesh.t[:, self.mesh.f2t[0, self.mesh.boundaries[boundary]]].T
+    def _behind(self, facets: Indices) -> Indices:
+        """Vertices of the elements that facets of the surface belong to, ``(m, dim + 1)``."""
+        cells: Indices = self.mesh.t[:, self.mesh.f2t[0, facets]].T
         return cells
 
     def vertices(self, boundary: str) -> Indices:

@@ -207,5 +207,7 @@ def _prestressed(
         elastic = copy(body.elastic)
         elastic.stiffness = stiffness
         placed = interface_nodes(mesh.interfaces, number, elastic.body)
-        bodies.append(SupportedBody(elastic, body.constraints, *placed, loads, body.imposed))
+        bodies.append(
+            SupportedBody(elastic, body.constraints, *placed, loads, body.imposed, body.loaded)
+        )
     return PrestressedStructure(mesh, bodies[0], bodies[1], displacements, share)

@@ -7,26 +7,54 @@ from functools import cached_property
 
 import numpy as np
 
-from fe_models.elasticity import maximum_principal, von_mises
+from fe_models.elasticity import ElasticBody, maximum_principal, von_mises
 from fe_models.mesh import Body, in_space
+from fe_models.recovery import StressRecovery
 from fe_models.structure import Structure
 from sa_solver.subsurface_influence import INDICES
+from sa_solver.ties import first_largest
 from sa_solver.types import Array, Frame, Indices
 
 # A point this share of an element outside of it is on its border.
 ON_BORDER = 1e-9
+
+# How much of what other fits change is missing from the largest stress, by the order of elements:
+# of notches in five dovetails with 10 to 40 nodes across the flank the median, and nine tenths (of
+# order 2 three quarters) within a factor of two. Least 0.37 of the true error, where that is over
+# 0.5 %.
+MISSING = {1: 1.4, 2: 0.75}
+
+
+@dataclass(frozen=True)
+class PeakStress:
+    """Largest von Mises and principal stress of some vertices [MPa], and where the former is.
+
+    ``place`` is X, Y, Z [mm]; ``at_contact`` tells whether it is on a contact face. ``error`` is
+    what the mesh leaves of the less certain of both, estimated and relative to the larger: all of
+    it beside a sharp inward corner or the end of a clamped face, where stress has no bound.
+    """
+
+    von_mises: float
+    maximum_principal: float
+    place: tuple[float, ...]
+    at_contact: bool
+    error: float
 
 
 @dataclass(frozen=True)
 class StressField:
     """At the vertices of one ``body``: ``displacement`` ``(n, 3)`` [mm], ``stress`` ``(6, n)``.
 
-    Stress [MPa] is ordered xx, yy, zz, xy, yz, zx of the global axes.
+    Stress [MPa] is ordered xx, yy, zz, xy, yz, zx of the global axes. ``peak`` is the largest of all
+    and ``notch`` that of the surface on which nothing acts, which is what the mesh can resolve:
+    contact pressure has steep edges. None where there is no such surface.
     """
 
     body: Body
     displacement: Array
     stress: Array
+    peak: PeakStress
+    notch: PeakStress | None
 
     @cached_property
     def von_mises(self) -> Array:
@@ -122,14 +150,51 @@ def _motion(
 def _fields(
     structure: Structure, displacements: tuple[Array, Array]
 ) -> tuple[StressField, StressField]:
-    fields = []
-    for body, displacement in zip(structure.bodies, displacements, strict=True):
-        elastic = body.elastic
-        nodal = displacement.reshape(-1, elastic.dimension)
-        vertices = in_space(nodal[: elastic.body.mesh.nvertices])
-        stress = elastic.at_vertices(elastic.stress(displacement))
-        fields.append(StressField(elastic.body, np.array(vertices), stress))
-    return fields[0], fields[1]
+    one, two = (
+        stress_field(body.elastic, displacement, body.free_facets, body.nodes, body.clamped)
+        for body, displacement in zip(structure.bodies, displacements, strict=True)
+    )
+    return one, two
+
+
+def stress_field(
+    elastic: ElasticBody, displacement: Array, free: Indices, contact: Indices, clamped: Indices
+) -> StressField:
+    """Stress of a body from its displacements ``(size,)``.
+
+    ``free`` are the facets on which nothing acts, ``contact`` the vertices of contact faces and
+    ``clamped`` those that cannot move.
+    """
+    count = elastic.body.mesh.nvertices
+    recovery = StressRecovery(elastic, free)
+    clamped = np.intersect1d(clamped, elastic.body.mesh.facets[:, free])
+    unbounded = recovery.beside(np.append(recovery.inward_edges, clamped))
+    stress = recovery.stress(displacement)
+    equivalent, principal = von_mises(stress), maximum_principal(stress)
+
+    def largest(vertices: Indices) -> PeakStress:
+        """The largest stress of some vertices."""
+        at = vertices[[first_largest(values[vertices]) for values in (equivalent, principal)]]
+        told = np.array([equivalent[at[0]], principal[at[1]]])
+        others = recovery.alternatives(displacement, at)
+        apart = [(von_mises(s)[0] - told[0], maximum_principal(s)[1] - told[1]) for s in others]
+        change = MISSING[elastic.order] * np.abs(apart).max(axis=0)
+        # Under compression the largest principal stress is next to nothing.
+        size = np.maximum(np.abs(told), told[0])
+        error = np.divide(change, size, out=np.zeros(2), where=size > 0.0)
+        error[np.isin(at, unbounded) & (size > 0.0)] = 1.0
+        place = tuple(elastic.body.points[at[0]].tolist())
+        at_contact = bool(np.isin(at[0], contact))
+        return PeakStress(float(told[0]), float(told[1]), place, at_contact, float(error.max()))
+
+    untouched, nodal = recovery.untouched, displacement.reshape(-1, elastic.dimension)
+    return StressField(
+        body=elastic.body,
+        displacement=np.array(in_space(nodal[:count])),
+        stress=stress,
+        peak=largest(np.arange(count)),
+        notch=largest(untouched) if len(untouched) else None,
+    )
 
 
 def turned(stress: Array, frame: Frame) -> Array:

@@ -34,9 +34,10 @@ class SupportedBody:
 
     ``nodes`` ``(n,)`` are its interface vertices and ``frames`` ``(n, d, d)`` the axes at each, d
     the dimension; ``loads`` ``(d all, cases)`` its load cases, and ``imposed`` ``(d all, cases)``
-    displacements that each imposes on nodes that ``constraints`` hold. ``held`` ``(d n,)`` marks
-    the interface displacements that are held at zero, as on a plane of symmetry. Raises ValueError
-    if those of an interface node are constrained in any other way.
+    displacements that each imposes on nodes that ``constraints`` hold; ``loaded`` are boundaries
+    with tractions on them. ``held`` ``(d n,)`` marks the interface displacements that are held at
+    zero, as on a plane of symmetry. Raises ValueError if those of an interface node are constrained
+    in any other way.
     """
 
     def __init__(
@@ -47,9 +48,12 @@ class SupportedBody:
         frames: Array,
         loads: Array,
         imposed: Array | None = None,
+        loaded: Sequence[str] = (),
     ) -> None:
         self.elastic = elastic
         self.loads = loads
+        self.loaded = loaded
+        self.nodes = nodes
         self.imposed = imposed
         self.constraints = constraints
         if imposed is not None and imposed[self._dofs(nodes)].any():
@@ -139,6 +143,28 @@ class SupportedBody:
         interface = np.zeros((len(self.held), *displacement.shape[1:]))
         interface[self._free] = displacement[self._interface]
         return self._all(displacement, amplitudes), interface
+
+    @cached_property
+    def free_facets(self) -> Indices:
+        """Facets of the surface on which nothing acts: no support, load or contact."""
+        mesh = self.elastic.body.mesh
+        transformation, free = self.constraints.transformation(), self.constraints.free
+        slaves = np.setdiff1d(np.arange(transformation.shape[0]), free)
+        tied = np.concatenate([slaves, free[np.unique(transformation[slaves].indices)]])
+        touched = np.zeros(len(self.elastic.nodes), bool)
+        touched[tied // self.elastic.dimension] = True
+        touched[self.nodes] = True
+        facets = mesh.boundary_facets()
+        loaded = [mesh.boundaries[name] for name in self.loaded]
+        facets = np.setdiff1d(facets, np.concatenate(loaded) if loaded else [])
+        return np.asarray(facets[~touched[mesh.facets[:, facets]].all(axis=0)], dtype=np.int64)
+
+    @property
+    def clamped(self) -> Indices:
+        """Vertices that cannot move in any direction."""
+        still = np.diff(self.constraints.transformation().indptr) == 0
+        vertices = still.reshape(-1, self.elastic.dimension)[: self.elastic.body.mesh.nvertices]
+        return np.flatnonzero(vertices.all(axis=1))
 
     def load_resultants(self, amplitudes: Array, about: Array) -> Array:
         """Force and moment ``(2, 3)`` of the applied loads about a point."""

@@ -138,7 +138,7 @@ class Specimen:
             _mesh_pad(gmsh.model, surfaces[CONTACT], half, self.pad_elements // 2)
             _mesh_ring(gmsh.model, self)
             fine = self.strip_width / self.pad_elements
-            grow_from(gmsh, "SurfacesList", [surfaces[CONTACT]], fine, size, growth)
+            grow_from(gmsh, "SurfacesList", [([surfaces[CONTACT]], fine, growth)], size)
             gmsh.model.mesh.generate(3)
             boundaries = [EntityGroup(name, 2, [surface]) for name, surface in surfaces.items()]
             quarter = EntityGroup("quarter", 3, [tag for _, tag in gmsh.model.getEntities(3)])

@@ -18,7 +18,7 @@ from fe_models.structure import CycleSolution, Structure
 from sa_solver.types import Material
 
 # Coarse: the laws tested here hold on any mesh.
-FLANK_NODES, SIZE = (8, 10), 8.0
+FLANK_NODES, SIZE, NOTCH = (8, 10), 8.0, 16
 
 
 @pytest.fixture(scope="session")
@@ -64,7 +64,7 @@ def symmetric(mission: Mission) -> Mission:
 
 @pytest.fixture(scope="session")
 def coarse_mesh(dovetail: Dovetail) -> StructureMesh:
-    return dovetail.mesh(FLANK_NODES, SIZE)
+    return dovetail.mesh(FLANK_NODES, SIZE, notch=NOTCH)
 
 
 @pytest.fixture(scope="session")
@@ -79,7 +79,7 @@ def structure_of(
     @cache
     def build(airfoil_mass: float = 0.8e-3, **changes) -> tuple[Structure, JointStiffness]:
         changed = replace(dovetail, **changes)
-        mesh = changed.mesh(FLANK_NODES, SIZE)
+        mesh = changed.mesh(FLANK_NODES, SIZE, notch=NOTCH)
         lifted = replace(mission, airfoil_mass=airfoil_mass)
         structure = dovetail_structure(changed, mesh, titanium, titanium, lifted, 1)
         return structure, structure.condense()

@@ -17,7 +17,7 @@ BLADE = {"intrados", "extrados", "root_bottom", "shank_top"}
 @pytest.fixture(scope="module", params=SKEWS, ids=["straight", "skewed"])
 def joint_and_mesh(request, dovetail):
     changed = replace(dovetail, skew=request.param)
-    return changed, changed.mesh((8, 10), 8.0)
+    return changed, changed.mesh((8, 10), 8.0, notch=24)
 
 
 def triangle_areas(mesh, boundary):

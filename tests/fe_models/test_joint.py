@@ -258,13 +258,14 @@ def test_dovetail_has_five_rigid_modes(structure, joint):
 
 def test_order_2_dovetail_is_softer(dovetail, titanium, mission):
     """Its space of displacements is larger, so its energy under the same loads is."""
-    mesh = dovetail.mesh((4, 4), 15.0)
+    mesh = dovetail.mesh((4, 4), 15.0, notch=16)
     energies = []
     for order in ORDERS:
         structure = dovetail_structure(dovetail, mesh, titanium, titanium, mission, order)
         joint = structure.condense()
         assert joint.rigid_modes == 5
-        assert np.abs(joint.stiffness - joint.stiffness.T).max() < 1e-12 * joint.largest
-        w = np.random.default_rng(0).standard_normal((len(joint.stiffness), 10))
-        energies.append(np.einsum("an,an->n", w, joint.stiffness @ w))
+        stiffness = np.asarray(joint.stiffness)
+        assert np.abs(stiffness - stiffness.T).max() < 1e-12 * joint.largest
+        w = np.random.default_rng(0).standard_normal((len(stiffness), 10))
+        energies.append(np.einsum("an,an->n", w, stiffness @ w))
     assert np.all(energies[1] < energies[0])

@@ -47,3 +47,28 @@ def test_refined_mesh_moves_the_load_by_less_than_half_a_percent(dovetail, titan
     np.testing.assert_allclose(middle_slip, fine_slip, rtol=5e-2)
     assert np.all(np.abs(fine_slip - middle_slip) < np.abs(fine_slip - coarse_slip))
     assert np.all(stress > 0.0)
+
+
+@pytest.mark.slow
+def test_stress_of_the_notches_is_near_that_of_a_fine_mesh(dovetail, titanium, symmetric):
+    """In the plane; the error told is the true one within a factor of three, if that counts."""
+    amplitudes = symmetric.amplitudes()
+
+    def notches(flank_nodes, order, notch):
+        mesh = dovetail.mesh((flank_nodes, 2), 5.0, 2, notch)
+        structure = dovetail_structure(dovetail, mesh, titanium, titanium, symmetric, order)
+        joint = FrictionalJoint(structure.condense().resolvent(), FRICTION)
+        cycle = structure.solve_cycle(joint, amplitudes, structure.gap(), FRICTION)
+        force, apart = (
+            np.concatenate([getattr(h, name)[PEAK] for h in cycle.histories], axis=1)
+            for name in ("force", "displacement")
+        )
+        return [field.notch for field in stress_state(structure, force, apart, amplitudes[PEAK])]
+
+    fine = notches(120, 2, 200)
+    for settings, left in (((40, 2, 48), 0.01), ((20, 2, 48), 0.01), ((20, 1, 48), 0.08)):
+        for found, exact in zip(notches(*settings), fine, strict=True):
+            true = abs(found.von_mises / exact.von_mises - 1.0)
+            assert true < left
+            assert true / 3.0 < found.error < 3.0 * true or max(true, found.error) < 0.02
+            assert np.linalg.norm(np.abs(found.place) - np.abs(exact.place)) < 0.5

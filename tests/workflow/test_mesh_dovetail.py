@@ -112,6 +112,14 @@ def test_dovetail_as_a_mesh_is_the_dovetail(tmp_path, small_path, ending, monkey
         np.testing.assert_allclose(
             two.slip[..., order], one.slip, atol=1e-6 * np.abs(one.slip).max()
         )
+    # Nobody tells which surfaces are free but supports, loads and contacts.
+    fields = (stage.stress(stage.mesh, stage.unworn_cycle) for stage in (ours, theirs))
+    for one, two in zip(*fields, strict=True):
+        for here, there in ((one.peak, two.peak), (one.notch, two.notch)):
+            assert there.von_mises == pytest.approx(here.von_mises, rel=1e-6)
+            assert there.maximum_principal == pytest.approx(here.maximum_principal, rel=1e-6)
+            assert there.error == pytest.approx(here.error, rel=1e-4)
+            assert there.at_contact == here.at_contact
     face, original = theirs.faces[0], ours.faces[0]
     np.testing.assert_allclose(face.size, original.size, rtol=1e-9)
     x, y = np.linspace(-5.0, 5.0, 7)[:, None], np.linspace(-28.0, 28.0, 5)[None, :]

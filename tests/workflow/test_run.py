@@ -20,7 +20,7 @@ from workflow.shell.results import frame_of
 
 UM3_PER_J = 1e-12
 # What warnings of a coarse mesh speak of.
-MESH = re.compile("link|what the structure carries past the contact")
+MESH = re.compile("link|what the structure carries past the contact|raise mesh.notch")
 # Few and quick increments for the odd cases, where a run is only to end well.
 QUICK = (
     *("load_path.increments=5", "load_path.peak_at=2", "contact.grid=[16, 24]"),
@@ -52,6 +52,32 @@ def balances(run, laws):
 
 
 # --- what a run leaves --------------------------------------------------------------------------
+
+
+def test_largest_stresses_are_told_with_place_and_error(whole):
+    """As in the results; in notches the largest principal stress is tension along the surface."""
+    told = whole.summary["structure"]["peak_stress"]
+    with h5py.File(whole.folder / "results.h5") as file:
+        for moment, bodies in told.items():
+            for name, peak in bodies.items():
+                group = file[f"bodies/{name}/{moment}"]
+                values, points = group["von_mises"][()], group["points"][()]
+                notch = peak["notch"]
+                for one in (peak, notch):
+                    # Faces of body 2 are shown in their form, and solved flat.
+                    at = np.argmin(np.linalg.norm(points - one["at"], axis=1))
+                    assert points[at] == pytest.approx(one["at"], abs=0.1)
+                    assert values[at] == one["von_mises"]
+                    assert 0.0 < one["error"] < 0.5
+                assert peak["von_mises"] == pytest.approx(values.max(), rel=1e-5)
+                assert peak["at_contact"] or peak["von_mises"] == notch["von_mises"]
+                assert 0.85 < notch["von_mises"] / notch["maximum_principal"] < 1.0
+                if notch["error"] > 0.05:
+                    assert any(
+                        warning.startswith(f"{name}: the largest stress on the free")
+                        for warning in whole.summary["warnings"]
+                    )
+                assert f"{name}: von Mises stress up to" in (whole.folder / "run.log").read_text()
 
 
 def test_folder_holds_what_it_promises(whole):

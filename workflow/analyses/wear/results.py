@@ -76,6 +76,7 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
     structure = None
     if isinstance(source, StructureStage):
         structure = worn_structure(source, stages, state, case.friction, folder, reporter)
+        structure.warn(case.accuracy, reporter)
     with reporter.stage("stress under the contacts"):
         stresses = _stresses(outcome, structure, reporter)
     budget = error_budget(outcome, reporter)
@@ -95,6 +96,7 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
             summary[name][key] = numbers
     lines = [
         *_lines(outcome, summary, budget),
+        *(f"  {sentence}" for sentence in (structure.sentences() if structure else ())),
         *(f"  {alike.sentence(name)}" for name, alike in uniform.items()),
         *(f"  {loops_sentence(name, loop, source.line)}" for name, loop in loops.items()),
     ]

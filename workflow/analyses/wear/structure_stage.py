@@ -50,7 +50,8 @@ class StructureModel(Protocol):
 
     ``key`` is everything that its condensed joint depends on, ``missions`` are the closed cycles of
     its loads, one unless several are mixed; ``peak`` is the increment of peak load, counted from 0
-    over all missions, ``friction`` µ before any wear, ``order`` that of the elements.
+    over all missions, ``friction`` µ before any wear, ``order`` that of the elements; ``finer``
+    tells a user how to refine the mesh where stress is large.
     """
 
     peak: int
@@ -62,6 +63,8 @@ class StructureModel(Protocol):
     def key(self) -> tuple[object, ...]: ...
     @property
     def missions(self) -> tuple[MissionLoads, ...]: ...
+    @property
+    def finer(self) -> str: ...
 
     def softening(self, structure: Structure) -> Softening:
         """Spin softening of both bodies at peak load."""

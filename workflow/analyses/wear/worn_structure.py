@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,7 +11,7 @@ import numpy as np
 from fe_models.mesh import Body, MeshError, StructureMesh, write_msh
 from fe_models.nonlinear import NonlinearCheck
 from fe_models.remesh import form_of, formed_mesh, worn_mesh, worn_volume
-from fe_models.stress import CycleStress, StressField
+from fe_models.stress import CycleStress, PeakStress, StressField
 from fe_models.structure import CycleSolution
 from sa_solver.types import Array, LoadHistory
 from wear.coupled import CoupledState
@@ -82,14 +83,61 @@ class WornStructure:
             "peak_stress": {
                 moment: {
                     body.name: {
-                        "von_mises": float(field.von_mises.max()),
-                        "maximum_principal": float(field.maximum_principal.max()),
+                        **_peak(field.peak),
+                        "at_contact": field.peak.at_contact,
+                        "notch": None if field.notch is None else _peak(field.notch),
                     }
                     for body, field in zip(bodies, stress.fields, strict=True)
                 }
                 for moment, stress in self.stresses.items()
             },
         }
+
+    def warn(self, accuracy: float, reporter: Reporter) -> None:
+        """Notches of whose stress the mesh leaves more than the ``accuracy``."""
+        bodies = self.mesh.body_1, self.mesh.body_2
+        for body, *fields in zip(bodies, *self._fields, strict=True):
+            notches = [field.notch for field in fields if field.notch is not None]
+            worst = max(notches, key=lambda notch: notch.error, default=None)
+            if worst is not None and worst.error > accuracy:
+                x, y, z = worst.place
+                reporter.warn(
+                    f"{body.name}: the largest stress on the free surface, {worst.von_mises:.0f} "
+                    f"MPa at X {x:.4g}, Y {y:.4g}, Z {z:.4g} mm, "
+                    + self._why(worst.error, accuracy)
+                )
+
+    @property
+    def _fields(self) -> tuple[tuple[StressField, StressField], ...]:
+        """Of both bodies, unworn and worn."""
+        return tuple(stress.fields for stress in self.stresses.values())
+
+    def _why(self, error: float, accuracy: float) -> str:
+        """Why a stress is not to be trusted, and what helps."""
+        if error == 1.0:
+            return (
+                "is beside a sharp inward corner, a fillet of fewer than nine elements round the "
+                "circle or the end of a clamped face, where it grows with every refinement: round "
+                "the corner, refine it, or hold the body farther away"
+            )
+        return (
+            f"has an estimated error of {error:.0%} by the mesh where {accuracy:.3g} may pass: "
+            f"{self.stage.model.finer}"
+        )
+
+    def sentences(self) -> Iterator[str]:
+        """The largest stresses of each body, unworn and worn."""
+        bodies = self.mesh.body_1, self.mesh.body_2
+        for body, unworn, worn in zip(bodies, *self._fields, strict=True):
+            parts = []
+            if unworn.notch is not None and worn.notch is not None:
+                error = max(unworn.notch.error, worn.notch.error)
+                left = "without bound" if error == 1.0 else f"the mesh leaves {error:.1%}"
+                parts.append(f"{_change(unworn.notch, worn.notch)} on the free surface ({left})")
+            if worn.peak != worn.notch:
+                where = "on a contact face" if worn.peak.at_contact else "elsewhere"
+                parts.append(f"{_change(unworn.peak, worn.peak)} {where}")
+            yield f"{body.name}: von Mises stress up to {', '.join(parts)}"
 
     def interface_summary(self, number: int) -> dict[str, Any]:
         """Volumes in the mesh and resultants at peak load, unworn and worn."""
@@ -104,6 +152,20 @@ class WornStructure:
                 "worn": resultants_at(worn, stage.peak),
             },
         }
+
+
+def _change(unworn: PeakStress, worn: PeakStress) -> str:
+    return f"{unworn.von_mises:.0f} -> {worn.von_mises:.0f} MPa"
+
+
+def _peak(peak: PeakStress) -> dict[str, Any]:
+    """What the summary has of a largest stress."""
+    return {
+        "von_mises": peak.von_mises,
+        "maximum_principal": peak.maximum_principal,
+        "at": list(peak.place),
+        "error": peak.error,
+    }
 
 
 def _body(body: Body, field: StressField) -> dict[str, Dataset]:

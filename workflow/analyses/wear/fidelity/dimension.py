@@ -8,6 +8,7 @@ from fe_models.mesh import MeshError
 from fe_models.transfer import FaceTransfer
 from workflow.analyses.wear.choice import Decision
 from workflow.analyses.wear.fidelity.estimate import Numbers, scales
+from workflow.analyses.wear.fidelity.probe import NOTCH
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.analyses.wear.structures.dovetail.model import DovetailModel
@@ -59,7 +60,8 @@ def _mid_slot(case: DovetailCase, dimension: int) -> Numbers:
     """What the sections in mid-slot carry on every flank, on a coarse mesh."""
     width, length = case.structure.face_width, case.structure.slot_length
     nodes = NODES_ACROSS, 1 + ceil(ROWS_PER_WIDTH * length / width)
-    mesh = case.mesh.model_copy(update={"flank_nodes": nodes, "size": width, "order": 1})
+    coarsest = {"flank_nodes": nodes, "size": width, "notch": NOTCH, "order": 1}
+    mesh = case.mesh.model_copy(update=coarsest)
     structure = case.structure.model_copy(update={"dimension": dimension})
     coarse = case.model_copy(update={"structure": structure, "mesh": mesh})
     stage = StructureStage(DovetailModel(coarse))

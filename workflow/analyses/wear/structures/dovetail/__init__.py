@@ -37,7 +37,7 @@ def _memory(case: DovetailCase, nodes: int = 0, interface_nodes: int = 0) -> Mem
     if case.structure.dimension == 3:
         interface_nodes = 2 * prod(case.mesh.flank_nodes)
         kept = 2 * len(case.load_path.shares) * sum(case.expected_legs) * FIELDS
-    remedy = "lower mesh.flank_nodes, mesh.order or contact.grid, or raise mesh.size"
+    remedy = "lower mesh.flank_nodes, mesh.notch, mesh.order or contact.grid, or raise mesh.size"
     return memory(case, nodes, interface_nodes, kept, remedy)
 
 

@@ -238,6 +238,9 @@ class Mesh(Section):
         "nodes across the flank, along the slot", [20, 34], default=(20, 34)
     )
     size: Length = entry("of the elements away from the flanks [mm]", "5 mm", default=5.0)
+    notch: Annotated[int, Whole(8, 1000)] = entry(
+        "elements round a full circle of a fillet, whose stress is told", 48, default=48
+    )
     order: Literal[1, 2] = entry("of the tetrahedra, 1 or 2", 1, default=1)
 
 

@@ -52,9 +52,15 @@ class DovetailModel:
         shares = self._case.load_path.shares
         return tuple(MissionLoads(p, p[:0], share) for p, share in zip(paths, shares, strict=True))
 
+    @property
+    def finer(self) -> str:
+        along = " or mesh.flank_nodes" if self._case.structure.dimension == 3 else ""
+        return f"raise mesh.notch{along}{', or take mesh.order: 2' if self.order == 1 else ''}"
+
     def mesh(self) -> StructureMesh:
         mesh = self._case.mesh
-        return self.dovetail.mesh(mesh.flank_nodes, mesh.size, self._case.structure.dimension)
+        dimension = self._case.structure.dimension
+        return self.dovetail.mesh(mesh.flank_nodes, mesh.size, dimension, mesh.notch)
 
     def structure(self, mesh: StructureMesh) -> Structure:
         disk, blade = self._case.material(1), self._case.material(2)

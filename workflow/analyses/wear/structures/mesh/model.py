@@ -55,6 +55,13 @@ class MeshModel:
             missions.append(MissionLoads(path[before:], path[:before], share))
         return tuple(missions)
 
+    @property
+    def finer(self) -> str:
+        how = "refine the file's mesh there"
+        if self._case.structure.size is not None:
+            how = "lower structure.size"
+        return how + (", or take structure.order: 2" if self.order == 1 else "")
+
     def _path(self, factors: tuple[float, ...]) -> Array:
         """Amplitudes of the loads, ``(t, loads)``; squared where a load is a rotation."""
         legs, loads = self._case.load_path.legs, self._case.structure.loads

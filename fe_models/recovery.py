@@ -1,0 +1,268 @@
+"""Stress at the vertices of a body, recovered from the displacements of the nodes around each.
+
+Nodal displacements are more accurate than their derivatives in the elements. Round each vertex a
+polynomial of one degree more than the elements is fitted to them by least squares, and its gradient
+gives the stress (polynomial preserving recovery: Zhang and Naga 2005,
+doi:10.1137/S1064827503402837). A stress of the elements' degree is found exactly, on any mesh and
+at the boundary too, where the superconvergent patches of Zienkiewicz and Zhu (1992,
+doi:10.1002/nme.1620330702) have few points and no partner: at the rim of a hole, 24 elements round
+it, it leaves two thirds of their error with elements of order 1 and a fifth with those of order 2.
+On surfaces that nothing touches the tractions left are taken off.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from itertools import product
+
+import numpy as np
+import scipy.sparse as sp
+from numpy.typing import NDArray
+
+from fe_models.elasticity import ElasticBody
+from sa_solver.types import Array, Indices
+
+Flags = NDArray[np.bool_]
+
+# Vertices inside take the elements beside them if these have so many nodes per coefficient.
+NODES_PER_COEFFICIENT = 1.5
+# Weight of a node, (REACH - r)^2 at a distance r relative to that of the farthest.
+REACH = 1.05
+# A degree is one too many for the nodes where it makes slopes so many times as uncertain as a plane
+# through them: through a single layer of elements 1e8 times and more, at a corner 300 times.
+UNCERTAIN = 400.0
+# Share of the normal matrix's trace that keeps it regular there: a thousand times rounding.
+REGULAR = 1e-13
+# Numbers of the fits' matrices at a time: few enough to stay in a processor's cache.
+AT_ONCE = 200_000
+# A surface is smooth where its facets turn by no more than 20 degrees from the mean normal, as of a
+# fillet with nine round the circle; else it has an edge, of directions with more than such a share
+# of the normals' squares.
+SMOOTH, EDGE = 0.94, 0.1
+
+
+class StressRecovery:
+    """The stress of a body at its vertices; ``free`` are facets on which nothing acts."""
+
+    def __init__(self, elastic: ElasticBody, free: Indices) -> None:
+        self._elastic = elastic
+        self._free = free
+
+    def stress(self, displacement: Array) -> Array:
+        """Cauchy stress of displacements ``(size,)`` at all vertices, ``(6, vertices)`` [MPa].
+
+        Ordered xx, yy, zz, xy, yz, zx of the global axes.
+        """
+        patches, vertices = self._patches, np.arange(self._elastic.body.mesh.nvertices)
+        return self._of(displacement, vertices, patches, self._elastic.order + 1)
+
+    def alternatives(self, displacement: Array, vertices: Indices) -> Array:
+        """The same at a few ``vertices`` by other fits, ``(k, 6, vertices)``: what is uncertain.
+
+        From patches that reach an element farther; of elements of order 1 also by a polynomial of
+        one degree less, since their displacements are of that order.
+        """
+        order, beside = self._elastic.order, self._elements_of_vertices
+        reached = self._neighbours[vertices]
+        near, wide = ((r @ beside).tocsr() for r in (reached, reached @ self._neighbours))
+        found = [self._of(displacement, vertices, wide, order + 1)]
+        if order == 1:
+            found.append(self._of(displacement, vertices, near, order))
+        return np.array(found)
+
+    @cached_property
+    def untouched(self) -> Indices:
+        """Vertices of the surface on whose facets nothing acts."""
+        mesh = self._elastic.body.mesh
+        touched = mesh.facets[:, np.setdiff1d(mesh.boundary_facets(), self._free)]
+        return np.setdiff1d(mesh.facets[:, self._free], touched)
+
+    def _of(
+        self, displacement: Array, vertices: Indices, elements: sp.csr_matrix, degree: int
+    ) -> Array:
+        """By a polynomial of a ``degree`` on so many rows of ``elements`` around ``vertices``."""
+        elastic, axes = self._elastic, list(self._elastic.body.axes)
+        nodes = (elements @ self._nodes_of_elements).tocsr()
+        nodes.sort_indices()
+        gradient = np.zeros((3, 3, len(vertices)))
+        gradient[np.ix_(axes, axes)] = _gradients(
+            elastic.nodes[:, axes], displacement.reshape(-1, elastic.dimension), vertices, nodes,
+            degree,
+        )  # fmt: skip
+        return self._without_tractions(elastic.cauchy(gradient), vertices)
+
+    @cached_property
+    def _elements_of_vertices(self) -> sp.csr_matrix:
+        """Elements at each vertex, ``(vertices, elements)``."""
+        mesh = self._elastic.body.mesh
+        return _incidence(mesh.t, mesh.nvertices).T.tocsr()
+
+    @cached_property
+    def _nodes_of_elements(self) -> sp.csr_matrix:
+        """Nodes of each element, ``(elements, nodes)``."""
+        return _incidence(self._elastic.element_nodes, len(self._elastic.nodes))
+
+    @cached_property
+    def _neighbours(self) -> sp.csr_matrix:
+        """Vertices that share an element, ``(vertices, vertices)``."""
+        beside = self._elements_of_vertices
+        return (beside @ beside.T).tocsr()
+
+    @cached_property
+    def _patches(self) -> sp.csr_matrix:
+        """Elements whose nodes each vertex takes: two rings, inside one if that has enough."""
+        mesh, near = self._elastic.body.mesh, self._elements_of_vertices
+        reached = np.diff((near @ self._nodes_of_elements).tocsr().indptr)
+        coefficients = len(_exponents(mesh.dim(), self._elastic.order + 1))
+        few = reached < NODES_PER_COEFFICIENT * coefficients
+        few[mesh.boundary_nodes()] = True
+        wide = sp.diags(few.astype(float)) @ self._neighbours
+        return (near + wide @ near).tocsr()
+
+    def _without_tractions(self, stress: Array, vertices: Indices) -> Array:
+        """P σ P with P along the surface, where nothing acts on it."""
+        along = self._along_surface[vertices].transpose(1, 2, 0)
+        xx, yy, zz, xy, yz, zx = stress
+        tensor = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
+        tensor = np.einsum("abn,bcn,cdn->adn", along, tensor, along)
+        if self._elastic.dimension == 2:
+            tensor[1, 1] = self._elastic.material.poisson * (tensor[0, 0] + tensor[2, 2])
+        return tensor[[0, 1, 2, 0, 1, 2], [0, 1, 2, 1, 2, 0]]
+
+    @cached_property
+    def _along_surface(self) -> Array:
+        """Projectors on the surface ``(vertices, 3, 3)`` where it is free, else the identity.
+
+        On an edge that sticks out both its surfaces are free and nothing but the stress along it is
+        left; in one that goes inwards stress has no bound, and is left as it is.
+        """
+        mean, smooth, inwards, squares = self._surface(self._free)
+        along = np.tile(np.eye(3), (len(mean), 1, 1))
+        plane = self.untouched[smooth[self.untouched]]
+        along[plane] -= mean[plane, :, None] * mean[plane, None, :]
+        edge = self.untouched[~(smooth | inwards)[self.untouched]]
+        share, direction = np.linalg.eigh(squares[edge])
+        kept = share <= EDGE * share.sum(axis=1, keepdims=True)
+        along[edge] = np.einsum("nak,nk,nbk->nab", direction, kept, direction)
+        return along
+
+    @cached_property
+    def inward_edges(self) -> Indices:
+        """Vertices of edges and corners of the body that go inwards: stress there has no bound."""
+        return np.flatnonzero(self._surface(self._elastic.body.mesh.boundary_facets())[2])
+
+    def beside(self, vertices: Indices) -> Indices:
+        """The vertices and those that share an element with them."""
+        return np.unique(self._neighbours[vertices].indices)
+
+    def _surface(self, facets: Indices) -> tuple[Array, Flags, Flags, Array]:
+        """Of a surface at all vertices: unit normals, smooth or not, going inwards or not.
+
+        And the sums of the dyads of facet normals, ``(vertices, 3, 3)``.
+        """
+        body, count = self._elastic.body, self._elastic.body.mesh.nvertices
+        corners, normals = body.mesh.facets[:, facets].T, body.outward_of(facets)
+        area = np.linalg.norm(normals, axis=1, keepdims=True)
+        normals = normals / area
+        mean = _vertex_normals(body.points, corners, normals, area, count)
+        towards = body.points[corners].mean(axis=1)[:, None, :] - body.points[corners]
+        towards /= np.linalg.norm(towards, axis=2, keepdims=True)
+        turned, inward, sunk = np.ones(count), np.zeros((count, 3)), np.full(count, -np.inf)
+        for k, corner in enumerate(corners.T):
+            np.minimum.at(turned, corner, np.einsum("fa,fa->f", mean[corner], normals))
+            np.add.at(inward, corner, towards[:, k])
+        for corner in corners.T:
+            np.maximum.at(sunk, corner, np.einsum("fa,fa->f", inward[corner], normals))
+        squares = (area[:, :, None] * normals[:, :, None] * normals[:, None, :]).reshape(-1, 9)
+        total = (_incidence(corners.T, count).T @ squares).reshape(-1, 3, 3)
+        smooth = turned > SMOOTH
+        return mean, smooth, ~smooth & (sunk > 0.0), total
+
+
+def _incidence(rows: Indices, count: int) -> sp.csr_matrix:
+    """``(m, count)`` with ones at the ``rows`` ``(k, m)`` of its columns."""
+    k, m = rows.shape
+    places = np.tile(np.arange(m), k), rows.ravel()
+    return sp.csr_matrix((np.ones(k * m), places), shape=(m, count))
+
+
+def _vertex_normals(
+    points: Array, corners: Indices, normals: Array, area: Array, count: int
+) -> Array:
+    """Unit normals ``(count, 3)`` of a faceted surface at its vertices, exact on a sphere.
+
+    Weights of Max (1999, doi:10.1080/10867651.1999.10487501): small facets count more.
+    """
+    total = np.zeros((count, 3))
+    for k in range(corners.shape[1]):
+        here = points[corners[:, k]]
+        sides = [points[corners[:, j]] - here for j in range(corners.shape[1]) if j != k]
+        weight = area if len(sides) == 2 else np.ones_like(area)
+        for side in sides:
+            square = np.einsum("fa,fa->f", side, side)[:, None]
+            weight = weight / (square if len(sides) == 2 else np.sqrt(square))
+        np.add.at(total, corners[:, k], weight * normals)
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    return np.divide(total, length, out=total, where=length > 0.0)
+
+
+def _exponents(dimension: int, degree: int) -> Indices:
+    """Exponents ``(m, dimension)`` of the monomials up to a degree."""
+    every = product(range(degree + 1), repeat=dimension)
+    # By degree: first the constant, then those of the axes in their order.
+    up = sorted((e for e in every if sum(e) <= degree), key=lambda e: (sum(e), e[::-1]))
+    return np.array(up)
+
+
+def _gradients(
+    points: Array, values: Array, vertices: Indices, nodes: sp.csr_matrix, degree: int
+) -> Array:
+    """``(d, d, len(vertices))``: derivatives along axis b, the second, of component a of values.
+
+    Fitted to the nodes in each row of ``nodes``, by as high a ``degree`` as they can tell;
+    ``points`` and ``values`` are ``(n, d)``.
+    """
+    d, exponents = points.shape[1], _exponents(points.shape[1], degree)
+    regular = REGULAR * np.diag((exponents.sum(axis=1) > 1).astype(float))
+    slopes = slice(1, d + 1)
+    poor = np.zeros(len(vertices), bool)
+    counts = np.diff(nodes.indptr)
+    gradient = np.empty((d, d, len(vertices)))
+    # Rows of like lengths together, filled up with nodes of no weight.
+    order = np.argsort(counts, kind="stable")
+    per_chunk = max(AT_ONCE // (len(exponents) * int(counts.max(initial=1))), 1)
+    for part in np.array_split(order, range(per_chunk, len(order), per_chunk)):
+        places = np.arange(counts[part].max())
+        real = places < counts[part, None]
+        near = nodes.indices[np.where(real, nodes.indptr[part, None] + places, 0)]
+        own = vertices[part, None]
+        arms = points[near] - points[own]
+        distance = np.where(real, np.linalg.norm(arms, axis=2), 0.0)
+        size = distance.max(axis=1)[:, None]
+        weight = np.where(real, (REACH - distance / size) ** 2, 0.0)
+        terms = _monomials(arms / size[:, :, None], exponents)
+        weighted = (weight[:, :, None] * terms).swapaxes(1, 2)
+        normal = weighted @ terms
+        normal += np.trace(normal, axis1=1, axis2=2)[:, None, None] * regular
+        right = weighted @ (values[near] - values[own])
+        unit = np.broadcast_to(np.eye(len(exponents))[:, slopes], (len(part), len(exponents), d))
+        solved = np.linalg.solve(normal, np.concatenate([right, unit], axis=2))[:, slopes]
+        gradient[:, :, part] = (solved[:, :, :d] / size[:, :, None]).transpose(2, 1, 0)
+        plane = np.linalg.inv(normal[:, : d + 1, : d + 1])[:, slopes, slopes]
+        inflated = np.linalg.solve(plane, solved[:, :, d:])
+        poor[part] = np.trace(inflated, axis1=1, axis2=2) > d * UNCERTAIN
+    if poor.any() and degree > 1:
+        gradient[:, :, poor] = _gradients(points, values, vertices[poor], nodes[poor], degree - 1)
+    return gradient
+
+
+def _monomials(x: Array, exponents: Indices) -> Array:
+    """``(..., m)`` at points ``(..., d)``."""
+    powers = [np.ones_like(x)]
+    for _ in range(exponents.max()):
+        powers.append(powers[-1] * x)
+    terms = np.ones((*x.shape[:-1], len(exponents)))
+    for term, exponent in enumerate(exponents):
+        for axis in np.flatnonzero(exponent):
+            terms[..., term] *= powers[exponent[axis]][..., axis]
+    return terms
