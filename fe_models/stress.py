@@ -45,8 +45,8 @@ class PeakStress:
 class StressField:
     """At the vertices of one ``body``: ``displacement`` ``(n, 3)`` [mm], ``stress`` ``(6, n)``.
 
-    Stress [MPa] is ordered xx, yy, zz, xy, yz, zx of the global axes. ``peak`` is the largest of all
-    and ``notch`` that of the surface on which nothing acts, which is what the mesh can resolve:
+    Stress [MPa] is ordered xx, yy, zz, xy, yz, zx of the global axes. ``peak`` is the largest of
+    all and ``notch`` that of the surface on which nothing acts, which is what the mesh can resolve:
     contact pressure has steep edges. None where there is no such surface.
     """
 
