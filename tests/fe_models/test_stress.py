@@ -157,7 +157,7 @@ def test_stress_at_points_is_linear_and_turned(kind):
     stress = np.zeros((6, mesh.nvertices))
     stress[0] = 10.0 + 4.0 * mesh.p[0]
     peak = PeakStress(14.0, 14.0, (1.0, 0.0, 0.0), False, 0.0)
-        field = StressField(body, np.zeros((mesh.nvertices, 3)), stress, peak, None)
+    field = StressField(body, np.zeros((mesh.nvertices, 3)), stress, peak, None)
     half = np.sqrt(0.5)
     axes = np.array([[half, 0.0, half], [0.0, 1.0, 0.0], [-half, 0.0, half]])
     frame = Frame(np.array([0.5, 0.5 if mesh.dim() == 3 else 0.0, 0.5]), axes)
