@@ -79,7 +79,7 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
         structure.warn(case.accuracy, reporter)
     with reporter.stage("stress under the contacts"):
         stresses = _stresses(outcome, structure, reporter)
-    budget = error_budget(outcome, reporter)
+    budget = error_budget(outcome, reporter) | (structure.errors() if structure else {})
     with reporter.stage("results"):
         recorded, contents = _write_results(outcome, structure, stresses, budget, run)
     run.draw(contents)
@@ -265,7 +265,9 @@ def _summary(
         "cycles": float(state.cycles[-1]),
         "jumps": state.jump,
         "work": vars(state.spent),
-        **({"structure": structure.summary(state)} if structure else {}),
+        **(
+            {"structure": structure.summary(state) | _notches(budget, outcome)} if structure else {}
+        ),
         **{
             name: _interface_summary(outcome, contact)
             | (structure.interface_summary(number) if structure else {})
@@ -282,6 +284,16 @@ def _summary(
                 for name, contact in zip(recorded, contacts, strict=True)
             },
         },
+    }
+
+
+def _notches(budget: Budget, outcome: Outcome) -> dict[str, Any]:
+    """Errors of what is a body's and not a contact's."""
+    contacts = {contact.stage.name for contact in outcome.interfaces}
+    return {
+        "error": {
+            name: summary_of(errors) for name, errors in budget.items() if name not in contacts
+        }
     }
 
 

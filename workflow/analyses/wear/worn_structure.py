@@ -15,6 +15,7 @@ from fe_models.stress import CycleStress, PeakStress, StressField
 from fe_models.structure import CycleSolution
 from sa_solver.types import Array, LoadHistory
 from wear.coupled import CoupledState
+from workflow.analyses.wear.budget.parts import ResultError
 from workflow.analyses.wear.case.evolution import EvolvingFriction
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.datasets import put_face
@@ -124,6 +125,17 @@ class WornStructure:
             f"has an estimated error of {error:.0%} by the mesh where {accuracy:.3g} may pass: "
             f"{self.stage.model.finer}"
         )
+
+    def errors(self) -> dict[str, dict[str, ResultError]]:
+        """Of the largest stress off the contact faces, by body; beside a sharp corner not known."""
+        bodies = self.mesh.body_1, self.mesh.body_2
+        errors = {}
+        for body, *fields in zip(bodies, *self._fields, strict=True):
+            left = [field.notch.error for field in fields if field.notch is not None]
+            if left:
+                part = max(left) if max(left) < 1.0 else None
+                errors[body.name] = {"notch_stress": ResultError({"mesh": part})}
+        return errors
 
     def sentences(self) -> Iterator[str]:
         """The largest stresses of each body, unworn and worn."""
