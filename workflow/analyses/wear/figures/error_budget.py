@@ -14,16 +14,18 @@ from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
 
 COLOURS = dict(zip(PARTS, (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK), strict=True))
 
-# Of a panel, in inches.
-HEIGHT = 3.2
+# Of a bar, in inches.
+HEIGHT = 0.55
 
 
 def error_budget(file: h5py.File, contents: Contents) -> Figure:
-    """Bars of the parts of every error, a panel for each group of results."""
-    names = list(file["error"])
+    """Bars of the parts of every error, a panel for each contact and each body."""
+    names = [*contents.names, *(name for name in file["error"] if name not in contents.names)]
     title = "Estimated errors of the main results, and what leaves them"
-    figure = new_figure(title, 1.5 + HEIGHT * len(names))
-    axes = figure.subplots(len(names), squeeze=False, sharex=True)[:, 0]
+    bars = [1 + len(file["error"][name]) for name in names]
+    figure = new_figure(title, 1.5 + HEIGHT * sum(bars))
+    grid = {"height_ratios": bars}
+    axes = figure.subplots(len(names), squeeze=False, sharex=True, gridspec_kw=grid)[:, 0]
     for axis, name in zip(axes, names, strict=True):
         _draw(axis, file["error"][name])
         axis.set_title(name)
