@@ -205,7 +205,7 @@ def test_pictures_are_written(start, separate_processes, tmp_path):
     stressed = "stress.section=x", "stress.life.parameter=ruiz"
     run = start(tmp_path / "out", *QUICK, *drawn, *stressed)
     assert run.ending.exit_code == 0, run.ending.stderr
-    assert len(list((run.folder / "figures").glob("*.png"))) == 8
+    assert len(list((run.folder / "figures").glob("*.png"))) == 9
     assert (run.folder / "paraview" / "structure.pvd").exists()
     assert not list(run.folder.rglob("*.part.*"))
 
