@@ -150,7 +150,7 @@ def errors(state: WearState, exact: Array) -> tuple[float, float]:
     return told / size, root_mean_square(state.surfaces.depth - exact, exact) / size
 
 
-@pytest.mark.parametrize("kind", [ImplicitStepper, SecondOrderStepper])
+@pytest.mark.parametrize("kind", [slow(ImplicitStepper), SecondOrderStepper])
 def test_automatic_steps_meet_their_tolerance_and_grow_fewer_with_it(kind) -> None:
     """And say within a factor of three how large their error is."""
     cycles = 100.0 * CONSTANT.stable_cycles(rounded())

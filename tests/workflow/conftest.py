@@ -17,6 +17,7 @@ from sa_solver.types import Array, Frame, Grid
 from tests.conftest import CASES
 from tests.workflow.commands import invoke, runs_here
 from workflow.analyses.wear import contact_workers
+from workflow.analyses.wear.budget import finding
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.layout import Contents
 from workflow.kinds import load_case
@@ -327,6 +328,17 @@ def _all_here() -> Iterator[None]:
         yield
 
 
+@pytest.fixture(scope="session", autouse=True)
+def _without_companions() -> Iterator[None]:
+    """Runs tell what they know of themselves: lives of companions take seconds.
+
+    They are for test_error_budget.py.
+    """
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(finding, "lives_of_companions", lambda *_: {})
+        yield
+
+
 @pytest.fixture
 def separate_processes(monkeypatch: pytest.MonkeyPatch) -> None:
     """Contacts and pictures have processes of their own, as where there is no test."""
@@ -336,11 +348,11 @@ def separate_processes(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session")
 def start(small_path: Path) -> Runner:
-    """Runs the small case with overrides, without pictures and companions, in this process."""
+    """Runs the small case with overrides and without pictures, in this process."""
 
     def run(folder: Path, *overrides: str, force: bool = False) -> Run:
-        lean = "output.paraview=false", "output.figures=false", "error_budget=known"
-        settings = [part for entry in (*lean, *overrides) for part in ("--set", entry)]
+        quiet = "output.paraview=false", "output.figures=false"
+        settings = [part for entry in (*quiet, *overrides) for part in ("--set", entry)]
         forced = ["--force"] if force else []
         return Run(invoke("run", small_path, "--out", folder, *forced, *settings), folder)
 

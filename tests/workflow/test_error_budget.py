@@ -9,6 +9,7 @@ import pytest
 
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import settings
+from workflow.analyses.wear.budget import finding
 from workflow.analyses.wear.budget.companions import Companions
 from workflow.analyses.wear.budget.lives import live
 from workflow.analyses.wear.budget.parts import PARTS, ResultError, peak_left
@@ -20,6 +21,14 @@ from workflow.kinds import load_case
 
 CASES = Path(__file__).parents[2] / "cases"
 QUIET = ("output.figures=false", "output.paraview=false", "stress.section=none")
+
+
+ALIVE = finding.lives_of_companions  # before the tests' runs do without
+
+
+@pytest.fixture(autouse=True)
+def _companions_live(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(finding, "lives_of_companions", ALIVE)
 
 
 # --- parts ----------------------------------------------------------------------------------------

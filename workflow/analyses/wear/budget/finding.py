@@ -21,7 +21,7 @@ Lives = dict[str, dict[str, dict[str, float]]]  # by part, interface and result
 def error_budget(outcome: Outcome, reporter: Reporter) -> dict[str, Errors]:
     """Errors of the main results by interface, each by what leaves them."""
     with reporter.stage("error budget"):
-        lives = _lives(outcome, reporter)
+        lives = lives_of_companions(outcome, reporter)
         return {
             contact.stage.name: errors_of(
                 outcome.case,
@@ -33,7 +33,7 @@ def error_budget(outcome: Outcome, reporter: Reporter) -> dict[str, Errors]:
         }
 
 
-def _lives(outcome: Outcome, reporter: Reporter) -> Lives:
+def lives_of_companions(outcome: Outcome, reporter: Reporter) -> Lives:
     """What companions tell; nothing where there are none, or they fail."""
     case = outcome.case
     if case.error_budget == "known" or case.contact.method == "nodes":
