@@ -186,7 +186,7 @@ class ElasticBody:
         strain = 0.5 * (gradient + gradient.transpose(1, 0, 2))
         trace = strain[0, 0] + strain[1, 1] + strain[2, 2]
         lame, shear = self.material.lame, self.material.shear_modulus
-        return np.array([lame * trace * (a == b) + 2.0 * shear * strain[a, b] for a, b in INDICES])
+        return components(lame * trace * np.eye(3)[:, :, None] + 2.0 * shear * strain)
 
     def _facet_basis(self, boundary: str) -> FacetBasis:
         mesh = self.body.mesh
@@ -216,6 +216,15 @@ def von_mises(stress: Array) -> Array:
 
 def maximum_principal(stress: Array) -> Array:
     """Largest principal stress of ``(6, n)`` components."""
+    return np.linalg.eigvalsh(tensors(stress).transpose(2, 0, 1))[:, -1]
+
+
+def tensors(stress: Array) -> Array:
+    """Tensors ``(3, 3, n)`` of ``(6, n)`` components."""
     xx, yy, zz, xy, yz, zx = stress
-    tensors = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]]).transpose(2, 0, 1)
-    return np.linalg.eigvalsh(tensors)[:, -1]
+    return np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
+
+
+def components(tensors: Array) -> Array:
+    """Components ``(6, n)`` of symmetric tensors ``(3, 3, n)``."""
+    return tensors[tuple(np.transpose(INDICES))]

@@ -19,7 +19,7 @@ import numpy as np
 import scipy.sparse as sp
 from numpy.typing import NDArray
 
-from fe_models.elasticity import ElasticBody
+from fe_models.elasticity import ElasticBody, components, tensors
 from sa_solver.types import Array, Indices
 
 Flags = NDArray[np.bool_]
@@ -122,12 +122,10 @@ class StressRecovery:
     def _without_tractions(self, stress: Array, vertices: Indices) -> Array:
         """P σ P with P along the surface, where nothing acts on it."""
         along = self._along_surface[vertices].transpose(1, 2, 0)
-        xx, yy, zz, xy, yz, zx = stress
-        tensor = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
-        tensor = np.einsum("abn,bcn,cdn->adn", along, tensor, along)
+        tensor = np.einsum("abn,bcn,cdn->adn", along, tensors(stress), along)
         if self._elastic.dimension == 2:
             tensor[1, 1] = self._elastic.material.poisson * (tensor[0, 0] + tensor[2, 2])
-        return tensor[[0, 1, 2, 0, 1, 2], [0, 1, 2, 1, 2, 0]]
+        return components(tensor)
 
     @cached_property
     def _along_surface(self) -> Array:

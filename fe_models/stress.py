@@ -7,11 +7,16 @@ from functools import cached_property
 
 import numpy as np
 
-from fe_models.elasticity import ElasticBody, maximum_principal, von_mises
+from fe_models.elasticity import (
+    ElasticBody,
+    components,
+    maximum_principal,
+    tensors,
+    von_mises,
+)
 from fe_models.mesh import Body, in_space
 from fe_models.recovery import StressRecovery
 from fe_models.structure import Structure
-from sa_solver.subsurface_influence import INDICES
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Frame, Indices
 
@@ -39,6 +44,11 @@ class PeakStress:
     place: tuple[float, ...]
     at_contact: bool
     error: float
+
+    @property
+    def bounded(self) -> bool:
+        """Whether stress there has a bound that finer meshes go to."""
+        return self.error < 1.0
 
 
 @dataclass(frozen=True)
@@ -75,23 +85,14 @@ class StressField:
         return turned(np.einsum("cin,in->cn", self.stress[:, corners.T], weights), frame)
 
 
-def stress_state(
-    structure: Structure, force: Array, relative: Array, amplitudes: Array
-) -> tuple[StressField, StressField]:
-    """Stress fields of body 1 and body 2.
-
-    ``force`` ``(3, n)`` on body 2 and ``relative`` displacement ``(3, n)`` over all interfaces, in
-    their frames; ``amplitudes`` of the load cases.
-    """
-    return _fields(structure, deformation(structure, force, relative, amplitudes))
-
-
 def deformation(
     structure: Structure, force: Array, relative: Array, amplitudes: Array
 ) -> tuple[Array, Array]:
     """All displacements of body 1 and body 2, each ``(size,)`` [mm].
 
-    Body 1 carries the forces, body 2 follows it at the relative displacements.
+    Body 1 carries the forces, body 2 follows it at the relative displacements. ``force`` ``(3, n)``
+    on body 2 and ``relative`` displacement ``(3, n)`` are over all interfaces, in their frames;
+    ``amplitudes`` those of the load cases.
     """
     every, _, follows = _motion(structure, force[None], relative[None], amplitudes[None])
     return every[:, 0], structure.body_2.recover(follows[:, 0], amplitudes)
@@ -115,7 +116,7 @@ def cycle_stress(
     """Stress in increment ``at``, and the motion of the faces in every one.
 
     ``force`` ``(t, 3, n)``, ``relative`` ``(t, 3, n)`` and ``amplitudes`` ``(t, cases)`` as in
-    :func:`stress_state`.
+    :func:`deformation`.
     """
     every, leads, follows = _motion(structure, force, relative, amplitudes)
     displacements = every[:, at], structure.body_2.recover(follows[:, at], amplitudes[at])
@@ -125,7 +126,11 @@ def cycle_stress(
         np.split(in_space(moved.T.reshape(len(force), -1, dimension)).swapaxes(1, 2), ends, axis=2)
         for moved in (leads, follows)
     )
-    return CycleStress(_fields(structure, displacements), tuple(zip(faces_1, faces_2, strict=True)))
+    one, two = (
+        stress_field(body.elastic, displacement, body.free_facets, body.nodes, body.clamped)
+        for body, displacement in zip(structure.bodies, displacements, strict=True)
+    )
+    return CycleStress((one, two), tuple(zip(faces_1, faces_2, strict=True)))
 
 
 def _motion(
@@ -145,16 +150,6 @@ def _motion(
     if projection is not None:
         leads = projection @ leads
     return every, leads, leads + gaps
-
-
-def _fields(
-    structure: Structure, displacements: tuple[Array, Array]
-) -> tuple[StressField, StressField]:
-    one, two = (
-        stress_field(body.elastic, displacement, body.free_facets, body.nodes, body.clamped)
-        for body, displacement in zip(structure.bodies, displacements, strict=True)
-    )
-    return one, two
 
 
 def stress_field(
@@ -199,10 +194,7 @@ def stress_field(
 
 def turned(stress: Array, frame: Frame) -> Array:
     """Stress ``(6, n)`` of the global axes along those of a ``frame``."""
-    xx, yy, zz, xy, yz, zx = stress
-    tensors = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
-    local = np.einsum("ai,ijn,bj->abn", frame.axes, tensors, frame.axes)
-    return np.array([local[a, b] for a, b in INDICES])
+    return components(np.einsum("ai,ijn,bj->abn", frame.axes, tensors(stress), frame.axes))
 
 
 def _in_elements(body: Body, points: Array) -> tuple[Indices, Array]:

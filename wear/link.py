@@ -182,9 +182,7 @@ class Link:
 
     def fields(self, places: Array) -> Array:
         """d ``(t, 3, nx, ny)`` [mm] at places ``(2, nx, ny)`` of the face [mm]."""
-        basis = _products(places.reshape(2, -1).T, self.region, self.degrees)
-        rows = self.coefficients.reshape(-1, basis.shape[1]) @ basis.T
-        return rows.reshape(len(self.coefficients), 3, *places.shape[1:])
+        return self._of(_products(places.reshape(2, -1).T, self.region, self.degrees), places)
 
     def derivative(self, places: Array, orders: tuple[int, int]) -> Array:
         """Derivatives of d of such ``orders`` along x and y ``(t, 3, nx, ny)`` [mm^(1 - orders)].
@@ -194,7 +192,11 @@ class Link:
         size = self.region[1] - self.region[0]
         scaled = np.clip(_scaled(places.reshape(2, -1).T, self.region), -1.0, 1.0).T
         along_x, along_y = map(_derived, scaled, self.degrees, size, orders)
-        basis = (along_x[:, :, None] * along_y[:, None, :]).reshape(len(along_x), -1)
+        products = along_x[:, :, None] * along_y[:, None, :]
+        return self._of(products.reshape(len(along_x), -1), places)
+
+    def _of(self, basis: Array, places: Array) -> Array:
+        """Sums of a ``basis`` ``(nx ny, m)`` at ``places``, ``(t, 3, nx, ny)``."""
         rows = self.coefficients.reshape(-1, basis.shape[1]) @ basis.T
         return rows.reshape(len(self.coefficients), 3, *places.shape[1:])
 

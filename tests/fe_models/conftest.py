@@ -14,11 +14,19 @@ from fe_models.friction import FrictionalJoint
 from fe_models.geometry.dovetail import Dovetail
 from fe_models.joint import JointStiffness
 from fe_models.mesh import Body, StructureMesh
+from fe_models.stress import StressField, cycle_stress
 from fe_models.structure import CycleSolution, Structure
-from sa_solver.types import Material
+from sa_solver.types import Array, Material
 
 # Coarse: the laws tested here hold on any mesh.
 FLANK_NODES, SIZE, NOTCH = (8, 10), 8.0, 16
+
+
+def stress_state(
+    structure: Structure, force: Array, relative: Array, amplitudes: Array
+) -> tuple[StressField, StressField]:
+    """Stress fields of both bodies in one state, a cycle of a single increment."""
+    return cycle_stress(structure, force[None], relative[None], amplitudes[None], 0).fields
 
 
 @pytest.fixture(scope="session")

@@ -5,7 +5,7 @@ import pytest
 
 from fe_models.dovetail import dovetail_structure
 from fe_models.friction import FrictionalJoint
-from fe_models.stress import stress_state
+from tests.fe_models.conftest import stress_state
 
 FRICTION, PEAK = 0.4, 7
 
