@@ -216,7 +216,8 @@ def von_mises(stress: Array) -> Array:
 
 def maximum_principal(stress: Array) -> Array:
     """Largest principal stress of ``(6, n)`` components."""
-    return np.linalg.eigvalsh(tensors(stress).transpose(2, 0, 1))[:, -1]
+    largest = np.linalg.eigvalsh(tensors(stress).transpose(2, 0, 1))[:, -1]
+    return np.asarray(largest, dtype=np.float64)
 
 
 def tensors(stress: Array) -> Array:

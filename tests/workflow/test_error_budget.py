@@ -79,6 +79,11 @@ def test_a_result_beyond_the_accuracy_is_a_warning_that_names_the_setting() -> N
     assert SETTINGS["mesh"] in line
 
 
+def companions_of(case) -> Companions:
+    structure = structure_of(case)
+    return Companions.of(case, structure.finer(case), structure.source(case).line)
+
+
 # --- lives ----------------------------------------------------------------------------------------
 
 
@@ -90,7 +95,7 @@ def section():
 
 
 def test_companions_differ_in_one_thing_each(section) -> None:
-    companions = structure_of(section).companions(section)
+    companions = companions_of(section)
     own, finer, coarser = companions.own, companions.finer, companions.coarser
     assert companions.linked is None
     assert changed(finer, {"mesh": own.mesh}) == own
@@ -101,7 +106,7 @@ def test_companions_differ_in_one_thing_each(section) -> None:
 
 def test_a_joint_in_space_is_judged_by_its_section() -> None:
     case = load_case(CASES / "dovetail.yaml")
-    companions = structure_of(case).companions(case)
+    companions = companions_of(case)
     assert not companions.same
     assert companions.own.structure.dimension == companions.finer.structure.dimension == 2
     assert companions.own.mesh == case.mesh
@@ -109,7 +114,7 @@ def test_a_joint_in_space_is_judged_by_its_section() -> None:
 
 def test_half_spaces_have_a_companion_that_is_linked(section) -> None:
     case = changed(section, {"contact.link": "half_space"})
-    companions = structure_of(case).companions(case)
+    companions = companions_of(case)
     assert companions.linked is not None
     assert companions.linked.contact.link == "corrected"
 
@@ -118,7 +123,7 @@ def test_half_spaces_have_a_companion_that_is_linked(section) -> None:
 def test_lives_tell_what_the_mesh_leaves(section) -> None:
     """Of two orders and sizes, against a mesh so fine that what it leaves does not count."""
     structure = structure_of(section)
-    companions = structure.companions(section)
+    companions = companions_of(section)
     told = companions.errors(structure.source(section), structure.source)["mesh"]["intrados"]
 
     fine = {"mesh.flank_nodes": (61, 61), "mesh.size": 1.5, "mesh.order": 2}
@@ -137,7 +142,7 @@ def test_lives_tell_what_the_mesh_leaves(section) -> None:
 def test_grids_are_compared_by_their_order() -> None:
     """A body without a structure: the sphere's scar on half as many cells."""
     case = load_case(CASES / "sphere_wear.yaml")
-    companions: Companions = structure_of(case).companions(case)
+    companions: Companions = companions_of(case)
     assert companions.cells == case.contact.grid[0] / companions.own.contact.grid[0]
     assert companions.finer is None
 

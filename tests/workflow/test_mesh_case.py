@@ -95,6 +95,17 @@ def test_parts_and_instances_run(blocks, tmp_path):
     assert summary["structure"]["closure"] <= CLOSED
 
 
+def test_a_contact_may_be_called_as_a_body(blocks, tmp_path):
+    """Both have errors of their own."""
+    edit(blocks, "name: foot", "name: Foot-1")
+    summary = run(blocks, tmp_path / "out")
+    assert {"depth", "volume", "peak_pressure"} <= summary["Foot-1"]["error"].keys()
+    assert summary["structure"]["error"]["Foot-1"].keys() == {"notch_stress"}
+    with h5py.File(tmp_path / "out" / "results.h5") as file:
+        assert "depth" in file["error/Foot-1"]
+        assert list(file["bodies/Foot-1/error"]) == ["notch_stress"]
+
+
 def test_worn_faces_come_back_at_the_users_nodes(blocks, tmp_path):
     """By the numbers of the file: the top of the base and the bottom of the foot."""
     edit(blocks, "4 N", "18 N")  # of the 20 N at which all of the foot slides: some of it does

@@ -118,17 +118,8 @@ FIRST = (
     *("title", "analysis", "structure", "materials", "friction", "load_path", "mesh"),
     *("joint", "evolution", "drive", "excitation", "energies", "ageing", "integration"),
     *("forces", "frequencies", "mass", "resolution", "continuation", "force_sweeps", "backbone"),
-    *(
-        "nonlinearity",
-        "reduction",
-        "contact",
-        "wear",
-        "coupling",
-        "accuracy",
-        "error_budget",
-        "fidelity",
-    ),
-    *("loops", "stress"),
+    *("nonlinearity", "reduction", "contact", "wear", "coupling"),
+    *("accuracy", "error_budget", "fidelity", "loops", "stress"),
 )
 LAST = ("output", "assumed", "reported", "expect")
 

@@ -87,7 +87,12 @@ class InterfaceOutcome:
     @cached_property
     def increments_error(self) -> dict[str, float] | None:
         """What increments leave of depth and energy of the first and the last cycle together."""
-        return increments_error([self.stage.unworn_tractions(self.unworn, self.first), self.end])
+        return increments_error([self.begin, self.end])
+
+    @cached_property
+    def begin(self) -> CycleTractions:
+        """The tractions of the unworn cycle."""
+        return self.stage.unworn_tractions(self.unworn, self.first)
 
     @cached_property
     def end(self) -> CycleTractions:

@@ -79,7 +79,7 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
         structure.warn(case.accuracy, reporter)
     with reporter.stage("stress under the contacts"):
         stresses = _stresses(outcome, structure, reporter)
-    budget = error_budget(outcome, reporter) | (structure.errors() if structure else {})
+    budget = error_budget(outcome, reporter)
     with reporter.stage("results"):
         recorded, contents = _write_results(outcome, structure, stresses, budget, run)
     run.draw(contents)
@@ -111,11 +111,10 @@ def _stresses(
         return []
     cycles = []
     for number, contact in enumerate(outcome.interfaces):
-        assert contact.worn is not None
         stage, worn = contact.stage, contact.unworn
         if structure is not None:
             worn = structure.cycle.histories[number]
-        found = stage.unworn_tractions(contact.unworn, contact.first), contact.worn
+        found = contact.begin, contact.end
         unworn, after = (
             StressedCycle(
                 with_known_shear(stage, tractions, loads),
@@ -162,7 +161,7 @@ def _write_results(
         _write_kinetics(writer, outcome, recorded)
         write_loops(writer, run.folder, outcome.state.jump)
         if structure is not None:
-            structure.write(writer)
+            structure.write(writer, case.accuracy)
         for stress in stresses:
             stress.write(writer)
         for name, errors in budget.items():
@@ -265,9 +264,7 @@ def _summary(
         "cycles": float(state.cycles[-1]),
         "jumps": state.jump,
         "work": vars(state.spent),
-        **(
-            {"structure": structure.summary(state) | _notches(budget, outcome)} if structure else {}
-        ),
+        **({"structure": structure.summary(state)} if structure else {}),
         **{
             name: _interface_summary(outcome, contact)
             | (structure.interface_summary(number) if structure else {})
@@ -284,16 +281,6 @@ def _summary(
                 for name, contact in zip(recorded, contacts, strict=True)
             },
         },
-    }
-
-
-def _notches(budget: Budget, outcome: Outcome) -> dict[str, Any]:
-    """Errors of what is a body's and not a contact's."""
-    contacts = {contact.stage.name for contact in outcome.interfaces}
-    return {
-        "error": {
-            name: summary_of(errors) for name, errors in budget.items() if name not in contacts
-        }
     }
 
 

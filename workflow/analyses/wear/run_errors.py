@@ -9,6 +9,7 @@ from workflow.analyses.wear.budget.report import Budget, warning_of
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import Duration
 from workflow.analyses.wear.outcome import InterfaceOutcome
+from workflow.analyses.wear.structure import SETTINGS
 from workflow.analyses.wear.structures import structure_of
 from workflow.shell.reporter import Reporter
 
@@ -27,7 +28,7 @@ def warn_of_errors(
 
     And few increments of surfaces that move over each other, which no estimate knows of.
     """
-    settings = structure_of(case).settings
+    settings = {**SETTINGS, **structure_of(case).settings}
     for contact in contacts:
         name, state = contact.stage.name, contact.state
         _warn_of_steps(case.wear, contact, reporter)

@@ -13,7 +13,6 @@ from workflow.shell.analysis import as_written
 from workflow.shell.memory import Memory, factor_bytes
 
 if TYPE_CHECKING:
-    from workflow.analyses.wear.budget.companions import Companions
     from workflow.analyses.wear.contact_stage import ContactStage
     from workflow.analyses.wear.load_source import LoadSource
 
@@ -52,6 +51,18 @@ def memory(
 
 
 @dataclass(frozen=True)
+class Finer(Generic[AnyWearCase]):
+    """A finer mesh, to tell what that of a case leaves: so large a ``share`` of the difference.
+
+    ``mesh`` are its entries, in the case or in a ``section`` in the plane that stands for it.
+    """
+
+    mesh: Mapping[str, Any]
+    share: float = 1.0
+    section: AnyWearCase | None = None
+
+
+@dataclass(frozen=True)
 class WearStructure(Generic[AnyWearCase]):
     """What a wear run needs to know of a kind of structure.
 
@@ -59,8 +70,8 @@ class WearStructure(Generic[AnyWearCase]):
     how many they are, by which the time of a run is told, and ``memory`` what a run needs, given
     the nodes of both bodies and of all interfaces (0: unknown). ``choose`` gives the case with the
     settings that it leaves open, and a record of why; ``warnings`` are about the unworn contact of
-    a stage under a peak load [N]. ``companions`` tell what its mesh and its grid leave, and
-    ``settings`` what makes the parts of the error smaller.
+    a stage under a peak load [N]. ``finer`` gives a finer mesh, if there is one that is cheap, and
+    ``settings`` say what makes the parts of the error smaller where that is not :data:`SETTINGS`.
     """
 
     name: str
@@ -70,5 +81,5 @@ class WearStructure(Generic[AnyWearCase]):
     memory: Callable[[AnyWearCase, int, int], Memory] = memory
     choose: Callable[[AnyWearCase], tuple[AnyWearCase, dict[str, Any] | None]] = as_written
     warnings: Callable[[AnyWearCase, ContactStage, float], Iterable[str]] = lambda *_: ()
-    companions: Callable[[AnyWearCase], Companions[AnyWearCase] | None] = lambda _: None
-    settings: Mapping[str, str] = field(default_factory=lambda: dict(SETTINGS))
+    finer: Callable[[AnyWearCase], Finer[AnyWearCase] | None] = lambda _: None
+    settings: Mapping[str, str] = field(default_factory=dict)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from fe_models.structure import CycleSolution
 from sa_solver.types import Array, LoadHistory
 from wear.coupled import CoupledState
 from workflow.analyses.wear.budget.parts import ResultError
+from workflow.analyses.wear.budget.report import datasets_of, summary_of
 from workflow.analyses.wear.case.evolution import EvolvingFriction
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.datasets import put_face
@@ -53,7 +54,7 @@ class WornStructure:
         stress = self.stresses[moment]
         return stress.faces[number], stress.fields
 
-    def write(self, writer: ResultsWriter) -> None:
+    def write(self, writer: ResultsWriter, accuracy: float) -> None:
         """Load histories of the worn faces, and both bodies unworn and worn."""
         for history in self.cycle.histories:
             name = history.interface.name
@@ -64,6 +65,8 @@ class WornStructure:
             bodies = zip((mesh.body_1, mesh.body_2), self.stresses[moment].fields, strict=True)
             for body, field in bodies:
                 writer.put(f"bodies/{body.name}/{moment}", _body(body, field))
+        for name, errors in self._errors().items():
+            writer.put(f"bodies/{name}/error", datasets_of(errors), accuracy=accuracy)
 
     def summary(self, state: CoupledState) -> dict[str, Any]:
         """What the solver says of itself, and the largest stresses."""
@@ -81,6 +84,7 @@ class WornStructure:
             "closure": unworn.closure,
             "nonlinearity": nonlinearity_summary(stage),
             "drift": [float(value) for value in state.drift],
+            "error": {name: summary_of(errors) for name, errors in self._errors().items()},
             "peak_stress": {
                 moment: {
                     body.name: {
@@ -104,8 +108,7 @@ class WornStructure:
                 x, y, z = worst.place
                 reporter.warn(
                     f"{body.name}: the largest stress on the free surface, {worst.von_mises:.0f} "
-                    f"MPa at X {x:.4g}, Y {y:.4g}, Z {z:.4g} mm, "
-                    + self._why(worst.error, accuracy)
+                    f"MPa at X {x:.4g}, Y {y:.4g}, Z {z:.4g} mm, " + self._why(worst, accuracy)
                 )
 
     @property
@@ -113,28 +116,27 @@ class WornStructure:
         """Of both bodies, unworn and worn."""
         return tuple(stress.fields for stress in self.stresses.values())
 
-    def _why(self, error: float, accuracy: float) -> str:
+    def _why(self, peak: PeakStress, accuracy: float) -> str:
         """Why a stress is not to be trusted, and what helps."""
-        if error == 1.0:
+        if not peak.bounded:
             return (
                 "is beside a sharp inward corner, a fillet of fewer than nine elements round the "
                 "circle or the end of a clamped face, where it grows with every refinement: round "
                 "the corner, refine it, or hold the body farther away"
             )
         return (
-            f"has an estimated error of {error:.0%} by the mesh where {accuracy:.3g} may pass: "
-            f"{self.stage.model.finer}"
+            f"has an estimated error of {peak.error:.0%} by the mesh, where {100 * accuracy:g} % "
+            f"may pass: {self.stage.model.finer}"
         )
 
-    def errors(self) -> dict[str, dict[str, ResultError]]:
+    def _errors(self) -> dict[str, dict[str, ResultError]]:
         """Of the largest stress off the contact faces, by body; beside a sharp corner not known."""
         bodies = self.mesh.body_1, self.mesh.body_2
         errors = {}
         for body, *fields in zip(bodies, *self._fields, strict=True):
-            left = [field.notch.error for field in fields if field.notch is not None]
+            left = [field.notch for field in fields if field.notch is not None]
             if left:
-                part = max(left) if max(left) < 1.0 else None
-                errors[body.name] = {"notch_stress": ResultError({"mesh": part})}
+                errors[body.name] = {"notch_stress": ResultError({"mesh": _known(left)})}
         return errors
 
     def sentences(self) -> Iterator[str]:
@@ -143,8 +145,8 @@ class WornStructure:
         for body, unworn, worn in zip(bodies, *self._fields, strict=True):
             parts = []
             if unworn.notch is not None and worn.notch is not None:
-                error = max(unworn.notch.error, worn.notch.error)
-                left = "without bound" if error == 1.0 else f"the mesh leaves {error:.1%}"
+                error = _known([unworn.notch, worn.notch])
+                left = "without bound" if error is None else f"the mesh leaves {error:.1%}"
                 parts.append(f"{_change(unworn.notch, worn.notch)} on the free surface ({left})")
             if worn.peak != worn.notch:
                 where = "on a contact face" if worn.peak.at_contact else "elsewhere"
@@ -164,6 +166,11 @@ class WornStructure:
                 "worn": resultants_at(worn, stage.peak),
             },
         }
+
+
+def _known(peaks: Sequence[PeakStress]) -> float | None:
+    """The largest error of these stresses, None where one of them has no bound."""
+    return max(peak.error for peak in peaks) if all(p.bounded for p in peaks) else None
 
 
 def _change(unworn: PeakStress, worn: PeakStress) -> str:

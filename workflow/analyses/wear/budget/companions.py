@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Generic
+from typing import TYPE_CHECKING, Generic
 
-from workflow.analyses.wear.budget.lives import AnyWearCase, live, shortened
+from workflow.analyses.wear.budget.lives import Worn, live, shortened, worn_by
+from workflow.analyses.wear.structure import AnyWearCase, Finer
 from workflow.case.changing import changed
 
 if TYPE_CHECKING:
@@ -18,22 +19,17 @@ ORDER = 2.0
 # Cells along a direction of a contact that lives shortly, half of the case's unless it is a line;
 # with fewer than the least none lives.
 MOST_CELLS, FEWEST = 64, 8
-# Of the difference to a mesh of half the size, of elements of second order: all of the error of
-# first order, and of second order what Richardson makes of it.
-MESH_SHARES = {1: 1.0, 2: 4.0 / 3.0}
-
-Worn = dict[str, dict[str, float]]  # by interface and quantity
 
 
 @dataclass(frozen=True)
 class Companions(Generic[AnyWearCase]):
     """Cases that live shortly beside ``own``, which stands for the case that is run.
 
-    ``own`` has the ``same`` structure as that case, or a cheaper one. ``finer`` is on a mesh that
-    leaves so much less that ``mesh_share`` times the difference is the error of ``own``. The
-    contact grid of ``coarser`` has half as many cells along each direction, that of the case
-    ``cells`` times as many as ``own``. ``linked`` has its contacts linked to the nodes of the
-    structure, which ``own`` has not. None where there is no such case.
+    ``own`` has the ``same`` structure as that case, or a section in its place. ``finer`` is on a
+    mesh of which ``mesh_share`` times the difference is the error of ``own``. The contact grid of
+    ``coarser`` has half as many cells along each direction, that of the case ``cells`` times as
+    many as ``own``. ``linked`` has its contacts linked to the nodes of the structure, which ``own``
+    has not. None where there is no such case.
     """
 
     own: AnyWearCase
@@ -46,31 +42,26 @@ class Companions(Generic[AnyWearCase]):
 
     @classmethod
     def of(
-        cls,
-        case: AnyWearCase,
-        section: AnyWearCase | None = None,
-        *,
-        line: bool,
-        finer: Mapping[str, Any] | None = None,
-        mesh_share: float = 1.0,
+        cls, case: AnyWearCase, finer: Finer[AnyWearCase] | None, line: bool
     ) -> Companions[AnyWearCase]:
-        """Those of a case, or of a ``section`` that stands for it; ``finer`` are entries."""
+        """Those of a case with, or without, a ``finer`` mesh; ``line`` as of its own contacts."""
+        section = None if finer is None else finer.section
+        line = line or section is not None
         across, along = case.contact.grid
         grid = (min(across, MOST_CELLS), along) if line else (_fewer(across), _fewer(along))
         settings = {"contact.grid": grid, "contact.method": "normal"}
         own = shortened(case if section is None else section, settings)
         linked = own.contact.link == "corrected"
         half = tuple(max(1, count // 2) for count in grid)
+        enough = min(half[: 1 if line else 2]) >= FEWEST
         return cls(
             own,
-            section is None,
-            None if finer is None else changed(own, finer),
-            mesh_share,
-            changed(own, {"contact.grid": half})
-            if min(half[: 1 if line else 2]) >= FEWEST
-            else None,
-            across / grid[0],
-            None if linked else changed(own, {"contact.link": "corrected"}),
+            same=section is None,
+            finer=None if finer is None else changed(own, finer.mesh),
+            mesh_share=1.0 if finer is None else finer.share,
+            coarser=changed(own, {"contact.grid": half}) if enough else None,
+            cells=across / grid[0],
+            linked=None if linked else changed(own, {"contact.link": "corrected"}),
         )
 
     def errors(
@@ -102,15 +93,12 @@ def _worn(case: AnyWearCase, source: LoadSource) -> Worn:
     # Where loads follow wear, what the mesh makes of it counts as well.
     coupled = case.recoupling.resultants != "constant"
     stages, (begin, *_, end) = live(case, source, "every" if coupled else "constant")
-    pressures = [_largest_pressures(state) for state in (begin, end)]
+    pressures = zip(*(_largest_pressures(state) for state in (begin, end)), strict=True)
     return {
-        stage.name: {
-            "depth": float(state.surfaces.depth.max()),
-            "volume": stage.volume(state.surfaces.depth),
-            "peak_pressure": unworn,
-            "worn_peak_pressure": worn,
-        }
-        for stage, state, unworn, worn in zip(stages, end.interfaces, *pressures, strict=True)
+        name: numbers | {"peak_pressure": unworn, "worn_peak_pressure": worn}
+        for (name, numbers), (unworn, worn) in zip(
+            worn_by(stages, end).items(), pressures, strict=True
+        )
     }
 
 

@@ -4,18 +4,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from fe_models.mesh import MeshError
-from sa_solver.normal import NormalContactError
 from wear.interface import MotionError
-from wear.stepping import ContactFailure
 from workflow.analyses.wear.budget.companions import Companions
+from workflow.analyses.wear.budget.lives import FAILURES, Worn
 from workflow.analyses.wear.budget.parts import Errors, errors_of
 from workflow.analyses.wear.outcome import Outcome
 from workflow.analyses.wear.structures import structure_of
-from workflow.errors import MethodFailed, UserError
+from workflow.errors import UserError
 from workflow.shell.reporter import Reporter
 
-Lives = dict[str, dict[str, dict[str, float]]]  # by part, interface and result
+Lives = dict[str, Worn]  # by part
 
 
 def error_budget(outcome: Outcome, reporter: Reporter) -> dict[str, Errors]:
@@ -34,19 +32,14 @@ def error_budget(outcome: Outcome, reporter: Reporter) -> dict[str, Errors]:
 
 
 def lives_of_companions(outcome: Outcome, reporter: Reporter) -> Lives:
-    """What companions tell; nothing where there are none, or they fail."""
+    """What companions tell; nothing where none are asked for, or they fail."""
     case = outcome.case
     if case.error_budget == "known" or case.contact.method == "nodes":
         return {}
-    structure = structure_of(case)
-    companions: Companions[Any] | None = structure.companions(case)
-    if companions is None:
-        return {}
+    structure, source = structure_of(case), outcome.source
+    companions: Companions[Any] = Companions.of(case, structure.finer(case), source.line)
     try:
-        return companions.errors(outcome.source, structure.source)
-    except (
-        *(MeshError, NormalContactError, ContactFailure, MotionError),
-        *(MethodFailed, UserError),
-    ) as error:
+        return companions.errors(source, structure.source)
+    except (*FAILURES, MotionError, UserError) as error:
         reporter.log(f"error budget: mesh and grid stay unknown, a short life failed: {error}")
         return {}

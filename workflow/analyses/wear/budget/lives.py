@@ -6,18 +6,25 @@ difference that this one thing makes.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import Any, Literal, TypeVar
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal
 
+from fe_models.mesh import MeshError
+from sa_solver.normal import NormalContactError
 from wear.coupled import Contacts, CoupledSettings, CoupledState, CoupledWear, JumpSize
+from wear.stepping import ContactFailure
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Life, Step
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.load_source import LoadSource
+from workflow.analyses.wear.structure import AnyWearCase
 from workflow.case.changing import changed
+from workflow.errors import MethodFailed
 
-AnyWearCase = TypeVar("AnyWearCase", bound=WearCase)
+Worn = dict[str, dict[str, float]]  # by interface and quantity
 
+# What a life may end in.
+FAILURES = (MeshError, NormalContactError, ContactFailure, MethodFailed)
 # Implicit steps of a life. On the default joint 3 and 8 give the same errors of increments and
 # meshes within 2 %, and of grids within 20 % of these errors.
 STEPS = 3
@@ -44,7 +51,7 @@ def live(
 ) -> tuple[list[ContactStage], list[CoupledState]]:
     """The contacts of a life under the loads of ``source``, and its states, the unworn one first.
 
-    Raises what structure and contact raise.
+    Raises one of :data:`FAILURES` where structure or contacts fail.
     """
     stages = [ContactStage(case, face) for face in source.faces]
     cycles = case.wear.cycles
@@ -52,3 +59,12 @@ def live(
     loop = CoupledWear(settings, source, Contacts(stages))
     state, _ = loop.begin(source.unworn())
     return stages, [state, *loop.march(state)]
+
+
+def worn_by(stages: Sequence[ContactStage], state: CoupledState) -> Worn:
+    """Largest depth [mm] and volume [mm³, per length mm²] of both bodies together."""
+    depths = [interface.surfaces.depth for interface in state.interfaces]
+    return {
+        stage.name: {"depth": float(depth.max()), "volume": stage.volume(depth)}
+        for stage, depth in zip(stages, depths, strict=True)
+    }

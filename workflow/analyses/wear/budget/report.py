@@ -10,7 +10,7 @@ import numpy as np
 from workflow.analyses.wear.budget.parts import PARTS, RESULTS, ResultError
 from workflow.shell.dataset import Dataset
 
-Budget = Mapping[str, Mapping[str, ResultError]]  # by interface or body, and result
+Budget = Mapping[str, Mapping[str, ResultError]]  # by interface and result
 
 # Pressure at the edges that wear makes, and stress below them, may be so many times farther off:
 # the finer the cells, the larger they are.

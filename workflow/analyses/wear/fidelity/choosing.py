@@ -13,16 +13,13 @@ from dataclasses import replace
 from operator import attrgetter
 from typing import Any
 
-from fe_models.mesh import MeshError
-from sa_solver.normal import NormalContactError
-from wear.stepping import ContactFailure
+from workflow.analyses.wear.budget.lives import FAILURES
 from workflow.analyses.wear.choice import Decision, record_of, since
 from workflow.analyses.wear.fidelity.axes import AXES, Axis
 from workflow.analyses.wear.fidelity.dimension import choose_dimension
 from workflow.analyses.wear.fidelity.probe import LEGS
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
 from workflow.case.changing import changed
-from workflow.errors import MethodFailed
 
 
 def choose(case: DovetailCase) -> tuple[DovetailCase, dict[str, Any]]:
@@ -45,7 +42,7 @@ def _decide(axis: Axis, case: DovetailCase, allowed: float) -> Decision:
     begin = time.perf_counter()
     try:
         decision = axis.decide(case, allowed)
-    except (MeshError, MethodFailed, ContactFailure, NormalContactError) as error:
+    except FAILURES as error:
         why = f"as the case has it: the probe failed: {error}"
         written = attrgetter(axis.entry)(case)
         decision = Decision(axis.entry, written, why, allowed=allowed, met=False)

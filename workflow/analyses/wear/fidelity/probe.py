@@ -14,13 +14,11 @@ import numpy as np
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, resultant_change
-from wear.coupled import CoupledState
 from wear.steppers import ImplicitStepper, advance_cycles
 from wear.stepping import SlidingCycle, WearingContact, WearState
 from wear.tractions import acting_slip
-from workflow.analyses.wear.budget.lives import STEPS, TOLERANCE, live, shortened
+from workflow.analyses.wear.budget.lives import STEPS, TOLERANCE, live, shortened, worn_by
 from workflow.analyses.wear.case.sections import Contact
-from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.fidelity.estimate import Numbers
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
@@ -70,7 +68,7 @@ def life(case: DovetailCase) -> Numbers:
     MethodFailed where nothing wears.
     """
     stages, (*_, end) = live(case, _structure(case))
-    return _wearing(_worn_by_flank(stages, end))
+    return _wearing(worn_by(stages, end))
 
 
 def coupled_life(case: DovetailCase) -> tuple[Numbers, float]:
@@ -81,12 +79,7 @@ def coupled_life(case: DovetailCase) -> tuple[Numbers, float]:
     stages, (first, *_, end) = live(case, _structure(case), "every")
     sizes = np.array([stage.grid.size for stage in stages])
     drift = resultant_change(end.solved_resultants, first.solved_resultants, sizes)
-    return _worn_by_flank(stages, end), float(np.abs(drift).max())
-
-
-def _worn_by_flank(stages: list[ContactStage], state: CoupledState) -> Numbers:
-    pairs = zip(stages, state.interfaces, strict=True)
-    return {stage.name: _worn(interface.surfaces.depth, stage.grid) for stage, interface in pairs}
+    return worn_by(stages, end), float(np.abs(drift).max())
 
 
 def _wearing(numbers: Numbers) -> Numbers:

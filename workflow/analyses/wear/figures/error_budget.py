@@ -20,14 +20,18 @@ HEIGHT = 0.55
 
 def error_budget(file: h5py.File, contents: Contents) -> Figure:
     """Bars of the parts of every error, a panel for each contact and each body."""
-    names = [*contents.names, *(name for name in file["error"] if name not in contents.names)]
+    panels = [(name, file["error"][name]) for name in contents.names]
+    if contents.structure:
+        panels += [
+            (name, body["error"]) for name, body in file["bodies"].items() if "error" in body
+        ]
     title = "Estimated errors of the main results, and what leaves them"
-    bars = [1 + len(file["error"][name]) for name in names]
+    bars = [1 + len(group) for _, group in panels]
     figure = new_figure(title, 1.5 + HEIGHT * sum(bars))
     grid = {"height_ratios": bars}
-    axes = figure.subplots(len(names), squeeze=False, sharex=True, gridspec_kw=grid)[:, 0]
-    for axis, name in zip(axes, names, strict=True):
-        _draw(axis, file["error"][name])
+    axes = figure.subplots(len(panels), squeeze=False, sharex=True, gridspec_kw=grid)[:, 0]
+    for axis, (name, group) in zip(axes, panels, strict=True):
+        _draw(axis, group)
         axis.set_title(name)
     axes[-1].set_xlabel("estimated error [%]")
     legend_below(figure, axes)

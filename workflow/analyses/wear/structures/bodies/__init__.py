@@ -5,11 +5,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from workflow.analyses.wear.run_time import Extent
-from workflow.analyses.wear.structure import AnyWearCase, WearStructure
+from workflow.analyses.wear.structure import WearStructure
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
 
 if TYPE_CHECKING:
-    from workflow.analyses.wear.budget.companions import Companions
     from workflow.analyses.wear.load_source import LoadSource
 
 
@@ -25,23 +24,7 @@ def _extent(case: BodiesWearCase | LineBodiesWearCase) -> Extent:
     return Extent(2 * path.increments, path=2.0 * path.stroke)
 
 
-def _companions(case: AnyWearCase) -> Companions[AnyWearCase]:
-    from workflow.analyses.wear.budget.companions import Companions
-
-    return Companions.of(case, line=isinstance(case, LineBodiesWearCase))
-
-
-STRUCTURE = WearStructure(
-    name="bodies_wear",
-    case=BodiesWearCase,
-    source=_source,
-    extent=_extent,
-    companions=_companions,
-)
+STRUCTURE = WearStructure(name="bodies_wear", case=BodiesWearCase, source=_source, extent=_extent)
 LINE_STRUCTURE = WearStructure(
-    name="line_wear",
-    case=LineBodiesWearCase,
-    source=_source,
-    extent=_extent,
-    companions=_companions,
+    name="line_wear", case=LineBodiesWearCase, source=_source, extent=_extent
 )

@@ -7,12 +7,12 @@ from math import pi, prod
 from typing import TYPE_CHECKING, Any
 
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
-from workflow.analyses.wear.structure import SETTINGS, SPECTRA, WearStructure, memory
+from workflow.analyses.wear.structure import SPECTRA, Finer, WearStructure, memory
 from workflow.analyses.wear.structures.dovetail.case import DovetailCase
+from workflow.case.changing import changed
 from workflow.shell.memory import Memory
 
 if TYPE_CHECKING:
-    from workflow.analyses.wear.budget.companions import Companions
     from workflow.analyses.wear.contact_stage import ContactStage
     from workflow.analyses.wear.load_source import LoadSource
 
@@ -21,6 +21,9 @@ FIELDS = 12
 # Nodes of both bodies in space, for every node of a flank and by their volume; of quadratic
 # elements so many times more.
 FLANK_NODES, VOLUME_NODES, QUADRATIC = 40.0, 1.5, 7.0
+# Of the difference to a mesh of half the size, of elements of second order: all of the error of
+# first order, and of second order what Richardson makes of it.
+MESH_SHARES = {1: 1.0, 2: 4.0 / 3.0}
 
 
 def _source(case: DovetailCase) -> LoadSource:
@@ -76,10 +79,21 @@ def _warnings(case: DovetailCase, stage: ContactStage, load: float) -> Iterator[
     return warnings(case, stage, load)
 
 
-def _companions(case: DovetailCase) -> Companions[DovetailCase]:
-    from workflow.analyses.wear.structures.dovetail.companions import companions
+def _finer(case: DovetailCase) -> Finer[DovetailCase]:
+    """The section on a mesh of half the size and second order, for the joint in space too.
 
-    return companions(case)
+    What the mesh leaves along the slot is not in it.
+    """
+    from workflow.analyses.wear.fidelity.probe import plane_section
+
+    across, along = case.mesh.flank_nodes
+    mesh = {
+        "mesh.flank_nodes": (2 * across - 1, 2 * along - 1),
+        "mesh.size": 0.5 * case.mesh.size,
+        "mesh.order": 2,
+    }
+    section = changed(plane_section(case), {"mesh": case.mesh})
+    return Finer(mesh, MESH_SHARES[case.mesh.order], section)
 
 
 STRUCTURE = WearStructure(
@@ -90,6 +104,6 @@ STRUCTURE = WearStructure(
     memory=_memory,
     choose=_choose,
     warnings=_warnings,
-    companions=_companions,
-    settings=SETTINGS | {"mesh": "mesh.order, mesh.flank_nodes and mesh.size"},
+    finer=_finer,
+    settings={"mesh": "mesh.order, mesh.flank_nodes and mesh.size"},
 )

@@ -5,13 +5,15 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
-from workflow.analyses.wear.structure import SETTINGS, WearStructure, memory
+from workflow.analyses.wear.structure import Finer, WearStructure, memory
 from workflow.analyses.wear.structures.mesh.case import MeshCase
 from workflow.errors import UserError
 
 if TYPE_CHECKING:
-    from workflow.analyses.wear.budget.companions import Companions
     from workflow.analyses.wear.load_source import LoadSource
+
+# Nodes in space of which elements of second order, seven times as many, are still cheap.
+MOST_NODES = 4000
 
 
 def _source(case: MeshCase) -> LoadSource:
@@ -34,10 +36,11 @@ def _extent(case: MeshCase) -> Extent:
     )
 
 
-def _companions(case: MeshCase) -> Companions[MeshCase]:
-    from workflow.analyses.wear.structures.mesh.companions import companions
-
-    return companions(case)
+def _finer(case: MeshCase) -> Finer[MeshCase] | None:
+    """The mesh with elements of second order, where it has others and is small enough."""
+    mesh = case.structure.mesh()
+    cheap = mesh.interfaces[0].line or mesh.node_count(1) <= MOST_NODES
+    return Finer({"structure.order": 2}) if case.structure.order == 1 and cheap else None
 
 
 def _choose(case: MeshCase) -> tuple[MeshCase, dict[str, Any] | None]:
@@ -61,6 +64,6 @@ STRUCTURE = WearStructure(
     source=_source,
     extent=_extent,
     choose=_choose,
-    companions=_companions,
-    settings=SETTINGS | {"mesh": "structure.order or a finer mesh"},
+    finer=_finer,
+    settings={"mesh": "structure.order or a finer mesh"},
 )

@@ -8,11 +8,10 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from workflow.analyses.wear.run_time import DISSIPATING, Extent
-from workflow.analyses.wear.structure import SETTINGS, WearStructure
+from workflow.analyses.wear.structure import WearStructure
 from workflow.analyses.wear.structures.resultants.case import ResultantsCase
 
 if TYPE_CHECKING:
-    from workflow.analyses.wear.budget.companions import Companions
     from workflow.analyses.wear.load_source import LoadSource
 
 
@@ -28,20 +27,12 @@ def _extent(case: ResultantsCase) -> Extent:
     return Extent(increments, len(loads), dissipating=DISSIPATING)
 
 
-def _companions(case: ResultantsCase) -> Companions[ResultantsCase]:
-    from workflow.analyses.wear.budget.companions import Companions
-
-    return Companions.of(case, line=case.structure.line)
-
-
 STRUCTURE = WearStructure(
     name="resultants",
     case=ResultantsCase,
     source=_source,
     extent=_extent,
-    companions=_companions,
-    settings=SETTINGS
-    | {
+    settings={
         "link": "displacements of the nodes in structure.file",
         "mesh": "the mesh that structure.file comes from",
         "increments": "more increments in structure.file",
