@@ -1,17 +1,35 @@
 """What tests of interrupted runs look for."""
 
 import os
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from workflow.analyses.wear.recording import Recorder
 from workflow.shell.store import read_arrays
 
 # Seconds within which everything must have ended.
 PATIENCE = 60.0
 
 posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
+
+
+@contextmanager
+def interrupted(jumps: int = 2) -> Iterator[None]:
+    """A run in this process gets Ctrl-C once so many jumps are kept."""
+    keep = Recorder.keep
+
+    def interrupting(recorder, state):
+        keep(recorder, state)
+        if state.jump == jumps:
+            raise KeyboardInterrupt
+
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(Recorder, "keep", interrupting)
+        yield
 
 
 def assert_equal(run, reference):

@@ -12,6 +12,7 @@ from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.marks import slow
 from tests.workflow.conftest import CONTENTS, Run, invoke
+from tests.workflow.interruptions import interrupted
 from wear.stepping import ContactFailure
 from workflow.analyses.wear.case.loops import Loops
 from workflow.analyses.wear.contact_loops import (
@@ -27,7 +28,6 @@ from workflow.analyses.wear.figures import loops as loops_figure
 from workflow.analyses.wear.figures import wear as figures
 from workflow.analyses.wear.layout import Contents
 from workflow.analyses.wear.loop_table import COLUMNS
-from workflow.analyses.wear.recording import Recorder
 from workflow.case.fields import Quantity
 from workflow.case.table_file import read_columns
 from workflow.errors import CaseError, UserError
@@ -307,19 +307,9 @@ def test_loops_change_nothing_else(start_balls, rubbed, tmp_path):
 
 
 @pytest.mark.parametrize("every", [slow("end"), "jump"])
-def test_resumed_run_keeps_its_earlier_loops(
-    start_balls, resume, rubbed, tmp_path, monkeypatch, every
-):
+def test_resumed_run_keeps_its_earlier_loops(start_balls, resume, rubbed, tmp_path, every):
     """The same loops as without the interruption; with ``end`` the first and the last of them."""
-    keep = Recorder.keep
-
-    def interrupting(recorder, state):
-        keep(recorder, state)
-        if state.jump == 2:
-            raise KeyboardInterrupt
-
-    with monkeypatch.context() as patch:
-        patch.setattr(Recorder, "keep", interrupting)
+    with interrupted():
         begun = start_balls(tmp_path / "out", *ASKED, f"loops.every={every}")
         assert begun.ending.exit_code == 130
     run = resume(tmp_path / "out")

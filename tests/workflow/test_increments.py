@@ -11,12 +11,12 @@ import workflow.analyses.wear.increments as module
 from tests.conftest import CASES
 from tests.marks import slow
 from tests.workflow.commands import command
+from tests.workflow.interruptions import interrupted
 from tests.workflow.mesh_scenes import refused, write_case
 from tests.workflow.test_mesh_case import ASSEMBLY, BLOCKS, cube
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.case.base import MOST_INCREMENTS
 from workflow.analyses.wear.increments import decide_increments, differences
-from workflow.analyses.wear.recording import Recorder
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.model import DovetailModel
 from workflow.analyses.wear.structures.mesh.model import MeshModel
@@ -98,16 +98,8 @@ def test_legs_of_a_mesh_get_what_each_asks_for(blocks):
 @pytest.mark.slow
 def test_a_run_is_of_what_was_chosen_and_tells_it_once(tmp_path, monkeypatch):
     """Killed and gone on with too, where nothing is chosen again."""
-    keep = Recorder.keep
-
-    def interrupting(recorder, state):
-        keep(recorder, state)
-        if state.jump == 2:
-            raise KeyboardInterrupt
-
     overrides = [AUTO, *COARSE]
-    with monkeypatch.context() as patch:
-        patch.setattr(Recorder, "keep", interrupting)
+    with interrupted():
         ending = command("run", PLANE, "--out", tmp_path / "out", overrides=overrides)
     assert ending.exit_code == 130
     kept = load_case(tmp_path / "out" / "case.yaml")

@@ -13,9 +13,8 @@ import pytest
 
 import wear.coupled
 import workflow.analyses.wear.run
-from tests.workflow.interruptions import PATIENCE, assert_equal, jumps_kept, posix_only
+from tests.workflow.interruptions import PATIENCE, assert_equal, interrupted, jumps_kept, posix_only
 from workflow.analyses.wear import contact_workers
-from workflow.analyses.wear.recording import Recorder
 from workflow.shell import processes as workers
 from workflow.shell.store import read_arrays, write_arrays
 
@@ -25,15 +24,7 @@ from workflow.shell.store import read_arrays, write_arrays
 @pytest.fixture(scope="module")
 def stopped(start, tmp_path_factory):
     """A run that got Ctrl-C once two jumps were kept; not to be changed."""
-    keep = Recorder.keep
-
-    def interrupting(recorder, state):
-        keep(recorder, state)
-        if state.jump == 2:
-            raise KeyboardInterrupt
-
-    with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Recorder, "keep", interrupting)
+    with interrupted():
         run = start(tmp_path_factory.mktemp("stopped") / "out")
     assert run.ending.exit_code == 130
     assert run.ending.stderr.splitlines()[-1].startswith("fretscale: interrupted")
