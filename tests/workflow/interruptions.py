@@ -18,7 +18,7 @@ posix_only = pytest.mark.skipif(os.name != "posix", reason="signals of POSIX")
 
 
 @contextmanager
-def interrupted(jumps: int = 2) -> Iterator[None]:
+def ctrl_c_after_jumps(jumps: int) -> Iterator[None]:
     """A run in this process gets Ctrl-C once so many jumps are kept."""
     keep = Recorder.keep
 

@@ -12,7 +12,7 @@ from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Grid, Material
 from tests.marks import slow
 from tests.workflow.conftest import CONTENTS, Run, invoke
-from tests.workflow.interruptions import interrupted
+from tests.workflow.interruptions import ctrl_c_after_jumps
 from wear.stepping import ContactFailure
 from workflow.analyses.wear.case.loops import Loops
 from workflow.analyses.wear.contact_loops import (
@@ -309,7 +309,7 @@ def test_loops_change_nothing_else(start_balls, rubbed, tmp_path):
 @pytest.mark.parametrize("every", [slow("end"), "jump"])
 def test_resumed_run_keeps_its_earlier_loops(start_balls, resume, rubbed, tmp_path, every):
     """The same loops as without the interruption; with ``end`` the first and the last of them."""
-    with interrupted():
+    with ctrl_c_after_jumps(2):
         begun = start_balls(tmp_path / "out", *ASKED, f"loops.every={every}")
         assert begun.ending.exit_code == 130
     run = resume(tmp_path / "out")

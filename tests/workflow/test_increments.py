@@ -11,7 +11,7 @@ import workflow.analyses.wear.increments as module
 from tests.conftest import CASES
 from tests.marks import slow
 from tests.workflow.commands import command
-from tests.workflow.interruptions import interrupted
+from tests.workflow.interruptions import ctrl_c_after_jumps
 from tests.workflow.mesh_scenes import refused, write_case
 from tests.workflow.test_mesh_case import ASSEMBLY, BLOCKS, cube
 from workflow.analyses.wear import ANALYSIS
@@ -99,7 +99,7 @@ def test_legs_of_a_mesh_get_what_each_asks_for(blocks):
 def test_a_run_is_of_what_was_chosen_and_tells_it_once(tmp_path, monkeypatch):
     """Killed and gone on with too, where nothing is chosen again."""
     overrides = [AUTO, *COARSE]
-    with interrupted():
+    with ctrl_c_after_jumps(2):
         ending = command("run", PLANE, "--out", tmp_path / "out", overrides=overrides)
     assert ending.exit_code == 130
     kept = load_case(tmp_path / "out" / "case.yaml")

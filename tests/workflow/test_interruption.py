@@ -13,7 +13,13 @@ import pytest
 
 import wear.coupled
 import workflow.analyses.wear.run
-from tests.workflow.interruptions import PATIENCE, assert_equal, interrupted, jumps_kept, posix_only
+from tests.workflow.interruptions import (
+    PATIENCE,
+    assert_equal,
+    ctrl_c_after_jumps,
+    jumps_kept,
+    posix_only,
+)
 from workflow.analyses.wear import contact_workers
 from workflow.shell import processes as workers
 from workflow.shell.store import read_arrays, write_arrays
@@ -24,7 +30,7 @@ from workflow.shell.store import read_arrays, write_arrays
 @pytest.fixture(scope="module")
 def stopped(start, tmp_path_factory):
     """A run that got Ctrl-C once two jumps were kept; not to be changed."""
-    with interrupted():
+    with ctrl_c_after_jumps(2):
         run = start(tmp_path_factory.mktemp("stopped") / "out")
     assert run.ending.exit_code == 130
     assert run.ending.stderr.splitlines()[-1].startswith("fretscale: interrupted")
