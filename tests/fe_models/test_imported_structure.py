@@ -20,9 +20,9 @@ from fe_models.imported_structure import (
 )
 from fe_models.mesh import Body, MeshError
 from fe_models.remesh import element_volumes
-from fe_models.stress import stress_state
 from fe_models.structure import CLOSED, MOST_CYCLES
 from sa_solver.types import Material
+from tests.fe_models.conftest import stress_state
 
 STEEL = Material(200e3, 0.3, 7.8e-9)
 PAIR = ContactPair("foot", "top", "bottom", np.array([1.0, 0.0, 0.0]))
