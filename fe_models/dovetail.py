@@ -14,6 +14,7 @@ from fe_models.mesh import StructureMesh
 from fe_models.spin_softening import CarriedMass, spin_softening
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes
+from fe_models.trace import LinearTrace
 from sa_solver.types import Array, Material
 
 # The boundary of the blade that the airfoil pulls at.
@@ -76,16 +77,19 @@ def dovetail_structure(
         guided.zero_mean(*elastic_2.boundary_weights("root_bottom"), dovetail.slot_direction)
     loads_2 = _blade_loads(elastic_2, dovetail, mission)
 
-    for constraints, elastic in ((held, elastic_1), (guided, elastic_2)):
-        for interface in mesh.interfaces:
-            constraints.average(*elastic.midsides(interface.name))
-
+    mesh = mesh.weighted(order)
     nodes_1, frames_1 = interface_nodes(mesh.interfaces, 1, mesh.body_1)
     nodes_2, frames_2 = interface_nodes(mesh.interfaces, 2, mesh.body_2)
+    trace_1, trace_2 = (
+        LinearTrace.of(elastic, {i.name: i.nodes(number) for i in mesh.interfaces})
+        for number, elastic in ((1, elastic_1), (2, elastic_2))
+    )
     return Structure(
         mesh=mesh,
-        body_1=SupportedBody(elastic_1, held, nodes_1, frames_1, loads_1),
-        body_2=SupportedBody(elastic_2, guided, nodes_2, frames_2, loads_2, loaded=[TOP]),
+        body_1=SupportedBody(elastic_1, held, nodes_1, frames_1, loads_1, trace=trace_1),
+        body_2=SupportedBody(
+            elastic_2, guided, nodes_2, frames_2, loads_2, loaded=[TOP], trace=trace_2
+        ),
     )
 
 

@@ -169,6 +169,21 @@ class ElasticBody:
         edges = np.unique(mesh.f2e[:, facets])
         return self._basis.edge_dofs[0, edges], mesh.edges[:, edges].T
 
+    def linear_moments(self, boundary: str) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+        """∫ φ_i φ_k dA and ∫ φ_i N_j dA over a boundary, φ linear and N the elements' functions.
+
+        Of all vertices and of all vertices and nodes, ``(v, v)`` and ``(v, n)`` [mm²].
+        """
+        linear = ELEMENTS[self.dimension, 1]()
+        facets = self.body.mesh.boundaries[boundary]
+        # Products of linear functions and the elements' own, exact.
+        tests, trials = (
+            FacetBasis(self.body.mesh, element, facets=facets, intorder=1 + self.order)
+            for element in (linear, self._element())
+        )
+        product = BilinearForm(lambda u, v, w: u * v)
+        return product.assemble(tests).tocsr(), product.assemble(trials, tests).tocsr()
+
     def stress(self, displacement: Array) -> Array:
         """Cauchy stress of displacements ``(size,)``, element means, ``(6, elements)`` [MPa].
 

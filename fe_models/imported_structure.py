@@ -18,6 +18,7 @@ from fe_models.mortar import frame_of_faces, mortar_interface
 from fe_models.spin_softening import spin_softening
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes
+from fe_models.trace import LinearTrace
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Indices, Material
 
@@ -165,7 +166,7 @@ def imported_structure(
         _supported(number, mesh, imported, material, supports, loads, order)
         for number, material in enumerate(materials, start=1)
     ]
-    structure = Structure(mesh, *bodies)
+    structure = Structure(mesh.weighted(order), *bodies)
     _check_held(structure)
     _check_rest(structure.body_1)
     return structure
@@ -343,13 +344,12 @@ def _supported(
             loaded += [name for name in (_boundary(load),) if name is not None]
     _check_against_supports(loads, imposed, supported_motions @ imposed[free])
     _check_against_each_other(elastic, moved)
-    for interface in mesh.interfaces:
-        constraints.average(*elastic.midsides(interface.name))
     _check_separate(mesh, number)
     placed = interface_nodes(mesh.interfaces, number, body)
     moving = imposed if imposed.any() else None
     try:
-        supported = SupportedBody(elastic, constraints, *placed, forces, moving, loaded)
+        trace = LinearTrace.of(elastic, {i.name: i.nodes(number) for i in mesh.interfaces})
+        supported = SupportedBody(elastic, constraints, *placed, forces, moving, loaded, trace)
     except ValueError as error:
         raise MeshError(f"body {body.name}: {error}") from error
     if len(constraints.free) <= np.sum(~supported.held):

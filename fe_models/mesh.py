@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import errno
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -99,13 +99,16 @@ class Face:
     """A contact face: ``coordinates`` ``(n, 2)`` of its nodes in the frame [mm] and their facets.
 
     ``facets`` are triangles ``(m, 3)``, or segments ``(m, 2)`` of a line contact, whose nodes have
-    y = 0.
+    y = 0. Fields on it are linear between nodes. Forces of nodes are pressures times areas and
+    displacements those of the nodes, unless it is ``weighted``: then they are integrals of a linear
+    traction, ∫ φ_i t dA, and values of the linear field next to the displacement (least squares).
     """
 
     name: str
     frame: Frame
     coordinates: Array
     facets: Indices
+    weighted: bool = field(default=False, kw_only=True)
 
     def __len__(self) -> int:
         return len(self.coordinates)
@@ -123,15 +126,17 @@ class Face:
     @property
     def facet_shares(self) -> Array:
         """Each node's equal share of its facets ``(n,)`` [mm²]; in a line contact [mm]."""
+        total = np.zeros(len(self))
+        np.add.at(total, self.facets, self.facet_sizes[:, None] / self.facets.shape[1])
+        return total
+
+    @property
+    def facet_sizes(self) -> Array:
+        """Area of each facet ``(m,)`` [mm²]; in a line contact its length [mm]."""
         corners = self.coordinates[self.facets]
         edges = corners[:, 1:] - corners[:, :1]
-        if self.line:
-            size = np.hypot(*edges[:, 0].T)
-        else:
-            size = 0.5 * np.abs(np.linalg.det(edges))
-        total = np.zeros(len(self))
-        np.add.at(total, self.facets, size[:, None] / self.facets.shape[1])
-        return total
+        sizes = np.hypot(*edges[:, 0].T) if self.line else 0.5 * np.abs(np.linalg.det(edges))
+        return np.asarray(sizes)
 
 
 @dataclass(frozen=True)
@@ -171,6 +176,18 @@ class StructureMesh:
     body_1: Body
     body_2: Body
     interfaces: tuple[Interface, ...]
+
+    def weighted(self, order: int) -> StructureMesh:
+        """With faces that are ``weighted`` where elements are of second order."""
+        faces = (
+            replace(
+                face,
+                weighted=order == 2,
+                face_1=face.face_1 and replace(face.face_1, weighted=order == 2),
+            )
+            for face in self.interfaces
+        )
+        return replace(self, interfaces=tuple(faces))
 
     def node_count(self, order: int) -> int:
         """Nodes of both bodies, with elements of order 2 midsides included."""

@@ -17,11 +17,12 @@ import scipy.sparse as sp
 
 from fe_models.friction import FrictionState
 from fe_models.joint import JointResolvent
-from fe_models.mesh import Body, Interface, StructureMesh, in_space
+from fe_models.mesh import Body, Interface, StructureMesh
 from fe_models.rigid_motions import rigid_motions
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes
 from fe_models.total_lagrangian import TotalLagrangian
+from fe_models.trace import LinearTrace
 from sa_solver.types import Array, Frame
 
 # Displacements, or spin softening matrices, of body 1 and body 2.
@@ -71,15 +72,12 @@ class PrestressedStructure(Structure):
 
     def _relative(self) -> Array:
         """Displacements of body 2 relative to body 1 ``(d n,)`` at the load, in the frames."""
-        axes = self.mesh.body_1.axes
-        nodal_1, nodal_2 = (in_space(u.reshape(-1, len(axes))) for u in self.displacements)
-        relative = []
-        for face in self.mesh.interfaces:
-            below = nodal_1[face.nodes_1]
-            if face.projection is not None:
-                below = face.projection @ below
-            relative.append(face.frame.components(nodal_2[face.nodes_2] - below))
-        return np.concatenate(relative)[:, axes].ravel()
+        below, above = (
+            body.at_interface(moved)
+            for body, moved in zip(self.bodies, self.displacements, strict=True)
+        )
+        projection = self.projection
+        return above - (below if projection is None else projection @ below)
 
     def _rigid_motions(self) -> Array:
         """Orthonormal motions ``(d n, k)`` of the interfaces that body 2's supports leave free."""
@@ -207,7 +205,10 @@ def _prestressed(
         elastic = copy(body.elastic)
         elastic.stiffness = stiffness
         placed = interface_nodes(mesh.interfaces, number, elastic.body)
+        trace = LinearTrace.of(elastic, {i.name: i.nodes(number) for i in mesh.interfaces})
         bodies.append(
-            SupportedBody(elastic, body.constraints, *placed, loads, body.imposed, body.loaded)
+            SupportedBody(
+                elastic, body.constraints, *placed, loads, body.imposed, body.loaded, trace
+            )
         )
     return PrestressedStructure(mesh, bodies[0], bodies[1], displacements, share)

@@ -94,8 +94,8 @@ def deformation(
     on body 2 and ``relative`` displacement ``(3, n)`` are over all interfaces, in their frames;
     ``amplitudes`` those of the load cases.
     """
-    every, _, follows = _motion(structure, force[None], relative[None], amplitudes[None])
-    return every[:, 0], structure.body_2.recover(follows[:, 0], amplitudes)
+    every, forces, _, follows = _motion(structure, force[None], relative[None], amplitudes[None])
+    return every[:, 0], structure.body_2.recover(follows[:, 0], forces[:, 0], amplitudes)
 
 
 @dataclass(frozen=True)
@@ -118,8 +118,9 @@ def cycle_stress(
     ``force`` ``(t, 3, n)``, ``relative`` ``(t, 3, n)`` and ``amplitudes`` ``(t, cases)`` as in
     :func:`deformation`.
     """
-    every, leads, follows = _motion(structure, force, relative, amplitudes)
-    displacements = every[:, at], structure.body_2.recover(follows[:, at], amplitudes[at])
+    every, forces, leads, follows = _motion(structure, force, relative, amplitudes)
+    of_body_2 = structure.body_2.recover(follows[:, at], forces[:, at], amplitudes[at])
+    displacements = every[:, at], of_body_2
     dimension = structure.body_1.elastic.dimension
     ends = np.cumsum([len(interface) for interface in structure.mesh.interfaces])[:-1]
     faces_1, faces_2 = (
@@ -135,10 +136,10 @@ def cycle_stress(
 
 def _motion(
     structure: Structure, force: Array, relative: Array, amplitudes: Array
-) -> tuple[Array, Array, Array]:
-    """All displacements of body 1 ``(size, t)``, and those of body 1's and body 2's interfaces.
+) -> tuple[Array, Array, Array, Array]:
+    """All displacements of body 1 ``(size, t)``, and what the interfaces do.
 
-    Those ``(d n, t)`` are at the interfaces' nodes.
+    At their nodes ``(d n, t)``: forces on body 2, displacements of body 1 and of body 2.
     """
     axes = structure.mesh.body_1.axes
     forces, gaps = (
@@ -149,7 +150,7 @@ def _motion(
     every, leads = structure.body_1.respond(-on_body_1, amplitudes.T)
     if projection is not None:
         leads = projection @ leads
-    return every, leads, leads + gaps
+    return every, forces, leads, leads + gaps
 
 
 def stress_field(

@@ -16,6 +16,7 @@ from fe_models.mesh import Body, Interface
 from fe_models.reduction import reduce_body
 from fe_models.rigid_motions import rigid_body_modes, rigid_motions
 from fe_models.symmetry import Mirror, halves, mirror_of_nodes
+from fe_models.trace import LinearTrace
 from sa_solver.types import Array, Indices
 
 # A rigid motion that supports change by less than this share of itself is free.
@@ -38,6 +39,10 @@ class SupportedBody:
     with tractions on them. ``held`` ``(d n,)`` marks the interface displacements that are held at
     zero, as on a plane of symmetry. Raises ValueError if those of an interface node are constrained
     in any other way.
+
+    Without ``trace`` the interface displacements are those of the vertices, which move the face
+    linearly between them. With it, a face of second-order elements moves as these do, and the
+    interface displacements are of the linear field next to its own (:class:`LinearTrace`).
     """
 
     def __init__(
@@ -49,11 +54,13 @@ class SupportedBody:
         loads: Array,
         imposed: Array | None = None,
         loaded: Sequence[str] = (),
+        trace: LinearTrace | None = None,
     ) -> None:
         self.elastic = elastic
         self.loads = loads
         self.loaded = loaded
         self.nodes = nodes
+        self._frames = frames
         self.imposed = imposed
         self.constraints = constraints
         if imposed is not None and imposed[self._dofs(nodes)].any():
@@ -62,14 +69,25 @@ class SupportedBody:
         rows = transformation[self._dofs(nodes)]
         self.held, self._interface, blocks = _interface_displacements(rows, frames)
         self._free = np.flatnonzero(~self.held)
-        rotation = _rotation(transformation.shape[1], self._interface, blocks)
-        self._transformation = (transformation @ rotation).tocsr()
+        if trace is None:
+            rotation = _rotation(transformation.shape[1], self._interface, blocks)
+            self._transformation = (transformation @ rotation).tocsr()
+            self._springs = None
+        else:
+            free, count = transformation.shape[1], len(self._free)
+            self._interface = free + np.arange(count)
+            self._transformation = sp.hstack(
+                [transformation, sp.csr_matrix((elastic.size, count))], format="csr"
+            )
+            self._springs = trace.springs(elastic, frames, self._free)
 
     def condense(self) -> tuple[Array, Array]:
         """Stiffness ``(k, k)`` and loads ``(k, cases)`` on the interface displacements not held."""
         stiffness, loads = self._reduced()
         model = reduce_body(stiffness, None, self._interface, loads=loads)
-        return model.static_stiffness, model.loads
+        if self._springs is None:
+            return model.static_stiffness, model.loads
+        return self._springs.removed(model.static_stiffness, model.loads)
 
     def mirror(self, axis: int) -> Mirror | None:
         """The mirror across a global ``axis`` of the displacements that supports leave.
@@ -80,10 +98,18 @@ class SupportedBody:
         free = self.constraints.free
         of_nodes = mirror_of_nodes(self.elastic.nodes, self.elastic.body.axes, axis)
         of_free = None if of_nodes is None else of_nodes.restricted(free)
-        if of_free is None:
+        if of_nodes is None or of_free is None:
             return None
-        rotation = self._transformation[free]
-        return Mirror.of(rotation.T @ of_free.matrix() @ rotation)
+        if self._springs is None:
+            rotation = self._transformation[free]
+            return Mirror.of(rotation.T @ of_free.matrix() @ rotation)
+        of_faces = of_nodes.restricted(self._dofs(self.nodes))
+        if of_faces is None:
+            return None
+        along = sp.block_diag(list(self._frames), format="csr")[self._free]
+        return Mirror.of(
+            sp.block_diag([of_free.matrix(), along @ of_faces.matrix() @ along.T], format="csr")
+        )
 
     def on_interface(self, mirror: Mirror) -> Mirror | None:
         """What a mirror of all displacements does to the interface's; None if it leaves them."""
@@ -110,17 +136,25 @@ class SupportedBody:
             model = reduce_body(part, None, kept, loads=basis.T @ loads)
             # The same motions, in another order and some with the opposite sign.
             renamed = coordinates.T @ on_faces[:, kept]
-            condensed.append(
-                (renamed @ (renamed @ model.static_stiffness).T, renamed @ model.loads)
-            )
+            half = renamed @ (renamed @ model.static_stiffness).T, renamed @ model.loads
+            if self._springs is not None:
+                half = self._springs.removed(*half, coordinates)
+            condensed.append(half)
         return tuple(condensed)
 
-    def recover(self, interface_displacement: Array, amplitudes: Array) -> Array:
+    def recover(
+        self, interface_displacement: Array, interface_forces: Array, amplitudes: Array
+    ) -> Array:
         """All displacements ``(d all,)`` for given interface displacements ``(d n,)``.
 
-        Those that are held stay at zero, whatever is given.
+        Those that are held stay at zero, whatever is given. ``interface_forces`` ``(d n,)`` are the
+        forces on the body there, which must be those of the displacements; where these are of the
+        vertices themselves, nothing depends on them.
         """
         interface_displacement = interface_displacement[self._free]
+        if self._springs is not None:
+            forces = interface_forces[self._free]
+            interface_displacement = self._springs.ends(interface_displacement, forces)
         stiffness, loads = self._reduced()
         inner = np.setdiff1d(np.arange(stiffness.shape[0]), self._interface)
         rhs = loads[inner] @ amplitudes
@@ -138,11 +172,26 @@ class SupportedBody:
         """
         stiffness, loads = self._reduced()
         rhs = loads @ amplitudes
-        rhs[self._interface] += interface_forces[self._free]
+        forces = interface_forces[self._free]
+        rhs[self._interface] += forces if self._springs is None else self._springs.on_ends(forces)
         displacement = prepare(stiffness, self._soft_motions())(rhs)
         interface = np.zeros((len(self.held), *displacement.shape[1:]))
-        interface[self._free] = displacement[self._interface]
+        moved = displacement[self._interface]
+        if self._springs is not None:
+            moved = self._springs.nodal(moved, forces)
+        interface[self._free] = moved
         return self._all(displacement, amplitudes), interface
+
+    def at_interface(self, displacement: Array) -> Array:
+        """Interface displacements ``(d n,)`` of all displacements ``(d all,)``."""
+        interface = np.zeros(len(self.held))
+        if self._springs is None:
+            nodal = displacement[self._dofs(self.nodes)].reshape(len(self.nodes), -1)
+            along = np.einsum("nab,nb->na", self._frames, nodal).ravel()
+            interface[self._free] = along[self._free]
+        else:
+            interface[self._free] = self._springs.of(displacement)
+        return interface
 
     @cached_property
     def free_facets(self) -> Indices:
@@ -199,7 +248,11 @@ class SupportedBody:
     def _soft_motions(self) -> Array:
         """What is left of the rigid motions ``(free, k)``: motions of little energy."""
         elastic = self.elastic
-        return rigid_body_modes(elastic.nodes, elastic.body.axes, self._transformation)
+        if self._springs is None:
+            return rigid_body_modes(elastic.nodes, elastic.body.axes, self._transformation)
+        supports = self.constraints.transformation()
+        modes = rigid_body_modes(elastic.nodes, elastic.body.axes, supports)
+        return np.concatenate([modes, self._springs.means @ (supports @ modes)])
 
     def _reduced(self) -> tuple[sp.csr_matrix, Array]:
         return self._stiffness, self._transformation.T @ self.nodal_loads()
@@ -207,8 +260,11 @@ class SupportedBody:
     @cached_property
     def _stiffness(self) -> sp.csr_matrix:
         """On the displacements that supports leave, those of the interface in its frames."""
-        t = self._transformation
-        return (t.T @ self.elastic.stiffness @ t).tocsr()
+        if self._springs is None:
+            t = self._transformation
+            return (t.T @ self.elastic.stiffness @ t).tocsr()
+        t = self.constraints.transformation()
+        return self._springs.joined((t.T @ self.elastic.stiffness @ t).tocsr(), t)
 
     def _all(self, free: Array, amplitudes: Array) -> Array:
         displacement = self._transformation @ free

@@ -3,17 +3,21 @@
 The face carries a piecewise linear field on its facets. With W the share of each cell's area
 that belongs to each node's shape function, a cell takes the mean W s / ΣW over the part of it that
 the face covers, and a node the mean Wᵀ h / A of the cells over its area A. Both keep constants and
-integrals where the grid covers the face.
+integrals where the grid covers the face. Nodes of a weighted face have a linear field's values
+instead: its means under the nodes' shape functions are those of the cells.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
+from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from fe_models.mesh import Face
@@ -23,6 +27,8 @@ from sa_solver.types import Array, Grid
 GAUSS = np.sqrt(1.0 / 3.0)
 # Differences leave rounding in cells that a triangle does not meet: below this share of its area.
 ROUNDING = 1e-12
+# A node whose area the cells cover but for this share is covered.
+SHARED = 1e-6
 
 
 @dataclass(frozen=True)
@@ -61,14 +67,15 @@ class FaceTransfer:
     def spacing(self, region: Array) -> Array:
         """Distance of neighbouring nodes along x and along y ``(2,)`` [mm]; 0 along y on a line.
 
-        As facets usually are in a ``region`` ``(2, 2)``, between least and largest x and y.
+        As facets usually are in a ``region`` ``(2, 2)``, between least and largest x and y. On a
+        weighted face with the midsides among the nodes.
         """
         corners = self.face.coordinates[self.face.facets]
         middles = corners.mean(axis=1)
         within = np.all((middles >= region[0]) & (middles <= region[1]), axis=1)
         near = corners[within] if within.any() else corners
         spacing: Array = np.median(np.ptp(near, axis=1), axis=0)
-        return spacing
+        return 0.5 * spacing if self.face.weighted else spacing
 
     @cached_property
     def places(self) -> Array:
@@ -91,19 +98,56 @@ class FaceTransfer:
         cells[:, inside] = means[:, inside] / self.covered[inside]
         return cells.reshape(*nodal.shape[:-1], *self.grid.shape)
 
+    @cached_property
+    def reached(self) -> NDArray[np.bool_]:
+        """Nodes ``(n,)`` of which the grid tells all that :meth:`sample` takes."""
+        if not self.face.weighted:
+            return np.ones(len(self.nodes), dtype=np.bool_)
+        return np.asarray(self.shared.sum(axis=0)).ravel() > (1.0 - SHARED) * self.areas
+
     def spread(self, forces: Array) -> Array:
         """Tractions ``(..., nx, ny)`` [MPa] of nodal ``forces`` ``(..., n)`` [N], sums kept."""
-        rows = forces.reshape(-1, forces.shape[-1]) / self.areas
-        cells = (self.shared @ rows.T).T / self.grid.cell_area
+        rows = forces.reshape(-1, forces.shape[-1])
+        tractions = self._factors.solve(rows.T) if self.face.weighted else (rows / self.areas).T
+        cells = (self.shared @ tractions).T / self.grid.cell_area
         return cells.reshape(*forces.shape[:-1], *self.grid.shape)
 
+    def means(self, nodal: Array) -> Array:
+        """What :meth:`sample` gives of a field with ``nodal`` values ``(..., n)``."""
+        if not self.face.weighted:
+            return nodal
+        rows = nodal.reshape(-1, nodal.shape[-1])
+        return np.asarray((self._products @ rows.T).T / self.areas).reshape(nodal.shape)
+
     def sample(self, cells: Array) -> Array:
-        """Values ``(..., n)`` of fields ``(..., nx, ny)`` at the nodes, linear between cells."""
+        """Values ``(..., n)`` of fields ``(..., nx, ny)`` at the nodes, linear between cells.
+
+        Of a weighted face means under the nodes' shape functions.
+        """
+        if self.face.weighted:
+            rows = cells.reshape(-1, self.grid.shape[0] * self.grid.shape[1])
+            return ((self.shared.T @ rows.T).T / self.areas).reshape(*cells.shape[:-2], -1)
         pitch, shape = np.array(self.grid.pitch), np.array(self.grid.shape)
         at = (self.nodes / pitch + 0.5 * (shape - 1)).T
         fields = cells.reshape(-1, *self.grid.shape)
         values = [map_coordinates(field, at, order=1, mode="nearest") for field in fields]
         return np.reshape(values, (*cells.shape[:-2], -1))
+
+    @cached_property
+    def _products(self) -> sp.csr_matrix:
+        """∫ φ_i φ_k dA of the linear functions φ of the nodes ``(n, n)`` [mm²]; on a line [mm]."""
+        facets = self.face.facets
+        count = facets.shape[1]
+        # On a facet of size 1, of 2 or 3 corners: 2 on and 1 off the diagonal, by k (k + 1).
+        local = (np.eye(count) + 1.0) / (count * (count + 1))
+        values = self.face.facet_sizes[:, None, None] * local
+        rows, columns = np.broadcast_arrays(facets[:, :, None], facets[:, None, :])
+        places = rows.ravel(), columns.ravel()
+        return sp.csr_matrix((values.ravel(), places), shape=(len(self.face),) * 2)
+
+    @cached_property
+    def _factors(self) -> Any:
+        return splu(self._products.tocsc())
 
     def to_nodes(self, cells: Array) -> Array:
         """Nodal values ``(n,)`` of cell values ``(nx, ny)``, zero beyond the grid."""

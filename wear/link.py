@@ -24,6 +24,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.polynomial.legendre import legder, legvander
+from numpy.typing import NDArray
 
 from sa_solver.half_space import HalfSpace
 from sa_solver.ties import first_largest
@@ -85,8 +86,17 @@ class Transfer(Protocol):
         """Tractions ``(..., nx, ny)`` [MPa] of nodal ``forces`` ``(..., n)`` [N], sums kept."""
         ...
 
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        """Nodes ``(n,)`` of which the grid tells all that :meth:`sample` takes."""
+        ...
+
     def sample(self, cells: Array) -> Array:
-        """Values ``(..., n)`` of fields ``(..., nx, ny)`` at the nodes."""
+        """Values ``(..., n)`` of fields ``(..., nx, ny)`` at the nodes, or means about them."""
+        ...
+
+    def means(self, nodal: Array) -> Array:
+        """What :meth:`sample` gives of a field with ``nodal`` values ``(..., n)``."""
         ...
 
     def to_cells(self, nodal: Array) -> Array:
@@ -126,8 +136,15 @@ class CellNodes:
     def spread(self, forces: Array) -> Array:
         return self.to_cells(forces) / self.grid.cell_area
 
+    @property
+    def reached(self) -> NDArray[np.bool_]:
+        return np.ones(self.grid.shape, dtype=np.bool_).ravel()
+
     def sample(self, cells: Array) -> Array:
         return cells.reshape(*cells.shape[:-2], -1)
+
+    def means(self, nodal: Array) -> Array:
+        return nodal
 
     def to_cells(self, nodal: Array) -> Array:
         return nodal.reshape(*nodal.shape[:-1], *self.grid.shape)
@@ -235,14 +252,16 @@ def linked(
     half-space has its own friction, and K is all of it; without, what shear does is left to d.
     """
     deflection = _deflection(half_space, face, loads, force, shear)
-    defect = displacement - deflection
+    defect = face.means(displacement) - deflection
     region = _region(face.nodes, force[:, 2])
     inside = np.all((face.nodes >= region[0]) & (face.nodes <= region[1]), axis=1)
-    near = inside & (face.opposed > 0.0)  # no displacement is relative where nothing is opposite
+    # No displacement is relative where nothing is opposite.
+    near = inside & (face.opposed > 0.0) & face.reached
     if near.sum() < FEWEST_NODES:
         return Link.none()
     degrees = _degrees(region, face.spacing(region))
-    basis, weights = _products(face.nodes[near], region, degrees), np.sqrt(face.opposed[near])
+    basis = face.means(_products(face.nodes, region, degrees).T).T[near]
+    weights = np.sqrt(face.opposed[near])
     given = (defect[..., near] * weights).reshape(-1, len(basis))
     fit = np.linalg.lstsq(weights[:, None] * basis, given.T, rcond=LEAST_DETERMINED)[0].T
     coefficients = np.array(fit).reshape(*defect.shape[:2], degrees[0] + 1, degrees[1] + 1)

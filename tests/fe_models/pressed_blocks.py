@@ -11,6 +11,7 @@ from fe_models.joint import join
 from fe_models.mesh import AXES, Body
 from fe_models.mortar import mortar_interface
 from fe_models.supported_body import SupportedBody, interface_nodes
+from fe_models.trace import LinearTrace
 from sa_solver.types import Frame, Material
 
 LINE, SURFACE = 2, 3
@@ -103,10 +104,10 @@ class Pressed:
         constraints = isostatic(self.elastic[0]), Constraints(self.count(1), dimension)
         self.bodies = []
         for k, elastic in enumerate(self.elastic):
-            constraints[k].average(*elastic.midsides(contact[k]))
             placed = interface_nodes([self.interface], k + 1, elastic.body)
+            trace = LinearTrace.of(elastic, {contact[k]: placed[0]})
             load = boundary_load(elastic, stress, contact[k])[:, None]
-            self.bodies.append(SupportedBody(elastic, constraints[k], *placed, load))
+            self.bodies.append(SupportedBody(elastic, constraints[k], *placed, load, trace=trace))
         self.joint = join(*(body.condense() for body in self.bodies), self.projection)
 
     def count(self, number):
@@ -128,7 +129,8 @@ class Pressed:
         """Stresses ``(6, elements)`` of both bodies."""
         one = np.ones(1)
         first, at_1 = self.bodies[0].respond(-self.projection.T @ force.ravel(), one)
-        second = self.bodies[1].recover(self.projection @ at_1 + relative.ravel(), one)
+        at_2 = self.projection @ at_1 + relative.ravel()
+        second = self.bodies[1].recover(at_2, force.ravel(), one)
         return [e.stress(u) for e, u in zip(self.elastic, (first, second), strict=True)]
 
     @property

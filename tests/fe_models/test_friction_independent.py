@@ -259,9 +259,10 @@ def whole_displacements(supported, states, amplitudes):
     """All displacements of the upper body in each of the states."""
     displacements = []
     for state, amplitude in zip(states, amplitudes, strict=True):
-        _, interface = supported[0].respond(-state.force.T.ravel(), amplitude)
+        force = state.force.T.ravel()
+        _, interface = supported[0].respond(-force, amplitude)
         displacements.append(
-            supported[1].recover(interface + state.displacement.T.ravel(), amplitude)
+            supported[1].recover(interface + state.displacement.T.ravel(), force, amplitude)
         )
     return displacements
 

@@ -9,6 +9,7 @@ from fe_models.friction import FrictionalJoint
 from fe_models.joint import join
 from fe_models.mesh import Body
 from fe_models.supported_body import SupportedBody
+from fe_models.trace import LinearTrace
 from sa_solver.reference import hertz
 from sa_solver.reference.subsurface import cylinder_stress, point_force_stress, sphere_axis_stress
 from tests.fe_models.test_verification import (
@@ -119,9 +120,11 @@ class HertzPair:
         frames = np.tile(np.eye(dimension), (len(self.nodes), 1, 1))
         for elastic, side in ((self.lower, -1.0), (self.upper, 1.0)):
             constraints = held_still(elastic, "z0", floats=side > 0.0)
-            constraints.average(*elastic.midsides("contact"))
+            trace = LinearTrace.of(elastic, {"contact": self.nodes})
             load = self._far_load(elastic, side)[:, None]
-            supported.append(SupportedBody(elastic, constraints, self.nodes, frames, load))
+            supported.append(
+                SupportedBody(elastic, constraints, self.nodes, frames, load, trace=trace)
+            )
         joint = join(*(body.condense() for body in supported))
         # Across the contact and, in each direction, about it.
         assert joint.rigid_modes == self.dimension
@@ -138,7 +141,7 @@ class HertzPair:
         components = state.displacement[list(self.lower.body.axes)].T.ravel()
         forces = state.force[list(self.lower.body.axes)].T.ravel()
         below, interface = supported[0].respond(-forces, np.ones(1))
-        above = supported[1].recover(interface + components, np.ones(1))
+        above = supported[1].recover(interface + components, forces, np.ones(1))
         ends = [self._far_end(e, u) for e, u in ((self.lower, below), (self.upper, above))]
         # Mean square distance of Hertz's pressure from the middle: 1/4 and 2/5.
         spread = {2: 0.25, 3: 0.4}[self.dimension]

@@ -227,7 +227,7 @@ def rub(elastics, held, face, load, friction):
     (state,) = FrictionalJoint(joint.resolvent(), friction).march(np.ones((1, 1)), face.gap)
     force, relative = (v[list(AXES[LINE])].T.ravel() for v in (state.force, state.displacement))
     _, at_1 = bodies[0].respond(-projection.T @ force, np.ones(1))
-    return state, load @ bodies[1].recover(projection @ at_1 + relative, np.ones(1))
+    return state, load @ bodies[1].recover(projection @ at_1 + relative, force, np.ones(1))
 
 
 def hertz_error(pitches, radius=100.0):

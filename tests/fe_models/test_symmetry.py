@@ -4,13 +4,17 @@ import numpy as np
 import pytest
 import scipy.sparse as sp
 
+from fe_models.dovetail import dovetail_structure
 from fe_models.joint import join
 from fe_models.symmetry import Mirror, SplitMatrix, halves, mirror_of_nodes
 
 
-@pytest.fixture(scope="module")
-def both(structure):
+@pytest.fixture(scope="module", params=[1, 2], ids=["first order", "second order"])
+def both(request, structure, dovetail, titanium, mission):
     """The joint by halves, and of the whole bodies."""
+    if request.param == 2:
+        mesh = dovetail.mesh((10, 34), 10.0, dimension=2)
+        structure = dovetail_structure(dovetail, mesh, titanium, titanium, mission, 2)
     return structure.condense(), join(structure.body_1.condense(), structure.body_2.condense())
 
 

@@ -20,6 +20,7 @@ from fe_models.joint import join
 from fe_models.linear_solver import factorise
 from fe_models.mesh import Body
 from fe_models.supported_body import SupportedBody
+from fe_models.trace import LinearTrace
 from sa_solver.types import Material
 
 ORDERS, DIMENSIONS = [1, 2], [2, 3]
@@ -245,14 +246,16 @@ def test_constant_stress_crosses_a_stuck_contact(monkeypatch, dimension, order):
             constraints = held_still(elastic, "z0")
         else:
             constraints = Constraints(len(elastic.nodes), dimension)
-        constraints.average(*elastic.midsides("z1"))
         normals = {name: OUTWARD[name] for name in names} | {"z0": side * AXES[2]}
         load = traction_forces(
             elastic, lambda x: np.multiply.outer(tensor, np.ones_like(x[0])), normals
         )
         nodes = elastic.body.vertices("z1")
         frames = np.tile(np.eye(dimension), (len(nodes), 1, 1))
-        supported.append(SupportedBody(elastic, constraints, nodes, frames, load[:, None]))
+        trace = LinearTrace.of(elastic, {"z1": nodes})
+        supported.append(
+            SupportedBody(elastic, constraints, nodes, frames, load[:, None], trace=trace)
+        )
         bodies.append(elastic)
     joint = join(*(body.condense() for body in supported))
     frictional = FrictionalJoint(joint.resolvent(), 0.5)

@@ -38,7 +38,8 @@ def put_face(
     if tilt == "held":
         del columns["Mx"], columns["My"]
     writer.put(f"{group}/load_history", columns)
-    writer.put(group, face_mesh(face) | {"slip": slip_field(carried.slip)})
+    datasets = face_mesh(face) | {"slip": slip_field(carried.slip)}
+    writer.put(group, datasets, weighted=face.weighted or None)
     force, displacement = carried.force, carried.displacement
     if force is not None and displacement is not None:
         pressure, shear = force[:, 2] / face.nodal_areas, force[:, :2] / face.nodal_areas

@@ -106,7 +106,7 @@ class StructureStage:
     @cached_property
     def mesh(self) -> StructureMesh:
         """The unworn mesh."""
-        return self.model.mesh()
+        return self.model.mesh().weighted(self.model.order)
 
     @property
     def faces(self) -> tuple[ContactFace, ...]:

@@ -152,6 +152,7 @@ def _read(group: Group, bounds: Bounds, line: bool) -> ImportedLoads:
         nodes_2=_nodes(group, "nodes_2", count),
         nodal_height=group.shaped("nodal_height", "mm", (count,)),
         height=height,
+        weighted=bool(group.group.attrs.get("weighted", False)),
     )
 
 

@@ -34,6 +34,7 @@ class ImportedLoads:
     line contact, ``(m, 2)``, the ``frame`` in the user's axes, the user's node numbers on body 1
     and body 2 ``(n,)``, and the gap of the unloaded, unworn faces [mm]: ``nodal_height`` ``(n,)``
     at these nodes, ``height`` ``(nx, ny)`` on the grid of the case. None where not given.
+    ``weighted`` tells how force and displacement are those of nodes (:class:`fe_models.mesh.Face`).
     """
 
     loads: LoadHistory
@@ -49,6 +50,7 @@ class ImportedLoads:
     nodes_2: Indices | None = None
     nodal_height: Array | None = None
     height: Array | None = None
+    weighted: bool = False
 
     def face(self, name: str) -> Face | None:
         """The face that slip is given on, None where there is none.
@@ -58,7 +60,7 @@ class ImportedLoads:
         if self.coordinates is None or self.facets is None:
             return None
         frame = self.frame or Frame(np.zeros(3), np.eye(3))
-        return Face(name, frame, self.coordinates, self.facets)
+        return Face(name, frame, self.coordinates, self.facets, weighted=self.weighted)
 
 
 def base_units(line: bool) -> dict[str, str]:

@@ -80,7 +80,8 @@ def write_resultants_h5(
                 datasets["height"] = Dataset(heights[name], "mm", "gap before loading")
             if isinstance(face, Interface):
                 datasets |= _at_nodes(face)
-            writer.put(name, datasets, origin=face.frame.origin, axes=face.frame.axes)
+            placed = {"origin": face.frame.origin, "axes": face.frame.axes}
+            writer.put(name, datasets, **placed, weighted=face.weighted or None)
             if cycle is not None:
                 put_closure(writer, name, cycle)
 
