@@ -82,6 +82,10 @@ class Constraints:
         """The displacements that nothing eliminates, ascending: the columns of T."""
         return np.setdiff1d(np.arange(self._size), np.fromiter(self._eliminated, np.int64))
 
+    def places(self, nodes: Indices) -> Indices:
+        """Where the displacements of unconstrained nodes are among :attr:`free`."""
+        return np.searchsorted(self.free, self._dofs(nodes))
+
     def transformation(self) -> sp.csr_matrix:
         """T, ``(displacements, free)``; eliminated masters are followed to the end."""
         slaves = np.setdiff1d(np.arange(self._size), self.free)

@@ -234,10 +234,15 @@ class ReducedPair:
 
     def stick_stiffness(self, normal: NormalSolution, axis: int = X) -> float:
         """Tangential stiffness at the ring while all that touches sticks [N/mm]."""
+        return -float(self.stuck_shear(normal, axis).sum())
+
+    def stuck_shear(self, normal: NormalSolution, axis: int = X) -> Array:
+        """Forces ``(n,)`` [N] on body 2 per mm along ``axis`` while all that touches sticks."""
         touching = np.flatnonzero(normal.touching)
-        ones = np.ones(len(touching))
+        shear = np.zeros(len(self.face))
         A = self.block(axis)[np.ix_(touching, touching)]
-        return float(ones @ sl.solve(A, ones, assume_a="pos"))
+        shear[touching] = -sl.solve(A, np.ones(len(touching)), assume_a="pos")
+        return shear
 
     def virgin_curve(
         self, normal: NormalSolution, displacements: Array, friction: float

@@ -140,7 +140,8 @@ def free_frequencies(
         raise ValueError(f"{count} frequencies of {size} displacements: take 1 to fewer than those")
     # A shift below zero makes a free body's K - σ M definite, and keeps rigid motions exact beside
     # frequencies that are higher by many orders.
-    shift = -SHIFT_SHARE * float(np.median(stiffness.diagonal() / mass.diagonal()))
+    moved = mass.diagonal() > 0.0
+    shift = -SHIFT_SHARE * float(np.median(stiffness.diagonal()[moved] / mass.diagonal()[moved]))
     shifted = stiffness - shift * mass
     if isinstance(shifted, np.ndarray):
         largest = size - count, size - 1

@@ -13,6 +13,7 @@ from fe_models.elasticity import ElasticBody
 from fe_models.geometry.specimens import CONTACT, Specimen
 from fe_models.mesh import Body, StructureMesh
 from fe_models.reduction import ReducedModel, reduce_body
+from fe_models.trace import LinearTrace
 from sa_solver.types import Array, Indices, Material
 
 # Fixed-interface modes of each specimen ("Dynamics simulations of fretting wear for aero-engine
@@ -26,11 +27,12 @@ NONE: Indices = np.empty(0, dtype=np.int64)
 
 @dataclass(frozen=True)
 class SpecimenMatrices:
-    """The free specimen with a linear trace on its pad and on its ring.
+    """The free specimen with the linear trace of its pad, its ring linear.
 
     ``stiffness`` and ``mass`` ``(n, n)`` on the displacements that are left, ``transformation``
     ``(all, n)`` to those of all nodes; ``kept`` are the three displacements of each pad node, in
-    the interface's order, then of each ring node, and of further points.
+    the interface's order, then of each ring node, and of further points. Those of the pad are the
+    last and massless, of its trace (:mod:`fe_models.trace`), where elements are of second order.
     """
 
     stiffness: sp.csr_matrix
@@ -58,19 +60,23 @@ def specimen_matrices(
     elastic = ElasticBody(body, material, order)
     ring = specimen.ring(body)
     constraints = Constraints(len(elastic.nodes))
-    constraints.average(*elastic.midsides(CONTACT))
     if order == 2:
         edges = np.stack([ring, np.roll(ring, -1)], axis=1)
         middle = elastic.nodes[edges].mean(axis=1)
         constraints.average(cKDTree(elastic.nodes).query(middle)[1].astype(np.int64), edges)
-    nodes = np.concatenate([pad, ring, further])
     t = constraints.transformation()
-    return SpecimenMatrices(
-        stiffness=(t.T @ elastic.stiffness @ t).tocsr(),
-        mass=(t.T @ elastic.mass @ t).tocsr(),
-        transformation=t,
-        kept=np.searchsorted(constraints.free, (3 * nodes[:, None] + np.arange(3)).ravel()),
-    )
+    stiffness, mass = ((t.T @ matrix @ t).tocsr() for matrix in (elastic.stiffness, elastic.mass))
+    trace = LinearTrace.of(elastic, {CONTACT: pad})
+    if trace is None:
+        kept = constraints.places(np.concatenate([pad, ring, further]))
+    else:
+        axes, every = np.tile(np.eye(3), (len(pad), 1, 1)), np.arange(3 * len(pad))
+        free, massless = t.shape[1], sp.csr_matrix((len(every),) * 2)
+        stiffness = trace.springs(elastic, axes, every).tied(stiffness, t)
+        mass = sp.block_diag([mass, massless], format="csr")
+        t = sp.hstack([t, sp.csr_matrix((elastic.size, len(every)))], format="csr")
+        kept = np.concatenate([free + every, constraints.places(np.concatenate([ring, further]))])
+    return SpecimenMatrices(stiffness, mass, t, kept)
 
 
 def reduced_specimens(

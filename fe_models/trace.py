@@ -38,6 +38,9 @@ from scipy.sparse.linalg import splu
 from fe_models.elasticity import ElasticBody
 from sa_solver.types import Array, Indices
 
+# Springs that stay give way by about so small a share of what the nodes they hang on do.
+TIED = 1e4
+
 
 @dataclass(frozen=True)
 class LinearTrace:
@@ -90,6 +93,16 @@ class TraceSprings:
     means: sp.csr_matrix
     averages: sp.csc_matrix
     stiffness: float
+
+    def tied(self, stiffness: sp.csr_matrix, transformation: sp.csr_matrix) -> sp.csr_matrix:
+        """As :meth:`joined` by springs ``TIED`` times as stiff, whose ends are nodal values.
+
+        For reduced models, out of which nothing can be taken again.
+        """
+        stretch = sp.hstack([self.means @ transformation, -self.averages], format="csr")
+        ends = sp.csr_matrix((len(self),) * 2)
+        body = sp.block_diag([stiffness, ends], format="csr")
+        return (body + TIED * self.stiffness * (stretch.T @ stretch)).tocsr()
 
     def joined(self, stiffness: sp.csr_matrix, transformation: sp.csr_matrix) -> sp.csr_matrix:
         """Stiffness of a body's free displacements ``(m, m)`` with the springs' ends after them."""

@@ -217,6 +217,12 @@ class Link:
         rows = self.coefficients.reshape(-1, basis.shape[1]) @ basis.T
         return rows.reshape(len(self.coefficients), 3, *places.shape[1:])
 
+    def without_shift(self) -> Link:
+        """The same without what moves the bodies as a whole: far away that may be any length."""
+        coefficients = self.coefficients.copy()
+        coefficients[:, :, :1, :1] = 0.0
+        return replace(self, coefficients=coefficients)
+
     def level(self) -> Link:
         """The same without what merely tilts the bodies."""
         coefficients = self.coefficients.copy()
@@ -253,7 +259,17 @@ def linked(
     """
     deflection = _deflection(half_space, face, loads, force, shear)
     defect = face.means(displacement) - deflection
-    region = _region(face.nodes, force[:, 2])
+    return fitted(face, defect, deflection, force[:, 2], first_largest(loads.P)).without_shift()
+
+
+def fitted(face: Transfer, defect: Array, deflection: Array, pressing: Array, peak: int) -> Link:
+    """The link of a ``defect`` ``(t, 3, n)`` at the nodes [mm], as :meth:`Transfer.sample` has it.
+
+    ``deflection`` ``(t, 3, n)`` is that of the half-spaces, ``pressing`` ``(t, n)`` the forces that
+    say where the contact is; quality is told of increment ``peak``. None where too few nodes are
+    near the contact.
+    """
+    region = _region(face.nodes, pressing)
     inside = np.all((face.nodes >= region[0]) & (face.nodes <= region[1]), axis=1)
     # No displacement is relative where nothing is opposite.
     near = inside & (face.opposed > 0.0) & face.reached
@@ -265,9 +281,6 @@ def linked(
     given = (defect[..., near] * weights).reshape(-1, len(basis))
     fit = np.linalg.lstsq(weights[:, None] * basis, given.T, rcond=LEAST_DETERMINED)[0].T
     coefficients = np.array(fit).reshape(*defect.shape[:2], degrees[0] + 1, degrees[1] + 1)
-    # Far from the contact the bodies may have moved by any length: it says nothing here.
-    coefficients[:, :, 0, 0] = 0.0
-    peak = first_largest(loads.P)
     residual = np.zeros(len(near))
     residual[near] = defect[peak, 2, near] - basis @ fit[3 * peak + 2]
     quality = _quality(face, near, defect[peak, 2], deflection[peak, 2], residual)

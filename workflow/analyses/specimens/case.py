@@ -126,6 +126,11 @@ class PadGrid(Section):
     """The same contact on a half-space, over exactly the pad."""
 
     grid: tuple[GridCells, GridCells] = entry("cells along x, y", [40, 40], default=(40, 40))
+    link: Literal["corrected", "half_space"] = entry(
+        "corrected: the specimens deform as they do; half_space: as half-spaces",
+        "corrected",
+        default="corrected",
+    )
     tolerance: Tolerance = entry(
         "relative, on equilibrium and complementarity [1]", 1e-8, default=1e-8
     )

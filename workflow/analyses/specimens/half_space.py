@@ -3,12 +3,13 @@
 Same shape, loads, friction and motions: normal force imposed, no tilt, then body 2 moved along x
 and nothing else; pressure and shear one after the other, as if both materials were alike. The
 half-space goes on beyond the pad and below it without end; the specimens are finite and held at the
-ring. What that changes is one compliance for normal and one for tangential motion, positive or
-negative, measured on the tied pad:
+ring. Linked to them (:mod:`wear.link`), it moves by what they do beside it,
 
-    c_bulk = 1/k_specimens(tied pad) - 1/k_half-space(tied pad),
+    d = A f - K Π f,
 
-and 1/(1/k_half-space + c_bulk) is what the half-space then predicts for the specimens.
+for the nodal forces f of each motion, the rigid approach and motion of the rings included: its own
+forces and motions are then those of the rings, on a finer grid. Beside half-spaces the pads are
+compared while tied: c_bulk = 1/k_specimens - 1/k_half-space, along z and x, positive or negative.
 """
 
 from __future__ import annotations
@@ -22,12 +23,13 @@ from numpy.typing import NDArray
 from scipy.interpolate import RectBivariateSpline
 
 from fe_models.mesh import Face
-from fe_models.reduced_contact import ReducedPair, X, Z
+from fe_models.reduced_contact import NormalSolution, ReducedPair, X, Z
 from fe_models.transfer import FaceTransfer
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalState
 from sa_solver.tangential import TangentialContact, TangentialState
 from sa_solver.types import Array, ElasticPair, Grid, Indices
+from wear.link import Link, fitted
 from workflow.errors import MethodFailed
 
 # A tied pad: any motion does, and a limit that no shear comes near.
@@ -45,7 +47,8 @@ class HalfSpaceState:
     Fields ``(nx, ny)``: ``pressure`` [MPa], ``shear`` along x at the end of first loading [MPa] and
     ``slip`` of body 2 there [mm]; ``nodal_pressure`` and ``nodal_shear`` ``(n,)`` are their means
     over the nodes of the pad. ``displacement`` [mm] and ``force`` [N] are first loading ``(k,)``,
-    ``stick_stiffness`` [N/mm] with all that touches stuck, ``energy`` of a cycle [N mm].
+    ``stick_stiffness`` [N/mm] with all that touches stuck, ``energy`` of a cycle [N mm], ``misfit``
+    that of the link, None where there is none.
     """
 
     pressure: Array
@@ -59,6 +62,22 @@ class HalfSpaceState:
     displacement: Array
     force: Array
     energy: float
+    misfit: float | None
+
+
+@dataclass(frozen=True)
+class PadLink:
+    """What specimens add to the half-space: to its gap ``(nx, ny)``, and to sliding [mm].
+
+    ``moved`` ``(k, 2, nx, ny)`` is that of first loading to each of its points, ``stuck``
+    ``(2, nx, ny)`` per mm where all that touches sticks. ``misfit`` is what the fit of ``gap``
+    leaves of the half-spaces' deflection.
+    """
+
+    gap: Array
+    moved: Array
+    stuck: Array
+    misfit: float
 
 
 @dataclass(frozen=True)
@@ -117,26 +136,57 @@ class PadHalfSpace:
         low, high = face.coordinates.min(axis=0), face.coordinates.max(axis=0)
         size = float(high[0] - low[0]), float(high[1] - low[1])
         self.grid = Grid.covering(size, cells)
-        self._to_nodes = FaceTransfer.between(face, self.grid).to_nodes
+        self._transfer = FaceTransfer.between(face, self.grid)
+        self._to_nodes = self._transfer.to_nodes
         self._nodes = NodeGrid.of(face)
-        half_space = HalfSpace(self.grid, pair)
+        self._half_space = half_space = HalfSpace(self.grid, pair)
         normal, tangential = NormalContact(half_space), TangentialContact(half_space)
         self._press = partial(normal.solve, tilt_x=0.0, tilt_y=0.0, tolerance=tolerance)
         self._shift = partial(tangential.solve, shift_y=0.0, twist=0.0, tolerance=tolerance)
         self._friction = friction
 
+    def link(self, pair: ReducedPair, normal: NormalSolution, path: Array) -> PadLink:
+        """The link to specimens pressed as ``normal`` and moved to the points of ``path`` [mm]."""
+        shears = [pair.tangential(normal, d, self._friction).shear for d in path]
+        pressed = self._linked(pair, normal, normal.force, Z)
+        moved = [self._linked(pair, normal, shear, X) for shear in shears]
+        stuck = self._linked(pair, normal, pair.stuck_shear(normal), X)
+        places = self.grid.centres
+        return PadLink(
+            gap=pressed.lift(0, places),
+            moved=np.array([link.fields(places)[0, :2] for link in moved]),
+            stuck=stuck.fields(places)[0, :2],
+            misfit=pressed.residual,
+        )
+
+    def _linked(self, pair: ReducedPair, normal: NormalSolution, forces: Array, axis: int) -> Link:
+        """That of nodal ``forces`` ``(n,)`` along one axis, where ``normal`` presses.
+
+        Pressure and shear do not know of each other: of shear it is the part along the face.
+        """
+        force = np.zeros((3, len(forces)))
+        force[axis] = forces
+        displacement = pair.compliance[:, :, :, axis] @ forces
+        traction = self._transfer.spread(force)
+        deflection = self._transfer.sample(self._half_space.displacement(traction))
+        defect = self._transfer.means(displacement.T) - deflection
+        return fitted(self._transfer, defect[None], deflection[None], normal.force[None], 0)
+
     def fretting_cycle(
-        self, height: Array, depth: Array, force: float, path: Array
+        self, height: Array, depth: Array, force: float, path: Array, link: PadLink | None = None
     ) -> HalfSpaceState:
         """Press the shape ``height`` ``(nx, ny)`` with ``force`` [N] and move along ``path``.
 
         ``depth`` ``(n,)`` is worn off both bodies at the nodes [mm], ``path`` ``(k,)`` rising
-        displacements of body 2 along x [mm]. Raises :class:`MethodFailed` if a solve does not
-        converge.
+        displacements of body 2 along x [mm]; ``link`` that of the specimens on the same shape.
+        Raises :class:`MethodFailed` if a solve does not converge.
         """
         worn = self._nodes.smooth(depth)(self.grid.x.ravel(), self.grid.y.ravel())
-        normal = _converged(self._press(height + worn, force))
-        states = [self._move(self._friction * normal.pressure, d) for d in path]
+        shape = height + worn if link is None else height + worn + link.gap
+        normal = _converged(self._press(shape, force))
+        limit = self._friction * normal.pressure
+        moved = [None] * len(path) if link is None else link.moved
+        states = [self._move(limit, d, by) for d, by in zip(path, moved, strict=True)]
         last, area = states[-1], self.grid.cell_area
         # Body 1's shift against body 2 in sa_solver is body 2's here, backwards.
         shear, slip = last.shear[0], last.slip[0]
@@ -148,10 +198,11 @@ class PadHalfSpace:
             nodal_shear=self._to_nodes(shear),
             area=float(np.count_nonzero(normal.pressure > 0.0)) * area,
             approach=normal.approach,
-            stick_stiffness=self._stuck(normal.pressure > 0.0),
+            stick_stiffness=self._stuck(normal.pressure > 0.0, link),
             displacement=path,
             force=np.array([-state.Qx for state in states]),
             energy=-4.0 * float(np.sum(last.shear * last.slip)) * area,
+            misfit=None if link is None else link.misfit,
         )
 
     def tied(self) -> tuple[float, float]:
@@ -160,12 +211,13 @@ class PadHalfSpace:
         pressed = self._press(flat, approach=UNIT_MOTION)
         return pressed.P / UNIT_MOTION, self._stuck(np.ones(self.grid.shape, dtype=np.bool_))
 
-    def _move(self, limit: Array, displacement: float) -> TangentialState:
-        return _converged(self._shift(limit, shift_x=-displacement))
+    def _move(self, limit: Array, displacement: float, by: Array | None = None) -> TangentialState:
+        return _converged(self._shift(limit, by, shift_x=-displacement))
 
-    def _stuck(self, pressed: NDArray[np.bool_]) -> float:
+    def _stuck(self, pressed: NDArray[np.bool_], link: PadLink | None = None) -> float:
         """Stiffness along x of the cells ``pressed``, stuck [N/mm]."""
-        return -self._move(np.where(pressed, NO_LIMIT, 0.0), UNIT_MOTION).Qx / UNIT_MOTION
+        by = None if link is None else UNIT_MOTION * link.stuck
+        return -self._move(np.where(pressed, NO_LIMIT, 0.0), UNIT_MOTION, by).Qx / UNIT_MOTION
 
 
 def bulk_compliance(pair: ReducedPair, half_space: PadHalfSpace) -> BulkCompliance:

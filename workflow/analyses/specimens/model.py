@@ -47,7 +47,8 @@ class SpecimensModel:
     @cached_property
     def mesh(self) -> StructureMesh:
         """Both specimens; raises :class:`~fe_models.mesh.MeshError`."""
-        return self.specimen.mesh(self.case.mesh.size)
+        mesh = self.case.mesh
+        return self.specimen.mesh(mesh.size).weighted(mesh.order)
 
     @property
     def face(self) -> Interface:

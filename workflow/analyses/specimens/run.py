@@ -16,9 +16,10 @@ from fe_models.mesh import MeshError
 from fe_models.reduced_contact import FrettingConditions, ReducedPair, VirginCurve
 from sa_solver.steps import Steps
 from sa_solver.types import Array, ElasticPair
+from wear.link import LARGEST_RESIDUAL
 from wear.steppers import ExplicitStepper, StabilityError, rest
 from workflow.analyses.specimens.case import SpecimensCase
-from workflow.analyses.specimens.half_space import PadHalfSpace, bulk_compliance
+from workflow.analyses.specimens.half_space import HalfSpaceState, PadHalfSpace, bulk_compliance
 from workflow.analyses.specimens.memory import memory
 from workflow.analyses.specimens.model import SpecimensModel
 from workflow.analyses.specimens.outcome import (
@@ -115,13 +116,16 @@ def _fret(
     path = 0.5 * conditions.stroke * rising(HALF_SPACE_POINTS)
     with reporter.stage("half-space"):
         first, last = (
-            steps(
-                "half-space",
-                partial(half_space.fretting_cycle, height, state.depths.sum(axis=0), force, path),
-            )
+            steps("half-space", partial(_beside, model, half_space, height, force, path, state))
             for state in (blocks[0], blocks[-1])
         )
     name = f"the half-space under {force:g} N"
+    for state in (first, last):
+        if state.misfit is not None and state.misfit > LARGEST_RESIDUAL:
+            reporter.warn(
+                f"{name}: the link to the specimens leaves {state.misfit:.1%} of what half-spaces "
+                "deform, and pressures may be wrong by as much; raise mesh.pad_elements"
+            )
     check_cells(name, case.contact, grid, first.pressure, reporter)
     check_cells(name, case.contact, grid, last.pressure, reporter, worn=True)
     with reporter.stage("coupled cycle"):
@@ -130,6 +134,21 @@ def _fret(
     end = blocks[-1]
     reporter.say(f"  {force:g} N: {end.cycles:.4g} cycles in {len(blocks) - 1} cycle blocks")
     return LoadOutcome(force, blocks, kept, (first, last), marched)
+
+
+def _beside(
+    model: SpecimensModel,
+    half_space: PadHalfSpace,
+    height: Array,
+    force: float,
+    path: Array,
+    state: BlockState,
+) -> HalfSpaceState:
+    """The half-space under the shape of a state, linked to the specimens as the case asks for."""
+    link = None
+    if model.case.contact.link == "corrected":
+        link = half_space.link(model.pair, state.contact.normal, path)
+    return half_space.fretting_cycle(height, state.depths.sum(axis=0), force, path, link)
 
 
 def _blocks(

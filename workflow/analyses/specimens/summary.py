@@ -112,22 +112,21 @@ def _state_summary(outcome: SpecimensOutcome, load: LoadOutcome, place: int) -> 
         "pressure_deviation": pressure_deviation(areas, normal.pressure),
         "friction": contact.friction,
         "energy_per_cycle": contact.energy,
-        "half_space": _beside(outcome, state, beside, load.force),
+        "half_space": _beside(outcome, state, beside),
     }
 
 
 def _beside(
-    outcome: SpecimensOutcome, state: KeptState, beside: HalfSpaceState, force: float
+    outcome: SpecimensOutcome, state: KeptState, beside: HalfSpaceState
 ) -> dict[str, float]:
-    """The half-space, its stiffness corrected by what it lacks, and how its fields differ."""
+    """The half-space, what its link to the specimens leaves, and how its fields differ."""
     areas, contact = outcome.model.pair.areas, state.block.contact
     shear = contact.tangential.shear / areas
     return {
         "stick_stiffness": beside.stick_stiffness,
-        "corrected_stiffness": 1.0 / (1.0 / beside.stick_stiffness + outcome.bulk.tangential),
         "area": beside.area,
         "approach": beside.approach,
-        "corrected_approach": beside.approach + force * outcome.bulk.normal,
+        **({} if beside.misfit is None else {"link_misfit": beside.misfit}),
         "peak_pressure": float(beside.pressure.max()),
         "edge_pressure_share": edge_share(outcome.model.pair, beside.nodal_pressure),
         "energy_per_cycle": beside.energy,
