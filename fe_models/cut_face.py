@@ -57,10 +57,14 @@ def cut_interface(
         origin = origin + (plane - origin @ normal) * normal
     if not planes:
         return interface
-    face_1 = interface.face_1
-    moved = replace(interface, planes=tuple(planes), **_about(interface, origin, planes, bodies))
+    rounding, face_1 = _rounding(bodies), interface.face_1
+    frame, coordinates = _about(interface, origin, planes, rounding)
+    if face_1 is not None:
+        face_1 = replace(
+            face_1, frame=frame, coordinates=_about(face_1, origin, planes, rounding)[1]
+        )
     return replace(
-        moved, face_1=face_1 and replace(face_1, **_about(face_1, origin, planes, bodies))
+        interface, planes=tuple(planes), frame=frame, coordinates=coordinates, face_1=face_1
     )
 
 
@@ -79,7 +83,9 @@ class WholeFace(Face):
 
     @property
     def nodal_areas(self) -> Array:
-        areas: Array = self.sides * self.part.nodal_areas[self.nodes]
+        if self.part.areas is None:
+            return self.facet_shares
+        areas: Array = self.sides * self.part.areas[self.nodes]
         return areas
 
     def face(self, number: int) -> Face:
@@ -97,8 +103,9 @@ def whole_face(interface: Interface) -> Face:
     """The face of which planes of symmetry leave a part; the interface itself if none cut it."""
     if not interface.planes:
         return interface
-    coordinates, facets, *images = _mirrored(interface, interface.planes)
-    return WholeFace(interface.name, interface.frame, coordinates, facets, interface, *images)
+    coordinates, facets, nodes, signs, sides = _mirrored(interface, interface.planes)
+    name, frame = interface.name, interface.frame
+    return WholeFace(name, frame, coordinates, facets, interface, nodes, signs, sides)
 
 
 def whole_values(interface: Interface, part: Array) -> Array:
@@ -164,12 +171,13 @@ def _mirrored(face: Face, planes: Sequence[int]) -> tuple[Array, Indices, Indice
     for axis in planes:
         turned = np.ones(3)
         turned[axis] = -1.0
-        off = np.flatnonzero(coordinates[:, axis])
+        off, on_plane = np.flatnonzero(coordinates[:, axis]), coordinates[:, axis] == 0.0
         image = np.arange(len(coordinates))
         image[off] = len(coordinates) + np.arange(len(off))
         # Images of facets turn round: their corners in the other order.
         facets = np.concatenate([facets, image[facets][:, ::-1]])
-        sides = sides * np.where(coordinates[:, axis] == 0.0, 2.0, 1.0)
+        sides = np.where(on_plane, 2.0, 1.0) * sides
+        signs[axis, on_plane] = 0.0  # where faces do not match, one side alone says otherwise
         coordinates = np.concatenate([coordinates, coordinates[off] * turned[:2]])
         nodes, sides = np.append(nodes, nodes[off]), np.append(sides, sides[off])
         signs = np.concatenate([signs, signs[:, off] * turned[:, None]], axis=1)
@@ -205,19 +213,18 @@ def _rounding(bodies: Sequence[Body]) -> float:
 
 
 def _about(
-    face: Face, origin: Array, planes: Sequence[int], bodies: Sequence[Body]
-) -> dict[str, Frame | Array]:
+    face: Face, origin: Array, planes: Sequence[int], rounding: float
+) -> tuple[Frame, Array]:
     """Frame and coordinates of a face about an origin on ``planes``; nodes on these are at 0."""
-    frame = Frame(origin, face.frame.axes)
     coordinates = face.coordinates - face.frame.components(origin - face.frame.origin)[:2]
     for axis in planes:
-        coordinates[np.abs(coordinates[:, axis]) <= _rounding(bodies), axis] = 0.0
-    return {"frame": frame, "coordinates": coordinates}
+        coordinates[np.abs(coordinates[:, axis]) <= rounding, axis] = 0.0
+    return Frame(origin, face.frame.axes), coordinates
 
 
 def _whole_loads(interface: Interface, loads: LoadHistory) -> LoadHistory:
     columns = whole_resultants(interface, loads.resultants).T
     P, Qx, Qy, Mx, My, Mz = map(np.ascontiguousarray, columns)
     both = 2.0 ** len(interface.planes)
-    energies = {"Edx": both * loads.Edx, "Edy": both * loads.Edy}
-    return replace(loads, P=P, Qx=Qx, Qy=Qy, Mx=Mx, My=My, Mz=Mz, **energies)
+    Edx, Edy = both * loads.Edx, both * loads.Edy
+    return replace(loads, P=P, Qx=Qx, Qy=Qy, Mx=Mx, My=My, Mz=Mz, Edx=Edx, Edy=Edy)
