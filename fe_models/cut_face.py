@@ -92,7 +92,8 @@ class WholeFace(Face):
         other = self.part.face(number)
         if other is self.part:
             return self
-        return Face(self.name, self.frame, *_mirrored(other, self.part.planes)[:2])
+        coordinates, facets, *_ = _mirrored(other, self.part.planes)
+        return replace(other, coordinates=coordinates, facets=facets)
 
     def components(self, part: Array) -> Array:
         """Components along x, y and maybe z ``(..., c, N)`` of those of the part's nodes."""

@@ -39,13 +39,13 @@ def meshed(bodies, supports, points=None, x=(1.0, 0.0, 0.0)):
     return imported, imported_mesh(imported, ("block", "pad"), [pair], supports)
 
 
-def solved(planes, match, push):
+def solved(planes, match, push, order):
     """A cycle pressed on and pushed along x by so much in all; the structure and its history."""
     supports = [BASE, *(PLANES[axis] for axis in planes)]
     imported, mesh = meshed(pad_on_block(planes, match), supports)
     share = np.array([push * 0.5 ** len(planes), 0.0, 0.0])
     loads = [Pressure("lid", 50.0), BoundaryForce("lid", share)]
-    joined = imported_structure(mesh, imported, (STEEL, STEEL), supports, loads, 1)
+    joined = imported_structure(mesh, imported, (STEEL, STEEL), supports, loads, order)
     joint = FrictionalJoint(joined.condense().resolvent(), MU)
     path = np.array([[0.4, 0.0], [1.0, 0.0], [1.0, 1.0], [1.0, -1.0]])
     (history,) = joined.solve_cycle(joint, path, joined.gap(), MU).histories
@@ -53,17 +53,23 @@ def solved(planes, match, push):
 
 
 @pytest.mark.parametrize(
-    ("planes", "match"),
-    [((0, 1), False), slow((0, 1), True), slow((1,), False), slow((1,), True), slow((0,), True)],
+    ("planes", "match", "order"),
+    [
+        ((0, 1), False, 1),
+        slow((0, 1), True, 2),
+        slow((1,), False, 2),
+        slow((1,), True, 1),
+        slow((0,), True, 1),
+    ],
 )
-def test_part_with_its_images_is_the_whole(planes, match, monkeypatch):
+def test_part_with_its_images_is_the_whole(planes, match, order, monkeypatch):
     """Node by node, and in all resultants, as the same bodies meshed whole."""
     monkeypatch.setattr(friction, "TOLERANCE", 1e-12)
     monkeypatch.setattr(structure, "CLOSED", -1.0)
     monkeypatch.setattr(structure, "MOST_CYCLES", 3)
     push = 0.0 if 0 in planes else 60.0
-    part, mine = solved(planes, match, push)
-    whole, theirs = solved((), match, push)
+    part, mine = solved(planes, match, push, order)
+    whole, theirs = solved((), match, push, order)
     interface, mine = part.mesh.interfaces[0], whole_history(mine)
     assert interface.planes == planes
     origin = whole.mesh.interfaces[0].frame.origin
@@ -76,7 +82,9 @@ def test_part_with_its_images_is_the_whole(planes, match, monkeypatch):
     for name in ("force", "displacement", "slip"):
         expected = getattr(theirs, name)[..., twins]
         largest = np.abs(expected).max()
-        np.testing.assert_allclose(getattr(mine, name), expected, atol=2e-8 * largest, err_msg=name)
+        # Slips of 1e-10 mm are differences of displacements, whose rounding they have.
+        within = 2e-8 * largest + 1e-14
+        np.testing.assert_allclose(getattr(mine, name), expected, atol=within, err_msg=name)
     largest = np.abs(theirs.loads.resultants).max()
     np.testing.assert_allclose(mine.loads.resultants, theirs.loads.resultants, atol=1e-8 * largest)
     work = theirs.loads.P.max() * np.abs(theirs.displacement).max()

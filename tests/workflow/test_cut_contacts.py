@@ -83,14 +83,14 @@ def told(out):
 
 @pytest.mark.slow
 @pytest.mark.parametrize(
-    ("planes", "load", "match", "method"),
+    ("planes", "load", "match", "method", "order"),
     [
-        ((1,), pushed, True, "full"),
-        ((0, 1), stretched, False, "normal"),
-        ((1,), pushed, False, "nodes"),
+        ((1,), pushed, True, "full", 1),
+        ((0, 1), stretched, False, "normal", 2),
+        ((1,), pushed, False, "nodes", 1),
     ],
 )
-def test_part_wears_as_the_whole_does(tmp_path, monkeypatch, planes, load, match, method):
+def test_part_wears_as_the_whole_does(tmp_path, monkeypatch, planes, load, match, method, order):
     """Pressures, shears, slips, worn surfaces, loads, life and their errors, and half the mesh."""
     # As many cycles of either: what closes within CLOSED in two may be told to go on in the other.
     monkeypatch.setattr(structure, "CLOSED", -1.0)
@@ -99,12 +99,13 @@ def test_part_wears_as_the_whole_does(tmp_path, monkeypatch, planes, load, match
     if method == "nodes":
         wear["step"] = {"kind": "second_order"}
     stress = {"section": "none", "life": {"parameter": "smith_watson_topper"}}
+    settings = f"contact.method={method}", f"structure.order={order}"
     summaries, fields = [], []
     for cut in (planes, ()):
         budget = "known" if method == "full" else "probed"
         case = write(tmp_path, cut, load, match, wear=wear, stress=stress, error_budget=budget)
         out = tmp_path / f"out{len(cut)}"
-        summaries.append(run(case, out, f"contact.method={method}")["foot"])
+        summaries.append(run(case, out, *settings)["foot"])
         fields.append(told(out))
     part, whole = fields
     assert part.keys() == whole.keys()
