@@ -11,6 +11,7 @@ import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
 from fe_models.constraints import Constraints
+from fe_models.cut_face import cut_interface
 from fe_models.elasticity import ElasticBody
 from fe_models.geometry.imported import ImportedMesh
 from fe_models.mesh import Body, MatchError, MeshError, StructureMesh, matched_interface
@@ -25,6 +26,8 @@ from sa_solver.types import Array, Indices, Material
 AXIS_NAMES = "xyz"
 # Displacements that differ by this share of themselves are the same: the rest is rounding.
 HELD_SHARE = 1e-9
+# Supports do not depend on what bodies are made of.
+ANY = Material(1.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -121,11 +124,15 @@ AppliedLoad = Pressure | BoundaryForce | Displacement | Rotation | Acceleration
 
 
 def imported_mesh(
-    imported: ImportedMesh, names: tuple[str, str], pairs: Sequence[ContactPair]
+    imported: ImportedMesh,
+    names: tuple[str, str],
+    pairs: Sequence[ContactPair],
+    supports: Sequence[Support] = (),
 ) -> StructureMesh:
     """The two bodies of those names and the interfaces between them.
 
-    The contact faces become boundaries named as their interface, whose nodes need not match.
+    The contact faces become boundaries named as their interface, whose nodes need not match;
+    ``supports`` on them may be planes of symmetry (:mod:`fe_models.cut_face`).
     Raises :class:`MeshError` for names that are not in the file or faces that do not meet.
     """
     body_1, body_2 = (named_body(imported, name) for name in names)
@@ -141,7 +148,10 @@ def imported_mesh(
         except MatchError:
             interface = mortar_interface(pair.name, *faces, frame)
         interfaces.append(interface)
-    return StructureMesh(body_1, body_2, tuple(interfaces))
+    bodies = body_1, body_2
+    held = [_held(imported, ElasticBody(body, ANY), supports).transformation() for body in bodies]
+    cut = (cut_interface(interface, bodies, held) for interface in interfaces)
+    return StructureMesh(body_1, body_2, tuple(cut))
 
 
 def imported_structure(
@@ -325,11 +335,7 @@ def _supported(
 ) -> SupportedBody:
     body = (mesh.body_1, mesh.body_2)[number - 1]
     elastic = ElasticBody(body, material, order)
-    constraints = Constraints(len(elastic.nodes), elastic.dimension)
-    groups = set[str]().union(*_groups(imported, [body]))
-    for support in supports:
-        if support.group in groups:
-            _hold(constraints, elastic, imported.points[body.name], support)
+    constraints, groups = _held(imported, elastic, supports), _names(imported, body)
     free, supported_motions = constraints.free, constraints.transformation()
     imposed = np.zeros((elastic.size, len(loads)))
     forces = np.zeros((elastic.size, len(loads)))
@@ -368,6 +374,21 @@ def _check_separate(mesh: StructureMesh, number: int) -> None:
                 f"{(mesh.body_1, mesh.body_2)[number - 1].name}; divide the face between them, or "
                 "make them one contact"
             )
+
+
+def _held(imported: ImportedMesh, elastic: ElasticBody, supports: Sequence[Support]) -> Constraints:
+    """What supports hold of a body."""
+    body = elastic.body
+    constraints = Constraints(len(elastic.nodes), elastic.dimension)
+    for support in supports:
+        if support.group in _names(imported, body):
+            _hold(constraints, elastic, imported.points[body.name], support)
+    return constraints
+
+
+def _names(imported: ImportedMesh, body: Body) -> set[str]:
+    """Names of the boundaries and node sets of a body."""
+    return set[str]().union(*_groups(imported, [body]))
 
 
 def _hold(

@@ -113,6 +113,10 @@ class Face:
     def __len__(self) -> int:
         return len(self.coordinates)
 
+    def face(self, number: int) -> Face:
+        """The face of body ``number``, 1 or 2, with its own nodes; one for both unless it says."""
+        return self
+
     @property
     def line(self) -> bool:
         """Whether the face is that of a line contact, and all it carries is per length."""
@@ -147,6 +151,8 @@ class Interface(Face):
     the unloaded, unworn faces [mm]. Faces that meet node to node list their nodes in the same
     order. Otherwise ``projection`` ``(n, n_1)`` gives a field of body 1's nodes at those of body 2,
     ``face_1`` is body 1's own face and ``areas`` ``(n,)`` what it covers of each node's area [mm²].
+    Planes of symmetry may cut it: ``planes`` are the axes of the frame that are normal to them, and
+    the frame's origin is on them (:mod:`fe_models.cut_face`).
     """
 
     nodes_1: Indices
@@ -155,13 +161,13 @@ class Interface(Face):
     projection: sp.csr_matrix | None = None
     face_1: Face | None = None
     areas: Array | None = None
+    planes: tuple[int, ...] = ()
 
     @property
     def nodal_areas(self) -> Array:
         return self.facet_shares if self.areas is None else self.areas
 
     def face(self, number: int) -> Face:
-        """The face of body ``number``, 1 or 2, with its own nodes."""
         return self.face_1 if number == 1 and self.face_1 is not None else self
 
     def nodes(self, number: int) -> Indices:

@@ -23,37 +23,11 @@ from fe_models.remesh import element_volumes
 from fe_models.structure import CLOSED, MOST_CYCLES
 from sa_solver.types import Material
 from tests.fe_models.conftest import stress_state
+from tests.mirrored_blocks import along, mirrored, with_faces
 
 STEEL = Material(200e3, 0.3, 7.8e-9)
 PAIR = ContactPair("foot", "top", "bottom", np.array([1.0, 0.0, 0.0]))
 MU = 0.5
-
-
-def along(*counts):
-    """Node coordinates of pieces ``(from, to, elements)`` one after the other."""
-    return np.unique(np.concatenate([np.linspace(a, b, n + 1) for a, b, n in counts]))
-
-
-def with_faces(mesh, faces):
-    """Name boundaries by the axis and value of their planes."""
-    return mesh.with_boundaries(
-        {
-            name: (lambda x, axis=axis, value=value: np.isclose(x[axis], value))
-            for name, (axis, value) in faces.items()
-        }
-    )
-
-
-def mirrored(mesh, axis):
-    """The mesh with its mirror image at coordinate 0, nodes there shared."""
-    points, count = mesh.p, mesh.p.shape[1]
-    image = points.copy()
-    image[axis] *= -1.0
-    place = np.arange(count) + count
-    plane = np.isclose(points[axis], 0.0)
-    place[plane] = np.flatnonzero(plane)
-    kept, numbers = np.unique(np.concatenate([mesh.t, place[mesh.t]], axis=1), return_inverse=True)
-    return type(mesh)(np.hstack([points, image])[:, kept], numbers.reshape(mesh.t.shape[0], -1))
 
 
 def imported(lower, upper, points=None):

@@ -25,6 +25,7 @@ class Blocks:
     """A foot over x in ``foot`` on a block over ``base`` and ``depth`` thick [mm].
 
     Elements are as large as told within ``fine``; ``hold`` is how the block stands on its base.
+    ``half`` of both, over x > 0, are cut by a plane of symmetry.
     """
 
     base: tuple[float, float]
@@ -35,6 +36,7 @@ class Blocks:
     hold: str = "all"
     materials: tuple[dict[str, str], dict[str, str]] = (RUBBER, CERAMIC)
     strips: int = 256
+    half: bool = False
 
     def write(
         self,
@@ -59,6 +61,8 @@ class Blocks:
         supports = [{"group": "base_z0", "hold": self.hold}]
         supports += [] if self.hold == "all" else [{"group": "base_x0", "hold": "x"}]
         supports += [] if moved else [{"group": "foot_z1", "hold": "x"}]
+        if self.half:
+            supports += [{"group": f"{name}_x0", "hold": "normal"} for name in ("base", "foot")]
         contact = {"name": "foot", "face_1": "base_z1", "face_2": "foot_z0", "x": [1, 0, 0]}
         structure = {
             "file": "blocks.msh",

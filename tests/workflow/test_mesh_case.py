@@ -10,6 +10,7 @@ from fe_models import friction
 from fe_models.geometry.imported import patch, read_bodies
 from fe_models.gmsh_session import gmsh_model
 from fe_models.structure import CLOSED
+from tests.marks import slow
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import WEAR, refused, run, write_case
 from workflow.analyses.wear.structure_stage import StructureStage
@@ -429,16 +430,24 @@ def test_gap_that_the_mesh_cannot_show_costs_no_run(blocks, tmp_path):
     assert low == 2.0
 
 
-def test_contact_cut_by_a_plane_of_symmetry_is_warned_of(tmp_path):
-    """Half of the blocks: the structure halves its loads, the contact stage cannot."""
+@pytest.mark.parametrize("group", ["cut", slow("edge")])
+def test_supports_on_a_contact_face(tmp_path, group):
+    """On a plane of symmetry the contact is the whole one; a held edge is none, and warned of."""
     text = cube("base", 2.0) + cube("foot", 1.0) + ASSEMBLY.replace("0.5, 0.5, 2.", "0.5, 0., 2.")
+    for part, first in (("base", 19), ("foot", 1)):
+        edge = f"*Nset, nset={part}_edge\n{first}, {first + 1}, {first + 2}\n*End Part"
+        head, tail = text.split(f"*Part, name={part}\n")
+        text = head + f"*Part, name={part}\n" + tail.replace("*End Part", edge, 1)
     (tmp_path / "half.inp").write_text(text, encoding="utf-8")
-    planes = [{"group": f"{name}_cut", "hold": "normal"} for name in ("base", "foot")]
-    structure = BLOCKS | {"file": "half.inp", "supports": [*BLOCKS["supports"], *planes]}
-    case = write_case(tmp_path / "half.yaml", structure, TO_AND_FRO)
+    held = [{"group": f"{name}_{group}", "hold": "y"} for name in ("base", "foot")]
+    structure = BLOCKS | {"file": "half.inp", "supports": [*BLOCKS["supports"], *held]}
+    case = write_case(tmp_path / "half.yaml", structure, TO_AND_FRO, error_budget="known")
     summary = run(case, tmp_path / "out")
-    assert summary["foot"]["peak_load"]["unworn"]["P"] == pytest.approx(40.0, rel=1e-6)
-    assert any("plane of symmetry" in line for line in summary["warnings"])
+    warned = any("not as a plane of symmetry" in line for line in summary["warnings"])
+    foot, whole = summary["foot"], group == "cut"
+    assert warned is not whole
+    assert foot["peak_load"]["unworn"]["P"] == pytest.approx(80.0 if whole else 40.0, rel=1e-6)
+    assert foot.get("mirrored_across") == (["y"] if whole else None)
 
 
 def test_slice_in_plane_strain_is_refused(blocks):

@@ -100,11 +100,11 @@ def test_a_cycle_dissipates_as_finely_divided_ones_do() -> None:
         wearing = Wearing.of(
             *COARSE[:2], f"load_path.increments={increments}", f"load_path.peak_at={peak}"
         )
-        history = wearing.source.unworn_cycle.histories[0]
+        histories = wearing.source.unworn_cycle.histories
         areas = np.concatenate([stage.face.nodal_areas for stage in wearing.contacts.stages])
-        cycle = StructureCycle(wearing.source.unworn_cycle, FRICTION, areas, 1.0)
+        cycle = StructureCycle(histories, FRICTION, areas, 1.0)
         by_state = 0.5 * FRICTION * float((cycle.slip * cycle.pressure).sum(axis=0) @ areas)
-        return by_state, history.loads.mean_energy
+        return by_state, histories[0].loads.mean_energy
 
     fine = energies(88, 32)[0]
     by_state, by_increment = energies(11, 4)

@@ -13,7 +13,7 @@ from typing import Literal
 
 import numpy as np
 
-from fe_models.stress import StressField
+from fe_models.cut_face import WholeStress
 from sa_solver.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Grid, Material
 from wear.bulk_stress import SIDE, BodyFace, BulkStress
@@ -65,7 +65,7 @@ class StressedCycle:
     tractions: CycleTractions
     loads: FaceLoads
     faces: tuple[Array, Array] | None = None
-    fields: tuple[StressField, StressField] | None = None
+    fields: tuple[WholeStress, WholeStress] | None = None
 
     def traction(self, t: int) -> Array:
         """Tractions qx, qy, p of increment ``t`` ``(3, nx, ny)`` [MPa]."""

@@ -6,7 +6,7 @@ from typing import Literal
 
 import numpy as np
 
-from fe_models.mesh import Face, Interface
+from fe_models.mesh import Face
 from fe_models.transfer import FaceTransfer
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
@@ -54,7 +54,7 @@ class ContactStage(InterfaceContact):
 
     def face_of(self, body: Literal[1, 2]) -> Face:
         """The face of one body, with its own nodes."""
-        return self.face.face(body) if isinstance(self.face, Interface) else self.face
+        return self.face.face(body)
 
     def depths_of_bodies(self, state: InterfaceState) -> tuple[Array, Array]:
         """Worn depths of body 1 and body 2 at the nodes of their own faces, volumes kept."""

@@ -14,6 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
+from fe_models.cut_face import whole_values
 from fe_models.structure import CycleSolution, InterfaceHistory
 from fe_models.transfer import FaceTransfer
 from sa_solver.types import Array
@@ -44,7 +45,7 @@ class StructureCycle:
     ``stiffness`` [MPa/mm] is the most that the pressure of a node answers to its gap.
     """
 
-    solution: CycleSolution
+    histories: Sequence[InterfaceHistory]
     friction: float
     areas: Array
     stiffness: float
@@ -53,13 +54,12 @@ class StructureCycle:
     @cached_property
     def slip(self) -> Array:
         """Half of that before and half of that after each solved state ``(t, n)`` [mm]."""
-        histories = self.solution.histories
-        return np.concatenate([acting_slip(h.slip, h.loads) for h in histories], axis=1)
+        return np.concatenate([acting_slip(h.slip, h.loads) for h in self.histories], axis=1)
 
     @cached_property
     def pressure(self) -> Array:
         """At the end of each increment ``(t, n)`` [MPa]."""
-        force = self.solution.fields()["force"][:, 2]
+        force = np.concatenate([h.force[:, 2] for h in self.histories], axis=1)
         return np.divide(force, self.areas, out=np.zeros_like(force), where=self.areas > 0.0)
 
     def stable_cycles(self, depth_per_pressure: Array) -> float:
@@ -81,7 +81,7 @@ class NodalStage(ContactStage):
     def history(self, state: InterfaceState) -> InterfaceHistory:
         """What the face does in a cycle on the surfaces of a state."""
         assert isinstance(state.start, np.ndarray)
-        return self._cycles.at(state.start).histories[self._number]
+        return self._cycles.on_faces(self._cycles.at(state.start))[self._number]
 
     # -- surfaces --------------------------------------------------------------------------------
     def on_grid(self, state: InterfaceState) -> Surfaces:
@@ -123,9 +123,9 @@ class NodalStage(ContactStage):
 class _Cycles:
     """The structure's cycles on worn surfaces, each a function of these alone."""
 
-    def __init__(self, source: StructureStage) -> None:
-        self._source = source
-        self._ends = np.cumsum([len(interface) for interface in source.mesh.interfaces])[:-1]
+    def __init__(self, source: StructureStage, faces: Sequence[ContactFace]) -> None:
+        self._source, self.on_faces = source, source.on_faces
+        self._ends = np.cumsum([len(contact.face) for contact in faces])[:-1]
         self._solved: deque[tuple[Array, CycleSolution]] = deque(maxlen=KEPT)
 
     def split(self, nodal: Array) -> list[Array]:
@@ -154,14 +154,15 @@ class NodalContacts(StagedContacts):
     def __init__(
         self, case: WearCase, faces: Sequence[ContactFace], source: StructureStage
     ) -> None:
-        self._cycles = _Cycles(source)
+        self._cycles = _Cycles(source, faces)
         super().__init__(
             [NodalStage(case, face, self._cycles, number) for number, face in enumerate(faces)]
         )
         self._laws, self._friction = self.stages[0].settings.laws, source.model.friction
-        self._gap = source.structure.gap()
+        meshed = source.mesh.interfaces
+        self._gap = np.concatenate([whole_values(face, face.gap) for face in meshed])
         self._areas = np.concatenate([stage.face.nodal_areas for stage in self.stages])
-        self._stiffness = source.stiffest(self._areas)
+        self._stiffness = source.stiffest(np.concatenate([face.nodal_areas for face in meshed]))
         self._stepper = StabilisedStepper(error_control(case.wear))
 
     def begin(
@@ -199,7 +200,8 @@ class NodalContacts(StagedContacts):
         return replace(state, interfaces=self._found(state.interfaces))
 
     def _contact(self, solution: CycleSolution) -> NodalContact:
-        cycle = StructureCycle(solution, self._friction, self._areas, self._stiffness)
+        histories = self._cycles.on_faces(solution)
+        cycle = StructureCycle(histories, self._friction, self._areas, self._stiffness)
         return NodalContact(self._laws, (cycle,))
 
     # -- states of all nodes, and by interface -----------------------------------------------------
@@ -229,7 +231,7 @@ class NodalContacts(StagedContacts):
         coarse: Sequence[InterfaceState | None] = [None] * len(self.stages)
         if state.coarse is not None:
             coarse = self._of_interfaces(state.coarse, rates, solution)
-        histories = solution.histories
+        histories = self._cycles.on_faces(solution)
         parts = map(split, (self._gap, _fields(state.surfaces), rates, self._areas))
         faces = []
         for gap, worn, rate, areas, history, companion in zip(
@@ -266,7 +268,7 @@ class NodalContacts(StagedContacts):
 
     def _first_contacts(self, solution: CycleSolution, stable: float) -> list[FirstContact]:
         firsts = []
-        columns = zip(self.stages, solution.histories, strict=True)
+        columns = zip(self.stages, self._cycles.on_faces(solution), strict=True)
         for number, (stage, history) in enumerate(columns):
             firsts.append(
                 FirstContact(

@@ -113,7 +113,7 @@ def _stresses(
     for number, contact in enumerate(outcome.interfaces):
         stage, worn = contact.stage, contact.unworn
         if structure is not None:
-            worn = structure.cycle.histories[number]
+            worn = structure.loads(number)
         found = contact.begin, contact.end
         unworn, after = (
             StressedCycle(

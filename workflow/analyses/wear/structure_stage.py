@@ -10,6 +10,7 @@ from typing import Literal, Protocol, TypeVar
 import numpy as np
 from scipy.linalg import eigvalsh
 
+from fe_models.cut_face import whole_history, whole_resultants
 from fe_models.friction import FrictionalJoint, FrictionState
 from fe_models.joint import JointResolvent
 from fe_models.mesh import Interface, StructureMesh
@@ -94,8 +95,10 @@ class StructureModel(Protocol):
 class StructureStage:
     """Everything the run asks of the structure: a load source, and stress and worn mesh after it.
 
-    Worn depths are nodal, ``(n,)`` per interface, of both bodies together [mm]. Coefficients of
-    friction are one per interface; those before any wear where they are not given.
+    Worn depths are nodal, ``(n,)`` per contact face, of both bodies together [mm]. Of a face that
+    planes of symmetry cut the contact is that of the whole, whose first nodes are the meshed ones;
+    cycles, stress and worn meshes are those of the part that is meshed. Coefficients of friction
+    are one per interface; those before any wear where they are not given.
     """
 
     def __init__(self, model: StructureModel) -> None:
@@ -232,7 +235,11 @@ class StructureStage:
         return cycle
 
     def unworn(self) -> tuple[InterfaceHistory, ...]:
-        return self.unworn_cycle.histories
+        return self.on_faces(self.unworn_cycle)
+
+    def on_faces(self, cycle: CycleSolution) -> tuple[InterfaceHistory, ...]:
+        """What the contact faces do over a cycle, the whole of those that symmetry cuts."""
+        return tuple(map(whole_history, cycle.histories))
 
     def worn_cycle(
         self,
@@ -255,7 +262,7 @@ class StructureStage:
     def worn(
         self, depths: list[Array], friction: Sequence[float] | None = None
     ) -> tuple[InterfaceHistory, ...]:
-        return self.worn_cycle(depths, friction).histories
+        return self.on_faces(self.worn_cycle(depths, friction))
 
     def _mixed(self, cycles: Sequence[CycleSolution]) -> CycleSolution:
         return mixed(cycles, [mission.share for mission in self.model.missions])
@@ -295,7 +302,8 @@ class StructureStage:
         Cheap, and moved by wear and friction as those of the full cycle are.
         """
         state = self._march_to_peak(depths, [self._unworn_peak.state], friction)
-        return self.structure.interface_resultants(state)
+        pairs = zip(self.mesh.interfaces, self.structure.interface_resultants(state), strict=True)
+        return np.array([whole_resultants(*pair) for pair in pairs])
 
     @cached_property
     def _unworn_peak(self) -> FrictionState:
@@ -343,7 +351,9 @@ class StructureStage:
         return cycle_stress(structure, force, relative, self._amplitudes, self.peak)
 
     def _gap(self, depths: list[Array]) -> Array:
-        return self.structure.gap() + np.concatenate(depths)
+        pairs = zip(self.mesh.interfaces, depths, strict=True)
+        meshed = [depth[: len(interface)] for interface, depth in pairs]
+        return self.structure.gap() + np.concatenate(meshed)
 
 
 def _converged(solved: Solved) -> Solved:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -59,4 +60,6 @@ def _worn_nodes(face: UserFace, stage: ContactStage, state: InterfaceState) -> N
     if face.points is not None:
         return nodal_depths(face.points, face.frame, stage.grid, depth)
     nodal = stage.depths_of_bodies(state)[face.body - 1]
-    return NodalDepths.of(nodal, stage.face_of(face.body).facet_shares, stage.grid, depth)
+    worn = NodalDepths.of(nodal, stage.face_of(face.body).facet_shares, stage.grid, depth)
+    # Of a whole face the first nodes are those that are meshed.
+    return replace(worn, depth=worn.depth[: len(face.numbers)])

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from fe_models.mesh import Body, MeshError, StructureMesh, write_msh
+from fe_models.cut_face import WholeStress, whole_components
+from fe_models.mesh import Body, Interface, MeshError, StructureMesh, write_msh
 from fe_models.nonlinear import NonlinearCheck
 from fe_models.remesh import form_of, formed_mesh, worn_mesh, worn_volume
 from fe_models.stress import CycleStress, PeakStress, StressField
-from fe_models.structure import CycleSolution
+from fe_models.structure import CycleSolution, InterfaceHistory
 from sa_solver.types import Array, LoadHistory
 from wear.coupled import CoupledState
 from workflow.analyses.wear.budget.parts import ResultError
@@ -49,14 +50,20 @@ class WornStructure:
 
     def under(
         self, moment: str, number: int
-    ) -> tuple[tuple[Array, Array], tuple[StressField, StressField]]:
+    ) -> tuple[tuple[Array, Array], tuple[WholeStress, WholeStress]]:
         """Motions of both bodies' faces under interface ``number``, and stress at peak load."""
-        stress = self.stresses[moment]
-        return stress.faces[number], stress.fields
+        stress, interface = self.stresses[moment], self.stage.mesh.interfaces[number]
+        one, two = (whole_components(interface, moved) for moved in stress.faces[number])
+        field_1, field_2 = (WholeStress(field, interface) for field in stress.fields)
+        return (one, two), (field_1, field_2)
+
+    def loads(self, number: int) -> InterfaceHistory:
+        """What the whole face of interface ``number`` does over the worn cycle."""
+        return self.stage.on_faces(self.cycle)[number]
 
     def write(self, writer: ResultsWriter, accuracy: float) -> None:
         """Load histories of the worn faces, and both bodies unworn and worn."""
-        for history in self.cycle.histories:
+        for history in self.stage.on_faces(self.cycle):
             name = history.interface.name
             put_face(writer, f"structure_worn/{name}", history.interface, history)
             put_closure(writer, f"structure_worn/{name}", self.cycle)
@@ -156,9 +163,10 @@ class WornStructure:
     def interface_summary(self, number: int) -> dict[str, Any]:
         """Volumes in the mesh and resultants at peak load, unworn and worn."""
         stage, interface = self.stage, self.stage.mesh.interfaces[number]
-        unworn, worn = (cycle.histories[number].loads for cycle in (stage.unworn_cycle, self.cycle))
+        unworn, worn = stage.unworn()[number].loads, self.loads(number).loads
         before, after = stage.mesh, self.mesh
         return {
+            **({"mirrored_across": planes} if (planes := _mirrored_across(interface)) else {}),
             "mesh_volume_1": worn_volume(before.body_1, after.body_1, interface, 1),
             "mesh_volume_2": worn_volume(before.body_2, after.body_2, interface, 2),
             "peak_load": {
@@ -166,6 +174,11 @@ class WornStructure:
                 "worn": resultants_at(worn, stage.peak),
             },
         }
+
+
+def _mirrored_across(interface: Interface) -> list[str]:
+    """Axes across which planes of symmetry cut an interface."""
+    return ["xy"[axis] for axis in interface.planes]
 
 
 def _known(peaks: Sequence[PeakStress]) -> float | None:
@@ -218,9 +231,8 @@ def worn_structure(
             else [friction.at(interface.energy) for _, interface in pairs],
         )
     with reporter.stage("re-meshing"):
-        mesh = worn_mesh(
-            stage.mesh, [contact.depths_of_bodies(interface) for contact, interface in pairs]
-        )
+        depths = [contact.depths_of_bodies(interface) for contact, interface in pairs]
+        mesh = worn_mesh(stage.mesh, list(map(meshed_depths, stage.mesh.interfaces, depths)))
         written = _formed({"unworn": stage.mesh, "worn": mesh}, reporter)
         with replacing(folder.reserve("worn.msh", "the mesh with the worn faces")) as partial:
             write_msh(partial, written["worn"])
@@ -230,6 +242,12 @@ def worn_structure(
             "worn": stage.stress(mesh, cycle),
         }
     return WornStructure(stage, mesh, cycle, stresses, written)
+
+
+def meshed_depths(interface: Interface, depths: tuple[Array, Array]) -> tuple[Array, Array]:
+    """Those of both bodies at the nodes that are meshed: of a whole face the first ones."""
+    depth_1, depth_2 = depths
+    return depth_1[: len(interface.nodes_1)], depth_2[: len(interface.nodes_2)]
 
 
 def _formed(meshes: dict[str, StructureMesh], reporter: Reporter) -> dict[str, StructureMesh]:

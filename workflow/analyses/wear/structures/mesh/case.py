@@ -13,7 +13,7 @@ from pydantic import model_validator
 
 from fe_models.mesh import Interface, MeshError, StructureMesh
 from workflow.analyses.wear.case.base import FiniteElementCase, check_interface_name
-from workflow.analyses.wear.case.gaps import Gap, check_gap
+from workflow.analyses.wear.case.gaps import Gap, HeightsGap, check_gap
 from workflow.analyses.wear.case.sections import (
     Share,
     TwoMaterials,
@@ -28,6 +28,7 @@ from workflow.analyses.wear.structures.mesh.loads import (
     Name,
 )
 from workflow.case.fields import AUTO, Auto, File, OrAuto, Whole
+from workflow.case.input_files import read_heights
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 if TYPE_CHECKING:
@@ -41,6 +42,10 @@ ENDINGS = (
     ".msh", ".inp", ".step", ".stp", ".brep", ".vtu", ".vtk", ".xdmf", ".med", ".bdf", ".mesh",
     ".nas", ".cdb", ".odb", ".cae", ".db", ".igs", ".iges",
 )  # fmt: skip
+
+# Heights on both sides of a plane of symmetry may differ by this share of their range: files round.
+MIRRORED = 1e-6
+AXIS_NAMES = "xy"
 
 Stamp = tuple[int, int]
 
@@ -160,7 +165,8 @@ def _joined(structure: ImportedStructure, stamp: Stamp) -> StructureMesh:
     from fe_models.imported_structure import imported_mesh
 
     pairs = [pair.described() for pair in structure.contacts]
-    return imported_mesh(structure.read(), (structure.body_1, structure.body_2), pairs)
+    supports = [support.described() for support in structure.supports]
+    return imported_mesh(structure.read(), (structure.body_1, structure.body_2), pairs, supports)
 
 
 def _stamp(file: str) -> Stamp:
@@ -326,6 +332,7 @@ class MeshCase(FiniteElementCase):
                 cells = self.contact.grid[0], 1 if face.line else self.contact.grid[1]
                 key = f"structure.contacts.{index}.gap"
                 check_gap(pair.gap, face_size(face), cells, face.line, key)
+                _check_mirrored(pair.gap, face.planes, key)
 
     def _check_supports(self, imported: ImportedMesh) -> None:
         """Build what holds the bodies, on elements of order 1 and without forces."""
@@ -350,9 +357,32 @@ class MeshCase(FiniteElementCase):
 
 
 def face_size(face: Interface) -> tuple[float, float]:
-    """Extent of a face along x and y about its origin [mm]; of a line contact a slice of 1 mm."""
+    """Extent of a face along x and y about its origin [mm]; of a line contact a slice of 1 mm.
+
+    Of one that planes of symmetry cut, whose origin they hold, the extent of the whole.
+    """
     reach = 2.0 * np.abs(face.coordinates).max(axis=0)
     return float(reach[0]), 1.0 if face.line else float(reach[1])
+
+
+def _check_mirrored(gap: Gap, planes: Sequence[int], key: str) -> None:
+    """Refuse heights that are not their own image across the ``planes`` that cut their face."""
+    if not isinstance(gap, HeightsGap):
+        return
+    heights = read_heights(gap.file)
+    for axis in planes:
+        apart = np.abs(heights - np.flip(heights, axis)).max()
+        if apart > MIRRORED * np.ptp(heights):
+            raise disagreement(
+                f"{gap.file}: not the same on both sides of {planes_of_symmetry([axis])}, by up to "
+                f"{apart:.3g} mm; allowed: heights that are, over the whole face, or a mesh of it",
+                key,
+            )
+
+
+def planes_of_symmetry(planes: Sequence[int]) -> str:
+    """Those across some axes of a contact's frame, in words."""
+    return " and ".join(f"a plane of symmetry across {AXIS_NAMES[axis]}" for axis in planes)
 
 
 def _outline_of(interface: Interface) -> str:
@@ -361,9 +391,14 @@ def _outline_of(interface: Interface) -> str:
     area = f"{interface.nodal_areas.sum():.4g} {'mm' if interface.line else 'mm²'}"
     # Rounded, as planes of a mesh file are off by its last digits.
     low, high = (round(float(gap), 9) + 0.0 for gap in (interface.gap.min(), interface.gap.max()))
+    cut = ""
+    if interface.planes:
+        x, y = face_size(interface)
+        whole = f"{x:.4g} mm" if interface.line else f"{x:.4g} x {y:.4g} mm"
+        cut = f"; cut by {planes_of_symmetry(interface.planes)}, on a grid over the whole, {whole}"
     return (
         f"{interface.name}, {len(interface)} nodes that {meet}, {area}, gap of the meshes "
-        f"{low:.3g} to {high:.3g} mm"
+        f"{low:.3g} to {high:.3g} mm{cut}"
     )
 
 

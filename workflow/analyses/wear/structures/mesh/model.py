@@ -9,8 +9,9 @@ from pathlib import Path
 import numpy as np
 from scipy.spatial import cKDTree
 
+from fe_models.cut_face import whole_face, whole_values
 from fe_models.imported_structure import imported_softening, imported_structure
-from fe_models.mesh import Interface, StructureMesh
+from fe_models.mesh import Face, Interface, StructureMesh
 from fe_models.relinearised import Softening
 from fe_models.structure import Structure
 from sa_solver.shapes import PARTING_SLOPE
@@ -18,7 +19,11 @@ from sa_solver.types import Array, Grid, Indices
 from workflow.analyses.wear.gaps import GapFunction, gap_over
 from workflow.analyses.wear.load_source import ContactFace
 from workflow.analyses.wear.structure_stage import MissionLoads
-from workflow.analyses.wear.structures.mesh.case import MeshCase, face_size
+from workflow.analyses.wear.structures.mesh.case import (
+    MeshCase,
+    face_size,
+    planes_of_symmetry,
+)
 from workflow.analyses.wear.structures.mesh.loads import RotationLoad
 from workflow.shell.reporter import Reporter
 
@@ -122,7 +127,9 @@ class MeshModel:
     def contact_face(self, interface: Interface) -> ContactFace:
         size, extra = face_size(interface), self._case_gap(interface)
         (meshed,) = (i for i in self._meshed.interfaces if i.name == interface.name)
-        return ContactFace(interface, size, _MeshGap(meshed, extra), _coarse(interface, size))
+        face = whole_face(interface)
+        gap = _MeshGap(face, whole_values(meshed, meshed.gap), extra)
+        return ContactFace(face, size, gap, _coarse(face, size))
 
     def node_numbers(self, body: int) -> Indices:
         structure = self._case.structure
@@ -130,23 +137,32 @@ class MeshModel:
         return structure.read().node_numbers[name]
 
     def warn(self, structure: Structure, reporter: Reporter) -> None:
-        """Planes of symmetry that cut a contact, of which its half-space knows nothing."""
-        for name in structure.held_faces:
-            reporter.warn(
-                f"{name}: supports hold some of its nodes, as on a plane of symmetry: the "
-                "structure knows of it, the half-space of the contact does not, whose pressure is "
-                "that of a face that ends there; mesh the whole face"
-            )
+        """What is told of contacts that planes of symmetry cut, and supports that are none."""
+        for interface in structure.mesh.interfaces:
+            name, planes = interface.name, interface.planes
+            if planes:
+                reporter.say(
+                    f"{name}: cut by {planes_of_symmetry(planes)}: its half-space has the mirror "
+                    "image too, and what is told of the contact is that of the whole face; "
+                    "worn.msh and worn_nodes are the part that is meshed"
+                )
+            elif name in structure.held_faces:
+                reporter.warn(
+                    f"{name}: supports hold some of its nodes along it, and not as a plane of "
+                    "symmetry does, across x or y of the contact with all nodes that both bodies "
+                    "have on it: the structure knows of them, the half-space of the contact does "
+                    "not, whose pressure is that of a face that ends there; mesh the whole face"
+                )
 
 
 class _MeshGap:
-    """Gap of the meshed faces, linear between nodes; the bodies part beyond them.
+    """Gap of the meshed faces, ``(n,)`` at nodes and linear between; the bodies part beyond them.
 
     ``extra`` is a gap that the case gives beside it.
     """
 
-    def __init__(self, interface: Interface, extra: GapFunction | None) -> None:
-        self._face, self._gap, self._extra = interface, interface.gap, extra
+    def __init__(self, face: Face, gap: Array, extra: GapFunction | None) -> None:
+        self._face, self._gap, self._extra = face, gap, extra
 
     def __call__(self, x: Array, y: Array) -> Array:
         """Gap ``(nx, ny)`` [mm] at ``x`` ``(nx, 1)`` and ``y`` ``(1, ny)``."""
@@ -182,9 +198,9 @@ class _MeshGap:
         return gap
 
 
-def _coarse(interface: Interface, size: tuple[float, float]) -> tuple[int, int]:
+def _coarse(face: Face, size: tuple[float, float]) -> tuple[int, int]:
     """About as many cells as nodes, as square as may be."""
-    if interface.line:
-        return len(interface), 1
-    across = max(int(np.sqrt(len(interface) * size[0] / size[1])), 1)
-    return across, max(len(interface) // across, 1)
+    if face.line:
+        return len(face), 1
+    across = max(int(np.sqrt(len(face) * size[0] / size[1])), 1)
+    return across, max(len(face) // across, 1)
