@@ -105,8 +105,10 @@ def whole_face(interface: Interface) -> Face:
     if not interface.planes:
         return interface
     coordinates, facets, nodes, signs, sides = _mirrored(interface, interface.planes)
-    name, frame = interface.name, interface.frame
-    return WholeFace(name, frame, coordinates, facets, interface, nodes, signs, sides)
+    name, frame, weighted = interface.name, interface.frame, interface.weighted
+    return WholeFace(
+        name, frame, coordinates, facets, interface, nodes, signs, sides, weighted=weighted
+    )
 
 
 def whole_values(interface: Interface, part: Array) -> Array:
