@@ -124,7 +124,8 @@ def _fret(
         if state.misfit is not None and state.misfit > LARGEST_RESIDUAL:
             reporter.warn(
                 f"{name}: the link to the specimens leaves {state.misfit:.1%} of what half-spaces "
-                "deform, and pressures may be wrong by as much; raise mesh.pad_elements"
+                "deform, and its pressures may be wrong by as much: raise mesh.pad_elements; at "
+                "the sharp border of flat pads that are not worn no mesh is fine enough"
             )
     check_cells(name, case.contact, grid, first.pressure, reporter)
     check_cells(name, case.contact, grid, last.pressure, reporter, worn=True)
