@@ -64,6 +64,12 @@ class Mirror:
         """Orthonormal bases of symmetric ``(n, n₊)`` and of antisymmetric unknowns ``(n, n₋)``."""
         return self._basis(1.0), self._basis(-1.0)
 
+    @cached_property
+    def basis(self) -> tuple[sp.csr_matrix, sp.csr_matrix]:
+        """Both bases side by side ``(n, n)``, and the transpose."""
+        both = sp.hstack(self.bases, format="csr")
+        return both, both.T.tocsr()
+
     def restricted(self, unknowns: Indices) -> Mirror | None:
         """The same mirror of some unknowns, in their order; None if it leads out of them."""
         place = np.full(len(self.partner), -1)
@@ -102,8 +108,10 @@ class SplitMatrix:
         return len(self.mirror.partner)
 
     def __matmul__(self, vectors: Array) -> Array:
-        parts = zip(self.mirror.bases, self.blocks, strict=True)
-        return np.asarray(sum(basis @ (block @ (basis.T @ vectors)) for basis, block in parts))
+        basis, transposed = self.mirror.basis
+        parts = np.split(transposed @ vectors, [len(self.blocks[0])])
+        images = [block @ part for block, part in zip(self.blocks, parts, strict=True)]
+        return np.asarray(basis @ np.concatenate(images))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         return np.asarray(self @ np.eye(len(self)), dtype)

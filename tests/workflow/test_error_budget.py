@@ -12,8 +12,9 @@ from tests.workflow.mesh_scenes import settings
 from workflow.analyses.wear.budget import finding
 from workflow.analyses.wear.budget.companions import Companions
 from workflow.analyses.wear.budget.lives import live
-from workflow.analyses.wear.budget.parts import PARTS, ResultError, peak_left
+from workflow.analyses.wear.budget.parts import ResultError, peak_left
 from workflow.analyses.wear.budget.report import datasets_of, sentence, summary_of, warning_of
+from workflow.analyses.wear.layout import PARTS
 from workflow.analyses.wear.structure import SETTINGS
 from workflow.analyses.wear.structures import structure_of
 from workflow.case.changing import changed

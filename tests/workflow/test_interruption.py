@@ -292,7 +292,7 @@ def test_worker_killed_before_its_first_word_is_one_line(monkeypatch):
     resource_tracker.ensure_running()
     monkeypatch.setattr(spawn, "_python_exe", b"/bin/true")
     with pytest.raises(MethodFailed, match="a process of the run has gone"):
-        workers.side_by_side([(len, (bytes(1_000_000),))])
+        workers.side_by_side([(len, (b"",)), (len, (bytes(1_000_000),))])
 
 
 @pytest.mark.slow

@@ -32,27 +32,42 @@ def write_pictures(
     folder: OutputFolder,
     pictures: Callable[[], Pictures],
     contents: Any,
-    processes: int = 0,
+    processes: int,
 ) -> None:
     """Write the pictures of the results in a folder that a case asks for in its ``output``.
 
-    ``contents`` is what the results hold, as ``pictures`` are told it.
+    ``contents`` is what the results hold, as ``pictures`` are told it. So many ``processes`` share
+    them, this one among them.
     """
-    drawn = pictures, contents, folder.results
-    jobs: list[tuple[Callable[..., Any], tuple[Any, ...]]] = []
     with ExitStack() as stack:
+        paraview = figures = None
         if output.paraview:
             paraview = stack.enter_context(folder.filling("paraview", "files for ParaView"))
-            jobs.append((write_paraview, (*drawn, paraview)))
         if output.figures:
-            parts = max(processes, 1)
             figures = stack.enter_context(folder.filling("figures", "figures of the results"))
-            jobs += [(write_figures, (*drawn, figures, part, parts)) for part in range(parts)]
-        if processes:
-            side_by_side(jobs)
-            return
-        for write, arguments in jobs:
-            write(*arguments)
+        drawn = pictures, contents, folder.results, figures
+        parts = processes if output.figures else 1
+        # The last one has files for ParaView to write besides.
+        beside = [None] * (parts - 1) + [paraview]
+        side_by_side(
+            [(_write_share, (*drawn, also, part, parts)) for part, also in enumerate(beside)]
+        )
+
+
+def _write_share(
+    pictures: Callable[[], Pictures],
+    contents: Any,
+    results: Path,
+    figures: Path | None,
+    paraview: Path | None,
+    first: int,
+    every: int,
+) -> None:
+    """What one process draws, into the folders that there are."""
+    if figures is not None:
+        write_figures(pictures, contents, results, figures, first, every)
+    if paraview is not None:
+        write_paraview(pictures, contents, results, paraview)
 
 
 def write_paraview(

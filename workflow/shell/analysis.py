@@ -98,8 +98,7 @@ class Analysis(Generic[AnyCase]):
     ``cases`` are its kinds of case by the names that ``fretscale new`` has for them; these say
     themselves how they are told apart, what they would run and on how many cores. ``memory`` is
     what a run needs before anything is meshed, ``run_time`` about how long it takes, ``pictures``
-    how its results are shown: figures in so many ``drawing_processes``, and the files beside them;
-    0: all in that of the run.
+    how its results are shown, drawn in so many ``drawing_processes``, that of the run among them.
     ``resumable`` are runs that leave a checkpoint to go on from (:mod:`workflow.shell.checkpoint`),
     by their steps (:mod:`workflow.shell.steps`) or a state of their own.
     ``choose`` gives the case with the settings that it leaves open, and a record of why.
@@ -113,7 +112,7 @@ class Analysis(Generic[AnyCase]):
     memory: Callable[[AnyCase], Memory]
     run_time: Callable[[AnyCase], RunTime]
     pictures: Callable[[], Pictures] | None = None
-    drawing_processes: int = 0
+    drawing_processes: int = 1
     resumable: bool = False
     choose: Callable[[AnyCase], tuple[AnyCase, dict[str, Any] | None]] = as_written
     comparison: Comparison[AnyCase] = Comparison()

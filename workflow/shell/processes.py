@@ -60,11 +60,13 @@ def workers(make: Callable[[Any], Answering], settings: Sequence[Any]) -> Iterat
 
 
 def side_by_side(jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]]) -> None:
-    """Run functions, given with their arguments, each in a process of its own.
+    """Run functions, given with their arguments: the first one here, others in processes.
 
-    Raises what one of them raised, once all have ended.
+    Raises what one of them raised.
     """
-    with _processes(_do, jobs) as connections:
+    (here, arguments), *others = jobs
+    with _processes(_do, others) as connections:
+        here(*arguments)
         _answers(connections)
 
 

@@ -7,6 +7,15 @@ from dataclasses import dataclass
 MOMENTS = "unworn", "worn"
 # How far kinetics are extended, in computed numbers of cycles.
 EXTRAPOLATION = 2.0
+# What leaves errors, in the order of their datasets.
+PARTS = ("link", "mesh", "increments", "grid", "steps", "solver")
+# Results that have errors, by their names and in words: what is worn, pressures, and the rest.
+WORN = {"depth": "depth", "volume": "volume"}
+PRESSURES = {
+    "peak_pressure": "unworn peak pressure",
+    "worn_peak_pressure": "worn peak pressure",
+}
+RESULTS = WORN | PRESSURES | {"life": "fretting parameter", "notch_stress": "notch stress"}
 
 
 def energy_name(nodes: bool) -> str:

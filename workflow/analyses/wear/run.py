@@ -71,8 +71,7 @@ def _compute(run: Run[WearCase]) -> Outcome:
     kept = checkpoint.restored(run, run.kept) if run.kept else None
     source = structure_of(case).source(case)
     faces = meshed_faces(case, source, reporter)
-    nodal = case.contact.method == "nodes"
-    with contact_workers(case, () if nodal else faces) as workers:
+    with contact_workers(case, faces if _worn_apart(case, source) else ()) as workers:
         with reporter.stage("condensation"):
             source.prepare()
         with reporter.stage("structural friction"):
@@ -99,11 +98,18 @@ def _compute(run: Run[WearCase]) -> Outcome:
 def _contacts(
     case: WearCase, source: LoadSource, faces: Sequence[ContactFace], workers: Workers
 ) -> StagedContacts:
-    """What wears: half-spaces in the workers, or the nodes of the structure here."""
+    """What wears: half-spaces in the workers or here, or the nodes of the structure."""
     if case.contact.method == "nodes":
         assert isinstance(source, StructureStage)
         return NodalContacts(case, faces, source)
-    return ContactProcesses([ContactStage(case, face) for face in faces], workers)
+    stages = [ContactStage(case, face) for face in faces]
+    return ContactProcesses(stages, workers) if _worn_apart(case, source) else StagedContacts(stages)
+
+
+def _worn_apart(case: WearCase, source: LoadSource) -> bool:
+    """Whether contacts wear in workers: a line's pressures take less time than these to start."""
+    method = case.contact.method
+    return method == "full" or (method == "normal" and not source.line)
 
 
 def _march(

@@ -13,16 +13,9 @@ import numpy as np
 
 from sa_solver.types import Array
 from workflow.analyses.wear.case.base import WearCase
+from workflow.analyses.wear.layout import PRESSURES, WORN
 from workflow.analyses.wear.outcome import InterfaceOutcome
 
-PARTS = ("link", "mesh", "increments", "grid", "steps", "solver")
-# What is worn and pressures, by their names in the summary and in words.
-WORN = {"depth": "depth", "volume": "volume"}
-PRESSURES = {
-    "peak_pressure": "unworn peak pressure",
-    "worn_peak_pressure": "worn peak pressure",
-}
-RESULTS = WORN | PRESSURES | {"life": "fretting parameter", "notch_stress": "notch stress"}
 # How often the energy and the pressure count in a fretting parameter: Ruiz's is work times tension,
 # that of Smith, Watson and Topper stress times strain, that of Findley a stress.
 POWERS = {"ruiz": (1, 1), "smith_watson_topper": (0, 2), "findley": (0, 1)}

@@ -7,8 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from workflow.analyses.wear.budget.parts import PARTS, RESULTS
-from workflow.analyses.wear.layout import Contents
+from workflow.analyses.wear.layout import PARTS, RESULTS, Contents
 from workflow.pictures.panels import legend_below, new_figure
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
 
