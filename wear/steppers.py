@@ -301,9 +301,13 @@ At = Callable[[State], Compared]
 
 @dataclass(frozen=True)
 class ComparingStepper(ABC, Generic[State, Compared]):
-    """Steps, as long as asked for or as ``control`` lets them be, and their companion's."""
+    """Steps, as long as asked for or as ``control`` lets them be, and their companion's.
+
+    Those of given length may go ``alone``: nothing tells their error then.
+    """
 
     control: ErrorControl | None = None
+    alone: bool = False
 
     @abstractmethod
     def _advance(
@@ -327,15 +331,18 @@ class ComparingStepper(ABC, Generic[State, Compared]):
             half, last = 0.5 * cycles, cycles >= left * (1.0 - ROUNDING)
             first = self._advance(state, half, contact, contact_at, last)
             second = self._advance(first.state, half, contact_at(first.state), contact_at, last)
-            whole = self._advance(companion, cycles, with_companion, contact_at, last)
-            after = replace(second.state, coarse=whole.state, order=order)
+            after, spent = replace(second.state, order=order), first.spent + second.spent
+            if not self.alone:
+                whole = self._advance(companion, cycles, with_companion, contact_at, last)
+                after, spent = replace(after, coarse=whole.state), spent + whole.spent
             shortest = 2.0 * _shortest(min(contact.stable_cycles(end) for end in (state, after)))
             fits, proposed = True, cycles
             if control is not None:
                 fits, change = _judged(control, state, after, max(left / cycles, 1.0))
                 proposed = max(cycles * float(np.clip(change, SHRINKAGE, GROWTH)), shortest)
-            spent = replace(first.spent + second.spent + whole.spent, steps=2)
-            step = WearStep(replace(after, next_cycles=proposed), cycles, spent)
+            step = WearStep(
+                replace(after, next_cycles=proposed), cycles, replace(spent, steps=2)
+            )
             return _Trial(step, fits, min(proposed, 0.5 * cycles), shortest)
 
         longest = min(most, 2.0 / order * contact.comparable_cycles(state))

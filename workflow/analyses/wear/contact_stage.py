@@ -27,22 +27,28 @@ from workflow.analyses.wear.contact_loops import WornLoop, worn_loop
 from workflow.analyses.wear.load_source import ContactFace
 from workflow.errors import UserError
 
+WearStepper = Stepper[WearState, WearingContact]
+
 
 class ContactStage(InterfaceContact):
     """One face of a case on its grid.
 
     ``remedy`` is what to do where the contact reaches the border of that, ``coarse_grid`` another
-    with as many cells as the face has nodes.
+    with as many cells as the face has nodes. It wears by the ``stepper`` of the case unless another
+    is given.
     """
 
     transfer: FaceTransfer
 
-    def __init__(self, case: WearCase, contact: ContactFace) -> None:
+    def __init__(
+        self, case: WearCase, contact: ContactFace, stepper: WearStepper | None = None
+    ) -> None:
         grid = contact.grid(case.contact.grid)
         _check_section(case.stress, grid)
         self._case, self._contact_face, self.face = case, contact, contact.face
         self.remedy, self.coarse_grid = contact.remedy, contact.grid(contact.coarse)
-        super().__init__(_interface(case, contact, FaceTransfer.between(contact.face, grid)))
+        transfer = FaceTransfer.between(contact.face, grid)
+        super().__init__(_interface(case, contact, transfer, stepper or stepper_of(case.wear)))
 
     def coarse_pressure(self, loads: LoadHistory, link: Link, peak: int) -> Array:
         """Unworn peak pressure on a grid as coarse as the mesh of the structure."""
@@ -70,7 +76,9 @@ class ContactStage(InterfaceContact):
         return worn_loop(contact, self._case.loops, self.name, state, peak, tilt, lift)
 
 
-def _interface(case: WearCase, contact: ContactFace, transfer: FaceTransfer) -> InterfaceSettings:
+def _interface(
+    case: WearCase, contact: ContactFace, transfer: FaceTransfer, stepper: WearStepper
+) -> InterfaceSettings:
     """A face and how it wears, as the library takes it."""
     grid, settings = transfer.grid, case.contact
     return InterfaceSettings(
@@ -81,7 +89,7 @@ def _interface(case: WearCase, contact: ContactFace, transfer: FaceTransfer) -> 
         pair=ElasticPair(case.material(1), case.material(2)),
         laws=(case.wear_of(1).described(), case.wear_of(2).described()),
         friction=case.friction.at,
-        stepper=stepper_of(case.wear),
+        stepper=stepper,
         method="full" if settings.method == "full" else "normal",
         gross_slip=settings.gross_slip,
         driven=contact.driven,
@@ -106,7 +114,7 @@ def _follow(case: WearCase) -> bool | None:
     return follow
 
 
-def stepper_of(wear: Duration) -> Stepper[WearState, WearingContact]:
+def stepper_of(wear: Duration) -> WearStepper:
     """What advances the surfaces of a contact, as the case asks for."""
     step = wear.step
     if step.kind == "explicit":

@@ -7,11 +7,14 @@ difference that this one thing makes.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from itertools import islice
 from typing import Any, Literal
 
 from fe_models.mesh import MeshError
 from sa_solver.normal import NormalContactError
 from wear.coupled import Contacts, CoupledSettings, CoupledState, CoupledWear, JumpSize
+from wear.steppers import ImplicitStepper
 from wear.stepping import ContactFailure
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Life, Step
@@ -53,12 +56,15 @@ def live(
 
     Raises one of :data:`FAILURES` where structure or contacts fail.
     """
-    stages = [ContactStage(case, face) for face in source.faces]
-    cycles = case.wear.cycles
+    # What its steps leave is no question, nor what loads the structure lays on the surfaces at last.
+    stages = [ContactStage(case, face, ImplicitStepper(alone=True)) for face in source.faces]
+    cycles, contacts = case.wear.cycles, Contacts(stages)
     settings = CoupledSettings(cycles, JumpSize(cycles / STEPS), resultants=resultants)
-    loop = CoupledWear(settings, source, Contacts(stages))
+    loop = CoupledWear(settings, source, contacts)
     state, _ = loop.begin(source.unworn())
-    return stages, [state, *loop.march(state)]
+    states = [state, *islice(loop.march(state), STEPS - 1)]
+    last = CoupledWear(replace(settings, resultants="constant"), source, contacts)
+    return stages, [*states, *last.march(states[-1])]
 
 
 def worn_by(stages: Sequence[ContactStage], state: CoupledState) -> Worn:

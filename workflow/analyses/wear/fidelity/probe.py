@@ -14,6 +14,7 @@ import numpy as np
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, resultant_change
+from wear.coupled import Contacts
 from wear.steppers import ImplicitStepper, advance_cycles
 from wear.stepping import SlidingCycle, WearingContact, WearState
 from wear.tractions import acting_slip
@@ -76,9 +77,11 @@ def coupled_life(case: DovetailCase) -> tuple[Numbers, float]:
 
     The drift is that of the resultants in the end, as a run measures it.
     """
-    stages, (first, *_, end) = live(case, _structure(case), "every")
+    structure = _structure(case)
+    stages, (first, *_, end) = live(case, structure, "every")
     sizes = np.array([stage.grid.size for stage in stages])
-    drift = resultant_change(end.solved_resultants, first.solved_resultants, sizes)
+    drifted = structure.probe(Contacts(stages).nodal_depths(end.interfaces))
+    drift = resultant_change(drifted, first.solved_resultants, sizes)
     return worn_by(stages, end), float(np.abs(drift).max())
 
 
@@ -132,6 +135,6 @@ def _worn_away(contact: WearingContact, state: WearState, cycles: float) -> Arra
     """Depth of both bodies after so many cycles."""
     for _ in range(STEPS):
         step = cycles / STEPS
-        stepper = ImplicitStepper()
+        stepper = ImplicitStepper(alone=True)
         state = advance_cycles(stepper, state, step, cycles, lambda worn: contact).state
     return state.surfaces.depth
