@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
+from scipy.linalg.blas import dsymv
 from scipy.spatial import cKDTree
 
 from sa_solver.types import Array, Indices
@@ -110,11 +111,22 @@ class SplitMatrix:
     def __matmul__(self, vectors: Array) -> Array:
         basis, transposed = self.mirror.basis
         parts = np.split(transposed @ vectors, [len(self.blocks[0])])
-        images = [block @ part for block, part in zip(self.blocks, parts, strict=True)]
+        images = [symmetric_product(*pair) for pair in zip(self.blocks, parts, strict=True)]
         return np.asarray(basis @ np.concatenate(images))
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> Array:
         return np.asarray(self @ np.eye(len(self)), dtype)
+
+
+def symmetric_product(matrix: Array, vectors: Array) -> Array:
+    """A symmetric ``matrix`` ``(n, n)`` times ``vectors`` ``(n,)`` or ``(n, m)``.
+
+    Of a large one, a product waits for memory: for one vector half of the matrix is read.
+    """
+    if vectors.ndim == 2:
+        return matrix @ vectors
+    by_columns = matrix if matrix.flags.f_contiguous else matrix.T
+    return np.asarray(dsymv(1.0, by_columns, vectors))
 
 
 def mirror_of_nodes(nodes: Array, axes: tuple[int, ...], axis: int) -> Mirror | None:

@@ -43,7 +43,18 @@ def write_figures(figures: Iterable[tuple[str, Callable[[], Figure]]], folder: P
     with rc_context(STYLE):
         for name, draw in figures:
             path = folder / f"{name}.png"
+            figure = draw()
+            _lay_out(figure)
             with replacing(path) as partial:
-                draw().savefig(partial, format="png", dpi=DOTS_PER_INCH)
+                figure.savefig(partial, format="png", dpi=DOTS_PER_INCH)
             written.append(path)
     return written
+
+
+def _lay_out(figure: Figure) -> None:
+    """Give everything its place for good: to save a figure with a layout would draw it twice."""
+    engine = figure.get_layout_engine()
+    if engine is not None:
+        figure.set_dpi(DOTS_PER_INCH)
+        engine.execute(figure)
+        figure.set_layout_engine("none")
