@@ -105,8 +105,8 @@ class SubsurfaceStress:
 
         The section along x lies at y = ``at`` [mm], moved to the centre of the nearest row, and the
         other way round; ``depths`` >= 0 [mm]. ``traction`` as in :meth:`at_depth`. Transforms go
-        along the section only and rows without load are left out: a quarter of the cost of as many
-        planes, each with new symbols.
+        along the section only, rows without load are left out, and those as far on either side go
+        together: a tenth of the cost of as many planes, each with new symbols.
 
         Raises SubsurfaceError for another shape, a depth below 0, a plane off the grid or a section
         along y of a line contact.
@@ -122,15 +122,14 @@ class SubsurfaceStress:
         loaded = np.flatnonzero(felt.any(axis=(0, 1)))
         if len(loaded) == 0:
             return stress
-        first, last = int(loaded[0]), int(loaded[-1])
-        period = self._padded[along]
-        spectra = scipy.fft.rfft(felt[:, :, first : last + 1], period, axis=1)
-        rows = np.arange(row - last, row - first + 2, dtype=np.float64) - 0.5
+        period, away = self._padded[along], row - np.arange(loaded[0], loaded[-1] + 1)
+        sources = felt[:, :, loaded[0] : loaded[-1] + 1]
+        spectra = _folded(scipy.fft.rfft(sources, period, axis=1), away)
+        rows = np.arange(spectra.shape[-1] + 1, dtype=np.float64) - 0.5
         edges = [quarter_edges(period, self.grid.pitch[along]), rows * self.grid.pitch[1 - along]]
         for column, depth in enumerate(depths):
             kernels = self._influence(edges if along == 0 else edges[::-1], float(depth))
-            # Kernels run over point less source, so backwards over the sources.
-            kernels = np.moveaxis(kernels, along + 2, 2)[..., ::-1]
+            kernels = np.moveaxis(kernels, along + 2, 2)
             whole = _along_rows(kernels, spectra, along, period)
             stress[:, :, column] = whole[:, : felt.shape[1]]
         stress[[YZ, ZX]] *= self._mirror[0]
@@ -191,15 +190,29 @@ def _odd(component: int, traction: int, axis: int) -> bool:
     return (*INDICES[component], traction).count(axis) % 2 == 1
 
 
+def _folded(spectra: Array, away: Array) -> Array:
+    """Those of rows ``away`` ``(r,)``, to either side, by distance ``(2, 3, frequency, distance)``.
+
+    Rows on both sides act alike: their sums are for even kernels, their differences for odd ones.
+    """
+    folded = np.zeros((2, *spectra.shape[:2], np.abs(away).max() + 1), dtype=np.complex128)
+    ahead = away >= 0
+    folded[..., away[ahead]] = spectra[..., ahead]
+    behind = spectra[..., ~ahead]
+    folded[..., -away[~ahead]] += np.stack([behind, -behind])
+    return folded
+
+
 def _along_rows(kernels: Array, spectra: Array, along: int, period: int) -> Array:
     """Convolution along the rows of cells, summed over them, ``(6, period)``.
 
-    ``kernels`` ``(6, 3, distance, row)`` and ``spectra`` ``(3, frequency, row)`` of the tractions;
-    ``along`` is the direction of the rows.
+    ``kernels`` ``(6, 3, distance, row)`` and folded ``spectra`` of the tractions; ``along`` is the
+    direction of the rows.
     """
-    total = np.zeros((6, spectra.shape[1]), dtype=np.complex128)
+    total = np.zeros((6, spectra.shape[2]), dtype=np.complex128)
     for i, k in np.ndindex(6, 3):
         whole = continued(kernels[i, k], 0, period, _odd(i, k, along))
-        total[i] += np.einsum("fr,fr->f", scipy.fft.rfft(whole, axis=0), spectra[k])
+        rows = spectra[int(_odd(i, k, 1 - along)), k]
+        total[i] += np.einsum("fr,fr->f", scipy.fft.rfft(whole, axis=0), rows)
     stress: Array = scipy.fft.irfft(total, period, axis=1)
     return stress

@@ -61,8 +61,9 @@ class BulkStress:
         """
         side = SIDE[self.body]
         z = side * depth
+        rest = replace(self.rest, coefficients=side * self.rest.coefficients)
         x, y, xx, xy, yy = (
-            side * np.moveaxis(self.rest.derivative(places, orders), 1, 0)
+            np.moveaxis(rest.derivative(places, orders), 1, 0)
             for orders in ((1, 0), (0, 1), (2, 0), (1, 1), (0, 2))
         )
         poisson, shear = self.material.poisson, self.material.shear_modulus

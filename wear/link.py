@@ -294,11 +294,10 @@ def _deflection(
     """K Π f at the nodes ``(t, 3, n)`` [mm]; of the pressure along z alone without ``shear``."""
     deflection = np.zeros(force.shape)
     for t in np.flatnonzero(loads.P > 0.0):
-        traction = face.spread(force[t])
         if shear:
-            deflection[t] = face.sample(half_space.displacement(traction))
+            deflection[t] = face.sample(half_space.displacement(face.spread(force[t])))
         else:
-            deflection[t, 2] = face.sample(half_space.normal(traction[2]))
+            deflection[t, 2] = face.sample(half_space.normal(face.spread(force[t, 2])))
     return deflection
 
 
