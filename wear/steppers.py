@@ -340,9 +340,7 @@ class ComparingStepper(ABC, Generic[State, Compared]):
             if control is not None:
                 fits, change = _judged(control, state, after, max(left / cycles, 1.0))
                 proposed = max(cycles * float(np.clip(change, SHRINKAGE, GROWTH)), shortest)
-            step = WearStep(
-                replace(after, next_cycles=proposed), cycles, replace(spent, steps=2)
-            )
+            step = WearStep(replace(after, next_cycles=proposed), cycles, replace(spent, steps=2))
             return _Trial(step, fits, min(proposed, 0.5 * cycles), shortest)
 
         longest = min(most, 2.0 / order * contact.comparable_cycles(state))

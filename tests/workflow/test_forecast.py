@@ -215,7 +215,7 @@ def test_check_tells_the_order_of_magnitude(name: str, true: float) -> None:
     ("name", "finer"),
     [
         ("dovetail", "mesh.flank_nodes=[40, 68]"),
-        ("dovetail", "wear.step.cycles=3000"),
+        ("dovetail", "wear.step.cycles=2000"),
         ("dovetail", "contact.grid=[512, 1024]"),
         ("cylinder_wear", "wear.step.cycles=100"),
         ("sphere_fretting", "contact.grid=[512, 512]"),

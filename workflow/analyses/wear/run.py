@@ -103,7 +103,9 @@ def _contacts(
         assert isinstance(source, StructureStage)
         return NodalContacts(case, faces, source)
     stages = [ContactStage(case, face) for face in faces]
-    return ContactProcesses(stages, workers) if _worn_apart(case, source) else StagedContacts(stages)
+    if _worn_apart(case, source):
+        return ContactProcesses(stages, workers)
+    return StagedContacts(stages)
 
 
 def _worn_apart(case: WearCase, source: LoadSource) -> bool:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil, prod, sqrt
 
 from workflow.analyses.wear.case.base import WearCase
@@ -39,8 +39,13 @@ CYCLES = 2
 CYCLES_IN_A_STEP = 5
 # Branches of a tangential loop that are marched until it is closed, each problem soon solved.
 BRANCHES = 4
-# Stress under a contact, of a cell in an increment: on a face, and by a search for the worst plane.
-STRESS, SEARCHED = 1.2e-6, 10.0
+# Stress under a contact, of a cell in an increment: on a face, by a search for the worst plane, and
+# what a structure carries past it.
+STRESS, SEARCHED, CARRIED = 1.2e-6, 10.0, 1e-6
+# Lives beside the run that tell what mesh and grid leave: how many, their steps, and their cells at
+# most; mesh and factors of their structures, and an iteration of friction in the plane [s].
+LIVES, LIFE_STEPS, LIFE_CELLS = 3, 6, 64
+PLANE, PLANE_ITERATION = 0.5, 1e-4
 # Stress and mesh of the structure at the end, in sparse factors; figures and files of fields [s].
 WORN, PICTURES = 2.0, 6.0
 
@@ -51,7 +56,8 @@ class Extent:
 
     ``nodes`` are those of both bodies and ``interface_nodes`` those of all faces, 0 without finite
     elements. In a cycle the bodies pass a ``path`` [mm] over each other; ``dissipating`` is the
-    share of its increments in which they slide.
+    share of its increments in which they slide. Of a ``section`` in the plane, which stands for the
+    structure in short lives beside the run, it is the same.
     """
 
     increments: int
@@ -60,6 +66,7 @@ class Extent:
     interface_nodes: float = 0.0
     path: float = SLIP
     dissipating: float = 1.0
+    section: Extent | None = None
 
 
 def run_time(case: WearCase, extent: Extent) -> RunTime:
@@ -85,6 +92,7 @@ def run_time(case: WearCase, extent: Extent) -> RunTime:
     cycle = _structural_cycle(extent)
     before = shared * begun + _condensation(extent) + CYCLES * cycle
     after = PICTURES + WORN * factors(extent.nodes) + cycle + _stress(case, extent, cells)
+    after += _lives(case, extent, plane)
     return RunTime(before, shared * worn + again * cycle, after)
 
 
@@ -137,5 +145,24 @@ def _stress(case: WearCase, extent: Extent, cells: int) -> float:
     life = case.stress.life.parameter
     if life == "none":
         return 0.0
-    searched = 1.0 if life == "ruiz" else SEARCHED
-    return 2.0 * STRESS * searched * extent.faces * extent.increments * cells
+    searched = STRESS * (1.0 if life == "ruiz" else SEARCHED)
+    carried = CARRIED if extent.interface_nodes else 0.0
+    return 2.0 * (searched + carried) * extent.faces * extent.increments * cells
+
+
+def _lives(case: WearCase, extent: Extent, plane: bool) -> float:
+    """Of short lives for the error budget, one of them on a mesh of half the size [s]."""
+    if case.error_budget == "known" or case.contact.method == "nodes":
+        return 0.0
+    plane, life = plane or extent.section is not None, extent.section or extent
+    across, along = (min(count, LIFE_CELLS) for count in case.contact.grid)
+    cells, kind = (across, NORMAL_LINE) if plane else (across * along // 4, NORMAL)
+    lives = LIVES if life.interface_nodes else LIVES - 1
+    solved = lives * life.faces * life.increments * (1.0 + LIFE_STEPS * life.dissipating)
+    contacts = solves(solved, cells, kind)
+    if not life.interface_nodes or case.recoupling.resultants == "constant":
+        return contacts
+    finer = replace(life, interface_nodes=2.0 * life.interface_nodes)
+    own, other = (LIFE_STEPS / 2 * _structural_cycle(mesh) for mesh in (life, finer))
+    iterated = lives * LIFE_STEPS / 2 * life.increments * ITERATIONS * PLANE_ITERATION
+    return contacts + 2.0 * (own + PLANE) + other + iterated

@@ -56,7 +56,7 @@ def live(
 
     Raises one of :data:`FAILURES` where structure or contacts fail.
     """
-    # What its steps leave is no question, nor what loads the structure lays on the surfaces at last.
+    # What its steps leave is not asked, nor what loads the structure lays on the last surfaces.
     stages = [ContactStage(case, face, ImplicitStepper(alone=True)) for face in source.faces]
     cycles, contacts = case.wear.cycles, Contacts(stages)
     settings = CoupledSettings(cycles, JumpSize(cycles / STEPS), resultants=resultants)

@@ -49,15 +49,18 @@ def _extent(case: DovetailCase) -> Extent:
     across, along = case.mesh.flank_nodes
     structure, faces = case.structure, 2
     increments = len(case.load_path.shares) * sum(case.expected_legs)
+    section = Extent(increments, faces, 0.0, faces * across, dissipating=DISSIPATING)
     if structure.dimension == 2:
-        return Extent(increments, faces, 0.0, faces * across, dissipating=DISSIPATING)
+        return section
     sector = 2.0 * pi * structure.rim_radius / structure.blades * structure.disk_height
     blade = structure.shank_height * structure.neck_width
     volume = (sector + blade) * structure.slot_length
     nodes = FLANK_NODES * across * along + VOLUME_NODES * volume / case.mesh.size**3
     if case.mesh.order == 2:
         nodes *= QUADRATIC
-    return Extent(increments, faces, nodes, faces * across * along, dissipating=DISSIPATING)
+    return Extent(
+        increments, faces, nodes, faces * across * along, dissipating=DISSIPATING, section=section
+    )
 
 
 def _choose(case: DovetailCase) -> tuple[DovetailCase, dict[str, Any] | None]:
