@@ -20,7 +20,7 @@ import numpy as np
 from sa_solver.contact_law import unilateral
 from sa_solver.normal_problem import Iterate, NormalProblem, normal_residuals
 from sa_solver.preconditioner import NormalPreconditioner
-from sa_solver.rigid_modes import RANK_CUTOFF
+from sa_solver.rigid_modes import pseudoinverse
 from sa_solver.types import Array, Mask
 
 ITERATIONS = 200
@@ -216,9 +216,7 @@ class BoundConjugateGradients:
             self._compute_punch()
         else:
             np.multiply(self._punch_shape, self._on_set, out=self._punch)
-        self._inverse = np.linalg.pinv(
-            self._modes.products(self._punch), rcond=RANK_CUTOFF, hermitian=True
-        )
+        self._inverse = pseudoinverse(self._modes.products(self._punch))
         self._find_gap()
 
     def _compute_punch(self) -> None:

@@ -16,7 +16,7 @@ from functools import cached_property
 
 import numpy as np
 
-from sa_solver.types import Array, Grid
+from sa_solver.types import Array, Grid, Indices
 
 BALANCE_TOLERANCE = 1e-13
 """Resultants left by :meth:`NormalModes.balance`, relative to the load: rounding of a sum."""
@@ -33,6 +33,9 @@ the corresponding rotation."""
 
 APPROACH, TILT_X, TILT_Y = range(3)
 """The normal modes δz, φx and φy."""
+
+POWERS, SIGNS = ((0, 0), (0, 1), (1, 0)), (1.0, 1.0, -1.0)
+"""Of x and y in each of these modes, and its sign."""
 
 RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
 """Order of the six resultants, and of the motions conjugate to them: δz, δx, δy, φx, φy, φz."""
@@ -73,10 +76,9 @@ class NormalModes:
 
     def sums(self, fields: Array) -> Array:
         """Products ``(..., k)`` of fields ``(..., nx, ny)`` with the modes."""
-        rows = fields @ self._lines_y
-        total = rows.sum(axis=-2)
-        every = np.stack([total[..., 0], total[..., 1], -(rows[..., 0] @ self.x)], axis=-1)
-        return every[..., list(self.free)]
+        moments = self._powers_x[:2] @ (fields @ self._powers_y[:, :2])
+        i, j, signs = self._places
+        return np.asarray(signs * moments[..., i, j])
 
     def motion(self, coefficients: Array) -> Array:
         """Rigid displacement field ``(nx, ny)``."""
@@ -106,7 +108,7 @@ class NormalModes:
 
     def products(self, weight: Array) -> Array:
         """Products ``(k, k)`` of the modes with one another, weighted by a field ``(nx, ny)``."""
-        return self._products(self._moments(weight, np.zeros(3)))
+        return self._products(self._powers_x @ (weight @ self._powers_y))
 
     def balance(self, pressure: Array, target: Array) -> Array | None:
         """``pressure`` times ``exp(a + b y + c x)`` such that its sums are ``target`` ``(k,)``.
@@ -126,21 +128,41 @@ class NormalModes:
         for _ in range(BALANCE_ITERATIONS):
             moments = self._moments(pressure, exponent)
             products = self._products(moments)
-            missing = target - self._first(moments)
+            i, j, signs = self._places
+            missing = target - signs * moments[i, j]
             if np.abs(missing).max() <= BALANCE_TOLERANCE * moments[0, 0]:
                 along_x, along_y = (np.exp(part) for part in self._all_profiles(exponent))
                 balanced: Array = pressure * along_x[:, None]
                 balanced *= along_y
                 return balanced
             step = np.zeros(3)
-            step[at] = np.linalg.pinv(products, rcond=RANK_CUTOFF, hermitian=True) @ missing
+            step[at] = pseudoinverse(products) @ missing
             exponent += step * min(1.0, LARGEST_EXPONENT_STEP / self._largest(step))
         return None
 
     # -- fields that are sums or products of a profile along x and one along y ------------------
     @cached_property
-    def _lines_y(self) -> Array:
-        return np.stack([np.ones_like(self.y), self.y], axis=1)
+    def _powers_x(self) -> Array:
+        """1, x and x² ``(3, nx)``."""
+        return np.stack([np.ones_like(self.x), self.x, self.x * self.x])
+
+    @cached_property
+    def _powers_y(self) -> Array:
+        """1, y and y² ``(ny, 3)``."""
+        return np.stack([np.ones_like(self.y), self.y, self.y * self.y], axis=1)
+
+    @cached_property
+    def _places(self) -> tuple[Indices, Indices, Array]:
+        """Powers of x and y in the free modes, and their signs ``(k,)`` each."""
+        free = list(self.free)
+        i, j = np.array(POWERS)[free].T
+        return i, j, np.array(SIGNS)[free]
+
+    @cached_property
+    def _places_of_products(self) -> tuple[Indices, Indices, Array]:
+        """The same of products of two free modes ``(k, k)`` each."""
+        i, j, signs = self._places
+        return i[:, None] + i, j[:, None] + j, signs[:, None] * signs
 
     def _profiles(self, coefficients: Array) -> tuple[Array, Array]:
         every = np.zeros(3)
@@ -159,22 +181,20 @@ class NormalModes:
     def _moments(self, weight: Array, exponent: Array) -> Array:
         """``Σ w e x^i y^j`` for i, j up to 2, with e the exponential of a rigid motion."""
         along_x, along_y = (np.exp(part) for part in self._all_profiles(exponent))
-        powers = np.arange(3)
-        rows = weight @ (self.y[:, None] ** powers * along_y[:, None])
-        return (self.x[:, None] ** powers * along_x[:, None]).T @ rows
+        return (self._powers_x * along_x) @ (weight @ (self._powers_y * along_y[:, None]))
 
-    def _first(self, m: Array) -> Array:
-        return np.array([m[0, 0], m[0, 1], -m[1, 0]])[list(self.free)]
+    def _products(self, moments: Array) -> Array:
+        i, j, signs = self._places_of_products
+        return np.asarray(signs * moments[i, j])
 
-    def _products(self, m: Array) -> Array:
-        every = np.array(
-            [
-                [m[0, 0], m[0, 1], -m[1, 0]],
-                [m[0, 1], m[0, 2], -m[1, 1]],
-                [-m[1, 0], -m[1, 1], m[2, 0]],
-            ]
-        )
-        return every[np.ix_(self.free, self.free)]
+
+def pseudoinverse(matrix: Array) -> Array:
+    """That of a symmetric ``matrix`` ``(k, k)`` of few modes, for which numpy's takes long."""
+    values, vectors = np.linalg.eigh(matrix)
+    sizes = np.abs(values)
+    kept = sizes > RANK_CUTOFF * sizes.max(initial=0.0)
+    basis = vectors[:, kept]
+    return np.asarray((basis / values[kept]) @ basis.T)
 
 
 def mode_lengths(grid: Grid) -> Array:
