@@ -65,7 +65,7 @@ class SupportedBody:
         self.constraints = constraints
         if imposed is not None and imposed[self._dofs(nodes)].any():
             raise ValueError("a displacement is imposed on nodes of a contact face")
-        transformation = constraints.transformation()
+        self._supports = transformation = constraints.transformation()
         rows = transformation[self._dofs(nodes)]
         self.held, self._interface, blocks = _interface_displacements(rows, frames)
         self._free = np.flatnonzero(~self.held)
@@ -197,7 +197,7 @@ class SupportedBody:
     def free_facets(self) -> Indices:
         """Facets of the surface on which nothing acts: no support, load or contact."""
         mesh = self.elastic.body.mesh
-        transformation, free = self.constraints.transformation(), self.constraints.free
+        transformation, free = self._supports, self.constraints.free
         slaves = np.setdiff1d(np.arange(transformation.shape[0]), free)
         tied = np.concatenate([slaves, free[np.unique(transformation[slaves].indices)]])
         touched = np.zeros(len(self.elastic.nodes), bool)
@@ -211,7 +211,7 @@ class SupportedBody:
     @property
     def clamped(self) -> Indices:
         """Vertices that cannot move in any direction."""
-        still = np.diff(self.constraints.transformation().indptr) == 0
+        still = np.diff(self._supports.indptr) == 0
         vertices = still.reshape(-1, self.elastic.dimension)[: self.elastic.body.mesh.nvertices]
         return np.flatnonzero(vertices.all(axis=1))
 
@@ -236,7 +236,7 @@ class SupportedBody:
         the global axes.
         """
         motions = rigid_motions((self.elastic.nodes - about) / size, self.elastic.body.axes)
-        held = motions - self.constraints.transformation() @ motions[self.constraints.free]
+        held = motions - self._supports @ motions[self.constraints.free]
         gram = motions.T @ motions
         # Motions along the plane of a plane body are the only ones it knows.
         known = np.flatnonzero(np.diag(gram) > 0.0)

@@ -105,6 +105,7 @@ class StructureStage:
         self.model = model
         self.peak = model.peak
         self.from_cache = False
+        self._worn: tuple[Array, CycleSolution] | None = None
 
     @cached_property
     def mesh(self) -> StructureMesh:
@@ -251,13 +252,19 @@ class StructureStage:
 
         Of a single mission it may follow one ``after`` which the gaps were less wide: found sooner.
         """
-        missions = self._unworn_missions
+        missions, asked = self._unworn_missions, np.concatenate([*depths, friction or ()])
         if after is not None:
             (unworn,) = missions
             missions = (replace(after, cycles=unworn.cycles),)
+        elif self._worn is not None and np.array_equal(asked, self._worn[0]):
+            # A run's end is asked for again where its loads have just followed it.
+            return self._worn[1]
         pairs = zip(self.model.missions, missions, strict=True)
         cycles = [self._cycle(mission, depths, unworn, friction) for mission, unworn in pairs]
-        return self._mixed(cycles)
+        cycle = self._mixed(cycles)
+        if after is None:
+            self._worn = asked, cycle
+        return cycle
 
     def worn(
         self, depths: list[Array], friction: Sequence[float] | None = None
