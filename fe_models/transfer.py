@@ -21,7 +21,7 @@ from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from fe_models.mesh import Face
-from sa_solver.types import Array, Grid
+from sa_solver.types import Array, Grid, Indices
 
 # Two points integrate the quadratics under a straight edge exactly (Gauss).
 GAUSS = np.sqrt(1.0 / 3.0)
@@ -29,6 +29,8 @@ GAUSS = np.sqrt(1.0 / 3.0)
 ROUNDING = 1e-12
 # A node whose area the cells cover but for this share is covered.
 SHARED = 1e-6
+# Pairs of lines near triangles that are looked at together.
+AT_ONCE = 20_000
 
 
 @dataclass(frozen=True)
@@ -176,7 +178,21 @@ def _shared_areas(face: Face, grid: Grid) -> sp.csr_matrix:
     their differences.
     """
     borders = _borders(grid)
-    parts = [_triangle(face, triangle, borders, grid.shape[1]) for triangle in face.facets]
+    corners = face.coordinates[face.facets]
+    first, count = _windows(corners, borders)
+    parts = []
+    # Triangles whose windows have the same size together, so many that they stay in the cache.
+    for size in np.unique(count, axis=0):
+        alike = np.flatnonzero((count == size).all(axis=1))
+        for part in np.array_split(alike, -(-len(alike) * size.prod() // AT_ONCE)):
+            lines = [
+                near[first[part, axis, None] + np.arange(size[axis])]
+                for axis, near in enumerate(borders)
+            ]
+            which, i, j, shares = _triangles(corners[part], *lines)
+            at, nodes = first[part[which]], face.facets[part[which]]
+            cells = (at[:, 0] + i) * grid.shape[1] + at[:, 1] + j
+            parts.append((shares.ravel(), np.tile(cells, 3), nodes.T.ravel()))
     values, cells, nodes = (np.concatenate(part) for part in zip(*parts, strict=True))
     shape = grid.shape[0] * grid.shape[1], len(face)
     return sp.csr_matrix((values, (cells, nodes)), shape=shape)
@@ -190,43 +206,49 @@ def _borders(grid: Grid) -> list[Array]:
     ]
 
 
-def _triangle(
-    face: Face, triangle: Array, borders: list[Array], columns: int
-) -> tuple[Array, Array, Array]:
-    """Shared areas of one triangle's corners, with their cells and nodes."""
-    corners = face.coordinates[triangle]
-    middle = corners.mean(axis=0)
-    near = [
-        slice(max(np.searchsorted(lines, low) - 1, 0), np.searchsorted(lines, high) + 1)
-        for lines, low, high in zip(borders, corners.min(axis=0), corners.max(axis=0), strict=True)
-    ]
-    x, y = (lines[share] - c for lines, share, c in zip(borders, near, middle, strict=True))
-    local = corners - middle
-    moments = _left_and_below(local, x, y)
-    shapes = np.linalg.inv(np.column_stack([np.ones(3), local]))
-    twice = float(np.linalg.det(local[1:] - local[0]))
+def _windows(corners: Array, borders: list[Array]) -> tuple[Indices, Indices]:
+    """First of the borders near triangles along x and along y, and how many: ``(m, 2)`` each."""
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    first, last = (
+        np.stack([np.searchsorted(lines, ends[:, axis]) for axis, lines in enumerate(borders)], 1)
+        for ends in (low, high)
+    )
+    first = np.maximum(first - 1, 0)
+    return first, np.minimum(last + 1, [len(lines) for lines in borders]) - first
+
+
+def _triangles(corners: Array, x: Array, y: Array) -> tuple[Indices, Indices, Indices, Array]:
+    """Areas that triangles' shape functions share with cells between lines ``x`` and ``y``.
+
+    ``corners`` are ``(m, 3, 2)``, lines ``(m, p)`` and ``(m, q)``. Returns the numbers of the
+    triangle and of the cell's lines, ``(k,)`` each, and the areas of its corners ``(3, k)``.
+    """
+    middle = corners.mean(axis=1)
+    local = corners - middle[:, None]
+    moments = _left_and_below(local, x - middle[:, :1], y - middle[:, 1:])
+    shapes = np.linalg.inv(np.concatenate([np.ones_like(local[..., :1]), local], axis=2))
+    twice = np.linalg.det(local[:, 1:] - local[:, :1])[:, None, None]
     # The upper edges of a counter-clockwise triangle run backwards.
-    integrals = -np.sign(twice) * np.diff(np.diff(moments, axis=1), axis=2)
-    met = integrals[0] > ROUNDING * abs(twice)
-    i, j = np.nonzero(met)
-    shares = shapes.T @ integrals[:, met]
-    cells = (i + near[0].start) * columns + j + near[1].start
-    return shares.ravel(), np.tile(cells, 3), np.repeat(triangle, len(cells))
+    integrals = -np.sign(twice) * np.diff(np.diff(moments, axis=2), axis=3)
+    met = integrals[0] > ROUNDING * np.abs(twice)
+    which, i, j = np.nonzero(met)
+    return which, i, j, np.einsum("kac,ak->ck", shapes[which], integrals[:, met])
 
 
 def _left_and_below(corners: Array, x: Array, y: Array) -> Array:
-    """Integrals of 1, x and y ``(3, nx, ny)`` over a triangle, left of each x and below each y.
+    """Integrals of 1, x and y ``(3, m, p, q)`` over triangles, left of each x and below each y.
 
     Counted negative where it is counter-clockwise, and from y = 0, which cancels in differences.
     """
-    start, end = corners.T[..., None, None], np.roll(corners, -1, axis=0).T[..., None, None]
+    x, y = x[:, :, None], y[:, None, :]
+    start, end = corners.T[..., None, None], np.roll(corners, -1, axis=1).T[..., None, None]
     width, height = end - start
     upright = width == 0.0  # nothing lies under it
     rise = np.divide(height, width, out=np.zeros_like(width), where=~upright)
     left, right = np.minimum(start[0], end[0]), np.maximum(start[0], end[0])
-    stop = np.clip(x[:, None], left, right)
+    stop = np.clip(x, left, right)
     # Where the edge passes y: on one side of it the edge is the upper limit, on the other y is.
-    above = y[None, :] - start[1]
+    above = y - start[1]
     level = np.broadcast_to(rise == 0.0, above.shape)
     passing = start[0] + np.divide(above, rise, out=np.zeros_like(above), where=~level)
     cross = np.clip(passing, left, stop)
