@@ -250,7 +250,7 @@ class SupportedBody:
         elastic = self.elastic
         if self._springs is None:
             return rigid_body_modes(elastic.nodes, elastic.body.axes, self._transformation)
-        supports = self.constraints.transformation()
+        supports = self._supports
         modes = rigid_body_modes(elastic.nodes, elastic.body.axes, supports)
         return np.concatenate([modes, self._springs.means @ (supports @ modes)])
 
@@ -263,7 +263,7 @@ class SupportedBody:
         if self._springs is None:
             t = self._transformation
             return (t.T @ self.elastic.stiffness @ t).tocsr()
-        t = self.constraints.transformation()
+        t = self._supports
         return self._springs.joined((t.T @ self.elastic.stiffness @ t).tocsr(), t)
 
     def _all(self, free: Array, amplitudes: Array) -> Array:
