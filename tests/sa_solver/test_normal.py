@@ -10,6 +10,7 @@ from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact, NormalContactError
 from sa_solver.reference.flat_rounded import FlatRoundedPunch
 from sa_solver.reference.hertz import HertzSphere
+from sa_solver.rigid_modes import pseudoinverse
 from sa_solver.types import ElasticPair, Grid, Material
 
 TITANIUM = Material(115e3, 0.29)
@@ -320,3 +321,11 @@ def test_bad_fields_and_grids():
     start = NormalContact(HalfSpace(other, PAIR)).solve(other_height, 1.0)
     with pytest.raises(NormalContactError, match="same grid"):
         contact.solve(height, 1.0, start=start)
+
+
+@pytest.mark.parametrize("rank", [0, 1, 2, 3])
+def test_pseudoinverse_is_that_of_the_modes_that_cells_feel(rank):
+    root = np.random.default_rng(rank).standard_normal((3, rank))
+    matrix = root @ root.T
+    expected = np.linalg.pinv(matrix, rcond=1e-12, hermitian=True)
+    np.testing.assert_allclose(pseudoinverse(matrix), expected, atol=1e-9 * np.abs(expected).max())

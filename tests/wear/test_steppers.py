@@ -187,6 +187,20 @@ def test_the_companion_takes_steps_of_twice_the_length() -> None:
     assert volume == pytest.approx(3e-8 * state.companion.energy, rel=1e-10)
 
 
+def test_steps_that_go_alone_are_the_same_without_their_companion() -> None:
+    compared, alone = (
+        advance_cycles(ImplicitStepper(alone=one), waved(), LIMIT, LIMIT, evolving)
+        for one in (False, True)
+    )
+    assert compared.state.coarse is not None
+    assert alone.state.coarse is None
+    for ours, theirs in zip(
+        alone.state.surfaces.depths, compared.state.surfaces.depths, strict=True
+    ):
+        np.testing.assert_array_equal(ours, theirs)
+    assert 3 * alone.spent.contact_solves == 2 * compared.spent.contact_solves
+
+
 @pytest.mark.parametrize("kind", [ImplicitStepper, slow(SecondOrderStepper)])
 def test_steps_stay_short_enough_to_compare(kind) -> None:
     """Ten times as long as it takes to press away all that three unlike loads can.
