@@ -82,7 +82,8 @@ def errors_of_increments(
     causes. Pressure over slip that bends: a third of what two increments along one way change when
     they are taken as one (Richardson), half in each. Slip that begins within an increment: a sixth
     of the change of pressure, the mean over all times at which it may. Bodies that part: half of
-    what the pressure before would do over the slip that is left to close the cycle.
+    what the pressure before would do over the slip that is left to close the cycle, but for that of
+    the increment in which they meet again: worn ones have come some way apart by then.
     None where no two increments go along one way: nothing then tells how pressure bends.
     """
     parts = [_errors(pressure[mission], slip[mission], loaded[mission]) for mission in missions]
@@ -113,6 +114,7 @@ def _errors(pressure: Array, slip: Array, loaded: Mask) -> tuple[Array, bool]:
     )
     bent = share / np.maximum(count, 1.0)
     begun = np.where(begins & (p_last > 0.0), -size * rise / 6.0, 0.0)
-    closing = np.linalg.norm(slip.sum(axis=0), axis=0)
+    meets = loaded & ~np.roll(loaded, 1)
+    closing = np.linalg.norm(in_rows(slip, ~meets).sum(axis=0), axis=0)
     parted = in_rows(-0.5 * p_last * closing, ~loaded & np.roll(loaded, 1))
     return np.asarray(bent + begun + parted), bool(pair.any())

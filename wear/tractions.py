@@ -77,12 +77,13 @@ class CycleTractions:
 def increments_error(cycles: Iterable[CycleTractions]) -> dict[str, float] | None:
     """What increments leave of ``depth`` (root mean square) and ``energy`` of cycles, relative.
 
-    The depth is that of what all of them rub: errors that change their sign from cycle to cycle
-    cancel, as they do in wear. None where nothing is rubbed, or nobody knows.
+    The energy is too large by that. The depth is that of what all of them rub: errors that change
+    their sign from cycle to cycle cancel, as they do in wear. None where nothing is rubbed, or
+    nobody knows.
     """
     known = [left for left in (cycle.increments_left for cycle in cycles) if left is not None]
     if not known:
         return None
     rubbed, errors = (np.sum(fields, axis=0) for fields in zip(*known, strict=True))
-    depth, energy = depth_and_energy(errors) / depth_and_energy(rubbed)
-    return {"depth": float(depth), "energy": float(energy)}
+    depth, _ = depth_and_energy(errors) / depth_and_energy(rubbed)
+    return {"depth": float(depth), "energy": float(errors.sum() / rubbed.sum())}

@@ -2,17 +2,21 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from fe_models.mesh import MeshError
 from tests.workflow.commands import invoke
 from tests.workflow.mesh_scenes import settings
-from workflow.analyses.wear.budget import finding
+from workflow.analyses.wear.budget import companions as lives_of
+from workflow.analyses.wear.budget import finding, lives
 from workflow.analyses.wear.budget.companions import Companions
-from workflow.analyses.wear.budget.lives import live
-from workflow.analyses.wear.budget.parts import ResultError, peak_left
+from workflow.analyses.wear.budget.lives import STEPS, live
+from workflow.analyses.wear.budget.parts import UNCERTAIN, ResultError, peak_left
 from workflow.analyses.wear.budget.report import datasets_of, sentence, summary_of, warning_of
 from workflow.analyses.wear.layout import PARTS
 from workflow.analyses.wear.structure import SETTINGS
@@ -62,12 +66,30 @@ ERROR = ResultError({"link": 0.004, "mesh": 0.03, "increments": None, "steps": 0
 
 def test_parts_add_up_and_unknown_ones_are_named() -> None:
     assert ERROR.total == pytest.approx(0.046)
-    assert summary_of({"depth": ERROR})["depth"] == {**ERROR.parts, "sum": ERROR.total}
+    assert summary_of({"depth": ERROR})["depth"] == {**ERROR.parts, "total": ERROR.total}
     said = sentence({"depth": ERROR})
     assert said == "depth 4.6% (mesh 3.0%, steps 1.2%, increments unknown)"
     (written,) = (data.values for data in datasets_of({"depth": ERROR}).values())
-    known = {part: value for part, value in zip(PARTS, written, strict=True) if value == value}
-    assert known == {"link": 0.004, "mesh": 0.03, "grid": 0.0, "steps": 0.012, "solver": 0.0}
+    *by_part, total = written
+    known = {part: value for part, value in zip(PARTS, by_part, strict=True) if value == value}
+    left = {"link": 0.004, "mesh": 0.03, "steps": 0.012}
+    assert known == {"grid": 0.0, "coupling": 0.0, "solver": 0.0, **left}
+    assert total == ERROR.total
+
+
+def test_parts_of_opposite_sign_cancel_but_for_what_each_is_uncertain_by() -> None:
+    """Half of each part, as the parts are drawn at random: the root mean square of many draws."""
+    parts = {"mesh": 0.04, "increments": -0.03, "grid": 0.002}
+    error = ResultError(parts, frozenset({"mesh", "increments"}))
+    assert error.total == pytest.approx(np.sqrt(0.01**2 + 0.25 * 0.05**2 + 0.002**2), rel=1e-12)
+    off = np.random.default_rng(1).normal(1.0, UNCERTAIN, (2, 100_000))
+    drawn = off[0] * parts["mesh"] + off[1] * parts["increments"]
+    assert np.sqrt(np.mean(drawn**2)) == pytest.approx(np.hypot(0.01, 0.025), rel=0.02)
+    assert sentence({"volume": error}) == "volume 2.7% (mesh +4.0%, increments -3.0%)"
+
+
+def test_one_sign_is_the_sum_of_sizes() -> None:
+    assert ResultError({"grid": 0.02, "steps": -0.03}).total == pytest.approx(0.05, rel=1e-12)
 
 
 def test_a_result_beyond_the_accuracy_is_a_warning_that_names_the_setting() -> None:
@@ -97,12 +119,24 @@ def section():
 
 def test_companions_differ_in_one_thing_each(section) -> None:
     companions = companions_of(section)
-    own, finer, coarser = companions.own, companions.finer, companions.coarser
+    own, finer, other = companions.own, companions.finer, companions.regridded
     assert companions.linked is None
+    assert companions.coupled
     assert changed(finer, {"mesh": own.mesh}) == own
-    assert changed(coarser, {"contact.grid": own.contact.grid}) == own
+    assert changed(other, {"contact.grid": own.contact.grid}) == own
     assert (finer.mesh.flank_nodes[0] - 1, finer.mesh.size) == (2 * 11, 4.0)
-    assert coarser.contact.grid[0] == own.contact.grid[0] // 2
+    assert other.contact.grid[0] == 2 * own.contact.grid[0]
+    assert companions.grid_share == pytest.approx(4.0 / 3.0)
+
+
+def test_few_strips_are_compared_with_those_of_a_life(section) -> None:
+    """Second order: 24 strips are off by 64² / (64² - 24²) of what they and 64 are apart."""
+    few = companions_of(changed(section, {"contact.grid": (24, 24)}))
+    assert (few.own.contact.grid, few.regridded.contact.grid) == ((64, 24), (24, 24))
+    assert few.grid_share == pytest.approx(-1.0 / (1.0 - (24 / 64) ** 2))
+    many = companions_of(changed(section, {"contact.grid": (256, 24)}))
+    assert (many.own.contact.grid, many.regridded.contact.grid) == ((64, 24), (128, 24))
+    assert many.grid_share == pytest.approx(4.0 / 3.0 / 4**2)
 
 
 def test_a_joint_in_space_is_judged_by_its_section() -> None:
@@ -120,12 +154,68 @@ def test_half_spaces_have_a_companion_that_is_linked(section) -> None:
     assert companions.linked.contact.link == "corrected"
 
 
+def test_a_life_that_fails_leaves_its_own_part_unknown(section, monkeypatch) -> None:
+    """The structure of the finer mesh fails, the others do not."""
+    lived = []
+
+    def live(case, source, kind, begun=None):
+        if case is failing:
+            raise MeshError("no such mesh")
+        lived.append((case, kind, begun))
+        return [], []
+
+    monkeypatch.setattr(lives_of, "live", live)
+    monkeypatch.setattr(lives_of, "_worn", lambda life: {"flank": {"depth": float(len(lived))}})
+    companions, failures = companions_of(section), {}
+    failing = companions.finer
+    errors = companions.errors(None, lambda case: None, failures.__setitem__)
+    assert failures.keys() == {"mesh"}
+    # The first life wears 1, the second one, on finer strips, 2, the third, under unworn loads, 3.
+    assert errors["grid"]["flank"]["depth"] == pytest.approx(-0.5 * companions.grid_share)
+    assert errors["coupling"]["flank"]["depth"] == pytest.approx(2.0 * STEPS / (STEPS - 1.0))
+    assert lived[-1] == (companions.own, "constant", ([], []))
+
+    failing = companions.own
+    with pytest.raises(MeshError):
+        companions.errors(None, lambda case: None, failures.__setitem__)
+
+
+def _never(part: str, error: Exception) -> None:
+    raise error
+
+
+@pytest.mark.slow
+def test_lives_tell_what_loads_that_follow_change(section, monkeypatch) -> None:
+    """Against lives of eight times as many steps, with and without."""
+    companions, source = companions_of(section), structure_of(section).source(section)
+    told = replace(companions, finer=None, regridded=None).errors(source, lambda _: source, _never)
+    monkeypatch.setattr(lives, "STEPS", 8 * STEPS)
+    depths = [
+        live(companions.own, source, kind)[1][-1].interfaces[0].surfaces.depth.max()
+        for kind in ("constant", "every")
+    ]
+    true = depths[0] / depths[1] - 1.0
+    assert 0.5 < told["coupling"]["intrados"]["depth"] / true < 2.0
+
+
+@pytest.mark.parametrize(
+    ("resultants", "share"),
+    [("constant", 1.0), ("every", 0.1**2 + 0.3**2 + 0.6**2), ("drift", 0.4**2 + 0.6**2)],
+)
+def test_loads_that_follow_late_miss_the_squares_of_their_parts(resultants, share) -> None:
+    state = SimpleNamespace(cycles=np.array([0.0, 1e3, 4e3, 1e4]), drift=np.array([0, 1, 3, 2.0]))
+    coupling = SimpleNamespace(resultants=resultants, drift=2.0)
+    outcome = SimpleNamespace(state=state, case=SimpleNamespace(recoupling=coupling))
+    assert finding.missed(outcome) == pytest.approx(share, rel=1e-12)
+
+
 @pytest.mark.slow
 def test_lives_tell_what_the_mesh_leaves(section) -> None:
     """Of two orders and sizes, against a mesh so fine that what it leaves does not count."""
     structure = structure_of(section)
     companions = companions_of(section)
-    told = companions.errors(structure.source(section), structure.source)["mesh"]["intrados"]
+    told = companions.errors(structure.source(section), structure.source, _never)
+    told = told["mesh"]["intrados"]
 
     fine = {"mesh.flank_nodes": (61, 61), "mesh.size": 1.5, "mesh.order": 2}
     truth = changed(companions.own, fine)
@@ -144,8 +234,11 @@ def test_grids_are_compared_by_their_order() -> None:
     """A body without a structure: the sphere's scar on half as many cells."""
     case = load_case(CASES / "sphere_wear.yaml")
     companions: Companions = companions_of(case)
-    assert companions.cells == case.contact.grid[0] / companions.own.contact.grid[0]
+    coarser = case.contact.grid[0] / companions.own.contact.grid[0]
+    assert companions.grid_share == pytest.approx(-1.0 / 3.0 / coarser**2)
+    assert companions.own.contact.grid[0] == 2 * companions.regridded.contact.grid[0]
     assert companions.finer is None
+    assert not companions.coupled
 
 
 # --- runs -----------------------------------------------------------------------------------------
@@ -165,7 +258,7 @@ def test_a_run_tells_its_errors(tmp_path) -> None:
     )
     for result, name in (("depth", "depth_1"), ("volume", "volume_1")):
         true = abs(own[name] / exact[name] - 1.0)
-        assert 0.5 < own["error"][result]["sum"] / true < 2.0
+        assert 0.5 < own["error"][result]["total"] / true < 2.0
     assert exact["error"]["depth"]["mesh"] is None
 
 

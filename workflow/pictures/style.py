@@ -26,7 +26,7 @@ STYLE: dict[Any, Any] = {
 }
 # Okabe and Ito's colours, which colour-blind readers distinguish too.
 BLUE, ORANGE, GREEN, PURPLE, BLACK = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222"
-SKY = "#56B4E9"
+SKY, AMBER = "#56B4E9", "#E69F00"
 # Of fields, and of curves in an order; its end is too bright for lines.
 COLOUR_MAP, LAST_SHADE = "viridis", 0.9
 # Of panels that begin at 0, over the largest value.

@@ -8,7 +8,7 @@ MOMENTS = "unworn", "worn"
 # How far kinetics are extended, in computed numbers of cycles.
 EXTRAPOLATION = 2.0
 # What leaves errors, in the order of their datasets.
-PARTS = ("link", "mesh", "increments", "grid", "steps", "solver")
+PARTS = ("link", "mesh", "increments", "grid", "steps", "coupling", "solver")
 # Results that have errors, by their names and in words: what is worn, pressures, and the rest.
 WORN = {"depth": "depth", "volume": "volume"}
 PRESSURES = {

@@ -30,6 +30,7 @@ SETTINGS = {
     "increments": "load_path.increments",
     "grid": "contact.grid",
     "steps": "wear.step (kind: second_order) and wear.tolerance",
+    "coupling": "coupling.resultants and coupling.drift",
     "solver": "contact.tolerance",
 }
 

@@ -6,7 +6,16 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Generic
 
-from workflow.analyses.wear.budget.lives import Worn, live, shortened, worn_by
+from workflow.analyses.wear.budget.lives import (
+    LIFE_FAILURES,
+    STEPS,
+    Lived,
+    Worn,
+    live,
+    shortened,
+    worn_by,
+)
+from workflow.analyses.wear.case.base import FiniteElementCase
 from workflow.analyses.wear.structure import AnyWearCase, Finer
 from workflow.case.changing import changed
 
@@ -16,9 +25,11 @@ if TYPE_CHECKING:
 
 # Order of what a contact wears in the size of its cells.
 ORDER = 2.0
-# Cells along a direction of a contact that lives shortly, half of the case's unless it is a line;
-# with fewer than the least none lives.
+# Cells along a direction of a contact that lives shortly, half of the case's at most; with fewer
+# than the least none lives. Lines have as many as strips: they cost next to nothing.
 MOST_CELLS, FEWEST = 64, 8
+# Loads that follow at the end of each step miss half of it: of a steady drift, one step of all.
+ALL_OF_DRIFT = STEPS / (STEPS - 1)
 
 
 @dataclass(frozen=True)
@@ -26,18 +37,19 @@ class Companions(Generic[AnyWearCase]):
     """Cases that live shortly beside ``own``, which stands for the case that is run.
 
     ``own`` has the ``same`` structure as that case, or a section in its place. ``finer`` is on a
-    mesh of which ``mesh_share`` times the difference is the error of ``own``. The contact grid of
-    ``coarser`` has half as many cells along each direction, that of the case ``cells`` times as
-    many as ``own``. ``linked`` has its contacts linked to the nodes of the structure, which ``own``
-    has not. None where there is no such case.
+    mesh of which ``mesh_share`` times the difference is the error of ``own``, ``regridded`` on
+    another contact grid, of which ``grid_share`` times the difference is the error of the case.
+    ``linked`` has its contacts linked to the nodes of the structure, which ``own`` has not. None
+    where there is no such case. ``coupled`` has a structure, whose loads can follow wear.
     """
 
     own: AnyWearCase
     same: bool = True
+    coupled: bool = False
     finer: AnyWearCase | None = None
     mesh_share: float = 1.0
-    coarser: AnyWearCase | None = None
-    cells: float = 1.0
+    regridded: AnyWearCase | None = None
+    grid_share: float = 0.0
     linked: AnyWearCase | None = None
 
     @classmethod
@@ -48,39 +60,82 @@ class Companions(Generic[AnyWearCase]):
         section = None if finer is None else finer.section
         line = line or section is not None
         across, along = case.contact.grid
-        grid = (min(across, MOST_CELLS), along) if line else (_fewer(across), _fewer(along))
+        grid = (MOST_CELLS, along) if line else (_fewer(across), _fewer(along))
         settings = {"contact.grid": grid, "contact.method": "normal"}
         own = shortened(case if section is None else section, settings)
         linked = own.contact.link == "corrected"
-        half = tuple(max(1, count // 2) for count in grid)
-        enough = min(half[: 1 if line else 2]) >= FEWEST
+        other, share = (_strips if line else _cells)(grid, case.contact.grid)
         return cls(
             own,
             same=section is None,
+            coupled=isinstance(case, FiniteElementCase),
             finer=None if finer is None else changed(own, finer.mesh),
             mesh_share=1.0 if finer is None else finer.share,
-            coarser=changed(own, {"contact.grid": half}) if enough else None,
-            cells=across / grid[0],
+            regridded=None if other is None else changed(own, {"contact.grid": other}),
+            grid_share=share,
             linked=None if linked else changed(own, {"contact.link": "corrected"}),
         )
 
     def errors(
-        self, source: LoadSource, source_of: Callable[[AnyWearCase], LoadSource]
+        self,
+        source: LoadSource,
+        source_of: Callable[[AnyWearCase], LoadSource],
+        failed: Callable[[str, Exception], None],
     ) -> dict[str, Worn]:
-        """What ``mesh``, ``grid`` and ``link`` leave, relative, of what is worn, and of pressure.
+        """Relative errors of what is worn and of pressures: by how much the run tells too much.
 
-        ``source`` is that of the case itself. Raises what structures and contacts raise.
+        What ``mesh``, ``grid`` and ``link`` leave, and under ``coupling`` what it would if loads
+        never followed wear. ``source`` is that of the case itself. Parts of which a life fails are
+        left out and given to ``failed``. Raises :data:`LIFE_FAILURES` where that of ``own`` fails.
         """
         shared = source if self.same else source_of(self.own)
-        own, errors = _worn(self.own, shared), {}
-        if self.finer is not None:
-            errors["mesh"] = _apart(own, _worn(self.finer, source_of(self.finer)), self.mesh_share)
-        if self.coarser is not None:
-            left = 1.0 / (2.0**ORDER - 1.0) / self.cells**ORDER
-            errors["grid"] = _apart(own, _worn(self.coarser, shared), left)
-        if self.linked is not None:
-            errors["link"] = _apart(own, _worn(self.linked, shared), 1.0)
+        # Where loads follow wear, what the mesh makes of it counts as well.
+        kind = "constant" if self.own.recoupling.resultants == "constant" else "every"
+        life = live(self.own, shared, kind)
+        own, parts = _worn(life), dict[str, Callable[[], Worn]]()
+        if (finer := self.finer) is not None:
+            parts["mesh"] = lambda: _apart(
+                own, _worn(live(finer, source_of(finer), kind)), self.mesh_share
+            )
+        if (regridded := self.regridded) is not None:
+            parts["grid"] = lambda: _apart(
+                own, _worn(live(regridded, shared, kind)), self.grid_share
+            )
+        if (linked := self.linked) is not None:
+            parts["link"] = lambda: _apart(own, _worn(live(linked, shared, kind)), 1.0)
+        if self.coupled:
+            other, share = ("constant", -1.0) if kind == "every" else ("every", 1.0)
+            parts["coupling"] = lambda: _apart(
+                own, _worn(live(self.own, shared, other, life)), share * ALL_OF_DRIFT
+            )
+        errors = {}
+        for part, told in parts.items():
+            try:
+                errors[part] = told()
+            except LIFE_FAILURES as error:
+                failed(part, error)
         return errors
+
+
+Cells = tuple[int, int]
+
+
+def _strips(own: Cells, of_case: Cells) -> tuple[Cells, float]:
+    """Strips to compare ``own`` with, and the share of the difference that is the case's error.
+
+    Those of the case, where they are fewer and know less of edges, else twice as many.
+    """
+    (strips, along), fewer = own, of_case[0] / own[0]
+    if fewer < 1.0:
+        return (of_case[0], along), -1.0 / (1.0 - fewer**ORDER)
+    return (2 * strips, along), 1.0 / (1.0 - 0.5**ORDER) / fewer**ORDER
+
+
+def _cells(own: Cells, of_case: Cells) -> tuple[Cells | None, float]:
+    """The same of cells: half as many along each direction, if these are enough."""
+    half = own[0] // 2, own[1] // 2
+    share = -1.0 / (2.0**ORDER - 1.0) * (own[0] / of_case[0]) ** ORDER
+    return half if min(half) >= FEWEST else None, share
 
 
 def _fewer(cells: int) -> int:
@@ -88,11 +143,9 @@ def _fewer(cells: int) -> int:
     return max(min(cells, 2 * FEWEST), min(MOST_CELLS, cells // 2))
 
 
-def _worn(case: AnyWearCase, source: LoadSource) -> Worn:
+def _worn(life: Lived) -> Worn:
     """What a life wears of both bodies together, and its largest pressures."""
-    # Where loads follow wear, what the mesh makes of it counts as well.
-    coupled = case.recoupling.resultants != "constant"
-    stages, (begin, *_, end) = live(case, source, "every" if coupled else "constant")
+    stages, (begin, *_, end) = life
     pressures = zip(*(_largest_pressures(state) for state in (begin, end)), strict=True)
     return {
         name: numbers | {"peak_pressure": unworn, "worn_peak_pressure": worn}
@@ -111,11 +164,16 @@ def _largest_pressures(state: CoupledState) -> list[float]:
 
 
 def _apart(own: Worn, other: Worn, share: float) -> Worn:
-    """So large a share of the relative differences."""
+    """So large a share of the relative differences; below 0 where ``own`` is the finer one."""
     return {
         name: {
-            key: share * abs(value - other[name][key]) / value if value else 0.0
+            key: share
+            * _relative(value, other[name][key], value if share < 0.0 else other[name][key])
             for key, value in numbers.items()
         }
         for name, numbers in own.items()
     }
+
+
+def _relative(value: float, other: float, finer: float) -> float:
+    return float((value - other) / finer) if finer else 0.0

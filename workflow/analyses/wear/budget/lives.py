@@ -14,6 +14,7 @@ from typing import Any, Literal
 from fe_models.mesh import MeshError
 from sa_solver.normal import NormalContactError
 from wear.coupled import Contacts, CoupledSettings, CoupledState, CoupledWear, JumpSize
+from wear.interface import MotionError
 from wear.steppers import ImplicitStepper
 from wear.stepping import ContactFailure
 from workflow.analyses.wear.case.base import WearCase
@@ -22,12 +23,15 @@ from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.load_source import LoadSource
 from workflow.analyses.wear.structure import AnyWearCase
 from workflow.case.changing import changed
-from workflow.errors import MethodFailed
+from workflow.errors import MethodFailed, UserError
 
 Worn = dict[str, dict[str, float]]  # by interface and quantity
+Lived = tuple[list[ContactStage], list[CoupledState]]
 
 # What a life may end in.
 FAILURES = (MeshError, NormalContactError, ContactFailure, MethodFailed)
+# And that of a case that nobody has checked yet.
+LIFE_FAILURES = (*FAILURES, MotionError, UserError)
 # Implicit steps of a life. On the default joint 3 and 8 give the same errors of increments and
 # meshes within 2 %, and of grids within 20 % of these errors.
 STEPS = 3
@@ -50,18 +54,25 @@ def shortened(case: AnyWearCase, settings: Mapping[str, Any]) -> AnyWearCase:
 
 
 def live(
-    case: WearCase, source: LoadSource, resultants: Literal["constant", "every"] = "constant"
-) -> tuple[list[ContactStage], list[CoupledState]]:
+    case: WearCase,
+    source: LoadSource,
+    resultants: Literal["constant", "every"] = "constant",
+    begun: Lived | None = None,
+) -> Lived:
     """The contacts of a life under the loads of ``source``, and its states, the unworn one first.
 
-    Raises one of :data:`FAILURES` where structure or contacts fail.
+    It goes the other way from the unworn state of one that has ``begun``, if that is given. Raises
+    one of :data:`FAILURES` where structure or contacts fail.
     """
-    # What its steps leave is not asked, nor what loads the structure lays on the last surfaces.
-    stages = [ContactStage(case, face, ImplicitStepper(alone=True)) for face in source.faces]
+    if begun is None:
+        # What its steps leave is not asked, nor what loads the structure lays on the last surfaces.
+        stages = [ContactStage(case, face, ImplicitStepper(alone=True)) for face in source.faces]
+    else:
+        stages = begun[0]
     cycles, contacts = case.wear.cycles, Contacts(stages)
     settings = CoupledSettings(cycles, JumpSize(cycles / STEPS), resultants=resultants)
     loop = CoupledWear(settings, source, contacts)
-    state, _ = loop.begin(source.unworn())
+    state = loop.begin(source.unworn())[0] if begun is None else begun[1][0]
     states = [state, *islice(loop.march(state), STEPS - 1)]
     last = CoupledWear(replace(settings, resultants="constant"), source, contacts)
     return stages, [*states, *last.march(states[-1])]

@@ -16,20 +16,25 @@ Budget = Mapping[str, Mapping[str, ResultError]]  # by interface and result
 # Pressure at the edges that wear makes, and stress below them, may be so many times farther off:
 # the finer the cells, the larger they are.
 AT_EDGES, EDGES = 5.0, ("worn_peak_pressure", "life")
-# Parts below this share of the sum are not worth a word in a line.
+# Parts below this share of the total are not worth a word in a line.
 WORTH_TELLING = 0.1
 
 
 def summary_of(errors: Mapping[str, ResultError]) -> dict[str, Any]:
-    """By result, its parts and their ``sum``; None for what nobody knows."""
-    return {name: {**error.parts, "sum": error.total} for name, error in errors.items()}
+    """By result, its parts and their ``total``; None for what nobody knows."""
+    return {name: {**error.parts, "total": error.total} for name, error in errors.items()}
 
 
 def datasets_of(errors: Mapping[str, ResultError]) -> dict[str, Dataset]:
-    """By result, its parts in the order of ``PARTS``; not numbers where nobody knows them."""
-    what = f"estimated relative errors by {', '.join(PARTS)}"
+    """By result, its parts in the order of ``PARTS``, nan for unknown ones, and their total."""
+    what = (
+        f"estimated relative errors by {', '.join(PARTS)}, above 0 where too much is told, and "
+        "their total"
+    )
     return {
-        name: Dataset(np.array([_number(error.parts.get(part, 0.0)) for part in PARTS]), "1", what)
+        name: Dataset(
+            np.array([*(_number(error.parts.get(p, 0.0)) for p in PARTS), error.total]), "1", what
+        )
         for name, error in errors.items()
     }
 
@@ -44,8 +49,9 @@ def sentence(errors: Mapping[str, ResultError]) -> str:
 
 
 def _shown(error: ResultError) -> str:
-    worth = [(name, part) for name, part in error.largest if part >= WORTH_TELLING * error.total]
-    parts = [f"{name} {part:.1%}" for name, part in worth if part > 0.0]
+    least = WORTH_TELLING * error.total
+    worth = [(name, part) for name, part in error.largest if part and abs(part) >= least]
+    parts = [f"{name} {part:{'+' if name in error.signed else ''}.1%}" for name, part in worth]
     parts += [f"{name} unknown" for name in error.unknown]
     return f"{error.total:.1%}" + (f" ({', '.join(parts)})" if parts else "")
 
@@ -59,7 +65,9 @@ def warning_of(
     if not beyond:
         return None
     shares = {
-        part: sum((error.parts.get(part) or 0.0) / allowed[name] for name, error in beyond.items())
+        part: sum(
+            abs(error.parts.get(part) or 0.0) / allowed[name] for name, error in beyond.items()
+        )
         for part in PARTS
     }
     most = max(shares, key=shares.__getitem__)

@@ -9,9 +9,9 @@ from matplotlib.figure import Figure
 
 from workflow.analyses.wear.layout import PARTS, RESULTS, Contents
 from workflow.pictures.panels import legend_below, new_figure
-from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
+from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
 
-COLOURS = dict(zip(PARTS, (BLUE, ORANGE, GREEN, PURPLE, SKY, BLACK), strict=True))
+COLOURS = dict(zip(PARTS, (BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK), strict=True))
 
 # Of a bar, in inches.
 HEIGHT = 0.55
@@ -32,28 +32,35 @@ def error_budget(file: h5py.File, contents: Contents) -> Figure:
     for axis, (name, group) in zip(axes, panels, strict=True):
         _draw(axis, group)
         axis.set_title(name)
-    axes[-1].set_xlabel("estimated error [%]")
+    axes[-1].set_xlabel("estimated error [%], above 0: the run tells too much")
     legend_below(figure, axes)
     return figure
 
 
 def _draw(axis: Axes, group: h5py.Group) -> None:
+    """Parts that make a result too small to the left of 0, and the size of all together."""
     results = [result for result in RESULTS if result in group]
-    parts = np.array([group[result][()] for result in results])
-    places, known = np.arange(len(results)), 100.0 * np.nan_to_num(parts)
-    ends = np.cumsum(known, axis=1)
-    for number, part in enumerate(PARTS):
-        axis.barh(
-            places,
-            known[:, number],
-            left=ends[:, number] - known[:, number],
-            color=COLOURS[part],
-            label=part,
-        )
-    for place, (end, row) in enumerate(zip(ends[:, -1], parts, strict=True)):
+    columns = np.array([group[result][()] for result in results])
+    places, parts, totals = np.arange(len(results)), columns[:, :-1], 100.0 * columns[:, -1]
+    known = 100.0 * np.nan_to_num(parts)
+    signs = [np.where(known > 0.0, known, 0.0), np.where(known < 0.0, known, 0.0)]
+    for sizes in signs:
+        ends = np.cumsum(sizes, axis=1)
+        for number, part in enumerate(PARTS):
+            axis.barh(
+                places,
+                sizes[:, number],
+                left=ends[:, number] - sizes[:, number],
+                color=COLOURS[part],
+                label=part if sizes is signs[0] else None,
+            )
+    reach = np.maximum(totals, signs[0].sum(axis=1))
+    axis.scatter(totals, places, color=BLACK, marker="|", s=300, zorder=3, label="all together")
+    for place, (end, total, row) in enumerate(zip(reach, totals, parts, strict=True)):
         unknown = [part for part, value in zip(PARTS, row, strict=True) if np.isnan(value)]
-        text = f" {end:.1f} %" + (f", {', '.join(unknown)} unknown" if unknown else "")
+        text = f" {total:.1f} %" + (f", {', '.join(unknown)} unknown" if unknown else "")
         axis.text(end, place, text, va="center", color=BLACK)
+    axis.axvline(0.0, color=BLACK, linewidth=1.0)
     axis.axvline(100.0 * group.attrs["accuracy"], color=BLACK, linestyle=":", label="accuracy")
     axis.set_yticks(places, [RESULTS[result] for result in results])
     axis.invert_yaxis()
