@@ -158,7 +158,7 @@ def test_a_life_that_fails_leaves_its_own_part_unknown(section, monkeypatch) -> 
     """The structure of the finer mesh fails, the others do not."""
     lived = []
 
-    def live(case, source, kind, begun=None):
+    def live(case, source, kind="constant", begun=None):
         if case is failing:
             raise MeshError("no such mesh")
         lived.append((case, kind, begun))
@@ -170,10 +170,10 @@ def test_a_life_that_fails_leaves_its_own_part_unknown(section, monkeypatch) -> 
     failing = companions.finer
     errors = companions.errors(None, lambda case: None, failures.__setitem__)
     assert failures.keys() == {"mesh"}
-    # The first life wears 1, the second one, on finer strips, 2, the third, under unworn loads, 3.
-    assert errors["grid"]["flank"]["depth"] == pytest.approx(-0.5 * companions.grid_share)
-    assert errors["coupling"]["flank"]["depth"] == pytest.approx(2.0 * STEPS / (STEPS - 1.0))
-    assert lived[-1] == (companions.own, "constant", ([], []))
+    # That of the case wears 1, under unworn loads 2, and so on twice as many strips 3.
+    assert errors["grid"]["flank"]["depth"] == pytest.approx(-companions.grid_share / 3.0)
+    assert errors["coupling"]["flank"]["depth"] == pytest.approx(STEPS / (STEPS - 1.0))
+    assert lived[1] == (companions.own, "constant", ([], []))
 
     failing = companions.own
     with pytest.raises(MeshError):

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Generic
+from functools import cache
+from typing import TYPE_CHECKING, Generic, Literal
 
 from workflow.analyses.wear.budget.lives import (
     LIFE_FAILURES,
@@ -88,33 +89,46 @@ class Companions(Generic[AnyWearCase]):
         never followed wear. ``source`` is that of the case itself. Parts of which a life fails are
         left out and given to ``failed``. Raises :data:`LIFE_FAILURES` where that of ``own`` fails.
         """
-        shared = source if self.same else source_of(self.own)
-        # Where loads follow wear, what the mesh makes of it counts as well.
-        kind = "constant" if self.own.recoupling.resultants == "constant" else "every"
-        life = live(self.own, shared, kind)
-        own, parts = _worn(life), dict[str, Callable[[], Worn]]()
-        if (finer := self.finer) is not None:
-            parts["mesh"] = lambda: _apart(
-                own, _worn(live(finer, source_of(finer), kind)), self.mesh_share
-            )
-        if (regridded := self.regridded) is not None:
-            parts["grid"] = lambda: _apart(
-                own, _worn(live(regridded, shared, kind)), self.grid_share
-            )
-        if (linked := self.linked) is not None:
-            parts["link"] = lambda: _apart(own, _worn(live(linked, shared, kind)), 1.0)
-        if self.coupled:
-            other, share = ("constant", -1.0) if kind == "every" else ("every", 1.0)
-            parts["coupling"] = lambda: _apart(
-                own, _worn(live(self.own, shared, other, life)), share * ALL_OF_DRIFT
-            )
         errors = {}
-        for part, told in parts.items():
+        for part, told in self._parts(source, source_of).items():
             try:
                 errors[part] = told()
             except LIFE_FAILURES as error:
                 failed(part, error)
         return errors
+
+    def _parts(
+        self, source: LoadSource, source_of: Callable[[AnyWearCase], LoadSource]
+    ) -> dict[str, Callable[[], Worn]]:
+        """What tells each part, once ``own`` has lived."""
+        shared = source if self.same else source_of(self.own)
+        # Where loads follow wear, what the mesh makes of it counts as well.
+        follows = self.own.recoupling.resultants != "constant"
+        kind: Literal["constant", "every"] = "every" if follows else "constant"
+        life = live(self.own, shared, kind)
+        own = _worn(life)
+
+        @cache
+        def apart() -> Worn:
+            """Under unworn loads, which are enough for what the contacts alone make of them."""
+            return _worn(live(self.own, shared, "constant", life)) if follows else own
+
+        parts = dict[str, Callable[[], Worn]]()
+        if (finer := self.finer) is not None:
+            parts["mesh"] = lambda: _apart(
+                own, _worn(live(finer, source_of(finer), kind)), self.mesh_share
+            )
+        if (regridded := self.regridded) is not None:
+            parts["grid"] = lambda: _apart(apart(), _worn(live(regridded, shared)), self.grid_share)
+        if (linked := self.linked) is not None:
+            parts["link"] = lambda: _apart(apart(), _worn(live(linked, shared)), 1.0)
+        if self.coupled and follows:
+            parts["coupling"] = lambda: _apart(own, apart(), -ALL_OF_DRIFT)
+        elif self.coupled:
+            parts["coupling"] = lambda: _apart(
+                own, _worn(live(self.own, shared, "every", life)), ALL_OF_DRIFT
+            )
+        return parts
 
 
 Cells = tuple[int, int]
