@@ -186,10 +186,10 @@ def _never(part: str, error: Exception) -> None:
 
 @pytest.mark.slow
 def test_lives_tell_what_loads_that_follow_change(section, monkeypatch) -> None:
-    """Against lives of eight times as many steps, with and without."""
+    """Against lives of four times as many steps, with and without."""
     companions, source = companions_of(section), structure_of(section).source(section)
     told = replace(companions, finer=None, regridded=None).errors(source, lambda _: source, _never)
-    monkeypatch.setattr(lives, "STEPS", 8 * STEPS)
+    monkeypatch.setattr(lives, "STEPS", 4 * STEPS)
     depths = [
         live(companions.own, source, kind)[1][-1].interfaces[0].surfaces.depth.max()
         for kind in ("constant", "every")
