@@ -89,7 +89,7 @@ def test_parts_of_opposite_sign_cancel_but_for_what_each_is_uncertain_by() -> No
 
 
 def test_one_sign_is_the_sum_of_sizes() -> None:
-    assert ResultError({"grid": 0.02, "steps": -0.03}).total == pytest.approx(0.05, rel=1e-12)
+    assert ResultError({"grid": 0.02, "steps": 0.03}).total == pytest.approx(0.05, rel=1e-12)
 
 
 def test_a_result_beyond_the_accuracy_is_a_warning_that_names_the_setting() -> None:

@@ -29,7 +29,7 @@ UNCERTAIN = 0.5
 
 @dataclass(frozen=True)
 class ResultError:
-    """Estimated error of one result by its ``parts``, relative; of those ``signed`` with a sign."""
+    """Estimated error of one result by its ``parts``, relative, those ``signed`` with a sign."""
 
     parts: Mapping[str, float | None]
     signed: frozenset[str] = frozenset()
@@ -38,12 +38,12 @@ class ResultError:
     def total(self) -> float:
         """Root mean square of what all known parts may leave together.
 
-        (Σ s)² + (u² Σ s²) + (Σ |e|)² over parts s of known sign, each of them off by a share u of
-        itself, and the others e.
+        (Σ s)² + u² Σ s² + (Σ e)² over parts s of known sign, each of them off by a share u of
+        itself, and sizes e of the others.
         """
         known = {name: part for name, part in self.parts.items() if part is not None}
         signs = [part for name, part in known.items() if name in self.signed]
-        sizes = [abs(part) for name, part in known.items() if name not in self.signed]
+        sizes = [part for name, part in known.items() if name not in self.signed]
         return hypot(sum(signs), UNCERTAIN * hypot(*signs), sum(sizes))
 
     @property
@@ -87,13 +87,7 @@ def errors_of(case: WearCase, contact: InterfaceOutcome, peak: int, probed: Prob
         del parts["link"], parts["mesh"]
     if case.contact.method == "nodes":
         del parts["link"], parts["grid"]
-    errors = {
-        result: ResultError(
-            {part: by[result] for part, by in parts.items() if result in by},
-            SIGNED.get(result, frozenset()),
-        )
-        for result in (*WORN, *PRESSURES)
-    }
+    errors = {result: _error(parts, result) for result in (*WORN, *PRESSURES)}
     if case.stress.life.parameter in POWERS:
         of_work, of_stress = POWERS[case.stress.life.parameter]
         work, stress = errors["depth"].parts, errors["worn_peak_pressure"].parts
@@ -101,6 +95,16 @@ def errors_of(case: WearCase, contact: InterfaceOutcome, peak: int, probed: Prob
             {part: _sum(of_work, work[part], of_stress, stress.get(part, 0.0)) for part in work}
         )
     return errors
+
+
+def _error(parts: Mapping[str, ByResult], result: str) -> ResultError:
+    signed = SIGNED.get(result, frozenset())
+    told = {part: by[result] for part, by in parts.items() if result in by}
+    sizes = {
+        part: value if value is None or part in signed else abs(value)
+        for part, value in told.items()
+    }
+    return ResultError(sizes, signed)
 
 
 def _link(contact: InterfaceOutcome, probed: Probed) -> ByResult:

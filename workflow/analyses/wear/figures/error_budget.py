@@ -64,4 +64,5 @@ def _draw(axis: Axes, group: h5py.Group) -> None:
     axis.axvline(100.0 * group.attrs["accuracy"], color=BLACK, linestyle=":", label="accuracy")
     axis.set_yticks(places, [RESULTS[result] for result in results])
     axis.invert_yaxis()
+    axis.use_sticky_edges = False
     axis.margins(x=0.3)
