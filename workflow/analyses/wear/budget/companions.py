@@ -7,6 +7,9 @@ from dataclasses import dataclass
 from functools import cache
 from typing import TYPE_CHECKING, Generic, Literal
 
+import numpy as np
+
+from sa_solver.types import Array
 from workflow.analyses.wear.budget.lives import (
     LIFE_FAILURES,
     STEPS,
@@ -29,8 +32,8 @@ ORDER = 2.0
 # Cells along a direction of a contact that lives shortly, half of the case's at most; with fewer
 # than the least none lives. Lines have as many as strips: they cost next to nothing.
 MOST_CELLS, FEWEST = 64, 8
-# Loads that follow at the end of each step miss half of it: of a steady drift, one step of all.
-ALL_OF_DRIFT = STEPS / (STEPS - 1)
+# Slower than this, loads that follow wear have hardly come to rest by the end of a life.
+SLOW = 1e-2
 
 
 @dataclass(frozen=True)
@@ -81,16 +84,18 @@ class Companions(Generic[AnyWearCase]):
         self,
         source: LoadSource,
         source_of: Callable[[AnyWearCase], LoadSource],
+        followed: Array,
         failed: Callable[[str, Exception], None],
     ) -> dict[str, Worn]:
         """Relative errors of what is worn and of pressures: by how much the run tells too much.
 
-        What ``mesh``, ``grid`` and ``link`` leave, and under ``coupling`` what it would if loads
-        never followed wear. ``source`` is that of the case itself. Parts of which a life fails are
-        left out and given to ``failed``. Raises :data:`LIFE_FAILURES` where that of ``own`` fails.
+        What ``mesh``, ``grid`` and ``link`` leave, and under ``coupling`` loads that follow wear
+        after such shares of all cycles as ``followed`` has. ``source`` is that of the case itself.
+        Parts of which a life fails are left out and given to ``failed``. Raises
+        :data:`LIFE_FAILURES` where that of ``own`` fails.
         """
         errors = {}
-        for part, told in self._parts(source, source_of).items():
+        for part, told in self._parts(source, source_of, followed).items():
             try:
                 errors[part] = told()
             except LIFE_FAILURES as error:
@@ -98,7 +103,10 @@ class Companions(Generic[AnyWearCase]):
         return errors
 
     def _parts(
-        self, source: LoadSource, source_of: Callable[[AnyWearCase], LoadSource]
+        self,
+        source: LoadSource,
+        source_of: Callable[[AnyWearCase], LoadSource],
+        followed: Array,
     ) -> dict[str, Callable[[], Worn]]:
         """What tells each part, once ``own`` has lived."""
         shared = source if self.same else source_of(self.own)
@@ -123,12 +131,33 @@ class Companions(Generic[AnyWearCase]):
         if (linked := self.linked) is not None:
             parts["link"] = lambda: _apart(apart(), _worn(live(linked, shared)), 1.0)
         if self.coupled and follows:
-            parts["coupling"] = lambda: _apart(own, apart(), -ALL_OF_DRIFT)
+            parts["coupling"] = lambda: _apart(own, apart(), -late(_rest(life), followed))
         elif self.coupled:
-            parts["coupling"] = lambda: _apart(
-                own, _worn(live(self.own, shared, "every", life)), ALL_OF_DRIFT
-            )
+            parts["coupling"] = lambda: self._followed(life, shared, followed)
         return parts
+
+    def _followed(self, life: Lived, source: LoadSource, followed: Array) -> Worn:
+        """What would change of a ``life`` under unworn loads if these followed wear."""
+        other = live(self.own, source, "every", life)
+        return _apart(_worn(life), _worn(other), late(_rest(other), followed))
+
+
+def late(rest: float, followed: Array) -> float:
+    """Error of loads that follow late, over what a life changes if loads do not follow at all.
+
+    What wear does to the loads, and these to wear, comes to rest: h' = 1 - z h, with z = ``rest``
+    over all cycles, has worn (1 - exp(-z)) / z by the end. With h from the solution before, in
+    shares ``followed`` of the cycles (1 - Π(1 - z s)) / z, and 1 with unworn loads.
+    """
+    z = max(rest, SLOW)
+    apart = z - 1.0 + (1.0 - z / STEPS) ** STEPS
+    return float((np.exp(-z) - np.prod(1.0 - z * followed)) / apart)
+
+
+def _rest(life: Lived) -> float:
+    """How fast loads that follow come to rest, by how much less they drift in the second step."""
+    _, first, second, *_ = life[1][-1].drift
+    return STEPS * float(np.clip(1.0 - second / first, 0.0, 1.0)) if first > 0.0 else 0.0
 
 
 Cells = tuple[int, int]

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from sa_solver.types import Array
 from workflow.analyses.wear.budget.companions import Companions
 from workflow.analyses.wear.budget.lives import LIFE_FAILURES, Worn
 from workflow.analyses.wear.budget.parts import Errors, errors_of
@@ -43,34 +44,20 @@ def lives_of_companions(outcome: Outcome, reporter: Reporter) -> Lives:
         reporter.log(f"error budget: {part} unknown, a short life failed: {error}")
 
     try:
-        told = companions.errors(source, structure.source, failed)
+        return companions.errors(source, structure.source, followed(outcome), failed)
     except LIFE_FAILURES as error:
         failed("mesh, grid and coupling", error)
         return {}
-    if "coupling" in told:
-        told["coupling"] = _scaled(told["coupling"], missed(outcome))
-    return told
 
 
-def missed(outcome: Outcome) -> float:
-    """Share of what wear does to the loads in a run that its contacts do not feel.
-
-    Loads that drift steadily act too late by half of the cycles to the next solution, if there is
-    one: of a run with none all is missed, else the sum of the squares of the parts.
-    """
+def followed(outcome: Outcome) -> Array:
+    """Shares of the cycles of a run from one solution of its structure to the next, or the end."""
     coupling, state = outcome.case.recoupling, outcome.state
     solved = {
         "constant": np.zeros(len(state.cycles), dtype=bool),
         "every": np.ones(len(state.cycles), dtype=bool),
         "drift": state.drift > coupling.drift,
     }[coupling.resultants]
-    end = state.cycles[-1]
-    parts = np.diff([0.0, *state.cycles[solved], end]) / end if end > 0.0 else np.zeros(1)
-    return float(np.sum(parts**2))
-
-
-def _scaled(worn: Worn, share: float) -> Worn:
-    return {
-        name: {key: share * value for key, value in numbers.items()}
-        for name, numbers in worn.items()
-    }
+    end = float(state.cycles[-1])
+    shares = np.diff([0.0, *state.cycles[solved], end]) / end if end > 0.0 else np.ones(1)
+    return np.asarray(shares[shares > 0.0])
