@@ -42,9 +42,9 @@ BRANCHES = 4
 # Stress under a contact, of a cell in an increment: on a face, by a search for the worst plane, and
 # what a structure carries past it.
 STRESS, SEARCHED, CARRIED = 1.2e-6, 10.0, 1e-6
-# Lives beside the run that tell what mesh and grid leave: how many, their steps, and their cells at
-# most; mesh and factors of their structures, and an iteration of friction in the plane [s].
-LIVES, LIFE_STEPS, LIFE_CELLS = 3, 6, 64
+# Lives beside the run that tell what mesh, grid and coupling leave: how many, their steps, and their
+# cells at most; mesh and factors of their structures, and an iteration of friction in the plane [s].
+LIVES, LIFE_STEPS, LIFE_CELLS = 4, 6, 64
 PLANE, PLANE_ITERATION = 0.5, 1e-4
 # Stress and mesh of the structure at the end, in sparse factors; figures and files of fields [s].
 WORN, PICTURES = 2.0, 6.0
@@ -157,12 +157,13 @@ def _lives(case: WearCase, extent: Extent, plane: bool) -> float:
     plane, life = plane or extent.section is not None, extent.section or extent
     across, along = (min(count, LIFE_CELLS) for count in case.contact.grid)
     cells, kind = (across, NORMAL_LINE) if plane else (across * along // 4, NORMAL)
-    lives = LIVES if life.interface_nodes else LIVES - 1
+    lives = LIVES if life.interface_nodes else LIVES // 2
     solved = lives * life.faces * life.increments * (1.0 + LIFE_STEPS * life.dissipating)
     contacts = solves(solved, cells, kind)
     if not life.interface_nodes or case.recoupling.resultants == "constant":
         return contacts
     finer = replace(life, interface_nodes=2.0 * life.interface_nodes)
     own, other = (LIFE_STEPS / 2 * _structural_cycle(mesh) for mesh in (life, finer))
-    iterated = lives * LIFE_STEPS / 2 * life.increments * ITERATIONS * PLANE_ITERATION
-    return contacts + 2.0 * (own + PLANE) + other + iterated
+    # The others have loads that do not follow.
+    iterated = LIFE_STEPS * life.increments * ITERATIONS * PLANE_ITERATION
+    return contacts + own + other + 2.0 * PLANE + iterated
