@@ -42,8 +42,9 @@ BRANCHES = 4
 # Stress under a contact, of a cell in an increment: on a face, by a search for the worst plane, and
 # what a structure carries past it.
 STRESS, SEARCHED, CARRIED = 1.2e-6, 10.0, 1e-6
-# Lives beside the run that tell what mesh, grid and coupling leave: how many, their steps, and their
-# cells at most; mesh and factors of their structures, and an iteration of friction in the plane [s].
+# Lives beside the run that tell what mesh, grid and coupling leave: how many, their steps, and
+# their cells at most; mesh and factors of their structures, and an iteration of friction in the
+# plane [s].
 LIVES, LIFE_STEPS, LIFE_CELLS = 4, 6, 64
 PLANE, PLANE_ITERATION = 0.5, 1e-4
 # Stress and mesh of the structure at the end, in sparse factors; figures and files of fields [s].
