@@ -9,8 +9,8 @@ A linear field with nodal values w has the means G w, so that m = G w makes w th
 (least squares), and the forces that work with it f_i = ∫ φ_i t dA: sums and moments of forces at
 the vertices are those of the tractions, rigid motions and linear fields are their own trace. Faces
 held to be linear instead, by midsides between their vertices, leave the elements behind a face no
-better than those of first order: under a Hertzian pressure on ten of them the deflection of a face is
-off by 1.7 %, with this trace by 0.1 % (a uniform pressure 2.9 and 0.2 %).
+better than those of first order: under a Hertzian pressure on ten of them the deflection of a face
+is off by 1.7 %, with this trace by 0.1 % (a uniform pressure 2.9 and 0.2 %).
 
 Each mean hangs on a spring of stiffness κ in every direction, whose far end e is an unknown of the
 body and carries the contact force F = G⁻ᵀf: bodies without support stay as they are, and systems

@@ -44,8 +44,8 @@ FEWEST_NODES = 4
 LARGEST_RESIDUAL = 0.03
 """Residual of a fit, over the deflection of the half-spaces, that may pass. Pressures are wrong by
 one to three times as much: by 6 % and 7 % where a cylinder on a layer left 5 % and 4 %, by 1.5 %
-where it left 0.6 %, by 0.3 % where the default dovetail left 1.3 % in the plane, on elements of first
-order."""
+where it left 0.6 %, by 0.3 % where the default dovetail left 1.3 % in the plane, on elements of
+first order."""
 
 SMOOTH = 1.8
 """Ratio of the smooth part of a residual to the rest from which it is no graininess. That of noise
