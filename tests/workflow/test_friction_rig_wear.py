@@ -199,7 +199,7 @@ def in_steps(pads, state, cycles, count):
 
 def test_steps_converge_with_their_square(pads, unworn):
     """Over cycles in which no further node comes to touch: there the rate has a corner."""
-    depths = [in_steps(pads, unworn, 4e4, count).surfaces.depth for count in (1, 2, 4, 16)]
+    depths = [in_steps(pads, unworn, 4e4, count).surfaces.depth for count in (1, 2, 8)]
     errors = [np.abs(depth - depths[-1]).max() for depth in depths[:-1]]
     orders = np.log2(np.divide(errors[:-1], errors[1:]))
     assert np.all((orders > 1.7) & (orders < 2.4)), orders

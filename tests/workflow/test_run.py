@@ -24,7 +24,6 @@ MESH = re.compile("link|what the structure carries past the contact|raise mesh.n
 # Few and quick increments for the odd cases, where a run is only to end well.
 QUICK = (
     *("load_path.increments=5", "load_path.peak_at=2", "contact.grid=[16, 24]"),
-    *("stress.section=none", "stress.life.parameter=none"),
 )
 
 
