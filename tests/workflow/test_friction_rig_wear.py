@@ -29,8 +29,8 @@ from workflow.shell.reporter import Reporter
 WORN = {
     "wear": {"force": "75 N", "frequency": "100 Hz", "cycles": [5e5]},
     "forces": ["2 N", "20 N"],
-    "frequencies": ["80 Hz", "240 Hz"],
-    "resolution": {"harmonics": 2, "samples": 48},
+    "frequencies": ["100 Hz", "200 Hz"],
+    "resolution": {"harmonics": 1, "samples": 32},
     "continuation": {"longest_step": 0.4},
 }
 # Of both bodies, unlike each other so that they are not taken for each other [1/MPa].
