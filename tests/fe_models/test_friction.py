@@ -299,6 +299,7 @@ def test_sticking_nodes_have_no_slip_and_none_gains_energy(structure, joint, mis
         assert not state.slip[:, pressed & inside].any()
 
 
+@pytest.mark.slow
 def test_worn_faces_meet_under_a_light_load(structure, joint, mission):
     """A first load of 1/5000 of the largest, on faces worn by more than it presses together."""
     amplitudes, gap = mission.amplitudes(), structure.gap()

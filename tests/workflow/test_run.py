@@ -22,9 +22,7 @@ UM3_PER_J = 1e-12
 # What warnings of a coarse mesh speak of.
 MESH = re.compile("link|what the structure carries past the contact|raise mesh.notch")
 # Few and quick increments for the odd cases, where a run is only to end well.
-QUICK = (
-    *("load_path.increments=5", "load_path.peak_at=2", "contact.grid=[16, 24]"),
-)
+QUICK = (*("load_path.increments=5", "load_path.peak_at=2", "contact.grid=[16, 24]"),)
 
 
 def balances(run, laws):
@@ -227,6 +225,7 @@ def test_jumps_that_add_up_leave_no_jump_of_rounding(start, tmp_path):
     assert run.summary["cycles"] == pytest.approx(3e4, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_step_and_stop_by_depth(start, tmp_path):
     """No jump wears much more than the step; the last ones are cut to end at the stop."""
     small, stop = 0.1e-3, 0.35e-3
@@ -344,6 +343,7 @@ def test_without_wear_coefficient_nothing_wears(start, tmp_path, step):
     assert run.summary["intrados"]["energy"] > 0.0
 
 
+@pytest.mark.slow
 def test_blade_without_airfoil_pulls_by_its_own_mass(start, tmp_path):
     run = start(tmp_path / "out", "load_path.airfoil_mass=0", "wear.cycles=1e4", *QUICK)
     assert run.ending.exit_code == 0, run.ending.stderr
