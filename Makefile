@@ -19,7 +19,7 @@ run: $(INSTALLED)
 	$(BIN)/fretscale run cases/dovetail.yaml --out out/dovetail --force
 
 test: $(TESTABLE)
-	@echo 'fretscale: style, types and layers, then the tests: 4 to 6 minutes on two cores.'
+	@echo 'fretscale: style, types and layers, then the tests: about 4 minutes on two cores.'
 	@$(MAKE) --no-print-directory lint
 	$(TESTING) $(BIN)/python -m pytest -q -n 2 --dist worksteal
 

@@ -16,7 +16,7 @@ NODES = 4
 FORCES = 1e-5
 
 # Between the steepest and the flattest flanks the rest is for `make test-full`.
-ANGLES = [35, *(slow(angle) for angle in (45, 55)), 65]
+ANGLES = [35, *(slow(angle) for angle in (45, 55, 65))]
 
 
 def small_joint(rng, nodes=NODES, plane=False):

@@ -84,8 +84,8 @@ LIMIT = CONSTANT.stable_cycles(waved())
         (ExplicitStepper(), 1, 12, evolving),
         (ImplicitStepper(), 1, 6, unchanging),
         (ImplicitStepper(), 1, 6, evolving),
-        (SecondOrderStepper(), 2, 6, unchanging),
-        slow(SecondOrderStepper(), 2, 6, evolving),
+        (SecondOrderStepper(), 2, 4, unchanging),
+        slow(SecondOrderStepper(), 2, 4, evolving),
     ],
 )
 def test_order_of_convergence(stepper, order, fewest, contact_at) -> None:

@@ -352,6 +352,7 @@ def test_mistakes_are_told_in_one_line(text, tmp_path, override, words):
 def test_it_runs_from_the_command_line(text, tmp_path):
     (tmp_path / "case.yaml").write_text(text, encoding="utf-8")
     settings = ("--set", "forces=[2 N]", "--set", "frequencies=[150 Hz, 160 Hz]")
+    settings += ("--set", "resolution={harmonics: 1, samples: 32}")
     ended = invoke("run", tmp_path / "case.yaml", "--out", tmp_path / "out", *settings)
     assert ended.exit_code == 0, ended.output
     assert (tmp_path / "out" / "summary.json").exists()
