@@ -273,7 +273,7 @@ def test_a_run_writes_what_every_wear_run_does(tmp_path: Path) -> None:
     assert {"results.h5", "case.yaml", "run.log"} <= {p.name for p in (tmp_path / "out").iterdir()}
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("dimension", [2, slow(3)])
 def test_moments_that_hold_the_tilt_are_results(dimension: int, tmp_path: Path) -> None:
     """Of the places that a cylinder or a ball takes over its groove; the loads have none.
 

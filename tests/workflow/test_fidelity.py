@@ -214,6 +214,7 @@ def test_tolerance_leaves_half_of_itself(case, tolerance):
             assert loose[flank][name] == pytest.approx(value, rel=0.5 * tolerance)
 
 
+@pytest.mark.slow
 def test_drift_is_what_changes_depth_by_its_share(case):
     """Followed after each of n steps, a steady drift is felt for 1 - 1/n of what it would be."""
     section = plane_section(case)

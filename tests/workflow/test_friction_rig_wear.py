@@ -218,6 +218,7 @@ def test_the_tolerance_bounds_the_error(pads, unworn):
         assert done.spent.steps < best.spent.steps
 
 
+@pytest.mark.slow
 def test_explicit_steps_come_to_the_same(pads, unworn):
     """Euler's, of a tenth of their limit: of first order only."""
     done = advance_cycles(ExplicitStepper(0.1), unworn, 1e5, 1e5, pads.contact_at)

@@ -153,6 +153,7 @@ def test_symmetric_load_wears_both_flanks_alike(whole):
         assert one[key] == pytest.approx(other[key], rel=1e-6)
 
 
+@pytest.mark.slow
 def test_explicit_run_with_a_law_for_each_body_and_its_overrides_on_record(start, tmp_path):
     run = start(
         tmp_path / "out",
