@@ -7,8 +7,9 @@ INSTALLED := .venv/.installed
 TESTABLE := .venv/.testable
 SYSTEM_CHECK := workflow/shell/system_check.py
 PYHARM := .venv/pyharm/.installed
-# Tests run side by side in processes; threads inside each would only fight over the cores.
-ONE_THREAD := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1
+# Tests run side by side in processes; threads inside each would only fight over the cores. What is
+# compiled of them is kept for the other process, those that they start, and the next time.
+TESTING := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=
 
 .PHONY: run test test-full bench lint install clean
 .DEFAULT_GOAL := run
@@ -18,13 +19,13 @@ run: $(INSTALLED)
 	$(BIN)/fretscale run cases/dovetail.yaml --out out/dovetail --force
 
 test: $(TESTABLE)
-	@echo 'fretscale: style, types and layers, then the tests: 4 to 6 minutes on two cores.'
+	@echo 'fretscale: style, types and layers, then the tests: about 4 minutes on two cores.'
 	@$(MAKE) --no-print-directory lint
-	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 --dist worksteal
+	$(TESTING) $(BIN)/python -m pytest -q -n 2 --dist worksteal
 
 test-full: test
 	@echo 'fretscale: the tests of more than a few seconds: about 17 minutes on two cores.'
-	$(ONE_THREAD) $(BIN)/python -m pytest -q -n 2 --dist worksteal -m slow
+	$(TESTING) $(BIN)/python -m pytest -q -n 2 --dist worksteal -m slow
 
 lint: $(TESTABLE)
 	$(BIN)/ruff check .
@@ -35,8 +36,8 @@ lint: $(TESTABLE)
 bench: $(TESTABLE)
 	$(PIP) -e '.[test,bench]'
 	-$(MAKE) $(PYHARM)
-	$(ONE_THREAD) $(BIN)/python -m pytest -q -s tests/benchmarks/test_tamaas.py
-	$(ONE_THREAD) $(BIN)/python -m pytest -q -s -m "slow or not slow" tests/benchmarks \
+	$(TESTING) $(BIN)/python -m pytest -q -s tests/benchmarks/test_tamaas.py
+	$(TESTING) $(BIN)/python -m pytest -q -s -m "slow or not slow" tests/benchmarks \
 	    --ignore tests/benchmarks/test_tamaas.py
 
 install: $(INSTALLED)

@@ -72,7 +72,9 @@ class NormalModes:
 
     def cropped(self, window: Window) -> NormalModes:
         """The same modes on part of the cells."""
-        return replace(self, x=self.x[window[0]], y=self.y[window[1]])
+        x, y = self.x[window[0]], self.y[window[1]]
+        whole = len(x) == len(self.x) and len(y) == len(self.y)
+        return self if whole else replace(self, x=x, y=y)
 
     def sums(self, fields: Array) -> Array:
         """Products ``(..., k)`` of fields ``(..., nx, ny)`` with the modes."""

@@ -19,7 +19,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-import scipy.linalg
 from numpy.typing import NDArray
 
 from sa_solver.types import Array
@@ -182,7 +181,7 @@ class AndersonMemory:
 def _solve_gram(gram: Array, right: Array) -> Array:
     """Least-squares weights from a Gram matrix that may be singular to rounding."""
     scale = 1.0 / np.sqrt(np.maximum(np.diag(gram), TINY))
-    values, vectors = scipy.linalg.eigh(gram * np.outer(scale, scale), check_finite=False)
+    values, vectors = np.linalg.eigh(gram * np.outer(scale, scale))
     kept = values > GRAM_CUTOFF * values[-1]
     basis = vectors[:, kept]
     weights: Array = scale * (basis @ ((basis.T @ (scale * right)) / values[kept]))

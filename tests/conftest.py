@@ -1,5 +1,6 @@
 """Shared by all tests: one thread per process, and the cases of the repository."""
 
+import gc
 import os
 from pathlib import Path
 
@@ -23,6 +24,13 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     first, second = long[::2], long[1::2]
     rest = len(items) // 2 - len(first)
     items[:] = [*first, *short[:rest], *second, *short[rest:]]
+
+
+@pytest.hookimpl(trylast=True)
+def pytest_collection_finish() -> None:
+    """Keep the libraries and thousands of tests out of what is searched for garbage again."""
+    gc.collect()
+    gc.freeze()
 
 
 @pytest.fixture(scope="session")

@@ -13,6 +13,7 @@ from sa_solver.history import ContactLoadPath, march_history
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Grid, LoadHistory
 from tests.limits.scenes import ALIKE, BOTH, FRICTION, RADIUS, SOLVED, P, sphere
+from tests.marks import slow
 from wear.full_cycle import march_cycle
 
 
@@ -103,7 +104,7 @@ def test_motions_that_part_the_bodies_and_join_them(kind):
     assert states[3].resultants[0] == pytest.approx(P, rel=1e-5 if kind == "alike" else 0.01)
 
 
-@BOTH
+@pytest.mark.parametrize("kind", ["alike", slow("unlike")])
 def test_legs_are_not_taken_in_one_step_across_a_parting(kind):
     """The short way through a history does not apply, and is not taken."""
     contact, height = sphere(kind, 16)

@@ -145,7 +145,7 @@ def turned(steps):
 
 def test_increments_of_a_load_that_turns_are_split_as_accuracy_asks():
     """Backward steps are of first order, and so is their estimate."""
-    half_space, height = ball(0.3, 16)
+    half_space, height = ball(0.3, 12)
     given, rough, finest = (
         march_history(half_space, height, turned(2), FRICTION, **settings)
         for settings in ({"history": "full"}, {"accuracy": 0.03}, {"accuracy": 0.005})

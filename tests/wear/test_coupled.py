@@ -449,6 +449,7 @@ def test_a_law_that_changes_from_place_to_place_does_not_move() -> None:
 # --- what it needs --------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_it_needs_neither_cases_nor_finite_elements() -> None:
     """All of this file, imported and a run of it made, in a process of its own."""
     code = f"""

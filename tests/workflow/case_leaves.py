@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from fe_models.reduction import ReducedModel
-from workflow.case import source
 from workflow.case.sections import Section, sections_of
 from workflow.kinds import kinds, template
 
@@ -278,7 +277,6 @@ def first_of_each(places: list[Leaf]) -> list[Leaf]:
     return list(first.values())
 
 
-PARSED = functools.cache(source.parse_yaml)
 TEMPLATE = functools.cache(template)
 PLACES = list(in_all_places())
 LEAVES = first_of_each(PLACES)

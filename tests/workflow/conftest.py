@@ -348,11 +348,13 @@ def separate_processes(monkeypatch: pytest.MonkeyPatch) -> None:
 
 @pytest.fixture(scope="session")
 def start(small_path: Path) -> Runner:
-    """Runs the small case with overrides and without pictures, in this process."""
+    """Runs the small case with overrides, in this process: still smaller, without pictures."""
+    fewer = "load_path.increments=8", "load_path.peak_at=3"
+    quiet = "output.paraview=false", "output.figures=false"
+    quiet += "stress.section=none", "stress.life.parameter=none"
 
     def run(folder: Path, *overrides: str, force: bool = False) -> Run:
-        quiet = "output.paraview=false", "output.figures=false"
-        settings = [part for entry in (*quiet, *overrides) for part in ("--set", entry)]
+        settings = [part for entry in (*fewer, *quiet, *overrides) for part in ("--set", entry)]
         forced = ["--force"] if force else []
         return Run(invoke("run", small_path, "--out", folder, *forced, *settings), folder)
 

@@ -34,7 +34,7 @@ wear:
   law: energy
   body_1: {coefficient: 1e4 um^3/J}
   body_2: {coefficient: 1e4 um^3/J}
-  cycles: 1e5
+  cycles: 4e4
   step: {kind: implicit, cycles: 1e4}
 stress: {section: none, life: {parameter: none}}
 output: {paraview: false, figures: false}

@@ -211,7 +211,7 @@ def test_the_flat_wears_as_the_punch_passes_over_it() -> None:
         *("load_path.P=20 N/mm", "load_path.stroke=0.1 mm", "load_path.increments=8"),
         *("wear.body_2.coefficient=0", "wear.cycles=400", "wear.motion=follow"),
     )
-    stage, state = worn(case, 40)
+    stage, state = worn(case, 16)
     x, depth = stage.grid.x.ravel(), state.surfaces.depth_1.ravel()
     reach = np.abs(x[depth > 0.0]).max() + 0.5 * stage.grid.pitch[0]
     assert reach == pytest.approx(0.25, abs=1.01 * stage.grid.pitch[0])
@@ -273,7 +273,7 @@ def test_a_run_writes_what_every_wear_run_does(tmp_path: Path) -> None:
     assert {"results.h5", "case.yaml", "run.log"} <= {p.name for p in (tmp_path / "out").iterdir()}
 
 
-@pytest.mark.parametrize("dimension", [2, 3])
+@pytest.mark.parametrize("dimension", [2, slow(3)])
 def test_moments_that_hold_the_tilt_are_results(dimension: int, tmp_path: Path) -> None:
     """Of the places that a cylinder or a ball takes over its groove; the loads have none.
 
@@ -283,7 +283,7 @@ def test_moments_that_hold_the_tilt_are_results(dimension: int, tmp_path: Path) 
     case = tmp_path / "case.yaml"
     case.write_text(text, encoding="utf-8")
     overrides = [
-        *(small, "wear.cycles=2000", "wear.step.cycles=500", "load_path.stroke=0.1 mm"),
+        *(small, "wear.cycles=2000", "wear.step.cycles=1000", "load_path.stroke=0.1 mm"),
         *("load_path.P=20", "wear.motion=follow", "stress.section=none"),
         *("stress.life.parameter=none", "output.paraview=false"),
     ]

@@ -22,7 +22,6 @@ from tests.workflow.case_leaves import (
     CELLS,
     EXPECT,
     LEAVES,
-    PARSED,
     PLACES,
     SECTIONS,
     TEMPLATE,
@@ -31,17 +30,10 @@ from tests.workflow.case_leaves import (
     each_section,
 )
 from workflow.analyses.contact.load_table import FORCES, MOTIONS
-from workflow.case import source
 from workflow.case.fields import File, Path, Quantity, Text, Whole
 from workflow.case.sections import entry_of
 from workflow.errors import CaseError
 from workflow.kinds import kinds, load_case, parse_case
-
-
-@pytest.fixture(autouse=True)
-def _parse_once(monkeypatch):
-    """Reading the same YAML a thousand times would take most of the time of these tests."""
-    monkeypatch.setattr(source, "parse_yaml", PARSED)
 
 
 @pytest.fixture(scope="module")

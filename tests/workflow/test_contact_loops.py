@@ -10,7 +10,6 @@ from sa_solver.contact import FrictionalContact
 from sa_solver.half_space import HalfSpace
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.types import ElasticPair, Grid, Material
-from tests.marks import slow
 from tests.workflow.conftest import CONTENTS, Run, invoke
 from tests.workflow.interruptions import ctrl_c_after_jumps
 from wear.stepping import ContactFailure
@@ -306,7 +305,8 @@ def test_loops_change_nothing_else(start_balls, rubbed, tmp_path):
     assert not list(plain.folder.glob("loops_*"))
 
 
-@pytest.mark.parametrize("every", [slow("end"), "jump"])
+@pytest.mark.slow
+@pytest.mark.parametrize("every", ["end", "jump"])
 def test_resumed_run_keeps_its_earlier_loops(start_balls, resume, rubbed, tmp_path, every):
     """The same loops as without the interruption; with ``end`` the first and the last of them."""
     with ctrl_c_after_jumps(2):

@@ -6,6 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tests.marks import slow
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.case.base import MOST_INCREMENTS
 from workflow.analyses.wear.case.sections import Coupling, Step
@@ -201,7 +202,7 @@ def test_steps_leave_no_more_than_their_tolerance(plane_path, tmp_path):
         assert np.max(np.abs(reached / limit - 1.0)) <= steps.error == tolerance
 
 
-@pytest.mark.parametrize("tolerance", [1e-3, 2e-4])
+@pytest.mark.parametrize("tolerance", [1e-3, slow(2e-4)])
 def test_tolerance_leaves_half_of_itself(case, tolerance):
     """Of depth and volume, on a case where flanks carry differently."""
     case = changed(case, {"load_path.aerodynamic_moment": 3e4, "friction.coefficient": 0.25})
@@ -213,6 +214,7 @@ def test_tolerance_leaves_half_of_itself(case, tolerance):
             assert loose[flank][name] == pytest.approx(value, rel=0.5 * tolerance)
 
 
+@pytest.mark.slow
 def test_drift_is_what_changes_depth_by_its_share(case):
     """Followed after each of n steps, a steady drift is felt for 1 - 1/n of what it would be."""
     section = plane_section(case)

@@ -46,11 +46,13 @@ def title(figure: Any) -> str:
     return str(figure.get_suptitle())
 
 
+@pytest.mark.slow
 def test_every_figure_is_written(written: list[Path]) -> None:
     assert {path.stem for path in written} == NAMES
     assert sorted(written) == sorted(written[0].parent.iterdir())
 
 
+@pytest.mark.slow
 def test_figures_are_wide_and_not_blank(written: list[Path]) -> None:
     from matplotlib.image import imread
 

@@ -230,6 +230,7 @@ def test_a_run_of_its_own_stays_until_the_case_is_finished(case, folder, finishe
     assert ("wear" in folder.manifest) is not finished
 
 
+@pytest.mark.slow
 def test_a_run_beside_what_is_not_its_own_says_so(start, tmp_path):
     (tmp_path / "worn.msh").write_text("mine")
     run = start(tmp_path, "wear.cycles=1e4", "contact.grid=[16, 24]", force=True)

@@ -63,6 +63,7 @@ def test_unfinished_run_is_not_started_again(interrupted, start):
     assert jumps_kept(interrupted.folder) == 2
 
 
+@pytest.mark.slow
 def test_what_a_kill_left_half_written_does_not_matter(interrupted, resume, whole):
     """A torn checkpoint beside the whole one, a torn jump, torn results."""
     torn = (interrupted.folder / "checkpoint.h5").read_bytes()[:1000]

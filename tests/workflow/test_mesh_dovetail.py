@@ -7,7 +7,6 @@ import pytest
 
 from fe_models import friction
 from fe_models.mesh import write_msh
-from tests.marks import slow
 from tests.workflow.mesh_scenes import ABAQUS_FACES, write_case
 from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures.dovetail.model import DovetailModel
@@ -87,7 +86,8 @@ def dovetail_as_mesh(folder, dovetail, ending):
     return write_case(folder / "joint.yaml", structure, legs, mu, materials=materials)
 
 
-@pytest.mark.parametrize("ending", [".msh", slow(".inp")])
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", [".msh", ".inp"])
 def test_dovetail_as_a_mesh_is_the_dovetail(tmp_path, small_path, ending, monkeypatch):
     """Loads, slips and energies of every increment, to the solver's accuracy."""
     monkeypatch.setattr(friction, "TOLERANCE", 1e-11)

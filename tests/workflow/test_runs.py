@@ -28,7 +28,7 @@ from workflow.shell.folder import OutputFolder
 
 QUIET = "output: {paraview: false, figures: false}\n"
 # Jumps of some hundredths of a second each, so that a moment among them is easily met.
-MANY = "wear.step.cycles=3000"
+MANY = "wear.step.cycles=1200"
 # Seconds within which everything must have ended.
 PATIENCE = 120.0
 

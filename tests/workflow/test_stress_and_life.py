@@ -29,8 +29,8 @@ FLANKS = ("intrados", "extrados")
 BODIES = {1: "disk", 2: "blade"}
 METAL = Material(115e3, 0.29)
 QUICK = (
-    *("contact.grid=[24, 32]", "load_path.increments=8", "load_path.peak_at=3"),
-    *("wear.cycles=1e4", "stress.points=6"),
+    *("contact.grid=[24, 32]", "wear.cycles=1e4"),
+    "stress={points: 6}",
 )
 # Of the pressures of one contact problem solved from two different starts.
 SOLVER = 1e-6

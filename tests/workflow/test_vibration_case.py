@@ -114,6 +114,7 @@ def test_single_harmonic_of_one_mass_is_the_closed_form(tmp_path):
     assert summary["responses"][0]["error"] < 0.01
 
 
+@pytest.mark.slow
 def test_resonance_falls_from_stuck_to_free(tmp_path):
     overrides = ("structure.damping_ratio=0.01", "forces=[0.2 N, 20 N, 300 N]")
     summary = run(tmp_path, RIG, *overrides, "resolution.tolerance=1 %")
@@ -222,6 +223,7 @@ def test_memory_grows_with_the_samples():
     assert memory(many).required - memory(few).required == 8 * 2000 * 2 * (65536 - 256)
 
 
+@pytest.mark.slow
 def test_phase_resonance_follows_the_peaks(tmp_path):
     """Half of the way from peak to peak; force and answer 90 degrees apart at the driven mass."""
     summary = run(tmp_path, RIG, "forces=[2 N, 20 N, 60 N]", "backbone=true", "mass=2")

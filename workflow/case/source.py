@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -28,6 +29,7 @@ DEEPEST = 20  # levels; a case has four
 TOO_MUCH = "nested too deeply or too long for a case"
 LONGEST_NUMBER = 9  # digits of a place in a list, far beyond the longest
 LONGEST_REASON = 100  # of what the YAML parser has to say
+KEPT = 64  # texts whose nodes are kept: a sweep reads one case for each of its runs
 
 
 class Source:
@@ -175,12 +177,18 @@ class _Parser(RoundTripParser):
         return event
 
 
-def parse_yaml(text: str, name: str) -> Any:
-    """``text`` as ruamel's nodes; YAML 1.2, where ``1e5`` is a number and ``yes`` a word."""
+@lru_cache(KEPT)
+def _nodes(text: str) -> Any:
+    """``text`` as ruamel's nodes, which are only read: it takes twenty milliseconds for a case."""
     yaml = YAML(typ="rt", pure=True)
     yaml.Parser = _Parser
+    return yaml.load(text)
+
+
+def parse_yaml(text: str, name: str) -> Any:
+    """``text`` as ruamel's nodes; YAML 1.2, where ``1e5`` is a number and ``yes`` a word."""
     try:
-        return yaml.load(text)
+        return _nodes(text)
     except _TooMuch as error:
         raise CaseError(f"{_marked(error, name)}: {TOO_MUCH}") from None
     except DuplicateKeyError as error:
