@@ -343,7 +343,7 @@ def _check_steps(axis: Axis, settings: list) -> None:
                 *("coupling", "increments", "link", "mesh", "order"),
             },
         ),
-        ("specimens_flat", {"grid", "tolerance", "link", "mesh", "order"}),
+        ("specimens_flat", {"grid", "tolerance", "mesh", "order"}),
     ],
 )
 def test_axes_that_apply(case: str, expected: set[str]):

@@ -347,7 +347,8 @@ def _orders(case: Case) -> Iterator[Rung]:
 
 def _links(case: Case) -> Iterator[Rung]:
     """Half-spaces linked to the structure by forces alone, and by its nodes too, on its meshes."""
-    if entry_at(case, "contact.link") is None or entry_at(case, "contact.method") == "nodes":
+    # Specimens wear by finite elements, their half-space is for comparison: it has no method.
+    if entry_at(case, "contact.method") not in ("normal", "full"):
         return
     factors = MESHES_LINKED if _is_line(case) else MESHES_3D
     meshes = list(_refined(case, factors)) or [Rung("its mesh", ())]
