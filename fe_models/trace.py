@@ -38,8 +38,9 @@ from scipy.sparse.linalg import splu
 from fe_models.elasticity import ElasticBody
 from sa_solver.types import Array, Indices
 
-# Springs that stay give way by about so small a share of what the nodes they hang on do.
-TIED = 1e4
+# Springs that stay are so much stiffer than the nodes they hang on: softer ones add compliance,
+# stiffer ones rounding.
+TIED = 1e3
 
 
 @dataclass(frozen=True)

@@ -230,7 +230,7 @@ class TestRig:
         for force, cycles in ((17.0, 4e6), (87.0, 1e6), (150.0, 6e5), (250.0, 4e5)):
             states = list(worn(rig, rig.face.gap, cycles, force))
             stiffness = np.array([s.contact.stick_stiffness for s in states])
-            assert stiffness[-1] == pytest.approx(97.5e3, rel=0.01)
+            assert stiffness[-1] == pytest.approx(96.0e3, rel=0.01)
             at = int(np.argmax(stiffness > 0.99 * stiffness[-1]))
             steady[force], energies[force] = states[at].cycles, states[at].energy
         assert 2e6 < steady[17.0] < 3.5e6
