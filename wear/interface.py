@@ -25,8 +25,9 @@ from wear.face_loads import FaceLoads
 from wear.full_cycle import march_cycle
 from wear.laws import EvolvingLaw, WearLaw
 from wear.link import Link, Transfer, linked
+from wear.marching import advance_cycles
 from wear.moving import followed, passages
-from wear.steppers import Stepper, advance_cycles, first_cycles
+from wear.steppers import Stepper, first_cycles
 from wear.stepping import (
     ContactFailure,
     CycleResult,

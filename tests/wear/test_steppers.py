@@ -11,12 +11,12 @@ from sa_solver.normal import NormalContact
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
 from tests.marks import slow
 from wear.laws import EnergyLaw
+from wear.marching import advance_cycles
 from wear.steppers import (
     ErrorControl,
     ExplicitStepper,
     ImplicitStepper,
     SecondOrderStepper,
-    advance_cycles,
     root_mean_square,
 )
 from wear.stepping import SlidingCycle, WearingContact, WearState

@@ -15,7 +15,8 @@ from tests.workflow.test_friction_rig import NODES, RIG, SPECIMENS
 from tests.workflow.time_scenes import refused
 from wear.evolution import EnergyTable
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw
-from wear.steppers import ExplicitStepper, HeunStepper, advance_cycles, step_errors
+from wear.marching import advance_cycles
+from wear.steppers import ExplicitStepper, HeunStepper, step_errors
 from workflow.analyses.vibration.model import VibrationModel
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase
 from workflow.analyses.vibration_wear.pads import WearingPads

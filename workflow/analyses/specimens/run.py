@@ -17,7 +17,8 @@ from fe_models.reduced_contact import FrettingConditions, ReducedPair, VirginCur
 from sa_solver.steps import Steps
 from sa_solver.types import Array, ElasticPair
 from wear.link import LARGEST_RESIDUAL
-from wear.steppers import ExplicitStepper, StabilityError, rest
+from wear.marching import rest
+from wear.steppers import ExplicitStepper, StabilityError
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import HalfSpaceState, PadHalfSpace, bulk_compliance
 from workflow.analyses.specimens.memory import memory

@@ -11,8 +11,9 @@ from fe_models.reduced_contact import FrettingConditions, FrettingCycle, Reduced
 from sa_solver.steps import COMPUTED, Steps
 from sa_solver.types import Array
 from wear.laws import WearLaw
+from wear.marching import steps
 from wear.nodes import NodalContact, NodalState
-from wear.steppers import ExplicitStepper, steps
+from wear.steppers import ExplicitStepper
 
 
 @dataclass(frozen=True)

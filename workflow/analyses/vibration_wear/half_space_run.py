@@ -16,8 +16,9 @@ from fe_models.dynamics.harmonics import Resolution
 from sa_solver.steps import Steps
 from sa_solver.tangential_loop import TangentialLoop
 from wear.joints.jenkins import Jenkins
+from wear.marching import SubcyclingStepper
 from wear.moving import LARGE_STROKE
-from wear.steppers import SubcyclingStepper, first_cycles
+from wear.steppers import first_cycles
 from wear.stepping import WearState
 from workflow.analyses.rig.building import row_of_masses
 from workflow.analyses.vibration.loops import closed

@@ -8,7 +8,8 @@ from functools import partial
 from fe_models.dynamics.harmonic_solution import HarmonicSolution
 from fe_models.dynamics.resolution_error import resolution_error
 from sa_solver.steps import Steps
-from wear.steppers import Contact, Stepper, advance_cycles
+from wear.marching import advance_cycles
+from wear.steppers import Contact, Stepper
 from wear.worn import State
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.model import VibrationModel

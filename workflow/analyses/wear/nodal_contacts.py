@@ -22,9 +22,10 @@ from wear.coupled import CoupledState
 from wear.face_loads import FaceLoads
 from wear.interface import FirstContact, InterfaceState
 from wear.link import Link
+from wear.marching import advance_cycles
 from wear.nodes import NodalContact, NodalState
 from wear.stabilised import StabilisedStepper
-from wear.steppers import advance_cycles, first_cycles
+from wear.steppers import first_cycles
 from wear.surfaces import Surfaces
 from wear.tractions import ContactFields, CycleTractions, acting_slip
 from wear.worn import Spent
