@@ -22,7 +22,6 @@ from fe_models.rigid_motions import rigid_motions
 from fe_models.structure import Structure
 from fe_models.supported_body import SupportedBody, interface_nodes
 from fe_models.total_lagrangian import TotalLagrangian
-from fe_models.trace import LinearTrace
 from sa_solver.types import Array, Frame
 
 # Displacements, or spin softening matrices, of body 1 and body 2.
@@ -205,10 +204,6 @@ def _prestressed(
         elastic = copy(body.elastic)
         elastic.stiffness = stiffness
         placed = interface_nodes(mesh.interfaces, number, elastic.body)
-        trace = LinearTrace.of(elastic, {i.name: i.nodes(number) for i in mesh.interfaces})
-        bodies.append(
-            SupportedBody(
-                elastic, body.constraints, *placed, loads, body.imposed, body.loaded, trace
-            )
-        )
+        given = body.constraints, *placed, loads, body.imposed, body.loaded, body.trace
+        bodies.append(SupportedBody(elastic, *given))
     return PrestressedStructure(mesh, bodies[0], bodies[1], displacements, share)

@@ -60,6 +60,7 @@ class SupportedBody:
         self.loads = loads
         self.loaded = loaded
         self.nodes = nodes
+        self.trace = trace
         self._frames = frames
         self.imposed = imposed
         self.constraints = constraints

@@ -100,17 +100,11 @@ class TraceSprings:
 
         For reduced models, out of which nothing can be taken again.
         """
-        stretch = sp.hstack([self.means @ transformation, -self.averages], format="csr")
-        ends = sp.csr_matrix((len(self),) * 2)
-        body = sp.block_diag([stiffness, ends], format="csr")
-        return (body + TIED * self.stiffness * (stretch.T @ stretch)).tocsr()
+        return self._hung(stiffness, transformation, self.averages, TIED * self.stiffness)
 
     def joined(self, stiffness: sp.csr_matrix, transformation: sp.csr_matrix) -> sp.csr_matrix:
         """Stiffness of a body's free displacements ``(m, m)`` with the springs' ends after them."""
-        stretch = sp.hstack([self.means @ transformation, -sp.identity(len(self))], format="csr")
-        ends = sp.csr_matrix((len(self),) * 2)
-        body = sp.block_diag([stiffness, ends], format="csr")
-        return (body + self.stiffness * (stretch.T @ stretch)).tocsr()
+        return self._hung(stiffness, transformation, sp.identity(len(self)), self.stiffness)
 
     def removed(
         self, condensed: Array, loads: Array, basis: sp.csr_matrix | None = None
@@ -143,6 +137,18 @@ class TraceSprings:
     def of(self, displacement: Array) -> Array:
         """Nodal values ``(k,)`` of the linear field next to a displacement ``(size,)``."""
         return self._solve(self.means @ displacement)
+
+    def _hung(
+        self,
+        stiffness: sp.csr_matrix,
+        transformation: sp.csr_matrix,
+        of_ends: sp.spmatrix,
+        spring: float,
+    ) -> sp.csr_matrix:
+        """Stiffness with ends after the free displacements, whose ``of_ends`` means hang on."""
+        stretch = sp.hstack([self.means @ transformation, -of_ends], format="csr")
+        body = sp.block_diag([stiffness, sp.csr_matrix((len(self),) * 2)], format="csr")
+        return (body + spring * (stretch.T @ stretch)).tocsr()
 
     def __len__(self) -> int:
         return int(self.averages.shape[0])

@@ -15,13 +15,12 @@ from typing import Any
 
 import numpy as np
 import scipy.sparse as sp
-from numpy.typing import NDArray
 from scipy.ndimage import map_coordinates
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from fe_models.mesh import Face
-from sa_solver.types import Array, Grid, Indices
+from sa_solver.types import Array, Grid, Indices, Mask
 
 # Two points integrate the quadratics under a straight edge exactly (Gauss).
 GAUSS = np.sqrt(1.0 / 3.0)
@@ -101,7 +100,7 @@ class FaceTransfer:
         return cells.reshape(*nodal.shape[:-1], *self.grid.shape)
 
     @cached_property
-    def reached(self) -> NDArray[np.bool_]:
+    def reached(self) -> Mask:
         """Nodes ``(n,)`` of which the grid tells all that :meth:`sample` takes."""
         if not self.face.weighted:
             return np.ones(len(self.nodes), dtype=np.bool_)

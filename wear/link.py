@@ -24,11 +24,10 @@ from typing import Protocol
 
 import numpy as np
 from numpy.polynomial.legendre import legder, legvander
-from numpy.typing import NDArray
 
 from sa_solver.half_space import HalfSpace
 from sa_solver.ties import first_largest
-from sa_solver.types import Array, Grid, LoadHistory
+from sa_solver.types import Array, Grid, LoadHistory, Mask
 
 MARGIN = 0.5
 """How far beyond its loaded nodes a contact is fitted, in sizes of these, where the face has nodes.
@@ -88,7 +87,7 @@ class Transfer(Protocol):
         ...
 
     @property
-    def reached(self) -> NDArray[np.bool_]:
+    def reached(self) -> Mask:
         """Nodes ``(n,)`` of which the grid tells all that :meth:`sample` takes."""
         ...
 
@@ -138,7 +137,7 @@ class CellNodes:
         return self.to_cells(forces) / self.grid.cell_area
 
     @property
-    def reached(self) -> NDArray[np.bool_]:
+    def reached(self) -> Mask:
         return np.ones(self.grid.shape, dtype=np.bool_).ravel()
 
     def sample(self, cells: Array) -> Array:
