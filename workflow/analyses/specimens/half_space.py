@@ -148,29 +148,29 @@ class PadHalfSpace:
     def link(self, pair: ReducedPair, normal: NormalSolution, path: Array) -> PadLink:
         """The link to specimens pressed as ``normal`` and moved to the points of ``path`` [mm]."""
         shears = [pair.tangential(normal, d, self._friction).shear for d in path]
-        pressed = self._linked(pair, normal, normal.force, Z)
-        moved = [self._linked(pair, normal, shear, X) for shear in shears]
-        stuck = self._linked(pair, normal, pair.stuck_shear(normal), X)
-        places = self.grid.centres
+        pressed = self._linked(pair, normal, normal.force[None], Z)
+        sheared = self._linked(pair, normal, np.array([*shears, pair.stuck_shear(normal)]), X)
+        *moved, stuck = sheared.fields(self.grid.centres)[:, :2]
         return PadLink(
-            gap=pressed.lift(0, places),
-            moved=np.array([link.fields(places)[0, :2] for link in moved]),
-            stuck=stuck.fields(places)[0, :2],
+            gap=pressed.lift(0, self.grid.centres),
+            moved=np.array(moved),
+            stuck=stuck,
             misfit=pressed.residual,
         )
 
     def _linked(self, pair: ReducedPair, normal: NormalSolution, forces: Array, axis: int) -> Link:
-        """That of nodal ``forces`` ``(n,)`` along one axis, where ``normal`` presses.
+        """That of nodal ``forces`` ``(t, n)`` along one axis, where ``normal`` presses.
 
         Pressure and shear do not know of each other: of shear it is the part along the face.
         """
-        force = np.zeros((3, len(forces)))
-        force[axis] = forces
-        displacement = pair.compliance[:, :, :, axis] @ forces
-        traction = self._transfer.spread(force)
-        deflection = self._transfer.sample(self._half_space.displacement(traction))
-        defect = self._transfer.means(displacement.T) - deflection
-        return fitted(self._transfer, defect[None], deflection[None], normal.force[None], 0)
+        force = np.zeros((len(forces), 3, len(pair.face)))
+        force[:, axis] = forces
+        displacement = np.einsum("nkm,tm->tkn", pair.compliance[:, :, :, axis], forces)
+        tractions = self._transfer.spread(force)
+        moved = np.array([self._half_space.displacement(traction) for traction in tractions])
+        deflection = self._transfer.sample(moved)
+        defect = self._transfer.means(displacement) - deflection
+        return fitted(self._transfer, defect, deflection, normal.force[None], 0)
 
     def fretting_cycle(
         self, height: Array, depth: Array, force: float, path: Array, link: PadLink | None = None
