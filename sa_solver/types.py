@@ -290,13 +290,6 @@ class LoadHistory:
         """P, Qx, Qy, Mx, My and Mz ``(n, 6)``."""
         return np.stack([self.P, self.Qx, self.Qy, self.Mx, self.My, self.Mz], axis=1)
 
-    def pressing(self, increment: int, tilt: Tilt) -> dict[str, float]:
-        """What presses the bodies in an increment, as the normal contact takes it."""
-        P, Mx, My = (float(column[increment]) for column in (self.P, self.Mx, self.My))
-        if tilt == "held":
-            return {"P": P, "tilt_x": 0.0, "tilt_y": 0.0}
-        return {"P": P, "Mx": Mx, "My": My}
-
     @property
     def missions(self) -> list[slice]:
         """The increments of each mission, a closed cycle."""

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Literal
 
 import numpy as np
@@ -19,8 +19,10 @@ from sa_solver.contact import ContactState, FrictionalContact
 from sa_solver.errors import InputError
 from sa_solver.half_space import HalfSpace
 from sa_solver.normal import NormalContact
+from sa_solver.rigid_modes import NORMAL
 from sa_solver.ties import first_largest
-from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Tilt
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
+from wear.drive import Drive
 from wear.face_loads import FaceLoads
 from wear.full_cycle import march_cycle
 from wear.laws import EvolvingLaw, WearLaw
@@ -55,9 +57,8 @@ class InterfaceSettings:
     ``gap`` ``(nx, ny)`` [mm] is that of the unloaded, unworn bodies, ``laws`` those of body 1 and
     body 2, and ``friction`` gives Coulomb's coefficient after so much dissipated energy [N mm].
     Slips are those of the loads, or with ``method`` full the half-space's own; there ``gross_slip``
-    says in which direction it slides as a whole, and a ``driven`` contact has the slip of its loads
-    imposed as the motion of its bodies, in the place of the tangential force. A ``tilt`` that is
-    held stays that of the unworn bodies, in the place of the loads' Mx and My. ``follow`` says
+    says in which direction it slides as a whole. A ``drive`` may impose motions of the bodies in
+    the place of the loads' forces (:class:`wear.drive.Drive`). ``follow`` says
     whether surfaces that move over each other are followed; None: where that counts
     (:func:`wear.moving.moves`). The ``link`` to the structure of the loads is corrected for what
     its bodies do beyond half-spaces (:mod:`wear.link`), where they say it at their nodes, or they
@@ -74,8 +75,7 @@ class InterfaceSettings:
     stepper: Stepper[WearState, WearingContact]
     method: Literal["normal", "full"] = "normal"
     gross_slip: Literal["force", "energies"] = "force"
-    driven: bool = False
-    tilt: Tilt = "free"
+    drive: Drive = field(default_factory=Drive)
     follow: bool | None = None
     link: Literal["corrected", "half_space"] = "corrected"
     tolerance: float = 1e-8
@@ -293,12 +293,15 @@ class InterfaceContact:
         return self._given_tractions(history, pressure, 0.0)
 
     def carried(self, loads: LoadHistory, pressure: Array) -> LoadHistory:
-        """``loads``, where tilt is held with the moments of ``pressure`` ``(t, nx, ny)`` [MPa]."""
-        if self.settings.tilt == "free":
-            return loads
+        """``loads``, with what ``pressure`` ``(t, nx, ny)`` [MPa] carries where motions press."""
         force, grid = pressure * self.grid.cell_area, self.grid
-        Mx, My = (np.sum(force * arm, axis=(1, 2)) for arm in (grid.y, -grid.x))
-        return replace(loads, Mx=Mx, My=My)
+        arms = {"P": np.ones(1), "Mx": grid.y, "My": -grid.x}
+        imposed = zip(arms.items(), NORMAL, strict=True)
+        driven = {name: arm for (name, arm), k in imposed if self.settings.drive.motion[k]}
+        if not driven:
+            return loads
+        found = {name: np.sum(force * arm, axis=(1, 2)) for name, arm in driven.items()}
+        return replace(loads, **found)
 
     def frictional(self, energy: float) -> FrictionalContact:
         """The contact with the half-space's own friction, after so much ``energy`` [N mm]."""
@@ -322,7 +325,7 @@ class InterfaceContact:
         before = half_space.count
         link = linked(half_space, self.transfer, history.loads, force, displacement, shear)
         self._spent += Spent(0, half_space.count - before)
-        return link.level() if settings.tilt == "free" else link
+        return link.level() if settings.drive.tilt == "free" else link
 
     def _contact_at(self, state: WearState) -> WearingContact:
         assert isinstance(state, InterfaceState)
@@ -345,7 +348,7 @@ class InterfaceContact:
         acting = acting_slip(slip, state.loads)
         moved = state.link.fields(self.transfer.places) if state.link.corrects else None
         uplift = None if moved is None else moved[:, 2]
-        sliding = SlidingCycle(state.loads, acting, uplift, ways, settings.tilt)
+        sliding = SlidingCycle(state.loads, acting, uplift, ways, settings.drive)
         cycle: tuple[ContactState, ...] = ()
         if settings.method == "full":
             cycle = self._half_space_cycle(state, sliding, moved)
@@ -366,9 +369,8 @@ class InterfaceContact:
     ) -> tuple[ContactState, ...]:
         """The closed cycle with its own friction, on surfaces ``moved`` ``(t, 3, nx, ny)`` [mm]."""
         gaps = np.stack([sliding.gap(state.surfaces, t) for t in range(len(state.loads))])
-        motion = state.slip.mean(axis=2) if self.settings.driven else None
-        contact, tilt = self.frictional(state.energy), self.settings.tilt
-        cycle = tuple(march_cycle(contact, gaps, state.loads, motion, tilt, moved))
+        contact = self.frictional(state.energy)
+        cycle = tuple(march_cycle(contact, gaps, state.loads, self.settings.drive, moved))
         self._spent += Spent(len(cycle), sum(increment.convolutions for increment in cycle))
         return cycle
 

@@ -30,8 +30,10 @@ import numpy as np
 from sa_solver.errors import ConvergenceError
 from sa_solver.influence import Z
 from sa_solver.normal import NormalContact, NormalStart, NormalState
+from sa_solver.rigid_modes import NORMAL
 from sa_solver.ties import SAME, first_largest
-from sa_solver.types import Array, Grid, LoadHistory, Tilt
+from sa_solver.types import Array, Grid, LoadHistory
+from wear.drive import Drive
 from wear.laws import SlidingConditions, WearLaw
 from wear.moving import Passage, TravelError
 from wear.surfaces import Surfaces
@@ -55,15 +57,14 @@ class SlidingCycle:
     ``slip`` ``(t, nx, ny)`` is the size of the slip in each increment [mm]; ``uplift``
     ``(t, nx, ny)`` [mm] the normal displacement under its shear, None for similar bodies;
     ``passages`` how body 2 moves over body 1 in each, None where that is too little to matter.
-    The ``tilt`` is held at that of the unworn bodies by whatever moments it takes, or free under
-    those of the loads.
+    A ``drive`` may impose motions in the place of the loads' forces.
     """
 
     loads: LoadHistory
     slip: Array
     uplift: Array | None = None
     passages: tuple[Passage, ...] | None = None
-    tilt: Tilt = "free"
+    drive: Drive = field(default_factory=Drive)
 
     def gap(self, surfaces: Surfaces, increment: int) -> Array:
         """Gap before loading ``(nx, ny)`` [mm] where an increment has body 2, lifted by shear."""
@@ -210,8 +211,9 @@ class WearingContact:
         beyond. Increments that are all alike may wear together.
         """
         working, sliding = self.dissipating, self.sliding
-        wear, loads = np.add(*self.depth_per_pressure(state)), sliding.loads
-        imposed = (values[working] for values in (loads.P, loads.Mx, loads.My, wear))
+        wear = np.add(*self.depth_per_pressure(state))
+        pressing = sliding.drive.values(sliding.loads)[:, list(NORMAL)].T
+        imposed = (values[working] for values in (*pressing, wear))
         lifts = () if sliding.uplift is None else (sliding.uplift[working],)
         alike = sliding.passages is None and all(
             np.allclose(values, values[:1], rtol=SAME, atol=SAME * np.abs(values).max(initial=0.0))
@@ -285,7 +287,7 @@ class WearingContact:
         """Contact state of one increment; ``compliance`` ``(nx, ny)`` [mm/MPa] is wear."""
         state = self.contact.solve(
             self.sliding.gap(surfaces, increment),
-            **self.sliding.loads.pressing(increment, self.sliding.tilt),
+            **self.sliding.drive.pressing(self.sliding.loads, increment),
             tolerance=self.tolerance,
             start=start,
             compliance=compliance,

@@ -11,6 +11,7 @@ from fe_models.transfer import FaceTransfer
 from sa_solver.half_space import HalfSpace
 from sa_solver.types import Array, ElasticPair, Frame, Grid, LoadHistory, Material
 from tests.oracles.elastic_layer import layer_compliance, press
+from wear.drive import Drive
 from wear.face_loads import CycleLoads
 from wear.interface import FirstContact, InterfaceContact, InterfaceSettings
 from wear.laws import EnergyLaw
@@ -160,9 +161,11 @@ def test_a_tilt_that_is_held_is_that_of_the_structure() -> None:
     face, tilt = line_face(21), 1e-3
     loads = on_half_space(face)
     turned = replace(loads, displacement=loads.displacement + tilt * face.coordinates[:, 0])
-    held = pressure_of(contact(face, tilt="held"), turned)
+    held = pressure_of(contact(face, drive=Drive.by_forces("held")), turned)
     gap = GAP + tilt * GRID.x
-    imposed = pressure_of(contact(face, tilt="held", link="half_space", gap=gap), loads)
+    imposed = pressure_of(
+        contact(face, drive=Drive.by_forces("held"), link="half_space", gap=gap), loads
+    )
     np.testing.assert_allclose(held, imposed, atol=5e-3 * imposed.max())
 
 

@@ -10,6 +10,7 @@ from sa_solver.normal import NormalContact
 from sa_solver.partial_slip import partial_slip_curve
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material, Tilt
 from tests.oracles.sliding_cylinder import wear_without_tilt
+from wear.drive import Drive
 from wear.face_loads import CycleLoads
 from wear.full_cycle import march_cycle
 from wear.interface import InterfaceContact, InterfaceSettings
@@ -42,9 +43,8 @@ def interface(grid: Grid, gap: Array, tilt: Tilt, **settings) -> InterfaceContac
                 "laws": (EnergyLaw(COEFFICIENT), EnergyLaw(COEFFICIENT)),
                 "friction": lambda energy: FRICTION,
                 "stepper": ImplicitStepper(),
-                "driven": True,
                 "tolerance": 1e-10,
-                "tilt": tilt,
+                "drive": Drive.by_forces(tilt),
             }
             | settings
         )
@@ -61,6 +61,16 @@ def reciprocating(
     sliding = np.ones(len(motion), dtype=bool)
     loads = LoadHistory(P + zero, *[zero] * 7, sliding=sliding)
     return CycleLoads(loads, np.repeat(motion[:, :, None], np.prod(grid.shape), axis=2))
+
+
+def moved(history: CycleLoads, tilt: Tilt) -> Drive:
+    """The motion of a cycle imposed, the bodies meeting in the middle of it."""
+    motion = history.slip.mean(axis=2)
+    path = np.concatenate([np.zeros((1, 2)), np.cumsum(motion, axis=0)])
+    motions = np.zeros((len(motion), 6))
+    motions[:, 1:3] = 0.5 * (path.max(axis=0) + path.min(axis=0)) - path[1:]
+    held = tilt == "held"
+    return Drive((False, True, True, held, held, True), motions)
 
 
 def worn(
@@ -107,6 +117,8 @@ def test_the_moments_that_hold_a_tilt_leave_none_when_they_are_imposed(method, o
     history = reciprocating(grid, 40.0, 0.02, 2, angle=0.6)
     pair, P = ElasticPair(BODY, other), 40.0
     settings = {"pair": pair, "method": method, "tolerance": SOLVED, "follow": False}
+    if method == "full":
+        settings["drive"] = moved(history, "held")
     contact = interface(grid, gap, "held", **settings)
     state, first = contact.begin(history, 1.0)
     loads = contact.carried(state.loads, first.pressure)
@@ -123,8 +135,8 @@ def test_the_moments_that_hold_a_tilt_leave_none_when_they_are_imposed(method, o
         assert not solved.rigid[3:5].any()
         assert solved.resultants[0] == pytest.approx(P, rel=1e-6)
     if first.cycle:
-        held = march_cycle(contact.frictional(0.0), gap, history.loads, history.slip[..., 0])
-        assert np.abs([solved.rigid[3:5] for solved in held]).min() > 1e-7  # free ones do tilt
+        tilted = march_cycle(contact.frictional(0.0), gap, history.loads, moved(history, "free"))
+        assert np.abs([solved.rigid[3:5] for solved in tilted]).min() > 1e-7  # free ones do tilt
 
 
 def test_a_groove_holds_in_mirrored_places_by_opposite_moments() -> None:
@@ -240,7 +252,8 @@ def test_friction_of_the_half_space_wears_a_held_cylinder_alike(other) -> None:
     ends = {}
     for method in ("normal", "full"):
         settings = {"pair": pair, "method": method, "follow": True, "tolerance": SOLVED}
-        contact = interface(grid, grid.x**2 / 12.0, "held", **settings)
+        drive = moved(history, "held")
+        contact = interface(grid, grid.x**2 / 12.0, "held", drive=drive, **settings)
         state, energy = worn(contact, history, 2e3, 4)
         volume = state.surfaces.depth.sum() * grid.cell_area
         assert volume == pytest.approx(2.0 * COEFFICIENT * energy, rel=1e-9)

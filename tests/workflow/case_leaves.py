@@ -120,10 +120,11 @@ GIVEN = {
 }
 FLAT = {"kind": "bodies", "shape": "flat", "half_width": 0.1, "step": 0.1}
 FLATS = {"bodies": FLAT | {"half_length": 0.1}, "line": FLAT}
-# Two bodies that wear may have the shapes of those that do not, or be flat.
+LEGS = {"legs": {"legs": [{"P": 5}, {"P": 6}]}}
+# Two bodies that wear may have the shapes of those that do not, or be flat; legs or a stroke.
 GIVEN |= {
     f"{kind}_wear": wear("body_1", "body_2")
-    | {"structure": GIVEN[kind]["structure"] | {"flat": flat}}
+    | {"structure": GIVEN[kind]["structure"] | {"flat": flat}, "load_path": LEGS}
     for kind, flat in FLATS.items()
 }
 # Cases in time: other joints, factors of their parameters, and other excitations.
@@ -226,6 +227,8 @@ class Leaf:
             if self.key.startswith(f"{section}."):
                 chosen = [given[tag] for tag in (*self.tags, ALWAYS) if tag in given]
                 overrides += [f"{section}={value}" for value in chosen[:1]]
+        if "legs" in self.tags:
+            overrides.append("contact.method=full")
         if "friction_contact" in self.tags:
             overrides.append(f"structure={REDUCED}")
         if "friction_rig" in self.tags:
@@ -258,6 +261,7 @@ def leaves(model, path=(), tags=()):
             choices = [section.model_fields[key] for key in ("law", "shape", "kind", "scope")
                        if key in section.model_fields and len(sections) > 1]  # fmt: skip
             tag = [get_args(choice.annotation)[0] for choice in choices[:1]]
+            tag += [max(section.known_by)] if section.known_by else []
             yield from leaves(section, (*path, name, *index), (*tags, *tag))
         if not sections:
             yield (*path, name), tags, field, declaring(model, name)

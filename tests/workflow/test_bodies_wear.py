@@ -134,7 +134,7 @@ def test_faces_travel_to_the_processes_of_contacts() -> None:
         again = pickle.loads(pickle.dumps(face))
         grid = again.grid(case.contact.grid)
         np.testing.assert_array_equal(again.gap(grid.x, grid.y), face.gap(grid.x, grid.y))
-        assert again.driven
+        assert again.drive.motion[1]
 
 
 def test_a_flat_stands_on_its_step() -> None:
@@ -316,7 +316,7 @@ def test_a_loop_on_worn_surfaces_keeps_the_tilt_too() -> None:
         case = line(f"load_path.tilt={tilt}", "loops.amplitude=1 um")
         stage = ContactStage(case, BodiesSource(case).faces[0])
         state, _ = stage.begin(BodiesSource(case).unworn()[0], 1.0)
-        path = loop_path(case.loops, stage.name, state, 0, stage.settings.tilt)
+        path = loop_path(case.loops, stage.name, state, 0, stage.settings.drive.tilt)
         assert path.moments == moments
 
 

@@ -126,7 +126,9 @@ class Explanation:
             if isinstance(key, str):
                 fields = [m.model_fields[key] for m in models if key in m.model_fields]
                 models = [section for f in fields for section in sections_of(f.annotation)]
-            models = [m for m in models if _is_kind(m, node)] or models
+            fitting = [m for m in models if _is_kind(m, node)]
+            # Of kinds known by their keys the first, as where a case is read.
+            models = fitting[:1] if fitting and fitting[0].known_by else fitting or models
         return models
 
     def _path(self, details: ErrorDetails) -> KeyPath:
@@ -158,7 +160,9 @@ def _within(node: Any, key: str | int) -> Any:
 
 
 def _is_kind(model: type[Section], node: Any) -> bool:
-    """Whether the kind or law that ``node`` names is that of ``model``."""
+    """Whether the kind or law that ``node`` names, or a key of it, is that of ``model``."""
+    if model.known_by:
+        return isinstance(node, dict) and bool(model.known_by & node.keys())
     choices = [name for name in KINDS_ARE_NAMED_BY if name in model.model_fields]
     return all(
         child(node, name) in get_args(model.model_fields[name].annotation) for name in choices

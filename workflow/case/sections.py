@@ -48,6 +48,8 @@ class Section(BaseModel):
 
     # Whether a template fills in optional entries that most cases give.
     filled_in: ClassVar[bool] = True
+    # Keys by which it is known from other kinds of the same section, where no word names them.
+    known_by: ClassVar[frozenset[str]] = frozenset()
 
 
 class ElasticBody(Section):

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from sa_solver.half_space import HalfSpace
 from sa_solver.types import Array, ElasticPair, Grid, Material
-from workflow.analyses.contact.case import BodiesCase, Body, LineContactCase
+from workflow.analyses.contact.case import BodiesCase, LineContactCase, elastic
 from workflow.analyses.contact.load_table import LoadTable
-
-RIGID = Material(young=np.inf, poisson=0.0)
 
 
 def half_space_of(case: BodiesCase, grid: Grid) -> HalfSpace:
@@ -21,11 +17,7 @@ def half_space_of(case: BodiesCase, grid: Grid) -> HalfSpace:
 
 def bodies_of(case: BodiesCase) -> tuple[Material, Material]:
     """Materials of body 1 and body 2."""
-    return _material(case.materials.body_1), _material(case.materials.body_2)
-
-
-def _material(body: Body) -> Material:
-    return RIGID if body == "rigid" else body.elastic()
+    return elastic(case.materials.body_1), elastic(case.materials.body_2)
 
 
 def bulk_strain(table: LoadTable, bodies: tuple[Material, Material]) -> Array:

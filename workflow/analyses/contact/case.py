@@ -7,12 +7,13 @@ kind of case, though both are written ``analysis: contact``.
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Annotated, Generic, Literal, Self, TypeVar
+from typing import Annotated, ClassVar, Generic, Literal, Self, TypeVar
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from sa_solver.types import Array, Grid
+from sa_solver.types import Material as ElasticMaterial
 from workflow.analyses.contact.load_table import LoadTable, conflict, ramps
 from workflow.case.fields import File, Quantity, Whole
 from workflow.case.input_files import InputFileError, read_heights
@@ -59,6 +60,7 @@ BulkStress = Annotated[
 ]
 Increments = Annotated[int, Whole(1, 100_000)]
 
+RIGID = ElasticMaterial(young=np.inf, poisson=0.0)
 AREA_SHAPES = ("sphere", "ellipsoid")
 LINE_SHAPES = ("cylinder", "flat_rounded")
 HEIGHTS = "heights"
@@ -174,6 +176,11 @@ class BodyMaterials(Section):
         return self
 
 
+def elastic(body: Body) -> ElasticMaterial:
+    """The material of a body as the solvers take it."""
+    return RIGID if body == "rigid" else body.elastic()
+
+
 # --- loads --------------------------------------------------------------------------------------
 
 
@@ -231,6 +238,9 @@ LegT = TypeVar("LegT", Leg, LineLeg)
 class LegsOrFile(Section, Generic[LegT]):
     """Legs one after the other from the unloaded state, or a file."""
 
+    # Whether the path leads back to where it begins, over and over.
+    closed: ClassVar[bool] = False
+
     legs: tuple[LegT, ...] = entry("one after the other, from no load", default=())
     file: HistoryFile | None = entry(
         "instead of legs: columns named like their entries, a row per increment, base units",
@@ -265,7 +275,7 @@ class LegsOrFile(Section, Generic[LegT]):
         if self.file is not None:
             return LoadTable(read_columns(self.file, quantities))
         targets = {key: [getattr(leg, key) for leg in self.legs] for key in quantities}
-        return LoadTable(ramps(targets, [leg.increments for leg in self.legs]))
+        return LoadTable(ramps(targets, [leg.increments for leg in self.legs], self.closed))
 
     def place(self, row: int) -> str:
         """The entry that says how long increment ``row`` is."""
@@ -273,6 +283,18 @@ class LegsOrFile(Section, Generic[LegT]):
             return "load_path.file"
         ends = np.cumsum([leg.increments for leg in self.legs])
         return f"load_path.legs.{np.searchsorted(ends, row, side='right')}.increments"
+
+
+def check_bulk_stress(table: LoadTable, materials: BodyMaterials) -> None:
+    """Refuse bulk stress in a body that is rigid."""
+    for number in (1, 2):
+        body, key = f"body_{number}", f"bulk_stress_{number}"
+        if key in table.columns and getattr(materials, body) == "rigid":
+            raise disagreement(
+                f"a rigid body carries no bulk stress, but load_path has {key}; "
+                "allowed: an elastic body",
+                f"materials.{body}",
+            )
 
 
 class ContactPath(LegsOrFile[Leg]):
@@ -363,15 +385,7 @@ class BodiesCase(Case):
 
     @model_validator(mode="after")
     def _can_run(self) -> Self:
-        loads = self.load_path.table().columns
-        for number in (1, 2):
-            body, key = f"body_{number}", f"bulk_stress_{number}"
-            if key in loads and getattr(self.materials, body) == "rigid":
-                raise disagreement(
-                    f"a rigid body carries no bulk stress, but load_path has {key}; "
-                    "allowed: an elastic body",
-                    f"materials.{body}",
-                )
+        check_bulk_stress(self.load_path.table(), self.materials)
         if isinstance(self.structure, Heights):
             require_shape(self.structure.file, self.contact.centred().shape)
         return self

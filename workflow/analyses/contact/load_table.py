@@ -44,17 +44,20 @@ class LoadTable:
 
 
 def ramps(
-    targets: Mapping[str, Sequence[float | None]], increments: Sequence[int]
+    targets: Mapping[str, Sequence[float | None]], increments: Sequence[int], closed: bool = False
 ) -> dict[str, Array]:
     """Columns that reach their ``targets`` linearly, each in its number of ``increments``.
 
-    From 0; where a target is None the value stays. Columns without any target are left out.
+    From 0, or from where the last of them leads if the path is ``closed``; where a target is None
+    the value stays. Columns without any target are left out.
     """
     columns = {}
     for name, ends in targets.items():
-        if all(end is None for end in ends):
+        given = [end for end in ends if end is not None]
+        if not given:
             continue
-        reached = accumulate(ends, lambda value, end: value if end is None else end, initial=0.0)
+        start = given[-1] if closed else 0.0
+        reached = accumulate(ends, lambda value, end: value if end is None else end, initial=start)
         steps = zip(pairwise(reached), increments, strict=True)
         columns[name] = np.concatenate([np.linspace(*leg, count + 1)[1:] for leg, count in steps])
     return columns

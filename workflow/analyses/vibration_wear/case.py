@@ -18,7 +18,7 @@ from workflow.analyses.rig.joint_sections import (
 from workflow.analyses.rig.structure import FrictionRig, Rig
 from workflow.analyses.vibration.case import DrivenMass, VibrationCase, VibrationCaseBase, wears
 from workflow.analyses.wear.case.sections import Cycles, PressingForce
-from workflow.analyses.wear.structures.bodies.case import BodiesWearCase
+from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, Reciprocation
 from workflow.case.fields import Quantity
 from workflow.case.loading import YAML, CaseFile
 from workflow.case.sections import OutputWithoutFields, Section, Title, disagreement, entry
@@ -31,6 +31,8 @@ NOT_OF_A_STATE = ("assumed", "expect")
 
 def _unfit(bodies: BodiesWearCase) -> str:
     """Why the contact of a wear case cannot be the joint of a rig."""
+    if not isinstance(bodies.load_path, Reciprocation):
+        return "a cycle of legs or a file; take load_path: {P, stroke}, of which P counts"
     if bodies.material(1) != bodies.material(2):
         return (
             "materials that are not alike, whose pressure follows the shear; take the same "

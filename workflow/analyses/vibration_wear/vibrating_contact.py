@@ -24,11 +24,16 @@ from sa_solver.normal import NormalContact
 from sa_solver.partial_slip import PartialSlip, PartialSlipError, partial_slip_curve
 from sa_solver.tangential_loop import LoopFailure, LoopPath, TangentialLoop, march_loop
 from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
+from wear.drive import Drive
 from wear.joints.jenkins import Jenkins
 from wear.joints.parallel import ParallelSliders
 from wear.stepping import ContactFailure, SlidingCycle, WearingContact, WearState
 from workflow.analyses.rig.rig_model import RigModel
-from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, WearGrid
+from workflow.analyses.wear.structures.bodies.case import (
+    BodiesWearCase,
+    Reciprocation,
+    WearGrid,
+)
 from workflow.analyses.wear.structures.bodies.source import gap_of
 
 # Contacts of the last states: those before and after a step.
@@ -101,14 +106,10 @@ class VibratingContact:
         pair = ElasticPair(case.material(1), case.material(2))
         self._contact = NormalContact(HalfSpace(self.grid, pair))
         self._laws = case.wear_of(1).described(), case.wear_of(2).described()
-        self._tilt = case.load_path.tilt
+        assert isinstance(case.load_path, Reciprocation), "a case that is unfit"
+        self._tilt, self.load = case.load_path.tilt, case.load_path.P
         self._receptance = Receptance(rig.model)
         self._solved: deque[ContactCycle] = deque(maxlen=KEPT)
-
-    @property
-    def load(self) -> float:
-        """Normal force [N]."""
-        return self._case.load_path.P
 
     @property
     def settings(self) -> WearGrid:
@@ -232,4 +233,4 @@ class VibratingContact:
         """One increment: the load stays, and so does the pressure on surfaces that do not move."""
         nothing, pressed = np.zeros(1), np.array([self.load])
         loads = LoadHistory(pressed, *(nothing,) * 7, sliding=np.zeros(1, dtype=bool))
-        return SlidingCycle(loads, path[None], tilt=self._tilt)
+        return SlidingCycle(loads, path[None], drive=Drive.by_forces(self._tilt))

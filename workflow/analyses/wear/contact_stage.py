@@ -55,7 +55,7 @@ class ContactStage(InterfaceContact):
         contact = NormalContact(HalfSpace(self.coarse_grid, self.pair))
         grid = self.coarse_grid
         gap = gap_on(self._contact_face, grid) + link.lift(peak, grid.centres)
-        load = loads.pressing(peak, self.settings.tilt)
+        load = self.settings.drive.pressing(loads, peak)
         return contact.solve(gap, **load, start=None, compliance=None).pressure
 
     def face_of(self, body: Literal[1, 2]) -> Face:
@@ -72,7 +72,7 @@ class ContactStage(InterfaceContact):
     def loop(self, state: InterfaceState, peak: int) -> WornLoop:
         """The tangential loop that the case asks for, on the present surfaces."""
         contact, lift = self.frictional(state.energy), state.link.lift(peak, self.transfer.places)
-        tilt = self.settings.tilt
+        tilt = self.settings.drive.tilt
         return worn_loop(contact, self._case.loops, self.name, state, peak, tilt, lift)
 
 
@@ -92,8 +92,7 @@ def _interface(
         stepper=stepper,
         method="full" if settings.method == "full" else "normal",
         gross_slip=settings.gross_slip,
-        driven=contact.driven,
-        tilt=contact.tilt,
+        drive=contact.drive,
         follow=_follow(case),
         link=settings.link,
         tolerance=settings.tolerance,

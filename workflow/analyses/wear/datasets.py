@@ -6,7 +6,8 @@ Extensive quantities are in the units of a contact over an area.
 from __future__ import annotations
 
 from fe_models.mesh import Face
-from sa_solver.types import Array, Tilt
+from sa_solver.types import Array
+from wear.drive import TILTS, Drive
 from wear.face_loads import FaceLoads
 from workflow.analyses.contact.datasets import (
     load_columns,
@@ -28,15 +29,16 @@ def face_mesh(face: Face) -> dict[str, Dataset]:
 
 
 def put_face(
-    writer: ResultsWriter, group: str, face: Face, carried: FaceLoads, tilt: Tilt = "free"
+    writer: ResultsWriter, group: str, face: Face, carried: FaceLoads, drive: Drive | None = None
 ) -> None:
     """A contact face over a cycle; forces, tractions and displacements where these are known.
 
-    Where the ``tilt`` is held, the loads have no moments of the pressure.
+    Where a ``drive`` imposes a tilt, the loads have no moment of the pressure about its axis.
     """
     columns = load_columns(carried.loads)
-    if tilt == "held":
-        del columns["Mx"], columns["My"]
+    for name, k in zip(("Mx", "My"), TILTS, strict=True):
+        if drive is not None and drive.motion[k]:
+            del columns[name]
     writer.put(f"{group}/load_history", columns)
     datasets = face_mesh(face) | {"slip": slip_field(carried.slip)}
     writer.put(group, datasets, weighted=face.weighted or None)

@@ -4,14 +4,15 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 import numpy as np
 
 from fe_models.mesh import Face
-from sa_solver.types import Array, Frame, Grid, Indices, Tilt
+from sa_solver.types import Array, Frame, Grid, Indices
 from wear import coupled
+from wear.drive import Drive
 from wear.face_loads import CycleLoads, FaceLoads
 
 BODIES: tuple[Literal[1, 2], ...] = (1, 2)
@@ -27,9 +28,8 @@ class ContactFace:
 
     ``size`` (x, y) [mm] is what the contact grid covers, ``gap`` gives the distance [mm] at x and y
     of the face, and ``coarse`` as many cells as the face has nodes. ``remedy`` is what to do where
-    the contact reaches the end of the face. A ``driven`` contact has the motion of its bodies
-    imposed and not the tangential force: the slip of its loads is then that motion. Where its
-    ``tilt`` is held, the moments of its loads do not count.
+    the contact reaches the end of the face. A ``drive`` may impose motions in the place of the
+    forces of its loads.
     """
 
     face: Face
@@ -37,8 +37,7 @@ class ContactFace:
     gap: Callable[[Array, Array], Array]
     coarse: tuple[int, int]
     remedy: str = "make the face larger or round its edges"
-    driven: bool = False
-    tilt: Tilt = "free"
+    drive: Drive = field(default_factory=Drive)
 
     def grid(self, cells: tuple[int, int]) -> Grid:
         """The grid of so many cells along x and y over the face."""

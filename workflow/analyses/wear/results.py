@@ -148,8 +148,8 @@ def _write_results(
         for contact in outcome.interfaces:
             stage, first, loads = contact.stage, contact.first, contact.unworn.loads
             writer.put_grid(f"grid/{stage.name}", stage.grid, stage.face.frame)
-            tilt = stage.settings.tilt
-            put_face(writer, f"structure/{stage.name}", stage.face, contact.unworn, tilt)
+            drive = stage.settings.drive
+            put_face(writer, f"structure/{stage.name}", stage.face, contact.unworn, drive)
             if not nodes and _write_coarse(writer, contact, source.peak):
                 coarse.append(stage.name)
             dissipated = f"energy dissipated in each increment, {by} pressure"
@@ -185,7 +185,7 @@ def _write_results(
 
 def _holding_moments(contact: InterfaceOutcome) -> dict[str, Dataset]:
     """Moments ``(t,)`` that hold the tilt, where it is held."""
-    if contact.stage.settings.tilt == "free":
+    if contact.stage.settings.drive.tilt == "free":
         return {}
     return {
         f"{name}_{when}": Dataset(
@@ -312,7 +312,7 @@ def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str,
 
 def _tilt_summary(contact: InterfaceOutcome) -> dict[str, Any]:
     """Whether the tilt is held, and the largest moments of a cycle that hold it [N mm]."""
-    tilt = contact.stage.settings.tilt
+    tilt = contact.stage.settings.drive.tilt
     if tilt == "free":
         return {"tilt": tilt}
     cycles = contact.carried.items()

@@ -83,7 +83,7 @@ def errors_of(case: WearCase, contact: InterfaceOutcome, peak: int, probed: Prob
     }
     if isinstance(case, FiniteElementCase) and case.contact.method != "nodes":
         parts["coupling"] = _told(probed, "coupling", WORN)
-    if contact.stage.settings.driven:  # half-spaces are the model
+    if case.half_spaces:
         del parts["link"], parts["mesh"]
     if case.contact.method == "nodes":
         del parts["link"], parts["grid"]

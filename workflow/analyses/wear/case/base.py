@@ -52,6 +52,8 @@ class WearCase(Case):
 
     # Names of body 1 and body 2 (sa_solver.types) in the sections that tell them apart.
     bodies: ClassVar[tuple[str, str]] = ("body_1", "body_2")
+    # Whether both are half-spaces by themselves, which for others are a model.
+    half_spaces: ClassVar[bool] = False
 
     title: Title = entry("one line", "Ti-6Al-4V dovetail, one mission per cycle")
     analysis: Literal["wear"] = entry("what is computed", "wear")

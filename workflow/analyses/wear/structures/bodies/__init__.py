@@ -1,15 +1,24 @@
-"""Two bodies without a structure, one sliding to and fro on the other."""
+"""Two bodies without a structure, under a cycle of forces and motions."""
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from workflow.analyses.wear.run_time import Extent
 from workflow.analyses.wear.structure import WearStructure
-from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
+from workflow.analyses.wear.structures.bodies.case import (
+    SHIFTS,
+    BodiesWearCase,
+    LineBodiesWearCase,
+)
 
 if TYPE_CHECKING:
     from workflow.analyses.wear.load_source import LoadSource
+
+# Path of slip in a cycle of a contact that forces shear, to tell about how long it takes [mm].
+PARTIAL_SLIP = 5e-3
 
 
 def _source(case: BodiesWearCase | LineBodiesWearCase) -> LoadSource:
@@ -19,9 +28,11 @@ def _source(case: BodiesWearCase | LineBodiesWearCase) -> LoadSource:
 
 
 def _extent(case: BodiesWearCase | LineBodiesWearCase) -> Extent:
-    """Every increment of the way there and back dissipates."""
-    path = case.load_path
-    return Extent(2 * path.increments, path=2.0 * path.stroke)
+    """Every increment of the cycle may dissipate."""
+    table = case.load_path.table()
+    steps = [table[name] - np.roll(table[name], 1) for name in SHIFTS]
+    path = float(np.hypot(*steps).sum())
+    return Extent(len(table), path=path or PARTIAL_SLIP)
 
 
 STRUCTURE = WearStructure(name="bodies_wear", case=BodiesWearCase, source=_source, extent=_extent)

@@ -1,4 +1,4 @@
-"""A wear case of two bodies without a structure, one sliding to and fro on the other.
+"""A wear case of two bodies without a structure, under a closed cycle of forces and motions.
 
 A line contact, in plane strain, differs in the dimensions of its loads and its grid: a separate
 kind of case, though both are written ``analysis: wear`` and ``kind: bodies``.
@@ -6,27 +6,35 @@ kind of case, though both are written ``analysis: wear`` and ``kind: bodies``.
 
 from __future__ import annotations
 
-from math import cos, inf, sin
-from typing import Annotated, Literal
+from math import inf
+from typing import Annotated, ClassVar, Generic, Literal, Self
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from sa_solver.types import Array, Tilt
+from sa_solver.types import Material as ElasticMaterial
 from workflow.analyses.contact.case import (
     HEIGHTS,
-    BodyMaterial,
+    BodyMaterials,
     Cylinder,
     Ellipsoid,
     FlatRounded,
     Heights,
+    Leg,
+    LegsOrFile,
+    LegT,
+    LineLeg,
     Shape,
     Sphere,
+    check_bulk_stress,
+    elastic,
     require_shape,
     touches_along_a_line,
 )
+from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.case.sections import Contact, PressingForce, TwoBodies, Wear
+from workflow.analyses.wear.case.sections import Contact, PressingForce, Wear
 from workflow.case.fields import Quantity, Whole
 from workflow.case.sections import GridCells, Length, Section, Title, disagreement, entry
 from workflow.case.source import Source
@@ -40,6 +48,9 @@ Direction = Annotated[
 Increments = Annotated[int, Whole(1, 1000)]
 
 FLAT = "flat"
+SHIFTS = "shift_x", "shift_y"
+# What shears a contact otherwise than by moving all of it.
+SHEARING = {"Qx", "Qy", "Mz", "twist", "bulk_stress_1", "bulk_stress_2"}
 TILTS = "of the bodies, held: as they are placed; free: as no moment at all leaves them"
 
 # --- bodies -------------------------------------------------------------------------------------
@@ -69,14 +80,39 @@ class FlatStrip(Shape):
         return np.where(np.abs(x) < self.half_width, 0.0, self.step)
 
 
-class BodyMaterials(TwoBodies[BodyMaterial]):
-    """The two bodies in contact."""
-
-
 # --- loads --------------------------------------------------------------------------------------
 
 
-class Reciprocation(Section):
+def with_held(imposed: LoadTable, tilt: Tilt) -> LoadTable:
+    """A cycle with what is held: motions of 0."""
+    held = ["twist"] if "Mz" not in imposed.columns else []
+    if tilt == "held":
+        pairs = {"Mx": "tilt_x", "My": "tilt_y"}.items()
+        held += [motion for moment, motion in pairs if moment not in imposed.columns]
+    return LoadTable({name: np.zeros(len(imposed)) for name in held} | imposed.columns)
+
+
+def to_and_fro(P: float, stroke: float, increments: int, angle: float = 0.0) -> LoadTable:
+    """Every increment of a way there and back, ``angle`` from x to y.
+
+    Motions are those of body 1 relative to body 2, which meet in the middle of the way: a contact
+    that slips in part remembers from where it first moved, and met at one end of the way its loop
+    would not be centred.
+    """
+    step = stroke / increments * np.array([np.cos(angle), np.sin(angle)])
+    there = np.tile(step, (increments, 1))
+    path = np.cumsum(np.concatenate([there, -there]), axis=0)
+    x, y = (0.5 * increments * step - path).T
+    return LoadTable({"P": np.full(len(path), P), "shift_x": x, "shift_y": y})
+
+
+class Stroke(Section):
+    """To and fro at constant speed under a constant normal force."""
+
+    known_by: ClassVar[frozenset[str]] = frozenset({"stroke"})
+
+
+class Reciprocation(Stroke):
     """Body 2 moves to and fro at constant speed under a constant normal force."""
 
     P: PressingForce = entry("normal force [N]", "50 N")
@@ -85,8 +121,16 @@ class Reciprocation(Section):
     increments: Increments = entry("equal steps of each way, there and back", 4, default=4)
     tilt: Tilt = entry(TILTS, "held", default="held")
 
+    def table(self) -> LoadTable:
+        """Every increment of the cycle."""
+        return to_and_fro(self.P, self.stroke, self.increments, self.direction)
 
-class LineReciprocation(Section):
+    def cycle(self) -> LoadTable:
+        """The same with what is held."""
+        return with_held(self.table(), self.tilt)
+
+
+class LineReciprocation(Stroke):
     """Body 2 moves to and fro along x at constant speed under a constant normal force."""
 
     P: PressingLineForce = entry("normal force [N/mm]", "50 N/mm")
@@ -94,6 +138,62 @@ class LineReciprocation(Section):
     increments: Increments = entry("equal steps of each way, there and back", 4, default=4)
     tilt: Tilt = entry(TILTS, "held", default="held")
 
+    def table(self) -> LoadTable:
+        """Every increment of the cycle."""
+        return to_and_fro(self.P, self.stroke, self.increments)
+
+    def cycle(self) -> LoadTable:
+        """The same with what is held."""
+        return with_held(self.table(), self.tilt)
+
+
+class Cycle(LegsOrFile[LegT], Generic[LegT]):
+    """Forces and motions of a closed cycle: the first leg begins where the last one ends."""
+
+    closed: ClassVar[bool] = True
+    known_by: ClassVar[frozenset[str]] = frozenset({"legs", "file"})
+
+    tilt: Tilt = entry(f"{TILTS}; unless a moment or tilt is named", "held", default="held")
+
+    def cycle(self) -> LoadTable:
+        """Every increment of the cycle, with what is held."""
+        return with_held(self.table(), self.tilt)
+
+    @model_validator(mode="after")
+    def _presses(self) -> Self:
+        columns = self.table().columns
+        if not np.any(columns.get("P", columns.get("approach", 0.0)) > 0.0):
+            raise disagreement(
+                "nothing presses the bodies together; allowed: P or approach above 0 somewhere",
+                "file" if self.file is not None else "legs",
+            )
+        return self
+
+
+class ContactCycle(Cycle[Leg]):
+    """Forces and motions of a closed cycle: the first leg begins where the last one ends."""
+
+
+class LineContactCycle(Cycle[LineLeg]):
+    """Forces and motions of a closed cycle, per length: legs from where the last one ends."""
+
+
+def _way(value: object) -> str:
+    """How a cycle is given: as a stroke, unless there are legs or a file."""
+    if isinstance(value, Section):
+        return "(stroke)" if isinstance(value, Stroke) else "(cycle)"
+    named = set(value) if isinstance(value, dict) else set()
+    return "(cycle)" if Cycle.known_by & named and not Stroke.known_by & named else "(stroke)"
+
+
+LoadPath = Annotated[
+    Annotated[Reciprocation, Tag("(stroke)")] | Annotated[ContactCycle, Tag("(cycle)")],
+    Discriminator(_way),
+]
+LineLoadPath = Annotated[
+    Annotated[LineReciprocation, Tag("(stroke)")] | Annotated[LineContactCycle, Tag("(cycle)")],
+    Discriminator(_way),
+]
 
 # --- grids --------------------------------------------------------------------------------------
 
@@ -138,12 +238,14 @@ class LineWearGrid(Contact):
 class BodiesWearCase(WearCase):
     """Two bodies that wear over an area of both directions."""
 
+    half_spaces: ClassVar[bool] = True
+
     title: Title = entry("one line", "Ball that wears on a flat")
     structure: Annotated[Sphere | Ellipsoid | Flat | Heights, Field(discriminator="shape")] = entry(
         "the bodies: no finite elements; body 2 has the form"
     )
     materials: BodyMaterials = entry("the two bodies in contact")
-    load_path: Reciprocation = entry("of body 2 on body 1")
+    load_path: LoadPath = entry("of body 2 on body 1: a stroke, or legs or a file of a cycle")
     contact: WearGrid = entry("half-space grid")
     wear: Wear = entry("law, length of the run and step")
 
@@ -152,27 +254,33 @@ class BodiesWearCase(WearCase):
         return not touches_along_a_line(source, (HEIGHTS, FLAT))
 
     @model_validator(mode="after")
-    def _can_run(self) -> BodiesWearCase:
-        x, y = self.contact.size
-        across, along = abs(cos(self.load_path.direction)), abs(sin(self.load_path.direction))
-        room = min(x / across if across > 0.0 else inf, y / along if along > 0.0 else inf)
-        _require_fit(self, room)
+    def _can_run(self) -> Self:
+        _check(self, self.contact.size)
         return self
 
+    def material(self, number: int) -> ElasticMaterial:
+        return elastic(getattr(self.materials, self.bodies[number - 1]))
+
     def loads_outline(self) -> list[tuple[str, str]]:
-        path = self.load_path
-        return _outline(self.structure.shape, "no structure", path, f"{path.P:g} N")
+        return [
+            ("structure", f"{self.structure.shape}, no structure"),
+            ("load path", _in_words(self.load_path, "N")),
+        ]
 
 
 class LineBodiesWearCase(WearCase):
     """Two bodies that wear along a line, in plane strain: everything is per length of it."""
+
+    half_spaces: ClassVar[bool] = True
 
     title: Title = entry("one line", "Cylinder that wears on a flat")
     structure: Annotated[
         Cylinder | FlatRounded | FlatStrip | Heights, Field(discriminator="shape")
     ] = entry("the bodies: no finite elements; body 2 has the form")
     materials: BodyMaterials = entry("the two bodies in contact")
-    load_path: LineReciprocation = entry("of body 2 on body 1, forces per length")
+    load_path: LineLoadPath = entry(
+        "of body 2 on body 1, forces per length: a stroke, or legs or a file of a cycle"
+    )
     contact: LineWearGrid = entry("half-plane grid")
     wear: Wear = entry("law, length of the run and step")
 
@@ -181,36 +289,82 @@ class LineBodiesWearCase(WearCase):
         return touches_along_a_line(source, (HEIGHTS, FLAT))
 
     @model_validator(mode="after")
-    def _can_run(self) -> LineBodiesWearCase:
-        _require_fit(self, self.contact.size)
+    def _can_run(self) -> Self:
+        _check(self, (self.contact.size, inf))
         return self
 
+    def material(self, number: int) -> ElasticMaterial:
+        return elastic(getattr(self.materials, self.bodies[number - 1]))
+
     def loads_outline(self) -> list[tuple[str, str]]:
-        path = self.load_path
-        return _outline(self.structure.shape, "line contact", path, f"{path.P:g} N/mm")
+        return [
+            ("structure", f"{self.structure.shape}, line contact"),
+            ("load path", _in_words(self.load_path, "N/mm")),
+        ]
 
 
-def _require_fit(case: BodiesWearCase | LineBodiesWearCase, room: float) -> None:
-    """Raise unless the grid is that of the heights and has room for the stroke.
-
-    ``room`` is its length along the stroke [mm], which matters where the stroke is to be followed.
-    """
+def _check(case: BodiesWearCase | LineBodiesWearCase, size: tuple[float, float]) -> None:
+    """Refuse what does not fit together: grid, heights, motions, materials and loops."""
     if isinstance(case.structure, Heights):
         require_shape(case.structure.file, case.contact.grid)
-    stroke = case.load_path.stroke
-    if stroke >= room and case.wear.motion != "neglect":
+    table, path = case.load_path.cycle(), case.load_path
+    check_bulk_stress(table, case.materials)
+    _check_room(case, table, size)
+    _check_stress(case)
+    if isinstance(path, Stroke):
+        return
+    given = path.table().columns
+    if case.contact.method == "normal":
+        forces = sorted(given.keys() & SHEARING)
+        if forces or not given.keys() & SHIFTS:
+            wrong = f"has {', '.join(forces)}" if forces else "moves nothing along the face"
+            raise disagreement(
+                f"normal lets every cell slide by all of the motion, but load_path {wrong}; "
+                f"allowed: full, or no more than {', '.join(SHIFTS)} along the face",
+                "contact.method",
+            )
+    tilted = sorted(given.keys() & {"approach", "tilt_x", "tilt_y"})
+    if case.loops.wanted and (tilted or (path.tilt == "held" and given.keys() & {"Mx", "My"})):
         raise disagreement(
-            f"{stroke:g} mm: the grid reaches over {room:g} mm along it; allowed: shorter strokes, "
-            "a larger contact.size, or wear.motion: neglect",
-            *("load_path.stroke", "contact.size"),
+            f"loops run under a normal force, level or free to tilt, but load_path has "
+            f"{', '.join(tilted) or 'moments beside a tilt that is held'}; allowed: no loops",
+            "loops",
         )
 
 
-def _outline(
-    shape: str, kind: str, path: Reciprocation | LineReciprocation, load: str
-) -> list[tuple[str, str]]:
-    steps = f"{2 * path.increments} increments, tilt {path.tilt}"
-    return [
-        ("structure", f"{shape}, {kind}"),
-        ("load path", f"{load}, stroke {path.stroke:g} mm in {steps}"),
-    ]
+def _check_stress(case: BodiesWearCase | LineBodiesWearCase) -> None:
+    """Refuse to look for stress in a body that is rigid."""
+    wanted = case.stress.section != "none" or case.stress.life.parameter != "none"
+    if wanted and "rigid" in (case.materials.body_1, case.materials.body_2):
+        raise disagreement(
+            "stress under a contact is found in both bodies, and one is rigid; allowed: "
+            "{section: none, life: {parameter: none}}, or two elastic bodies",
+            "stress",
+        )
+
+
+def _check_room(
+    case: BodiesWearCase | LineBodiesWearCase, table: LoadTable, size: tuple[float, float]
+) -> None:
+    """Refuse a stroke that is to be followed beyond the grid of so much ``size`` [mm]."""
+    reach = np.array([np.ptp(table[name]) for name in SHIFTS])
+    stroke = float(np.hypot(*reach))
+    if case.wear.motion == "neglect" or not stroke > 0.0:
+        return
+    room = min(length * stroke / part for length, part in zip(size, reach, strict=True) if part > 0)
+    if stroke >= room:
+        key = "load_path.stroke" if isinstance(case.load_path, Stroke) else "load_path"
+        raise disagreement(
+            f"{stroke:g} mm: the grid reaches over {room:g} mm along it; allowed: shorter strokes, "
+            "a larger contact.size, or wear.motion: neglect",
+            *(key, "contact.size"),
+        )
+
+
+def _in_words(path: LoadPath | LineLoadPath, force: str) -> str:
+    """A cycle in words, forces in the unit ``force``."""
+    table = path.table()
+    steps = f"{len(table)} increments, tilt {path.tilt}"
+    if isinstance(path, Reciprocation | LineReciprocation):
+        return f"{path.P:g} {force}, stroke {path.stroke:g} mm in {steps}"
+    return f"{', '.join(path.table().columns)} in {steps}"

@@ -1,4 +1,4 @@
-"""Two bodies that slide to and fro on each other as a load source: nothing to solve."""
+"""Two bodies under a cycle of forces and motions as a load source: nothing responds to wear."""
 
 from __future__ import annotations
 
@@ -7,8 +7,13 @@ from functools import cached_property
 
 import numpy as np
 
-from sa_solver.types import Array, Grid, LoadHistory
+from sa_solver.half_space import HalfSpace
+from sa_solver.normal import NormalContact
+from sa_solver.ties import SAME, first_largest
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory
+from wear.drive import Drive
 from wear.face_loads import CycleLoads
+from workflow.analyses.contact.bodies import bulk_strain
 from workflow.analyses.contact.case import Heights, Shape
 from workflow.analyses.wear.gaps import GapFunction, GridHeights
 from workflow.analyses.wear.load_source import (
@@ -19,7 +24,13 @@ from workflow.analyses.wear.load_source import (
     coarse_cells,
     nominal_face,
 )
-from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
+from workflow.analyses.wear.structures.bodies.case import (
+    SHIFTS,
+    BodiesWearCase,
+    LineBodiesWearCase,
+    LineReciprocation,
+    Reciprocation,
+)
 from workflow.case.input_files import read_heights
 
 NAME = "interface"
@@ -27,15 +38,30 @@ REMEDY = "enlarge contact.size, and contact.grid with it"
 
 
 class BodiesSource(UncoupledSource):
-    """Two bodies as load source of a wear run: forces of gross sliding over the whole stroke.
+    """Two bodies as load source of a wear run: a cycle of forces and motions.
 
-    Its moments are 0: those that are imposed where the tilt is free.
+    Loads that nobody imposes are those of bodies that slide as a whole, along the face, and of the
+    unworn contact across it.
     """
 
     def __init__(self, case: BodiesWearCase | LineBodiesWearCase) -> None:
         self._case, self.line = case, isinstance(case, LineBodiesWearCase)
-        # The increment that passes the middle on the way there: all are loaded alike.
-        self.peak = case.load_path.increments // 2
+        self._table = case.load_path.cycle()
+        bodies = case.material(1), case.material(2)
+        strain = bulk_strain(self._table, bodies)
+        self.drive = Drive(
+            self._table.is_motion, self._table.imposed, strain if strain.any() else None
+        )
+        self.peak = self._peak()
+
+    def _peak(self) -> int:
+        """The increment of the largest normal force, and there of the largest shear force."""
+        path = self._case.load_path
+        if isinstance(path, Reciprocation | LineReciprocation):
+            return path.increments // 2  # that passes the middle on the way there
+        heaviest, shear = self._normal_force, np.hypot(self._table["Qx"], self._table["Qy"])
+        loaded = heaviest >= (1.0 - SAME) * heaviest.max()
+        return first_largest(np.where(loaded, shear, -1.0))
 
     @cached_property
     def faces(self) -> tuple[ContactFace, ...]:
@@ -47,45 +73,68 @@ class BodiesSource(UncoupledSource):
                 gap_of(self._case.structure, grid),
                 coarse_cells(grid.shape[0] // COARSER, grid.shape[1] // COARSER, self.line),
                 REMEDY,
-                driven=True,
-                tilt=self._case.load_path.tilt,
+                drive=self.drive,
             ),
         )
 
     def unworn(self) -> tuple[CycleLoads, ...]:
-        return self._sliding(self._case.friction.coefficient)
+        return self._cycle(self._case.friction.coefficient)
 
     def worn(
         self, depths: Sequence[Array], friction: Sequence[float] | None = None
     ) -> tuple[CycleLoads, ...]:
         """As unworn but for the friction: no structure responds to wear."""
-        return self._sliding(*friction) if friction else self.unworn()
+        return self._cycle(*friction) if friction else self.unworn()
 
     def user_faces(self, number: int) -> tuple[UserFace, ...]:
         """None: the bodies have no nodes."""
         return ()
 
-    @property
+    @cached_property
     def motion(self) -> Array:
-        """Motion of body 2 over body 1 in each increment, ``(t, 2)`` [mm]."""
-        path = self._case.load_path
-        angle = getattr(path, "direction", 0.0)  # line contacts slide along x
-        step = path.stroke / path.increments * np.array([np.cos(angle), np.sin(angle)])
-        there = np.tile(step, (path.increments, 1))
-        return np.concatenate([there, -there])
+        """Motion of body 2 over body 1 that is imposed in each increment, ``(t, 2)`` [mm]."""
+        shift = np.stack([self._table[name] for name in SHIFTS], axis=1)
+        return np.roll(shift, 1, axis=0) - shift
 
-    def _sliding(self, friction: float) -> tuple[CycleLoads]:
+    def _cycle(self, friction: float) -> tuple[CycleLoads]:
         """The cycle of the only contact."""
         slip = np.repeat(self.motion[:, :, None], len(self.faces[0].face), axis=2)
         return (CycleLoads(self._loads(friction), slip),)
 
     def _loads(self, friction: float) -> LoadHistory:
-        """Friction against the motion, and what it dissipates."""
-        motion, P = self.motion, self._case.load_path.P
-        shear = -friction * P * motion / np.hypot(motion[:, 0], motion[:, 1])[:, None]
-        one, zero = np.ones(len(motion)), np.zeros(len(motion))
-        (Qx, Qy), (Edx, Edy) = shear.T, (-shear * motion).T
-        return LoadHistory(P * one, Qx, Qy, zero, zero, zero, Edx, Edy, sliding=one > 0.0)
+        """Forces as imposed; where motions are, friction against these and what it dissipates."""
+        table, motion, P = self._table, self.motion, self._normal_force
+        Qx, Qy = table["Qx"], table["Qy"]
+        sliding = motion.any(axis=1) & (P > 0.0)
+        if motion.any():
+            length = np.hypot(motion[:, 0], motion[:, 1])[:, None]
+            along = np.divide(motion, length, out=np.zeros_like(motion), where=length > 0.0)
+            friction_x, friction_y = (-friction * P[:, None] * along).T
+            Qx, Qy = Qx + friction_x, Qy + friction_y
+        Edx, Edy = np.where(sliding, -np.stack([Qx, Qy]) * motion.T, 0.0)
+        Mx, My, Mz = (table[name] for name in ("Mx", "My", "Mz"))
+        return LoadHistory(P, Qx, Qy, Mx, My, Mz, Edx, Edy, sliding)
+
+    @cached_property
+    def _normal_force(self) -> Array:
+        """Normal force in each increment ``(t,)``: of the unworn contact where motions press."""
+        table, drive = self._table, self.drive
+        if not drive.motion[0]:
+            return table["P"]
+        grid, zero = self._grid, np.zeros(len(table))
+        pair = ElasticPair(self._case.material(1), self._case.material(2))
+        contact, gap = NormalContact(HalfSpace(grid, pair)), gap_of(self._case.structure, grid)
+        height = np.ascontiguousarray(np.broadcast_to(gap(grid.x, grid.y), grid.shape))
+        loads = LoadHistory(
+            zero, zero, zero, table["Mx"], table["My"], zero, zero, zero, sliding=zero > 0.0
+        )
+        pressing = (drive.pressing(loads, t) for t in range(len(table)))
+        return np.array(
+            [
+                contact.solve(height, **imposed, start=None, compliance=None).P
+                for imposed in pressing
+            ]
+        )
 
     @property
     def _grid(self) -> Grid:

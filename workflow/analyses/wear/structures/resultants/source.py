@@ -10,6 +10,7 @@ import numpy as np
 from fe_models.mesh import Face
 from sa_solver.ties import first_largest
 from sa_solver.types import Array, Frame, Grid
+from wear.drive import Drive
 from wear.face_loads import CycleLoads
 from workflow.analyses.wear.gaps import gap_over
 from workflow.analyses.wear.load_source import (
@@ -86,7 +87,9 @@ class ResultantsSource(UncoupledSource):
         face = self._face(name, imported, grid.size)
         gap = gap_over(structure.gap_of(name), imported.height, grid)
         coarse = self._coarse(imported, grid)
-        return ContactFace(face, grid.size, gap, coarse, REMEDY, tilt=imported.tilt)
+        return ContactFace(
+            face, grid.size, gap, coarse, REMEDY, drive=Drive.by_forces(imported.tilt)
+        )
 
     def _face(self, name: str, imported: ImportedLoads, size: tuple[float, float]) -> Face:
         """The face of the file, or the corners of the nominal one."""

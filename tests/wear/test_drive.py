@@ -1,0 +1,188 @@
+"""Contacts driven by forces and motions of a closed cycle: against marches of the same history, and
+limits of wear with closed forms.
+"""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sa_solver.contact import FrictionalContact
+from sa_solver.half_space import HalfSpace
+from sa_solver.types import Array, ElasticPair, Grid, LoadHistory, Material
+from wear.drive import Drive
+from wear.face_loads import CycleLoads
+from wear.full_cycle import march_cycle
+from wear.interface import InterfaceContact, InterfaceSettings
+from wear.laws import EnergyLaw
+from wear.link import CellNodes
+from wear.steppers import ImplicitStepper
+from wear.stepping import ContactFailure
+
+BODY, STEEL = Material(115e3, 0.29), Material(200e3, 0.3)
+PAIR = ElasticPair(BODY, BODY)
+RADIUS, FRICTION = 10.0, 0.5
+BALL = Grid.covering((0.8, 0.8), (20, 20))
+SPHERE = (BALL.x**2 + BALL.y**2) / (2.0 * RADIUS)
+
+
+def loads_of(**columns: list[float]) -> LoadHistory:
+    """Forces of a cycle; those that are not named are 0."""
+    count = len(next(iter(columns.values())))
+    names = ("P", "Qx", "Qy", "Mx", "My", "Mz", "Edx", "Edy")
+    given = {name: np.array(columns.get(name, np.zeros(count)), dtype=float) for name in names}
+    return LoadHistory(**given, sliding=np.zeros(count, dtype=bool))
+
+
+def interface(grid: Grid, gap: Array, drive: Drive, **settings) -> InterfaceContact:
+    return InterfaceContact(
+        InterfaceSettings(
+            **{
+                "name": "contact",
+                "grid": grid,
+                "gap": np.ascontiguousarray(np.broadcast_to(gap, grid.shape)),
+                "transfer": CellNodes(grid),
+                "pair": PAIR,
+                "laws": (EnergyLaw(1e-8), EnergyLaw(1e-8)),
+                "friction": lambda energy: FRICTION,
+                "stepper": ImplicitStepper(),
+                "drive": drive,
+                "follow": False,
+                "tolerance": 1e-8,
+            }
+            | settings
+        )
+    )
+
+
+# --- cycles ---------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("other", [BODY, STEEL], ids=["alike", "unlike"])
+def test_forces_and_the_motions_that_they_make_are_one_problem(other: Material) -> None:
+    """P, Q, moments and bulk stress; then the rigid motions they have led to, imposed."""
+    loads = loads_of(
+        P=[60.0, 80.0, 60.0, 0.0],
+        Qx=[15.0, -20.0, 5.0, 0.0],
+        Qy=[0.0, 4.0, -4.0, 0.0],
+        My=[0.5, -0.5, 0.2, 0.0],
+        Mz=[0.5, -0.2, 0.0, 0.0],
+    )
+    contact = FrictionalContact(HalfSpace(BALL, ElasticPair(BODY, other)), FRICTION, 1e-10)
+    strain = np.array([1e-4, -1e-4, 5e-5, 0.0])
+    forced = march_cycle(contact, SPHERE, loads, Drive(strain=strain))
+    motions = np.array([state.rigid for state in forced])
+    moved = march_cycle(contact, SPHERE, loads, Drive((True,) * 6, motions, strain))
+    # Where motions are imposed, a cycle that opens is marched twice like any other.
+    for one, other_state in zip(forced[:3], moved[:3], strict=True):
+        scale = one.pressure.max()
+        np.testing.assert_allclose(one.traction, other_state.traction, atol=2e-5 * scale)
+        np.testing.assert_allclose(one.resultants, other_state.resultants, atol=2e-4 * 80.0)
+
+
+def test_bodies_that_part_meet_where_their_motion_has_led_them() -> None:
+    """Moved by 1 mm while apart: no slip, no shear. And back: the same again."""
+    loads = loads_of(P=[50.0, 50.0, 0.0, 50.0, 0.0])
+    motions = np.zeros((5, 6))
+    motions[:, 1] = [0.0, 2e-4, 1.0, 1.0, 0.0]
+    drive = Drive((False, True, True, True, True, True), motions)
+    contact = FrictionalContact(HalfSpace(BALL, PAIR), FRICTION)
+    states = march_cycle(contact, SPHERE, loads, drive)
+    assert not states[0].shear.any()
+    assert states[1].resultants[1] > 1.0  # body 1 takes body 2 along
+    assert not states[2].traction.any()
+    assert not states[3].shear.any()
+    np.testing.assert_allclose(states[3].pressure, states[0].pressure, rtol=1e-6)
+
+
+@pytest.mark.parametrize("other", [BODY, STEEL], ids=["alike", "unlike"])
+def test_a_cycle_that_creeps_is_marched_until_it_repeats(other: Material) -> None:
+    """Pressure that swings while shear turns: two passes leave ten times as much."""
+    loads = loads_of(
+        P=[40.0, 85.0, 55.0, 35.0, 80.0, 60.0],
+        Qx=[15.0, -30.0, 20.0, -14.0, 25.0, -10.0],
+        Qy=[5.0, 8.0, -6.0, 3.0, -8.0, 6.0],
+    )
+    contact = FrictionalContact(HalfSpace(BALL, ElasticPair(BODY, other)), FRICTION)
+    states = march_cycle(contact, SPHERE, loads, Drive.by_forces("held"))
+    limit = FRICTION * max(state.pressure.max() for state in states)
+    state, values = states[-1], Drive.by_forces("held").increments(loads)
+    for load, before in zip(values, states, strict=True):
+        state = contact.advance(state, SPHERE, load)
+        np.testing.assert_allclose(state.shear, before.shear, atol=5e-3 * limit)
+        np.testing.assert_allclose(state.slip, before.slip, atol=2e-2 * np.abs(before.slip).max())
+
+
+# --- wear -----------------------------------------------------------------------------------------
+
+
+def test_a_held_approach_wears_until_nothing_is_pressed() -> None:
+    """Both surfaces together then miss what interpenetrated: δ - h, and the force is gone."""
+    approach, motions = 2e-3, np.zeros((2, 6))
+    motions[:, 0], motions[:, 1] = approach, [0.01, -0.01]
+    drive = Drive((True, True, True, True, True, True), motions)
+    slip = np.broadcast_to(np.array([0.02, -0.02])[:, None, None] * [[1.0], [0.0]], (2, 2, 400))
+    contact = interface(BALL, SPHERE, drive)
+    history = CycleLoads(loads_of(P=[1.0, 1.0]), slip)
+    state, first = contact.begin(history, 1e9)
+    carried = [contact.carried(history.loads, first.pressure).P[0]]
+    for jump in range(12):
+        cycles = 3.0 ** (jump + 1)
+        state, _ = contact.jump(state, cycles, cycles)
+        pressure = np.stack([start.pressure for start in state.starts.values()])
+        carried.append(contact.carried(state.loads, pressure).P[0])
+    np.testing.assert_allclose(state.surfaces.depth, np.maximum(approach - SPHERE, 0.0), atol=2e-6)
+    assert np.all(np.diff(carried) < 0.0)
+    assert carried[-1] < 2e-3 * carried[0]
+    # The unworn force is Hertz's, to what 20 cells make of it.
+    hertz = 4.0 / 3.0 * PAIR.contact_modulus * np.sqrt(RADIUS) * approach**1.5
+    assert carried[0] == pytest.approx(hertz, rel=0.02)
+
+
+def test_partial_slip_wears_a_cylinder_down_to_its_stick_zone() -> None:
+    """Goryacheva, Rajeev and Farris 2001: what slips wears off, and |x| < c carries all of P.
+
+    There the surfaces are as new and touch over a width 2c of their own: p = E*/2R √(c² - x²) +
+    (P - π E* c²/4R) / (π √(c² - x²)), with c/a = √(1 - Q/µP), Cattaneo's, as long as Q stays. Cells
+    of c/16 leave 1.4 %.
+    """
+    load, shear = 400.0, 100.0
+    modulus, grid = PAIR.contact_modulus, Grid.strips(0.9, 72)
+    half = np.sqrt(4.0 * load * RADIUS / (np.pi * modulus))
+    stick = half * np.sqrt(1.0 - shear / (FRICTION * load))
+    loads = loads_of(P=[load, load], Qx=[shear, -shear])
+    contact = interface(grid, grid.x**2 / (2.0 * RADIUS), Drive.by_forces("held"), method="full")
+    state, _ = contact.begin(CycleLoads(loads, np.zeros((2, 2, grid.shape[0]))), 1e7)
+    for cycles in 3e4 * 2.0 ** np.arange(7):
+        state, _ = contact.jump(state, cycles, cycles)
+    pressure, x = contact.fields(state, 0).pressure.ravel(), grid.x.ravel()
+    inside = np.abs(x) < 0.7 * stick
+    root = np.sqrt(stick**2 - x[inside] ** 2)
+    own = np.pi * modulus * stick**2 / (4.0 * RADIUS)
+    limit = modulus / (2.0 * RADIUS) * root + (load - own) / (np.pi * root)
+    np.testing.assert_allclose(pressure[inside], limit, rtol=0.02)
+    carried = pressure[np.abs(x) < stick + grid.pitch[0]].sum() * grid.pitch[0]
+    assert carried == pytest.approx(load, rel=1e-3)
+    assert state.surfaces.depth[inside].max() < 1e-5 * state.surfaces.depth.max()
+
+
+def test_a_cycle_of_forces_wears_what_its_friction_dissipates() -> None:
+    """V = 2 α E with both bodies, under P that changes and Q that turns."""
+    loads = loads_of(P=[40.0, 60.0, 40.0], Qx=[12.0, 0.0, -12.0], Qy=[0.0, 15.0, -5.0])
+    contact = interface(BALL, SPHERE, Drive.by_forces("held"), method="full")
+    state, _ = contact.begin(CycleLoads(loads, np.zeros((3, 2, 400))), 1e4)
+    for _ in range(2):
+        state, _ = contact.jump(state, 5e3, 5e3)
+    volume = state.surfaces.depth.sum() * BALL.cell_area
+    assert state.energy > 0.0
+    assert volume == pytest.approx(2.0 * 1e-8 * state.energy, rel=1e-9)
+
+
+def test_more_shear_than_friction_carries_is_told() -> None:
+    loads = loads_of(P=[40.0, 40.0], Qx=[21.0, -21.0])
+    contact = interface(BALL, SPHERE, Drive.by_forces("held"), method="full")
+    history = CycleLoads(loads, np.zeros((2, 2, 400)))
+    with pytest.raises(ContactFailure, match="increment 1: friction cannot carry Qx = 21 N"):
+        contact.begin(history, 1.0)
+    weaker = replace(history, loads=loads_of(P=[40.0, 40.0], Qx=[19.0, -19.0]))
+    assert contact.begin(weaker, 1.0)[1].energy.sum() > 0.0

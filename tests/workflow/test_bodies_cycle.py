@@ -1,0 +1,130 @@
+"""Bodies that wear under legs or a file: the case, its loads, and what a run of it finds."""
+
+import json
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+from tests.workflow.commands import command
+from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, LineBodiesWearCase
+from workflow.analyses.wear.structures.bodies.source import BodiesSource
+from workflow.case.writing import dump_case
+from workflow.errors import CaseError
+from workflow.kinds import parse_case, template
+
+AREA, LINE = template("bodies_wear"), template("line_wear")
+SMALL = ["contact.grid=[24, 24]", "contact.size=[1 mm, 1 mm]", "contact.method=full"]
+FORCED = "{legs: [{P: 50 N, Qx: 10 N, increments: 2}, {Qx: -10 N, increments: 4}]}"
+NO_STRESS = "stress={section: none, life: {parameter: none}}"
+PLAIN = [NO_STRESS, "output.figures=false", "output.paraview=false"]
+
+
+def area(load_path: str, *overrides: str) -> BodiesWearCase:
+    case = parse_case(AREA, "area.yaml", [*SMALL, f"load_path={load_path}", *overrides])
+    assert isinstance(case, BodiesWearCase)
+    return case
+
+
+def run(case: BodiesWearCase | LineBodiesWearCase, folder: Path) -> dict[str, Any]:
+    path = folder.with_suffix(".yaml")
+    path.write_text(dump_case(case), encoding="utf-8")
+    assert command("run", path, "--out", folder).exit_code == 0
+    summary: dict[str, Any] = json.loads((folder / "summary.json").read_text())
+    return summary
+
+
+def test_legs_begin_where_the_last_one_ends() -> None:
+    """A constant force needs to be named once; Qx swings between its two ends."""
+    case = area(FORCED)
+    assert parse_case(dump_case(case), "dump") == case
+    source = BodiesSource(case)
+    (cycle,) = source.unworn()
+    np.testing.assert_allclose(cycle.loads.P, 50.0)
+    np.testing.assert_allclose(cycle.loads.Qx, [0.0, 10.0, 5.0, 0.0, -5.0, -10.0], atol=1e-12)
+    assert not cycle.slip.any()
+    assert source.peak == 1
+    assert source.drive.motion == (False, False, False, True, True, True)
+    free = BodiesSource(area(FORCED.replace("]}", "], tilt: free}")))
+    assert free.drive.motion == (False, False, False, False, False, True)
+
+
+def test_a_file_says_the_same_as_legs(tmp_path: Path) -> None:
+    legs = BodiesSource(area(FORCED))
+    columns = legs.unworn()[0].loads
+    rows = "\n".join(f"{P},{Qx}" for P, Qx in zip(columns.P, columns.Qx, strict=True))
+    (tmp_path / "cycle.csv").write_text(f"P,Qx\n{rows}\n")
+    text = str(tmp_path / "case.yaml")
+    case = parse_case(AREA, text, [*SMALL, "load_path={file: cycle.csv}"])
+    np.testing.assert_array_equal(
+        BodiesSource(case).drive.values(columns), legs.drive.values(columns)
+    )
+
+
+@pytest.mark.parametrize("method", ["normal", "full"])
+def test_a_stroke_is_legs_of_motion(tmp_path: Path, method: str) -> None:
+    """To and fro about where the bodies met: the same worn depths."""
+    legs = (
+        "{legs: [{P: 50, shift_x: 25 um, shift_y: 0, increments: 2}, "
+        "{shift_x: -25 um, increments: 2}]}"
+    )
+    settings = [f"contact.method={method}", "wear.cycles=200", "wear.step.cycles=100", *PLAIN]
+    depths = {}
+    for name, path in (("stroke", "{P: 50, stroke: 50 um, increments: 2}"), ("legs", legs)):
+        run(area(path, *settings), tmp_path / name)
+        with h5py.File(tmp_path / name / "results.h5") as file:
+            depths[name] = file["surfaces/interface/00002/body_2"][()]
+    # Legs begin with the way back: a cycle has no beginning, but steps wear one after the other.
+    scale = np.ptp(depths["stroke"] - depths["stroke"].min())
+    assert scale > 0.0
+    np.testing.assert_allclose(depths["legs"], depths["stroke"], atol=1e-2 * scale)
+
+
+@pytest.mark.parametrize(
+    ("load_path", "overrides", "words"),
+    [
+        ("{legs: [{P: 5, Qx: 1}], P: 5}", (), "unknown key; allowed: legs, file, tilt"),
+        ("{legs: [{P: 5}], stroke: 1 um}", (), "unknown key; allowed: P, stroke, direction"),
+        ("{legs: [{Qx: 1}]}", (), "neither P nor approach is given"),
+        ("{legs: [{P: 0, shift_x: 1 um}]}", (), "nothing presses the bodies together"),
+        (FORCED, ("contact.method=normal",), "load_path has Qx; allowed: full"),
+        ("{legs: [{P: 5}]}", ("contact.method=normal",), "load_path moves nothing along the face"),
+        ("{legs: [{P: 5, bulk_stress_1: 9}]}", ("materials.body_1=rigid", NO_STRESS), "rigid"),
+        (FORCED, ("materials.body_1=rigid",), "stress under a contact is found in both bodies"),
+        ("{legs: [{approach: 1 um}]}", ("loops.amplitude=1 um",), "loops run under a normal force"),
+        ("{legs: [{P: 5, shift_x: 1 mm}, {shift_x: -1 mm}]}", (), "2 mm: the grid reaches over 1"),
+    ],
+)
+def test_what_makes_no_sense_is_refused(load_path: str, overrides: tuple[str], words: str) -> None:
+    with pytest.raises(CaseError) as refusal:
+        area(load_path, *overrides)
+    assert words in str(refusal.value)
+
+
+def test_friction_that_does_not_carry_the_force_ends_the_run(tmp_path: Path) -> None:
+    """Where forces are imposed nothing says how far bodies would slide: a line that says so."""
+    case = area(FORCED.replace("10 N", "30 N"), *PLAIN)
+    path = tmp_path / "case.yaml"
+    path.write_text(dump_case(case), encoding="utf-8")
+    result = command("run", path, "--out", tmp_path / "out")
+    assert result.exit_code == 3
+    assert "friction cannot carry Qx" in result.output
+
+
+def test_a_rigid_punch_held_at_its_approach_wears_itself_free(tmp_path: Path) -> None:
+    """An elastic cylinder on a rigid flat: the force falls, and what it was is Hertz's."""
+    text = [
+        "materials.body_1=rigid",
+        "contact={grid: [128, 1], size: 2 mm, method: normal}",
+        "load_path={legs: [{P: 50 N/mm, shift_x: 20 um}, {shift_x: -20 um}]}",
+        *("wear.cycles=100", "wear.step.cycles=50", *PLAIN),
+    ]
+    case = parse_case(LINE, "line.yaml", text)
+    assert isinstance(case, LineBodiesWearCase)
+    found = run(case, tmp_path / "out")["interface"]
+    modulus = 115e3 / (1.0 - 0.29**2)
+    hertz = np.sqrt(50.0 * modulus / (np.pi * 10.0))
+    assert found["peak_pressure"]["unworn"] == pytest.approx(hertz, rel=5e-3)
+    assert found["depth_2"] > 0.0
