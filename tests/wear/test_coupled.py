@@ -34,6 +34,7 @@ from wear.coupled import (
     Stop,
 )
 from wear.evolution import EnergyTable
+from wear.drive import Drive
 from wear.face_loads import CycleLoads
 from wear.interface import InterfaceContact, InterfaceSettings, InterfaceState, MotionError
 from wear.laws import EnergyLaw, EvolvingLaw
@@ -403,18 +404,21 @@ def same(one: InterfaceState, other: InterfaceState) -> None:
 def test_going_on_from_any_state_ends_bit_for_bit_alike(method: str) -> None:
     """Two contacts under loads that drift, with contacts and source made anew."""
     loads, control = (LOAD, 0.6 * LOAD), ErrorControl(0.02)
-    contacts = [
-        patch(
-            name=name, method=method, stepper=ImplicitStepper(control), driven=True, tolerance=1e-8
-        )
-        for name in ("left", "right")
-    ]
-    settings = CoupledSettings(0.3 * SCALE, drift=0.05)
-    states = run(settings, falling(*loads), contacts)
+    motions = np.zeros((2, 6))
+    motions[:, 1] = [-0.25 * SLIP, 0.25 * SLIP]
+    settings = {
+        "method": method,
+        "stepper": ImplicitStepper(control),
+        "drive": Drive((False, True, True, False, False, True), motions),
+        "tolerance": 1e-8,
+    }
+    contacts = [patch(name=name, **settings) for name in ("left", "right")]
+    coupling = CoupledSettings(0.3 * SCALE, drift=0.05)
+    states = run(coupling, falling(*loads), contacts)
     assert len(states) > 3
     assert states[-1].solutions > 1
     for begun in states[:-1]:
-        loop = CoupledWear(settings, falling(*loads), in_turn(contacts))
+        loop = CoupledWear(coupling, falling(*loads), in_turn(contacts))
         *_, end = loop.march(begun)
         for name in ("cycles", "kinetics", "drift", "solved_resultants"):
             np.testing.assert_array_equal(getattr(end, name), getattr(states[-1], name))

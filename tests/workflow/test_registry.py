@@ -217,7 +217,7 @@ class StampLoads:
         face = Face("foot", Frame(np.zeros(3), np.eye(3)), corners, facets)
         size = 2.0 * HALF_WIDTH, 2.0 * HALF_WIDTH
         gap = partial(rounded, self._case.structure.radius)
-        return (ContactFace(face, size, gap, (8, 8), driven=True),)
+        return (ContactFace(face, size, gap, (8, 8)),)
 
     def prepare(self) -> None:
         """Nothing is costly."""
