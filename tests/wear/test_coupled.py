@@ -33,8 +33,8 @@ from wear.coupled import (
     Observer,
     Stop,
 )
-from wear.evolution import EnergyTable
 from wear.drive import Drive
+from wear.evolution import EnergyTable
 from wear.face_loads import CycleLoads
 from wear.interface import InterfaceContact, InterfaceSettings, InterfaceState, MotionError
 from wear.laws import EnergyLaw, EvolvingLaw
