@@ -6,7 +6,6 @@ import shutil
 import subprocess
 import sys
 from dataclasses import replace
-from multiprocessing import resource_tracker, spawn
 
 import h5py
 import pytest
@@ -272,7 +271,7 @@ def test_method_that_fails_later_says_how_to_go_on(start, resume, whole, monkeyp
 # --- workers ------------------------------------------------------------------------------------
 
 
-def die(connection, code):
+def die(messages, answers, code):
     """A worker that is killed."""
     os._exit(code)
 
@@ -281,8 +280,8 @@ def die(connection, code):
 def test_worker_that_dies_is_one_line():
     from workflow.errors import MethodFailed
 
-    with workers._processes(die, [(9,)]) as connections, pytest.raises(MethodFailed, match="gone"):
-        workers._answers(connections)
+    with workers._processes(die, [(9,)]) as processes, pytest.raises(MethodFailed, match="gone"):
+        workers._answers(processes)
 
 
 @posix_only
@@ -290,8 +289,7 @@ def test_worker_killed_before_its_first_word_is_one_line(monkeypatch):
     """It ends while it is told what to do: a large setting does not go into the pipe at once."""
     from workflow.errors import MethodFailed
 
-    resource_tracker.ensure_running()
-    monkeypatch.setattr(spawn, "_python_exe", b"/bin/true")
+    monkeypatch.setattr(sys, "executable", "/bin/true")
     with pytest.raises(MethodFailed, match="a process of the run has gone"):
         workers.side_by_side([(len, (b"",)), (len, (bytes(1_000_000),))])
 
@@ -308,13 +306,8 @@ def test_worker_that_cannot_be_set_up_says_why(separate_processes):
 
 @posix_only
 def test_workers_are_born_deaf_to_ctrl_c():
-    """From their first instruction, the first of a process included."""
-    code = """
-import signal
-from workflow.shell.processes import _answers, _do, _processes
-ask = signal.pthread_sigmask, (signal.SIG_BLOCK, ())
-with _processes(_do, [ask, ask]) as connections:
-    assert all(signal.SIGINT in mask for mask in _answers(connections))
-assert signal.SIGINT not in signal.pthread_sigmask(signal.SIG_BLOCK, ())
-"""
-    subprocess.run([sys.executable, "-c", code], check=True, timeout=PATIENCE)
+    """From their first instruction: the terminal sends it to the session of the parent."""
+    ask = os.getsid, (0,)
+    with workers._processes(workers._do, [ask, ask]) as processes:
+        sessions = workers._answers(processes)
+    assert len({os.getsid(0), *sessions}) == 3

@@ -18,6 +18,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
+from fe_models.interpreter import python_running
 from sa_solver.errors import FretscaleError
 from workflow.case.sections import Case
 from workflow.errors import MethodFailed, UserError, one_line
@@ -28,8 +29,6 @@ from workflow.shell.processes import THREAD_SETTINGS
 
 # Seconds between two looks at whether a run is still wanted.
 LOOK = 0.2
-# What the process runs; its only argument is the job.
-COMMAND = "from workflow.runs.job import main; main()"
 
 
 @dataclass(frozen=True)
@@ -107,7 +106,7 @@ def run_job(
     theirs, lifeline = os.pipe()
     try:
         process = subprocess.Popen(
-            [sys.executable, "-c", COMMAND, json.dumps(arguments)],
+            [*python_running(__name__), json.dumps(arguments)],
             stdin=theirs,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

@@ -1,36 +1,75 @@
 """Processes beside the main one: workers that answer calls, and jobs side by side.
 
-A process of ours ends with its parent, however the parent ends, and leaves Ctrl-C to it.
+A process of ours ends with its parent, however the parent ends, and leaves Ctrl-C to it. It is a
+fresh Python that is told over its stdin what to do and answers on its stdout: multiprocessing would
+run the parent's ``__main__`` again, which may have no guard, or be a notebook.
 """
 
 from __future__ import annotations
 
-import multiprocessing
 import os
+import pickle
 import signal
+import subprocess
 import threading
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, contextmanager
-from multiprocessing import resource_tracker
-from multiprocessing.connection import Connection, wait
-from multiprocessing.context import SpawnProcess
-from typing import Any
+from contextlib import contextmanager
+from queue import SimpleQueue
+from typing import Any, BinaryIO
 
+from fe_models.interpreter import python_running
 from workflow.errors import MethodFailed
 
 # The workers share the cores among themselves; threads inside each would fight over them.
 THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+# Bytes that say how long a message is.
+LENGTH = 8
 
 
 Answering = Callable[..., Any]
 """What a worker is: given a method's name and its arguments, it answers."""
 
 
+class Process:
+    """A process of ours, from the side of its parent; of ``one_thread`` if so."""
+
+    def __init__(self, one_thread: bool = False) -> None:
+        self._process = subprocess.Popen(
+            python_running(__name__),
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            env=os.environ | (dict.fromkeys(THREAD_SETTINGS, "1") if one_thread else {}),
+            start_new_session=True,
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._questions, self._answers = self._process.stdin, self._process.stdout
+
+    def tell(self, *message: Any) -> None:
+        """Say what to do. Raises :class:`MethodFailed` if it is gone."""
+        try:
+            _write(self._questions, message)
+        except OSError as error:
+            raise _gone(error) from error
+
+    def answer(self) -> Any:
+        """Wait for its next answer. Raises :class:`MethodFailed` if it is gone."""
+        try:
+            return pickle.loads(_read(self._answers))
+        except (EOFError, OSError) as error:
+            raise _gone(error) from error
+
+    def end(self) -> None:
+        """End it, busy or not."""
+        self._process.kill()
+        self._process.communicate()
+
+
 class Workers:
     """Objects in processes of their own, called all together."""
 
-    def __init__(self, connections: list[Connection]) -> None:
-        self._connections = connections
+    def __init__(self, processes: list[Process]) -> None:
+        self._processes = processes
 
     def call(self, method: str, *arguments: Sequence[Any]) -> list[Any]:
         """Call a method of every worker, each with its own share of the ``arguments``.
@@ -38,13 +77,10 @@ class Workers:
         Raises what one of them raised, once all have answered; :class:`MethodFailed` if one is
         gone.
         """
-        try:
-            shares = zip(*arguments, strict=True)
-            for connection, share in zip(self._connections, shares, strict=True):
-                connection.send((method, share))
-        except OSError as error:
-            raise _gone(error) from error
-        return _answers(self._connections)
+        shares = zip(*arguments, strict=True)
+        for process, share in zip(self._processes, shares, strict=True):
+            process.tell(method, share)
+        return _answers(self._processes)
 
 
 @contextmanager
@@ -55,8 +91,8 @@ def workers(make: Callable[[Any], Answering], settings: Sequence[Any]) -> Iterat
     """
     with _processes(
         _serve, [(make, setting) for setting in settings], one_thread=True
-    ) as connections:
-        yield Workers(connections)
+    ) as processes:
+        yield Workers(processes)
 
 
 def side_by_side(jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]]) -> None:
@@ -65,93 +101,31 @@ def side_by_side(jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]]) -> 
     Raises what one of them raised.
     """
     (here, arguments), *others = jobs
-    with _processes(_do, others) as connections:
+    with _processes(_do, others) as processes:
         here(*arguments)
-        _answers(connections)
+        _answers(processes)
 
 
 @contextmanager
 def _processes(
     target: Callable[..., None], arguments: Sequence[tuple[Any, ...]], one_thread: bool = False
-) -> Iterator[list[Connection]]:
-    """Processes that run ``target`` with their end of a pipe; ended, busy or not, at the end."""
-    context = multiprocessing.get_context("spawn")
-    connections: list[Connection] = []
-    processes: list[SpawnProcess] = []
+) -> Iterator[list[Process]]:
+    """Processes that run ``target``; ended, busy or not, at the end."""
+    processes: list[Process] = []
     try:
-        with ExitStack() as stack:
-            if one_thread:
-                stack.enter_context(environment(dict.fromkeys(THREAD_SETTINGS, "1")))
-            stack.enter_context(_interrupts_held())
-            for _ in arguments:
-                ours, theirs = context.Pipe()
-                process = context.Process(target=_run, args=(target, theirs), daemon=True)
-                process.start()
-                theirs.close()
-                connections.append(ours)
-                processes.append(process)
-        # Python itself would wait forever for a process that is killed before it has read them.
-        for connection, parts in zip(connections, arguments, strict=True):
-            try:
-                connection.send(parts)
-            except OSError as error:
-                raise _gone(error) from error
-        yield connections
+        for _ in arguments:
+            processes.append(Process(one_thread))
+        for process, parts in zip(processes, arguments, strict=True):
+            process.tell(target, parts)
+        yield processes
     finally:
-        for connection in connections:
-            connection.close()
         for process in processes:
-            process.terminate()
-            process.join()
+            process.end()
 
 
-def _run(target: Callable[..., None], connection: Connection) -> None:
-    """First thing in a new process: leave Ctrl-C to the parent, and end when it ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    threading.Thread(target=_end_with_parent, daemon=True).start()
-    try:
-        target(connection, *connection.recv())
-    except (EOFError, BrokenPipeError):
-        return
-
-
-def _end_with_parent() -> None:
-    parent = multiprocessing.parent_process()
-    assert parent is not None
-    wait([parent.sentinel])
-    os._exit(1)
-
-
-def _serve(connection: Connection, make: Callable[[Any], Answering], settings: Any) -> None:
-    """Answer calls until the other end of the pipe closes."""
-    answering = _attempt(make, (settings,))
-    while True:
-        method, arguments = connection.recv()
-        if isinstance(answering, Exception):
-            connection.send(answering)
-        else:
-            connection.send(_attempt(answering, (method, *arguments)))
-
-
-def _do(connection: Connection, function: Callable[..., Any], arguments: tuple[Any, ...]) -> None:
-    """Run a function and answer once, with what it returned or raised."""
-    connection.send(_attempt(function, arguments))
-
-
-def _attempt(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
-    """What the function returned or, as a value, what it raised."""
-    try:
-        return function(*arguments)
-    except Exception as error:
-        return error
-
-
-def _answers(connections: list[Connection]) -> list[Any]:
+def _answers(processes: list[Process]) -> list[Any]:
     """An answer from every process; raises the first that is an exception."""
-    try:
-        answers = [connection.recv() for connection in connections]
-    except (EOFError, OSError) as error:
-        raise _gone(error) from error
+    answers = [process.answer() for process in processes]
     for answer in answers:
         if isinstance(answer, Exception):
             raise answer
@@ -164,19 +138,88 @@ def _gone(error: Exception) -> MethodFailed:
     )
 
 
-@contextmanager
-def _interrupts_held() -> Iterator[None]:
-    """Hold Ctrl-C back; processes started within never see it, not even while they import."""
-    if not hasattr(signal, "pthread_sigmask"):  # Windows
-        yield
-        return
-    # It starts with the first process, and lets Ctrl-C through again when it has.
-    resource_tracker.ensure_running()
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+# --- messages: their length, and what pickle makes of them ---------------------------------------
+
+
+def _write(stream: BinaryIO, message: Any) -> None:
+    data = pickle.dumps(message)
+    stream.write(len(data).to_bytes(LENGTH, "little"))
+    stream.write(data)
+    stream.flush()
+
+
+def _read(stream: BinaryIO) -> bytes:
+    """A message that is not unpickled yet. Raises EOFError where the other end has gone."""
+    length = int.from_bytes(_bytes(stream, LENGTH), "little")
+    return _bytes(stream, length)
+
+
+def _bytes(stream: BinaryIO, number: int) -> bytes:
+    data = stream.read(number)
+    if len(data) < number:
+        raise EOFError
+    return data
+
+
+# --- in the process -------------------------------------------------------------------------------
+
+
+def main() -> None:
+    """Do what is told on stdin, and leave Ctrl-C to the parent."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    # Whatever a library prints is no part of the answer.
+    answers = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    messages: SimpleQueue[bytes] = SimpleQueue()
+    threading.Thread(target=_listen, args=(messages,), daemon=True).start()
+    # Here, for what is imported with a message may want to be in the main thread.
+    target, parts = pickle.loads(messages.get())
+    target(messages, answers, *parts)
+
+
+def _listen(messages: SimpleQueue[bytes]) -> None:
+    """Take in what the parent says; end when it ends, however busy this process is."""
+    # Not sys.stdin, whose lock the end of this process would wait for.
+    with os.fdopen(os.dup(0), "rb") as questions:
+        try:
+            while True:
+                messages.put(_read(questions))
+        finally:
+            os._exit(1)
+
+
+def _serve(
+    messages: SimpleQueue[bytes],
+    answers: BinaryIO,
+    make: Callable[[Any], Answering],
+    settings: Any,
+) -> None:
+    """Answer calls, one after the other."""
+    answering = _attempt(make, (settings,))
+    while True:
+        method, arguments = pickle.loads(messages.get())
+        if isinstance(answering, Exception):
+            _write(answers, answering)
+        else:
+            _write(answers, _attempt(answering, (method, *arguments)))
+
+
+def _do(
+    messages: SimpleQueue[bytes],
+    answers: BinaryIO,
+    function: Callable[..., Any],
+    arguments: tuple[Any, ...],
+) -> None:
+    """Run a function and answer once, with what it returned or raised."""
+    _write(answers, _attempt(function, arguments))
+
+
+def _attempt(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:
+    """What the function returned or, as a value, what it raised."""
     try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        return function(*arguments)
+    except Exception as error:
+        return error
 
 
 @contextmanager
