@@ -17,9 +17,10 @@ from contextlib import suppress
 from pathlib import Path
 
 from fe_models.geometry.grouped import GroupedMesh
-from fe_models.interpreter import python_running
+from fe_models.interpreter import fresh_python
 from fe_models.mesh import MeshError
 
+COMMAND = "from fe_models.geometry.apart import main; main()"
 # Exit code of a process that got signal 9, as the system sends it where memory runs out.
 KILLED = -9
 
@@ -31,7 +32,7 @@ def read_apart(read: Callable[..., GroupedMesh], path: Path, *arguments: float) 
     """
     # Its stdin stays open as long as this process lives; what it says besides is no answer.
     with subprocess.Popen(
-        python_running(__name__),
+        fresh_python(COMMAND),
         bufsize=0,
         stdin=subprocess.PIPE,
         stdout=subprocess.PIPE,

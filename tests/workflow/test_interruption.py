@@ -3,7 +3,6 @@
 import os
 import re
 import shutil
-import subprocess
 import sys
 from dataclasses import replace
 
@@ -13,7 +12,6 @@ import pytest
 import wear.coupled
 import workflow.analyses.wear.run
 from tests.workflow.interruptions import (
-    PATIENCE,
     assert_equal,
     ctrl_c_after_jumps,
     jumps_kept,

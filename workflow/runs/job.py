@@ -18,7 +18,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from fe_models.interpreter import python_running
+from fe_models.interpreter import fresh_python
 from sa_solver.errors import FretscaleError
 from workflow.case.sections import Case
 from workflow.errors import MethodFailed, UserError, one_line
@@ -29,6 +29,8 @@ from workflow.shell.processes import THREAD_SETTINGS
 
 # Seconds between two looks at whether a run is still wanted.
 LOOK = 0.2
+# What the process runs; its only argument is the job.
+COMMAND = "from workflow.runs.job import main; main()"
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,7 @@ def run_job(
     theirs, lifeline = os.pipe()
     try:
         process = subprocess.Popen(
-            [*python_running(__name__), json.dumps(arguments)],
+            [*fresh_python(COMMAND), json.dumps(arguments)],
             stdin=theirs,
             stdout=subprocess.PIPE,
             stderr=subprocess.PIPE,

@@ -17,11 +17,12 @@ from contextlib import contextmanager
 from queue import SimpleQueue
 from typing import Any, BinaryIO
 
-from fe_models.interpreter import python_running
+from fe_models.interpreter import fresh_python
 from workflow.errors import MethodFailed
 
 # The workers share the cores among themselves; threads inside each would fight over them.
 THREAD_SETTINGS = ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS")
+COMMAND = "from workflow.shell.processes import main; main()"
 # Bytes that say how long a message is.
 LENGTH = 8
 
@@ -35,7 +36,7 @@ class Process:
 
     def __init__(self, one_thread: bool = False) -> None:
         self._process = subprocess.Popen(
-            python_running(__name__),
+            fresh_python(COMMAND),
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             env=os.environ | (dict.fromkeys(THREAD_SETTINGS, "1") if one_thread else {}),
