@@ -12,10 +12,14 @@ from importlib import import_module
 
 
 def lazy_names(
-    package: str, modules: Mapping[str, Sequence[str]]
+    package: str, modules: Mapping[str, Sequence[str]], within: str = ""
 ) -> tuple[Callable[[str], object], Callable[[], list[str]]]:
-    """``__getattr__`` and ``__dir__`` of a ``package`` that offers names of its ``modules``."""
-    homes = {name: f"{package}.{module}" for module, names in modules.items() for name in names}
+    """``__getattr__`` and ``__dir__`` of a ``package`` that offers names of its ``modules``.
+
+    The modules may lie ``within`` another package.
+    """
+    home = within or package
+    homes = {name: f"{home}.{module}" for module, names in modules.items() for name in names}
 
     def find(name: str) -> object:
         if name not in homes:

@@ -23,6 +23,9 @@ KeyPath = tuple[str | int, ...]
 # Keys that a message has as they are.
 WORD = r"\w(?:[\w -]{0,58}\w)?"
 
+# In the place of the file of a case that is the data of a program, and has no lines.
+IN_PYTHON = "the case"
+
 LARGEST_FILE = 1_000_000  # bytes; cases have a few thousand
 MOST_ENTRIES = 10_000  # after expanding YAML aliases, which can grow without bound
 DEEPEST = 20  # levels; a case has four
@@ -44,9 +47,9 @@ class Source:
         reading = _Reading(name)
         data = reading.plain(parse_yaml(text, name), (), 1)
         if data is None:
-            raise CaseError(f"{name}:1: empty; allowed: a case (see `fretscale new`)")
+            raise CaseError(f"{_place(name, 1)}: empty; allowed: a case (see `fretscale new`)")
         if not isinstance(data, dict):
-            raise CaseError(f"{name}:1: {shown(data)}: not a case; allowed: key: value")
+            raise CaseError(f"{_place(name, 1)}: {shown(data)}: not a case; allowed: key: value")
         self.data: dict[str, Any] = data
         self._lines = reading.lines
         for override in overrides:
@@ -62,8 +65,8 @@ class Source:
             if part in self._overrides:
                 return 0, f"--set {self._overrides[part]}"
             if part in self._lines:
-                return self._lines[part], f"{self.name}:{self._lines[part]}"
-        return 1, f"{self.name}:1"
+                return self._lines[part], _place(self.name, self._lines[part])
+        return 1, _place(self.name, 1)
 
     def is_override(self, path: KeyPath) -> bool:
         """Whether ``path``, or a section around it, was set by an override."""
@@ -210,8 +213,8 @@ def _marked(error: MarkedYAMLError, name: str) -> str:
 
 
 def _place(name: str, line: int) -> str:
-    """File and line; an override has no lines."""
-    return name if name.startswith("--set ") else f"{name}:{line}"
+    """File and line; what is no file has no lines."""
+    return name if name == IN_PYTHON or name.startswith("--set ") else f"{name}:{line}"
 
 
 def _problem(error: MarkedYAMLError, text: str) -> str:

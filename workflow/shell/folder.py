@@ -201,9 +201,18 @@ class OutputFolder:
     def check_finished(self, case: Mapping[str, Any]) -> None:
         """Raise UserError unless a finished run is as it was left, and of the values of a case."""
         for name, kept in self.read_summary()[DIGESTS].items():
-            path = self.root / name
-            if kept != (json_digest(case) if path == self.case else file_digest(path)):
-                raise UserError(f"{path}: not as the run in {self.root} had it; {self.again}")
+            self._check(name, kept, case)
+
+    def check_results(self, case: Mapping[str, Any]) -> None:
+        """The same of its case and results; of its input files only their paths may be left."""
+        digests = self.read_summary()[DIGESTS]
+        for path in (self.case, self.results):
+            self._check(path.name, digests.get(path.name), case)
+
+    def _check(self, name: str, kept: str | None, case: Mapping[str, Any]) -> None:
+        path = self.root / name
+        if kept != (json_digest(case) if path == self.case else file_digest(path)):
+            raise UserError(f"{path}: not as the run in {self.root} had it; {self.again}")
 
     @property
     def again(self) -> str:

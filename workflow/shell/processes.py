@@ -15,7 +15,7 @@ import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from queue import SimpleQueue
-from typing import Any, BinaryIO
+from typing import IO, Any
 
 from fe_models.interpreter import fresh_python
 from workflow.errors import MethodFailed
@@ -142,20 +142,20 @@ def _gone(error: Exception) -> MethodFailed:
 # --- messages: their length, and what pickle makes of them ---------------------------------------
 
 
-def _write(stream: BinaryIO, message: Any) -> None:
+def _write(stream: IO[bytes], message: Any) -> None:
     data = pickle.dumps(message)
     stream.write(len(data).to_bytes(LENGTH, "little"))
     stream.write(data)
     stream.flush()
 
 
-def _read(stream: BinaryIO) -> bytes:
+def _read(stream: IO[bytes]) -> bytes:
     """A message that is not unpickled yet. Raises EOFError where the other end has gone."""
     length = int.from_bytes(_bytes(stream, LENGTH), "little")
     return _bytes(stream, length)
 
 
-def _bytes(stream: BinaryIO, number: int) -> bytes:
+def _bytes(stream: IO[bytes], number: int) -> bytes:
     data = stream.read(number)
     if len(data) < number:
         raise EOFError
@@ -191,7 +191,7 @@ def _listen(messages: SimpleQueue[bytes]) -> None:
 
 def _serve(
     messages: SimpleQueue[bytes],
-    answers: BinaryIO,
+    answers: IO[bytes],
     make: Callable[[Any], Answering],
     settings: Any,
 ) -> None:
@@ -207,7 +207,7 @@ def _serve(
 
 def _do(
     messages: SimpleQueue[bytes],
-    answers: BinaryIO,
+    answers: IO[bytes],
     function: Callable[..., Any],
     arguments: tuple[Any, ...],
 ) -> None:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +15,34 @@ from sa_solver.types import Frame, Grid
 from workflow.case.sections import Case
 from workflow.case.writing import dump_case
 from workflow.shell.analysis import Run
-from workflow.shell.dataset import Datasets, unit_in
+from workflow.shell.dataset import Dataset, Datasets, unit_in
 from workflow.shell.store import replacing_hdf5
 from workflow.shell.versions import versions
 
 # Datasets of more values are worth packing.
 LARGE = 4096
 PACKED = {"compression": "gzip", "compression_opts": 1}
+# Attribute of a dataset: the group that has the coordinates along its axes, if not its own.
+COORDINATES = "coordinates"
+# The last axes of a field on a grid.
+CELLS = "x", "y"
+
+
+@dataclass(frozen=True)
+class Along:
+    """Datasets as long as that of this name are curves over it: of their group, or with a path."""
+
+    name: str
+
+
+@dataclass(frozen=True)
+class On:
+    """Datasets whose last two axes are as long as those of the ``grid`` are fields on its cells.
+
+    It is the group that :meth:`ResultsWriter.put_grid` has written.
+    """
+
+    grid: str
 
 
 class ResultsWriter:
@@ -29,8 +51,14 @@ class ResultsWriter:
     def __init__(self, file: h5py.File, line: bool = False) -> None:
         self._file, self._line = file, line
 
-    def put(self, group: str, datasets: Datasets, /, **attributes: Any) -> None:
-        """Write a group, new or there already; attributes that are None are left out."""
+    def put(
+        self, group: str, datasets: Datasets, over: Along | On | None = None, /, **attributes: Any
+    ) -> None:
+        """Write a group, new or there already; attributes that are None are left out.
+
+        HDF5's labels of axes say what datasets are ``over``: they name datasets of the same group,
+        or of that in their attribute ``coordinates``.
+        """
         place = self._file.require_group(group)
         for name, dataset in datasets.items():
             packed = PACKED if np.size(dataset.values) > LARGE else {}
@@ -38,12 +66,36 @@ class ResultsWriter:
             written.attrs["unit"] = unit_in(self._line, dataset.unit)
             written.attrs["description"] = dataset.description
         place.attrs.update({name: value for name, value in attributes.items() if value is not None})
+        made = [place[name] for name in datasets]
+        if isinstance(over, On):
+            self._label_fields(made, over.grid)
+        elif isinstance(over, Along):
+            self._label_curves(made, place, over.name)
+
+    def _label_fields(self, made: Sequence[h5py.Dataset], grid: str) -> None:
+        shape = tuple(self._file[grid].attrs["shape"])
+        for dataset in made:
+            if dataset.shape[-2:] == shape:
+                dataset.dims[dataset.ndim - 2].label, dataset.dims[dataset.ndim - 1].label = CELLS
+                dataset.attrs[COORDINATES] = grid
+
+    def _label_curves(self, made: Sequence[h5py.Dataset], place: h5py.Group, along: str) -> None:
+        elsewhere, _, name = along.rpartition("/")
+        length = (self._file[elsewhere] if elsewhere else place)[name].shape
+        for dataset in made:
+            if dataset.shape[:1] == length:
+                dataset.dims[0].label = name
+                dataset.attrs.update({COORDINATES: elsewhere} if elsewhere else {})
 
     def put_grid(self, group: str, grid: Grid, frame: Frame | None = None) -> None:
-        """A grid and, where it is known, its place in space."""
+        """A grid, the centres of its cells and, where it is known, its place in space."""
         line = {"line": True} if grid.line else {}
         placed = {} if frame is None else {"origin": frame.origin, "axes": frame.axes}
-        self.put(group, {}, shape=grid.shape, pitch=grid.pitch, **line, **placed)
+        centres = {
+            "x": Dataset(grid.x[:, 0], "mm", "centres of the cells along x"),
+            "y": Dataset(grid.y[0], "mm", "centres of the cells along y"),
+        }
+        self.put(group, centres, shape=grid.shape, pitch=grid.pitch, **line, **placed)
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.contact.summary import loop_summary, slides, state_summaries, stick_zone
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset, described
-from workflow.shell.results import run_results
+from workflow.shell.results import Along, On, run_results
 from workflow.shell.summary import finish
 
 ContactRun = Run[BodiesCase]
@@ -66,13 +66,14 @@ def write_contact_results(outcome: ContactOutcome, run: ContactRun) -> None:
     height = Dataset(outcome.height, "mm", "gap before loading")
     with run_results(run, case, {"friction": friction}, grid.line) as writer:
         writer.put_grid(f"grid/{BODIES}", grid, Frame(np.zeros(3), np.eye(3)))
-        writer.put(f"surfaces/{BODIES}", {"height": height})
+        writer.put(f"surfaces/{BODIES}", {"height": height}, On(f"grid/{BODIES}"))
         writer.put("path", _path(outcome.table))
         method = {"method": history.method, "reason": history.reason, "parts": history.parts}
-        writer.put("history", _columns(history, friction), **method)
+        writer.put("history", _columns(history, friction), Along("increment"), **method)
         for index, state in zip(history.indices, history.states, strict=True):
             place = f"contact/{BODIES}/{index + 1:05d}"
-            writer.put(place, _fields(state, friction), increment=index + 1)
+            fields = _fields(state, friction)
+            writer.put(place, fields, On(f"grid/{BODIES}"), increment=index + 1)
 
 
 def _path(table: LoadTable) -> dict[str, Dataset]:

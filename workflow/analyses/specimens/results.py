@@ -28,7 +28,7 @@ from workflow.analyses.wear.datasets import cycles_column, face_mesh, kinetics_c
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset, described
 from workflow.shell.reporter import Reporter
-from workflow.shell.results import ResultsWriter, run_results
+from workflow.shell.results import Along, On, ResultsWriter, run_results
 from workflow.shell.store import replacing_hdf5
 from workflow.shell.summary import finish
 
@@ -100,7 +100,7 @@ def _write_results(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -> None:
 
 def _put_load(writer: ResultsWriter, group: str, load: LoadOutcome, areas: Array) -> None:
     writer.put(group, {}, normal_force=load.force, unit="N")
-    writer.put(f"{group}/kinetics", _kinetics(load.blocks, areas))
+    writer.put(f"{group}/kinetics", _kinetics(load.blocks, areas), Along("cycles"))
     for number, kept in enumerate(load.kept):
         name, loop = f"{group}/states/{number:05d}", masing_loop(kept.curve)
         numbers = {"cycles": kept.block.cycles, "energy": kept.block.energy}
@@ -110,7 +110,7 @@ def _put_load(writer: ResultsWriter, group: str, load: LoadOutcome, areas: Array
         name = f"{group}/half_space/{shape}"
         fields = beside.pressure, beside.shear, 4.0 * beside.slip
         first_loading = beside.displacement, beside.force
-        writer.put(name, described(PAD_FIELDS, fields))
+        writer.put(name, described(PAD_FIELDS, fields), On(f"grid/{PAD}"))
         writer.put(f"{name}/first_loading", described(RING_LOOP, first_loading))
     marched = load.marched.displacement, load.marched.force
     writer.put(f"{group}/coupled_cycle", described(RING_LOOP, marched))

@@ -9,6 +9,7 @@ from typing import Any
 from sa_solver.types import Array
 from workflow.analyses.time.case import JointCase, RigCase
 from workflow.shell.dataset import Dataset, Datasets
+from workflow.shell.results import Along
 
 # The parameters of a joint that evolve, in the order in which they are told.
 PARAMETERS = {
@@ -19,6 +20,13 @@ PARAMETERS = {
 }
 # Groups of curves of a state.
 LOOP, MOTION, RESPONSE, RING_DOWN = "loop", "motion", "frequency_response", "ring_down"
+# What they are over; a loop is over nothing.
+ALONG = {
+    LOOP: None,
+    MOTION: Along("time"),
+    RESPONSE: Along("frequency"),
+    RING_DOWN: Along("amplitude"),
+}
 
 
 @dataclass(frozen=True)

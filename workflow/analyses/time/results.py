@@ -6,12 +6,12 @@ from collections.abc import Iterator, Mapping
 from typing import Any
 
 from workflow.analyses.time.case import JointCase, RigCase, TimeCase, joules
-from workflow.analyses.time.outcome import MOTION, State, TimeOutcome
+from workflow.analyses.time.outcome import ALONG, MOTION, State, TimeOutcome
 from workflow.case.fields import in_unit_of
 from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
-from workflow.shell.results import run_results
+from workflow.shell.results import Along, run_results
 from workflow.shell.summary import finish, number_at
 from workflow.shell.tables import write_curves
 
@@ -38,14 +38,14 @@ def _write_results(outcome: TimeOutcome, run: TimeRun) -> None:
     case = outcome.case
     attributes = {"analysis": case.analysis, "law": case.joint.law, "seen": outcome.seen or None}
     with run_results(run, case, attributes) as writer:
-        writer.put(EVOLUTION, outcome.evolution)
+        writer.put(EVOLUTION, outcome.evolution, Along("energy"))
         for number, state in enumerate(outcome.states):
             place = f"states/{number:05d}"
             scalars = {k: v for k, v in state.numbers.items() if isinstance(v, int | float | list)}
             parameters = {"energy": state.energy, "cycles": state.cycles, **state.parameters}
             writer.put(place, {}, **(parameters | scalars))
             for group, curves in state.curves.items():
-                writer.put(f"{place}/{group}", curves)
+                writer.put(f"{place}/{group}", curves, ALONG[group])
 
 
 def _write_tables(outcome: TimeOutcome, folder: OutputFolder) -> None:

@@ -17,7 +17,7 @@ from workflow.analyses.vibration.outcome import (
 )
 from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
-from workflow.shell.results import ResultsWriter, run_results
+from workflow.shell.results import Along, ResultsWriter, run_results
 from workflow.shell.summary import finish
 from workflow.shell.tables import write_curves
 
@@ -43,15 +43,18 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
     attributes = {"analysis": case.analysis, "law": case.joint.law, "seen": list(outcome.labels)}
     with run_results(run, case, attributes) as writer:
         limits = {name: outcome.numbers[name] for name in ("free", "stuck", "sliding")}
-        writer.put("linear", outcome.linear, **limits)
+        writer.put("linear", outcome.linear, Along("frequency"), **limits)
         if outcome.contact is not None:
             writer.put("contact", outcome.contact)
         for number, response in enumerate(outcome.responses):
             _put_response(writer, f"{RESPONSES}/{number:05d}", response)
         if outcome.backbone is not None:
-            writer.put(BACKBONE, outcome.backbone.datasets, **outcome.backbone.numbers)
+            writer.put(
+                BACKBONE, outcome.backbone.datasets, Along("force"), **outcome.backbone.numbers
+            )
         for number, sweep in enumerate(outcome.force_sweeps):
-            writer.put(f"{FORCE_SWEEPS}/{number:05d}", sweep.datasets, **sweep.numbers)
+            place = f"{FORCE_SWEEPS}/{number:05d}"
+            writer.put(place, sweep.datasets, Along("force"), **sweep.numbers)
 
 
 def _put_response(writer: ResultsWriter, place: str, response: Response) -> None:
@@ -65,7 +68,8 @@ def _put_response(writer: ResultsWriter, place: str, response: Response) -> None
 
 def put_response_curves(writer: ResultsWriter, place: str, response: Response) -> None:
     """The curves of a response and its numbers."""
-    writer.put(place, response.curves, **{"force": response.force, **response.numbers})
+    numbers = {"force": response.force, **response.numbers}
+    writer.put(place, response.curves, Along("frequency"), **numbers)
 
 
 # --- tables -------------------------------------------------------------------------------------

@@ -20,7 +20,7 @@ from workflow.analyses.vibration_wear.outcome import (
 )
 from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
-from workflow.shell.results import run_results
+from workflow.shell.results import Along, On, run_results
 from workflow.shell.summary import finish
 from workflow.shell.tables import write_curves
 
@@ -53,12 +53,13 @@ def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None
             writer.put_grid("grid", outcome.grid)
         if outcome.places is not None:
             writer.put(PLACES, outcome.places)
-        writer.put(EVOLUTION, outcome.evolution)
+        writer.put(EVOLUTION, outcome.evolution, Along("cycles"))
         for number, state in enumerate(outcome.states):
             place = f"{WORN}/{number:05d}"
             writer.put(place, {}, **state.numbers)
+            on = None if outcome.grid is None else On("grid")
             for group, datasets in state.fields.items():
-                writer.put(f"{place}/{group}", datasets)
+                writer.put(f"{place}/{group}", datasets, on)
             for force, response in enumerate(state.responses):
                 put_response_curves(writer, f"{place}/{RESPONSES}/{force:05d}", response)
 

@@ -9,7 +9,7 @@ import numpy as np
 from sa_solver.contact import ContactState
 from sa_solver.types import LoadHistory
 from workflow.analyses.contact.datasets import load_columns, traction_fields
-from workflow.shell.results import ResultsWriter
+from workflow.shell.results import On, ResultsWriter
 
 # Increments shown, as shares of the way from the peak to the end of the cycle: 8, 12 and 15 of 22.
 SHOWN = 0.0, 2.0 / 7.0, 0.5
@@ -39,7 +39,7 @@ def write_comparison(
     for increment in sorted({peak + round(share * left) for share in SHOWN}):
         state = cycle[increment]
         fields = traction_fields(state.pressure, state.shear, state.slip)
-        writer.put(f"{group}/{increment:05d}", fields)
+        writer.put(f"{group}/{increment:05d}", fields, On(f"grid/{name}"))
 
 
 def comparison_summary(cycle: tuple[ContactState, ...], structure: LoadHistory) -> dict[str, Any]:

@@ -29,7 +29,7 @@ from workflow.analyses.wear.layout import MOMENTS
 from workflow.analyses.wear.load_source import BODIES
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
-from workflow.shell.results import ResultsWriter
+from workflow.shell.results import On, ResultsWriter
 
 # Share of the load whose shear may be unknown. A hole in the shear makes stress of the order of µp
 # at its rim, whatever its size; the cells at the edge of a sliding contact that find no slipping
@@ -121,7 +121,8 @@ class InterfaceStress:
         for moment, contact in self.moments.items():
             writer.put(f"{group}/{moment}", {"left_out": Dataset(contact.left_out, "1", LEFT_OUT)})
             for number, body in enumerate(contact.bodies, start=1):
-                writer.put(f"{group}/{moment}/body_{number}", body.maps)
+                on = On(f"grid/{self.name}")
+                writer.put(f"{group}/{moment}/body_{number}", body.maps, on)
         life = self.planes.settings.life
         attributes = {"parameter": life.parameter, "depth": life.depth, "bulk_stress": self.bulk}
         writer.put(group, {}, **attributes)

@@ -42,7 +42,7 @@ from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset
 from workflow.shell.folder import OutputFolder
 from workflow.shell.reporter import Reporter
-from workflow.shell.results import ResultsWriter, run_results
+from workflow.shell.results import Along, On, ResultsWriter, run_results
 from workflow.shell.store import read_arrays
 from workflow.shell.summary import finish
 
@@ -208,8 +208,9 @@ def _write_coarse(writer: ResultsWriter, contact: InterfaceOutcome, peak: int) -
     except NormalContactError:
         return False
     grid = stage.coarse_grid
-    shape = {"shape": grid.shape, "pitch": grid.pitch, "line": grid.line}
-    writer.put(f"contact/{stage.name}/coarse", {"pressure": pressure_field(pressure)}, **shape)
+    place = f"contact/{stage.name}/coarse"
+    writer.put_grid(place, grid)
+    writer.put(place, {"pressure": pressure_field(pressure)}, On(place))
     return True
 
 
@@ -228,8 +229,9 @@ def _write_jumps(
                 for kind, fields in JUMP_FIELDS.items()
             )
             place, pressure = f"{name}/{jump:05d}", tractions["pressure"]
-            writer.put(f"surfaces/{place}", surface_heights(**surfaces), cycles=cycles)
-            writer.put(f"contact/{place}", traction_fields(**tractions), cycles=cycles)
+            heights, fields = surface_heights(**surfaces), traction_fields(**tractions)
+            writer.put(f"surfaces/{place}", heights, On(f"grid/{name}"), cycles=cycles)
+            writer.put(f"contact/{place}", fields, On(f"grid/{name}"), cycles=cycles)
             peaks.area.append(np.count_nonzero(pressure > 0.0) * cell_area)
             peaks.pressure.append(float(pressure.max()))
     return recorded
@@ -247,7 +249,7 @@ def _write_kinetics(
             for quantity, regime in contact.regimes.items()
             for attribute, field in REGIME_ATTRIBUTES.items()
         }
-        writer.put(f"kinetics/{name}", columns, **regimes)
+        writer.put(f"kinetics/{name}", columns, Along("kinetics/cycles"), **regimes)
 
 
 def _summary(

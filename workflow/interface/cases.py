@@ -1,0 +1,116 @@
+"""Cases from files, dictionaries and other cases."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from workflow import kinds
+from workflow.case.sections import Case, Section
+from workflow.case.source import IN_PYTHON, dotted
+from workflow.case.writing import dump_case
+from workflow.errors import CaseError
+
+AnyCase = str | os.PathLike[str] | Mapping[str, Any] | Case
+"""A case: the path of its file, its entries as nested dictionaries, or one that was loaded."""
+
+# In the place of the dots of an entry, where it is the name of an argument.
+BETWEEN = "__"
+
+
+def load_case(case: AnyCase, /, **overrides: Any) -> Case:
+    """Read and check a case.
+
+    A dictionary has the entries of a case file; values are numbers in the base units (N, mm, s,
+    MPa, tonne) or texts with a unit, and files are looked for from the current folder. An override
+    is an entry with ``__`` for each dot: ``wear__cycles=1e6`` is what ``--set wear.cycles=1e6`` is
+    on the command line. Entries of lists, and those whose names are no words, go in as
+    ``**{"load_path.0.P": "2 kN"}``.
+
+    Returns the frozen case, its entries as attributes, in base units. Raises :class:`CaseError`,
+    a line for each thing wrong, in the words of the command.
+
+    >>> import fretscale
+    >>> case = fretscale.load_case("cases/sphere_normal.yaml", friction__coefficient=0.6)
+    >>> case.friction.coefficient
+    0.6
+    >>> try:
+    ...     fretscale.load_case({"analysis": "fretting"})
+    ... except fretscale.CaseError as error:
+    ...     print(error)
+    the case: analysis: 'fretting': not known; allowed: wear, contact, time, vibration
+    """
+    changes = [f"{key.replace(BETWEEN, '.')}={_text(value)}" for key, value in overrides.items()]
+    if isinstance(case, str | os.PathLike):
+        return kinds.load_case(os.fspath(case), changes)
+    if isinstance(case, Mapping):
+        return kinds.parse_case(json.dumps(_plain(case)), IN_PYTHON, changes)
+    if isinstance(case, Section):
+        return kinds.parse_case(dump_case(case), IN_PYTHON, changes) if changes else case
+    raise CaseError(
+        f"{IN_PYTHON}: of type {type(case).__name__}; allowed: the path of a file, a dictionary, "
+        "a case"
+    )
+
+
+@dataclass(frozen=True)
+class Check:
+    """What a case would run.
+
+    ``memory`` is the upper estimate of what it needs [bytes], ``seconds`` the order of magnitude of
+    its time [s], ``outline`` what would run by name.
+    """
+
+    title: str
+    outline: dict[str, str]
+    memory: float
+    seconds: float
+
+    def __str__(self) -> str:
+        memory = f"up to {self.memory / 1e9:.1f} GB"
+        rows = {**self.outline, "memory": memory, "seconds": f"about {self.seconds:.2g}"}
+        return "\n".join([self.title, *(f"  {name:<10} {text}" for name, text in rows.items())])
+
+
+def check(case: AnyCase, /, **overrides: Any) -> Check:
+    """What a case would run, in what memory and time; nothing is computed.
+
+    Takes what :func:`load_case` takes. Raises :class:`CaseError`; :class:`OutOfMemory` where the
+    machine has too little.
+
+    >>> import fretscale
+    >>> checked = fretscale.check("cases/sphere_normal.yaml")
+    >>> checked.seconds < 60.0
+    True
+    """
+    loaded = load_case(case, **overrides)
+    analysis = kinds.analysis_of(loaded)
+    memory, time = analysis.memory(loaded), analysis.run_time(loaded)
+    memory.check()
+    return Check(loaded.title, dict(loaded.outline()), memory.required, time.seconds)
+
+
+def _text(value: object) -> str:
+    """A value as one would write it behind ``--set key=``."""
+    return value if isinstance(value, str) else json.dumps(_plain(value))
+
+
+def _plain(value: Any, path: tuple[str | int, ...] = ()) -> Any:
+    """A value as JSON has it. Raises :class:`CaseError`."""
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if isinstance(value, Mapping):
+        return {str(key): _plain(below, (*path, str(key))) for key, below in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(below, (*path, number)) for number, below in enumerate(value)]
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    if hasattr(value, "tolist"):  # of numpy
+        return _plain(value.tolist(), path)
+    raise CaseError(
+        f"{IN_PYTHON}: {dotted(path)}: of type {type(value).__name__}; "
+        "allowed: number, text, True, False, list, dictionary"
+    )

@@ -1,0 +1,342 @@
+"""What lies in ``results.h5``, read when it is needed: as numpy, xarray and pandas have it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass
+from functools import cached_property
+from html import escape
+from importlib import import_module
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+from numpy.lib.mixins import NDArrayOperatorsMixin
+from numpy.typing import NDArray
+
+from workflow.errors import UserError
+from workflow.shell.results import COORDINATES
+
+if TYPE_CHECKING:
+    import pandas as pd
+    import xarray as xr
+
+# What tells numbered groups apart: the first that all have; else their number.
+TOLD_APART_BY = ("cycles", "increment", "force", "energy", "frequency")
+NUMBER = "number"
+
+
+@dataclass(frozen=True)
+class File:
+    """``results.h5`` as it was when it was opened, which another run may have replaced since."""
+
+    path: Path
+    written: tuple[int, ...]
+
+    @classmethod
+    def at(cls, path: Path) -> File:
+        return cls(path, _written(path))
+
+    @contextmanager
+    def reading(self) -> Iterator[h5py.File]:
+        """The file, open. Raises :class:`UserError` where it is not the same any more."""
+        if not self.path.exists() or _written(self.path) != self.written:
+            raise UserError(f"{self.path}: replaced or removed since it was opened; open it again")
+        with h5py.File(self.path) as file:
+            yield file
+
+
+def _written(path: Path) -> tuple[int, ...]:
+    status = path.stat()
+    return status.st_ino, status.st_size, status.st_mtime_ns
+
+
+class Values(NDArrayOperatorsMixin):
+    """A dataset: its ``values`` are read when they are needed, the rest is known at once.
+
+    Numpy takes it as the array that it is; ``[...]`` reads a part of it. ``unit`` is "1" for none.
+    ``dims`` are the names of its axes, "" for one without; ``coordinates`` their values by name.
+    """
+
+    def __init__(self, file: File, dataset: h5py.Dataset) -> None:
+        self._file = file
+        self.name: str = dataset.name.strip("/")
+        self.unit = str(dataset.attrs.get("unit", "1"))
+        self.description = str(dataset.attrs.get("description", ""))
+        self.shape: tuple[int, ...] = dataset.shape
+        self.dtype = dataset.dtype
+        self.dims = tuple(str(axis.label) for axis in dataset.dims)
+        above = self.name.rpartition("/")[0]
+        self._homes = (above, str(dataset.attrs.get(COORDINATES, above)))
+
+    def __getitem__(self, part: Any) -> Any:
+        with self._file.reading() as file:
+            return file[self.name][part]
+
+    @cached_property
+    def values(self) -> NDArray[Any]:
+        """All of it."""
+        return np.asarray(self[()])
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> NDArray[Any]:
+        return np.array(self.values, dtype=dtype, copy=copy)
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **settings: Any) -> Any:
+        plain = [item.values if isinstance(item, Values) else item for item in inputs]
+        return getattr(ufunc, method)(*plain, **settings)
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def __iter__(self) -> Iterator[Any]:
+        return iter(self.values)
+
+    def __float__(self) -> float:
+        return float(self.values)
+
+    @property
+    def ndim(self) -> int:
+        """Number of axes."""
+        return len(self.shape)
+
+    @property
+    def coordinates(self) -> dict[str, Values]:
+        """The datasets along its axes, by the names of these."""
+        found = {}
+        with self._file.reading() as file:
+            for dim in filter(None, self.dims):
+                paths = (f"{home}/{dim}" for home in self._homes)
+                there = [file[path] for path in paths if path in file]
+                if there:
+                    found[dim] = Values(self._file, there[0])
+        return found
+
+    def xarray(self) -> xr.DataArray:
+        """The same as an ``xarray.DataArray``. Raises :class:`UserError` without xarray."""
+        return _data_array(self)
+
+    def pandas(self) -> pd.Series:
+        """A curve as a ``pandas.Series`` over what it is along; :class:`UserError` for others."""
+        return _series(self)
+
+    def __repr__(self) -> str:
+        shape = ", ".join(
+            f"{dim} {n}" if dim else str(n) for dim, n in zip(self.dims, self.shape, strict=True)
+        )
+        unit = "" if self.unit == "1" else f" [{self.unit}]"
+        return f"{self.name} ({shape}){unit}: {self.description}"
+
+
+class Group(Mapping[str, "Group | Values"]):
+    """What lies under one name in ``results.h5``: groups and datasets, by name or path.
+
+    ``attributes`` are the numbers and texts that belong to it.
+    """
+
+    def __init__(self, file: File, name: str = "") -> None:
+        self._file, self.name = file, name
+
+    @contextmanager
+    def _reading(self) -> Iterator[h5py.Group]:
+        with self._file.reading() as file:
+            yield file[self.name or "/"]
+
+    def __getitem__(self, name: str) -> Any:
+        path = f"{self.name}/{name}".strip("/")
+        with self._file.reading() as file:
+            if path not in file:
+                with self._reading() as group:
+                    known = ", ".join(group)
+                raise KeyError(f"{name}: not there; {self.name or 'the results'}: {known}")
+            item = file[path]
+            dataset = isinstance(item, h5py.Dataset)
+            return Values(self._file, item) if dataset else Group(self._file, path)
+
+    def __iter__(self) -> Iterator[str]:
+        with self._reading() as group:
+            return iter(list(group))
+
+    def __len__(self) -> int:
+        with self._reading() as group:
+            return len(group)
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        """Numbers and texts that belong to it, by name."""
+        with self._reading() as group:
+            return {name: _plain(value) for name, value in group.attrs.items()}
+
+    def tree(self, depth: int = 20) -> str:
+        """What there is, with shapes and units, as lines; so many levels of it."""
+        return "\n".join(self._lines(depth))
+
+    def _lines(self, depth: int, indent: str = "") -> Iterator[str]:
+        """The same; of numbered groups, which are alike, the first."""
+        numbered = [name for name in self if name.isdecimal()]
+        for name in self:
+            if name in numbered[1:]:
+                continue
+            more = f" to {numbered[-1]}" if name in numbered[:1] and len(numbered) > 1 else ""
+            item = self[name]
+            if isinstance(item, Values):
+                yield indent + repr(item).removeprefix(f"{self.name}/")
+            else:
+                yield f"{indent}{name}{more}/"
+                if depth > 1:
+                    yield from item._lines(depth - 1, indent + "  ")
+
+    def xarray(self) -> xr.Dataset:
+        """Its datasets as an ``xarray.Dataset``; those of numbered groups are put together.
+
+        The new axis is the cycles, increments or forces that tell the groups apart. Raises
+        :class:`UserError` without xarray.
+        """
+        return _data_set(self)
+
+    def pandas(self) -> pd.DataFrame:
+        """Its curves as a ``pandas.DataFrame``, or the numbers of numbered groups, a row for each.
+
+        Raises :class:`UserError` without pandas, and where there is nothing of the kind.
+        """
+        return _data_frame(self)
+
+    def __repr__(self) -> str:
+        return f"{self.name}/\n" + "\n".join(self._lines(2, "  "))
+
+    def _repr_html_(self) -> str:
+        return f"<pre>{escape(repr(self))}</pre>"
+
+
+def _plain(value: Any) -> Any:
+    """An attribute as Python has it."""
+    return value.item() if isinstance(value, np.generic) else value
+
+
+# --- xarray and pandas ---------------------------------------------------------------------------
+
+
+def _data_array(values: Values) -> xr.DataArray:
+    """A dataset over its coordinates."""
+    xarray = _library("xarray")
+    dims = _dims(values)
+    coordinates = {
+        dim: xarray.Variable((dim,), along.values, _attributes(along))
+        for dim, along in values.coordinates.items()
+        if along.shape == (values.shape[dims.index(dim)],)
+    }
+    return xarray.DataArray(
+        values.values, coordinates, dims, values.name.rpartition("/")[2], _attributes(values)
+    )
+
+
+def _data_set(group: Group) -> xr.Dataset:
+    """The datasets of a group, and those of the numbered groups in it put together."""
+    xarray = _library("xarray")
+    arrays = {name: _data_array(item) for name, item in _datasets(group).items()}
+    curves = {name: array for name, array in arrays.items() if name not in array.coords}
+    numbered = _numbered(group)
+    if numbered:
+        axis, places = _told_apart(numbered)
+        along = xarray.Variable((axis,), places)
+        for name, parts in _alike(numbered).items():
+            stacked = [_data_array(part) for part in parts]
+            curves[name] = xarray.concat(stacked, along, combine_attrs="override")
+    return xarray.Dataset(curves, attrs=group.attributes)
+
+
+def _series(values: Values) -> pd.Series:
+    """A curve over what it is along."""
+    pandas = _library("pandas")
+    if values.ndim != 1:
+        raise UserError(f"{values.name}: of {values.ndim} axes; allowed: curves, of one")
+    return pandas.Series(values.values, _index(values), name=_heading(values))
+
+
+def _data_frame(group: Group) -> pd.DataFrame:
+    """The curves of a group side by side, or the numbers of the numbered groups in it."""
+    pandas = _library("pandas")
+    datasets = {name: item for name, item in _datasets(group).items() if item.ndim == 1}
+    if datasets and len({item.shape for item in datasets.values()}) == 1:
+        index = _index(next(iter(datasets.values())))
+        over = None if index is None else index.name
+        columns = {_heading(item): item.values for item in datasets.values()}
+        return pandas.DataFrame({k: v for k, v in columns.items() if k != over}, index)
+    numbered = _numbered(group)
+    if datasets or not numbered:
+        raise UserError(
+            f"{group.name or 'the results'}: no table; allowed: groups of curves that are equally "
+            "long, or of numbered groups"
+        )
+    axis, places = _told_apart(numbered)
+    rows = [
+        {name: value for name, value in part.attributes.items() if np.ndim(value) == 0}
+        for part in numbered.values()
+    ]
+    return pandas.DataFrame(rows, pandas.Index(places, name=axis)).drop(
+        columns=axis, errors="ignore"
+    )
+
+
+def _library(name: str) -> Any:
+    try:
+        return import_module(name)
+    except ImportError:
+        raise UserError(
+            f"{name} is not installed; install it with: pip install 'fretscale[results]'"
+        ) from None
+
+
+def _attributes(values: Values) -> dict[str, str]:
+    """As others name them (CF conventions)."""
+    return {"units": values.unit, "long_name": values.description}
+
+
+def _heading(values: Values) -> str:
+    name = values.name.rpartition("/")[2]
+    return name if values.unit == "1" else f"{name} [{values.unit}]"
+
+
+def _dims(values: Values) -> list[str]:
+    """Names of all axes; one without is of this dataset alone."""
+    name = values.name.rpartition("/")[2]
+    return [dim or f"{name}_{axis}" for axis, dim in enumerate(values.dims)]
+
+
+def _index(values: Values) -> Any:
+    """What curves are along, if they are along something."""
+    along = values.coordinates.get(values.dims[0])
+    if along is None:
+        return None
+    return _library("pandas").Index(along.values, name=_heading(along))
+
+
+def _datasets(group: Group) -> dict[str, Values]:
+    return {name: item for name, item in group.items() if isinstance(item, Values)}
+
+
+def _numbered(group: Group) -> dict[str, Group]:
+    """The groups in a group whose names are numbers."""
+    groups = {name: item for name, item in group.items() if isinstance(item, Group)}
+    return {name: item for name, item in groups.items() if name.isdecimal()}
+
+
+def _told_apart(numbered: dict[str, Group]) -> tuple[str, list[Any]]:
+    """What tells them apart, and its value for each."""
+    attributes = [part.attributes for part in numbered.values()]
+    for name in TOLD_APART_BY:
+        places = [found.get(name) for found in attributes]
+        if None not in places and len(set(places)) == len(places):
+            return name, places
+    return NUMBER, [int(name) for name in numbered]
+
+
+def _alike(numbered: dict[str, Group]) -> dict[str, list[Values]]:
+    """The datasets that all of them have in the same shape."""
+    parts = [_datasets(part) for part in numbered.values()]
+    return {
+        name: [part[name] for part in parts]
+        for name, first in parts[0].items()
+        if all(name in part and part[name].shape == first.shape for part in parts)
+    }
