@@ -54,7 +54,7 @@ $(INSTALLED): pyproject.toml constraints.txt
 	@touch $@
 
 $(TESTABLE): $(INSTALLED)
-	@echo 'fretscale: installing what tests add: 40 MB to download, 150 MB on disk, a minute.'
+	@echo 'fretscale: installing what tests add: 55 MB to download, 250 MB on disk, a minute.'
 	$(PIP) -e '.[test]'
 	@touch $@
 

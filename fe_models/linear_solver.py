@@ -9,7 +9,6 @@ system whose factors do not fit: conjugate gradients with multigrid.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import inf
 from typing import Any
 
 import numpy as np
@@ -138,9 +137,8 @@ class _Iterative:
 
 
 def _limit(memory: float | None) -> float:
-    """The memory allowed; no limit where the system does not tell."""
-    free = available_bytes() if memory is None else memory
-    return inf if free is None else free
+    """The memory allowed: what is free, unless given."""
+    return available_bytes() if memory is None else memory
 
 
 class _Checked:

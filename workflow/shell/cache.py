@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from platformdirs import user_cache_path
 
 import fe_models
 import sa_solver
@@ -34,8 +35,7 @@ SOLVERS = ("numpy", "scipy", "scikit-fem", "gmsh")
 
 def cache_folder() -> Path:
     """``FRETSCALE_CACHE``, or ``fretscale`` in the user's cache folder."""
-    default = Path(os.environ.get("XDG_CACHE_HOME", Path.home() / ".cache")) / "fretscale"
-    return Path(os.environ.get("FRETSCALE_CACHE", default))
+    return Path(os.environ.get("FRETSCALE_CACHE", user_cache_path("fretscale", appauthor=False)))
 
 
 def content_key(*parts: object) -> str:

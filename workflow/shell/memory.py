@@ -35,7 +35,7 @@ class Memory:
     def check(self) -> None:
         """Raise :class:`OutOfMemory` if the machine has less."""
         required, available = self.required, _available_bytes()
-        if available is not None and required > available:
+        if required > available:
             raise OutOfMemory(
                 f"this case needs about {required / 1e9:.1f} GB of memory, {available / 1e9:.1f} "
                 f"GB are free: {self.remedy}"

@@ -52,7 +52,7 @@ class Reporter:
     ) -> None:
         check_regular(log)
         self._log = log.open("a" if append else "w", encoding="utf-8")
-        self._console = Console(stderr=True, highlight=False)
+        self._console = Console(stderr=True, highlight=False, force_jupyter=False)
         self._begin, self._expected, self._after = time.perf_counter(), expected, 0.0
         self._course: _Course | None = None
         self._span, self._names = (0.0, 1.0), ""

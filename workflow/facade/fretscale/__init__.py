@@ -65,6 +65,8 @@ def _in_the_way() -> str:
             continue
         found = getattr(sys.modules.get(name), "__file__", None)
         file = (spec.origin if spec else None) or found or next(iter(places), None)
+        if name in sys.modules and file is None:
+            file = f"a module `{name}` without a file"
         if file is None:
             return f"fretscale: its package `{name}` is not installed; install fretscale again"
         return (
