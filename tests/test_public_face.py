@@ -11,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parent.parent
 FACES = ["sa_solver", "wear", "wear.joints"]
-FACES += ["fe_models", "fe_models.dynamics", "fe_models.geometry"]
+FACES += ["fe_models", "fe_models.dynamics", "fe_models.geometry", "fretscale"]
 LARGEST = 28
 INSTALLED = {"numpy", "scipy", "numba", "llvmlite", "pyfftw"}
 
@@ -73,7 +73,8 @@ def test_type_checkers_see_the_same_names(name):
 
 
 @pytest.mark.parametrize("name", FACES)
-def test_the_example_of_a_package_runs(name):
+def test_the_example_of_a_package_runs(name, monkeypatch):
+    monkeypatch.chdir(ROOT)  # cases are named from there
     failed, tried = doctest.testmod(importlib.import_module(name))
     assert tried > 0
     assert failed == 0

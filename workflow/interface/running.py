@@ -47,12 +47,18 @@ def run(
     by ``fretscale resume``.
 
     >>> import fretscale, tempfile
+    >>> coarse = fretscale.load_case(
+    ...     "cases/sphere_normal.yaml",
+    ...     contact__grid=[32, 32],
+    ...     output__paraview=False,
+    ...     output__figures=False,
+    ... )
     >>> with tempfile.TemporaryDirectory() as folder:
-    ...     ball = fretscale.run(
-    ...         "cases/sphere_normal.yaml", folder, contact__grid=[32, 32], quiet=True
-    ...     )
+    ...     ball = fretscale.run(coarse, folder, quiet=True)
     ...     print(ball["history/P"])
-    history/P (1) [N]: normal force on body 2
+    ...     print(f"{ball['history/P'][-1]:.1f}")
+    history/P (increment 1) [N]: normal force on body 2
+    400.0
     """
     loaded = load_case(case, **overrides)
     folder = OUT / _name(case, loaded) if out is None else Path(out)

@@ -53,8 +53,8 @@ _OURS = {
 }
 
 
-def _in_the_way() -> str:
-    """Why the packages that Python would import are not ours, in a line; empty if they are."""
+def _check_packages() -> None:
+    """Raise ImportError where the packages that Python would import are not ours."""
     for name, of_ours in _OURS.items():
         try:
             spec = find_spec(name)
@@ -68,16 +68,16 @@ def _in_the_way() -> str:
         if name in sys.modules and file is None:
             file = f"a module `{name}` without a file"
         if file is None:
-            return f"fretscale: its package `{name}` is not installed; install fretscale again"
-        return (
+            raise ImportError(
+                f"fretscale: its package `{name}` is not installed; install fretscale again"
+            )
+        raise ImportError(
             f"fretscale: {file} is in the way: it has the name of fretscale's own package "
             f"`{name}`; rename it, or start Python elsewhere"
         )
-    return ""
 
 
-if _wrong := _in_the_way():
-    raise ImportError(_wrong)
+_check_packages()
 
 from sa_solver.lazy import lazy_names  # noqa: E402
 
