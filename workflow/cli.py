@@ -317,8 +317,7 @@ def schema() -> None:
 
 def main() -> None:
     """Entry point of the command."""
-    # No file of a run may get the number of a stream that is closed, where libraries print.
-    while (free := os.open(os.devnull, os.O_RDWR)) <= 2:
-        pass
-    os.close(free)
+    from workflow.shell.streams import hold_standard_streams
+
+    hold_standard_streams()
     cli(prog_name="fretscale")

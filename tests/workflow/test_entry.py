@@ -116,6 +116,15 @@ def test_a_program_needs_no_guard(how, tmp_path):
     assert ended.stderr == "in a process\n"
 
 
+@posix_only
+def test_a_program_may_have_no_standard_streams(tmp_path):
+    """Then the processes of a run have none either."""
+    code = "from workflow.shell.streams import hold_standard_streams; hold_standard_streams()"
+    code += SIDE_BY_SIDE.replace('print("once")', "") + "open('done', 'w')"
+    python("-c", f"import os; [os.close(i) for i in range(3)]; {code}", cwd=tmp_path)
+    assert (tmp_path / "done").exists()
+
+
 def answer(client, asked):
     """What a kernel has to say of a cell when it is done."""
     while True:

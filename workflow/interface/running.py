@@ -17,6 +17,7 @@ from workflow.interface.results import Results
 from workflow.interface.results import open as open_results
 from workflow.kinds import kind_of
 from workflow.runs.run import bring_to_end, kept_in, run_case
+from workflow.shell.streams import hold_standard_streams
 
 # Where runs go that are given no folder.
 OUT = Path("out")
@@ -60,6 +61,7 @@ def run(
     history/P (increment 1) [N]: normal force on body 2
     400.0
     """
+    hold_standard_streams()
     loaded = load_case(case, **overrides)
     folder = OUT / _name(case, loaded) if out is None else Path(out)
     with redirect_stderr(io.StringIO()) if quiet else nullcontext():
