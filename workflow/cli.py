@@ -35,7 +35,10 @@ class _OneLineGroup(click.Group):
                 sys.stdout.flush()
         except (FretscaleError, OSError, ImportError, MemoryError) as error:
             message, code = _ending(error)
-        except SystemExit:  # what click and rich make of a pipe that was closed
+        except SystemExit as ended:
+            if not ended.code:  # a shell has been told how to complete a command
+                raise
+            # What click and rich make of a pipe that was closed.
             message, code = _ending(BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE)))
         except click.Abort:
             message, code = f"interrupted; {ADVICE}", errors.INTERRUPTED
@@ -303,6 +306,15 @@ def new(kind: str, file: Path | None) -> None:
             stream.write(text)
     except FileExistsError:
         raise errors.UserError(f"{file}: exists; give another name or remove it") from None
+
+
+@cli.command()
+def materials() -> None:
+    """List the materials that a case may name, and where their values are from."""
+    from workflow.commands.materials import known_materials
+
+    for line in known_materials():
+        click.echo(line)
 
 
 @cli.command()

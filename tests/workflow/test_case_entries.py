@@ -161,12 +161,12 @@ def stated(leaf):
             leaf.kind != "specimens"
         ):
             return [f"wear.step={{kind: explicit, {leaf.name}: {example}}}"]
+        case "wear.blade.specific_wear_rate":
+            return [f"wear.blade={{law: archard, specific_wear_rate: {example}}}"]
         case "wear.reference_amplitude":
             return ["wear.law=energy_amplitude", plain]
-        case "wear.energy":
-            return ["wear.cycles=", plain]
-        case "ageing.energy":
-            return ["ageing.cycles=", plain]
+        case "wear.energy" | "ageing.energy":
+            return [leaf.key.replace("energy", "cycles="), plain]
         case "evolution.file":
             return [f"evolution={{file: {example}}}"]
         case "structure.body":

@@ -78,6 +78,22 @@ def blocks(tmp_path):
     return write_case(tmp_path / "blocks.yaml", {"file": "blocks.inp", **BLOCKS}, TO_AND_FRO)
 
 
+def test_density_is_for_loads_on_the_mass(blocks):
+    """Pressures need none; what turns or is accelerated does, and says why."""
+    steel = "{young: 200 GPa, poisson: 0.3}"
+    bare = [f"materials.body_{number}={steel}" for number in (1, 2)]
+    assert load_case(blocks, bare).material(1).density == 0.0
+    load = "{kind: acceleration, acceleration: [0, 0, 9810], path: [1, 1, 1, 1]}"
+    line = refused(blocks, *bare, f"structure.loads.1={load}")
+    assert line.endswith(
+        "materials.body_1.density: missing, and a load of acceleration acts on the mass; allowed: "
+        "mass per volume [t/mm^3], such as 4430 kg/m^3"
+    )
+    named = ["materials.body_1=304L", "materials.body_2=304L"]
+    case = load_case(blocks, [*named, f"structure.loads.1={load}"])
+    assert case.material(2).density == 7.9e-9
+
+
 def edit(path, old, new):
     """Replace text in a file and give its lines."""
     text = path.read_text("utf-8")

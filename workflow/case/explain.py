@@ -94,6 +94,9 @@ class Explanation:
         return path, f"missing; allowed: {field.description}{example}"
 
     def _unknown(self, path: KeyPath) -> str:
+        for model in self._models_at(path[:-1]):
+            if told := model.refused.get(str(path[-1])):
+                return told
         near = self._nearest(path)
         if near:
             return f"unknown key; did you mean '{near}'?"

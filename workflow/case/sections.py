@@ -7,7 +7,7 @@ write it. JSON schema, template and error messages are made from these; nothing 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, StrictBool, field_validator, model_validator
@@ -16,6 +16,7 @@ from pydantic_core import PydanticCustomError
 
 from sa_solver.types import Material as ElasticMaterial
 from workflow.case.fields import Entry, File, Path, Quantity, Text, Whole, shown, split_dataset
+from workflow.case.materials import MATERIALS, near
 from workflow.case.source import Source
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual machine.
@@ -50,14 +51,58 @@ class Section(BaseModel):
     filled_in: ClassVar[bool] = True
     # Keys by which it is known from other kinds of the same section, where no word names them.
     known_by: ClassVar[frozenset[str]] = frozenset()
+    # Keys that who knows other kinds of case may try here, and what to say of them.
+    refused: ClassVar[Mapping[str, str]] = {}
+
+
+class MaterialName(Text):
+    """The name of a known material."""
+
+    allowed = "a name that `fretscale materials` lists"
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"enum": list(MATERIALS)}
 
 
 class ElasticBody(Section):
-    """Base of the materials of a case."""
+    """Base of the materials of a case: one that is known by name, numbers, or both."""
+
+    refused: ClassVar[Mapping[str, str]] = {
+        "density": "no mass is moved here; allowed: leave it out"
+    }
+
+    material: Annotated[str, MaterialName()] | None = entry(
+        "one of `fretscale materials`, for all that is not given beside it",
+        "Ti-6Al-4V",
+        default=None,
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named(cls, data: Any) -> Any:
+        """Fill in what is known of a material by its name, which may stand alone."""
+        given = data if isinstance(data, dict) else {}
+        if data is None or isinstance(data, str | int | float):
+            data = {"material": data}
+        if not isinstance(data, dict) or data.get("material") is None:
+            return data
+        name = data["material"]
+        if not isinstance(name, str) or name not in MATERIALS:
+            meant = near(str(name))
+            hint = f", did you mean '{meant}'?" if meant else ""
+            raise disagreement(
+                f"{shown(name)}: no known material{hint}; allowed: {MaterialName.allowed}, or "
+                "a section with young and poisson",
+                *(["material"] if "material" in given else []),
+            )
+        known = MATERIALS[name].in_base_units().items()
+        filled = {k: v for k, v in known if k in cls.model_fields and data.get(k) is None}
+        return data | filled
 
     def elastic(self) -> ElasticMaterial:
         """The same material as the solvers take it; no yield stress is an infinite one."""
         properties = {k: v for k, v in self.model_dump().items() if v is not None}
+        properties.pop("material", None)
         return ElasticMaterial(**properties)
 
 

@@ -15,10 +15,11 @@ HEADER = """\
 # wrong with a case, `fretscale run` runs it. Entries behind a # are optional.
 """
 # Optional entries the template fills in: a material that can yield, the length of a run, legs that
-# press, when a speed peaks, a face with all edges rounded, and a joint whose friction rises.
+# press, when a speed peaks, a face with all edges rounded, a joint whose friction rises and
+# a mass.
 FILLED_IN = (
     *("yield_stress", "cycles", "legs", "P", "peak_at", "gap", "end_width", "end_radius"),
-    "friction",
+    *("friction", "density"),
 )
 
 

@@ -157,15 +157,15 @@ class BodyMaterial(ElasticBody):
 
 Body = Annotated[
     Annotated[BodyMaterial, Tag("(section)")] | Annotated[Literal["rigid"], Tag("(name)")],
-    Discriminator(lambda value: "(name)" if isinstance(value, str) else "(section)"),
+    Discriminator(lambda value: "(name)" if str(value).startswith("rigid") else "(section)"),
 ]
 
 
 class BodyMaterials(Section):
     """The two bodies in contact."""
 
-    body_1: Body = entry("the lower, fixed body; or the word rigid")
-    body_2: Body = entry("the upper, moving body; or the word rigid")
+    body_1: Body = entry("the lower, fixed body; a material's name, its entries or the word rigid")
+    body_2: Body = entry("the upper, moving body; a material's name, its entries or the word rigid")
 
     @model_validator(mode="after")
     def _one_is_elastic(self) -> BodyMaterials:

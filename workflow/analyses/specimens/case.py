@@ -172,7 +172,7 @@ class SpecimensWear(TwoBodies[BodyWear], Laws):
 
     @model_validator(mode="after")
     def _something_wears(self) -> SpecimensWear:
-        if self.body_1.coefficient == self.body_2.coefficient == 0.0:
+        if self.body_1.rate(1.0) == self.body_2.rate(1.0) == 0.0:
             raise disagreement("0 for both bodies; allowed: one of them at most", "body_1")
         return self
 

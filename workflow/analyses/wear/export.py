@@ -106,6 +106,7 @@ def _imported(case: WearCase, faces: tuple[ContactFace, ...], out: Path) -> Resu
     for section in ("materials", "wear"):
         for number, body in enumerate(case.bodies, start=1):
             data[section][f"body_{number}"] = data[section].pop(body)
+            data[section][f"body_{number}"].pop("density", None)  # the loads know of it
     data["structure"] = _structure(faces)
     imported = ResultantsCase.model_validate(data, context={"folder": str(out)})
     # The files stay together wherever they go.

@@ -15,17 +15,21 @@ from fe_models.mesh import Interface, MeshError, StructureMesh
 from workflow.analyses.wear.case.base import FiniteElementCase, check_interface_name
 from workflow.analyses.wear.case.gaps import Gap, HeightsGap, check_gap
 from workflow.analyses.wear.case.sections import (
+    Density,
+    Material,
     Share,
-    TwoMaterials,
+    TwoBodies,
     Wear,
     check_shares,
 )
 from workflow.analyses.wear.structures.mesh.loads import (
+    AccelerationLoad,
     Component,
     DisplacementLoad,
     Factor,
     Load,
     Name,
+    RotationLoad,
 )
 from workflow.case.fields import AUTO, Auto, File, OrAuto, Whole
 from workflow.case.input_files import read_heights
@@ -220,12 +224,26 @@ class Legs(Section):
         return [(cycle.factors, cycle.share) for cycle in self.mix] or [((1.0,) * loads, 1.0)]
 
 
+class MeshMaterial(Material):
+    """Isotropic linear elastic material, with a mass where that counts."""
+
+    density: Density | None = entry(
+        "mass per volume, for loads of rotation and acceleration [t/mm^3]",
+        "4430 kg/m^3",
+        default=None,
+    )
+
+
+class MeshMaterials(TwoBodies[MeshMaterial]):
+    """The two bodies in contact."""
+
+
 class MeshCase(FiniteElementCase):
     """Bodies from a file under loads of the user's."""
 
     title: Title = entry("one line", "Two bodies of a mesh file")
     structure: ImportedStructure = entry("bodies, contacts, supports and loads, named by groups")
-    materials: TwoMaterials = entry("the two bodies in contact")
+    materials: MeshMaterials = entry("the two bodies in contact")
     load_path: Legs = entry("one cycle")
     wear: Wear = entry("law, length of the run and step")
 
@@ -279,6 +297,21 @@ class MeshCase(FiniteElementCase):
                     f"{len(cycle.factors)} factors for {loads} loads; allowed: one for each load",
                     f"load_path.mix.{index}.factors",
                 )
+        return self
+
+    @model_validator(mode="after")
+    def _mass_is_known(self) -> MeshCase:
+        for load in self.structure.loads:
+            if not isinstance(load, RotationLoad | AccelerationLoad):
+                continue
+            for body in ("body_1", "body_2"):
+                if getattr(self.materials, body).density is None:
+                    raise disagreement(
+                        f"missing, and a load of {load.kind} acts on the mass; allowed: mass per "
+                        "volume [t/mm^3], such as 4430 kg/m^3",
+                        f"materials.{body}.density",
+                        f"materials.{body}",
+                    )
         return self
 
     @model_validator(mode="after")

@@ -50,7 +50,7 @@ class MeshModel:
         loads = [load.model_dump(exclude={"path"}) for load in structure.loads]
         described = structure.model_dump(exclude={"file", "loads"})
         gaps = [interface.gap.tobytes() for interface in self._mesh.interfaces]
-        return contents, described, loads, gaps, self._case.materials
+        return contents, described, loads, gaps, self._case.material(1), self._case.material(2)
 
     @property
     def missions(self) -> tuple[MissionLoads, ...]:

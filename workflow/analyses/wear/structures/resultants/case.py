@@ -9,9 +9,10 @@ import numpy as np
 from pydantic import model_validator
 
 from sa_solver.types import Frame
+from workflow.analyses.contact.case import BodyMaterial
 from workflow.analyses.wear.case.base import WearCase, check_interface_name
 from workflow.analyses.wear.case.gaps import Gap, GapShape, check_cells, check_gap
-from workflow.analyses.wear.case.sections import Contact, TwoMaterials, Wear
+from workflow.analyses.wear.case.sections import Contact, TwoBodies, Wear
 from workflow.analyses.wear.structures.resultants.faces import FaceError
 from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
 from workflow.case.fields import File, Quantity, shown, split_dataset
@@ -179,6 +180,10 @@ class ImportedContact(Contact):
     )
 
 
+class BodyMaterials(TwoBodies[BodyMaterial]):
+    """The two bodies in contact."""
+
+
 # --- the case -----------------------------------------------------------------------------------
 
 
@@ -187,7 +192,7 @@ class ResultantsCase(WearCase):
 
     title: Title = entry("one line", "Contacts under loads of another code")
     structure: Resultants = entry("the loads, and the faces they press")
-    materials: TwoMaterials = entry("the two bodies in contact")
+    materials: BodyMaterials = entry("the two bodies in contact")
     contact: ImportedContact = entry(
         "half-space grid over each contact face", default=ImportedContact()
     )
