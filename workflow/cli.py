@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import click
+from click.shell_completion import CompletionItem
 
 from sa_solver.errors import FretscaleError
 from workflow import errors
@@ -103,7 +104,7 @@ def cli() -> None:
 
 
 @cli.command()
-@click.argument("case")
+@click.argument("case", type=click.Path())
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
 @click.option("--force", is_flag=True, help="Overwrite a folder that holds another run.")
@@ -210,7 +211,7 @@ def sweep(file: Path, out: Path, processes: int | None, dask: str | None, force:
 
 
 @cli.command()
-@click.argument("case")
+@click.argument("case", type=click.Path())
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
 def check(case: str, overrides: tuple[str, ...]) -> None:
     """Read CASE, say what it would run and about how long, if this machine's memory is enough."""
@@ -227,7 +228,7 @@ def check(case: str, overrides: tuple[str, ...]) -> None:
 
 
 @cli.command()
-@click.argument("case")
+@click.argument("case", type=click.Path())
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
 @click.option("--force", is_flag=True, help="Overwrite what is there.")
@@ -280,24 +281,44 @@ def describe(file: Path, size: str | None) -> None:
         click.echo(line)
 
 
-class _KindsInHelp(click.Command):
-    """A command whose help ends with the kinds of case that there are."""
+def _kinds() -> dict[str, str]:
+    """What `new` writes: each kind of case, and the file of a sweep, in a line of plain words."""
+    from workflow.kinds import about
+    from workflow.sweep.template import ABOUT, SWEEP
 
-    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        from workflow.kinds import kinds
-
-        formatter.write_paragraph()
-        formatter.write_text(f"KIND is one of {', '.join(kinds())}.")
+    return {**about(), SWEEP: ABOUT}
 
 
-@cli.command(cls=_KindsInHelp)
-@click.argument("kind")
+class _Kind(click.ParamType):
+    """A kind of case, which a shell completes."""
+
+    name = "kind"
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        return [
+            CompletionItem(kind, help=text)
+            for kind, text in _kinds().items()
+            if kind.startswith(incomplete)
+        ]
+
+
+@cli.command()
+@click.argument("kind", required=False, type=_Kind())
 @click.argument("file", required=False, type=click.Path(path_type=Path))
-def new(kind: str, file: Path | None) -> None:
-    """Write a commented case of KIND to FILE, or print it."""
+def new(kind: str | None, file: Path | None) -> None:
+    """Write a commented case of KIND to FILE, or print it; without KIND list the kinds."""
     from workflow.kinds import template
+    from workflow.sweep.template import SWEEP, sweep_template
 
-    text = template(kind)
+    if kind is None:
+        for name, text in _kinds().items():
+            click.echo(f"{name:<18} {text}")
+        return
+    if kind not in _kinds():
+        raise errors.UserError(f"{kind}: no such kind of case; allowed: {', '.join(_kinds())}")
+    text = sweep_template() if kind == SWEEP else template(kind)
     if file is None:
         click.echo(text, nl=False)
         return

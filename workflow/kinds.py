@@ -12,7 +12,6 @@ from workflow.analyses import contact, specimens, time, vibration, vibration_wea
 from workflow.case import loading
 from workflow.case.sections import Case
 from workflow.case.template import template as write_template
-from workflow.errors import UserError
 from workflow.shell.analysis import Analysis
 
 ANALYSES: tuple[Analysis[Any], ...] = (
@@ -28,6 +27,11 @@ ANALYSES: tuple[Analysis[Any], ...] = (
 def kinds() -> dict[str, type[Case]]:
     """Every kind of case, by the name that ``fretscale new`` has for it."""
     return {name: case for analysis in ANALYSES for name, case in analysis.cases.items()}
+
+
+def about() -> dict[str, str]:
+    """What each kind of case is about, in a line of plain words."""
+    return {name: case.about for name, case in kinds().items()}
 
 
 def analysis_of(case: Case) -> Analysis[Any]:
@@ -51,9 +55,7 @@ def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
 
 
 def template(kind: str) -> str:
-    """A commented case of a kind, ready to run. Raises UserError for a kind that there is not."""
-    if kind not in kinds():
-        raise UserError(f"{kind}: no such kind of case; allowed: {', '.join(kinds())}")
+    """A commented case of a kind, ready to run."""
     return write_template(kinds()[kind])
 
 

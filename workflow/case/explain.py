@@ -9,11 +9,10 @@ from typing import Any, get_args
 from pydantic_core import ErrorDetails
 
 from workflow.case.fields import shown
-from workflow.case.sections import Section, sections_of
+from workflow.case.sections import KINDS_ARE_NAMED_BY, Section, sections_of
 from workflow.case.source import KeyPath, Source, child, dotted, split_path
 
-# Keys that choose between sections, and the one that a section takes from that around it.
-KINDS_ARE_NAMED_BY = ("kind", "law", "shape", "scope")
+# The one of KINDS_ARE_NAMED_BY that a section takes from that around it.
 INHERITED = "law"
 
 # Lines about a text: the same mistake mostly is in many places.

@@ -30,6 +30,9 @@ Title = Annotated[str, Text()]
 DottedPath = Annotated[str, Path()]
 Tolerance = Annotated[float, Quantity("1", at_least=1e-12, at_most=1e-3)]
 
+# Keys that choose between sections.
+KINDS_ARE_NAMED_BY = ("kind", "law", "shape", "scope")
+
 
 def entry(description: str, example: object = None, **settings: Any) -> Any:
     """A field with its description and, for a leaf, an example as one would write it."""
@@ -51,6 +54,8 @@ class Section(BaseModel):
     filled_in: ClassVar[bool] = True
     # Keys by which it is known from other kinds of the same section, where no word names them.
     known_by: ClassVar[frozenset[str]] = frozenset()
+    # Those that it fills in here beside them.
+    also_filled_in: ClassVar[tuple[str, ...]] = ()
     # Keys that who knows other kinds of case may try here, and what to say of them.
     refused: ClassVar[Mapping[str, str]] = {}
 
@@ -173,6 +178,9 @@ LAST = ("output", "assumed", "reported", "expect")
 
 class Case(Section, ABC):
     """Base of all kinds of case: what the shell needs of any of them."""
+
+    # What a case of this kind is about, in a line of plain words.
+    about: ClassVar[str]
 
     title: Title = entry("one line", "Ball on a flat, pressed and sheared")
     analysis: str = entry("what is computed", "contact")

@@ -406,6 +406,8 @@ class BodiesCase(Case):
 class ContactCase(BodiesCase):
     """Two bodies in contact over an area of both directions."""
 
+    about: ClassVar[str] = "a ball, ellipsoid or measured heights under any history of loads"
+
     title: Title = entry("one line", "Ball on a flat, pressed and sheared")
     structure: Annotated[Sphere | Ellipsoid | Heights, Field(discriminator="shape")] = entry(
         "the bodies: no finite elements"
@@ -420,6 +422,8 @@ class ContactCase(BodiesCase):
 
 class LineContactCase(BodiesCase):
     """Two bodies in contact along a line, in plane strain: everything is per length of it."""
+
+    about: ClassVar[str] = "a cylinder, flat or heights along a line under any history of loads"
 
     title: Title = entry("one line", "Cylinder on a flat, pressed and sheared")
     structure: Annotated[Cylinder | FlatRounded | Heights, Field(discriminator="shape")] = entry(

@@ -84,6 +84,8 @@ class WornByEnergy(Worn, EnergyBody):
 class WornByEnergyAmplitude(Worn, EnergyBody):
     """Energy law whose coefficient grows with the slip amplitude over a reference amplitude."""
 
+    also_filled_in: ClassVar[tuple[str, ...]] = ("reference_amplitude",)
+
     law: Literal["energy_amplitude"] = entry(
         "of this body; without it wear.law", "energy_amplitude", default=None
     )
@@ -103,6 +105,8 @@ class WornByEnergyAmplitude(Worn, EnergyBody):
 
 class WornByArchard(Worn):
     """Depth = k x pressure x slip, with k = K / H: either K and H are given, or k."""
+
+    also_filled_in: ClassVar[tuple[str, ...]] = ("coefficient", "hardness")
 
     law: Literal["archard"] = entry("of this body; without it wear.law", "archard", default=None)
     coefficient: Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)] | None = entry(

@@ -238,6 +238,7 @@ class LineWearGrid(Contact):
 class BodiesWearCase(WearCase):
     """Two bodies that wear over an area of both directions."""
 
+    about: ClassVar[str] = "a ball, flat or measured heights that wear under a cycle of loads"
     half_spaces: ClassVar[bool] = True
 
     title: Title = entry("one line", "Ball that wears on a flat")
@@ -271,6 +272,7 @@ class BodiesWearCase(WearCase):
 class LineBodiesWearCase(WearCase):
     """Two bodies that wear along a line, in plane strain: everything is per length of it."""
 
+    about: ClassVar[str] = "a cylinder, flat or heights along a line that wear under a cycle of loads"
     half_spaces: ClassVar[bool] = True
 
     title: Title = entry("one line", "Cylinder that wears on a flat")

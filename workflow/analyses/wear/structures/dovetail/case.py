@@ -247,6 +247,8 @@ class Mesh(Section):
 class DovetailCase(FiniteElementCase):
     """A dovetail under its mission."""
 
+    about: ClassVar[str] = "the built-in blade root in its disk, in space or in the plane"
+
     bodies: ClassVar[tuple[str, str]] = ("disk", "blade")
 
     structure: Dovetail = entry("lengths in the section across the slot unless named otherwise")

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import model_validator
@@ -240,6 +240,8 @@ class MeshMaterials(TwoBodies[MeshMaterial]):
 
 class MeshCase(FiniteElementCase):
     """Bodies from a file under loads of the user's."""
+
+    about: ClassVar[str] = "two bodies of your own mesh or CAD file under your loads"
 
     title: Title = entry("one line", "Two bodies of a mesh file")
     structure: ImportedStructure = entry("bodies, contacts, supports and loads, named by groups")

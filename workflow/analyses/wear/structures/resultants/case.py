@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import model_validator
@@ -189,6 +189,8 @@ class BodyMaterials(TwoBodies[BodyMaterial]):
 
 class ResultantsCase(WearCase):
     """Contacts under loads from a file."""
+
+    about: ClassVar[str] = "contacts under loads from another finite-element code, as CSV or HDF5"
 
     title: Title = entry("one line", "Contacts under loads of another code")
     structure: Resultants = entry("the loads, and the faces they press")
