@@ -304,7 +304,15 @@ class _Kind(click.ParamType):
         ]
 
 
-@cli.command()
+class _KindsInHelp(click.Command):
+    """A command whose help ends with the kinds of case that there are."""
+
+    def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("KIND is one of"):
+            formatter.write_dl(list(_kinds().items()))
+
+
+@cli.command(cls=_KindsInHelp)
 @click.argument("kind", required=False, type=_Kind())
 @click.argument("file", required=False, type=click.Path(path_type=Path))
 def new(kind: str | None, file: Path | None) -> None:
@@ -340,12 +348,15 @@ def materials() -> None:
 
 @cli.command()
 def schema() -> None:
-    """Print the JSON schema of a case, for editors."""
+    """Print the JSON schema of a case or a sweep, for editors."""
     import json
 
     from workflow.kinds import json_schema
+    from workflow.sweep.schema import AnySweepFile
+    from workflow.sweep.template import ABOUT, SWEEP
 
-    click.echo(json.dumps(json_schema(), indent=2, allow_nan=False, ensure_ascii=False))
+    made = json_schema({SWEEP: (AnySweepFile, ABOUT)})
+    click.echo(json.dumps(made, indent=1, allow_nan=False, ensure_ascii=False))
 
 
 def main() -> None:

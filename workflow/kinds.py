@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Union
-
-from pydantic import TypeAdapter
+from typing import Any
 
 from workflow.analyses import contact, specimens, time, vibration, vibration_wear, wear
 from workflow.case import loading
-from workflow.case.sections import Case
+from workflow.case.json_schema import json_schema as write_schema
+from workflow.case.sections import Case, Section
 from workflow.case.template import template as write_template
 from workflow.shell.analysis import Analysis
 
@@ -22,6 +21,8 @@ ANALYSES: tuple[Analysis[Any], ...] = (
     vibration.ANALYSIS,
     vibration_wear.ANALYSIS,
 )
+
+NOTHING: Mapping[str, tuple[type[Section], str]] = {}
 
 
 def kinds() -> dict[str, type[Case]]:
@@ -59,7 +60,7 @@ def template(kind: str) -> str:
     return write_template(kinds()[kind])
 
 
-def json_schema() -> dict[str, Any]:
-    """JSON schema of a case of any kind."""
-    union: Any = Union[tuple(kinds().values())]  # noqa: UP007 - of as many as there are
-    return TypeAdapter[Any](union).json_schema()
+def json_schema(others: Mapping[str, tuple[type[Section], str]] = NOTHING) -> dict[str, Any]:
+    """JSON schema of a case of any kind, or of other files by name, with a line about each."""
+    cases = {name: (case, case.about) for name, case in kinds().items()}
+    return write_schema({**cases, **others})

@@ -167,7 +167,7 @@ class Quantity(Entry):
         }
         finite = {name: limit for name, limit in limits.items() if math.isfinite(limit)}
         number = {"type": "number", **finite}
-        return {"anyOf": [number, {"type": "string", "pattern": units.QUANTITY_PATTERN}]}
+        return {"anyOf": [number, {"type": "string", "pattern": units.WITH_UNIT}]}
 
 
 @dataclass(frozen=True)

@@ -10,9 +10,18 @@ from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    StrictBool,
+    field_validator,
+    model_validator,
+)
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticCustomError
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError
 
 from sa_solver.types import Material as ElasticMaterial
 from workflow.case.fields import Entry, File, Path, Quantity, Text, Whole, shown, split_dataset
@@ -103,6 +112,19 @@ class ElasticBody(Section):
         known = MATERIALS[name].in_base_units().items()
         filled = {k: v for k, v in known if k in cls.model_fields and data.get(k) is None}
         return data | filled
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        reference = handler(schema)
+        section = handler.resolve_ref_schema(reference)
+        alone = dict(section)
+        section.clear()
+        numbers = alone.pop("required")
+        alone["anyOf"] = [{"required": ["material"]}, {"required": numbers}]
+        section |= {"anyOf": [MaterialName().json_schema(), alone]}
+        return reference
 
     def elastic(self) -> ElasticMaterial:
         """The same material as the solvers take it; no yield stress is an infinite one."""

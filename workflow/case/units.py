@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from pint import UnitRegistry
 
 QUANTITY_PATTERN = r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*$"
+# The same for editors, which know of a unit only that there is one.
+WITH_UNIT = r"^\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*(?:1\s*/\s*)?[A-Za-zµμ°%(].*$"
 LONGEST_UNIT = 40  # no unit is longer; keeps pint from chewing on prose
 
 # Units that nearly every case is written in, by their size in root units and their dimension. Pint,

@@ -165,6 +165,15 @@ class WornByArchard(Worn):
             key,
         )
 
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        reference = handler(schema)
+        given = [{"required": ["coefficient", "hardness"]}, {"required": ["specific_wear_rate"]}]
+        handler.resolve_ref_schema(reference)["oneOf"] = given
+        return reference
+
     def rate(self, friction: float) -> float:
         law = self._base()
         return law.coefficient / law.hardness
