@@ -23,7 +23,7 @@ structure:
   kind: resultants
   file: loads.csv
   dimension: 2
-  size: [1.6 mm]
+  size: 1.6 mm
   gap: {shape: paraboloid, radius_x: 10 mm}
 materials:
   body_1: {young: 115 GPa, poisson: 0.29}

@@ -150,7 +150,7 @@ def stated(leaf):
             return ["structure.file=specimens.yaml", plain]
         case "load_path.file":
             return [f"load_path={{file: {example}}}"]
-        case "structure.size" if leaf.kind == "mesh":
+        case "mesh.size" if leaf.kind == "mesh":
             return [*CAD, plain]
     if leaf.name in MOTIONS:  # take the place of the forces
         force = {"P": 1.0} if leaf.name != "approach" else {}

@@ -111,7 +111,8 @@ def test_a_run_is_of_what_was_chosen_and_tells_it_once(tmp_path, monkeypatch):
     (told,) = re.findall(r"chosen: load_path.increments: (\d+): (\d+) \+ (\d+) in the legs", log)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
     settings = summary["choice"]["chosen"]
-    assert settings == {"load_path.increments": int(told[0]), "load_path.peak_at": int(told[1])}
+    assert settings == {"load_path.increments": [int(count) for count in told[1:]]}
+    assert sum(settings["load_path.increments"]) == int(told[0])
     assert load_case(tmp_path / "out" / "case.yaml") == kept
 
 
@@ -163,10 +164,10 @@ def test_check_tells_how_many_there_may_be(blocks):
     ("override", "message"),
     [
         ("load_path.increments=atuo", "'atuo': not known; allowed: auto, or whole numbers"),
-        ("load_path.increments=1", "1: out of range; allowed: a whole number from 2 to 10000"),
-        ("load_path.increments=[8, 14]", "a list of 2: not a whole number; allowed: a whole"),
-        ("load_path.peak_at=null", "missing; allowed: increment at which the speed peaks"),
-        ("load_path.peak_at=auto", "'auto': not a whole number; allowed: a whole number from 1"),
+        ("load_path.increments=[0, 9]", "0: out of range; allowed: a whole number from 1 to 10000"),
+        ("load_path.increments=[8, 14, 8]", "too long; allowed: a list of 2"),
+        ("load_path.increments=22", "22: of a whole cycle; allowed: up to the peak and down from"),
+        ("load_path.peak_at=8", "the first leg of increments, which are [8, 14] where the speed"),
     ],
 )
 def test_what_is_no_number_of_increments_is_refused(override, message):

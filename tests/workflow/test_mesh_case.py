@@ -226,7 +226,7 @@ def cad(tmp_path):
     }.items():
         text = text.replace(json.dumps(group), json.dumps(face_at(imported, *place)))
     structure = json.loads(text) | {"body_1": lower, "body_2": upper, "file": file.name}
-    return write_case(tmp_path / "cad.yaml", structure | {"size": "0.5 mm"}, TO_AND_FRO)
+    return write_case(tmp_path / "cad.yaml", structure, TO_AND_FRO, mesh={"size": "0.5 mm"})
 
 
 def test_cad_file_runs(cad, tmp_path):
@@ -262,9 +262,13 @@ def test_describe_refuses_in_one_line(cad, file, size, wrong):
 
 
 def test_size_is_for_cad_files_alone(cad, blocks):
-    assert "structure.size=0.5: 0.5 mm: the file is a mesh" in refused(blocks, "structure.size=0.5")
-    edit(cad, "  size: 0.5 mm\n", "")
-    assert "structure.size: missing" in refused(cad)
+    assert "mesh.size=0.5: 0.5 mm: the file is a mesh" in refused(blocks, "mesh.size=0.5")
+    told = "structure.size=0.5: of the elements; allowed: as mesh.size"
+    assert refused(blocks, "structure.size=0.5").endswith(told)
+    told = "structure.order=2: of the elements; allowed: as mesh.order"
+    assert refused(blocks, "structure.order=2").endswith(told)
+    edit(cad, "mesh:\n  size: 0.5 mm\n", "")
+    assert "mesh.size: missing" in refused(cad)
 
 
 # --- in the plane ---------------------------------------------------------------------------------

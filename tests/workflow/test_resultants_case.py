@@ -150,7 +150,10 @@ def test_template_works_without_its_comment_signs(tmp_path):
         ("structure.gap={shape: heights, file: gap.npy}", "contact.grid", "allowed: [3, 4]"),
         ("structure.interfaces=[{name: pad}]", "interfaces.0.name", "early, late, never"),
         ("structure.interfaces=[{name: late}, {name: late}]", "interfaces.1.name", "given twice"),
-        ("structure.interfaces=[{name: late, size: [3]}]", "interfaces.0.size", "not a size"),
+        ("structure.interfaces=[{name: late, size: 3}]", "interfaces.0.size", "not a size"),
+        ("structure.interfaces=[{name: late, size: [3]}]", "interfaces.0.size",
+         "a list of 1; allowed: 3 without brackets, or [x, y]"),
+        ("contact.grid=16", "contact.grid", "16: of line contacts; allowed: [x, y]"),
         ("structure.interfaces=[{name: late, nodes: {body_1: nodes.csv}}]",
          "interfaces.0.nodes.body_1", "without its frame"),
         ("structure.interfaces=[{name: late, frame: {origin: [0, 0, 0], x: [1, 0, 1], "
@@ -382,7 +385,7 @@ def test_pictures_of_resultants_alone(typed, tmp_path):
     ids=["line, full", "area, given slips"],
 )
 def test_our_loads_through_files_wear_the_same_bit_for_bit(small_path, tmp_path, settings):
-    fewer = "load_path.increments=6", "load_path.peak_at=2", "wear.cycles=2e4"
+    fewer = "load_path.increments=[2, 4]", "wear.cycles=2e4"
     settings = [*settings, *fewer, "coupling.resultants=constant", *QUIET]
     assert command("resultants", small_path, "--out", tmp_path, overrides=settings).exit_code == 0
     original = run(small_path, tmp_path / "original", *settings)

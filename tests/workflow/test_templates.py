@@ -21,7 +21,7 @@ NEEDS = {
     "structure.interfaces.nodes": [f"structure.interfaces.0.frame={INTERFACE['frame']}"],
     "  law: friction_contact": [f"structure={REDUCED}"],
     "  kind: friction_rig": [f"joint={CONTACT | {'normal_load': 60}}"],
-    "  # size: 2 mm  # of the elements, for CAD files only": CAD,
+    "  # size: 2 mm  # for CAD files only": CAD,
 }
 
 

@@ -24,7 +24,18 @@ from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema, PydanticCustomError
 
 from sa_solver.types import Material as ElasticMaterial
-from workflow.case.fields import Entry, File, Path, Quantity, Text, Whole, shown, split_dataset
+from workflow.case.fields import (
+    Entry,
+    File,
+    OrAlone,
+    Path,
+    Quantity,
+    Rows,
+    Text,
+    Whole,
+    shown,
+    split_dataset,
+)
 from workflow.case.materials import MATERIALS, near
 from workflow.case.source import Source
 
@@ -35,6 +46,9 @@ Stress = Annotated[
     float, Quantity("MPa", above=0.0, at_most=2e6, range_text="above 0 and at most 2000 GPa")
 ]
 GridCells = Annotated[int, Whole(8, 4096)]
+# Cells along x and y of a contact that may be a line contact, and of one that is: a number alone.
+FaceCells = Annotated[tuple[GridCells, Annotated[int, Rows(8, 4096)]], OrAlone((1,))]
+LineCells = Annotated[tuple[GridCells, Annotated[int, Whole(1, 1)]], OrAlone((1,))]
 Title = Annotated[str, Text()]
 DottedPath = Annotated[str, Path()]
 Tolerance = Annotated[float, Quantity("1", at_least=1e-12, at_most=1e-3)]

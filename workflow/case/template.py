@@ -27,10 +27,10 @@ HEADER = f"""\
 # `or` another kind take the place of the section above, those `also` stand below it.
 """
 # Optional entries the template fills in: a material that can yield, the length of a run, legs that
-# press, when a speed peaks, a face with all edges rounded, a joint whose friction rises and
+# press, a face with all edges rounded, a joint whose friction rises and
 # a mass.
 FILLED_IN = (
-    *("yield_stress", "cycles", "legs", "P", "peak_at", "gap", "end_width", "end_radius"),
+    *("yield_stress", "cycles", "legs", "P", "gap", "end_width", "end_radius"),
     *("friction", "density"),
 )
 

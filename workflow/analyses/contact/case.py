@@ -24,6 +24,7 @@ from workflow.case.sections import (
     Friction,
     GridCells,
     Length,
+    LineCells,
     RoundingRadius,
     Section,
     Stress,
@@ -347,8 +348,8 @@ class ContactGrid(HalfSpaceGrid):
 class LineContactGrid(HalfSpaceGrid):
     """Half-plane solution on strips centred on the bodies."""
 
-    grid: GridCells = entry(
-        "strips along x; of heights as many as their file has", 512, default=512
+    grid: LineCells = entry(
+        "strips along x; of heights as many as their file has", 512, default=(512, 1)
     )
     size: Length = entry("of the grid along x [mm]", "2 mm")
     datum: Length | None = entry(
@@ -367,7 +368,7 @@ class LineContactGrid(HalfSpaceGrid):
         return self
 
     def centred(self) -> Grid:
-        return Grid.strips(self.size, self.grid)
+        return Grid.strips(self.size, self.grid[0])
 
 
 # --- cases --------------------------------------------------------------------------------------

@@ -117,7 +117,7 @@ def _imported(case: WearCase, faces: tuple[ContactFace, ...], out: Path) -> Resu
 def _structure(faces: tuple[ContactFace, ...]) -> dict[str, Any]:
     """The structure of that case: faces in their order, sizes to the last digit."""
     line = faces[0].face.line
-    sizes = [list(face.size[:1] if line else face.size) for face in faces]
+    sizes = [face.size[0] if line else list(face.size) for face in faces]
     interfaces = [
         {"name": face.face.name} | ({} if size == sizes[0] else {"size": size})
         for face, size in zip(faces, sizes, strict=True)

@@ -36,7 +36,7 @@ from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import Contact, PressingForce, Wear
 from workflow.case.fields import Quantity, Whole
-from workflow.case.sections import GridCells, Length, Section, Title, disagreement, entry
+from workflow.case.sections import GridCells, Length, LineCells, Section, Title, disagreement, entry
 from workflow.case.source import Source
 
 PressingLineForce = Annotated[
@@ -197,7 +197,6 @@ LineLoadPath = Annotated[
 
 # --- grids --------------------------------------------------------------------------------------
 
-OneRow = Annotated[int, Whole(1, 1)]
 METHODS = (
     "normal: every cell slides by all of the stroke; full: slips of the half-space, over the stroke"
 )
@@ -222,10 +221,8 @@ class WearGrid(Contact):
 class LineWearGrid(Contact):
     """Half-plane solution on strips centred on body 2, which move with it."""
 
-    grid: tuple[GridCells, OneRow] = entry(
-        "strips along x, in one row; of heights as many as their file has",
-        [512, 1],
-        default=(512, 1),
+    grid: LineCells = entry(
+        "strips along x; of heights as many as their file has", 512, default=(512, 1)
     )
     size: Length = entry("of the grid along x, room for the stroke included [mm]", "2 mm")
     method: Literal["normal", "full"] = entry(METHODS, "normal", default="normal")

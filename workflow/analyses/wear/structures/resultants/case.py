@@ -12,10 +12,10 @@ from sa_solver.types import Frame
 from workflow.analyses.contact.case import BodyMaterial
 from workflow.analyses.wear.case.base import WearCase, check_interface_name
 from workflow.analyses.wear.case.gaps import Gap, GapShape, check_cells, check_gap
-from workflow.analyses.wear.case.sections import Contact, TwoBodies, Wear
+from workflow.analyses.wear.case.sections import Contact, TwoBodies, Wear, check_rows
 from workflow.analyses.wear.structures.resultants.faces import FaceError
 from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
-from workflow.case.fields import File, Quantity, shown, split_dataset
+from workflow.case.fields import File, OrAlone, Quantity, shown, split_dataset
 from workflow.case.input_files import InputFileError
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
@@ -24,6 +24,7 @@ PERPENDICULAR = 1e-6
 
 Place = Annotated[float, Quantity("mm", at_least=-1e6, at_most=1e6)]
 Direction = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
+Sizes = Annotated[tuple[Length, ...], OrAlone()]
 NodeFile = Annotated[str, File((".csv",))]
 
 # --- faces --------------------------------------------------------------------------------------
@@ -74,9 +75,7 @@ class ImportedInterface(Section):
     """An interface of the file, and what is different or known about it."""
 
     name: Title = entry("as in the file; 'interface' where it has no names", "interface")
-    size: tuple[Length, ...] | None = entry(
-        "instead of structure.size [mm]", ["11 mm", "60 mm"], default=None
-    )
+    size: Sizes | None = entry("instead of structure.size [mm]", ["11 mm", "60 mm"], default=None)
     gap: Gap | None = entry("instead of structure.gap", default=None)
     frame: FaceFrame | None = entry("where the face lies; instead of the file's", default=None)
     nodes: NodeTables | None = entry("where the worn surfaces go to; needs a frame", default=None)
@@ -93,8 +92,8 @@ class Resultants(Section):
         "loads of one closed cycle (columns: the recipe in the README); .h5 may go on :group",
         "loads.csv",
     )
-    size: tuple[Length, ...] = entry(
-        "of every face, and of the contact grid, along x and y; along x in 2 dimensions [mm]",
+    size: Sizes = entry(
+        "of every face and the contact grid, along x and y; in 2 dimensions along x alone [mm]",
         ["11 mm", "60 mm"],
     )
     gap: Gap | None = entry(
@@ -114,7 +113,7 @@ class Resultants(Section):
         }
         for key, size in sizes.items():
             if len(size) != 2 and not (len(size) == 1 and self.dimension == 2):
-                allowed = "[x, y]" if self.dimension == 3 else "[x], or [x, y]"
+                allowed = "[x, y]" if self.dimension == 3 else "x, or [x, y]"
                 raise disagreement(f"{shown(size)}: not a size; allowed: {allowed}", key)
         return self
 
@@ -240,6 +239,7 @@ class ResultantsCase(WearCase):
 
     @model_validator(mode="after")
     def _loads_can_be_used(self) -> ResultantsCase:
+        check_rows(self.contact, self.structure.line)
         try:
             in_file = self.structure.read(self.friction.at(0.0))
         except InputFileError as error:
