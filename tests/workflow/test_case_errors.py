@@ -244,12 +244,8 @@ def test_every_error_has_its_line(tmp_path, dovetail_text):
     path.write_text(text.replace("increments:", "steps:"), encoding="utf-8")
     result = CliRunner().invoke(cli, ["check", str(path)])
     keys = [line.split(": ")[2] for line in result.stderr.splitlines()]
-    assert keys == [
-        "structure.flank_angle",
-        "structure.blades",
-        "load_path.increments",
-        "load_path.steps",
-    ]
+    ours = ["structure.flank_angle", "structure.blades"]
+    assert keys == [*ours, "load_path.increments", "load_path.steps"]
 
 
 @pytest.mark.parametrize(

@@ -267,9 +267,8 @@ def test_shares_add_up_to_the_accuracy(plane_path):
         assert record["met"]
         assert record["estimated_error"] <= accuracy * (1.0 + 1e-9)
         assert set(record["budget"]) == {decision["entry"] for decision in record["decisions"]}
-        costs.append(
-            (sum(chosen.load_path.increments), chosen.mesh.flank_nodes, chosen.contact.grid)
-        )
+        increments = sum(chosen.load_path.increments)
+        costs.append((increments, chosen.mesh.flank_nodes, chosen.contact.grid))
     assert costs[0] < costs[1]
 
 

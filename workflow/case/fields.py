@@ -232,10 +232,7 @@ class OrAuto:
 
 @dataclass(frozen=True)
 class OrAlone:
-    """What annotates a list whose first value may stand alone, for one and the ``rest``.
-
-    A list that says no more than that is refused where there is no rest.
-    """
+    """What annotates a list whose first value may stand alone, for one with the ``rest``."""
 
     rest: tuple[int, ...] = ()
 
@@ -245,9 +242,6 @@ class OrAlone:
         return core_schema.no_info_before_validator_function(self._listed, handler(source))
 
     def _listed(self, value: object) -> object:
-        if isinstance(value, list | tuple) and len(value) == 1 and not self.rest:
-            message = f"a list of 1; allowed: {shown(value[0])} without brackets, or [x, y]"
-            raise PydanticCustomError("entry", "{message}", {"message": message})
         numbers = int | float if self.rest else int | float | str
         if isinstance(value, numbers) and not isinstance(value, bool):
             return (value, *self.rest)
