@@ -171,11 +171,11 @@ class Cycle(LegsOrFile[LegT], Generic[LegT]):
 
 
 class ContactCycle(Cycle[Leg]):
-    """Forces and motions of a closed cycle: the first leg begins where the last one ends."""
+    """Closed cycle of any loads, with contact.method: full but for motions along the face."""
 
 
 class LineContactCycle(Cycle[LineLeg]):
-    """Forces and motions of a closed cycle, per length: legs from where the last one ends."""
+    """Closed cycle of any loads, with contact.method: full but for motions along the face."""
 
 
 def _way(value: object) -> str:
@@ -269,7 +269,7 @@ class BodiesWearCase(WearCase):
 class LineBodiesWearCase(WearCase):
     """Two bodies that wear along a line, in plane strain: everything is per length of it."""
 
-    about: ClassVar[str] = "a cylinder, flat or heights along a line that wear under a cycle of loads"
+    about: ClassVar[str] = "a cylinder, flat or heights along a line that wear under such a cycle"
     half_spaces: ClassVar[bool] = True
 
     title: Title = entry("one line", "Cylinder that wears on a flat")

@@ -114,7 +114,7 @@ class MeshModel:
         case, described = self._case, self._case.structure
         return imported_structure(
             mesh,
-            described.read(),
+            described.read(case.mesh.size),
             (case.material(1), case.material(2)),
             [support.described() for support in described.supports],
             [load.described() for load in described.loads],
