@@ -367,7 +367,7 @@ def separate_processes(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(scope="session")
 def start(small_path: Path) -> Runner:
     """Runs the small case with overrides, in this process: still smaller, without pictures."""
-    fewer = "load_path.increments=[3, 5]"
+    fewer = ("load_path.increments=[3, 5]",)
     quiet = "output.paraview=false", "output.figures=false"
     quiet += "stress.section=none", "stress.life.parameter=none"
 

@@ -97,7 +97,7 @@ def test_a_cycle_dissipates_as_finely_divided_ones_do() -> None:
     """Half the slip before a solved state and half after it, or the mean pressure of both ends."""
 
     def energies(increments: int, peak: int) -> tuple[float, float]:
-        wearing = Wearing.of(*COARSE[:1], f"load_path.increments=[{peak}, {increments - peak}]")
+        wearing = Wearing.of(*COARSE[:2], f"load_path.increments=[{peak}, {increments - peak}]")
         histories = wearing.source.unworn_cycle.histories
         areas = np.concatenate([stage.face.nodal_areas for stage in wearing.contacts.stages])
         cycle = StructureCycle(histories, FRICTION, areas, 1.0)
