@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 import click
+from click.shell_completion import CompletionItem
 
 from sa_solver.errors import FretscaleError
 from workflow import errors
@@ -35,7 +36,10 @@ class _OneLineGroup(click.Group):
                 sys.stdout.flush()
         except (FretscaleError, OSError, ImportError, MemoryError) as error:
             message, code = _ending(error)
-        except SystemExit:  # what click and rich make of a pipe that was closed
+        except SystemExit as ended:
+            if not ended.code:  # a shell has been told how to complete a command
+                raise
+            # What click and rich make of a pipe that was closed.
             message, code = _ending(BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE)))
         except click.Abort:
             message, code = f"interrupted; {ADVICE}", errors.INTERRUPTED
@@ -100,7 +104,7 @@ def cli() -> None:
 
 
 @cli.command()
-@click.argument("case")
+@click.argument("case", type=click.Path())
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
 @click.option("--force", is_flag=True, help="Overwrite a folder that holds another run.")
@@ -207,7 +211,7 @@ def sweep(file: Path, out: Path, processes: int | None, dask: str | None, force:
 
 
 @cli.command()
-@click.argument("case")
+@click.argument("case", type=click.Path())
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
 def check(case: str, overrides: tuple[str, ...]) -> None:
     """Read CASE, say what it would run and about how long, if this machine's memory is enough."""
@@ -224,7 +228,7 @@ def check(case: str, overrides: tuple[str, ...]) -> None:
 
 
 @cli.command()
-@click.argument("case")
+@click.argument("case", type=click.Path())
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
 @click.option("--force", is_flag=True, help="Overwrite what is there.")
@@ -277,24 +281,52 @@ def describe(file: Path, size: str | None) -> None:
         click.echo(line)
 
 
+def _kinds() -> dict[str, str]:
+    """What `new` writes: each kind of case, and the file of a sweep, in a line of plain words."""
+    from workflow.kinds import about
+    from workflow.sweep.template import ABOUT, SWEEP
+
+    return {**about(), SWEEP: ABOUT}
+
+
+class _Kind(click.ParamType):
+    """A kind of case, which a shell completes."""
+
+    name = "kind"
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        return [
+            CompletionItem(kind, help=text)
+            for kind, text in _kinds().items()
+            if kind.startswith(incomplete)
+        ]
+
+
 class _KindsInHelp(click.Command):
     """A command whose help ends with the kinds of case that there are."""
 
     def format_epilog(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        from workflow.kinds import kinds
-
-        formatter.write_paragraph()
-        formatter.write_text(f"KIND is one of {', '.join(kinds())}.")
+        with formatter.section("KIND is one of"):
+            formatter.write_dl(list(_kinds().items()))
 
 
 @cli.command(cls=_KindsInHelp)
-@click.argument("kind")
+@click.argument("kind", required=False, type=_Kind())
 @click.argument("file", required=False, type=click.Path(path_type=Path))
-def new(kind: str, file: Path | None) -> None:
-    """Write a commented case of KIND to FILE, or print it."""
+def new(kind: str | None, file: Path | None) -> None:
+    """Write a commented case of KIND to FILE, or print it; without KIND list the kinds."""
     from workflow.kinds import template
+    from workflow.sweep.template import SWEEP, sweep_template
 
-    text = template(kind)
+    if kind is None:
+        for name, text in _kinds().items():
+            click.echo(f"{name:<18} {text}")
+        return
+    if kind not in _kinds():
+        raise errors.UserError(f"{kind}: no such kind of case; allowed: {', '.join(_kinds())}")
+    text = sweep_template() if kind == SWEEP else template(kind)
     if file is None:
         click.echo(text, nl=False)
         return
@@ -306,13 +338,25 @@ def new(kind: str, file: Path | None) -> None:
 
 
 @cli.command()
+def materials() -> None:
+    """List the materials that a case may name, and where their values are from."""
+    from workflow.commands.materials import known_materials
+
+    for line in known_materials():
+        click.echo(line)
+
+
+@cli.command()
 def schema() -> None:
-    """Print the JSON schema of a case, for editors."""
+    """Print the JSON schema of a case or a sweep, for editors."""
     import json
 
     from workflow.kinds import json_schema
+    from workflow.sweep.schema import AnySweepFile
+    from workflow.sweep.template import ABOUT, SWEEP
 
-    click.echo(json.dumps(json_schema(), indent=2, allow_nan=False, ensure_ascii=False))
+    made = json_schema({SWEEP: (AnySweepFile, ABOUT)})
+    click.echo(json.dumps(made, indent=1, allow_nan=False, ensure_ascii=False))
 
 
 def main() -> None:

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any, Union
-
-from pydantic import TypeAdapter
+from typing import Any
 
 from workflow.analyses import contact, specimens, time, vibration, vibration_wear, wear
 from workflow.case import loading
-from workflow.case.sections import Case
+from workflow.case.json_schema import json_schema as write_schema
+from workflow.case.sections import Case, Section
 from workflow.case.template import template as write_template
-from workflow.errors import UserError
 from workflow.shell.analysis import Analysis
 
 ANALYSES: tuple[Analysis[Any], ...] = (
@@ -24,10 +22,17 @@ ANALYSES: tuple[Analysis[Any], ...] = (
     vibration_wear.ANALYSIS,
 )
 
+NOTHING: Mapping[str, tuple[type[Section], str]] = {}
+
 
 def kinds() -> dict[str, type[Case]]:
     """Every kind of case, by the name that ``fretscale new`` has for it."""
     return {name: case for analysis in ANALYSES for name, case in analysis.cases.items()}
+
+
+def about() -> dict[str, str]:
+    """What each kind of case is about, in a line of plain words."""
+    return {name: case.about for name, case in kinds().items()}
 
 
 def analysis_of(case: Case) -> Analysis[Any]:
@@ -51,13 +56,11 @@ def parse_case(text: str, name: str, overrides: Sequence[str] = ()) -> Case:
 
 
 def template(kind: str) -> str:
-    """A commented case of a kind, ready to run. Raises UserError for a kind that there is not."""
-    if kind not in kinds():
-        raise UserError(f"{kind}: no such kind of case; allowed: {', '.join(kinds())}")
+    """A commented case of a kind, ready to run."""
     return write_template(kinds()[kind])
 
 
-def json_schema() -> dict[str, Any]:
-    """JSON schema of a case of any kind."""
-    union: Any = Union[tuple(kinds().values())]  # noqa: UP007 - of as many as there are
-    return TypeAdapter[Any](union).json_schema()
+def json_schema(others: Mapping[str, tuple[type[Section], str]] = NOTHING) -> dict[str, Any]:
+    """JSON schema of a case of any kind, or of other files by name, with a line about each."""
+    cases = {name: (case, case.about) for name, case in kinds().items()}
+    return write_schema({**cases, **others})

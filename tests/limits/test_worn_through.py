@@ -16,8 +16,8 @@ structure:
   size: [2 mm, 2 mm]
   gap: {shape: paraboloid, radius_x: 100 mm, radius_y: 100 mm}
 materials:
-  body_1: {young: 115 GPa, poisson: 0.29, density: 4430 kg/m^3}
-  body_2: {young: 115 GPa, poisson: 0.29, density: 4430 kg/m^3}
+  body_1: {young: 115 GPa, poisson: 0.29}
+  body_2: {young: 115 GPa, poisson: 0.29}
 friction: {coefficient: 0.4}
 contact: {grid: [16, 16], method: full, tolerance: 1e-8}
 wear:

@@ -241,7 +241,10 @@ class Leaf:
 
     def listed(self, first, last):
         """A list as long as the example, its last value another than those before."""
-        return f"[{', '.join([first] * (len(self.field.examples[0]) - 1) + [last])}]"
+        (example,) = self.field.examples
+        if not isinstance(example, list):  # it may stand alone
+            return last
+        return f"[{', '.join([first] * (len(example) - 1) + [last])}]"
 
 
 def declaring(model: type[Section], name: str) -> type[Section]:

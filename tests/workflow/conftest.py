@@ -13,14 +13,16 @@ import pytest
 from click.testing import Result
 
 from fe_models.gmsh_session import gmsh_model
+from fe_models.reduction import save_reduced
 from sa_solver.types import Array, Frame, Grid
 from tests.conftest import CASES
+from tests.workflow.case_leaves import BODY, CELLS
 from tests.workflow.commands import invoke, runs_here
 from workflow.analyses.wear import contact_workers
 from workflow.analyses.wear.budget import finding
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.layout import Contents
-from workflow.kinds import load_case
+from workflow.kinds import kinds, load_case
 from workflow.pictures import drawing
 from workflow.shell import processes
 from workflow.shell.folder import OutputFolder
@@ -240,6 +242,22 @@ def template_files(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
+@pytest.fixture(scope="session")
+def folders(tmp_path_factory: pytest.TempPathFactory, template_files: Path) -> dict[str, Path]:
+    """A folder for the template of each kind, with the files that its examples name."""
+    made = {}
+    for kind in kinds():
+        made[kind] = tmp_path_factory.mktemp(kind)
+        shutil.copytree(template_files, made[kind], dirs_exist_ok=True)
+        np.save(made[kind] / "gap.npy", np.zeros(CELLS.get(kind, (0, 0))))
+        (made[kind] / "history.csv").write_text("P,Qx\n1,0\n1,0.1\n", encoding="utf-8")
+        (made[kind] / "force.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
+        shutil.copy(CASES / "specimens_coarse.yaml", made[kind] / "specimens.yaml")
+        save_reduced(made[kind] / "body_2.h5", BODY)
+        (made[kind] / "loops.csv").write_text("energy,P,kt,mu\n0,1,1,1\n", encoding="utf-8")
+    return made
+
+
 # --- runs of the small case ---------------------------------------------------------------------
 
 
@@ -349,7 +367,7 @@ def separate_processes(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.fixture(scope="session")
 def start(small_path: Path) -> Runner:
     """Runs the small case with overrides, in this process: still smaller, without pictures."""
-    fewer = "load_path.increments=8", "load_path.peak_at=3"
+    fewer = ("load_path.increments=[3, 5]",)
     quiet = "output.paraview=false", "output.figures=false"
     quiet += "stress.section=none", "stress.life.parameter=none"
 

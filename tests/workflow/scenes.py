@@ -23,11 +23,11 @@ structure:
   kind: resultants
   file: loads.csv
   dimension: 2
-  size: [1.6 mm]
+  size: 1.6 mm
   gap: {shape: paraboloid, radius_x: 10 mm}
 materials:
-  body_1: {young: 115 GPa, poisson: 0.29, density: 4430 kg/m^3}
-  body_2: {young: 115 GPa, poisson: 0.29, density: 4430 kg/m^3}
+  body_1: {young: 115 GPa, poisson: 0.29}
+  body_2: {young: 115 GPa, poisson: 0.29}
 friction: {coefficient: 0.4}
 contact: {grid: [32, 8]}
 wear:

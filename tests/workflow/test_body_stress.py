@@ -24,7 +24,7 @@ from workflow.kinds import load_case
 PLANE = CASES / "dovetail_2d.yaml"
 COARSE = (
     *("mesh={flank_nodes: [12, 10], size: 8 mm, order: 1}", "contact.grid=[64, 64]"),
-    *("load_path.increments=8", "load_path.peak_at=3"),
+    "load_path.increments=[3, 5]",
 )
 FRICTION = 0.4
 DEPTH = 0.02

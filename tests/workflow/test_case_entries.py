@@ -6,20 +6,13 @@ tried once, in the first of its places.
 """
 
 import math
-import shutil
-from pathlib import Path as Folder
 from typing import Literal, get_origin
 
-import numpy as np
 import pytest
 from pydantic import BaseModel
 
-from fe_models.reduction import save_reduced
-from tests.conftest import CASES
 from tests.workflow.case_leaves import (
-    BODY,
     CAD,
-    CELLS,
     EXPECT,
     LEAVES,
     PLACES,
@@ -34,22 +27,6 @@ from workflow.case.fields import File, Path, Quantity, Text, Whole
 from workflow.case.sections import entry_of
 from workflow.errors import CaseError
 from workflow.kinds import kinds, load_case, parse_case
-
-
-@pytest.fixture(scope="module")
-def folders(tmp_path_factory, template_files) -> dict[str, Folder]:
-    """A folder for the template of each kind, with the files that its examples name."""
-    made = {}
-    for kind in kinds():
-        made[kind] = tmp_path_factory.mktemp(kind)
-        shutil.copytree(template_files, made[kind], dirs_exist_ok=True)
-        np.save(made[kind] / "gap.npy", np.zeros(CELLS.get(kind, (0, 0))))
-        (made[kind] / "history.csv").write_text("P,Qx\n1,0\n1,0.1\n", encoding="utf-8")
-        (made[kind] / "force.csv").write_text("time,force\n0,0\n1,5\n", encoding="utf-8")
-        shutil.copy(CASES / "specimens_coarse.yaml", made[kind] / "specimens.yaml")
-        save_reduced(made[kind] / "body_2.h5", BODY)
-        (made[kind] / "loops.csv").write_text("energy,P,kt,mu\n0,1,1,1\n", encoding="utf-8")
-    return made
 
 
 def load(leaf, folders, *overrides):
@@ -161,19 +138,19 @@ def stated(leaf):
             leaf.kind != "specimens"
         ):
             return [f"wear.step={{kind: explicit, {leaf.name}: {example}}}"]
+        case "wear.blade.specific_wear_rate":
+            return [f"wear.blade={{law: archard, specific_wear_rate: {example}}}"]
         case "wear.reference_amplitude":
             return ["wear.law=energy_amplitude", plain]
-        case "wear.energy":
-            return ["wear.cycles=", plain]
-        case "ageing.energy":
-            return ["ageing.cycles=", plain]
+        case "wear.energy" | "ageing.energy":
+            return [leaf.key.replace("energy", "cycles="), plain]
         case "evolution.file":
             return [f"evolution={{file: {example}}}"]
         case "structure.body":
             return ["structure.file=specimens.yaml", plain]
         case "load_path.file":
             return [f"load_path={{file: {example}}}"]
-        case "structure.size" if leaf.kind == "mesh":
+        case "mesh.size" if leaf.kind == "mesh":
             return [*CAD, plain]
     if leaf.name in MOTIONS:  # take the place of the forces
         force = {"P": 1.0} if leaf.name != "approach" else {}

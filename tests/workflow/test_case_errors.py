@@ -44,10 +44,12 @@ WRONG = [
      "blade: {young: 115 GPa, poisson: 0.5",
      "materials.blade.poisson", "below 0.5"),
     ("friction over 2", "coefficient: 0.4", "coefficient: 40", "friction.coefficient", "2"),
-    ("no increments", "increments: 22", "increments: 0", "load_path.increments", "from 2"),
-    ("half an increment", "increments: 22", "increments: 22.5", "load_path.increments", "whole"),
-    ("bool for a whole number", "peak_at: 8", "peak_at: yes", "load_path.peak_at", "whole"),
-    ("peak after the cycle", "peak_at: 8", "peak_at: 22", "load_path.peak_at", "increments, 22"),
+    ("no increments", "[8, 14]", "[8, 0]", "load_path.increments.1", "from 1"),
+    ("half an increment", "[8, 14]", "[8, 14.5]", "load_path.increments.1", "whole"),
+    ("bool for a whole number", "notch: 48", "notch: yes", "mesh.notch", "whole"),
+    ("increments of a cycle", "[8, 14]", "22", "load_path.increments", "such as [8, 14], or auto"),
+    ("an earlier spelling", "  increments: [8, 14]", "  increments: [8, 14]\n  peak_at: 8",
+     "load_path.peak_at", "the first leg of increments"),
     ("grid of one cell", "[128, 256]", "[1, 256]", "contact.grid.0", "from 8 to 4096"),
     ("grid of one number", "[128, 256]", "[128]", "contact.grid", "too short"),
     ("grid of three numbers", "[128, 256]", "[128, 256, 64]", "contact.grid", "a list of 2"),
@@ -74,7 +76,7 @@ WRONG = [
     ("unknown key", "neck_fillet", "neck_filet", "structure.neck_filet", "'neck_fillet'"),
     ("unknown section", "output:", "pictures:", "pictures", "allowed: title"),
     ("unknown key of a law", "law: energy", "law: energy\n  hardnes: 1", "wear.hardnes", "allowed"),
-    ("missing entry", "  peak_at: 8\n", "", "load_path.peak_at", "missing"),
+    ("missing entry", "  increments: [8, 14]\n", "", "load_path.increments", "missing"),
     ("missing section", "friction: {coefficient: 0.4}", "", "friction", "missing"),
     ("missing kind", "  kind: dovetail\n", "", "structure.kind", "missing; allowed: dovetail"),
     ("missing law", "  law: energy\n", "", "wear.law", "energy_amplitude"),
@@ -103,7 +105,7 @@ WRONG = [
      "expect.2.kind", "missing; allowed: printed (by a publication"),
     ("expectation of another kind", "kind: closed_form\n    source: -µP",
      "kind: guess\n    source: -µP", "expect.2.kind", "'earlier'"),
-    ("duplicate key", "peak_at: 8", "peak_at: 8\n  peak_at: 9", "'peak_at'", "given twice"),
+    ("duplicate key", "blades: 24", "blades: 24\n  blades: 9", "'blades'", "given twice"),
 ]  # fmt: skip
 
 # Name, whole text of the file, line of the error, words in the message.
@@ -239,10 +241,11 @@ def test_odd_keys_are_quoted(tmp_path, dovetail_text):
 def test_every_error_has_its_line(tmp_path, dovetail_text):
     path = tmp_path / "wrong.yaml"
     text = dovetail_text.replace("45 deg", "4 deg").replace("blades: 24", "blades: 1")
-    path.write_text(text.replace("peak_at: 8", "peak: 8"), encoding="utf-8")
+    path.write_text(text.replace("increments:", "steps:"), encoding="utf-8")
     result = CliRunner().invoke(cli, ["check", str(path)])
     keys = [line.split(": ")[2] for line in result.stderr.splitlines()]
-    assert keys == ["structure.flank_angle", "structure.blades", "load_path.peak"]
+    ours = ["structure.flank_angle", "structure.blades"]
+    assert keys == [*ours, "load_path.increments", "load_path.steps"]
 
 
 @pytest.mark.parametrize(
@@ -260,7 +263,7 @@ def test_every_error_has_its_line(tmp_path, dovetail_text):
         ("structure.edge_width=\t1", "a tab"),
         ("structure.edge_width=31 mm", "edge_radius"),
         ("structure.rim_radius=500 mm", "airfoil"),
-        ("load_path.increments=5", "increments, 5"),
+        ("load_path.increments=5", "of a whole cycle"),
         ("wear.step.fraction=0.5", "with explicit"),
         ("wear.stop.depht=1 um", "did you mean 'depth'?"),
         ("output=", "not a section"),

@@ -57,8 +57,8 @@ structure:
   size: [1 mm, 1 mm]
   gap: {shape: paraboloid, radius_x: 10 mm, radius_y: 10 mm}
 materials:
-  body_1: {young: 115 GPa, poisson: 0.29, density: 4430 kg/m^3}
-  body_2: {young: 115 GPa, poisson: 0.29, density: 4430 kg/m^3}
+  body_1: {young: 115 GPa, poisson: 0.29}
+  body_2: {young: 115 GPa, poisson: 0.29}
 friction: {coefficient: 0.4}
 contact: {grid: [16, 16]}
 wear:

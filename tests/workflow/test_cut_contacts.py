@@ -99,7 +99,7 @@ def test_part_wears_as_the_whole_does(tmp_path, monkeypatch, planes, load, match
     if method == "nodes":
         wear["step"] = {"kind": "second_order"}
     stress = {"section": "none", "life": {"parameter": "smith_watson_topper"}}
-    settings = f"contact.method={method}", f"structure.order={order}"
+    settings = f"contact.method={method}", f"mesh.order={order}"
     summaries, fields = [], []
     for cut in (planes, ()):
         budget = "known" if method == "full" else "probed"

@@ -264,9 +264,9 @@ def test_grids_are_compared_by_their_order() -> None:
 def test_a_run_tells_its_errors(tmp_path) -> None:
     """Against a run finer in everything, the parts add up to the error of depth and volume."""
     coarse = "mesh.flank_nodes=[14, 14]", "mesh.size=7 mm", "mesh.order=1", "contact.grid=[64, 64]"
-    coarse += "load_path.increments=11", "load_path.peak_at=4"
+    coarse += ("load_path.increments=[4, 7]",)
     fine = "mesh.flank_nodes=[61, 61]", "mesh.size=2 mm", "mesh.order=2", "contact.grid=[128, 128]"
-    fine += "load_path.increments=44", "load_path.peak_at=16", "wear.tolerance=0.3 %"
+    fine += "load_path.increments=[16, 28]", "wear.tolerance=0.3 %"
     fine += "coupling.drift=0.5 %", "wear.step.kind=second_order", "error_budget=known"
     own, exact = (
         _summary(tmp_path / name, *overrides)["intrados"]

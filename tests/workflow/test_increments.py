@@ -108,10 +108,11 @@ def test_a_run_is_of_what_was_chosen_and_tells_it_once(tmp_path, monkeypatch):
     monkeypatch.setattr(module, "choose_increments", None)
     assert command("resume", tmp_path / "out").exit_code == 0
     log = (tmp_path / "out" / "run.log").read_text("utf-8")
-    (told,) = re.findall(r"chosen: load_path.increments: (\d+): (\d+) \+ (\d+) in the legs", log)
+    (told,) = re.findall(r"chosen: load_path.increments: .(\d+), (\d+).: (\d+ \+ \d+) in", log)
     summary = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))
     settings = summary["choice"]["chosen"]
-    assert settings == {"load_path.increments": int(told[0]), "load_path.peak_at": int(told[1])}
+    assert settings == {"load_path.increments": [int(count) for count in told[:2]]}
+    assert told[2] == " + ".join(told[:2])
     assert load_case(tmp_path / "out" / "case.yaml") == kept
 
 
@@ -130,7 +131,7 @@ def test_more_than_the_most_are_not_chosen_and_it_is_told(monkeypatch):
     case = load_case(PLANE, [AUTO, *COARSE])
     monkeypatch.setattr(module, "MOST_INCREMENTS", 12)
     decision = decide_increments(case, DovetailModel, 1e-4)
-    assert decision.value == 12
+    assert sum(decision.value) == 12
     assert not decision.met
     assert "the most that are offered" in decision.why
 
@@ -144,7 +145,8 @@ def test_cycles_of_few_increments_that_fail_ask_for_more(monkeypatch):
         return solve(stage, missions)
 
     monkeypatch.setattr(StructureStage, "cycle_under", failing)
-    assert decide_increments(load_case(PLANE, [AUTO, *COARSE]), DovetailModel, 0.5).value >= 12
+    decision = decide_increments(load_case(PLANE, [AUTO, *COARSE]), DovetailModel, 0.5)
+    assert sum(decision.value) >= 12
 
 
 def test_nothing_slides_in_the_fewest(blocks):
@@ -163,10 +165,10 @@ def test_check_tells_how_many_there_may_be(blocks):
     ("override", "message"),
     [
         ("load_path.increments=atuo", "'atuo': not known; allowed: auto, or whole numbers"),
-        ("load_path.increments=1", "1: out of range; allowed: a whole number from 2 to 10000"),
-        ("load_path.increments=[8, 14]", "a list of 2: not a whole number; allowed: a whole"),
-        ("load_path.peak_at=null", "missing; allowed: increment at which the speed peaks"),
-        ("load_path.peak_at=auto", "'auto': not a whole number; allowed: a whole number from 1"),
+        ("load_path.increments=[0, 9]", "0: out of range; allowed: a whole number from 1 to 10000"),
+        ("load_path.increments=[8, 14, 8]", "too long; allowed: a list of 2"),
+        ("load_path.increments=22", "22: of a whole cycle; allowed: up to the peak and down from"),
+        ("load_path.peak_at=8", "the first leg of increments, which are [8, 14] where the speed"),
     ],
 )
 def test_what_is_no_number_of_increments_is_refused(override, message):

@@ -19,7 +19,7 @@ from workflow.shell import processes as workers
 # Many quick jumps, so that a random moment mostly falls among them.
 MANY = (
     *("wear.step.cycles=1500", "coupling.drift=2e-4"),
-    *("load_path.increments=12", "load_path.peak_at=5"),
+    "load_path.increments=[5, 7]",
 )
 JUMPS = 20
 # Seconds a run of these needs; kills come at any moment of it, and some too late.

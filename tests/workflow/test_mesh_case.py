@@ -78,6 +78,22 @@ def blocks(tmp_path):
     return write_case(tmp_path / "blocks.yaml", {"file": "blocks.inp", **BLOCKS}, TO_AND_FRO)
 
 
+def test_density_is_for_loads_on_the_mass(blocks):
+    """Pressures need none; what turns or is accelerated does, and says why."""
+    steel = "{young: 200 GPa, poisson: 0.3}"
+    bare = [f"materials.body_{number}={steel}" for number in (1, 2)]
+    assert load_case(blocks, bare).material(1).density == 0.0
+    load = "{kind: acceleration, acceleration: [0, 0, 9810], path: [1, 1, 1, 1]}"
+    line = refused(blocks, *bare, f"structure.loads.1={load}")
+    assert line.endswith(
+        "materials.body_1.density: missing, and a load of acceleration acts on the mass; allowed: "
+        "mass per volume [t/mm^3], such as 4430 kg/m^3"
+    )
+    named = ["materials.body_1=304L", "materials.body_2=304L"]
+    case = load_case(blocks, [*named, f"structure.loads.1={load}"])
+    assert case.material(2).density == 7.9e-9
+
+
 def edit(path, old, new):
     """Replace text in a file and give its lines."""
     text = path.read_text("utf-8")
@@ -210,7 +226,7 @@ def cad(tmp_path):
     }.items():
         text = text.replace(json.dumps(group), json.dumps(face_at(imported, *place)))
     structure = json.loads(text) | {"body_1": lower, "body_2": upper, "file": file.name}
-    return write_case(tmp_path / "cad.yaml", structure | {"size": "0.5 mm"}, TO_AND_FRO)
+    return write_case(tmp_path / "cad.yaml", structure, TO_AND_FRO, mesh={"size": "0.5 mm"})
 
 
 def test_cad_file_runs(cad, tmp_path):
@@ -246,9 +262,13 @@ def test_describe_refuses_in_one_line(cad, file, size, wrong):
 
 
 def test_size_is_for_cad_files_alone(cad, blocks):
-    assert "structure.size=0.5: 0.5 mm: the file is a mesh" in refused(blocks, "structure.size=0.5")
-    edit(cad, "  size: 0.5 mm\n", "")
-    assert "structure.size: missing" in refused(cad)
+    assert "mesh.size=0.5: 0.5 mm: the file is a mesh" in refused(blocks, "mesh.size=0.5")
+    told = "structure.size=0.5: of the elements; allowed: as mesh.size"
+    assert refused(blocks, "structure.size=0.5").endswith(told)
+    told = "structure.order=2: of the elements; allowed: as mesh.order"
+    assert refused(blocks, "structure.order=2").endswith(told)
+    edit(cad, "mesh:\n  size: 0.5 mm\n", "")
+    assert "mesh.size: missing" in refused(cad)
 
 
 # --- in the plane ---------------------------------------------------------------------------------

@@ -81,7 +81,7 @@ def dovetail_as_mesh(folder, dovetail, ending):
         f"body_{n}": {"young": m.young, "poisson": m.poisson, "density": m.density}
         for n, m in ((1, dovetail.material(1)), (2, dovetail.material(2)))
     }
-    legs = {"increments": [1] * len(speeds), "peak_leg": path.peak_at}
+    legs = {"increments": [1] * len(speeds), "peak_leg": path.legs[0]}
     mu = dovetail.friction.coefficient
     return write_case(folder / "joint.yaml", structure, legs, mu, materials=materials)
 

@@ -22,7 +22,7 @@ from workflow.kinds import load_case, parse_case, template
 
 COARSE = "mesh.flank_nodes=[10, 10]", "mesh.size=8", "contact.grid=[48, 64]"
 QUIET = "output.paraview=false", "output.figures=false", "stress.section=none"
-SHORT = "load_path.increments=8", "load_path.peak_at=3"
+SHORT = ("load_path.increments=[3, 5]",)
 FRICTION = 0.4
 LOW = "rotation_speed: 4500 rpm, aerodynamic_moment: 20 N*m"
 

@@ -9,7 +9,7 @@ import re
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import h5py
 import numpy as np
@@ -56,6 +56,8 @@ class Ball(Section):
 
 class HertzCase(Case):
     """A ball pressed on a plane."""
+
+    about: ClassVar[str] = "a ball pressed on a plane"
 
     analysis: Literal["hertz"] = entry("what is computed", "hertz")
     structure: Ball = entry("what is loaded")
@@ -109,7 +111,7 @@ def test_new_analysis_is_written_and_checked(ball: Path) -> None:
 
 def test_new_analysis_is_in_the_schema(ball: Path) -> None:
     schema = json.loads(done("schema"))
-    assert schema["anyOf"][-1] == {"$ref": "#/$defs/HertzCase"}
+    assert schema["oneOf"][-2] == {"$ref": "#/$defs/HertzCase"}  # the last is a sweep
     radius = schema["$defs"]["Ball"]["properties"]["radius"]
     assert radius["description"] == "of the sphere [mm]"
 
@@ -177,6 +179,8 @@ class Stamp(Section):
 
 class StampCase(WearCase):
     """A stamp that wears with what it stands on."""
+
+    about: ClassVar[str] = "a stamp that wears with what it stands on"
 
     structure: Stamp = entry("what is loaded")
     materials: TwoMaterials = entry("the two bodies in contact")

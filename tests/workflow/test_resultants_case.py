@@ -140,7 +140,7 @@ def test_template_works_without_its_comment_signs(tmp_path):
         ("structure.size=[0.5, 60]", "structure.file", "outside the face"),
         ("structure.dimension=2", "structure.file", "'kN' cannot be converted to N/mm"),
         ("structure.size=[11]", "structure.size", "a list of 1: not a size; allowed: [x, y]"),
-        ("structure.size=11 mm", "structure.size", "not a list"),
+        ("structure.size=11 mm", "structure.size", "a list of 1: not a size; allowed: [x, y]"),
         ("structure.gap=", "structure.gap", "no height of early; allowed: shape rounded"),
         ("structure.gap.shape=cone", "structure.gap.shape", "rounded, paraboloid, heights"),
         ("structure.gap.edge_width=6", "structure.gap.edge_width", "size of the face, 5.5 mm"),
@@ -150,7 +150,8 @@ def test_template_works_without_its_comment_signs(tmp_path):
         ("structure.gap={shape: heights, file: gap.npy}", "contact.grid", "allowed: [3, 4]"),
         ("structure.interfaces=[{name: pad}]", "interfaces.0.name", "early, late, never"),
         ("structure.interfaces=[{name: late}, {name: late}]", "interfaces.1.name", "given twice"),
-        ("structure.interfaces=[{name: late, size: [3]}]", "interfaces.0.size", "not a size"),
+        ("structure.interfaces=[{name: late, size: 3}]", "interfaces.0.size", "not a size"),
+        ("contact.grid=16", "contact.grid", "16: of line contacts; allowed: [x, y]"),
         ("structure.interfaces=[{name: late, nodes: {body_1: nodes.csv}}]",
          "interfaces.0.nodes.body_1", "without its frame"),
         ("structure.interfaces=[{name: late, frame: {origin: [0, 0, 0], x: [1, 0, 1], "
@@ -315,7 +316,7 @@ def test_a_new_run_takes_away_the_nodes_of_the_old(typed, tmp_path):
     (tmp_path / "case.yaml").write_text(template("resultants"), encoding="utf-8")
     summary = run(
         tmp_path / "case.yaml", tmp_path / "out", *SMALL, "structure.dimension=2",
-        "structure.size=[3]", "structure.gap={shape: paraboloid, radius_x: 20 mm}",
+        "structure.size=3", "structure.gap={shape: paraboloid, radius_x: 20 mm}",
         "contact.grid=[64, 8]",
     )  # fmt: skip
     assert not list((tmp_path / "out").glob("worn_nodes_*"))
@@ -334,7 +335,7 @@ def test_a_table_without_moments_holds_the_tilt(tmp_path):
     case = tmp_path / "case.yaml"
     case.write_text(template("resultants"), encoding="utf-8")
     overrides = [
-        *SMALL, "structure.dimension=2", "structure.size=[3]", "contact.grid=[64, 8]",
+        *SMALL, "structure.dimension=2", "structure.size=3", "contact.grid=[64, 8]",
         "structure.gap={shape: heights, file: gap.npy}",
     ]  # fmt: skip
 
@@ -382,7 +383,7 @@ def test_pictures_of_resultants_alone(typed, tmp_path):
     ids=["line, full", "area, given slips"],
 )
 def test_our_loads_through_files_wear_the_same_bit_for_bit(small_path, tmp_path, settings):
-    fewer = "load_path.increments=6", "load_path.peak_at=2", "wear.cycles=2e4"
+    fewer = "load_path.increments=[2, 4]", "wear.cycles=2e4"
     settings = [*settings, *fewer, "coupling.resultants=constant", *QUIET]
     assert command("resultants", small_path, "--out", tmp_path, overrides=settings).exit_code == 0
     original = run(small_path, tmp_path / "original", *settings)

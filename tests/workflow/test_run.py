@@ -22,7 +22,7 @@ UM3_PER_J = 1e-12
 # What warnings of a coarse mesh speak of.
 MESH = re.compile("link|what the structure carries past the contact|raise mesh.notch")
 # Few and quick increments for the odd cases, where a run is only to end well.
-QUICK = (*("load_path.increments=5", "load_path.peak_at=2", "contact.grid=[16, 24]"),)
+QUICK = (*("load_path.increments=[2, 3]", "contact.grid=[16, 24]"),)
 
 
 def balances(run, laws):

@@ -35,3 +35,44 @@ def test_frequent_units_are_pints():
 )
 def test_anything_else_is_left_to_pint(text):
     assert units._frequent(text) is None
+
+
+@pytest.mark.parametrize(
+    ("written", "plain"),
+    [
+        *((f"1 {rate}", "1e-3 1/MPa") for rate in (
+            "mm^3/(N m)", "mm³/(N·m)", "mm³/(N*m)", "mm^3/N/m", "mm3/Nm", "mm**3 / (N * m)",
+            "mm³/Nm", "mm^3/J", "mm³ / J", "mm^3 N^-1 m^-1",
+        )),
+        ("2 µm³/J", "2 um^3/J"),
+        ("2 μm", "2 um"),
+        ("7.85 g/cm³", "7850 kg/m^3"),
+        ("3 kN·m", "3e6 N*mm"),
+        ("3 kNm", "3e6 N*mm"),
+        ("3 N mm", "3 N*mm"),
+    ],
+)  # fmt: skip
+def test_spaces_dots_and_superscripts(written, plain):
+    assert units.to_base(written, None) == units.to_base(plain, None)
+
+
+@pytest.mark.parametrize("text", ["1 mm³/(N·m)", "1 mm^3/(N m)", "1 mm3/Nm", "1 um³/J", "1 N mm"])
+def test_they_need_no_pint(text, monkeypatch):
+    """Which takes half a second to load."""
+    monkeypatch.setattr(units, "_by_pint", None)
+    units._parse.cache_clear()
+    assert units.to_base(text, None) > 0.0
+
+
+@pytest.mark.parametrize(
+    ("text", "told"),
+    [
+        ("1 mm³/N·m", "cannot be converted to 1/MPa; all that is below / needs brackets"),
+        ("1×10^-8 1/MPa", "power of ten; write 1e-8"),
+        ("1 mm^3", "cannot be converted to 1/MPa"),
+    ],
+)
+def test_what_is_wrong_with_a_rate_is_told(text, told):
+    with pytest.raises(units.UnitError) as error:
+        units.to_base(text, "1/MPa")
+    assert str(error.value).endswith(told)

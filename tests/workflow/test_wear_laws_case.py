@@ -55,6 +55,21 @@ def test_a_body_may_name_its_own_law(dovetail_path, law):
         assert laws(dovetail_path, *section, f"wear.disk={entry}") == (disk, blade)
 
 
+@pytest.mark.parametrize(
+    "written", ["3e-5 mm^3/(N*m)", "3e-5 mm³/(N·m)", "3e-5 mm^3/(N m)", "3e-5 mm3/Nm", "3e-8 1/MPa"]
+)
+def test_archard_takes_the_specific_wear_rate(dovetail_path, written):
+    """k = V / (P s) = K / H, whatever it is written in."""
+    entry = f"wear.disk={{law: archard, specific_wear_rate: {written}}}"
+    law, _ = laws(dovetail_path, entry)
+    assert law.coefficient / law.hardness == pytest.approx(3e-8, rel=1e-15)
+    case = load_case(dovetail_path, [entry])
+    assert parse_case(dump_case(case), "dump") == case
+    assert case.wear_of(1).rate(0.4) == law.coefficient
+    # An energy law wears as much with α = k / µ.
+    assert case.wear_of(2).rate(0.4) == 0.4 * case.wear_of(2).coefficient
+
+
 def test_reference_amplitude_is_of_the_section_or_of_the_body(dovetail_path):
     disk = f"wear.disk={AMPLITUDE}"
     first, _ = laws(dovetail_path, disk, "wear.reference_amplitude=50 um")
@@ -91,7 +106,22 @@ TABLE = "wear.disk.evolution={scope: local, energy: [%s], factor: [%s]}"
         ("wear.disk.evolutoin=1", "wear.disk.evolutoin", "did you mean 'evolution'?"),
         ("wear.disk.roughness=1", "wear.disk.roughness", "allowed: coefficient, evolution, law"),
         ("wear.disk={law: archard, coefficient: 1e-4}", "wear.disk.hardness",
-         "missing; allowed: of the worn body [MPa], such as 3.5 GPa"),
+         "missing; allowed: H of the worn body, beside coefficient [MPa], such as 3.5 GPa; or "
+         "specific_wear_rate, which has both in it"),
+        ("wear.disk={law: archard, hardness: 3 GPa}", "wear.disk.coefficient",
+         "such as 0.0001; or specific_wear_rate, which has both in it"),
+        ("wear.disk={law: archard, coefficient: 1e-5 mm^3/(N m), hardness: 3 GPa}",
+         "wear.disk.coefficient",
+         "volume over load and distance, not Archard's K; allowed: as specific_wear_rate, without "
+         "hardness"),
+        (f"wear.disk={ARCHARD[:-1]}, specific_wear_rate: 1e-8}}", "wear.disk.specific_wear_rate",
+         "given beside coefficient; allowed: it alone, or coefficient and hardness"),
+        ("wear.disk.specific_wear_rate=1e-8 1/MPa", "wear.disk.specific_wear_rate",
+         "of archard; allowed: coefficient, which is that rate over the coefficient of friction, "
+         "or law: archard"),
+        ("wear.disk.coefficient=1e-5 mm³/N·m", "wear.disk.coefficient",
+         "cannot be converted to 1/MPa; all that is below / needs brackets; allowed: 0 to 1e9 "
+         "um^3/J (a bare number is in 1/MPa)"),
         (f"wear.disk={AMPLITUDE}", "wear.reference_amplitude",
          "missing; allowed: at which coefficients of energy_amplitude hold [mm], such as 75 um"),
         ("wear.reference_amplitude=75 um", "wear.reference_amplitude",
@@ -163,13 +193,13 @@ def test_schema_takes_bodies_with_and_without_a_law():
     assert len(body["anyOf"]) == 3
     for reference in body["anyOf"]:
         definition = schema["$defs"][reference["$ref"].rpartition("/")[2]]
-        assert "law" not in definition["required"]
+        assert "law" not in definition.get("required", [])
         assert {"coefficient", "law", "evolution"} <= set(definition["properties"])
 
 
 def test_template_shows_how_a_body_names_its_own_law():
     assert template("dovetail").count("# law: energy  # of this body; without it wear.law") == 2
-    assert template("dovetail").count("# evolution:") == 3
+    assert template("dovetail").count("# evolution:") == 3 + 1  # of the other scope
 
 
 # --- mixes ----------------------------------------------------------------------------------------

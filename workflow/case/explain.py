@@ -9,11 +9,10 @@ from typing import Any, get_args
 from pydantic_core import ErrorDetails
 
 from workflow.case.fields import shown
-from workflow.case.sections import Section, sections_of
+from workflow.case.sections import KINDS_ARE_NAMED_BY, Section, sections_of
 from workflow.case.source import KeyPath, Source, child, dotted, split_path
 
-# Keys that choose between sections, and the one that a section takes from that around it.
-KINDS_ARE_NAMED_BY = ("kind", "law", "shape", "scope")
+# The one of KINDS_ARE_NAMED_BY that a section takes from that around it.
 INHERITED = "law"
 
 # Lines about a text: the same mistake mostly is in many places.
@@ -94,6 +93,9 @@ class Explanation:
         return path, f"missing; allowed: {field.description}{example}"
 
     def _unknown(self, path: KeyPath) -> str:
+        for model in self._models_at(path[:-1]):
+            if told := model.refused.get(str(path[-1])):
+                return told
         near = self._nearest(path)
         if near:
             return f"unknown key; did you mean '{near}'?"

@@ -167,7 +167,7 @@ class Quantity(Entry):
         }
         finite = {name: limit for name, limit in limits.items() if math.isfinite(limit)}
         number = {"type": "number", **finite}
-        return {"anyOf": [number, {"type": "string", "pattern": units.QUANTITY_PATTERN}]}
+        return {"anyOf": [number, {"type": "string", "pattern": units.WITH_UNIT}]}
 
 
 @dataclass(frozen=True)
@@ -179,6 +179,8 @@ class Whole(Entry):
 
     @property
     def allowed(self) -> str:
+        if self.at_least == self.at_most:
+            return str(self.at_least)
         return f"a whole number from {self.at_least} to {self.at_most}"
 
     def parse(self, value: object) -> int:
@@ -190,6 +192,21 @@ class Whole(Entry):
 
     def json_schema(self) -> dict[str, Any]:
         return {"type": "integer", "minimum": self.at_least, "maximum": self.at_most}
+
+
+@dataclass(frozen=True)
+class Rows(Whole):
+    """The cells of a grid along y: one row in a line contact."""
+
+    @property
+    def allowed(self) -> str:
+        return f"1 in a line contact, or {super().allowed}"
+
+    def parse(self, value: object) -> int:
+        return 1 if value == 1 and type(value) is int else super().parse(value)
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"anyOf": [{"const": 1}, super().json_schema()]}
 
 
 class OrAuto:
@@ -211,6 +228,31 @@ class OrAuto:
         self, schema: CoreSchema, handler: GetJsonSchemaHandler
     ) -> dict[str, Any]:
         return {"anyOf": [handler(schema), {"const": AUTO}]}
+
+
+@dataclass(frozen=True)
+class OrAlone:
+    """What annotates a list whose first value may stand alone, for one with the ``rest``."""
+
+    rest: tuple[int, ...] = ()
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self._listed, handler(source))
+
+    def _listed(self, value: object) -> object:
+        numbers = int | float if self.rest else int | float | str
+        if isinstance(value, numbers) and not isinstance(value, bool):
+            return (value, *self.rest)
+        return value
+
+    def __get_pydantic_json_schema__(
+        self, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        listed = handler(schema)
+        alone = listed["prefixItems"][0] if "prefixItems" in listed else listed["items"]
+        return {"anyOf": [alone, listed]}
 
 
 @dataclass(frozen=True)

@@ -7,15 +7,36 @@ write it. JSON schema, template and error messages are made from these; nothing 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, ClassVar, Literal, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, StrictBool, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    ConfigDict,
+    Field,
+    GetJsonSchemaHandler,
+    StrictBool,
+    field_validator,
+    model_validator,
+)
 from pydantic.fields import FieldInfo
-from pydantic_core import PydanticCustomError
+from pydantic.json_schema import JsonSchemaValue
+from pydantic_core import CoreSchema, PydanticCustomError
 
 from sa_solver.types import Material as ElasticMaterial
-from workflow.case.fields import Entry, File, Path, Quantity, Text, Whole, shown, split_dataset
+from workflow.case.fields import (
+    Entry,
+    File,
+    OrAlone,
+    Path,
+    Quantity,
+    Rows,
+    Text,
+    Whole,
+    shown,
+    split_dataset,
+)
+from workflow.case.materials import MATERIALS, near
 from workflow.case.source import Source
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual machine.
@@ -25,9 +46,15 @@ Stress = Annotated[
     float, Quantity("MPa", above=0.0, at_most=2e6, range_text="above 0 and at most 2000 GPa")
 ]
 GridCells = Annotated[int, Whole(8, 4096)]
+# Cells along x and y of a contact that may be a line contact, and of one that is: a number alone.
+FaceCells = Annotated[tuple[GridCells, Annotated[int, Rows(8, 4096)]], OrAlone((1,))]
+LineCells = Annotated[tuple[GridCells, Annotated[int, Whole(1, 1)]], OrAlone((1,))]
 Title = Annotated[str, Text()]
 DottedPath = Annotated[str, Path()]
 Tolerance = Annotated[float, Quantity("1", at_least=1e-12, at_most=1e-3)]
+
+# Keys that choose between sections.
+KINDS_ARE_NAMED_BY = ("kind", "law", "shape", "scope")
 
 
 def entry(description: str, example: object = None, **settings: Any) -> Any:
@@ -50,14 +77,73 @@ class Section(BaseModel):
     filled_in: ClassVar[bool] = True
     # Keys by which it is known from other kinds of the same section, where no word names them.
     known_by: ClassVar[frozenset[str]] = frozenset()
+    # Those that it fills in here beside them.
+    also_filled_in: ClassVar[tuple[str, ...]] = ()
+    # Keys that who knows other kinds of case may try here, and what to say of them.
+    refused: ClassVar[Mapping[str, str]] = {}
+
+
+class MaterialName(Text):
+    """The name of a known material."""
+
+    allowed = "a name that `fretscale materials` lists"
+
+    def json_schema(self) -> dict[str, Any]:
+        return {"enum": list(MATERIALS)}
 
 
 class ElasticBody(Section):
-    """Base of the materials of a case."""
+    """Base of the materials of a case: one that is known by name, numbers, or both."""
+
+    refused: ClassVar[Mapping[str, str]] = {
+        "density": "no mass is moved here; allowed: leave it out"
+    }
+
+    material: Annotated[str, MaterialName()] | None = entry(
+        "one of `fretscale materials`, for all that is not given beside it",
+        "Ti-6Al-4V",
+        default=None,
+    )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _named(cls, data: Any) -> Any:
+        """Fill in what is known of a material by its name, which may stand alone."""
+        given = data if isinstance(data, dict) else {}
+        if data is None or isinstance(data, str | int | float):
+            data = {"material": data}
+        if not isinstance(data, dict) or data.get("material") is None:
+            return data
+        name = data["material"]
+        if not isinstance(name, str) or name not in MATERIALS:
+            meant = near(str(name))
+            hint = f", did you mean '{meant}'?" if meant else ""
+            raise disagreement(
+                f"{shown(name)}: no known material{hint}; allowed: {MaterialName.allowed}, or "
+                "a section with young and poisson",
+                *(["material"] if "material" in given else []),
+            )
+        known = MATERIALS[name].in_base_units().items()
+        filled = {k: v for k, v in known if k in cls.model_fields and data.get(k) is None}
+        return data | filled
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        reference = handler(schema)
+        section = handler.resolve_ref_schema(reference)
+        alone = dict(section)
+        section.clear()
+        numbers = alone.pop("required")
+        alone["anyOf"] = [{"required": ["material"]}, {"required": numbers}]
+        section |= {"anyOf": [MaterialName().json_schema(), alone]}
+        return reference
 
     def elastic(self) -> ElasticMaterial:
         """The same material as the solvers take it; no yield stress is an infinite one."""
         properties = {k: v for k, v in self.model_dump().items() if v is not None}
+        properties.pop("material", None)
         return ElasticMaterial(**properties)
 
 
@@ -128,6 +214,9 @@ LAST = ("output", "assumed", "reported", "expect")
 
 class Case(Section, ABC):
     """Base of all kinds of case: what the shell needs of any of them."""
+
+    # What a case of this kind is about, in a line of plain words.
+    about: ClassVar[str]
 
     title: Title = entry("one line", "Ball on a flat, pressed and sheared")
     analysis: str = entry("what is computed", "contact")

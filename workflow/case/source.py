@@ -26,6 +26,9 @@ WORD = r"\w(?:[\w -]{0,58}\w)?"
 # In the place of the file of a case that is the data of a program, and has no lines.
 IN_PYTHON = "the case"
 
+# Sections in which a text stands for a section with nothing but that entry.
+SHORT: dict[KeyPath, str] = {("materials",): "material"}
+
 LARGEST_FILE = 1_000_000  # bytes; cases have a few thousand
 MOST_ENTRIES = 10_000  # after expanding YAML aliases, which can grow without bound
 DEEPEST = 20  # levels; a case has four
@@ -92,9 +95,13 @@ class Source:
             raise CaseError(f"{label}: {TOO_MUCH}; allowed: up to {DEEPEST} keys")
         value = _Reading(label).plain(parse_yaml(text, label), (), 1)
         node: Any = self.data
-        for key in path[:-1]:
-            if isinstance(node, dict) and node.get(str(key)) is None:
-                node[str(key)] = {}
+        for place, key in enumerate(path[:-1]):
+            if isinstance(node, dict):
+                inner = node.get(str(key))
+                if inner is None:
+                    node[str(key)] = {}
+                elif isinstance(inner, str) and path[:place] in SHORT:
+                    node[str(key)] = {SHORT[path[:place]]: inner}
             node = child(node, key)
         if isinstance(node, dict):
             node[str(path[-1])] = value

@@ -7,35 +7,66 @@ from typing import Any, get_origin
 
 from pydantic.fields import FieldInfo
 
-from workflow.case.sections import Case, Section, entries_of, sections_of
+from workflow.case.sections import (
+    KINDS_ARE_NAMED_BY,
+    Case,
+    Section,
+    entries_of,
+    sections_of,
+)
 from workflow.case.writing import Row, render
 
-HEADER = """\
+EDITORS = """\
+# yaml-language-server: $schema=fretscale.schema.json
+# Editors complete and check by it: `fretscale schema > fretscale.schema.json` beside this file.
+"""
+HEADER = f"""\
+{EDITORS}\
 # A number without a unit is in the base unit, given in brackets. `fretscale check` tells what is
-# wrong with a case, `fretscale run` runs it. Entries behind a # are optional.
+# wrong with a case, `fretscale run` runs it. Entries behind a # are optional: those said to be
+# `or` another kind take the place of the section above, those `also` stand below it.
 """
 # Optional entries the template fills in: a material that can yield, the length of a run, legs that
-# press, when a speed peaks, a face with all edges rounded, and a joint whose friction rises.
+# press, a face with all edges rounded, a joint whose friction rises and
+# a mass.
 FILLED_IN = (
-    *("yield_stress", "cycles", "legs", "P", "peak_at", "gap", "end_width", "end_radius"),
-    "friction",
+    *("yield_stress", "cycles", "legs", "P", "gap", "end_width", "end_radius"),
+    *("friction", "density"),
 )
 
 
 def template(model: type[Case]) -> str:
     """A commented case of a kind, ready to run, with every entry there is."""
-    return HEADER + render(_rows(model))
+    return HEADER + render(_rows(model, set()))
 
 
-def _rows(model: type[Section]) -> list[Row]:
-    filled_in = FILLED_IN if model.filled_in else ()
-    return [_row(name, field, filled_in) for name, field in entries_of(model).items()]
+def _rows(model: type[Section], shown: set[tuple[type[Section], ...]]) -> list[Row]:
+    """The entries of a section, and after each that may be of other kinds those not yet shown."""
+    filled_in = (*(FILLED_IN if model.filled_in else ()), *model.also_filled_in)
+    rows = []
+    for name, field in entries_of(model).items():
+        row = _row(name, field, filled_in, shown)
+        sections = tuple(sections_of(field.annotation))
+        others = [] if sections in shown else sections[1:]
+        shown |= {sections} if others else set()
+        kinds = [_other(name, model, sections[0], shown) for model in others]
+        if kinds and get_origin(field.annotation) is tuple:
+            items = [replace(kind, comment=f"also{kind.comment[2:]}") for kind in kinds]
+            rows.append(replace(row, value=[*row.value, *items]))
+        else:
+            rows += [row, *kinds]
+    return rows
 
 
-def _row(name: str, field: FieldInfo, filled_in: tuple[str, ...]) -> Row:
+def _row(
+    name: str,
+    field: FieldInfo,
+    filled_in: tuple[str, ...],
+    shown: set[tuple[type[Section], ...]],
+) -> Row:
     """The entry as one would write it; of several kinds the first."""
     sections = list(sections_of(field.annotation))
-    value: Any = _rows(sections[0]) if sections else (field.examples or [None])[0]
+    value: Any = _rows(sections[0], shown) if sections else (field.examples or [None])[0]
     off = not field.is_required() and field.default in (None, ()) and name not in filled_in
     if sections and all(row.off for row in value):
         # A section of nothing but optional entries is optional as a whole.
@@ -43,3 +74,22 @@ def _row(name: str, field: FieldInfo, filled_in: tuple[str, ...]) -> Row:
     if sections and get_origin(field.annotation) is tuple:
         value = [value]
     return Row(name, value, field.description or "", off)
+
+
+def _other(
+    name: str,
+    model: type[Section],
+    first: type[Section],
+    shown: set[tuple[type[Section], ...]],
+) -> Row:
+    """An entry of another kind than the ``first``: the key that names its kind, and what is new."""
+    rows = _rows(model, shown)
+    above = {key: field.description for key, field in first.model_fields.items()}
+    named = [replace(row, off=False, comment="") for row in rows if row.key in KINDS_ARE_NAMED_BY]
+    new = [
+        replace(row, comment="" if row.comment == above.get(row.key) else row.comment)
+        for row in rows
+        if row.key not in KINDS_ARE_NAMED_BY and not (row.off and row.key in above)
+    ]
+    told = (model.__doc__ or "").split("\n")[0].rstrip(".").replace("``", "")
+    return Row(name, [*named, *new], f"or: {told}", off=True)

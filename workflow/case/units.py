@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from pint import UnitRegistry
 
 QUANTITY_PATTERN = r"^\s*([-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?)\s*(\S.*?)?\s*$"
+# The same for editors, which know of a unit only that there is one.
+WITH_UNIT = r"^\s*[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?\s*(?:1\s*/\s*)?[A-Za-zµμ°%(].*$"
 LONGEST_UNIT = 40  # no unit is longer; keeps pint from chewing on prose
 
 # Units that nearly every case is written in, by their size in root units and their dimension. Pint,
@@ -53,12 +55,36 @@ FREQUENT: dict[str, tuple[str, dict[str, int]]] = {
     "%": ("1e-2", {}),
     "Hz": ("1", {SECOND: -1}),
 }
+# Other ways to write what is frequent: superscripts, dots, spaces, and newtons times lengths.
+SPELLINGS = (
+    ("²", "^2"),
+    ("³", "^3"),
+    (r"[µμ](?=m)", "u"),
+    (r"\*\*", "^"),
+    (r"(?<![A-Za-z])([cmu]?m)([23])\b", r"\1^\2"),
+    (r"\s*([/*()])\s*", r"\1"),
+    (r"\s*[·⋅]\s*|\s+", "*"),
+    (r"(?<![A-Za-z])([kM]?N)(mm?)(?![A-Za-z^])", r"(\1*\2)"),  # Nm, which pint takes for a yarn's
+)
+BELOW = re.compile(r"/[^()/]*[*·⋅ ]")  # mm³/N·m, which is (mm³/N)·m
 FACTOR_PATTERN = re.compile(r"(?P<unit>[A-Za-z%]+)(?:\^(?P<power>[1-9]))?")
 
 # Offered when a unit is not known; pint knows many more.
 COMMON_UNITS = (
     *("mm", "um", "m", "N", "kN", "MPa", "GPa", "Pa", "kg", "g", "t", "s", "h", "J", "mJ"),
-    *("deg", "rad", "rpm", "rad/s", "%", "kg/m^3", "N*m", "um^3/J", "mm^3/J"),
+    *(
+        "deg",
+        "rad",
+        "rpm",
+        "rad/s",
+        "%",
+        "kg/m^3",
+        "N*m",
+        "um^3/J",
+        "mm^3/J",
+        "mm^3/(N*m)",
+        "1/MPa",
+    ),
 )
 
 
@@ -83,7 +109,8 @@ def to_base(text: str, unit: str | None) -> float:
     wanted = _parse(unit)
     if known.powers != wanted.powers:
         target = "a ratio" if unit == "1" else unit
-        raise UnitError(f"unit '{written}' cannot be converted to {target}")
+        hint = "; all that is below / needs brackets" if BELOW.search(written) else ""
+        raise UnitError(f"unit '{written}' cannot be converted to {target}{hint}")
     return float(number * known.factor / wanted.factor)
 
 
@@ -97,6 +124,8 @@ def split(text: str) -> tuple[Decimal, str]:
         raise UnitError("text without a unit")
     if re.match(r",\d", unit):
         raise UnitError("decimal comma; write a point")
+    if power := re.match(r"[×x*·]\s*10(?:\^|\*\*)\s*([-+]?\d+)", unit):
+        raise UnitError(f"power of ten; write {number}e{power[1]}")
     return Decimal(number), unit
 
 
@@ -114,13 +143,17 @@ def _parse(unit: str) -> _Unit:
         raise UnitError("not a number with a unit")
     if unit == "1":
         return _Unit(Decimal(1), {})
-    return _frequent(unit) or _by_pint(unit)
+    plain = unit
+    for pattern, replacement in SPELLINGS:
+        plain = re.sub(pattern, replacement, plain)
+    return _frequent(plain) or _by_pint(unit)
 
 
 def _frequent(unit: str) -> _Unit | None:
     """Products and quotients of frequent units, such as kg/m^3 and 1/J; None for anything else."""
     factor, powers = Decimal(1), dict[str, Decimal]()
     unit = re.sub(r"/\(([^()*/]+)\*([^()*/]+)\)", r"/\1/\2", unit)  # 1/(N*mm) is 1/N/mm
+    unit = re.sub(r"^\(([^()*/]+)\*([^()*/]+)\)", r"\1*\2", unit)
     for place, part in enumerate(re.split(r"([*/])", f"*{unit}")[1:]):
         if place % 2 == 0:
             sign = 1 if part == "*" else -1

@@ -30,7 +30,7 @@ class Row:
     """One entry to write; ``off`` leaves it in as a comment."""
 
     key: str
-    value: Any  # scalar, list of values, or rows of a section
+    value: Any  # scalar, list of values, rows of a section, or a list of sections as rows
     comment: str = ""
     off: bool = False
 
@@ -80,9 +80,11 @@ def _entry_lines(row: Row) -> Iterator[str]:
         yield from (INDENT + line for line in _lines(row.value))
         return
     for item in row.value:
-        first, *rest = _lines(item)
-        yield f"{INDENT}- {first}"
-        yield from (2 * INDENT + line for line in rest)
+        other = isinstance(item, Row)  # an item of another kind, left in as a comment
+        first, *rest = _lines(item.value if other else item)
+        sign = "# " if other else ""
+        yield _commented(f"{INDENT}{sign}- {first}", item.comment if other else "")
+        yield from (f"{INDENT}{sign}{INDENT}{line}" for line in rest)
 
 
 def _is_section(value: Any) -> bool:

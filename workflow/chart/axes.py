@@ -34,7 +34,7 @@ MESHES_3D = 0.5, 0.5**0.5, 1.0, 2.0**0.5
 MESHES_2D = 0.5, 0.5**0.5, 1.0, 2.0**0.5, 2.0, 2.0**1.5, 4.0
 # Of finite elements alone, whose nodes carry the contact: refinements, and where their order is.
 MESHES_ALONE = 1.0, 2.0, 4.0, 8.0
-ORDERS = "mesh.order", "structure.order"
+ORDER = "mesh.order"
 # Links to the structure, and its meshes to be linked to in the plane.
 LINKS = {"half_space": "half-space", "corrected": "corrected"}
 MESHES_LINKED = 0.5, 1.0, 2.0, 4.0
@@ -164,7 +164,7 @@ def _grids(case: Case) -> Iterator[Rung]:
     grid = entry_at(case, "contact.grid")
     if grid is None or entry_at(case, "structure.shape") == HEIGHTS:
         return
-    cells = (grid,) if isinstance(grid, int) else tuple(grid)
+    cells = tuple(grid)
     line = _is_line(case)
     cheap = line or case.analysis == "contact"
     for factor in CONTACT_GRIDS if cheap else WEAR_GRIDS:
@@ -173,8 +173,7 @@ def _grids(case: Case) -> Iterator[Rung]:
         if min(finer) < FEWEST_CELLS:
             continue
         shown = f"{finer[0]} strips" if line else " x ".join(map(str, finer))
-        value = finer[0] if isinstance(grid, int) else [*finer, *cells[len(finer) :]]
-        yield Rung(shown, (f"contact.grid={value}",), 1.0 / finer[0])
+        yield Rung(shown, (f"contact.grid={[*finer, *cells[len(finer) :]]}",), 1.0 / finer[0])
 
 
 def _tolerances(case: Case) -> Iterator[Rung]:
@@ -200,21 +199,19 @@ def _histories(case: Case) -> Iterator[Rung]:
 
 def _increments(case: Case) -> Iterator[Rung]:
     """The loads of a wear cycle in fewer and in more increments."""
-    increments, peak = (entry_at(case, f"load_path.{key}") for key in ("increments", "peak_at"))
+    increments = entry_at(case, "load_path.increments")
     if increments is None:
         return
     for factor in INCREMENTS_2D if _is_line(case) else INCREMENTS:
-        yield _in_increments(increments, peak, factor)
+        yield _in_increments(increments, factor)
 
 
-def _in_increments(increments: int | Sequence[int], peak: int | None, factor: float) -> Rung:
-    """Loads in so many times the increments of a cycle, the peak among them."""
+def _in_increments(increments: int | Sequence[int], factor: float) -> Rung:
+    """Loads in so many times the increments of a cycle, or of each of its legs."""
     legs = (increments,) if isinstance(increments, int) else increments
     counts = [max(1, round(factor * count)) for count in legs]
-    overrides = [f"load_path.increments={counts[0] if isinstance(increments, int) else counts}"]
-    if peak is not None:
-        overrides.append(f"load_path.peak_at={round(factor * peak)}")
-    return Rung(f"{sum(counts)} increments", tuple(overrides), 1.0 / factor)
+    value = counts[0] if isinstance(increments, int) else counts
+    return Rung(f"{sum(counts)} increments", (f"load_path.increments={value}",), 1.0 / factor)
 
 
 def _legs(case: Case) -> Iterator[Rung]:
@@ -333,16 +330,15 @@ def _refined(case: Case, factors: Sequence[float]) -> Iterator[Rung]:
             size = entry_at(case, "mesh.size") / factor
             overrides = f"mesh.pad_elements={elements}", f"mesh.size={size!r}"
             yield Rung(f"{elements} elements on the pad", overrides, 1.0 / factor)
-        elif entry_at(case, "structure.kind") == "mesh" and entry_at(case, "structure.size"):
-            size = entry_at(case, "structure.size") / factor  # of elements of a CAD file
-            yield Rung(f"elements of {size:.3g} mm", (f"structure.size={size!r}",), 1.0 / factor)
+        elif entry_at(case, "structure.kind") == "mesh" and entry_at(case, "mesh.size"):
+            size = entry_at(case, "mesh.size") / factor  # of elements of a CAD file
+            yield Rung(f"elements of {size:.3g} mm", (f"mesh.size={size!r}",), 1.0 / factor)
 
 
 def _orders(case: Case) -> Iterator[Rung]:
-    for entry in ORDERS:
-        if entry_at(case, entry) is not None:
-            for order in (1, 2):
-                yield Rung(f"order {order}", (f"{entry}={order}",))
+    if entry_at(case, ORDER) is not None:
+        for order in (1, 2):
+            yield Rung(f"order {order}", (f"{ORDER}={order}",))
 
 
 def _links(case: Case) -> Iterator[Rung]:
@@ -368,12 +364,11 @@ def _alone(case: Case) -> Iterator[Rung]:
     if not plane and not (kind == "dovetail" and _is_line(case)):
         return
     yield from _methods(case)
-    orders = [entry for entry in ORDERS if entry_at(case, entry) is not None]
     further = ["contact.method=nodes", "wear.step={kind: second_order}"]
-    further += [f"{entry}=2" for entry in orders]
-    increments, peak = (entry_at(case, f"load_path.{key}") for key in ("increments", "peak_at"))
+    further += [f"{ORDER}=2"] if entry_at(case, ORDER) is not None else []
+    increments = entry_at(case, "load_path.increments")
     if increments is not None:
-        further += _in_increments(increments, peak, 2.0).overrides
+        further += _in_increments(increments, 2.0).overrides
     meshes = list(_refined(case, MESHES_ALONE)) or [Rung("its mesh", ())]
     for mesh in meshes:
         overrides = (*further, *mesh.overrides)

@@ -39,7 +39,7 @@ def check_cells(
     across = cells_across(pressed)[: 1 if grid.line else 2]
     if min(across) >= enough or not pressed.any():
         return
-    given = settings.grid if isinstance(settings.grid, tuple) else (settings.grid,)
+    given = settings.grid
     factors = [MARGIN * enough / count if count < enough else 1.0 for count in across]
     finer = [2 * ceil(0.5 * n * f) if f > 1.0 else n for n, f in zip(given, factors, strict=False)]
     finer += given[len(finer) :]

@@ -249,6 +249,14 @@ class SweepFile(Section):
         return {name: getattr(self.vary, name) for name in type(self.vary).model_fields}
 
 
+class AnySweepFile(SweepFile):
+    """The same, whatever varies: as editors take it."""
+
+    vary: dict[str, Variation] = entry(  # type: ignore[assignment]
+        "what each entry is given, by its dotted path in the case"
+    )
+
+
 @dataclass(frozen=True)
 class Sweep:
     """The file of a sweep, read, and where its entries were written."""

@@ -24,6 +24,7 @@ from workflow.case.sections import (
     Friction,
     GridCells,
     Length,
+    LineCells,
     RoundingRadius,
     Section,
     Stress,
@@ -157,15 +158,15 @@ class BodyMaterial(ElasticBody):
 
 Body = Annotated[
     Annotated[BodyMaterial, Tag("(section)")] | Annotated[Literal["rigid"], Tag("(name)")],
-    Discriminator(lambda value: "(name)" if isinstance(value, str) else "(section)"),
+    Discriminator(lambda value: "(name)" if str(value).startswith("rigid") else "(section)"),
 ]
 
 
 class BodyMaterials(Section):
     """The two bodies in contact."""
 
-    body_1: Body = entry("the lower, fixed body; or the word rigid")
-    body_2: Body = entry("the upper, moving body; or the word rigid")
+    body_1: Body = entry("the lower, fixed body; a material's name, its entries or the word rigid")
+    body_2: Body = entry("the upper, moving body; a material's name, its entries or the word rigid")
 
     @model_validator(mode="after")
     def _one_is_elastic(self) -> BodyMaterials:
@@ -347,8 +348,8 @@ class ContactGrid(HalfSpaceGrid):
 class LineContactGrid(HalfSpaceGrid):
     """Half-plane solution on strips centred on the bodies."""
 
-    grid: GridCells = entry(
-        "strips along x; of heights as many as their file has", 512, default=512
+    grid: LineCells = entry(
+        "strips along x; of heights as many as their file has", 512, default=(512, 1)
     )
     size: Length = entry("of the grid along x [mm]", "2 mm")
     datum: Length | None = entry(
@@ -367,7 +368,7 @@ class LineContactGrid(HalfSpaceGrid):
         return self
 
     def centred(self) -> Grid:
-        return Grid.strips(self.size, self.grid)
+        return Grid.strips(self.size, self.grid[0])
 
 
 # --- cases --------------------------------------------------------------------------------------
@@ -406,6 +407,8 @@ class BodiesCase(Case):
 class ContactCase(BodiesCase):
     """Two bodies in contact over an area of both directions."""
 
+    about: ClassVar[str] = "a ball, ellipsoid or measured heights under any history of loads"
+
     title: Title = entry("one line", "Ball on a flat, pressed and sheared")
     structure: Annotated[Sphere | Ellipsoid | Heights, Field(discriminator="shape")] = entry(
         "the bodies: no finite elements"
@@ -420,6 +423,8 @@ class ContactCase(BodiesCase):
 
 class LineContactCase(BodiesCase):
     """Two bodies in contact along a line, in plane strain: everything is per length of it."""
+
+    about: ClassVar[str] = "a cylinder, flat or heights along a line under any history of loads"
 
     title: Title = entry("one line", "Cylinder on a flat, pressed and sheared")
     structure: Annotated[Cylinder | FlatRounded | Heights, Field(discriminator="shape")] = entry(

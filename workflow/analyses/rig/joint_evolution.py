@@ -92,9 +92,9 @@ class JointEvolution(Section):
     normal_load: Factor | None = entry("of joint.normal_load", default=None)
     file: Annotated[str, CaseFile((".csv", YAML), WEAR_CASES, "wear with loops", _unfit)] | None = (
         entry(
-            "loops_<interface>.csv of a wear run, or measured: its kt (all of the stuck slope, "
-            "joint.residual_stiffness included) and mu against energy take the place of "
-            "joint.stiffness and joint.friction; or the wear case itself, which is run first",
+            "instead of friction and stiffness: loops_<interface>.csv of a wear run, or measured: "
+            "its kt (all of the stuck slope, joint.residual_stiffness included) and mu against "
+            "energy; or the wear case itself, which is run first",
             "loops.csv",
             default=None,
         )

@@ -102,12 +102,14 @@ class FourParameterIwanJoint(IwanJoint):
 
 
 class FrictionContactJoint(Joint):
-    """A point of a contact: Coulomb's cone about its normal, on a spring that lifts off."""
+    """Contact at points of a reduced structure: Coulomb's cone about the normal, on springs."""
 
-    law: Literal["friction_contact"] = entry("a point of a contact", "friction_contact")
+    law: Literal["friction_contact"] = entry(
+        "a point of a contact, in a reduced structure or a friction_rig", "friction_contact"
+    )
     stiffness: JointStiffness = entry("along the surface, stuck [N/mm]", "100 N/um")
     normal_stiffness: JointStiffness = entry("in contact [N/mm]", "100 N/um")
-    gap: Gap = entry("instead of a normal load: open by so much at rest [mm]", "1 um", default=0.0)
+    gap: Gap = entry("instead of a normal load: open by so much at rest [mm]", "0 um", default=0.0)
 
     @model_validator(mode="after")
     def _pressed_or_open(self) -> FrictionContactJoint:

@@ -149,7 +149,7 @@ class ReducedBody(Section):
 
 
 class FrictionRig(Section):
-    """Two masses in a row, and the specimens in contact between the second mass and the ground."""
+    """Two masses in a row on two specimens, whose joint is a friction_contact at every node."""
 
     kind: Literal["friction_rig"] = entry("two reduced specimens in a rig", "friction_rig")
     specimens: Annotated[str, CaseFile((YAML,), (SpecimensCase,), "specimens")] = entry(

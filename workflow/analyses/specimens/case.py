@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Literal
+from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -158,7 +158,7 @@ class SpecimensWear(TwoBodies[BodyWear], Laws):
 
     cycles: Cycles | None = entry("under each normal force [1]", 3e5, default=None)
     energy: PositiveEnergy | None = entry(
-        "dissipated under each normal force [N*mm]", "1 kJ", default=None
+        "instead of cycles: dissipated under each normal force [N*mm]", "1 kJ", default=None
     )
     step: ExplicitStep = entry("cycles of constant geometry", default=ExplicitStep())
     reported: tuple[Reported, ...] = entry("cycles that a source reports", default=())
@@ -172,7 +172,7 @@ class SpecimensWear(TwoBodies[BodyWear], Laws):
 
     @model_validator(mode="after")
     def _something_wears(self) -> SpecimensWear:
-        if self.body_1.coefficient == self.body_2.coefficient == 0.0:
+        if self.body_1.rate(1.0) == self.body_2.rate(1.0) == 0.0:
             raise disagreement("0 for both bodies; allowed: one of them at most", "body_1")
         return self
 
@@ -191,6 +191,8 @@ class SpecimensWear(TwoBodies[BodyWear], Laws):
 
 class SpecimensCase(Case):
     """Two specimens of a friction rig, on their reduced models and on a half-space."""
+
+    about: ClassVar[str] = "two crossed specimens of a friction rig that wear each other"
 
     title: Title = entry("one line", "Friction-rig specimens worn at 14 um stroke")
     analysis: Literal["wear"] = entry("what is computed", "wear")

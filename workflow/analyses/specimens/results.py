@@ -163,7 +163,7 @@ def _summary(outcome: SpecimensOutcome, reporter: Reporter) -> dict[str, Any]:
                 f"{load['normal_force']:g} N: steady only near the end of the run; raise "
                 "wear.energy or wear.cycles to be sure"
             )
-    coefficients = wear.body_1.coefficient, wear.body_2.coefficient
+    coefficients = wear.body_1.rate(1.0), wear.body_2.rate(1.0)  # what is reported is of energy
     return {
         "structure": {"nodes": model.node_count(), "pad_nodes": len(model.face)},
         "frequencies": frequencies(outcome),

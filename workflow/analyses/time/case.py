@@ -38,7 +38,9 @@ class SingleJoint(Section):
 class Ageing(Section):
     """How long the joint is driven: by energy or by cycles."""
 
-    energy: PositiveEnergy | None = entry("dissipated until the end [N*mm]", "2800 J", default=None)
+    energy: PositiveEnergy | None = entry(
+        "instead of cycles: dissipated until the end [N*mm]", "2800 J", default=None
+    )
     cycles: Cycles | None = entry("until the end [1]", 1.08e6, default=None)
     tolerance: JumpError = entry("of the cycles, for the jumps in energy [1]", 1e-4, default=1e-4)
 
@@ -124,6 +126,8 @@ class TimeCase(Case):
 class JointCase(TimeCase):
     """A joint alone, moved to and fro until it is worn."""
 
+    about: ClassVar[str] = "a friction joint alone, driven to and fro until it is worn"
+
     structure: SingleJoint = entry("what holds the joint: nothing but its drive")
     joint: JointLaw = entry("its law, and the parameters that it begins with")
     drive: Drive = entry("motion that is imposed on the joint")
@@ -148,6 +152,8 @@ class JointCase(TimeCase):
 
 class RigCase(TimeCase):
     """A rig with a joint: excited by a harmonic force, hit, or driven by a recorded force."""
+
+    about: ClassVar[str] = "masses on friction joints, shaken, hit or driven by a record"
 
     title: Title = entry("one line", "Friction rig driven by a force")
     structure: Annotated[Rig | ReducedBody, Field(discriminator="kind")] = entry(

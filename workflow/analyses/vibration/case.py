@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import radians
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, StrictBool, model_validator
 
@@ -235,6 +235,8 @@ class DrivenMass(VibrationCaseBase):
 
 class VibrationCase(DrivenMass):
     """A structure with joints that stay as they are."""
+
+    about: ClassVar[str] = "the steady vibration of a rig with friction joints, over frequency"
 
     @classmethod
     def suits(cls, source: Source) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -133,6 +133,8 @@ class VibrationWearCaseBase(VibrationCaseBase):
 class VibrationWearCase(VibrationWearCaseBase, DrivenMass):
     """A row of masses on a half-space contact that it wears."""
 
+    about: ClassVar[str] = "the steady vibration of a rig on a ball or flat that it wears"
+
     structure: Rig = entry("what holds the contact")
     contact: WornContact = entry("between the last mass and the ground")
 
@@ -149,6 +151,8 @@ class VibrationWearCase(VibrationWearCaseBase, DrivenMass):
 
 class FrictionRigWearCase(VibrationWearCaseBase):
     """Two specimens in a rig that wear each other, node by node."""
+
+    about: ClassVar[str] = "the steady vibration of a rig with two specimens that it wears"
 
     structure: FrictionRig = entry("two specimens in a rig; their case says how they wear")
     joint: PadContacts = entry("all contacts of the pads together; gaps are those of their form")

@@ -106,6 +106,7 @@ def _imported(case: WearCase, faces: tuple[ContactFace, ...], out: Path) -> Resu
     for section in ("materials", "wear"):
         for number, body in enumerate(case.bodies, start=1):
             data[section][f"body_{number}"] = data[section].pop(body)
+            data[section][f"body_{number}"].pop("density", None)  # the loads know of it
     data["structure"] = _structure(faces)
     imported = ResultantsCase.model_validate(data, context={"folder": str(out)})
     # The files stay together wherever they go.
@@ -116,7 +117,7 @@ def _imported(case: WearCase, faces: tuple[ContactFace, ...], out: Path) -> Resu
 def _structure(faces: tuple[ContactFace, ...]) -> dict[str, Any]:
     """The structure of that case: faces in their order, sizes to the last digit."""
     line = faces[0].face.line
-    sizes = [list(face.size[:1] if line else face.size) for face in faces]
+    sizes = [face.size[0] if line else list(face.size) for face in faces]
     interfaces = [
         {"name": face.face.name} | ({} if size == sizes[0] else {"size": size})
         for face, size in zip(faces, sizes, strict=True)

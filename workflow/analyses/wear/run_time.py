@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from math import ceil, prod, sqrt
 
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.case.worn_bodies import WornByArchard
 from workflow.shell.run_time import (
     FRICTIONAL,
     NORMAL,
@@ -120,11 +119,7 @@ def _stable(case: WearCase, extent: Extent) -> float:
     worn = 0.0
     for number in (1, 2):
         law = case.wear_of(number)
-        friction = case.friction.coefficient
-        coefficient: float = getattr(law, "coefficient")  # of every law  # noqa: B009
-        worn += (
-            coefficient / law.hardness if isinstance(law, WornByArchard) else coefficient * friction
-        )
+        worn += law.rate(case.friction.coefficient)
     size = getattr(case.contact, "size", None) or getattr(case.structure, "size", None)
     length = size[0] if isinstance(size, tuple) else (size or 10.0)
     pitch = length / case.contact.grid[0]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
 
@@ -52,6 +52,8 @@ def check_arcs(face: Section) -> None:
 
 class ParaboloidGap(Section):
     """Paraboloid x² / 2 Rx + y² / 2 Ry; straight along x or y where there is no radius."""
+
+    also_filled_in: ClassVar[tuple[str, ...]] = ("radius_x", "radius_y")
 
     shape: Literal["paraboloid"] = entry("rounded, paraboloid or heights", "paraboloid")
     radius_x: RoundingRadius | None = entry(

@@ -18,7 +18,7 @@ from workflow.analyses.wear.case.worn_bodies import (
 from workflow.case.fields import Quantity, Whole
 from workflow.case.sections import (
     ElasticBody,
-    GridCells,
+    FaceCells,
     Length,
     Section,
     Stress,
@@ -72,15 +72,20 @@ class TwoBodies(Section, Generic[Part]):
     body_2: Part = entry("the upper, moving body")
 
 
-class Material(ElasticBody):
-    """Isotropic linear elastic material."""
+class Solid(ElasticBody):
+    """Isotropic linear elastic material of finite elements."""
 
     young: Stress = entry("Young's modulus [MPa]", "115 GPa")
     poisson: Poisson = entry("Poisson's ratio [1]", 0.29)
-    density: Density = entry("mass per volume [t/mm^3]", "4430 kg/m^3")
     yield_stress: Stress | None = entry(
         "pressures above it are warned of; without it none [MPa]", "900 MPa", default=None
     )
+
+
+class Material(Solid):
+    """Isotropic linear elastic material with a mass."""
+
+    density: Density = entry("mass per volume [t/mm^3]", "4430 kg/m^3")
 
 
 class BladeAndDiskMaterials(BladeAndDisk[Material]):
@@ -94,8 +99,10 @@ class TwoMaterials(TwoBodies[Material]):
 class Contact(Section):
     """Half-space solution on a grid over each contact face."""
 
-    grid: tuple[GridCells, GridCells] = entry(
-        "cells along x, along y of every face", [128, 256], default=(128, 256)
+    grid: FaceCells = entry(
+        "cells along x, along y of every face; of line contacts along x alone, 256 or [256, 1]",
+        [128, 256],
+        default=(128, 256),
     )
     method: Literal["normal", "full", "nodes"] = entry(
         "normal: pressure of the half-space, slips of the structure; full: both of the half-space; "
@@ -118,6 +125,15 @@ class Contact(Section):
     tolerance: Tolerance = entry(
         "relative, on equilibrium and complementarity [1]", 1e-8, default=1e-8
     )
+
+
+def check_rows(contact: Contact, line: bool) -> None:
+    """Refuse a single row of cells where contacts are no lines."""
+    if contact.grid[1] == 1 and not line:
+        raise disagreement(
+            f"{contact.grid[0]}: of line contacts; allowed: [x, y], cells along both",
+            "contact.grid",
+        )
 
 
 class Step(Section):

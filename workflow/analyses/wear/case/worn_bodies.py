@@ -3,21 +3,26 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from typing import Annotated, Literal
+from collections.abc import Mapping
+from contextlib import suppress
+from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, GetJsonSchemaHandler
+from pydantic import Field, GetJsonSchemaHandler, model_validator
 from pydantic.json_schema import JsonSchemaValue
 from pydantic_core import CoreSchema
 
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
 from workflow.analyses.wear.case.evolution import Evolution
-from workflow.case.fields import Quantity
-from workflow.case.sections import Length, Section, entry
+from workflow.case import units
+from workflow.case.fields import Quantity, shown
+from workflow.case.sections import Length, Section, disagreement, entry
 
 # Metals wear 1e2 to 1e6 um^3 per joule; a forgotten unit gives 1e16.
 VolumePerEnergy = Annotated[
     float, Quantity("1/MPa", at_least=0.0, at_most=1e-3, range_text="0 to 1e9 um^3/J")
 ]
+
+ARCHARDS = "coefficient", "hardness", "specific_wear_rate"
 
 LawName = Literal["energy", "energy_amplitude", "archard"]
 
@@ -37,6 +42,10 @@ class Worn(Section):
         return EvolvingLaw(law, self.evolution.described(), self.evolution.scope)
 
     @abstractmethod
+    def rate(self, friction: float) -> float:
+        """Worn volume over load and sliding distance, without evolution [1/MPa]."""
+
+    @abstractmethod
     def _base(self) -> WearLaw:
         """The law without its evolution."""
 
@@ -44,7 +53,16 @@ class Worn(Section):
 class EnergyBody(Section):
     """Wear of one body by dissipated energy."""
 
-    coefficient: VolumePerEnergy = entry("volume per dissipated energy [1/MPa]", "1e4 um^3/J")
+    refused: ClassVar[Mapping[str, str]] = {
+        "specific_wear_rate": "of archard; allowed: coefficient, which is that rate over the "
+        "coefficient of friction, or law: archard",
+        "hardness": "of archard; allowed: coefficient alone, or law: archard",
+    }
+
+    coefficient: VolumePerEnergy = entry(
+        "α = V / Ed, worn volume over dissipated energy: k / µ of archard's k = V / (P s) [1/MPa]",
+        "1e4 um^3/J",
+    )
 
 
 # A body that names no law has that of the section around it, which is filled in before it is read
@@ -56,12 +74,17 @@ class WornByEnergy(Worn, EnergyBody):
 
     law: Literal["energy"] = entry("of this body; without it wear.law", "energy", default=None)
 
+    def rate(self, friction: float) -> float:
+        return self.coefficient * friction
+
     def _base(self) -> WearLaw:
         return EnergyLaw(self.coefficient)
 
 
 class WornByEnergyAmplitude(Worn, EnergyBody):
     """Energy law whose coefficient grows with the slip amplitude over a reference amplitude."""
+
+    also_filled_in: ClassVar[tuple[str, ...]] = ("reference_amplitude",)
 
     law: Literal["energy_amplitude"] = entry(
         "of this body; without it wear.law", "energy_amplitude", default=None
@@ -72,23 +95,94 @@ class WornByEnergyAmplitude(Worn, EnergyBody):
         default=None,
     )
 
+    def rate(self, friction: float) -> float:
+        return self.coefficient * friction
+
     def _base(self) -> WearLaw:
         assert self.reference_amplitude is not None
         return EnergyAmplitudeLaw(self.coefficient, self.reference_amplitude)
 
 
 class WornByArchard(Worn):
-    """Depth = coefficient / hardness x pressure x slip."""
+    """Depth = k x pressure x slip, with k = K / H: either K and H are given, or k."""
+
+    also_filled_in: ClassVar[tuple[str, ...]] = ("coefficient", "hardness")
 
     law: Literal["archard"] = entry("of this body; without it wear.law", "archard", default=None)
-    coefficient: Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)] = entry(
-        "Archard's wear coefficient K [1]", 1e-4
+    coefficient: Annotated[float, Quantity("1", at_least=0.0, at_most=1.0)] | None = entry(
+        "Archard's wear coefficient K = V H / (P s), beside hardness [1]", 1e-4, default=None
     )
-    hardness: Annotated[
-        float, Quantity("MPa", above=0.0, at_most=1e5, range_text="above 0 and at most 100 GPa")
-    ] = entry("of the worn body [MPa]", "3.5 GPa")
+    hardness: (
+        Annotated[
+            float, Quantity("MPa", above=0.0, at_most=1e5, range_text="above 0 and at most 100 GPa")
+        ]
+        | None
+    ) = entry("H of the worn body, beside coefficient [MPa]", "3.5 GPa", default=None)
+    specific_wear_rate: (
+        Annotated[
+            float,
+            Quantity("1/MPa", at_least=0.0, at_most=1e-3, range_text="0 to 1 mm^3/(N*m)"),
+        ]
+        | None
+    ) = entry(
+        "instead of coefficient and hardness: k = V / (P s) = K / H, worn volume over load and "
+        "sliding distance [1/MPa]",
+        "3e-5 mm^3/(N*m)",
+        default=None,
+    )
 
-    def _base(self) -> WearLaw:
+    @model_validator(mode="before")
+    @classmethod
+    def _is_no_rate(cls, data: Any) -> Any:
+        """Refuse k in the place of K, by its dimension."""
+        written = data.get("coefficient") if isinstance(data, dict) else None
+        if isinstance(written, str):
+            with suppress(units.UnitError, ArithmeticError):
+                units.to_base(written, "1/MPa")
+                raise disagreement(
+                    f"{shown(written)}: volume over load and distance, not Archard's K; allowed: "
+                    "as specific_wear_rate, without hardness",
+                    "coefficient",
+                )
+        return data
+
+    @model_validator(mode="after")
+    def _given_once(self) -> WornByArchard:
+        given = [key for key in ARCHARDS if getattr(self, key) is not None]
+        if given in (["coefficient", "hardness"], ["specific_wear_rate"]):
+            return self
+        if "specific_wear_rate" in given:
+            raise disagreement(
+                f"given beside {given[0]}; allowed: it alone, or coefficient and hardness",
+                "specific_wear_rate",
+            )
+        key = next(key for key in ARCHARDS if key not in given)
+        field = type(self).model_fields[key]
+        (example,) = field.examples or ("",)
+        raise disagreement(
+            f"missing; allowed: {field.description}, such as {example}; or specific_wear_rate, "
+            "which has both in it",
+            key,
+        )
+
+    @classmethod
+    def __get_pydantic_json_schema__(
+        cls, schema: CoreSchema, handler: GetJsonSchemaHandler
+    ) -> JsonSchemaValue:
+        reference = handler(schema)
+        given = [{"required": ["coefficient", "hardness"]}, {"required": ["specific_wear_rate"]}]
+        handler.resolve_ref_schema(reference)["oneOf"] = given
+        return reference
+
+    def rate(self, friction: float) -> float:
+        law = self._base()
+        return law.coefficient / law.hardness
+
+    def _base(self) -> ArchardLaw:
+        if self.specific_wear_rate is not None:
+            return ArchardLaw(self.specific_wear_rate, 1.0)  # k is K over a hardness of 1 MPa
+        assert self.coefficient is not None
+        assert self.hardness is not None
         return ArchardLaw(self.coefficient, self.hardness)
 
 

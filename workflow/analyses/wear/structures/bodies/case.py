@@ -36,7 +36,7 @@ from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import Contact, PressingForce, Wear
 from workflow.case.fields import Quantity, Whole
-from workflow.case.sections import GridCells, Length, Section, Title, disagreement, entry
+from workflow.case.sections import GridCells, Length, LineCells, Section, Title, disagreement, entry
 from workflow.case.source import Source
 
 PressingLineForce = Annotated[
@@ -171,11 +171,11 @@ class Cycle(LegsOrFile[LegT], Generic[LegT]):
 
 
 class ContactCycle(Cycle[Leg]):
-    """Forces and motions of a closed cycle: the first leg begins where the last one ends."""
+    """Closed cycle of any loads, with contact.method: full but for motions along the face."""
 
 
 class LineContactCycle(Cycle[LineLeg]):
-    """Forces and motions of a closed cycle, per length: legs from where the last one ends."""
+    """Closed cycle of any loads, with contact.method: full but for motions along the face."""
 
 
 def _way(value: object) -> str:
@@ -197,7 +197,6 @@ LineLoadPath = Annotated[
 
 # --- grids --------------------------------------------------------------------------------------
 
-OneRow = Annotated[int, Whole(1, 1)]
 METHODS = (
     "normal: every cell slides by all of the stroke; full: slips of the half-space, over the stroke"
 )
@@ -222,10 +221,8 @@ class WearGrid(Contact):
 class LineWearGrid(Contact):
     """Half-plane solution on strips centred on body 2, which move with it."""
 
-    grid: tuple[GridCells, OneRow] = entry(
-        "strips along x, in one row; of heights as many as their file has",
-        [512, 1],
-        default=(512, 1),
+    grid: LineCells = entry(
+        "strips along x; of heights as many as their file has", 512, default=(512, 1)
     )
     size: Length = entry("of the grid along x, room for the stroke included [mm]", "2 mm")
     method: Literal["normal", "full"] = entry(METHODS, "normal", default="normal")
@@ -238,6 +235,7 @@ class LineWearGrid(Contact):
 class BodiesWearCase(WearCase):
     """Two bodies that wear over an area of both directions."""
 
+    about: ClassVar[str] = "a ball, flat or measured heights that wear under a cycle of loads"
     half_spaces: ClassVar[bool] = True
 
     title: Title = entry("one line", "Ball that wears on a flat")
@@ -271,6 +269,7 @@ class BodiesWearCase(WearCase):
 class LineBodiesWearCase(WearCase):
     """Two bodies that wear along a line, in plane strain: everything is per length of it."""
 
+    about: ClassVar[str] = "a cylinder, flat or heights along a line that wear under such a cycle"
     half_spaces: ClassVar[bool] = True
 
     title: Title = entry("one line", "Cylinder that wears on a flat")

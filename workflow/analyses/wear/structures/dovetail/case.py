@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from math import cos, pi, radians, sin, tan
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import model_validator
+from pydantic import field_validator, model_validator
+from pydantic_core import PydanticCustomError
 
 from fe_models.mesh import MeshError
 from workflow.analyses.wear.case.base import FiniteElementCase
@@ -15,6 +16,7 @@ from workflow.analyses.wear.case.sections import (
     BladeAndDiskMaterials,
     DovetailWear,
     Share,
+    check_rows,
     check_shares,
 )
 from workflow.case.fields import AUTO, Auto, OrAuto, Quantity, Whole
@@ -41,6 +43,7 @@ RotationSpeed = Annotated[
 Moment = Annotated[
     float, Quantity("N*mm", at_least=-1e9, at_most=1e9, range_text="-1e6 N*m to 1e6 N*m")
 ]
+LegIncrements = Annotated[int, Whole(1, 10_000)]
 FlankNodes = Annotated[int, Whole(3, 2000)]
 
 
@@ -167,11 +170,13 @@ class LoadPath(Section):
     Centrifugal force and aerodynamic moment follow the square of the speed.
     """
 
-    increments: Annotated[Annotated[int, Whole(2, 10_000)] | Auto, OrAuto()] = entry(
-        "of one cycle; auto: peak_at too, as many as leave no more than wear.tolerance", 22
-    )
-    peak_at: Annotated[int, Whole(1, 10_000)] | None = entry(
-        "increment at which the speed peaks; not needed where increments are auto", 8, default=None
+    refused: ClassVar[Mapping[str, str]] = {
+        "peak_at": "the first leg of increments, which are [8, 14] where the speed peaks at 8 of 22"
+    }
+
+    increments: Annotated[tuple[LegIncrements, LegIncrements] | Auto, OrAuto()] = entry(
+        "up to the peak, and down from it; auto: as many as leave no more than wear.tolerance",
+        [8, 14],
     )
     rotation_speed: RotationSpeed = entry("at the peak [rad/s]", "6000 rpm")
     airfoil_mass: Mass = entry("of the blade outside the model [t]", "0.8 kg")
@@ -185,6 +190,18 @@ class LoadPath(Section):
         "missions that take turns; without it there is one", default=()
     )
 
+    @field_validator("increments", mode="before")
+    @classmethod
+    def _are_of_legs(cls, increments: object) -> object:
+        if type(increments) is int:
+            raise PydanticCustomError(
+                "entry",
+                "{count}: of a whole cycle; allowed: up to the peak and down from it, such as "
+                "[8, 14], or auto",
+                {"count": increments},
+            )
+        return increments
+
     @model_validator(mode="after")
     def _shares_are_whole(self) -> LoadPath:
         check_shares(self.shares)
@@ -197,7 +214,9 @@ class LoadPath(Section):
 
     def missions(self) -> list[dict[str, Any]]:
         """The entries of every mission of the mix."""
-        entries = self.model_dump(exclude={"mix"})
+        up, down = (0, 0) if self.increments == AUTO else self.legs
+        counts = {"increments": up + down, "peak_at": up}
+        entries = counts | self.model_dump(exclude={"mix", "increments"})
         missions = [
             mission.model_dump(exclude={"share"}, exclude_none=True) for mission in self.mix
         ]
@@ -212,23 +231,8 @@ class LoadPath(Section):
     @property
     def legs(self) -> tuple[int, int]:
         """Increments up to the peak and after it, once they are chosen."""
-        assert isinstance(self.increments, int)
-        assert self.peak_at is not None
-        return self.peak_at, self.increments - self.peak_at
-
-    @model_validator(mode="after")
-    def _peak_inside_cycle(self) -> LoadPath:
-        if not isinstance(self.increments, int):
-            return self
-        if self.peak_at is None:
-            raise disagreement("missing; allowed: increment at which the speed peaks", "peak_at")
-        if self.peak_at >= self.increments:
-            raise disagreement(
-                f"{self.peak_at}: the peak comes after the cycle; "
-                f"allowed: below increments, {self.increments}",
-                *("peak_at", "increments"),
-            )
-        return self
+        assert isinstance(self.increments, tuple)
+        return self.increments
 
 
 class Mesh(Section):
@@ -246,6 +250,8 @@ class Mesh(Section):
 
 class DovetailCase(FiniteElementCase):
     """A dovetail under its mission."""
+
+    about: ClassVar[str] = "the built-in blade root in its disk, in space or in the plane"
 
     bodies: ClassVar[tuple[str, str]] = ("disk", "blade")
 
@@ -266,14 +272,13 @@ class DovetailCase(FiniteElementCase):
         return (0, 0) if self.load_path.increments == AUTO else self.load_path.legs
 
     def divided(self, legs: Sequence[int]) -> dict[str, Any]:
-        up, down = legs
-        return {"load_path.increments": up + down, "load_path.peak_at": up}
+        return {"load_path.increments": tuple(legs)}
 
     def loads_outline(self) -> list[tuple[str, str]]:
         path, (across, along) = self.load_path, self.mesh.flank_nodes
         nodes = f"{across} x {along}" if self.structure.dimension == 3 else f"{across}"
         missions = f", {len(path.mix)} missions" if path.mix else ""
-        peak = f", peak at {path.peak_at}" if any(self.legs) else ""
+        peak = f", peak at {self.legs[0]}" if any(self.legs) else ""
         rows = [
             ("structure", f"dovetail in {self.structure.dimension}-D, {nodes} nodes on a flank"),
             ("load path", f"{self.increments_outline}{peak}{missions}"),
@@ -286,6 +291,11 @@ class DovetailCase(FiniteElementCase):
     @property
     def cores(self) -> int:
         return 2
+
+    @model_validator(mode="after")
+    def _grid_fits(self) -> DovetailCase:
+        check_rows(self.contact, line=self.structure.dimension == 2)
+        return self
 
     @model_validator(mode="after")
     def _airfoil_outside_disk(self) -> DovetailCase:

@@ -44,7 +44,8 @@ class DovetailModel:
     def key(self) -> tuple[object, ...]:
         case, mission = self._case, self._mission
         pull = mission.airfoil_mass, mission.airfoil_radius
-        return self.dovetail, case.structure.dimension, case.mesh, case.materials, pull
+        materials = case.material(1), case.material(2)
+        return self.dovetail, case.structure.dimension, case.mesh, materials, pull
 
     @property
     def missions(self) -> tuple[MissionLoads, ...]:

@@ -26,7 +26,7 @@ def _source(case: MeshCase) -> LoadSource:
 
 def _extent(case: MeshCase) -> Extent:
     """As the file has it, which a check reads anyway."""
-    mesh, cycles = case.structure.mesh(), max(1, len(case.load_path.mix))
+    mesh, cycles = case.structure.mesh(case.mesh.size), max(1, len(case.load_path.mix))
     return Extent(
         cycles * sum(case.expected_legs),
         len(mesh.interfaces),
@@ -38,9 +38,9 @@ def _extent(case: MeshCase) -> Extent:
 
 def _finer(case: MeshCase) -> Finer[MeshCase] | None:
     """The mesh with elements of second order, where it has others and is small enough."""
-    mesh = case.structure.mesh()
+    mesh = case.structure.mesh(case.mesh.size)
     cheap = mesh.interfaces[0].line or mesh.node_count(1) <= MOST_NODES
-    return Finer({"structure.order": 2}) if case.structure.order == 1 and cheap else None
+    return Finer({"mesh.order": 2}) if case.mesh.order == 1 and cheap else None
 
 
 def _choose(case: MeshCase) -> tuple[MeshCase, dict[str, Any] | None]:
@@ -65,5 +65,5 @@ STRUCTURE = WearStructure(
     extent=_extent,
     choose=_choose,
     finer=_finer,
-    settings={"mesh": "structure.order or a finer mesh"},
+    settings={"mesh": "mesh.order or a finer mesh"},
 )

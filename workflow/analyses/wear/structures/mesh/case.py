@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from functools import lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
 import numpy as np
 from pydantic import model_validator
@@ -15,17 +15,22 @@ from fe_models.mesh import Interface, MeshError, StructureMesh
 from workflow.analyses.wear.case.base import FiniteElementCase, check_interface_name
 from workflow.analyses.wear.case.gaps import Gap, HeightsGap, check_gap
 from workflow.analyses.wear.case.sections import (
+    Density,
     Share,
-    TwoMaterials,
+    Solid,
+    TwoBodies,
     Wear,
+    check_rows,
     check_shares,
 )
 from workflow.analyses.wear.structures.mesh.loads import (
+    AccelerationLoad,
     Component,
     DisplacementLoad,
     Factor,
     Load,
     Name,
+    RotationLoad,
 )
 from workflow.case.fields import AUTO, Auto, File, OrAuto, Whole
 from workflow.case.input_files import read_heights
@@ -99,12 +104,15 @@ class ImportedStructure(Section):
     plane mesh are called X and Z.
     """
 
+    refused: ClassVar[Mapping[str, str]] = {
+        "size": "of the elements; allowed: as mesh.size",
+        "order": "of the elements; allowed: as mesh.order",
+    }
+
     kind: Literal["mesh"] = entry("what the structure is", "mesh")
     file: Annotated[str, File(ENDINGS)] = entry(
         "mesh (.msh, .inp, .vtu, ...) or CAD (.step, .brep)", "joint.msh"
     )
-    size: Length | None = entry("of the elements, for CAD files only [mm]", "2 mm", default=None)
-    order: Literal[1, 2] = entry("of the elements, 1 or 2", 1, default=1)
     body_1: Name = entry("name in the file of the lower, fixed body", "disk")
     body_2: Name = entry("name in the file of the upper, moving body", "blade")
     contacts: tuple[ContactPair, ...] = entry("faces that meet")
@@ -119,19 +127,6 @@ class ImportedStructure(Section):
         return self
 
     @model_validator(mode="after")
-    def _size_is_for_cad(self) -> ImportedStructure:
-        shapes = Path(self.file).suffix.lower() in CAD
-        if shapes and self.size is None:
-            raise disagreement("missing; allowed: a size, to mesh a CAD file with", "size")
-        if not shapes and self.size is not None:
-            raise disagreement(
-                f"{self.size:g} mm: the file is a mesh already; allowed: none, or a file of "
-                f"{', '.join(CAD)}",
-                "size",
-            )
-        return self
-
-    @model_validator(mode="after")
     def _names_differ(self) -> ImportedStructure:
         names = [pair.name for pair in self.contacts]
         if len(set(names)) < len(names):
@@ -142,13 +137,13 @@ class ImportedStructure(Section):
             raise disagreement("the same body twice; allowed: two bodies", "body_2", "body_1")
         return self
 
-    def read(self) -> ImportedMesh:
-        """Everything in the file, read once. Raises MeshError."""
-        return _read(self.file, self.size, _stamp(self.file))
+    def read(self, size: float | None) -> ImportedMesh:
+        """Everything in the file, read once, CAD by elements of a ``size``. Raises MeshError."""
+        return _read(self.file, size, _stamp(self.file))
 
-    def mesh(self) -> StructureMesh:
+    def mesh(self, size: float | None) -> StructureMesh:
         """The two bodies and their interfaces, made once. Raises MeshError."""
-        return _joined(self, _stamp(self.file))
+        return _joined(self, size, _stamp(self.file))
 
 
 # Reading or meshing takes seconds for every 100 000 elements: a check and the run that follows it
@@ -161,12 +156,13 @@ def _read(file: str, size: float | None, stamp: Stamp) -> ImportedMesh:
 
 
 @lru_cache(maxsize=1)
-def _joined(structure: ImportedStructure, stamp: Stamp) -> StructureMesh:
+def _joined(structure: ImportedStructure, size: float | None, stamp: Stamp) -> StructureMesh:
     from fe_models.imported_structure import imported_mesh
 
     pairs = [pair.described() for pair in structure.contacts]
     supports = [support.described() for support in structure.supports]
-    return imported_mesh(structure.read(), (structure.body_1, structure.body_2), pairs, supports)
+    bodies = structure.body_1, structure.body_2
+    return imported_mesh(structure.read(size), bodies, pairs, supports)
 
 
 def _stamp(file: str) -> Stamp:
@@ -220,13 +216,37 @@ class Legs(Section):
         return [(cycle.factors, cycle.share) for cycle in self.mix] or [((1.0,) * loads, 1.0)]
 
 
+class Elements(Section):
+    """Elements of the structure: those of the file, or made for its shapes."""
+
+    size: Length | None = entry("for CAD files only [mm]", "2 mm", default=None)
+    order: Literal[1, 2] = entry("of the elements, 1 or 2", 1, default=1)
+
+
+class MeshMaterial(Solid):
+    """Isotropic linear elastic material, with a mass where that counts."""
+
+    density: Density | None = entry(
+        "mass per volume, for loads of rotation and acceleration [t/mm^3]",
+        "4430 kg/m^3",
+        default=None,
+    )
+
+
+class MeshMaterials(TwoBodies[MeshMaterial]):
+    """The two bodies in contact."""
+
+
 class MeshCase(FiniteElementCase):
     """Bodies from a file under loads of the user's."""
 
+    about: ClassVar[str] = "two bodies of your own mesh or CAD file under your loads"
+
     title: Title = entry("one line", "Two bodies of a mesh file")
     structure: ImportedStructure = entry("bodies, contacts, supports and loads, named by groups")
-    materials: TwoMaterials = entry("the two bodies in contact")
+    materials: MeshMaterials = entry("the two bodies in contact")
     load_path: Legs = entry("one cycle")
+    mesh: Elements = entry("finite elements of the structure", default=Elements())
     wear: Wear = entry("law, length of the run and step")
 
     @property
@@ -249,13 +269,26 @@ class MeshCase(FiniteElementCase):
         structure, path = self.structure, self.load_path
         cycles = f", {len(path.mix)} cycles mixed" if path.mix else ""
         before = f", those before it in {path.cycle_from - 1} legs" if path.cycle_from > 1 else ""
-        mesh = structure.mesh()
+        mesh = structure.mesh(self.mesh.size)
         bodies = [f"{b.name} of {b.mesh.nvertices} nodes" for b in (mesh.body_1, mesh.body_2)]
         return [
             ("structure", f"{Path(structure.file).name}: {' and '.join(bodies)}"),
             *(("face", _outline_of(interface)) for interface in mesh.interfaces),
             ("load path", f"{self.increments_outline} in {len(self.legs)} legs{before}{cycles}"),
         ]
+
+    @model_validator(mode="after")
+    def _size_is_for_cad(self) -> MeshCase:
+        shapes, size = Path(self.structure.file).suffix.lower() in CAD, self.mesh.size
+        if shapes and size is None:
+            raise disagreement("missing; allowed: a size, to mesh a CAD file with", "mesh.size")
+        if not shapes and size is not None:
+            raise disagreement(
+                f"{size:g} mm: the file is a mesh already; allowed: none, or a file of "
+                f"{', '.join(CAD)}",
+                "mesh.size",
+            )
+        return self
 
     @model_validator(mode="after")
     def _paths_fit_legs(self) -> MeshCase:
@@ -282,11 +315,26 @@ class MeshCase(FiniteElementCase):
         return self
 
     @model_validator(mode="after")
+    def _mass_is_known(self) -> MeshCase:
+        for load in self.structure.loads:
+            if not isinstance(load, RotationLoad | AccelerationLoad):
+                continue
+            for body in ("body_1", "body_2"):
+                if getattr(self.materials, body).density is None:
+                    raise disagreement(
+                        f"missing, and a load of {load.kind} acts on the mass; allowed: mass per "
+                        "volume [t/mm^3], such as 4430 kg/m^3",
+                        f"materials.{body}.density",
+                        f"materials.{body}",
+                    )
+        return self
+
+    @model_validator(mode="after")
     def _fits_the_file(self) -> MeshCase:
         """Every name is in the file, the faces meet and body 1 is held."""
         structure = self.structure
         with _pointing_at("structure.file"):
-            imported = structure.read()
+            imported = structure.read(self.mesh.size)
         self._check_names(imported)
         self._check_contacts()
         self._check_supports(imported)
@@ -319,15 +367,16 @@ class MeshCase(FiniteElementCase):
 
     def _check_contacts(self) -> None:
         """Make the interfaces; where they cannot be, find the pair that is at fault."""
-        structure = self.structure
+        structure, size = self.structure, self.mesh.size
         try:
-            interfaces = structure.mesh().interfaces
+            interfaces = structure.mesh(size).interfaces
         except MeshError:
             for index, pair in enumerate(structure.contacts):
                 with _pointing_at(f"structure.contacts.{index}"):
-                    structure.model_copy(update={"contacts": (pair,)}).mesh()
+                    structure.model_copy(update={"contacts": (pair,)}).mesh(size)
             raise
         for index, (pair, face) in enumerate(zip(structure.contacts, interfaces, strict=True)):
+            check_rows(self.contact, face.line)
             if pair.gap is not None:
                 cells = self.contact.grid[0], 1 if face.line else self.contact.grid[1]
                 key = f"structure.contacts.{index}.gap"
@@ -345,7 +394,8 @@ class MeshCase(FiniteElementCase):
         ]
         materials = self.material(1), self.material(2)
         with _pointing_at("structure.supports"):
-            made = imported_structure(structure.mesh(), imported, materials, supports, imposed, 1)
+            mesh = structure.mesh(self.mesh.size)
+            made = imported_structure(mesh, imported, materials, supports, imposed, 1)
         slices = [name for name, share in made.held_faces.items() if share == 1.0]
         if slices and made.body_1.elastic.dimension == 3:
             raise disagreement(

@@ -38,7 +38,7 @@ class MeshModel:
         self._case = case
         self.friction = case.friction.at(0.0)
         self.nonlinearity = case.nonlinearity
-        self.order = case.structure.order
+        self.order = case.mesh.order
         path = case.load_path
         self._increments_before = sum(path.legs[: path.cycle_from - 1])
         self.peak = sum(path.legs[: path.peak_leg]) - 1 - self._increments_before
@@ -50,7 +50,8 @@ class MeshModel:
         loads = [load.model_dump(exclude={"path"}) for load in structure.loads]
         described = structure.model_dump(exclude={"file", "loads"})
         gaps = [interface.gap.tobytes() for interface in self._mesh.interfaces]
-        return contents, described, loads, gaps, self._case.materials
+        materials = self._case.material(1), self._case.material(2)
+        return contents, described, loads, gaps, self._case.mesh, materials
 
     @property
     def missions(self) -> tuple[MissionLoads, ...]:
@@ -63,9 +64,9 @@ class MeshModel:
     @property
     def finer(self) -> str:
         how = "refine the file's mesh there"
-        if self._case.structure.size is not None:
-            how = "lower structure.size"
-        return how + (", or take structure.order: 2" if self.order == 1 else "")
+        if self._case.mesh.size is not None:
+            how = "lower mesh.size"
+        return how + (", or take mesh.order: 2" if self.order == 1 else "")
 
     def _path(self, factors: tuple[float, ...]) -> Array:
         """Amplitudes of the loads, ``(t, loads)``; squared where a load is a rotation."""
@@ -90,7 +91,7 @@ class MeshModel:
     @cached_property
     def _meshed(self) -> StructureMesh:
         """The mesh of the file, without the gaps that the case gives."""
-        return self._case.structure.mesh()
+        return self._case.structure.mesh(self._case.mesh.size)
 
     def _with_gap(self, interface: Interface) -> Interface:
         """The interface with the gap of the case on top of the meshes'."""
@@ -113,7 +114,7 @@ class MeshModel:
         case, described = self._case, self._case.structure
         return imported_structure(
             mesh,
-            described.read(),
+            described.read(case.mesh.size),
             (case.material(1), case.material(2)),
             [support.described() for support in described.supports],
             [load.described() for load in described.loads],
@@ -134,7 +135,7 @@ class MeshModel:
     def node_numbers(self, body: int) -> Indices:
         structure = self._case.structure
         name = {1: structure.body_1, 2: structure.body_2}[body]
-        return structure.read().node_numbers[name]
+        return structure.read(self._case.mesh.size).node_numbers[name]
 
     def warn(self, structure: Structure, reporter: Reporter) -> None:
         """What is told of contacts that planes of symmetry cut, and supports that are none."""

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal
+from typing import Annotated, ClassVar, Literal
 
 import numpy as np
 from pydantic import model_validator
 
 from sa_solver.types import Frame
+from workflow.analyses.contact.case import BodyMaterial
 from workflow.analyses.wear.case.base import WearCase, check_interface_name
 from workflow.analyses.wear.case.gaps import Gap, GapShape, check_cells, check_gap
-from workflow.analyses.wear.case.sections import Contact, TwoMaterials, Wear
+from workflow.analyses.wear.case.sections import Contact, TwoBodies, Wear, check_rows
 from workflow.analyses.wear.structures.resultants.faces import FaceError
 from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
-from workflow.case.fields import File, Quantity, shown, split_dataset
+from workflow.case.fields import File, OrAlone, Quantity, shown, split_dataset
 from workflow.case.input_files import InputFileError
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
@@ -23,6 +24,7 @@ PERPENDICULAR = 1e-6
 
 Place = Annotated[float, Quantity("mm", at_least=-1e6, at_most=1e6)]
 Direction = Annotated[float, Quantity("1", at_least=-1e6, at_most=1e6)]
+Sizes = Annotated[tuple[Length, ...], OrAlone()]
 NodeFile = Annotated[str, File((".csv",))]
 
 # --- faces --------------------------------------------------------------------------------------
@@ -73,9 +75,7 @@ class ImportedInterface(Section):
     """An interface of the file, and what is different or known about it."""
 
     name: Title = entry("as in the file; 'interface' where it has no names", "interface")
-    size: tuple[Length, ...] | None = entry(
-        "instead of structure.size [mm]", ["11 mm", "60 mm"], default=None
-    )
+    size: Sizes | None = entry("instead of structure.size [mm]", ["11 mm", "60 mm"], default=None)
     gap: Gap | None = entry("instead of structure.gap", default=None)
     frame: FaceFrame | None = entry("where the face lies; instead of the file's", default=None)
     nodes: NodeTables | None = entry("where the worn surfaces go to; needs a frame", default=None)
@@ -92,8 +92,8 @@ class Resultants(Section):
         "loads of one closed cycle (columns: the recipe in the README); .h5 may go on :group",
         "loads.csv",
     )
-    size: tuple[Length, ...] = entry(
-        "of every face, and of the contact grid, along x and y; along x in 2 dimensions [mm]",
+    size: Sizes = entry(
+        "of every face and the contact grid, along x and y; in 2 dimensions along x alone [mm]",
         ["11 mm", "60 mm"],
     )
     gap: Gap | None = entry(
@@ -113,7 +113,7 @@ class Resultants(Section):
         }
         for key, size in sizes.items():
             if len(size) != 2 and not (len(size) == 1 and self.dimension == 2):
-                allowed = "[x, y]" if self.dimension == 3 else "[x], or [x, y]"
+                allowed = "[x, y]" if self.dimension == 3 else "x, or [x, y]"
                 raise disagreement(f"{shown(size)}: not a size; allowed: {allowed}", key)
         return self
 
@@ -179,15 +179,21 @@ class ImportedContact(Contact):
     )
 
 
+class BodyMaterials(TwoBodies[BodyMaterial]):
+    """The two bodies in contact."""
+
+
 # --- the case -----------------------------------------------------------------------------------
 
 
 class ResultantsCase(WearCase):
     """Contacts under loads from a file."""
 
+    about: ClassVar[str] = "contacts under loads from another finite-element code, as CSV or HDF5"
+
     title: Title = entry("one line", "Contacts under loads of another code")
     structure: Resultants = entry("the loads, and the faces they press")
-    materials: TwoMaterials = entry("the two bodies in contact")
+    materials: BodyMaterials = entry("the two bodies in contact")
     contact: ImportedContact = entry(
         "half-space grid over each contact face", default=ImportedContact()
     )
@@ -233,6 +239,7 @@ class ResultantsCase(WearCase):
 
     @model_validator(mode="after")
     def _loads_can_be_used(self) -> ResultantsCase:
+        check_rows(self.contact, self.structure.line)
         try:
             in_file = self.structure.read(self.friction.at(0.0))
         except InputFileError as error:

@@ -1,0 +1,59 @@
+"""What a shell is told when a command is completed."""
+
+import os
+import subprocess
+import sys
+
+import pytest
+from click.shell_completion import BashComplete
+
+from workflow.cli import cli
+from workflow.kinds import kinds
+
+VARIABLE = "_FRETSCALE_COMPLETE"
+
+
+def completed(*words):
+    """Value and type of what the last of the words may become."""
+    shell = BashComplete(cli, {}, "fretscale", VARIABLE)
+    return [(c.value, c.type) for c in shell.get_completions(list(words[:-1]), words[-1])]
+
+
+def test_commands_are_completed():
+    assert completed("ch") == [("chart", "plain"), ("check", "plain")]
+    assert ("run", "plain") in completed("")
+
+
+def test_kinds_are_completed():
+    assert [value for value, _ in completed("new", "")] == [*kinds(), "sweep"]
+    assert completed("new", "vibration_") == [("vibration_wear", "plain")]
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        *(("run",), ("check",), ("new", "dovetail"), ("verify",), ("verify", "a.yaml")),
+        *(("sweep",), ("chart",), ("resultants",), ("describe",), ("loops",)),
+    ],
+)
+def test_files_are_completed(words):
+    """By the shell itself: it is told that a file stands here."""
+    assert completed(*words, "ca") == [("ca", "file")]
+
+
+def test_folders_are_completed():
+    assert completed("resume", "ou") == [("ou", "dir")]
+    assert completed("run", "--out", "ou") == [("ou", "file")]
+
+
+def test_a_shell_gets_its_script():
+    """And no word about a pipe: ``eval "$(_FRETSCALE_COMPLETE=zsh_source fretscale)"``."""
+    ended = subprocess.run(
+        [sys.executable, "-c", "from workflow.cli import main; main()"],
+        env={**os.environ, VARIABLE: "zsh_source"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert (ended.returncode, ended.stderr) == (0, "")
+    assert ended.stdout.startswith("#compdef fretscale")

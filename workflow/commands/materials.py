@@ -1,0 +1,28 @@
+"""The materials that a case may name, as ``fretscale materials`` lists them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from workflow.case.materials import MATERIALS
+
+HEAD = "name", "young", "poisson", "density", "yield", "state"
+
+
+def known_materials() -> Iterator[str]:
+    """A table with units, then where the values are from."""
+    yield "materials: {body_1: Ti-6Al-4V, body_2: {material: Ti-6Al-4V, yield_stress: 830 MPa}}"
+    yield ""
+    rows = [HEAD]
+    for name, known in MATERIALS.items():
+        yields = "-" if known.yield_stress is None else f"{known.yield_stress:g} MPa"
+        elastic = f"{known.young:g} GPa", f"{known.poisson:g}", f"{known.density:g} kg/m^3"
+        rows.append((name, *elastic, yields, known.state))
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    for row in rows:
+        yield "  ".join(
+            f"{text:<{width}}" for text, width in zip(row, widths, strict=True)
+        ).rstrip()
+    yield ""
+    for name, known in MATERIALS.items():
+        yield f"{name} ({', '.join(known.also)}): {known.source}"
