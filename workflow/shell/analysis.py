@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from workflow.shell.checkpoint import Checkpoint
     from workflow.shell.folder import OutputFolder
+    from workflow.shell.quantities import Quantity
     from workflow.shell.reporter import Reporter
 
 AnyCase = TypeVar("AnyCase", bound=Case)
@@ -66,6 +67,11 @@ def as_written(case: Any) -> tuple[Any, None]:
     return case, None
 
 
+def no_quantities(case: Any, summary: Summary) -> Sequence[Quantity]:
+    """None, of an analysis that names none."""
+    return ()
+
+
 def expected(case: Case, summary: Summary) -> list[str]:
     """What a case expects to find; of 0 there is no relative error."""
     return [entry.quantity for entry in case.expect if entry.value]
@@ -101,6 +107,7 @@ class Analysis(Generic[AnyCase]):
     how its results are shown, drawn in so many ``drawing_processes``, that of the run among them.
     ``resumable`` are runs that leave a checkpoint to go on from (:mod:`workflow.shell.checkpoint`),
     by their steps (:mod:`workflow.shell.steps`) or a state of their own.
+    ``quantities`` are the main results, for all that show or compare runs.
     ``choose`` gives the case with the settings that it leaves open, and a record of why.
     ``write_loads`` solves the structure of a case alone and writes the loads of its contacts into a
     folder, None where there is no structure.
@@ -111,6 +118,7 @@ class Analysis(Generic[AnyCase]):
     run: Callable[[Run[AnyCase]], None]
     memory: Callable[[AnyCase], Memory]
     run_time: Callable[[AnyCase], RunTime]
+    quantities: Callable[[AnyCase, Summary], Sequence[Quantity]] = no_quantities
     pictures: Callable[[], Pictures] | None = None
     drawing_processes: int = 1
     resumable: bool = False

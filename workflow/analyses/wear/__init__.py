@@ -7,6 +7,7 @@ from pathlib import Path
 
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.measures import COMPARISON
+from workflow.analyses.wear.quantities import main_results
 from workflow.analyses.wear.run_time import run_time
 from workflow.analyses.wear.structures import STRUCTURES, structure_of
 from workflow.shell.analysis import Analysis, Pictures, Run
@@ -43,6 +44,7 @@ ANALYSIS = Analysis(
     drawing_processes=2,  # ten seconds and more on one core
     memory=lambda case: structure_of(case).memory(case, 0, 0),
     run_time=lambda case: run_time(case, structure_of(case).extent(case)),
+    quantities=main_results,
     resumable=True,
     choose=lambda case: structure_of(case).choose(case),
     comparison=COMPARISON,

@@ -1,0 +1,67 @@
+"""Main results of joints in time: what joint and rig do at every energy dissipated so far."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+from workflow.analyses.time.case import JointCase, RigCase, joules
+from workflow.analyses.time.outcome import PARAMETERS
+from workflow.shell.analysis import Summary
+from workflow.shell.quantities import Quantity, estimate, told
+
+AGEING, IN_TIME = "jumps in energy, a bound", "displacement, by the steps in time"
+STEADY = "intervals between steady states"
+STIFFNESSES = "stiffness", "residual_stiffness"
+# Of a state, beside the joint's parameters: unit, text, everyday unit.
+NUMBERS = {
+    "cycles": ("1", "cycles so far", ""),
+    "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
+    "stroke": ("mm", "stroke of the joint, peak to peak", ""),
+    "largest_displacement": ("mm", "largest displacement of what is looked at", ""),
+    "dissipated": ("N mm", "energy dissipated in the motion", ""),
+    "first_frequency": ("Hz", "first peak of the response", ""),
+    "first_peak": ("mm/s^2/N", "height of the first peak", "m/s^2/N"),
+    "second_frequency": ("Hz", "second peak of the response", ""),
+    "second_peak": ("mm/s^2/N", "height of the second peak", "m/s^2/N"),
+    "ring_down.largest.damping_ratio": ("1", "damping ratio as the ring-down begins", "%"),
+    "stuck.0": ("Hz", "first natural frequency, joint stuck", ""),
+    "sliding.0": ("Hz", "first natural frequency, joint sliding", ""),
+}
+# What the error of steps in time is told of.
+MOVED = "stroke", "largest_displacement"
+
+
+def main_results(case: JointCase | RigCase, summary: Summary) -> list[Quantity]:
+    """Of every state, and of the whole life if the joint ages."""
+    whole = (
+        Quantity("whole life", "cycles", "cycles", "1"),
+        Quantity("whole life", "energy dissipated", "energy", "N mm", **_of_ageing(summary)),
+    )
+    states = (
+        quantity
+        for number, state in enumerate(summary["states"])
+        for quantity in _of_state(number, state["energy"], summary)
+    )
+    return told(summary, [*whole, *states])
+
+
+def _of_ageing(summary: Summary) -> dict[str, Any]:
+    """The error of cycles and energies of a life, relative."""
+    ageing, cycles = summary.get("ageing") or {}, summary.get("cycles")
+    if cycles and "error" in ageing:  # in cycles
+        return {"error": ageing["error"] / cycles, "error_of": AGEING}
+    return estimate(summary, "ageing.relative_error", STEADY)
+
+
+def _of_state(number: int, energy: float, summary: Summary) -> Iterator[Quantity]:
+    of, place = partial(Quantity, f"at {joules(energy)}"), f"states.{number}"
+    in_time = estimate(summary, f"{place}.step_error", IN_TIME)
+    for name, (unit, text, everyday) in NUMBERS.items():
+        known = in_time if name in MOVED else {}
+        if name == "cycles":
+            known = _of_ageing(summary)
+        yield of(text, f"{place}.{name}", unit, everyday=everyday, **known)
+    for name, (unit, text) in PARAMETERS.items():
+        yield of(text, f"{place}.{name}", unit, everyday="N/um" if name in STIFFNESSES else "")

@@ -1,0 +1,41 @@
+"""Main results of a run as people are told them: names, units and estimated errors.
+
+An analysis names them once, by dotted paths into the summary, for all that show or compare runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from workflow.shell.summary import number_at
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A number at ``path`` in the summary, in the base ``unit`` ("1" for none).
+
+    ``group`` is what it is of, such as an interface, empty for the whole run. ``error`` is the
+    estimated relative error, None where nobody knows, of which ``error_of`` says what it covers.
+    ``everyday`` is the unit that people want to read, where there is only one.
+    """
+
+    group: str
+    name: str
+    path: str
+    unit: str
+    error: float | None = None
+    error_of: str = ""
+    everyday: str = ""
+
+
+def told(summary: Mapping[str, Any], quantities: Iterable[Quantity]) -> list[Quantity]:
+    """Those of the quantities of which the summary has a number."""
+    return [quantity for quantity in quantities if number_at(summary, quantity.path) is not None]
+
+
+def estimate(summary: Mapping[str, Any], path: str, what: str) -> dict[str, Any]:
+    """The relative error at a path and what it is of, as fields of a quantity."""
+    error = number_at(summary, path)
+    return {} if error is None else {"error": abs(error), "error_of": what}
