@@ -125,6 +125,16 @@ def resume(folder: Path) -> None:
 
 
 @cli.command()
+@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Another file than its report.html.")
+def report(folder: Path, out: Path | None) -> None:
+    """Write the page that tells all of the finished run in FOLDER, its report.html, anew."""
+    from workflow.report.writing import write_report
+
+    click.echo(write_report(folder, out))
+
+
+@cli.command()
 @click.argument("cases", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "--out",

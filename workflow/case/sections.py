@@ -15,7 +15,17 @@ from pydantic.fields import FieldInfo
 from pydantic_core import PydanticCustomError
 
 from sa_solver.types import Material as ElasticMaterial
-from workflow.case.fields import Entry, File, Path, Quantity, Text, Whole, shown, split_dataset
+from workflow.case.fields import (
+    Entry,
+    File,
+    Formats,
+    Path,
+    Quantity,
+    Text,
+    Whole,
+    shown,
+    split_dataset,
+)
 from workflow.case.source import Source
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual machine.
@@ -25,6 +35,8 @@ Stress = Annotated[
     float, Quantity("MPa", above=0.0, at_most=2e6, range_text="above 0 and at most 2000 GPa")
 ]
 GridCells = Annotated[int, Whole(8, 4096)]
+# Of figures; the first if nothing is said.
+FIGURE_FORMATS = "png", "svg", "pdf"
 Title = Annotated[str, Text()]
 DottedPath = Annotated[str, Path()]
 Tolerance = Annotated[float, Quantity("1", at_least=1e-12, at_most=1e-3)]
@@ -73,7 +85,17 @@ class Output(Section):
     """What is written beside summary and results."""
 
     paraview: StrictBool = entry("files for ParaView", True, default=True)
-    figures: StrictBool = entry("charts", True, default=True)
+    figures: Annotated[bool | tuple[str, ...], Formats(FIGURE_FORMATS)] = entry(
+        "charts: true (png), false, or one or a list of png, svg and pdf", True, default=True
+    )
+    report: StrictBool = entry("report.html: all of it on one page", True, default=True)
+
+    @property
+    def figure_formats(self) -> tuple[str, ...]:
+        """The formats in which figures are written: none where they are not wanted."""
+        if isinstance(self.figures, tuple):
+            return self.figures
+        return FIGURE_FORMATS[:1] if self.figures else ()
 
 
 class Expectation(Section):

@@ -34,7 +34,8 @@ class Run(Generic[AnyCase]):
     ``choice`` is the record of the settings that were chosen for the case, None
     where they stand as written. ``compute`` runs another case file into a folder, from where an
     earlier run there has got to; False if that was finished already. ``draw`` writes the pictures
-    of the results that the case asks for, told what these hold.
+    of the results that the case asks for, told what these hold. ``report`` puts the summary that
+    the run is to end with, and what was drawn, on a page for people.
     """
 
     kind: str
@@ -47,6 +48,7 @@ class Run(Generic[AnyCase]):
     choice: dict[str, Any] | None
     compute: Callable[[Path, Path], bool]
     draw: Callable[[Any], None]
+    report: Callable[[Summary], None]
 
 
 @dataclass(frozen=True)
@@ -55,11 +57,13 @@ class Pictures:
 
     Both are told what the results hold: a frozen description that the run makes of what it has
     written. ``figures_of`` gives the figures to draw, by name; ``write_paraview`` writes files for
-    ParaView into a folder and gives their paths, None for cases without fields.
+    ParaView into a folder and gives their paths, None for cases without fields. ``contents`` is the
+    type of that description, for results whose run has ended; None where there is nothing to tell.
     """
 
     figures_of: Callable[[Any], Mapping[str, Callable[[h5py.File], Figure]]]
     write_paraview: Callable[[Any, h5py.File, Path], list[Path]] | None = None
+    contents: type[Any] | None = None
 
 
 def as_written(case: Any) -> tuple[Any, None]:

@@ -18,7 +18,9 @@ class Quantity:
 
     ``group`` is what it is of, such as an interface, empty for the whole run. ``error`` is the
     estimated relative error, None where nobody knows, of which ``error_of`` says what it covers.
-    ``everyday`` is the unit that people want to read, where there is only one.
+    ``everyday`` is the unit that people want to read, where there is only one. A ``budget`` is
+    what the error is of, in words, and where the summary has its parts, None for unknown ones, and
+    their ``total``.
     """
 
     group: str
@@ -28,6 +30,7 @@ class Quantity:
     error: float | None = None
     error_of: str = ""
     everyday: str = ""
+    budget: tuple[str, str] | None = None
 
 
 def told(summary: Mapping[str, Any], quantities: Iterable[Quantity]) -> list[Quantity]:

@@ -18,18 +18,17 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
     """
     reporter = run.reporter
     seconds = {name: round(value, 2) for name, value in reporter.seconds.items()}
-    run.folder.finish(
-        {
-            "title": run.case.title,
-            "assumed": list(run.case.assumed),
-            **numbers,
-            **({"choice": run.choice} if run.choice else {}),
-            "warnings": reporter.warnings,
-            "seconds": seconds,
-            "versions": versions(),
-        },
-        run.provenance,
-    )
+    summary = {
+        "title": run.case.title,
+        "assumed": list(run.case.assumed),
+        **numbers,
+        **({"choice": run.choice} if run.choice else {}),
+        "warnings": reporter.warnings,
+        "seconds": seconds,
+        "versions": versions(),
+    }
+    run.report(summary)
+    run.folder.finish(summary, run.provenance)
     run.folder.discard_state()
     for line in lines:
         reporter.say(line)

@@ -29,10 +29,11 @@ def _quantities(case: BodiesCase, summary: Summary) -> list[str]:
 
 def _pictures() -> Pictures:
     # Plots take a second to load: where they are drawn.
+    from workflow.analyses.contact.datasets import Contents
     from workflow.analyses.contact.figures import figures_of
     from workflow.analyses.contact.paraview import write_contact
 
-    return Pictures(figures_of, write_contact)
+    return Pictures(figures_of, write_contact, contents=Contents)
 
 
 ANALYSIS: Analysis[BodiesCase] = Analysis(

@@ -30,9 +30,10 @@ def _quantities(case: VibrationCase, summary: Summary) -> list[str]:
 def _pictures() -> Pictures:
     # Plots take a second to load: where they are drawn.
     from workflow.analyses.vibration.figures.response import figures_of
+    from workflow.analyses.vibration.outcome import Contents
     from workflow.analyses.vibration.paraview import write_vibration
 
-    return Pictures(figures_of, write_vibration)
+    return Pictures(figures_of, write_vibration, contents=Contents)
 
 
 ANALYSIS = Analysis(

@@ -19,8 +19,9 @@ def _run(run: Run[VibrationWearCase | FrictionRigWearCase]) -> None:
 def _pictures() -> Pictures:
     # Plots take a second to load: where they are drawn.
     from workflow.analyses.vibration_wear.figures import figures_of
+    from workflow.analyses.vibration_wear.outcome import Contents
 
-    return Pictures(figures_of)
+    return Pictures(figures_of, contents=Contents)
 
 
 ANALYSIS = Analysis(

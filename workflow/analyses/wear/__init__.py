@@ -31,9 +31,10 @@ def _write_loads(case: WearCase, name: str, out: Path, force: bool) -> Sequence[
 def _pictures() -> Pictures:
     # Plots take a second to load: where they are drawn.
     from workflow.analyses.wear.figures.wear import figures_of
+    from workflow.analyses.wear.layout import Contents
     from workflow.analyses.wear.paraview.wear import write_wear
 
-    return Pictures(figures_of, write_wear)
+    return Pictures(figures_of, write_wear, contents=Contents)
 
 
 ANALYSIS = Analysis(

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from functools import partial
+from typing import Any
 
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.layout import MOMENTS
+from workflow.analyses.wear.layout import MOMENTS, RESULTS
 from workflow.analyses.wear.measures import interfaces
 from workflow.shell.analysis import Summary
 from workflow.shell.dataset import unit_in
 from workflow.shell.quantities import Quantity, estimate, told
 
 # Estimated errors are totals of the error budget.
-BUDGET = "error budget: link, mesh, increments, grid, steps, coupling and solver"
+BUDGET = "all parts of the error budget below"
 STRUCTURE = "structure"
 # Fretting parameters: unit and name.
 PARAMETERS = {
@@ -42,10 +43,8 @@ def _worn(case: WearCase, summary: Summary, name: str) -> Iterator[Quantity]:
     """Wear, pressures and loads of an interface."""
     line = summary["per_length"]
     of = partial(Quantity, name)
-    error = {
-        key: estimate(summary, f"{name}.error.{key}.total", BUDGET)
-        for key in ("depth", "volume", "peak_pressure", "worn_peak_pressure")
-    }
+    results = "depth", "volume", "peak_pressure", "worn_peak_pressure"
+    error = {key: _budgeted(summary, name, key) for key in results}
     for number, body in enumerate(case.bodies, 1):
         text = f"largest depth worn from {named(body)}"
         yield of(text, f"{name}.depth_{number}", "mm", **error["depth"])
@@ -80,7 +79,7 @@ def _stressed(case: WearCase, summary: Summary, name: str) -> Iterator[Quantity]
         yield of(text, f"{path}.kt", unit, everyday=f"N/um{per}")
         text = f"energy of the tangential loop, {moment}"
         yield of(text, f"{path}.energy_per_loop", f"N mm{per}")
-    error = estimate(summary, f"{name}.error.life.total", BUDGET)
+    error = _budgeted(summary, name, "life")
     for key, (unit, text) in {"von_mises": ("MPa", "von Mises stress"), **PARAMETERS}.items():
         for body in case.bodies:
             for moment in MOMENTS:
@@ -89,6 +88,13 @@ def _stressed(case: WearCase, summary: Summary, name: str) -> Iterator[Quantity]
                 yield of(
                     f"largest {text} under the face of {named(body)}, {moment}", path, unit, **known
                 )
+
+
+def _budgeted(summary: Summary, name: str, result: str) -> dict[str, Any]:
+    """The total of the error budget of a result, and where its parts are."""
+    path = f"{name}.error.{result}"
+    known = estimate(summary, f"{path}.total", BUDGET)
+    return known | {"budget": (RESULTS[result], path)} if known else {}
 
 
 def _of_structure(case: WearCase, summary: Summary) -> Iterator[Quantity]:
