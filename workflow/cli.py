@@ -151,6 +151,32 @@ def verify(cases: tuple[Path, ...], out: Path) -> int:
 
 
 @cli.command()
+@click.argument(
+    "folders",
+    nargs=-1,
+    required=True,
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+)
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for table, page and figures.")
+@click.option("--force", is_flag=True, help="Overwrite what is there.")
+def compare(folders: tuple[Path, ...], out: Path | None, force: bool) -> None:
+    """Put the finished runs in FOLDERS side by side: results, cases, and curves.
+
+    The first is what the others are held against. All must be runs of one analysis.
+    """
+    from workflow.comparing import compare
+    from workflow.comparing.showing import show
+
+    compared = compare(folders)
+    show(compared)
+    if out is not None:
+        from workflow.comparing.writing import write_comparison
+
+        for path in write_comparison(compared, out, force):
+            click.echo(path)
+
+
+@cli.command()
 @click.argument("case", type=click.Path(path_type=Path))
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
 @click.option("--axis", "axes", multiple=True, metavar="NAME", help="Only this approximation.")

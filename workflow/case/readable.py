@@ -50,12 +50,17 @@ def readable(value: float, unit: str, error: float | None = None, everyday: str 
     """
     if not math.isfinite(value):
         return Readable("not a number" if math.isnan(value) else "infinite", "")
-    base = unit.replace(" ", "*")
-    shown = everyday or _suited(value, base)
-    factor = to_base(f"1 {shown}", base) if shown != base else 1.0
+    shown, factor = suited(value, unit, everyday)
     plain = unit == "1" and not everyday
     text = _text(value / factor, error, PLAIN_DIGITS if plain else DIGITS)
-    return Readable(text, "" if shown == "1" else pretty(shown))
+    return Readable(text, shown)
+
+
+def suited(value: float, unit: str, everyday: str = "") -> tuple[str, float]:
+    """The unit in print that suits a value in a base ``unit``, and how large it is."""
+    base = unit.replace(" ", "*")
+    shown = everyday or suited_unit(value, unit)
+    return pretty(shown), to_base(f"1 {shown}", base) if shown != base else 1.0
 
 
 def pretty(unit: str) -> str:
@@ -78,9 +83,9 @@ def percent(share: float) -> str:
     return f"{100.0 * share:.{min(digits, 2)}f} %"
 
 
-def _suited(value: float, base: str) -> str:
-    """The largest of the units of which there are enough."""
-    fitting = base
+def suited_unit(value: float, unit: str) -> str:
+    """The largest of the units of a base ``unit`` of which there are enough."""
+    fitting = base = unit.replace(" ", "*")
     for unit, least in SHOWN.get(base, ()):
         if least == 0.0 or abs(value) >= least * to_base(f"1 {unit}", base) * (1.0 - 1e-9):
             fitting = unit

@@ -47,6 +47,16 @@ def section(title: str, *inside: object, key: str = "") -> Html:
     return element("section", element("h2", title), *inside, id=name)
 
 
+def contents_of(parts: Sequence[Html]) -> Html:
+    """Links to the sections."""
+    links = []
+    for part in filter(None, parts):
+        name = part.split('id="', 1)[1].split('"', 1)[0]
+        title = part.split("<h2>", 1)[1].split("</h2>", 1)[0]
+        links.append(element("a", Html(title), href=f"#{name}"))
+    return element("nav", Html(" ".join(links)))
+
+
 def folded(title: str, *inside: object) -> Html:
     """What only some want to see: open where the page is printed."""
     return element("details", element("summary", title), *inside)

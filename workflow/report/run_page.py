@@ -13,6 +13,7 @@ from workflow.kinds import analysis_of
 from workflow.report.numbers import error_budget, results
 from workflow.report.page import (
     Html,
+    contents_of,
     element,
     folded,
     items,
@@ -32,7 +33,9 @@ LOOKED_FOR = (
     *("materials", "friction", "load_path", "wear", "joint", "evolution", "drive", "excitation"),
     *("energies", "ageing", "forces", "frequencies"),
 )
-# Bytes of a digest that tell files apart.
+# Letters of a value that stays in one line.
+SHORT = 20
+# Letters of a digest that tell files apart.
 DIGEST = 12
 
 
@@ -68,16 +71,6 @@ def _header(run: ToldRun, parts: Sequence[Html]) -> Html:
         element("p", f"{lead}; {told}{_met(run)}.", cls="lead"),
         contents_of(parts),
     )
-
-
-def contents_of(parts: Sequence[Html]) -> Html:
-    """Links to the sections."""
-    links = []
-    for part in filter(None, parts):
-        name = part.split('id="', 1)[1].split('"', 1)[0]
-        title = part.split("<h2>", 1)[1].split("</h2>", 1)[0]
-        links.append(element("a", Html(title), href=f"#{name}"))
-    return element("nav", Html(" ".join(links)))
 
 
 def _met(run: ToldRun) -> str:
@@ -203,8 +196,14 @@ def _entries(leaves: Sequence[Leaf], assumed: Sequence[str]) -> Html:
         for leaf in listed:
             below = leaf.path.partition(".")[2] or name
             star = "*" if any(f"{leaf.path}.".startswith(f"{path}.") for path in assumed) else ""
-            rows.append([element("span", element("code", below), star), leaf.text, leaf.what])
+            name_of = element("span", element("code", below), star)
+            rows.append([name_of, _kept_together(leaf.text), leaf.what])
     return table(["", "", ""], rows)
+
+
+def _kept_together(text: str) -> object:
+    """A short text in one line."""
+    return element("span", text, cls="short") if len(text) < SHORT else text
 
 
 def _choice(summary: Mapping[str, Any]) -> Iterator[Html]:
@@ -249,7 +248,8 @@ def _computing(run: ToldRun) -> Iterator[Html]:
             element("span", element("code", PurePath(name).name), f" (SHA-256 {digest[:DIGEST]}…)")
             for name, digest in run.input_files.items()
         )
-    yield table(["", "version"], [[name, text] for name, text in run.summary["versions"].items()])
+    versions = ", ".join(f"{name} {text}" for name, text in run.summary["versions"].items())
+    yield element("p", f"Versions: {versions}.")
 
 
 def _seconds(seconds: Mapping[str, float]) -> Html:

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
     from workflow.shell.checkpoint import Checkpoint
     from workflow.shell.folder import OutputFolder
-    from workflow.shell.quantities import Quantity
+    from workflow.shell.quantities import CurvesOf, Quantity
     from workflow.shell.reporter import Reporter
 
 AnyCase = TypeVar("AnyCase", bound=Case)
@@ -111,7 +111,8 @@ class Analysis(Generic[AnyCase]):
     how its results are shown, drawn in so many ``drawing_processes``, that of the run among them.
     ``resumable`` are runs that leave a checkpoint to go on from (:mod:`workflow.shell.checkpoint`),
     by their steps (:mod:`workflow.shell.steps`) or a state of their own.
-    ``quantities`` are the main results, for all that show or compare runs.
+    ``quantities`` are the main results, for all that show or compare runs, ``curves`` what is drawn
+    over each other where runs are compared.
     ``choose`` gives the case with the settings that it leaves open, and a record of why.
     ``write_loads`` solves the structure of a case alone and writes the loads of its contacts into a
     folder, None where there is no structure.
@@ -123,6 +124,7 @@ class Analysis(Generic[AnyCase]):
     memory: Callable[[AnyCase], Memory]
     run_time: Callable[[AnyCase], RunTime]
     quantities: Callable[[AnyCase, Summary], Sequence[Quantity]] = no_quantities
+    curves: Sequence[CurvesOf] = ()
     pictures: Callable[[], Pictures] | None = None
     drawing_processes: int = 1
     resumable: bool = False

@@ -1,4 +1,4 @@
-"""Main results of a run as people are told them: names, units and estimated errors.
+"""Main results of a run as people are told them: names, units, estimated errors, and curves.
 
 An analysis names them once, by dotted paths into the summary, for all that show or compare runs.
 """
@@ -10,6 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 from workflow.shell.summary import number_at
+
+# Parts of a path in the results: any group, each a curve of its own, and the last numbered one.
+ANY, LAST = "*", "-1"
 
 
 @dataclass(frozen=True)
@@ -31,6 +34,21 @@ class Quantity:
     error_of: str = ""
     everyday: str = ""
     budget: tuple[str, str] | None = None
+
+
+@dataclass(frozen=True)
+class CurvesOf:
+    """The datasets ``y`` against ``x``; ``*`` stands for any group, ``-1`` for the last numbered.
+
+    What stands for them in ``y`` does in ``x`` too. Of a dataset of several columns the last is
+    meant. Where ``x`` is a grid, ``y`` is a field over it, of a vector its first component, and the
+    curve goes along x through its middle. ``logarithmic`` is the axis of y.
+    """
+
+    title: str
+    x: str
+    y: str
+    logarithmic: bool = False
 
 
 def told(summary: Mapping[str, Any], quantities: Iterable[Quantity]) -> list[Quantity]:

@@ -2,7 +2,7 @@
 
 from workflow.analyses.contact.case import BodiesCase, ContactCase, LineContactCase
 from workflow.analyses.contact.memory import memory
-from workflow.analyses.contact.quantities import main_results
+from workflow.analyses.contact.quantities import CURVES, main_results
 from workflow.analyses.contact.run_time import run_time
 from workflow.shell.analysis import Analysis, Comparison, Pictures, Run, Summary, expected
 
@@ -44,5 +44,6 @@ ANALYSIS: Analysis[BodiesCase] = Analysis(
     memory=memory,
     run_time=run_time,
     quantities=main_results,
+    curves=CURVES,
     comparison=Comparison(quantities=_quantities, at_the_end=AT_THE_END),
 )

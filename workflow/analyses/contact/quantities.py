@@ -8,7 +8,7 @@ from workflow.analyses.contact.case import BodiesCase
 from workflow.analyses.contact.datasets import LOADS, RIGID_MOTIONS
 from workflow.shell.analysis import Summary
 from workflow.shell.dataset import unit_in
-from workflow.shell.quantities import Quantity, estimate, told
+from workflow.shell.quantities import CurvesOf, Quantity, estimate, told
 
 LAST, LOOP = "after the last increment", "last closed cycle"
 MOTIONS = {
@@ -34,6 +34,19 @@ NUMBERS = {
 # Forces and motions below this share of the largest are rounding.
 ROUNDING = 1e-9
 FORCES = "P", "Qx", "Qy"
+# What runs are compared by, beside the numbers.
+CURVES = (
+    CurvesOf(
+        "pressure along x in the middle, last increment",
+        "grid/bodies",
+        "contact/bodies/-1/pressure",
+    ),
+    CurvesOf(
+        "shear along x in the middle, last increment", "grid/bodies", "contact/bodies/-1/shear"
+    ),
+    CurvesOf("tangential force over motion", "history/shift_x", "history/Qx"),
+    CurvesOf("normal force over approach", "history/approach", "history/P"),
+)
 
 
 def main_results(case: BodiesCase, summary: Summary) -> list[Quantity]:

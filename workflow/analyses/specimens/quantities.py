@@ -8,7 +8,7 @@ from functools import partial
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.wear.layout import MOMENTS
 from workflow.shell.analysis import Summary
-from workflow.shell.quantities import Quantity, estimate, told
+from workflow.shell.quantities import CurvesOf, Quantity, estimate, told
 
 FREE = "free specimens"
 UNCOUPLED = "difference to a cycle with pressure and shear coupled"
@@ -22,6 +22,18 @@ STATE = {
 }
 # Results of the unworn pads that a coupled cycle is put beside.
 COUPLED = {"secant_stiffness": "secant_stiffness", "energy_per_cycle": "energy"}
+# What runs are compared by, beside the numbers.
+CURVES = (
+    CurvesOf("tangential stiffness", "loads/*/kinetics/cycles", "loads/*/kinetics/stick_stiffness"),
+    CurvesOf("contact area", "loads/*/kinetics/cycles", "loads/*/kinetics/area"),
+    CurvesOf("depth worn from body 1", "loads/*/kinetics/cycles", "loads/*/kinetics/depth_1"),
+    CurvesOf("depth worn from body 2", "loads/*/kinetics/cycles", "loads/*/kinetics/depth_2"),
+    CurvesOf(
+        "loop, worn",
+        "loads/*/states/-1/loop/ring_displacement",
+        "loads/*/states/-1/loop/ring_force",
+    ),
+)
 
 
 def main_results(case: SpecimensCase, summary: Summary) -> list[Quantity]:

@@ -9,7 +9,7 @@ from typing import Any
 from workflow.analyses.time.case import JointCase, RigCase, joules
 from workflow.analyses.time.outcome import PARAMETERS
 from workflow.shell.analysis import Summary
-from workflow.shell.quantities import Quantity, estimate, told
+from workflow.shell.quantities import CurvesOf, Quantity, estimate, told
 
 AGEING, IN_TIME = "jumps in energy, a bound", "displacement, by the steps in time"
 STEADY = "intervals between steady states"
@@ -31,6 +31,24 @@ NUMBERS = {
 }
 # What the error of steps in time is told of.
 MOVED = "stroke", "largest_displacement"
+# What runs are compared by, beside the numbers.
+CURVES = (
+    CurvesOf("stiffness of the joint", "evolution/energy", "evolution/stiffness"),
+    CurvesOf("friction of the joint", "evolution/energy", "evolution/friction"),
+    CurvesOf("normal load of the joint", "evolution/energy", "evolution/normal_load"),
+    CurvesOf("loop in the last state", "states/-1/loop/displacement", "states/-1/loop/force"),
+    CurvesOf(
+        "frequency response in the last state",
+        "states/-1/frequency_response/frequency",
+        "states/-1/frequency_response/magnitude",
+        logarithmic=True,
+    ),
+    CurvesOf(
+        "damping in the ring-down, last state",
+        "states/-1/ring_down/amplitude",
+        "states/-1/ring_down/damping_ratio",
+    ),
+)
 
 
 def main_results(case: JointCase | RigCase, summary: Summary) -> list[Quantity]:

@@ -4,7 +4,7 @@ from itertools import product
 
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.memory import memory
-from workflow.analyses.vibration.quantities import main_results
+from workflow.analyses.vibration.quantities import CURVES, main_results
 from workflow.analyses.vibration.run_time import run_time
 from workflow.shell.analysis import Analysis, Comparison, Pictures, Run, Summary
 
@@ -44,6 +44,7 @@ ANALYSIS = Analysis(
     memory=memory,
     run_time=run_time,
     quantities=main_results,
+    curves=CURVES,
     resumable=True,
     comparison=Comparison(quantities=_quantities),
 )

@@ -8,7 +8,7 @@ from typing import Any
 
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.shell.analysis import Summary
-from workflow.shell.quantities import Quantity, estimate, told
+from workflow.shell.quantities import CurvesOf, Quantity, estimate, told
 
 LINEAR = "linear limits"
 ERROR = "joints' vibration or energy lost, by harmonics and samples"
@@ -30,6 +30,12 @@ LOOP = {
     "friction": ("1", "friction coefficient of the loop", ""),
 }
 LOOP_WITH_ERROR = "energy", "stroke"
+# What runs are compared by, beside the numbers.
+CURVES = (
+    CurvesOf("amplitude", "responses/*/frequency", "responses/*/amplitude", logarithmic=True),
+    CurvesOf("loop", "responses/*/loops/-1/displacement", "responses/*/loops/-1/force"),
+    CurvesOf("phase resonance", "backbone/force", "backbone/frequency"),
+)
 
 
 def main_results(case: VibrationCase, summary: Summary) -> list[Quantity]:

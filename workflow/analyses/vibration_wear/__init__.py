@@ -2,7 +2,7 @@
 
 from workflow.analyses.vibration.memory import memory
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
-from workflow.analyses.vibration_wear.quantities import main_results
+from workflow.analyses.vibration_wear.quantities import CURVES, main_results
 from workflow.analyses.vibration_wear.run_time import run_time
 from workflow.shell.analysis import Analysis, Pictures, Run
 
@@ -32,5 +32,6 @@ ANALYSIS = Analysis(
     memory=memory,
     run_time=run_time,
     quantities=main_results,
+    curves=CURVES,
     resumable=True,
 )

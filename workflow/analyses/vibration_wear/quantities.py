@@ -9,7 +9,7 @@ from itertools import chain
 from workflow.analyses.vibration.quantities import of_response
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
 from workflow.shell.analysis import Summary
-from workflow.shell.quantities import Quantity, estimate, told
+from workflow.shell.quantities import CurvesOf, Quantity, estimate, told
 
 STEPS = "depth or volume, by the wear steps"
 MOTION = "joints' vibration or energy lost, by harmonics and samples"
@@ -31,6 +31,19 @@ ERRORS = {
     "stroke": ("error", MOTION),
     "energy_per_cycle": ("error", MOTION),
 }
+# What runs are compared by, beside the numbers.
+CURVES = (
+    CurvesOf("worn depth", "evolution/cycles", "evolution/depth"),
+    CurvesOf("worn volume", "evolution/cycles", "evolution/volume"),
+    CurvesOf("tangential stiffness", "evolution/cycles", "evolution/stiffness"),
+    CurvesOf(
+        "amplitude in the last state",
+        "worn/-1/responses/*/frequency",
+        "worn/-1/responses/*/amplitude",
+        logarithmic=True,
+    ),
+    CurvesOf("loop in the last state", "worn/-1/loop/displacement", "worn/-1/loop/force"),
+)
 
 
 def main_results(case: VibrationWearCase | FrictionRigWearCase, summary: Summary) -> list[Quantity]:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.measures import COMPARISON
-from workflow.analyses.wear.quantities import main_results
+from workflow.analyses.wear.quantities import CURVES, main_results
 from workflow.analyses.wear.run_time import run_time
 from workflow.analyses.wear.structures import STRUCTURES, structure_of
 from workflow.shell.analysis import Analysis, Pictures, Run
@@ -46,6 +46,7 @@ ANALYSIS = Analysis(
     memory=lambda case: structure_of(case).memory(case, 0, 0),
     run_time=lambda case: run_time(case, structure_of(case).extent(case)),
     quantities=main_results,
+    curves=CURVES,
     resumable=True,
     choose=lambda case: structure_of(case).choose(case),
     comparison=COMPARISON,

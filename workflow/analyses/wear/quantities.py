@@ -11,7 +11,7 @@ from workflow.analyses.wear.layout import MOMENTS, RESULTS
 from workflow.analyses.wear.measures import interfaces
 from workflow.shell.analysis import Summary
 from workflow.shell.dataset import unit_in
-from workflow.shell.quantities import Quantity, estimate, told
+from workflow.shell.quantities import CurvesOf, Quantity, estimate, told
 
 # Estimated errors are totals of the error budget.
 BUDGET = "all parts of the error budget below"
@@ -22,6 +22,16 @@ PARAMETERS = {
     "smith_watson_topper": ("MPa", "Smith-Watson-Topper parameter"),
     "findley": ("MPa", "Findley's parameter"),
 }
+# What runs are compared by, beside the numbers.
+CURVES = (
+    CurvesOf("depth worn from body 1", "kinetics/cycles", "kinetics/*/depth_1"),
+    CurvesOf("depth worn from body 2", "kinetics/cycles", "kinetics/*/depth_2"),
+    CurvesOf("volume worn from body 1", "kinetics/cycles", "kinetics/*/volume_1"),
+    CurvesOf("volume worn from body 2", "kinetics/cycles", "kinetics/*/volume_2"),
+    CurvesOf("pressure across the middle, unworn", "grid/*", "contact/*/00000/pressure"),
+    CurvesOf("pressure across the middle, worn", "grid/*", "contact/*/-1/pressure"),
+    CurvesOf("tangential loop, worn", "loops/*/-1/displacement", "loops/*/-1/force"),
+)
 
 
 def main_results(case: WearCase, summary: Summary) -> list[Quantity]:
