@@ -28,8 +28,8 @@ SHOWN: dict[str, tuple[tuple[str, float], ...]] = {
     "rad/s": (("rpm", 0.0),),
     "1/MPa": (("um^3/J", 0.0), ("mm^3/J", 1.0)),
 }
-# Digits where nothing is known of the error, of plain numbers, and at most.
-DIGITS, PLAIN_DIGITS, MOST_DIGITS = 4, 6, 6
+# Digits where nothing is known of the error, of plain numbers, at least and at most.
+DIGITS, PLAIN_DIGITS, LEAST_DIGITS, MOST_DIGITS = 4, 6, 2, 6
 POWERS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
 
 
@@ -51,8 +51,7 @@ def readable(value: float, unit: str, error: float | None = None, everyday: str 
     if not math.isfinite(value):
         return Readable("not a number" if math.isnan(value) else "infinite", "")
     shown, factor = suited(value, unit, everyday)
-    plain = unit == "1" and not everyday
-    text = _text(value / factor, error, PLAIN_DIGITS if plain else DIGITS)
+    text = _text(value / factor, error, DIGITS if shown else PLAIN_DIGITS)
     return Readable(text, shown)
 
 
@@ -89,9 +88,10 @@ def suited_unit(value: float, unit: str) -> str:
     for unit, least in SHOWN.get(base, ()):
         if least == 0.0 or abs(value) >= least * to_base(f"1 {unit}", base) * (1.0 - 1e-9):
             fitting = unit
-    # Of nothing there is enough in the base unit.
-    ladder = [unit for unit, _ in SHOWN.get(base, ())]
-    return base if value == 0.0 and base in ladder else fitting
+    if value == 0.0 and base in SHOWN:  # of nothing there is as much in every unit
+        ladder = [unit for unit, _ in SHOWN[base]]
+        return base if base in ladder else ladder[len(ladder) // 2]
+    return fitting
 
 
 def _text(value: float, error: float | None, digits: int) -> str:
@@ -101,7 +101,8 @@ def _text(value: float, error: float | None, digits: int) -> str:
     if error:
         # 2.83 ± 0.04 has three digits, 9.9 ± 0.1 two.
         last = math.floor(math.log10(abs(value) * error))
-        digits = min(MOST_DIGITS, max(1, math.floor(math.log10(abs(value))) - last + 1))
+        known = math.floor(math.log10(abs(value))) - last + 1
+        digits = min(MOST_DIGITS, max(LEAST_DIGITS, known))
     elif error is not None:
         digits = MOST_DIGITS
     text, power = _plain(value, digits)

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from os.path import commonpath
 from pathlib import Path
+from typing import Any
 
 from workflow.case.leaves import leaves_of
 from workflow.case.readable import suited_unit
@@ -91,7 +92,7 @@ class Comparison:
     ``entries`` are in words, one for every run, by dotted path.
     """
 
-    analysis: Analysis
+    analysis: Analysis[Any]
     runs: tuple[ComparedRun, ...]
     rows: tuple[Row, ...]
     entries: Mapping[str, tuple[str, ...]]
@@ -112,19 +113,14 @@ def compare(folders: Sequence[str | Path]) -> Comparison:
     told = [told_run(path, figures=False) for path in paths]
     names = _names(paths)
     runs = tuple(map(ComparedRun, names, paths, told))
-    analysis = analysis_of(told[0].case)
+    first, analysis = told[0], analysis_of(told[0].case)
     for run in runs[1:]:
-        other = analysis_of(run.run.case)
-        if other is not analysis:
+        if analysis_of(run.run.case) is not analysis:
             raise UserError(
-                f"{run.folder}: a run of {_words(other)}, where {runs[0].folder} is one of "
-                f"{_words(analysis)}; allowed: runs of one analysis"
+                f"{run.folder}: a run of a {run.run.kind} case, where that in {paths[0]} is of a "
+                f"{first.kind} case; allowed: {', '.join(analysis.cases)}"
             )
     return Comparison(analysis, runs, _rows(analysis, told), _entries(told))
-
-
-def _words(analysis: Analysis) -> str:
-    return analysis.name.replace("_", " ")
 
 
 def _names(paths: Sequence[Path]) -> list[str]:
@@ -136,7 +132,7 @@ def _names(paths: Sequence[Path]) -> list[str]:
     return [path.relative_to(above).as_posix() for path in whole]
 
 
-def _rows(analysis: Analysis, runs: Sequence[ToldRun]) -> tuple[Row, ...]:
+def _rows(analysis: Analysis[Any], runs: Sequence[ToldRun]) -> tuple[Row, ...]:
     """Quantities of all runs by their paths in the summaries, in the order of the first run."""
     of_runs = [{q.path: q for q in analysis.quantities(run.case, run.summary)} for run in runs]
     paths = dict.fromkeys(path for quantities in of_runs for path in quantities)

@@ -115,7 +115,7 @@ def write_csv(comparison: Comparison, path: Path) -> None:
 def comparison_page(comparison: Comparison, figures: dict[str, str]) -> str:
     """The whole page; ``figures`` are SVG texts by their titles."""
     names = comparison.names
-    pictures = [picture(svg, title) for title, svg in figures.items()]
+    pictures = [picture(svg, title, captioned=False) for title, svg in figures.items()]
     parts = [
         section("The runs", _runs(comparison)),
         section("What differs in their cases", _entries(comparison)),
@@ -123,7 +123,7 @@ def comparison_page(comparison: Comparison, figures: dict[str, str]) -> str:
         section("Curves", element("div", *pictures, cls="small") if pictures else ""),
     ]
     title = " and ".join(names) if len(names) == 2 else f"{len(names)} runs side by side"
-    lead = f"{len(names)} runs of {comparison.analysis.name.replace('_', ' ')} compared; the first "
+    lead = f"{len(names)} runs compared; what the others are held against "
     header = element(
         "header",
         element("h1", title),

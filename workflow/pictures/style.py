@@ -16,7 +16,7 @@ from workflow.shell.store import replacing
 
 DOTS_PER_INCH = 100
 # Of what is drawn as dots in vector graphics too: artists of more vertices.
-DENSE, DENSE_DOTS_PER_INCH = 4000, 150
+DENSE, DENSE_DOTS_PER_INCH = 1000, 120
 FONT_SIZE = 13
 STYLE: dict[Any, Any] = {
     "font.size": FONT_SIZE,

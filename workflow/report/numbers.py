@@ -6,12 +6,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from workflow.case.readable import percent, readable
-from workflow.report.page import Html, element, lines, note, table
+from workflow.report.page import Html, element, lines, note, table, unbroken
 from workflow.shell.quantities import Quantity
 from workflow.shell.summary import number_at, required_number
 
 # Groups side by side in a table at most, for it to be read on a sheet of paper.
 COLUMNS = 4
+# What errors are marked by that are not all of one kind.
+LETTERS = "abcdefgh"
 # Share of their names that groups in one table have in common.
 ALIKE = 0.5
 
@@ -20,13 +22,20 @@ Groups = dict[str, dict[str, Quantity]]
 
 def results(quantities: Sequence[Quantity], summary: Mapping[str, Any]) -> Html:
     """Tables of all quantities, and what their errors are of."""
+    marks = _marks(quantities)
     parts = []
     for family in _families(quantities):
+        tables = -(-len(family) // COLUMNS)
         names = list(family)
-        for first in range(0, len(names), COLUMNS):
-            shown = {name: family[name] for name in names[first : first + COLUMNS]}
-            parts.append(_table(shown, summary))
-    return lines([*parts, *_notes(quantities)])
+        for first in range(tables):
+            shown = {name: family[name] for name in _share(names, first, tables)}
+            parts.append(_table(shown, summary, marks))
+    return lines([*parts, _note(quantities, marks)])
+
+
+def _share(names: Sequence[str], part: int, parts: int) -> Sequence[str]:
+    """One of so many parts that are as long as each other, or longer by one."""
+    return names[part * len(names) // parts : (part + 1) * len(names) // parts]
 
 
 def _families(quantities: Iterable[Quantity]) -> list[Groups]:
@@ -46,48 +55,50 @@ def _families(quantities: Iterable[Quantity]) -> list[Groups]:
     return families
 
 
-def _table(groups: Groups, summary: Mapping[str, Any]) -> Html:
+def _table(groups: Groups, summary: Mapping[str, Any], marks: Mapping[str, str]) -> Html:
     names = dict.fromkeys(name for named in groups.values() for name in named)
     rows = (
-        [name, *(_cell(named.get(name), summary) for named in groups.values())] for name in names
+        [name, *(_cell(named.get(name), summary, marks) for named in groups.values())]
+        for name in names
     )
     return table(["", *groups], rows, numbers=range(1, len(groups) + 1))
 
 
-def _cell(quantity: Quantity | None, summary: Mapping[str, Any]) -> object:
+def _cell(
+    quantity: Quantity | None, summary: Mapping[str, Any], marks: Mapping[str, str]
+) -> object:
     if quantity is None:
         return "–"
-    return value_of(quantity, required_number(summary, quantity.path))
+    mark = marks.get(quantity.error_of, "")
+    return value_of(quantity, required_number(summary, quantity.path), mark)
 
 
-def value_of(quantity: Quantity, value: float) -> Html:
-    """A value with its unit and its estimated error."""
-    shown = readable(value, quantity.unit, quantity.error, quantity.everyday)
-    if quantity.error is None:
-        return element("span", str(shown))
-    return element(
-        "span", f"{shown} ", element("span", f"± {percent(quantity.error)}", cls="error")
-    )
+def value_of(quantity: Quantity, value: float, mark: str = "") -> Html:
+    """A value with its unit and its estimated error, which may have a ``mark`` for a note."""
+    shown = unbroken(str(readable(value, quantity.unit, quantity.error, quantity.everyday)))
+    if quantity.error is None or value == 0.0:
+        return element("span", shown)
+    error = unbroken(f"± {percent(quantity.error)}")
+    noted = element("sup", mark) if mark else Html("")
+    return element("span", f"{shown} ", element("span", error, noted, cls="error"))
 
 
-def _notes(quantities: Sequence[Quantity]) -> list[Html]:
-    """What the errors are of, and what has none."""
+def _marks(quantities: Sequence[Quantity]) -> dict[str, str]:
+    """A letter for each kind of error; none where there is one kind only."""
+    sources = list(dict.fromkeys(q.error_of for q in quantities if q.error is not None))
+    return dict(zip(sources, LETTERS, strict=False)) if len(sources) > 1 else {}
+
+
+def _note(quantities: Sequence[Quantity], marks: Mapping[str, str]) -> Html:
+    """What the errors are of, and that others have none."""
     known = [quantity for quantity in quantities if quantity.error is not None]
     if not known:
-        return [note("None of these results has an estimated error.")]
-    sources = dict.fromkeys(quantity.error_of for quantity in known)
-    covers = "; ".join(
-        f"{_named(known, source)}: {source}" if len(sources) > 1 else source for source in sources
-    )
-    text = f"± is the estimated relative error, of {covers}."
-    rest = " Results without it have none that is known." if len(known) < len(quantities) else ""
-    return [note(text + rest)]
-
-
-def _named(quantities: Sequence[Quantity], source: str) -> str:
-    """The names of those whose error is of a source, the first ones."""
-    names = list(dict.fromkeys(q.name for q in quantities if q.error_of == source))
-    return ", ".join(names[:3]) + (", …" if len(names) > 3 else "")
+        return note("No error is estimated of any of these results.")
+    rest = " Of results without it no error is estimated." if len(known) < len(quantities) else ""
+    if not marks:
+        return note(f"± is the estimated relative error: {known[0].error_of}.{rest}")
+    sources = (element("span", element("sup", mark), f" {of}") for of, mark in marks.items())
+    return note("± is the estimated relative error: ", Html("; ".join(sources)), f".{rest}")
 
 
 # --- error budget -------------------------------------------------------------------------------
@@ -132,4 +143,4 @@ def _part(parts: Mapping[str, Any], name: str) -> str:
     value = number_at(parts, name)
     if value is None:
         return "?"
-    return f"{'−' if value < 0.0 else ''}{percent(abs(value))}"
+    return unbroken(f"{'−' if value < 0.0 else ''}{percent(abs(value))}")

@@ -96,19 +96,24 @@ def _cell(tag: str, text: object, number: bool, **attributes: str) -> Html:
     return element(tag, text, **attributes, **({"cls": "number"} if number else {}))
 
 
+def unbroken(text: str) -> str:
+    """A text that stays in one line: a number with its unit, say."""
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
+
+
 def note(*inside: object) -> Html:
     """What explains something, smaller."""
     return element("p", *inside, cls="note")
 
 
-def picture(svg: str, caption: str) -> Html:
-    """A figure given as SVG.
+def picture(svg: str, what: str, captioned: bool = True) -> Html:
+    """A figure given as SVG; ``what`` it shows is its caption unless the figure says it itself.
 
     It is an image of its own: names within one would be taken for those within another.
     """
     source = base64.b64encode(_trimmed(svg).encode("utf-8")).decode("ascii")
-    image = f'<img alt="{escape(caption)}" src="data:image/svg+xml;base64,{source}">'
-    return element("figure", Html(image), element("figcaption", caption))
+    image = f'<img alt="{escape(what)}" src="data:image/svg+xml;base64,{source}">'
+    return element("figure", Html(image), element("figcaption", what) if captioned else Html(""))
 
 
 def _trimmed(svg: str) -> str:

@@ -8,7 +8,7 @@ from pathlib import PurePath
 from typing import Any
 
 from workflow.case.leaves import Leaf, in_words, leaves_of
-from workflow.case.readable import percent
+from workflow.case.readable import percent, pretty
 from workflow.kinds import analysis_of
 from workflow.report.numbers import error_budget, results
 from workflow.report.page import (
@@ -22,6 +22,7 @@ from workflow.report.page import (
     picture,
     section,
     table,
+    unbroken,
 )
 from workflow.report.told import ToldRun
 from workflow.shell.expectations import Verdict, verdicts
@@ -62,7 +63,8 @@ def run_page(run: ToldRun) -> str:
 
 def _header(run: ToldRun, parts: Sequence[Html]) -> Html:
     version = run.summary["versions"]["fretscale"]
-    lead = f"A {run.kind.replace('_', ' ')} case, computed by fretscale {version}"
+    what = (type(run.case).__doc__ or "").partition("\n")[0]
+    lead = f"{what} Computed by fretscale {version}"
     warnings = len(run.summary["warnings"])
     told = f"{warnings} warning{'s' * (warnings != 1)}" if warnings else "no warnings"
     return element(
@@ -140,8 +142,10 @@ def _verdict_cells(verdict: Verdict | str) -> list[object]:
     met = (
         element("span", "met", cls="good") if verdict.met else element("span", "missed", cls="bad")
     )
-    shown = (f"{value:.5g} {unit}".strip() for value in (verdict.expected, verdict.computed))
-    return [*shown, verdict.error_text.replace("%", " %"), allowed, met]
+    values = verdict.expected, verdict.computed
+    shown = (f"{value:.6g} {pretty(unit)}".strip() for value in values)
+    error = percent(verdict.error) if verdict.expected else f"{verdict.error:.1e}"
+    return [*map(unbroken, (*shown, error, allowed)), met]
 
 
 def _figures(run: ToldRun) -> Iterator[Html]:

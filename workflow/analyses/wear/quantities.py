@@ -112,6 +112,6 @@ def _of_structure(case: WearCase, summary: Summary) -> Iterator[Quantity]:
     for body in case.bodies:
         for moment in MOMENTS:
             path = f"{STRUCTURE}.peak_stress.{moment}.{body}.notch"
-            known = estimate(summary, f"{path}.error", "what the mesh leaves of it")
+            known = estimate(summary, f"{path}.error", "what the mesh leaves of the stress")
             text = f"largest von Mises stress on the free surface of {named(body)}, {moment}"
             yield Quantity(STRUCTURE, text, f"{path}.von_mises", "MPa", **known)
