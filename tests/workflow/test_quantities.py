@@ -14,6 +14,8 @@ from tests.workflow.test_kills import PADS_THAT_WEAR
 from tests.workflow.time_scenes import JOINT
 from workflow.case.units import to_base
 from workflow.kinds import ANALYSES, analysis_of, load_case
+from workflow.report.page import html
+from workflow.report.writing import write_report
 from workflow.shell.summary import required_number
 
 QUIET = ("output.figures=false", "output.paraview=false")
@@ -83,6 +85,10 @@ def test_main_results_are_numbers_in_the_units_of_the_results(tmp_path, name):
             assert quantity.unit in units[dataset], quantity
             compared += 1
     assert compared
+    if name not in QUICK:
+        page = write_report(out).read_text("utf-8")
+        assert all(html(quantity.name) in page for quantity in quantities)
+        assert page.count("<figure>") > 1
 
 
 def test_every_analysis_has_its_case_here():

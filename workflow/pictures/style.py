@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib import rc_context
 from matplotlib.collections import Collection, QuadMesh
 from matplotlib.figure import Figure
@@ -106,7 +107,7 @@ def _lay_out(figure: Figure) -> None:
 def _vertices(artist: Any) -> int:
     """About how many points a line or collection draws."""
     if isinstance(artist, Line2D):
-        return len(artist.get_xdata(orig=False))
+        return int(np.size(artist.get_xdata(orig=False)))
     if isinstance(artist, QuadMesh):
-        return 4 * int(artist.get_array().size)
+        return 4 * int(np.size(artist.get_array()))
     return sum(len(path.vertices) for path in artist.get_paths())

@@ -5,11 +5,7 @@ An analysis names them once, by dotted paths into the summary, for all that show
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
-from typing import Any
-
-from workflow.shell.summary import number_at
 
 # Parts of a path in the results: any group, each a curve of its own, and the last numbered one.
 ANY, LAST = "*", "-1"
@@ -49,14 +45,3 @@ class CurvesOf:
     x: str
     y: str
     logarithmic: bool = False
-
-
-def told(summary: Mapping[str, Any], quantities: Iterable[Quantity]) -> list[Quantity]:
-    """Those of the quantities of which the summary has a number."""
-    return [quantity for quantity in quantities if number_at(summary, quantity.path) is not None]
-
-
-def estimate(summary: Mapping[str, Any], path: str, what: str) -> dict[str, Any]:
-    """The relative error at a path and what it is of, as fields of a quantity."""
-    error = number_at(summary, path)
-    return {} if error is None else {"error": abs(error), "error_of": what}

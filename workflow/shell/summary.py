@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from workflow.shell.analysis import Run
+from workflow.shell.quantities import Quantity
 from workflow.shell.versions import versions
 
 
@@ -60,3 +61,14 @@ def number_at(summary: Mapping[str, Any], path: str) -> float | None:
         return required_number(summary, path)
     except QuantityError:
         return None
+
+
+def told(summary: Mapping[str, Any], quantities: Iterable[Quantity]) -> list[Quantity]:
+    """Those of the quantities of which the summary has a number."""
+    return [quantity for quantity in quantities if number_at(summary, quantity.path) is not None]
+
+
+def estimate(summary: Mapping[str, Any], path: str, what: str) -> dict[str, Any]:
+    """The relative error at a path and what it is of, as fields of a quantity."""
+    error = number_at(summary, path)
+    return {} if error is None else {"error": abs(error), "error_of": what}

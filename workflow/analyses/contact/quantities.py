@@ -8,7 +8,8 @@ from workflow.analyses.contact.case import BodiesCase
 from workflow.analyses.contact.datasets import LOADS, RIGID_MOTIONS
 from workflow.shell.analysis import Summary
 from workflow.shell.dataset import unit_in
-from workflow.shell.quantities import CurvesOf, Quantity, estimate, told
+from workflow.shell.quantities import CurvesOf, Quantity
+from workflow.shell.summary import estimate, told
 
 LAST, LOOP = "after the last increment", "last closed cycle"
 MOTIONS = {

@@ -8,7 +8,8 @@ from functools import partial
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.wear.layout import MOMENTS
 from workflow.shell.analysis import Summary
-from workflow.shell.quantities import CurvesOf, Quantity, estimate, told
+from workflow.shell.quantities import CurvesOf, Quantity
+from workflow.shell.summary import estimate, told
 
 FREE = "free specimens"
 UNCOUPLED = "difference to a cycle with pressure and shear coupled"

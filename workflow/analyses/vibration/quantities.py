@@ -8,7 +8,8 @@ from typing import Any
 
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.shell.analysis import Summary
-from workflow.shell.quantities import CurvesOf, Quantity, estimate, told
+from workflow.shell.quantities import CurvesOf, Quantity
+from workflow.shell.summary import estimate, told
 
 LINEAR = "linear limits"
 ERROR = "joints' vibration or energy lost, by harmonics and samples"

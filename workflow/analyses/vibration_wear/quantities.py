@@ -9,7 +9,8 @@ from itertools import chain
 from workflow.analyses.vibration.quantities import of_response
 from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
 from workflow.shell.analysis import Summary
-from workflow.shell.quantities import CurvesOf, Quantity, estimate, told
+from workflow.shell.quantities import CurvesOf, Quantity
+from workflow.shell.summary import estimate, told
 
 STEPS = "depth or volume, by the wear steps"
 MOTION = "joints' vibration or energy lost, by harmonics and samples"

@@ -11,7 +11,8 @@ from workflow.analyses.wear.layout import MOMENTS, RESULTS
 from workflow.analyses.wear.measures import interfaces
 from workflow.shell.analysis import Summary
 from workflow.shell.dataset import unit_in
-from workflow.shell.quantities import CurvesOf, Quantity, estimate, told
+from workflow.shell.quantities import CurvesOf, Quantity
+from workflow.shell.summary import estimate, told
 
 # Estimated errors are totals of the error budget.
 BUDGET = "all parts of the error budget below"
