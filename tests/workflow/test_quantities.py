@@ -39,7 +39,7 @@ CASES_OF = {
     "specimens": SPECIMENS,
     "vibration_wear": PADS_THAT_WEAR,
 }
-QUICK = "contact", "time", "vibration", "wear"
+QUICK = "contact", "vibration"
 
 
 def run(folder: Path, text: str, *overrides: str) -> Path:
