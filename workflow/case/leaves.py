@@ -5,11 +5,12 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 from dataclasses import dataclass
+from pathlib import PurePath
 from typing import Any
 
 from pydantic import BaseModel
 
-from workflow.case.fields import Quantity
+from workflow.case.fields import File, Quantity
 from workflow.case.readable import readable
 from workflow.case.sections import Section, entries_of, entry_of
 
@@ -48,7 +49,10 @@ def leaves_of(section: BaseModel, above: str = "") -> Iterator[Leaf]:
                 yield from leaves_of(item, f"{place}.")
             else:
                 what = UNIT.sub("", field.description or "")
-                yield Leaf(place, what, item, in_words(item, unit, name), told)
+                text = in_words(item, unit, name)
+                if isinstance(quantity, File):  # wherever it is
+                    text = PurePath(text).name
+                yield Leaf(place, what, item, text, told)
 
 
 def _items(value: Any, path: str) -> Iterator[tuple[str, Any]]:

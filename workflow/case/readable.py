@@ -106,7 +106,7 @@ def _text(value: float, error: float | None, digits: int) -> str:
     elif error is not None:
         digits = MOST_DIGITS
     text, power = _plain(value, digits)
-    if not error and "." in text:  # these noughts tell nothing
+    if (not error or digits == MOST_DIGITS) and "." in text:  # these noughts tell nothing
         text = text.rstrip("0").rstrip(".")
     return text + power
 

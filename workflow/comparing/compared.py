@@ -48,15 +48,12 @@ class Row:
         return next(quantity for quantity in self.quantities if quantity is not None)
 
     @property
-    def group(self) -> str:
-        """What it is of; all that runs call it."""
-        return " / ".join(dict.fromkeys(q.group for q in self.quantities if q is not None))
-
-    @property
     def everyday(self) -> str:
         """The unit to show it in: that of the largest."""
-        largest = max(abs(value) for value in self.values if value is not None)
-        return self.first.everyday or suited_unit(largest, self.first.unit)
+        unit = self.first.unit
+        told = zip(self.quantities, self.values, strict=True)
+        sizes = (abs(v) for q, v in told if q is not None and q.unit == unit and v is not None)
+        return self.first.everyday or suited_unit(max(sizes), unit)
 
     def difference(self, number: int) -> float | None:
         """Of a run to the first one, relative; None where they cannot be compared."""
@@ -133,14 +130,17 @@ def _names(paths: Sequence[Path]) -> list[str]:
 
 
 def _rows(analysis: Analysis[Any], runs: Sequence[ToldRun]) -> tuple[Row, ...]:
-    """Quantities of all runs by their paths in the summaries, in the order of the first run."""
-    of_runs = [{q.path: q for q in analysis.quantities(run.case, run.summary)} for run in runs]
-    paths = dict.fromkeys(path for quantities in of_runs for path in quantities)
+    """Quantities of all runs by group and name, in the order of the first run."""
+    of_runs = [
+        {(q.group, q.name): q for q in analysis.quantities(run.case, run.summary)} for run in runs
+    ]
+    groups = dict.fromkeys(group for of_run in of_runs for group, _ in of_run)
+    names = dict.fromkeys(name for of_run in of_runs for name in of_run)
     rows = []
-    for path in paths:
-        quantities = tuple(of_run.get(path) for of_run in of_runs)
+    for name in sorted(names, key=lambda name: list(groups).index(name[0])):
+        quantities = tuple(of_run.get(name) for of_run in of_runs)
         values = tuple(
-            None if quantity is None else required_number(run.summary, path)
+            None if quantity is None else required_number(run.summary, quantity.path)
             for quantity, run in zip(quantities, runs, strict=True)
         )
         rows.append(Row(quantities, values))

@@ -34,6 +34,8 @@ MEANING = (
     f"{BEYOND} marks differences to the first run that are more than the estimated errors of both "
     "together; where one of them is not known, nothing is marked."
 )
+# Times more or less are told as a factor, of two digits, not in per cent.
+LARGE, FACTOR_DIGITS = 5.0, 0.05
 # Columns of text where it goes to a file.
 FILE_WIDTH = 140
 
@@ -52,7 +54,7 @@ def show(comparison: Comparison) -> None:
         console.print("The cases are the same.")
     columns = (Column(name, justify="right") for name in comparison.names)
     numbers = Table(Column(""), *columns, box=SIMPLE)
-    for group, rows in groupby(comparison.rows, lambda row: row.group):
+    for group, rows in groupby(comparison.rows, lambda row: row.first.group):
         numbers.add_section()
         numbers.add_row(group)
         for row in rows:
@@ -81,8 +83,12 @@ def _apart(row: Row, number: int) -> Iterator[str]:
 
 
 def _signed(difference: float) -> str:
+    """A relative difference in per cent, a large one as a factor."""
     if not math.isfinite(difference):
         return "from 0"
+    factor = 1.0 + difference
+    if factor >= LARGE or 0.0 < factor <= 1.0 / LARGE:
+        return f"× {readable(factor, '1', FACTOR_DIGITS)}"
     size = percent(abs(difference))
     return size if size.startswith(("0 ", "<")) else f"{'−' if difference < 0.0 else '+'}{size}"
 
@@ -94,7 +100,7 @@ def write_csv(comparison: Comparison, path: Path) -> None:
     """All quantities in base units: values, estimated errors, and differences, all relative."""
     rows, names = comparison.rows, comparison.names
     columns: dict[str, list[Any]] = {
-        "of": [row.group for row in rows],
+        "of": [row.first.group for row in rows],
         "quantity": [row.first.name for row in rows],
         "path": [row.first.path for row in rows],
         "unit": [row.first.unit for row in rows],
@@ -153,7 +159,7 @@ def _entries(comparison: Comparison) -> Html:
 def _results(comparison: Comparison) -> Html:
     runs = range(len(comparison.runs))
     rows: list[list[object]] = []
-    for group, those in groupby(comparison.rows, lambda row: row.group):
+    for group, those in groupby(comparison.rows, lambda row: row.first.group):
         rows.append([group])
         rows += [[row.first.name, *(_cell(row, number) for number in runs)] for row in those]
     return table(["", *comparison.names], rows, numbers=range(1, len(comparison.runs) + 1))

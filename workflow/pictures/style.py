@@ -109,6 +109,6 @@ def _vertices(artist: Any) -> int:
     if isinstance(artist, Line2D):
         return int(np.size(artist.get_xdata(orig=False)))
     if isinstance(artist, QuadMesh):
-        rows, columns, _ = artist.get_coordinates().shape
+        rows, columns, _ = np.shape(np.asarray(artist.get_coordinates()))
         return 4 * (rows - 1) * (columns - 1)
     return sum(len(path.vertices) for path in artist.get_paths())

@@ -60,8 +60,8 @@ def main_results(case: JointCase | RigCase, summary: Summary) -> list[Quantity]:
     )
     states = (
         quantity
-        for number, state in enumerate(summary["states"])
-        for quantity in _of_state(number, state["energy"], summary)
+        for number in range(len(summary["states"]))
+        for quantity in _of_state(number, _when(number, summary), summary)
     )
     return told(summary, [*whole, *states])
 
@@ -74,8 +74,14 @@ def _of_ageing(summary: Summary) -> dict[str, Any]:
     return estimate(summary, "ageing.relative_error", STEADY)
 
 
-def _of_state(number: int, energy: float, summary: Summary) -> Iterator[Quantity]:
-    of, place = partial(Quantity, f"at {joules(energy)}"), f"states.{number}"
+def _when(number: int, summary: Summary) -> str:
+    """Of a state in words: the last of a joint that ages is where every life is compared."""
+    ends = "cycles" in summary and number == len(summary["states"]) - 1
+    return "at the end" if ends else f"at {joules(summary['states'][number]['energy'])}"
+
+
+def _of_state(number: int, when: str, summary: Summary) -> Iterator[Quantity]:
+    of, place = partial(Quantity, when), f"states.{number}"
     in_time = estimate(summary, f"{place}.step_error", IN_TIME)
     for name, (unit, text, everyday) in NUMBERS.items():
         known = in_time if name in MOVED else {}

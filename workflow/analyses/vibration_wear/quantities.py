@@ -16,6 +16,7 @@ STEPS = "depth or volume, by the wear steps"
 MOTION = "joints' vibration or energy lost, by harmonics and samples"
 # Of a state: unit, text, everyday unit.
 NUMBERS = {
+    "cycles": ("1", "cycles under the force that wears", ""),
     "depth": ("mm", "largest depth worn, both bodies together", ""),
     "volume": ("mm^3", "volume worn, both bodies together", ""),
     "energy": ("N mm", "energy dissipated so far", ""),
@@ -54,7 +55,9 @@ def main_results(case: VibrationWearCase | FrictionRigWearCase, summary: Summary
 
 
 def _of_state(number: int, state: Summary, summary: Summary) -> Iterator[Quantity]:
-    group, place = f"after {state['cycles']:g} cycles", f"states.{number}"
+    ends = number == len(summary["states"]) - 1
+    group = "at the end" if ends else f"after {state['cycles']:g} cycles"
+    place = f"states.{number}"
     of = partial(Quantity, group)
     for name, (unit, text, everyday) in NUMBERS.items():
         error, what = ERRORS.get(name, ("", ""))
