@@ -14,7 +14,7 @@ from workflow.case.units import to_base
 SHOWN: dict[str, tuple[tuple[str, float], ...]] = {
     "mm": (("nm", 0.0), ("um", 0.1), ("mm", 0.1), ("m", 10.0)),
     "mm^2": (("um^2", 0.0), ("mm^2", 1e-3)),
-    "mm^3": (("um^3", 0.0), ("mm^3", 1e-3)),
+    "mm^3": (("um^3", 0.0), ("mm^3", 1e-4)),
     "N": (("mN", 0.0), ("N", 0.1), ("kN", 1.0), ("MN", 1.0)),
     "N/mm": (("N/mm", 0.0), ("kN/mm", 10.0)),
     "N*mm": (("uJ", 0.0), ("mJ", 0.1), ("J", 1.0), ("kJ", 1.0), ("MJ", 1.0)),

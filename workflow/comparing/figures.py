@@ -26,29 +26,36 @@ Curves = dict[str, dict[str, Curve]]
 
 
 def figures_of(comparison: Comparison) -> dict[str, Callable[[], Figure]]:
-    """What draws each figure, by its title: those that at least two runs have."""
+    """What draws each figure, by its title: of curves that at least two runs have, in one unit."""
     shared: Curves = {}
     for run in comparison.runs[:MOST]:
         with h5py.File(OutputFolder(run.folder).results) as file:
             for wanted in comparison.analysis.curves:
                 for curve in curves_in(file, wanted):
                     shared.setdefault(curve.title, {})[run.name] = curve
+    alike = {title: _alike(curves) for title, curves in shared.items()}
     return {
-        title: partial(_draw, title, curves) for title, curves in shared.items() if len(curves) > 1
+        title: partial(_draw, title, curves) for title, curves in alike.items() if len(curves) > 1
     }
+
+
+def _alike(curves: dict[str, Curve]) -> dict[str, Curve]:
+    """Those that have the units of the first: forces of line contacts are per mm."""
+    units = _units(next(iter(curves.values())))
+    return {name: curve for name, curve in curves.items() if _units(curve) == units}
 
 
 def _draw(title: str, curves: dict[str, Curve]) -> Figure:
     figure = Figure(figsize=INCHES, layout="constrained")
     axis = figure.subplots()
     first = next(iter(curves.values()))
-    alike = {name: c for name, c in curves.items() if _units(c) == _units(first)}
     (x_unit, x_size), (y_unit, y_size) = (
-        suited(max(_largest(getattr(c, axis_name)) for c in alike.values()), unit)
+        suited(max(_largest(getattr(c, axis_name)) for c in curves.values()), unit)
         for axis_name, unit in (("x", first.x_unit), ("y", first.y_unit))
     )
-    for number, (name, curve) in enumerate(alike.items()):
-        look = STYLES[number // len(COLOURS) if len(alike) > len(COLOURS) else number % len(STYLES)]
+    for number, (name, curve) in enumerate(curves.items()):
+        many = len(curves) > len(COLOURS)
+        look = STYLES[number // len(COLOURS) if many else number % len(STYLES)]
         axis.plot(
             curve.x / x_size,
             curve.y / y_size,
