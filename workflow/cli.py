@@ -129,6 +129,16 @@ def resume(folder: Path) -> None:
 
 
 @cli.command()
+@click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), help="Another file than its report.html.")
+def report(folder: Path, out: Path | None) -> None:
+    """Write the page that tells all of the finished run in FOLDER, its report.html, anew."""
+    from workflow.report.writing import write_report
+
+    click.echo(write_report(folder, out))
+
+
+@cli.command()
 @click.argument("cases", nargs=-1, required=True, type=click.Path(path_type=Path))
 @click.option(
     "--out",
@@ -142,6 +152,32 @@ def verify(cases: tuple[Path, ...], out: Path) -> int:
     from workflow.runs.verify import verify_cases
 
     return errors.DONE if verify_cases(cases, out) else errors.ExpectationMissed.exit_code
+
+
+@cli.command()
+@click.argument(
+    "folders",
+    nargs=-1,
+    required=True,
+    type=click.Path(exists=True, file_okay=False, path_type=Path),
+)
+@click.option("--out", type=click.Path(path_type=Path), help="Folder for table, page and figures.")
+@click.option("--force", is_flag=True, help="Overwrite what is there.")
+def compare(folders: tuple[Path, ...], out: Path | None, force: bool) -> None:
+    """Put the finished runs in FOLDERS side by side: results, cases, and curves.
+
+    The first is what the others are held against. All must be runs of one analysis.
+    """
+    from workflow.comparing import compare
+    from workflow.comparing.showing import show
+
+    compared = compare(folders)
+    show(compared)
+    if out is not None:
+        from workflow.comparing.writing import write_comparison
+
+        for path in write_comparison(compared, out, force):
+            click.echo(path)
 
 
 @cli.command()

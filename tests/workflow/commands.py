@@ -67,9 +67,8 @@ def _workers(
     yield InThisProcess([make(sent(setting)) for setting in settings])
 
 
-def _one_by_one(jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]]) -> None:
-    for do, arguments in jobs:
-        do(*arguments)
+def _one_by_one(jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]]) -> list[Any]:
+    return [do(*arguments) for do, arguments in jobs]
 
 
 @contextmanager

@@ -23,7 +23,7 @@ from tests.workflow.case_leaves import (
     each_section,
 )
 from workflow.analyses.contact.load_table import FORCES, MOTIONS
-from workflow.case.fields import File, Path, Quantity, Text, Whole
+from workflow.case.fields import File, Formats, Path, Quantity, Text, Whole
 from workflow.case.sections import entry_of
 from workflow.errors import CaseError
 from workflow.kinds import kinds, load_case, parse_case
@@ -69,7 +69,9 @@ def test_every_declared_entry_is_tried_once():
 def test_wrong_type_is_refused(entries, folders):
     for leaf in entries:
         values = ["{a: 1}"]
-        if leaf.is_list:
+        if isinstance(entry_of(leaf.field), Formats):
+            values += ["3", "word", "[word]", "[]", "[png, png]"]
+        elif leaf.is_list:
             values += ["3", "word", "true"]
         elif isinstance(entry_of(leaf.field), Quantity | Whole):
             values += ["true", "word", "'1'", ".nan", ".inf", "-.inf", "[1]"]

@@ -182,7 +182,7 @@ def test_folder_holds_what_it_promises(whole):
     names = {path.name for path in whole.iterdir()}
     assert names == {
         *("case.yaml", "summary.json", "results.h5", "run.log", "paraview", "figures"),
-        "manifest.json",
+        *("manifest.json", "report.html"),
     }
     assert manifest_has_all(whole)
     assert {path.stem for path in (whole / "figures").iterdir()} == {"profiles", "maps", "forces"}

@@ -34,6 +34,8 @@ from workflow.shell.store import read_arrays
 # killed when all of them are written leaves the latter.
 NOT_RESULTS = {LOCK, "run.log", "checkpoint.h5", "manifest.json", "summary.json"}
 QUIET = "output={figures: false, paraview: false}"
+# In the report: how long each stage took.
+TIMES = re.compile(rb'<section id="time">.*?</section>', re.DOTALL)
 # Seconds within which a run must have ended.
 PATIENCE = 300.0
 # Kills of every kind, more than 50 in all, the most that one run takes, and runs at most.
@@ -110,7 +112,7 @@ def results_of(out: Path) -> dict[str, object]:
     summary = json.loads((out / "summary.json").read_text("utf-8"))
     del summary["seconds"], summary["digests"]["summary.json"]
     written = {
-        path.relative_to(out).as_posix(): path.read_bytes()
+        path.relative_to(out).as_posix(): TIMES.sub(b"", path.read_bytes())
         for path in out.rglob("*")
         if path.is_file() and path.name not in NOT_RESULTS and path.parent.name != "jumps"
     }

@@ -81,7 +81,7 @@ def test_folder_holds_what_it_promises(whole):
     names = {path.name for path in whole.folder.iterdir()}
     assert names == {
         *("case.yaml", "summary.json", "results.h5", "checkpoint.h5", "run.log", "worn.msh"),
-        "manifest.json",
+        *("manifest.json", "report.html"),
     }
     assert manifest_has_all(whole.folder)
     assert whole.summary["jumps"] == 3

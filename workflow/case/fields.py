@@ -256,6 +256,38 @@ class OrAlone:
 
 
 @dataclass(frozen=True)
+class Formats(Entry):
+    """Formats of files out of ``choices``: true for the first, false for none, one, or several.
+
+    Several, and one, are a tuple.
+    """
+
+    choices: tuple[str, ...]
+
+    @property
+    def allowed(self) -> str:
+        return f"true or false, or of {', '.join(self.choices)} one or a list"
+
+    def parse(self, value: object) -> bool | tuple[str, ...]:
+        if isinstance(value, bool):
+            return value
+        given = [value] if isinstance(value, str) else value
+        if not isinstance(given, list | tuple) or not given:
+            raise self.refusal(value, "no format")
+        for each in given:
+            if each not in self.choices:
+                raise self.refusal(each, "no such format")
+        if len(set(given)) < len(given):
+            raise self.refusal(value, "a format given twice")
+        return tuple(given)
+
+    def json_schema(self) -> dict[str, Any]:
+        one = {"enum": list(self.choices)}
+        several = {"type": "array", "items": one, "minItems": 1, "uniqueItems": True}
+        return {"anyOf": [{"type": "boolean"}, one, several]}
+
+
+@dataclass(frozen=True)
 class Text(Entry):
     """One line of printable text."""
 

@@ -27,6 +27,7 @@ from sa_solver.types import Material as ElasticMaterial
 from workflow.case.fields import (
     Entry,
     File,
+    Formats,
     OrAlone,
     Path,
     Quantity,
@@ -49,6 +50,8 @@ GridCells = Annotated[int, Whole(8, 4096)]
 # Cells along x and y of a contact that may be a line contact, and of one that is: a number alone.
 FaceCells = Annotated[tuple[GridCells, Annotated[int, Rows(8, 4096)]], OrAlone((1,))]
 LineCells = Annotated[tuple[GridCells, Annotated[int, Whole(1, 1)]], OrAlone((1,))]
+# Of figures; the first if nothing is said.
+FIGURE_FORMATS = "png", "svg", "pdf"
 Title = Annotated[str, Text()]
 DottedPath = Annotated[str, Path()]
 Tolerance = Annotated[float, Quantity("1", at_least=1e-12, at_most=1e-3)]
@@ -159,7 +162,17 @@ class Output(Section):
     """What is written beside summary and results."""
 
     paraview: StrictBool = entry("files for ParaView", True, default=True)
-    figures: StrictBool = entry("charts", True, default=True)
+    figures: Annotated[bool | tuple[str, ...], Formats(FIGURE_FORMATS)] = entry(
+        "charts: true (png), false, or one or a list of png, svg and pdf", True, default=True
+    )
+    report: StrictBool = entry("report.html: all of it on one page", True, default=True)
+
+    @property
+    def figure_formats(self) -> tuple[str, ...]:
+        """The formats in which figures are written: none where they are not wanted."""
+        if isinstance(self.figures, tuple):
+            return self.figures
+        return FIGURE_FORMATS[:1] if self.figures else ()
 
 
 class Expectation(Section):

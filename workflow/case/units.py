@@ -26,6 +26,7 @@ LONGEST_UNIT = 40  # no unit is longer; keeps pint from chewing on prose
 # which knows all others, takes a third of a second to load; a test holds these against it.
 RADIAN, METER, GRAM, SECOND = "radian", "meter", "gram", "second"
 LENGTH, MASS, TIME, ANGLE = {METER: 1}, {GRAM: 1}, {SECOND: 1}, {RADIAN: 1}
+FREQUENCY = {SECOND: -1}
 FORCE = {GRAM: 1, METER: 1, SECOND: -2}
 STRESS = {GRAM: 1, METER: -1, SECOND: -2}
 ENERGY = {GRAM: 1, METER: 2, SECOND: -2}
@@ -33,27 +34,33 @@ FREQUENT: dict[str, tuple[str, dict[str, int]]] = {
     "m": ("1", LENGTH),
     "mm": ("1e-3", LENGTH),
     "um": ("1e-6", LENGTH),
+    "nm": ("1e-9", LENGTH),
     "g": ("1", MASS),
     "kg": ("1e3", MASS),
     "t": ("1e6", MASS),
     "s": ("1", TIME),
     "ms": ("1e-3", TIME),
     "us": ("1e-6", TIME),
+    "kHz": ("1e3", FREQUENCY),
     "N": ("1e3", FORCE),
+    "mN": ("1", FORCE),
     "kN": ("1e6", FORCE),
     "MN": ("1e9", FORCE),
     "Pa": ("1e3", STRESS),
+    "kPa": ("1e6", STRESS),
     "MPa": ("1e9", STRESS),
     "GPa": ("1e12", STRESS),
     "J": ("1e3", ENERGY),
+    "uJ": ("1e-3", ENERGY),
     "mJ": ("1", ENERGY),
     "kJ": ("1e6", ENERGY),
+    "MJ": ("1e9", ENERGY),
     "h": ("3600", TIME),
     "rad": ("1", ANGLE),
     "deg": ("0.01745329251994329576923690768", ANGLE),
     "rpm": ("0.1047197551196597746154214461", {RADIAN: 1, SECOND: -1}),
     "%": ("1e-2", {}),
-    "Hz": ("1", {SECOND: -1}),
+    "Hz": ("1", FREQUENCY),
 }
 # Other ways to write what is frequent: superscripts, dots, spaces, and newtons times lengths.
 SPELLINGS = (

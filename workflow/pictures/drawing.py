@@ -12,7 +12,7 @@ files: the doubles are in ``results.h5``.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from functools import partial
 from itertools import islice
@@ -33,25 +33,30 @@ def write_pictures(
     pictures: Callable[[], Pictures],
     contents: Any,
     processes: int,
-) -> None:
+) -> dict[str, str]:
     """Write the pictures of the results in a folder that a case asks for in its ``output``.
 
     ``contents`` is what the results hold, as ``pictures`` are told it. So many ``processes`` share
-    them, this one among them.
+    them, this one among them. Returns the figures as SVG texts by their names, in the order in
+    which they are to be looked at, if they are to go into a report.
     """
+    formats = output.figure_formats
     with ExitStack() as stack:
         paraview = figures = None
         if output.paraview:
             paraview = stack.enter_context(folder.filling("paraview", "files for ParaView"))
-        if output.figures:
+        if formats:
             figures = stack.enter_context(folder.filling("figures", "figures of the results"))
-        drawn = pictures, contents, folder.results, figures
-        parts = processes if output.figures else 1
+        drawn = pictures, contents, folder.results, figures, formats, output.report
+        parts = processes if formats else 1
         # The last one has files for ParaView to write besides.
         beside = [None] * (parts - 1) + [paraview]
-        side_by_side(
+        shares = side_by_side(
             [(_write_share, (*drawn, also, part, parts)) for part, also in enumerate(beside)]
         )
+    vectors = {name: text for share in shares for name, text in share.items()}
+    order = pictures().figures_of(contents) if vectors else ()
+    return {name: vectors[name] for name in order}
 
 
 def _write_share(
@@ -59,15 +64,20 @@ def _write_share(
     contents: Any,
     results: Path,
     figures: Path | None,
+    formats: Sequence[str],
+    keep: bool,
     paraview: Path | None,
     first: int,
     every: int,
-) -> None:
-    """What one process draws, into the folders that there are."""
+) -> dict[str, str]:
+    """What one process draws, into the folders that there are; the figures to ``keep``, as SVG."""
+    vectors: dict[str, str] = {}
     if figures is not None:
-        write_figures(pictures, contents, results, figures, first, every)
+        kept = vectors if keep else None
+        write_figures(pictures, contents, results, figures, first, every, formats, kept)
     if paraview is not None:
         write_paraview(pictures, contents, results, paraview)
+    return vectors
 
 
 def write_paraview(
@@ -91,14 +101,27 @@ def write_figures(
     folder: Path,
     first: int = 0,
     every: int = 1,
+    formats: Sequence[str] = ("png",),
+    vectors: dict[str, str] | None = None,
 ) -> list[Path]:
-    """Draw the figures of ``results`` (a ``results.h5``) as PNG files; returns their paths.
+    """Draw the figures of ``results`` (a ``results.h5``) as files; returns their paths.
 
-    ``every`` so many of them from the ``first`` on, so that several processes may share them.
+    ``every`` so many of them from the ``first`` on, so that several processes may share them. For
+    ``formats`` and ``vectors`` see :func:`workflow.pictures.style.write_figures`.
     """
     # Plots take a second to load: where they are drawn.
     from workflow.pictures import style
 
     drawn = islice(pictures().figures_of(contents).items(), first, None, every)
     with h5py.File(results) as file:
-        return style.write_figures(((name, partial(draw, file)) for name, draw in drawn), folder)
+        figures = ((name, partial(draw, file)) for name, draw in drawn)
+        return style.write_figures(figures, folder, formats, vectors)
+
+
+def vector_figures(
+    pictures: Callable[[], Pictures], contents: Any, results: Path
+) -> dict[str, str]:
+    """The figures of ``results`` as SVG texts by their names; nothing is written."""
+    vectors: dict[str, str] = {}
+    write_figures(pictures, contents, results, results.parent, formats=(), vectors=vectors)
+    return vectors

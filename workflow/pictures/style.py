@@ -2,16 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+import io
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 from matplotlib import rc_context
+from matplotlib.collections import Collection, QuadMesh
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 from workflow.shell.store import replacing
 
 DOTS_PER_INCH = 100
+# Of what is drawn as dots in vector graphics too: artists of more vertices.
+DENSE, DENSE_DOTS_PER_INCH = 1000, 120
 FONT_SIZE = 13
 STYLE: dict[Any, Any] = {
     "font.size": FONT_SIZE,
@@ -23,6 +29,9 @@ STYLE: dict[Any, Any] = {
     "legend.framealpha": 0.85,
     "figure.titlesize": 15,
     "lines.linewidth": 1.8,
+    # Vector graphics look alike everywhere, and are the same bytes for the same results.
+    "svg.fonttype": "path",
+    "svg.hashsalt": "fretscale",
 }
 # Okabe and Ito's colours, which colour-blind readers distinguish too.
 BLUE, ORANGE, GREEN, PURPLE, BLACK = "#0072B2", "#D55E00", "#009E73", "#CC79A7", "#222222"
@@ -33,28 +42,73 @@ COLOUR_MAP, LAST_SHADE = "viridis", 0.9
 HEADROOM = 1.1
 
 
-def write_figures(figures: Iterable[tuple[str, Callable[[], Figure]]], folder: Path) -> list[Path]:
-    """Draw figures, given by their names, as PNG files; returns their paths.
+# Entries of files that would tell when they were written.
+UNDATED: dict[str, dict[str, Any]] = {
+    "png": {},
+    "svg": {"Date": None},
+    "pdf": {"CreationDate": None},
+}
 
-    Each appears under its name only when it is complete.
+
+def write_figures(
+    figures: Iterable[tuple[str, Callable[[], Figure]]],
+    folder: Path,
+    formats: Sequence[str] = ("png",),
+    vectors: dict[str, str] | None = None,
+) -> list[Path]:
+    """Draw figures, given by their names, as files of these formats; returns their paths.
+
+    Each appears under its name only when it is complete. ``vectors`` takes each as SVG text, by its
+    name, if it is given.
     """
-    folder.mkdir(parents=True, exist_ok=True)
+    if formats:
+        folder.mkdir(parents=True, exist_ok=True)
     written = []
     with rc_context(STYLE):
         for name, draw in figures:
-            path = folder / f"{name}.png"
             figure = draw()
             _lay_out(figure)
-            with replacing(path) as partial:
-                figure.savefig(partial, format="png", dpi=DOTS_PER_INCH)
-            written.append(path)
+            for kind in formats:
+                path = folder / f"{name}.{kind}"
+                with replacing(path) as partial:
+                    _save(figure, partial, kind)
+                written.append(path)
+            if vectors is not None:
+                vectors[name] = _as_svg(figure)
     return written
 
 
+def _save(figure: Figure, target: Any, kind: str) -> None:
+    dots = DOTS_PER_INCH if kind == "png" else DENSE_DOTS_PER_INCH
+    figure.savefig(target, format=kind, dpi=dots, metadata=UNDATED[kind])
+
+
+def _as_svg(figure: Figure) -> str:
+    text = io.StringIO()
+    _save(figure, text, "svg")
+    return text.getvalue()
+
+
 def _lay_out(figure: Figure) -> None:
-    """Give everything its place for good: to save a figure with a layout would draw it twice."""
+    """Give everything its place for good: to save a figure with a layout would draw it twice.
+
+    What is dense is drawn as dots in vector graphics too, which would be large and slow to show.
+    """
     engine = figure.get_layout_engine()
     if engine is not None:
         figure.set_dpi(DOTS_PER_INCH)
         engine.execute(figure)
         figure.set_layout_engine("none")
+    for artist in figure.findobj(lambda a: isinstance(a, Collection | Line2D)):
+        if _vertices(artist) > DENSE:
+            artist.set_rasterized(True)
+
+
+def _vertices(artist: Any) -> int:
+    """About how many points a line or collection draws."""
+    if isinstance(artist, Line2D):
+        return int(np.size(artist.get_xdata(orig=False)))
+    if isinstance(artist, QuadMesh):
+        rows, columns, _ = np.shape(np.asarray(artist.get_coordinates()))
+        return 4 * (rows - 1) * (columns - 1)
+    return sum(len(path.vertices) for path in artist.get_paths())

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import closing, contextmanager
 from pathlib import Path
 from typing import Any, Literal
@@ -13,9 +13,11 @@ from workflow.case.writing import dump_case
 from workflow.errors import UNWRITTEN, CaseError, NotWritten, UserError
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import write_pictures
+from workflow.report.told import ToldRun
+from workflow.report.writing import write_page
 from workflow.runs.provenance import case_values, provenance_of
 from workflow.shell import checkpoint
-from workflow.shell.analysis import Analysis, Run
+from workflow.shell.analysis import Analysis, Run, Summary
 from workflow.shell.checkpoint import Checkpoint
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
 from workflow.shell.lock import locked
@@ -194,7 +196,15 @@ def _run(
         with reporter.stage("paraview and figures"):
             if analysis.pictures is not None:
                 processes = analysis.drawing_processes
-                write_pictures(case.output, folder, analysis.pictures, contents, processes)
+                figures.update(
+                    write_pictures(case.output, folder, analysis.pictures, contents, processes)
+                )
+
+    def report(summary: Summary) -> None:
+        if case.output.report:
+            _report(run, summary, figures)
+
+    figures: dict[str, str] = {}
 
     expected = analysis.run_time(case)
     with closing(Reporter(folder.reserve_log(), resume, expected)) as reporter:
@@ -216,10 +226,32 @@ def _run(
             choice=folder.choice,
             compute=compute,
             draw=draw,
+            report=report,
         )
         reporter.say(f"{'resume' if resume else 'run'}: {case.title}")
         with telling(reporter):
             analysis.run(run)
+
+
+def _report(run: Run[Any], summary: Summary, figures: Mapping[str, str]) -> None:
+    """Write the page of a run. It is no reason to lose the run, but for a disk that is full."""
+    told = ToldRun(
+        case=run.case,
+        case_text=read_bytes(run.folder.case).decode("utf-8"),
+        kind=run.kind,
+        summary=summary,
+        input_files=run.provenance["input_files"],
+        figures=figures,
+    )
+    path = run.folder.reserve_report()
+    try:
+        write_page(told, path)
+    except OSError:
+        raise
+    except Exception as error:  # whatever of the results it could not put in words
+        run.reporter.warn(
+            f"{path.name}: not written ({type(error).__name__}: {error}); the results are whole"
+        )
 
 
 def _is_case(path: Path, case: Case) -> bool:

@@ -8,12 +8,12 @@ from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Column, Table
 
-from workflow.case.fields import in_unit_of
 from workflow.errors import UserError
 from workflow.kinds import load_case
 from workflow.runs.run import run_case
+from workflow.shell.expectations import verdicts
 from workflow.shell.folder import OutputFolder
-from workflow.shell.summary import QuantityError, required_number
+from workflow.shell.summary import QuantityError
 
 COLUMNS = "expected", "computed", "unit", "error", "verdict", "kind", "source"
 # Columns of text where the table goes to a file.
@@ -35,25 +35,20 @@ def verify_cases(cases: tuple[Path, ...], out: Path) -> bool:
         run_case(case, folder, force=True)
         summary = OutputFolder(folder).read_summary()
         table = Table(Column("quantity", no_wrap=True), *COLUMNS, title=str(path), box=SIMPLE)
-        for entry in case.expect:
-            try:
-                computed = required_number(summary, entry.quantity)
-            except QuantityError as wrong:
-                raise UserError(f"{path}: expect: {wrong}") from wrong
-            (value, unit), (computed_value, _) = (
-                in_unit_of(entry.value, number) for number in (entry.value, computed)
-            )
-            error = abs(computed_value - value) / (abs(value) or 1.0)
-            met = error <= entry.tolerance
-            met_all &= met
+        try:
+            found = verdicts(case, summary)
+        except QuantityError as wrong:
+            raise UserError(f"{path}: expect: {wrong}") from wrong
+        for verdict in found:
+            met_all &= verdict.met
             row = (
-                f"{value:.6g}",
-                f"{computed_value:.6g}",
-                unit or "-",
-                f"{error:.2%}" if value else f"{error:.1e}",
-                "met" if met else "MISSED",
-                entry.kind.replace("_", " "),
+                f"{verdict.expected:.6g}",
+                f"{verdict.computed:.6g}",
+                verdict.unit or "-",
+                verdict.error_text,
+                "met" if verdict.met else "MISSED",
+                verdict.entry.kind.replace("_", " "),
             )
-            table.add_row(entry.quantity, *row, entry.source)
+            table.add_row(verdict.entry.quantity, *row, verdict.entry.source)
         console.print(table)
     return met_all

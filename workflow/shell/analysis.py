@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
     from workflow.shell.checkpoint import Checkpoint
     from workflow.shell.folder import OutputFolder
+    from workflow.shell.quantities import CurvesOf, Quantity
     from workflow.shell.reporter import Reporter
 
 AnyCase = TypeVar("AnyCase", bound=Case)
@@ -33,7 +34,8 @@ class Run(Generic[AnyCase]):
     ``choice`` is the record of the settings that were chosen for the case, None
     where they stand as written. ``compute`` runs another case file into a folder, from where an
     earlier run there has got to; False if that was finished already. ``draw`` writes the pictures
-    of the results that the case asks for, told what these hold.
+    of the results that the case asks for, told what these hold. ``report`` puts the summary that
+    the run is to end with, and what was drawn, on a page for people.
     """
 
     kind: str
@@ -46,6 +48,7 @@ class Run(Generic[AnyCase]):
     choice: dict[str, Any] | None
     compute: Callable[[Path, Path], bool]
     draw: Callable[[Any], None]
+    report: Callable[[Summary], None]
 
 
 @dataclass(frozen=True)
@@ -54,16 +57,23 @@ class Pictures:
 
     Both are told what the results hold: a frozen description that the run makes of what it has
     written. ``figures_of`` gives the figures to draw, by name; ``write_paraview`` writes files for
-    ParaView into a folder and gives their paths, None for cases without fields.
+    ParaView into a folder and gives their paths, None for cases without fields. ``contents`` is the
+    type of that description, for results whose run has ended; None where there is nothing to tell.
     """
 
     figures_of: Callable[[Any], Mapping[str, Callable[[h5py.File], Figure]]]
     write_paraview: Callable[[Any, h5py.File, Path], list[Path]] | None = None
+    contents: type[Any] | None = None
 
 
 def as_written(case: Any) -> tuple[Any, None]:
     """The case, and no record: nothing is to choose."""
     return case, None
+
+
+def no_quantities(case: Any, summary: Summary) -> Sequence[Quantity]:
+    """None, of an analysis that names none."""
+    return ()
 
 
 def expected(case: Case, summary: Summary) -> list[str]:
@@ -101,6 +111,8 @@ class Analysis(Generic[AnyCase]):
     how its results are shown, drawn in so many ``drawing_processes``, that of the run among them.
     ``resumable`` are runs that leave a checkpoint to go on from (:mod:`workflow.shell.checkpoint`),
     by their steps (:mod:`workflow.shell.steps`) or a state of their own.
+    ``quantities`` are the main results, for all that show or compare runs, ``curves`` what is drawn
+    over each other where runs are compared.
     ``choose`` gives the case with the settings that it leaves open, and a record of why.
     ``write_loads`` solves the structure of a case alone and writes the loads of its contacts into a
     folder, None where there is no structure.
@@ -111,6 +123,8 @@ class Analysis(Generic[AnyCase]):
     run: Callable[[Run[AnyCase]], None]
     memory: Callable[[AnyCase], Memory]
     run_time: Callable[[AnyCase], RunTime]
+    quantities: Callable[[AnyCase, Summary], Sequence[Quantity]] = no_quantities
+    curves: Sequence[CurvesOf] = ()
     pictures: Callable[[], Pictures] | None = None
     drawing_processes: int = 1
     resumable: bool = False

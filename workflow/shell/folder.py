@@ -31,6 +31,7 @@ from workflow.shell.store import (
 )
 
 MANIFEST = "manifest.json"
+REPORT = "report.html"
 # Key of the manifest below which it lists what is ours: other programs have such files too.
 OURS = "fretscale"
 # What says how far a run is: left by somebody else, it would be taken for that of a run.
@@ -42,7 +43,7 @@ CHOICE = "choice.json"
 # Entry of the summary by which a finished run is known to be as it was left; not of what is written
 # to later, or by what a run knows itself.
 DIGESTS = "digests"
-NOT_DIGESTED = ("case.yaml", "summary.json", "checkpoint.h5", "run.log")
+NOT_DIGESTED = ("case.yaml", "summary.json", "checkpoint.h5", "run.log", REPORT)
 # What a run keeps of itself until it ends; too many to be listed one by one.
 STATE = "jumps"
 STATE_FILE = re.compile(rf"\d+\.h5|{re.escape(CHOICE)}")
@@ -169,6 +170,10 @@ class OutputFolder:
     def reserve_log(self) -> Path:
         """The path of what the run says."""
         return self.reserve("run.log", "what the run said, and when")
+
+    def reserve_report(self) -> Path:
+        """The path of the page that tells all of the run."""
+        return self.reserve(REPORT, "all of the run on one page, for people")
 
     def write_summary(self, summary: Mapping[str, Any]) -> None:
         """Write the summary, which marks the run as finished."""

@@ -96,15 +96,14 @@ def workers(make: Callable[[Any], Answering], settings: Sequence[Any]) -> Iterat
         yield Workers(processes)
 
 
-def side_by_side(jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]]) -> None:
+def side_by_side(jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]]) -> list[Any]:
     """Run functions, given with their arguments: the first one here, others in processes.
 
-    Raises what one of them raised.
+    Returns what each of them returned. Raises what one of them raised.
     """
     (here, arguments), *others = jobs
     with _processes(_do, others) as processes:
-        here(*arguments)
-        _answers(processes)
+        return [here(*arguments), *_answers(processes)]
 
 
 @contextmanager

@@ -10,10 +10,12 @@ from typing import Any
 
 import h5py
 import numpy as np
+from pydantic import TypeAdapter, ValidationError
 
 from sa_solver.types import Frame, Grid
 from workflow.case.sections import Case
 from workflow.case.writing import dump_case
+from workflow.errors import UserError
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset, Datasets, unit_in
 from workflow.shell.store import replacing_hdf5
@@ -21,6 +23,8 @@ from workflow.shell.versions import versions
 
 # Datasets of more values are worth packing.
 LARGE = 4096
+# Attribute of the file that says what is in it.
+CONTENTS = "contents"
 PACKED = {"compression": "gzip", "compression_opts": 1}
 # Attribute of a dataset: the group that has the coordinates along its axes, if not its own.
 COORDINATES = "coordinates"
@@ -87,6 +91,11 @@ class ResultsWriter:
                 dataset.dims[0].label = name
                 dataset.attrs.update({COORDINATES: elsewhere} if elsewhere else {})
 
+    def put_contents(self, contents: Any) -> None:
+        """What is in the file, as those who draw it are told."""
+        kind = TypeAdapter(type(contents))
+        self._file.attrs[CONTENTS] = kind.dump_json(contents).decode("utf-8")
+
     def put_grid(self, group: str, grid: Grid, frame: Frame | None = None) -> None:
         """A grid, the centres of its cells and, where it is known, its place in space."""
         line = {"line": True} if grid.line else {}
@@ -115,6 +124,21 @@ def run_results(
         writer.put("/", {}, kind=run.kind, title=case.title, **attributes)
         writer.put("case", {}, text=dump_case(case), **versions())
         yield writer
+
+
+def read_contents(path: Path, kind: type[Any] | None) -> Any:
+    """What is in the ``results.h5`` of a run that has ended, as a description of a ``kind``.
+
+    Raises UserError where it does not say, or in the words of another version.
+    """
+    with h5py.File(path) as file:
+        text = file.attrs.get(CONTENTS, "")
+    try:
+        return None if kind is None else TypeAdapter(kind).validate_json(text)
+    except ValidationError as error:
+        raise UserError(
+            f"{path}: does not say what it holds: of another version; run the case again"
+        ) from error
 
 
 def grid_of(group: h5py.Group) -> Grid:

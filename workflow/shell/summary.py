@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from workflow.shell.analysis import Run
+from workflow.shell.quantities import Quantity
 from workflow.shell.versions import versions
 
 
@@ -18,18 +19,17 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
     """
     reporter = run.reporter
     seconds = {name: round(value, 2) for name, value in reporter.seconds.items()}
-    run.folder.finish(
-        {
-            "title": run.case.title,
-            "assumed": list(run.case.assumed),
-            **numbers,
-            **({"choice": run.choice} if run.choice else {}),
-            "warnings": reporter.warnings,
-            "seconds": seconds,
-            "versions": versions(),
-        },
-        run.provenance,
-    )
+    summary = {
+        "title": run.case.title,
+        "assumed": list(run.case.assumed),
+        **numbers,
+        **({"choice": run.choice} if run.choice else {}),
+        "warnings": reporter.warnings,
+        "seconds": seconds,
+        "versions": versions(),
+    }
+    run.report(summary)
+    run.folder.finish(summary, run.provenance)
     run.folder.discard_state()
     for line in lines:
         reporter.say(line)
@@ -61,3 +61,14 @@ def number_at(summary: Mapping[str, Any], path: str) -> float | None:
         return required_number(summary, path)
     except QuantityError:
         return None
+
+
+def told(summary: Mapping[str, Any], quantities: Iterable[Quantity]) -> list[Quantity]:
+    """Those of the quantities of which the summary has a number."""
+    return [quantity for quantity in quantities if number_at(summary, quantity.path) is not None]
+
+
+def estimate(summary: Mapping[str, Any], path: str, what: str) -> dict[str, Any]:
+    """The relative error at a path and what it is of, as fields of a quantity."""
+    error = number_at(summary, path)
+    return {} if error is None else {"error": abs(error), "error_of": what}

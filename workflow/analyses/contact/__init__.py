@@ -2,6 +2,7 @@
 
 from workflow.analyses.contact.case import BodiesCase, ContactCase, LineContactCase
 from workflow.analyses.contact.memory import memory
+from workflow.analyses.contact.quantities import CURVES, main_results
 from workflow.analyses.contact.run_time import run_time
 from workflow.shell.analysis import Analysis, Comparison, Pictures, Run, Summary, expected
 
@@ -28,10 +29,11 @@ def _quantities(case: BodiesCase, summary: Summary) -> list[str]:
 
 def _pictures() -> Pictures:
     # Plots take a second to load: where they are drawn.
+    from workflow.analyses.contact.datasets import Contents
     from workflow.analyses.contact.figures import figures_of
     from workflow.analyses.contact.paraview import write_contact
 
-    return Pictures(figures_of, write_contact)
+    return Pictures(figures_of, write_contact, contents=Contents)
 
 
 ANALYSIS: Analysis[BodiesCase] = Analysis(
@@ -41,5 +43,7 @@ ANALYSIS: Analysis[BodiesCase] = Analysis(
     pictures=_pictures,
     memory=memory,
     run_time=run_time,
+    quantities=main_results,
+    curves=CURVES,
     comparison=Comparison(quantities=_quantities, at_the_end=AT_THE_END),
 )

@@ -54,9 +54,13 @@ def write_contact_output(outcome: ContactOutcome, run: ContactRun) -> None:
     """Write all files of a finished run; the summary comes last and marks it as finished."""
     with run.reporter.stage("results"):
         write_contact_results(outcome, run)
-    run.draw(Contents(outcome.grid.line, len(outcome.history.states)))
+    run.draw(_contents(outcome))
     summary = _summary(outcome)
     finish(run, summary, _lines(summary, outcome.grid))
+
+
+def _contents(outcome: ContactOutcome) -> Contents:
+    return Contents(outcome.grid.line, len(outcome.history.states))
 
 
 def write_contact_results(outcome: ContactOutcome, run: ContactRun) -> None:
@@ -65,6 +69,7 @@ def write_contact_results(outcome: ContactOutcome, run: ContactRun) -> None:
     friction = case.friction.coefficient
     height = Dataset(outcome.height, "mm", "gap before loading")
     with run_results(run, case, {"friction": friction}, grid.line) as writer:
+        writer.put_contents(_contents(outcome))
         writer.put_grid(f"grid/{BODIES}", grid, Frame(np.zeros(3), np.eye(3)))
         writer.put(f"surfaces/{BODIES}", {"height": height}, On(f"grid/{BODIES}"))
         writer.put("path", _path(outcome.table))

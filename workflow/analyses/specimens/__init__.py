@@ -2,6 +2,7 @@
 
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.memory import memory
+from workflow.analyses.specimens.quantities import CURVES, main_results
 from workflow.analyses.specimens.run_time import run_time
 from workflow.shell.analysis import Analysis, Pictures, Run
 
@@ -30,5 +31,7 @@ ANALYSIS = Analysis(
     pictures=_pictures,
     memory=memory,
     run_time=run_time,
+    quantities=main_results,
+    curves=CURVES,
     resumable=True,
 )

@@ -90,6 +90,7 @@ def write_specimens_output(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -
 def _write_results(outcome: SpecimensOutcome, run: Run[SpecimensCase]) -> None:
     case, face, areas = run.case, outcome.model.face, outcome.model.pair.areas
     with run_results(run, case, {"friction": case.friction.coefficient}) as writer:
+        writer.put_contents(None)
         writer.put_grid(f"grid/{PAD}", outcome.half_space.grid, face.frame)
         writer.put("specimens/pad", face_mesh(face))
         for number, both in enumerate(outcome.model.reduction.frequencies, 1):

@@ -2,6 +2,7 @@
 
 from workflow.analyses.time.case import JointCase, RigCase
 from workflow.analyses.time.memory import memory
+from workflow.analyses.time.quantities import CURVES, main_results
 from workflow.analyses.time.run_time import run_time
 from workflow.shell.analysis import Analysis, Pictures, Run
 
@@ -18,8 +19,9 @@ def _run(run: Run[JointCase | RigCase]) -> None:
 def _pictures() -> Pictures:
     # Plots take a second to load: where they are drawn.
     from workflow.analyses.time.figures import figures_of
+    from workflow.analyses.time.outcome import Contents
 
-    return Pictures(figures_of)
+    return Pictures(figures_of, contents=Contents)
 
 
 ANALYSIS = Analysis(
@@ -29,5 +31,7 @@ ANALYSIS = Analysis(
     pictures=_pictures,
     memory=memory,
     run_time=run_time,
+    quantities=main_results,
+    curves=CURVES,
     resumable=True,
 )

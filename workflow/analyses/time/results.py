@@ -38,6 +38,7 @@ def _write_results(outcome: TimeOutcome, run: TimeRun) -> None:
     case = outcome.case
     attributes = {"analysis": case.analysis, "law": case.joint.law, "seen": outcome.seen or None}
     with run_results(run, case, attributes) as writer:
+        writer.put_contents(outcome.contents)
         writer.put(EVOLUTION, outcome.evolution, Along("energy"))
         for number, state in enumerate(outcome.states):
             place = f"states/{number:05d}"

@@ -4,6 +4,7 @@ from itertools import product
 
 from workflow.analyses.vibration.case import VibrationCase
 from workflow.analyses.vibration.memory import memory
+from workflow.analyses.vibration.quantities import CURVES, main_results
 from workflow.analyses.vibration.run_time import run_time
 from workflow.shell.analysis import Analysis, Comparison, Pictures, Run, Summary
 
@@ -29,9 +30,10 @@ def _quantities(case: VibrationCase, summary: Summary) -> list[str]:
 def _pictures() -> Pictures:
     # Plots take a second to load: where they are drawn.
     from workflow.analyses.vibration.figures.response import figures_of
+    from workflow.analyses.vibration.outcome import Contents
     from workflow.analyses.vibration.paraview import write_vibration
 
-    return Pictures(figures_of, write_vibration)
+    return Pictures(figures_of, write_vibration, contents=Contents)
 
 
 ANALYSIS = Analysis(
@@ -41,6 +43,8 @@ ANALYSIS = Analysis(
     pictures=_pictures,
     memory=memory,
     run_time=run_time,
+    quantities=main_results,
+    curves=CURVES,
     resumable=True,
     comparison=Comparison(quantities=_quantities),
 )

@@ -42,6 +42,7 @@ def _write_results(outcome: VibrationOutcome, run: Run[VibrationCase]) -> None:
     case = outcome.case
     attributes = {"analysis": case.analysis, "law": case.joint.law, "seen": list(outcome.labels)}
     with run_results(run, case, attributes) as writer:
+        writer.put_contents(outcome.contents)
         limits = {name: outcome.numbers[name] for name in ("free", "stuck", "sliding")}
         writer.put("linear", outcome.linear, Along("frequency"), **limits)
         if outcome.contact is not None:

@@ -38,17 +38,22 @@ def write_vibration_wear_output(outcome: VibrationWearOutcome, run: VibrationWea
     with reporter.stage("results"):
         _write_results(outcome, run)
         _write_tables(outcome, folder)
-    run.draw(Contents(outcome.places is not None))
+    run.draw(_contents(outcome))
     finish(run, _summary(outcome), (f"  {_line(state)}" for state in outcome.states))
 
 
 # --- results ------------------------------------------------------------------------------------
 
 
+def _contents(outcome: VibrationWearOutcome) -> Contents:
+    return Contents(outcome.places is not None)
+
+
 def _write_results(outcome: VibrationWearOutcome, run: VibrationWearRun) -> None:
     case = outcome.case
     attributes = {"analysis": case.analysis, "forces": list(case.forces)}
     with run_results(run, case, attributes) as writer:
+        writer.put_contents(_contents(outcome))
         if outcome.grid is not None:
             writer.put_grid("grid", outcome.grid)
         if outcome.places is not None:

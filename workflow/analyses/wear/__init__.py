@@ -7,6 +7,7 @@ from pathlib import Path
 
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.measures import COMPARISON
+from workflow.analyses.wear.quantities import CURVES, main_results
 from workflow.analyses.wear.run_time import run_time
 from workflow.analyses.wear.structures import STRUCTURES, structure_of
 from workflow.shell.analysis import Analysis, Pictures, Run
@@ -30,9 +31,10 @@ def _write_loads(case: WearCase, name: str, out: Path, force: bool) -> Sequence[
 def _pictures() -> Pictures:
     # Plots take a second to load: where they are drawn.
     from workflow.analyses.wear.figures.wear import figures_of
+    from workflow.analyses.wear.layout import Contents
     from workflow.analyses.wear.paraview.wear import write_wear
 
-    return Pictures(figures_of, write_wear)
+    return Pictures(figures_of, write_wear, contents=Contents)
 
 
 ANALYSIS = Analysis(
@@ -43,6 +45,8 @@ ANALYSIS = Analysis(
     drawing_processes=2,  # ten seconds and more on one core
     memory=lambda case: structure_of(case).memory(case, 0, 0),
     run_time=lambda case: run_time(case, structure_of(case).extent(case)),
+    quantities=main_results,
+    curves=CURVES,
     resumable=True,
     choose=lambda case: structure_of(case).choose(case),
     comparison=COMPARISON,

@@ -166,20 +166,21 @@ def _write_results(
             stress.write(writer)
         for name, errors in budget.items():
             writer.put(f"error/{name}", datasets_of(errors), accuracy=case.accuracy)
-    contents = Contents(
-        names=tuple(sorted(contact.stage.name for contact in outcome.interfaces)),
-        bodies=case.bodies,
-        jumps=outcome.state.jump,
-        line=source.line,
-        mix=outcome.interfaces[0].unworn.loads.mixed,
-        structure=structure is not None,
-        nodes=nodes,
-        coarse=tuple(coarse),
-        comparison=case.contact.method == "full",
-        loops=case.loops.wanted,
-        sections=case.stress.section != "none",
-        life=tuple(sorted(stress.name for stress in stresses if stress.mapped)),
-    )
+        contents = Contents(
+            names=tuple(sorted(contact.stage.name for contact in outcome.interfaces)),
+            bodies=case.bodies,
+            jumps=outcome.state.jump,
+            line=source.line,
+            mix=outcome.interfaces[0].unworn.loads.mixed,
+            structure=structure is not None,
+            nodes=nodes,
+            coarse=tuple(coarse),
+            comparison=case.contact.method == "full",
+            loops=case.loops.wanted,
+            sections=case.stress.section != "none",
+            life=tuple(sorted(stress.name for stress in stresses if stress.mapped)),
+        )
+        writer.put_contents(contents)
     return recorded, contents
 
 

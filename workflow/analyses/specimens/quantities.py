@@ -1,0 +1,72 @@
+"""Main results of two specimens: what each normal force makes of pads and stiffness."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+from workflow.analyses.specimens.case import SpecimensCase
+from workflow.analyses.wear.layout import MOMENTS
+from workflow.shell.analysis import Summary
+from workflow.shell.quantities import CurvesOf, Quantity
+from workflow.shell.summary import estimate, told
+
+FREE = "free specimens"
+UNCOUPLED = "difference to a cycle with pressure and shear coupled"
+# Of the pads, unworn and worn: unit, text, everyday unit.
+STATE = {
+    "stick_stiffness": ("N/mm", "tangential stiffness, all that touches stuck", "N/um"),
+    "secant_stiffness": ("N/mm", "slope of the loop up to half of its force", "N/um"),
+    "area": ("mm^2", "contact area", ""),
+    "peak_pressure": ("MPa", "largest pressure", ""),
+    "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
+}
+# Results of the unworn pads that a coupled cycle is put beside.
+COUPLED = {"secant_stiffness": "secant_stiffness", "energy_per_cycle": "energy"}
+# What runs are compared by, beside the numbers.
+CURVES = (
+    CurvesOf("tangential stiffness", "loads/*/kinetics/cycles", "loads/*/kinetics/stick_stiffness"),
+    CurvesOf("contact area", "loads/*/kinetics/cycles", "loads/*/kinetics/area"),
+    CurvesOf("depth worn from body 1", "loads/*/kinetics/cycles", "loads/*/kinetics/depth_1"),
+    CurvesOf("depth worn from body 2", "loads/*/kinetics/cycles", "loads/*/kinetics/depth_2"),
+    CurvesOf(
+        "loop, worn",
+        "loads/*/states/-1/loop/ring_displacement",
+        "loads/*/states/-1/loop/ring_force",
+    ),
+)
+
+
+def main_results(case: SpecimensCase, summary: Summary) -> list[Quantity]:
+    """Of every normal force, and the first natural frequency of either specimen."""
+    quantities = [
+        quantity
+        for number, force in enumerate(case.load_path.normal_forces)
+        for quantity in _under(f"under {force:g} N", number, summary)
+    ]
+    quantities += [
+        Quantity(FREE, f"first natural frequency of body {n}", f"frequencies.body_{n}.full.0", "Hz")
+        for n in (1, 2)
+    ]
+    return told(summary, quantities)
+
+
+def _under(group: str, number: int, summary: Summary) -> Iterator[Quantity]:
+    """Of one normal force."""
+    of, load = partial(Quantity, group), f"loads.{number}"
+    for body in (1, 2):
+        yield of(f"largest depth worn from body {body}", f"{load}.depths.{body - 1}", "mm")
+    for body in (1, 2):
+        yield of(f"volume worn from body {body}", f"{load}.volumes.{body - 1}", "mm^3")
+    for name, (unit, text, everyday) in STATE.items():
+        known = {}
+        if beside := COUPLED.get(name):
+            path = f"{load}.coupled_cycle.{beside}_difference"
+            known = estimate(summary, path, UNCOUPLED)
+        unworn, worn = (f"{load}.{moment}.{name}" for moment in MOMENTS)
+        yield of(f"{text}, unworn", unworn, unit, everyday=everyday, **known)
+        yield of(f"{text}, worn", worn, unit, everyday=everyday)
+    yield of("energy dissipated by all cycles", f"{load}.energy", "N mm")
+    for name in ("stiffness", "pressure"):
+        text = f"cycles after which {name} is steady"
+        yield of(text, f"{load}.steady.{name}.cycles", "1")

@@ -1,0 +1,92 @@
+"""Main results of joints in time: what joint and rig do at every energy dissipated so far."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from typing import Any
+
+from workflow.analyses.time.case import JointCase, RigCase, joules
+from workflow.analyses.time.outcome import PARAMETERS
+from workflow.shell.analysis import Summary
+from workflow.shell.quantities import CurvesOf, Quantity
+from workflow.shell.summary import estimate, told
+
+AGEING, IN_TIME = "jumps in energy, a bound", "displacement, by the steps in time"
+STEADY = "intervals between steady states"
+STIFFNESSES = "stiffness", "residual_stiffness"
+# Of a state, beside the joint's parameters: unit, text, everyday unit.
+NUMBERS = {
+    "cycles": ("1", "cycles so far", ""),
+    "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
+    "stroke": ("mm", "stroke of the joint, peak to peak", ""),
+    "largest_displacement": ("mm", "largest displacement of what is looked at", ""),
+    "dissipated": ("N mm", "energy dissipated in the motion", ""),
+    "first_frequency": ("Hz", "first peak of the response", ""),
+    "first_peak": ("mm/s^2/N", "height of the first peak", "m/s^2/N"),
+    "second_frequency": ("Hz", "second peak of the response", ""),
+    "second_peak": ("mm/s^2/N", "height of the second peak", "m/s^2/N"),
+    "ring_down.largest.damping_ratio": ("1", "damping ratio as the ring-down begins", "%"),
+    "stuck.0": ("Hz", "first natural frequency, joint stuck", ""),
+    "sliding.0": ("Hz", "first natural frequency, joint sliding", ""),
+}
+# What the error of steps in time is told of.
+MOVED = "stroke", "largest_displacement"
+# What runs are compared by, beside the numbers.
+CURVES = (
+    CurvesOf("stiffness of the joint", "evolution/energy", "evolution/stiffness"),
+    CurvesOf("friction of the joint", "evolution/energy", "evolution/friction"),
+    CurvesOf("normal load of the joint", "evolution/energy", "evolution/normal_load"),
+    CurvesOf("loop in the last state", "states/-1/loop/displacement", "states/-1/loop/force"),
+    CurvesOf(
+        "frequency response in the last state",
+        "states/-1/frequency_response/frequency",
+        "states/-1/frequency_response/magnitude",
+        logarithmic=True,
+    ),
+    CurvesOf(
+        "damping in the ring-down, last state",
+        "states/-1/ring_down/amplitude",
+        "states/-1/ring_down/damping_ratio",
+    ),
+)
+
+
+def main_results(case: JointCase | RigCase, summary: Summary) -> list[Quantity]:
+    """Of every state, and of the whole life if the joint ages."""
+    whole = (
+        Quantity("whole life", "cycles", "cycles", "1"),
+        Quantity("whole life", "energy dissipated", "energy", "N mm", **_of_ageing(summary)),
+    )
+    states = (
+        quantity
+        for number in range(len(summary["states"]))
+        for quantity in _of_state(number, _when(number, summary), summary)
+    )
+    return told(summary, [*whole, *states])
+
+
+def _of_ageing(summary: Summary) -> dict[str, Any]:
+    """The error of cycles and energies of a life, relative."""
+    ageing, cycles = summary.get("ageing") or {}, summary.get("cycles")
+    if cycles and "error" in ageing:  # in cycles
+        return {"error": ageing["error"] / cycles, "error_of": AGEING}
+    return estimate(summary, "ageing.relative_error", STEADY)
+
+
+def _when(number: int, summary: Summary) -> str:
+    """Of a state in words: the last of a joint that ages is where every life is compared."""
+    ends = "cycles" in summary and number == len(summary["states"]) - 1
+    return "at the end" if ends else f"at {joules(summary['states'][number]['energy'])}"
+
+
+def _of_state(number: int, when: str, summary: Summary) -> Iterator[Quantity]:
+    of, place = partial(Quantity, when), f"states.{number}"
+    in_time = estimate(summary, f"{place}.step_error", IN_TIME)
+    for name, (unit, text, everyday) in NUMBERS.items():
+        known = in_time if name in MOVED else {}
+        if name == "cycles":
+            known = _of_ageing(summary)
+        yield of(text, f"{place}.{name}", unit, everyday=everyday, **known)
+    for name, (unit, text) in PARAMETERS.items():
+        yield of(text, f"{place}.{name}", unit, everyday="N/um" if name in STIFFNESSES else "")

@@ -1,0 +1,78 @@
+"""Main results of a steady vibration: resonances and loops under every force."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from functools import partial
+from typing import Any
+
+from workflow.analyses.vibration.case import VibrationCase
+from workflow.shell.analysis import Summary
+from workflow.shell.quantities import CurvesOf, Quantity
+from workflow.shell.summary import estimate, told
+
+LINEAR = "linear limits"
+ERROR = "joints' vibration or energy lost, by harmonics and samples"
+# Of the motion at resonance: unit, text, everyday unit.
+NUMBERS = {
+    "resonance": ("Hz", "resonance", ""),
+    "amplitude": ("mm", "amplitude at resonance", ""),
+    "receptance": ("mm/N", "amplitude over force at resonance", "um/N"),
+    "energy_per_cycle": ("N mm", "energy dissipated in a cycle at resonance", ""),
+    "damping": ("1", "damping ratio at resonance", "%"),
+    "slip": ("1", "share of the cycle in which joints slip", "%"),
+}
+# A resonance's frequency hardly depends on the amplitude: the error is that of the motion.
+WITH_ERROR = "amplitude", "receptance", "energy_per_cycle"
+LOOP = {
+    "energy": ("N mm", "energy of the loop", ""),
+    "stroke": ("mm", "stroke of the loop", ""),
+    "stiffness": ("N/mm", "stick slope of the loop", "N/um"),
+    "friction": ("1", "friction coefficient of the loop", ""),
+}
+LOOP_WITH_ERROR = "energy", "stroke"
+# What runs are compared by, beside the numbers.
+CURVES = (
+    CurvesOf("amplitude", "responses/*/frequency", "responses/*/amplitude", logarithmic=True),
+    CurvesOf("loop", "responses/*/loops/-1/displacement", "responses/*/loops/-1/force"),
+    CurvesOf("phase resonance", "backbone/force", "backbone/frequency"),
+)
+
+
+def main_results(case: VibrationCase, summary: Summary) -> list[Quantity]:
+    """Of the responses to all forces, their finest loops, and the limits stuck and sliding."""
+    limits = (
+        Quantity(LINEAR, f"first natural frequency, joints {state}", f"{state}.0", "Hz")
+        for state in ("stuck", "sliding", "free")
+    )
+    responses = (
+        quantity
+        for number, response in enumerate(summary["responses"])
+        for quantity in (
+            *of_response(f"under {response['force']:g} N", f"responses.{number}", summary),
+            *_of_loop(f"under {response['force']:g} N", f"responses.{number}.loops.-1", summary),
+        )
+    )
+    return told(summary, [*limits, *responses])
+
+
+def of_response(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
+    """The response to a force, which is at a ``path`` of the summary."""
+    return _of(group, path, NUMBERS, WITH_ERROR, estimate(summary, f"{path}.error", ERROR))
+
+
+def _of_loop(group: str, path: str, summary: Summary) -> Iterator[Quantity]:
+    return _of(group, path, LOOP, LOOP_WITH_ERROR, estimate(summary, f"{path}.error", ERROR))
+
+
+def _of(
+    group: str,
+    path: str,
+    numbers: Mapping[str, tuple[str, str, str]],
+    with_error: tuple[str, ...],
+    error: Mapping[str, Any],
+) -> Iterator[Quantity]:
+    of = partial(Quantity, group)
+    for name, (unit, text, everyday) in numbers.items():
+        known = error if name in with_error else {}
+        yield of(text, f"{path}.{name}", unit, everyday=everyday, **known)

@@ -1,0 +1,68 @@
+"""Main results of a rig that wears its contact: contact and resonances after so many cycles."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+from itertools import chain
+
+from workflow.analyses.vibration.quantities import of_response
+from workflow.analyses.vibration_wear.case import FrictionRigWearCase, VibrationWearCase
+from workflow.shell.analysis import Summary
+from workflow.shell.quantities import CurvesOf, Quantity
+from workflow.shell.summary import estimate, told
+
+STEPS = "depth or volume, by the wear steps"
+MOTION = "joints' vibration or energy lost, by harmonics and samples"
+# Of a state: unit, text, everyday unit.
+NUMBERS = {
+    "cycles": ("1", "cycles under the force that wears", ""),
+    "depth": ("mm", "largest depth worn, both bodies together", ""),
+    "volume": ("mm^3", "volume worn, both bodies together", ""),
+    "energy": ("N mm", "energy dissipated so far", ""),
+    "area": ("mm^2", "contact area at rest", ""),
+    "touching": ("1", "nodes in contact at rest", ""),
+    "peak_pressure": ("MPa", "largest pressure at rest", ""),
+    "stiffness": ("N/mm", "tangential stiffness", "N/um"),
+    "stroke": ("mm", "stroke under the force that wears", ""),
+    "energy_per_cycle": ("N mm", "energy dissipated in a cycle", ""),
+}
+ERRORS = {
+    "depth": ("step_error", STEPS),
+    "volume": ("step_error", STEPS),
+    "stroke": ("error", MOTION),
+    "energy_per_cycle": ("error", MOTION),
+}
+# What runs are compared by, beside the numbers.
+CURVES = (
+    CurvesOf("worn depth", "evolution/cycles", "evolution/depth"),
+    CurvesOf("worn volume", "evolution/cycles", "evolution/volume"),
+    CurvesOf("tangential stiffness", "evolution/cycles", "evolution/stiffness"),
+    CurvesOf(
+        "amplitude in the last state",
+        "worn/-1/responses/*/frequency",
+        "worn/-1/responses/*/amplitude",
+        logarithmic=True,
+    ),
+    CurvesOf("loop in the last state", "worn/-1/loop/displacement", "worn/-1/loop/force"),
+)
+
+
+def main_results(case: VibrationWearCase | FrictionRigWearCase, summary: Summary) -> list[Quantity]:
+    """Of every state, the unworn one first."""
+    states = enumerate(summary["states"])
+    return told(summary, chain.from_iterable(_of_state(n, state, summary) for n, state in states))
+
+
+def _of_state(number: int, state: Summary, summary: Summary) -> Iterator[Quantity]:
+    ends = number == len(summary["states"]) - 1
+    group = "at the end" if ends else f"after {state['cycles']:g} cycles"
+    place = f"states.{number}"
+    of = partial(Quantity, group)
+    for name, (unit, text, everyday) in NUMBERS.items():
+        error, what = ERRORS.get(name, ("", ""))
+        known = estimate(summary, f"{place}.{error}", what) if error else {}
+        yield of(text, f"{place}.{name}", unit, everyday=everyday, **known)
+    for force, response in enumerate(state["responses"]):
+        under = f"{group}, under {response['force']:g} N"
+        yield from of_response(under, f"{place}.responses.{force}", summary)

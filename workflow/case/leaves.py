@@ -1,0 +1,81 @@
+"""Entries of a case one by one: where they are, what they are, and their values in words."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import PurePath
+from typing import Any
+
+from pydantic import BaseModel
+
+from workflow.case.fields import File, Quantity
+from workflow.case.readable import readable
+from workflow.case.sections import Section, entries_of, entry_of
+
+# In the description of an entry: its base unit.
+UNIT = re.compile(r"\s*\[[^\]]*\]")
+# What is no energy or load though its unit is that of one, by a part of its name.
+EVERYDAY = {
+    "N*mm": (("moment", "N*m"), ("Mx", "N*mm"), ("My", "N*mm"), ("Mz", "N*mm")),
+    "N/mm": (("stiffness", "N/um"), ("springs", "N/um")),
+}
+
+
+@dataclass(frozen=True)
+class Leaf:
+    """An entry that is no section: its dotted ``path``, what it is, its value, and that in words.
+
+    ``told`` are values that the case does not take as everybody does who says nothing.
+    """
+
+    path: str
+    what: str
+    value: Any
+    text: str
+    told: bool
+
+
+def leaves_of(section: BaseModel, above: str = "") -> Iterator[Leaf]:
+    """All entries of a section that are set, in the order in which they are written."""
+    for name, field in entries_of(type(section)).items():
+        value, path = getattr(section, name), f"{above}{name}"
+        quantity = entry_of(field)
+        unit = quantity.unit if isinstance(quantity, Quantity) else None
+        told = field.is_required() or value != field.default
+        for place, item in _items(value, path):
+            if isinstance(item, Section):
+                yield from leaves_of(item, f"{place}.")
+            else:
+                what = UNIT.sub("", field.description or "")
+                text = in_words(item, unit, name)
+                if isinstance(quantity, File):  # wherever it is
+                    text = PurePath(text).name
+                yield Leaf(place, what, item, text, told)
+
+
+def _items(value: Any, path: str) -> Iterator[tuple[str, Any]]:
+    """A value, or each of a list of sections by its number; nothing where it is not set."""
+    if value is None:
+        return
+    if isinstance(value, tuple) and any(isinstance(item, Section | tuple) for item in value):
+        for number, item in enumerate(value):
+            yield from _items(item, f"{path}.{number}")
+    else:
+        yield path, value
+
+
+def in_words(value: Any, unit: str | None, name: str = "") -> str:
+    """A value of an entry, in a unit that suits it."""
+    if isinstance(value, tuple):
+        return ", ".join(in_words(item, unit, name) for item in value) or "none"
+    if isinstance(value, bool):
+        return "yes" if value else "no"
+    if isinstance(value, int | float):
+        return str(readable(value, unit or "1", everyday=_everyday(unit, name)))
+    return str(value)
+
+
+def _everyday(unit: str | None, name: str) -> str:
+    return next((shown for part, shown in EVERYDAY.get(unit or "", ()) if part in name), "")

@@ -1,0 +1,166 @@
+"""What finished runs have in common and where they differ."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from os.path import commonpath
+from pathlib import Path
+from typing import Any
+
+from workflow.case.leaves import leaves_of
+from workflow.case.readable import suited_unit
+from workflow.errors import UserError
+from workflow.kinds import analysis_of
+from workflow.report.told import ToldRun
+from workflow.report.writing import told_run
+from workflow.shell.analysis import Analysis
+from workflow.shell.quantities import Quantity
+from workflow.shell.summary import required_number
+
+# Entries of a case that no result depends on.
+NO_MATTER = "title", "output", "assumed", "expect", "reported"
+NOTHING = "–"
+
+
+@dataclass(frozen=True)
+class ComparedRun:
+    """A run, by the name that tells it from the others."""
+
+    name: str
+    folder: Path
+    run: ToldRun
+
+
+@dataclass(frozen=True)
+class Row:
+    """A quantity in every run, None where a run has none: what it is, and its value.
+
+    The first of the runs that has it is what the others are held against.
+    """
+
+    quantities: tuple[Quantity | None, ...]
+    values: tuple[float | None, ...]
+
+    @property
+    def first(self) -> Quantity:
+        return next(quantity for quantity in self.quantities if quantity is not None)
+
+    @property
+    def everyday(self) -> str:
+        """The unit to show it in: that of the largest."""
+        unit = self.first.unit
+        told = zip(self.quantities, self.values, strict=True)
+        sizes = (abs(v) for q, v in told if q is not None and q.unit == unit and v is not None)
+        return self.first.everyday or suited_unit(max(sizes), unit)
+
+    def difference(self, number: int) -> float | None:
+        """Of a run to the first one, relative; None where they cannot be compared."""
+        first, value = self.values[0], self.values[number]
+        if number == 0 or first is None or value is None or not self._alike(number):
+            return None
+        if value == first:
+            return 0.0
+        return (value - first) / abs(first) if first else math.inf
+
+    def beyond(self, number: int) -> bool | None:
+        """Whether the difference is more than both estimated errors; None where nobody knows."""
+        one, other = self.quantities[0], self.quantities[number]
+        difference = self.difference(number)
+        if difference is None or one is None or other is None:
+            return None
+        if one.error is None or other.error is None:
+            return None
+        first, value = self.values[0], self.values[number]
+        assert first is not None
+        assert value is not None
+        return abs(value - first) > one.error * abs(first) + other.error * abs(value)
+
+    def _alike(self, number: int) -> bool:
+        one, other = self.quantities[0], self.quantities[number]
+        return one is not None and other is not None and one.unit == other.unit
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Runs of one analysis, their main results, and entries of their cases that are not alike.
+
+    ``entries`` are in words, one for every run, by dotted path.
+    """
+
+    analysis: Analysis[Any]
+    runs: tuple[ComparedRun, ...]
+    rows: tuple[Row, ...]
+    entries: Mapping[str, tuple[str, ...]]
+
+    @property
+    def names(self) -> list[str]:
+        return [run.name for run in self.runs]
+
+
+def compare(folders: Sequence[str | Path]) -> Comparison:
+    """Compare the finished runs in two folders or more, all of one analysis.
+
+    Raises UserError for what is no finished run, or not as it was left, and for other analyses.
+    """
+    paths = [Path(folder) for folder in folders]
+    if len({path.resolve() for path in paths}) < max(len(paths), 2):
+        raise UserError("compare: two or more folders of finished runs are needed, each once")
+    told = [told_run(path, figures=False) for path in paths]
+    names = _names(paths)
+    runs = tuple(map(ComparedRun, names, paths, told))
+    first, analysis = told[0], analysis_of(told[0].case)
+    for run in runs[1:]:
+        if analysis_of(run.run.case) is not analysis:
+            raise UserError(
+                f"{run.folder}: a run of a {run.run.kind} case, where that in {paths[0]} is of a "
+                f"{first.kind} case; allowed: {', '.join(analysis.cases)}"
+            )
+    return Comparison(analysis, runs, _rows(analysis, told), _entries(told))
+
+
+def _names(paths: Sequence[Path]) -> list[str]:
+    """The last parts of the paths, as many as it takes to tell them apart."""
+    whole = [path.resolve() for path in paths]
+    if len({path.name for path in whole}) == len(whole):
+        return [path.name for path in whole]
+    above = Path(commonpath(whole))
+    return [path.relative_to(above).as_posix() for path in whole]
+
+
+def _rows(analysis: Analysis[Any], runs: Sequence[ToldRun]) -> tuple[Row, ...]:
+    """Quantities of all runs by group and name, in the order of the first run."""
+    of_runs = [
+        {(q.group, q.name): q for q in analysis.quantities(run.case, run.summary)} for run in runs
+    ]
+    groups = dict.fromkeys(group for of_run in of_runs for group, _ in of_run)
+    names = dict.fromkeys(name for of_run in of_runs for name in of_run)
+    rows = []
+    for name in sorted(names, key=lambda name: list(groups).index(name[0])):
+        quantities = tuple(of_run.get(name) for of_run in of_runs)
+        values = tuple(
+            None if quantity is None else required_number(run.summary, quantity.path)
+            for quantity, run in zip(quantities, runs, strict=True)
+        )
+        rows.append(Row(quantities, values))
+    return tuple(rows)
+
+
+def _entries(runs: Sequence[ToldRun]) -> dict[str, tuple[str, ...]]:
+    """Entries of the cases that are not alike, in words."""
+    leaves = [{leaf.path: leaf for leaf in leaves_of(run.case)} for run in runs]
+    paths = dict.fromkeys(path for of_run in leaves for path in of_run)
+    entries = {}
+    for path in paths:
+        if path.partition(".")[0] in NO_MATTER:
+            continue
+        found = [of_run.get(path) for of_run in leaves]
+        if any(leaf is None or found[0] is None or leaf.value != found[0].value for leaf in found):
+            # All digits where fewer do not tell them apart.
+            exact = len({None if leaf is None else leaf.text for leaf in found}) == 1
+            entries[path] = tuple(
+                NOTHING if leaf is None else str(leaf.value) if exact else leaf.text
+                for leaf in found
+            )
+    return entries

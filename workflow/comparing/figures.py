@@ -1,0 +1,85 @@
+"""Curves of several runs over each other."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+
+import h5py
+import numpy as np
+from matplotlib.figure import Figure
+
+from workflow.case.readable import suited
+from workflow.comparing.compared import Comparison
+from workflow.comparing.curves import Curve, curves_in
+from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
+from workflow.shell.folder import OutputFolder
+
+INCHES = 7.0, 4.6
+COLOURS = BLUE, ORANGE, GREEN, PURPLE, SKY, AMBER, BLACK
+STYLES = "-", "--", "-.", ":"
+# More curves than this in a panel cannot be told apart.
+MOST = len(COLOURS) * len(STYLES)
+
+Curves = dict[str, dict[str, Curve]]
+"""Curves by title and name of the run."""
+
+
+def figures_of(comparison: Comparison) -> dict[str, Callable[[], Figure]]:
+    """What draws each figure, by its title: of curves that at least two runs have, in one unit."""
+    shared: Curves = {}
+    for run in comparison.runs[:MOST]:
+        with h5py.File(OutputFolder(run.folder).results) as file:
+            for wanted in comparison.analysis.curves:
+                for curve in curves_in(file, wanted):
+                    shared.setdefault(curve.title, {})[run.name] = curve
+    alike = {title: _alike(curves) for title, curves in shared.items()}
+    return {
+        title: partial(_draw, title, curves) for title, curves in alike.items() if len(curves) > 1
+    }
+
+
+def _alike(curves: dict[str, Curve]) -> dict[str, Curve]:
+    """Those that have the units of the first: forces of line contacts are per mm."""
+    units = _units(next(iter(curves.values())))
+    return {name: curve for name, curve in curves.items() if _units(curve) == units}
+
+
+def _draw(title: str, curves: dict[str, Curve]) -> Figure:
+    figure = Figure(figsize=INCHES, layout="constrained")
+    axis = figure.subplots()
+    first = next(iter(curves.values()))
+    (x_unit, x_size), (y_unit, y_size) = (
+        suited(max(_largest(getattr(c, axis_name)) for c in curves.values()), unit)
+        for axis_name, unit in (("x", first.x_unit), ("y", first.y_unit))
+    )
+    for number, (name, curve) in enumerate(curves.items()):
+        many = len(curves) > len(COLOURS)
+        look = STYLES[number // len(COLOURS) if many else number % len(STYLES)]
+        axis.plot(
+            curve.x / x_size,
+            curve.y / y_size,
+            look,
+            color=COLOURS[number % len(COLOURS)],
+            label=name,
+        )
+    if first.logarithmic:
+        axis.set_yscale("log")
+    axis.set_title(title)
+    axis.set_xlabel(_label(first.x_name, x_unit))
+    axis.set_ylabel(_label(first.y_name, y_unit))
+    axis.legend()
+    return figure
+
+
+def _units(curve: Curve) -> tuple[str, str]:
+    return curve.x_unit, curve.y_unit
+
+
+def _largest(values: np.ndarray) -> float:
+    finite = np.abs(values[np.isfinite(values)])
+    return float(finite.max()) if finite.size else 0.0
+
+
+def _label(name: str, unit: str) -> str:
+    return f"{name} [{unit}]" if unit else name

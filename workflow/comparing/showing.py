@@ -1,0 +1,178 @@
+"""A comparison as text on the terminal, as a table, and on a page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from rich.box import SIMPLE
+from rich.console import Console
+from rich.table import Column, Table
+
+from workflow.case.readable import percent, readable
+from workflow.comparing.compared import NOTHING, Comparison, Row
+from workflow.report.numbers import value_of
+from workflow.report.page import (
+    Html,
+    contents_of,
+    element,
+    note,
+    page,
+    picture,
+    section,
+    table,
+)
+from workflow.shell.tables import write_table
+
+# What marks a difference of more than both estimated errors.
+BEYOND = "!"
+MEANING = (
+    f"{BEYOND} marks differences to the first run that are more than the estimated errors of both "
+    "together; where one of them is not known, nothing is marked."
+)
+# Times more or less are told as a factor, of two digits, not in per cent.
+LARGE, FACTOR_DIGITS = 5.0, 0.05
+# Columns of text where it goes to a file.
+FILE_WIDTH = 140
+
+
+def show(comparison: Comparison) -> None:
+    """Differences of the cases, and all quantities side by side, on the terminal."""
+    console = Console(highlight=False, markup=False)
+    if not console.is_terminal:
+        console.width = FILE_WIDTH
+    if comparison.entries:
+        entries = Table(Column("case"), *comparison.names, box=SIMPLE)
+        for path, texts in comparison.entries.items():
+            entries.add_row(path, *texts)
+        console.print(entries)
+    else:
+        console.print("The cases are the same.")
+    columns = (Column(name, justify="right") for name in comparison.names)
+    numbers = Table(Column(""), *columns, box=SIMPLE)
+    for group, rows in groupby(comparison.rows, lambda row: row.first.group):
+        numbers.add_section()
+        numbers.add_row(group)
+        for row in rows:
+            cells = (_text(row, number) for number in range(len(comparison.runs)))
+            numbers.add_row(f"  {row.first.name}", *cells)
+    console.print(numbers)
+    console.print(MEANING)
+
+
+def _text(row: Row, number: int) -> str:
+    """A value, and how far it is from that of the first run."""
+    quantity, value = row.quantities[number], row.values[number]
+    if quantity is None or value is None:
+        return NOTHING
+    everyday = row.everyday if quantity.unit == row.first.unit else quantity.everyday
+    shown = str(readable(value, quantity.unit, quantity.error, everyday))
+    return " ".join([shown, *_apart(row, number)])
+
+
+def _apart(row: Row, number: int) -> Iterator[str]:
+    difference = row.difference(number)
+    if difference is not None:
+        yield f"({_signed(difference)})"
+    if row.beyond(number):
+        yield BEYOND
+
+
+def _signed(difference: float) -> str:
+    """A relative difference in per cent, a large one as a factor."""
+    if not math.isfinite(difference):
+        return "from 0"
+    factor = 1.0 + difference
+    if factor >= LARGE or 0.0 < factor <= 1.0 / LARGE:
+        return f"× {readable(factor, '1', FACTOR_DIGITS)}"
+    size = percent(abs(difference))
+    return size if size.startswith(("0 ", "<")) else f"{'−' if difference < 0.0 else '+'}{size}"
+
+
+# --- table --------------------------------------------------------------------------------------
+
+
+def write_csv(comparison: Comparison, path: Path) -> None:
+    """All quantities in base units: values, estimated errors, and differences, all relative."""
+    rows, names = comparison.rows, comparison.names
+    columns: dict[str, list[Any]] = {
+        "of": [row.first.group for row in rows],
+        "quantity": [row.first.name for row in rows],
+        "path": [row.first.path for row in rows],
+        "unit": [row.first.unit for row in rows],
+    }
+    for number, name in enumerate(names):
+        columns[name] = [row.values[number] for row in rows]
+        errors = [quantity.error if (quantity := row.quantities[number]) else None for row in rows]
+        columns[f"{name}, estimated error"] = errors
+        if number:
+            columns[f"{name}, difference"] = [row.difference(number) for row in rows]
+            columns[f"{name}, beyond errors"] = [row.beyond(number) for row in rows]
+    write_table(path, columns)
+
+
+# --- page ---------------------------------------------------------------------------------------
+
+
+def comparison_page(comparison: Comparison, figures: dict[str, str]) -> str:
+    """The whole page; ``figures`` are SVG texts by their titles."""
+    names = comparison.names
+    pictures = [picture(svg, title, captioned=False) for title, svg in figures.items()]
+    parts = [
+        section("The runs", _runs(comparison)),
+        section("What differs in their cases", _entries(comparison)),
+        section("Results", _results(comparison), note(MEANING)),
+        section("Curves", element("div", *pictures, cls="small") if pictures else ""),
+    ]
+    title = " and ".join(names) if len(names) == 2 else f"{len(names)} runs side by side"
+    lead = f"{len(names)} runs compared; what the others are held against "
+    header = element(
+        "header",
+        element("h1", title),
+        element("p", f"{lead}is {names[0]}.", cls="lead"),
+        contents_of(parts),
+    )
+    return page(title, header, *parts)
+
+
+def _runs(comparison: Comparison) -> Html:
+    rows = []
+    for run in comparison.runs:
+        warnings = len(run.run.summary["warnings"])
+        version = run.run.summary["versions"]["fretscale"]
+        seconds = sum(run.run.summary["seconds"].values())
+        rows.append([run.name, run.run.case.title, version, str(warnings), f"{seconds:.0f} s"])
+    return table(["run", "title", "fretscale", "warnings", "time"], rows, numbers=(3, 4))
+
+
+def _entries(comparison: Comparison) -> Html:
+    if not comparison.entries:
+        return element("p", "Nothing that results depend on.")
+    rows = [[element("code", path), *texts] for path, texts in comparison.entries.items()]
+    return table(["", *comparison.names], rows)
+
+
+def _results(comparison: Comparison) -> Html:
+    runs = range(len(comparison.runs))
+    rows: list[list[object]] = []
+    for group, those in groupby(comparison.rows, lambda row: row.first.group):
+        rows.append([group])
+        rows += [[row.first.name, *(_cell(row, number) for number in runs)] for row in those]
+    return table(["", *comparison.names], rows, numbers=range(1, len(comparison.runs) + 1))
+
+
+def _cell(row: Row, number: int) -> object:
+    quantity, value = row.quantities[number], row.values[number]
+    if quantity is None or value is None:
+        return NOTHING
+    apart = " ".join(_apart(row, number))
+    look = "bad" if row.beyond(number) else "error"
+    shown = (
+        quantity if quantity.unit != row.first.unit else replace(quantity, everyday=row.everyday)
+    )
+    told = element("div", element("span", apart, cls=look)) if apart else Html("")
+    return element("div", value_of(shown, value), told)

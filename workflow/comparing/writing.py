@@ -1,0 +1,44 @@
+"""The files of a comparison: table, page and figures in a folder of their own."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+from workflow.comparing.compared import Comparison
+from workflow.comparing.showing import comparison_page, write_csv
+from workflow.shell.folder import OutputFolder
+from workflow.shell.lock import locked
+from workflow.shell.store import write_text
+
+TABLE, PAGE, FIGURES = "compare.csv", "compare.html", "curves"
+
+
+def write_comparison(comparison: Comparison, out: Path, force: bool = False) -> list[Path]:
+    """Write ``compare.csv``, ``compare.html`` and figures of curves; the paths of the first two.
+
+    Raises UserError for a folder that has them already, unless ``force``, or that is of nothing of
+    ours.
+    """
+    # Plots take a second to load: where they are drawn.
+    from workflow.comparing.figures import figures_of
+    from workflow.pictures.style import write_figures
+
+    with locked(out):
+        folder = OutputFolder(out, "comparison")
+        whats = {TABLE: "results side by side", PAGE: "results, cases and curves side by side"}
+        table, page = folder.replace(whats, force)
+        drawn, vectors = figures_of(comparison), dict[str, str]()
+        names = {_file_name(title): title for title in drawn}
+        with folder.filling(FIGURES, "curves of all runs over each other") as figures:
+            write_figures(
+                ((name, drawn[title]) for name, title in names.items()), figures, vectors=vectors
+            )
+        write_csv(comparison, table)
+        pictures = {names[name]: svg for name, svg in vectors.items()}
+        write_text(page, comparison_page(comparison, pictures))
+    return [table, page]
+
+
+def _file_name(title: str) -> str:
+    return re.sub(r"[^\w-]+", "_", title.lower()).strip("_")

@@ -1,0 +1,146 @@
+"""Main results as tables: those of several groups side by side where they have the same names."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from workflow.case.readable import percent, readable
+from workflow.report.page import Html, element, lines, note, table, unbroken
+from workflow.shell.quantities import Quantity
+from workflow.shell.summary import number_at, required_number
+
+# Groups side by side in a table at most, for it to be read on a sheet of paper.
+COLUMNS = 4
+# What errors are marked by that are not all of one kind.
+LETTERS = "abcdefgh"
+# Share of their names that groups in one table have in common.
+ALIKE = 0.5
+
+Groups = dict[str, dict[str, Quantity]]
+
+
+def results(quantities: Sequence[Quantity], summary: Mapping[str, Any]) -> Html:
+    """Tables of all quantities, and what their errors are of."""
+    marks = _marks(quantities)
+    parts = []
+    for family in _families(quantities):
+        tables = -(-len(family) // COLUMNS)
+        names = list(family)
+        for first in range(tables):
+            shown = {name: family[name] for name in _share(names, first, tables)}
+            parts.append(_table(shown, summary, marks))
+    return lines([*parts, _note(quantities, marks)])
+
+
+def _share(names: Sequence[str], part: int, parts: int) -> Sequence[str]:
+    """One of so many parts that are as long as each other, or longer by one."""
+    return names[part * len(names) // parts : (part + 1) * len(names) // parts]
+
+
+def _families(quantities: Iterable[Quantity]) -> list[Groups]:
+    """Quantities by group and name, groups with alike names together."""
+    groups: Groups = {}
+    for quantity in quantities:
+        groups.setdefault(quantity.group, {})[quantity.name] = quantity
+    families: list[Groups] = []
+    for group, named in groups.items():
+        for family in families:
+            first = next(iter(family.values()))
+            if len(named.keys() & first.keys()) >= ALIKE * min(len(named), len(first)):
+                family[group] = named
+                break
+        else:
+            families.append({group: named})
+    return families
+
+
+def _table(groups: Groups, summary: Mapping[str, Any], marks: Mapping[str, str]) -> Html:
+    names = dict.fromkeys(name for named in groups.values() for name in named)
+    rows = (
+        [name, *(_cell(named.get(name), summary, marks) for named in groups.values())]
+        for name in names
+    )
+    return table(["", *groups], rows, numbers=range(1, len(groups) + 1))
+
+
+def _cell(
+    quantity: Quantity | None, summary: Mapping[str, Any], marks: Mapping[str, str]
+) -> object:
+    if quantity is None:
+        return "–"
+    mark = marks.get(quantity.error_of, "")
+    return value_of(quantity, required_number(summary, quantity.path), mark)
+
+
+def value_of(quantity: Quantity, value: float, mark: str = "") -> Html:
+    """A value with its unit and its estimated error, which may have a ``mark`` for a note."""
+    shown = unbroken(str(readable(value, quantity.unit, quantity.error, quantity.everyday)))
+    if quantity.error is None or value == 0.0:
+        return element("span", shown)
+    error = unbroken(f"± {percent(quantity.error)}")
+    noted = element("sup", mark) if mark else Html("")
+    return element("span", f"{shown} ", element("span", error, noted, cls="error"))
+
+
+def _marks(quantities: Sequence[Quantity]) -> dict[str, str]:
+    """A letter for each kind of error; none where there is one kind only."""
+    sources = list(dict.fromkeys(q.error_of for q in quantities if q.error is not None))
+    return dict(zip(sources, LETTERS, strict=False)) if len(sources) > 1 else {}
+
+
+def _note(quantities: Sequence[Quantity], marks: Mapping[str, str]) -> Html:
+    """What the errors are of, and that others have none."""
+    known = [quantity for quantity in quantities if quantity.error is not None]
+    if not known:
+        return note("No error is estimated of any of these results.")
+    rest = " Of results without it no error is estimated." if len(known) < len(quantities) else ""
+    if not marks:
+        return note(f"± is the estimated relative error: {known[0].error_of}.{rest}")
+    sources = (element("span", element("sup", mark), f" {of}") for of, mark in marks.items())
+    return note("± is the estimated relative error: ", Html("; ".join(sources)), f".{rest}")
+
+
+# --- error budget -------------------------------------------------------------------------------
+
+
+def error_budget(quantities: Sequence[Quantity], summary: Mapping[str, Any]) -> Html:
+    """Parts of every error that has parts; empty where none has."""
+    budgets = {q.budget: q for q in quantities if q.budget}
+    parts = {path: _parts(summary, path) for _, path in budgets}
+    columns = [
+        name for name in dict.fromkeys(n for p in parts.values() for n in p) if name != "total"
+    ]
+    rows: list[list[object]] = []
+    group = None
+    for (name, path), quantity in budgets.items():
+        if quantity.group != group:
+            group = quantity.group
+            rows.append([group])
+        rows.append([name, *(_part(parts[path], part) for part in (*columns, "total"))])
+    if not rows:
+        return Html("")
+    explained = note(
+        "What each part leaves of a result, relative to it, below 0 where it is known to be told "
+        "too small; “?” is not known, “–” does not apply. The total adds parts of known sign, half "
+        "of each besides, and the others by their sizes."
+    )
+    numbers = range(1, len(columns) + 2)
+    return lines([table(["", *columns, "total"], rows, numbers), explained])
+
+
+def _parts(summary: Mapping[str, Any], path: str) -> Mapping[str, Any]:
+    node: Any = summary
+    for key in path.split("."):
+        node = node[key]
+    parts: Mapping[str, Any] = node
+    return parts
+
+
+def _part(parts: Mapping[str, Any], name: str) -> str:
+    if name not in parts:
+        return "–"
+    value = number_at(parts, name)
+    if value is None:
+        return "?"
+    return unbroken(f"{'−' if value < 0.0 else ''}{percent(abs(value))}")

@@ -1,0 +1,138 @@
+"""Pages of HTML that need nothing else: their look, and the few things that they are made of.
+
+No scripts, no links to elsewhere; figures are vector graphics within the page. What is put in as
+text is escaped, what is put in as HTML is a :class:`Html`.
+"""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Iterable, Sequence
+from html import escape
+from pathlib import Path
+
+GENERATOR = "fretscale"
+STYLE = Path(__file__).with_name("page.css")
+
+
+class Html(str):
+    """Text that is HTML already."""
+
+    __slots__ = ()
+
+
+def html(text: object) -> Html:
+    """A text as HTML; HTML as it is."""
+    return text if isinstance(text, Html) else Html(escape(str(text)))
+
+
+def element(tag: str, *inside: object, **attributes: str) -> Html:
+    """An element around texts and elements; a ``cls`` is its class."""
+    named = {name.replace("cls", "class"): value for name, value in attributes.items()}
+    given = "".join(f' {name}="{escape(value)}"' for name, value in named.items())
+    return Html(f"<{tag}{given}>{''.join(map(html, inside))}</{tag}>")
+
+
+def lines(parts: Iterable[Html]) -> Html:
+    """Elements one below the other."""
+    return Html("\n".join(parts))
+
+
+def section(title: str, *inside: object, key: str = "") -> Html:
+    """A section with its heading; empty for one without anything in it."""
+    if not any(inside):
+        return Html("")
+    name = key or re.sub(r"\W+", "-", title.lower()).strip("-")
+    return element("section", element("h2", title), *inside, id=name)
+
+
+def contents_of(parts: Sequence[Html]) -> Html:
+    """Links to the sections."""
+    links = []
+    for part in filter(None, parts):
+        name = part.split('id="', 1)[1].split('"', 1)[0]
+        title = part.split("<h2>", 1)[1].split("</h2>", 1)[0]
+        links.append(element("a", Html(title), href=f"#{name}"))
+    return element("nav", Html(" ".join(links)))
+
+
+def folded(title: str, *inside: object) -> Html:
+    """What only some want to see: open where the page is printed."""
+    return element("details", element("summary", title), *inside)
+
+
+def items(texts: Iterable[object]) -> Html:
+    """A list."""
+    return element("ul", *(element("li", text) for text in texts))
+
+
+def table(
+    head: Sequence[object], rows: Iterable[Sequence[object]], numbers: Sequence[int] = ()
+) -> Html:
+    """A table, the first cell of a row being its heading; columns of ``numbers`` keep right.
+
+    Rows of one cell go over all columns. Wide tables scroll by themselves.
+    """
+    titles = element(
+        "tr", *(_cell("th", text, n in numbers, scope="col") for n, text in enumerate(head))
+    )
+    body = lines(_row(row, len(head), numbers) for row in rows)
+    top = element("thead", titles) if any(head) else Html("")
+    return element("div", element("table", top, element("tbody", body)), cls="wide")
+
+
+def _row(row: Sequence[object], columns: int, numbers: Sequence[int]) -> Html:
+    if len(row) == 1:
+        return element(
+            "tr", element("th", row[0], colspan=str(columns), scope="colgroup", cls="group")
+        )
+    first, *rest = row
+    others = (_cell("td", text, n in numbers) for n, text in enumerate(rest, 1))
+    return element("tr", _cell("th", first, 0 in numbers, scope="row"), *others)
+
+
+def _cell(tag: str, text: object, number: bool, **attributes: str) -> Html:
+    return element(tag, text, **attributes, **({"cls": "number"} if number else {}))
+
+
+def unbroken(text: str) -> str:
+    """A text that stays in one line: a number with its unit, say."""
+    return text.replace(" ", "\N{NO-BREAK SPACE}")
+
+
+def note(*inside: object) -> Html:
+    """What explains something, smaller."""
+    return element("p", *inside, cls="note")
+
+
+def picture(svg: str, what: str, captioned: bool = True) -> Html:
+    """A figure given as SVG; ``what`` it shows is its caption unless the figure says it itself.
+
+    It is an image of its own: names within one would be taken for those within another.
+    """
+    source = base64.b64encode(_trimmed(svg).encode("utf-8")).decode("ascii")
+    image = f'<img alt="{escape(what)}" src="data:image/svg+xml;base64,{source}">'
+    return element("figure", Html(image), element("figcaption", what) if captioned else Html(""))
+
+
+def _trimmed(svg: str) -> str:
+    """Without what only other programs read."""
+    return re.sub(r"\s*<metadata>.*?</metadata>", "", svg, count=1, flags=re.DOTALL)
+
+
+def page(title: str, *inside: object) -> str:
+    """A whole page."""
+    style = STYLE.read_text("utf-8")
+    head = lines(
+        [
+            Html('<meta charset="utf-8">'),
+            Html('<meta name="viewport" content="width=device-width, initial-scale=1">'),
+            Html(f'<meta name="generator" content="{GENERATOR}">'),
+            element("title", title),
+            Html(f"<style>\n{style}</style>"),
+        ]
+    )
+    body = element("main", lines(filter(None, map(html, inside))))
+    top = f'<!DOCTYPE html>\n<html lang="en">\n<head>\n{head}\n</head>\n'
+    return f"{top}<body>\n{body}\n</body>\n</html>\n"

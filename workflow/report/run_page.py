@@ -1,0 +1,262 @@
+"""The page of a finished run, for somebody who was not there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import groupby
+from pathlib import PurePath
+from typing import Any
+
+from workflow.case.leaves import Leaf, in_words, leaves_of
+from workflow.case.readable import percent, pretty
+from workflow.kinds import analysis_of
+from workflow.report.numbers import error_budget, results
+from workflow.report.page import (
+    Html,
+    contents_of,
+    element,
+    folded,
+    items,
+    note,
+    page,
+    picture,
+    section,
+    table,
+    unbroken,
+)
+from workflow.report.told import ToldRun
+from workflow.shell.expectations import Verdict, verdicts
+from workflow.shell.summary import QuantityError
+
+# Sections of a case that are no part of what is computed, and those that most readers look for.
+APART = "title", "analysis", "output", "assumed", "expect", "reported"
+LOOKED_FOR = (
+    *("materials", "friction", "load_path", "wear", "joint", "evolution", "drive", "excitation"),
+    *("energies", "ageing", "forces", "frequencies"),
+)
+# Letters of a value that stays in one line.
+SHORT = 20
+# Letters of a digest that tell files apart.
+DIGEST = 12
+
+
+def run_page(run: ToldRun) -> str:
+    """The whole page."""
+    quantities = analysis_of(run.case).quantities(run.case, run.summary)
+    budget = error_budget(quantities, run.summary)
+    parts = [
+        section("What was computed", _outline(run)),
+        section("Results", results(quantities, run.summary) if quantities else ""),
+        section("Warnings", _warnings(run.summary["warnings"])),
+        section("Expectations", _expectations(run)),
+        section("Figures", *_figures(run)),
+        section("Error budget", budget),
+        section("Remarks", _remarks(run.summary)),
+        section("The case", *_case(run)),
+        section("Settings that were chosen", *_choice(run.summary)),
+        section("How it was computed", *_computing(run)),
+        section("Time", _seconds(run.summary["seconds"])),
+        section("The case file", folded("case.yaml", element("pre", run.case_text))),
+    ]
+    return page(run.case.title, _header(run, parts), *parts)
+
+
+def _header(run: ToldRun, parts: Sequence[Html]) -> Html:
+    version = run.summary["versions"]["fretscale"]
+    what = (type(run.case).__doc__ or "").partition("\n")[0]
+    lead = f"{what} Computed by fretscale {version}"
+    warnings = len(run.summary["warnings"])
+    told = f"{warnings} warning{'s' * (warnings != 1)}" if warnings else "no warnings"
+    return element(
+        "header",
+        element("h1", run.case.title),
+        element("p", f"{lead}; {told}{_met(run)}.", cls="lead"),
+        contents_of(parts),
+    )
+
+
+def _met(run: ToldRun) -> str:
+    found = _verdicts(run)
+    if not found:
+        return ""
+    met = sum(isinstance(verdict, Verdict) and verdict.met for verdict in found)
+    return f"; {met} of {len(found)} expectations met"
+
+
+# --- sections -----------------------------------------------------------------------------------
+
+
+def _outline(run: ToldRun) -> Html:
+    return table(["", ""], [[name, text] for name, text in run.case.outline()])
+
+
+def _warnings(warnings: Sequence[str]) -> Html:
+    """Each in its own words; those that several places share once."""
+    places: dict[str, list[str]] = {}
+    for warning in warnings:
+        place, colon, rest = warning.partition(": ")
+        if not colon or " " in place:
+            place, rest = "", warning
+        places.setdefault(rest, []).append(place)
+    told = (
+        element("span", element("strong", ", ".join(those)), ": ", rest) if any(those) else rest
+        for rest, those in places.items()
+    )
+    return items(told) if places else Html("")
+
+
+def _verdicts(run: ToldRun) -> list[Verdict | str]:
+    """Of every expectation; the reason where there is no number to compare."""
+    found: list[Verdict | str] = []
+    for entry in run.case.expect:
+        one = run.case.model_copy(update={"expect": (entry,)})
+        try:
+            found += verdicts(one, run.summary)
+        except QuantityError as error:
+            found.append(str(error))
+    return found
+
+
+def _expectations(run: ToldRun) -> Html:
+    found = _verdicts(run)
+    if not found:
+        return Html("")
+    names = {q.path: q for q in analysis_of(run.case).quantities(run.case, run.summary)}
+    rows = []
+    for entry, verdict in zip(run.case.expect, found, strict=True):
+        quantity = names.get(entry.quantity)
+        name = element("code", entry.quantity)
+        if quantity is not None:
+            name = element("span", f"{quantity.group}: {quantity.name}")
+        source = f"{entry.source} ({entry.kind.replace('_', ' ')})"
+        rows.append([name, *_verdict_cells(verdict), source])
+    head = ["", "expected", "computed", "off by", "allowed", "", "expected from"]
+    return table(head, rows, numbers=(1, 2, 3, 4))
+
+
+def _verdict_cells(verdict: Verdict | str) -> list[object]:
+    if isinstance(verdict, str):
+        return ["", "", "", "", element("span", verdict, cls="bad")]
+    tolerance, unit = verdict.entry.tolerance, verdict.unit
+    allowed = percent(tolerance) if verdict.expected else f"{tolerance:.1e}"
+    met = (
+        element("span", "met", cls="good") if verdict.met else element("span", "missed", cls="bad")
+    )
+    values = verdict.expected, verdict.computed
+    shown = (f"{value:.6g} {pretty(unit)}".strip() for value in values)
+    error = percent(verdict.error) if verdict.expected else f"{verdict.error:.1e}"
+    return [*map(unbroken, (*shown, error, allowed)), met]
+
+
+def _figures(run: ToldRun) -> Iterator[Html]:
+    for name, svg in run.figures.items():
+        yield picture(svg, name.replace("_", " ").capitalize())
+    if not run.figures:
+        yield note(
+            "The run drew no figures (output.figures); ",
+            element("code", "fretscale report DIR"),
+            " draws them into this page.",
+        )
+
+
+def _remarks(summary: Mapping[str, Any]) -> Html:
+    """What an analysis explains in sentences."""
+    told = [f"{text[:1].upper()}{text[1:]}." for text in summary.get("explanation") or ()]
+    return items(told) if told else Html("")
+
+
+def _case(run: ToldRun) -> Iterator[Html]:
+    """Entries of the case that are not as they are if nothing is said, in two parts."""
+    leaves = [leaf for leaf in leaves_of(run.case) if leaf.told and _top(leaf) not in APART]
+    first = [leaf for leaf in leaves if _top(leaf) in LOOKED_FOR]
+    assumed = run.case.assumed
+    if first:
+        yield _entries(first, assumed)
+    rest = [leaf for leaf in leaves if leaf not in first]
+    if rest:
+        yield folded("Structure, mesh, contact and methods", _entries(rest, assumed))
+    yield note("Entries that are not listed have their default values; the case file has all.")
+    if assumed:
+        yield element("h3", "Assumed")
+        yield element(
+            "p",
+            "Not printed by the source of this case, and chosen by whoever wrote it (marked * "
+            "above): ",
+            Html(", ".join(element("code", path) for path in assumed)),
+            ".",
+        )
+
+
+def _top(leaf: Leaf) -> str:
+    return leaf.path.partition(".")[0]
+
+
+def _entries(leaves: Sequence[Leaf], assumed: Sequence[str]) -> Html:
+    rows: list[list[object]] = []
+    for name, those in groupby(leaves, _top):
+        listed = list(those)
+        if len(listed) > 1 or "." in listed[0].path:
+            rows.append([name.replace("_", " ")])
+        for leaf in listed:
+            below = leaf.path.partition(".")[2] or name
+            star = "*" if any(f"{leaf.path}.".startswith(f"{path}.") for path in assumed) else ""
+            name_of = element("span", element("code", below), star)
+            rows.append([name_of, _kept_together(leaf.text), leaf.what])
+    return table(["", "", ""], rows)
+
+
+def _kept_together(text: str) -> object:
+    """A short text in one line."""
+    return element("span", text, cls="short") if len(text) < SHORT else text
+
+
+def _choice(summary: Mapping[str, Any]) -> Iterator[Html]:
+    choice = summary.get("choice")
+    if not choice:
+        return
+    yield element(
+        "p",
+        f"Probes of {choice['seconds']:.3g} s chose what the case leaves open, for an accuracy of "
+        f"{percent(choice['accuracy'])}: estimated error {percent(choice['estimated_error'])}, "
+        f"{'within' if choice['met'] else 'not within'} every share of it.",
+    )
+    yield table(
+        ["", "chosen", "estimated to leave", "of", "why"],
+        [
+            [
+                element("code", decision["entry"]),
+                _chosen(decision["value"]),
+                *(_share(decision[key]) for key in ("error", "allowed")),
+                decision["why"],
+            ]
+            for decision in choice["decisions"]
+        ],
+        numbers=(2, 3),
+    )
+
+
+def _chosen(value: Any) -> str:
+    return in_words(tuple(value) if isinstance(value, list) else value, None)
+
+
+def _share(share: float | None) -> str:
+    return "–" if share is None else percent(share)
+
+
+def _computing(run: ToldRun) -> Iterator[Html]:
+    yield element("p", "To compute it again, with the case file below saved as case.yaml:")
+    yield element("pre", "fretscale run case.yaml --out DIR")
+    if run.input_files:
+        yield element("p", "The case names files, which are not on this page:")
+        yield items(
+            element("span", element("code", PurePath(name).name), f" (SHA-256 {digest[:DIGEST]}…)")
+            for name, digest in run.input_files.items()
+        )
+    versions = ", ".join(f"{name} {text}" for name, text in run.summary["versions"].items())
+    yield element("p", f"Versions: {versions}.")
+
+
+def _seconds(seconds: Mapping[str, float]) -> Html:
+    rows = [[name, f"{value:.1f} s"] for name, value in seconds.items()]
+    whole = [element("strong", "all"), element("strong", f"{sum(seconds.values()):.1f} s")]
+    return table(["stage", "time"], [*rows, whole], numbers=(1,))

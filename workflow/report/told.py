@@ -1,0 +1,25 @@
+"""What a finished run is told of, and where a page of it takes that from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from workflow.case.sections import Case
+
+
+@dataclass(frozen=True)
+class ToldRun:
+    """A run that has come to its end.
+
+    ``case_text`` is the case as run, ``kind`` the name of its kind. ``input_files`` are digests of
+    the files that it names, ``figures`` SVG texts by their names.
+    """
+
+    case: Case
+    case_text: str
+    kind: str
+    summary: Mapping[str, Any]
+    input_files: Mapping[str, str]
+    figures: Mapping[str, str]

@@ -1,0 +1,82 @@
+"""Writing the page of a run: as it ends, and anew from its folder."""
+
+from __future__ import annotations
+
+from pathlib import Path, PurePath
+
+from workflow.errors import UserError
+from workflow.kinds import analysis_of, kind_of, load_case
+from workflow.pictures.drawing import vector_figures
+from workflow.report.run_page import run_page
+from workflow.report.told import ToldRun
+from workflow.shell.folder import DIGESTS, OutputFolder
+from workflow.shell.lock import locked
+from workflow.shell.results import read_contents
+from workflow.shell.store import file_digest, read_bytes, write_text
+
+
+def write_page(run: ToldRun, path: Path) -> None:
+    """Write the page of a run, which appears once it is whole."""
+    write_text(path, run_page(run))
+
+
+def write_report(root: Path, out: Path | None = None) -> Path:
+    """Write the page of the finished run in a folder anew, into the folder or a file ``out``.
+
+    Its figures are drawn again, whether or not the case asks for any. Returns the path. Raises
+    UserError where there is no finished run, or one that is not as it was left.
+    """
+    if out is not None:
+        run = told_run(root)
+        out.parent.mkdir(parents=True, exist_ok=True)
+        write_page(run, out)
+        return out
+    check_finished(root)
+    with locked(root):
+        run, folder = told_run(root), OutputFolder(root)
+        path = folder.reserve_report()
+        write_page(run, path)
+    return path
+
+
+def check_finished(root: Path) -> OutputFolder:
+    """The folder of a finished run. Raises UserError for anything else."""
+    folder = OutputFolder(root)
+    if not folder.case.exists():
+        raise UserError(f"{root}: no run of fretscale here (case.yaml is missing)")
+    if not folder.summary.exists():
+        raise UserError(
+            f"{root}: the run there is not finished; go on with `fretscale resume {root}`"
+        )
+    return folder
+
+
+def told_run(root: Path, figures: bool = True) -> ToldRun:
+    """The finished run in a folder, with its figures drawn again if wanted.
+
+    Raises UserError as :func:`write_report`.
+    """
+    folder = check_finished(root)
+    summary = folder.read_summary()
+    digests = summary[DIGESTS]
+    results = folder.results
+    if digests.get(results.name, "") != file_digest(results):
+        raise UserError(f"{results}: not as the run in {root} had it; {folder.again}")
+    case = load_case(folder.case)
+    return ToldRun(
+        case=case,
+        case_text=read_bytes(folder.case).decode("utf-8"),
+        kind=kind_of(case),
+        summary=summary,
+        input_files={name: digests[name] for name in digests if PurePath(name).is_absolute()},
+        figures=_figures(root) if figures else {},
+    )
+
+
+def _figures(root: Path) -> dict[str, str]:
+    folder = OutputFolder(root)
+    pictures = analysis_of(load_case(folder.case)).pictures
+    if pictures is None:
+        return {}
+    contents = read_contents(folder.results, pictures().contents)
+    return vector_figures(pictures, contents, folder.results)
