@@ -168,9 +168,9 @@ LIBRARY_MISSING = "libGLU.so.1: cannot open shared object file: No such file or 
     ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else None,
 )
 def test_endings_have_their_exit_code(monkeypatch, dovetail_path, tmp_path, ending, code, words):
-    def run_case(case, out, force):
+    def run_case(case, out, force, loudness):
         assert case == load_case(dovetail_path, ["friction.coefficient=0.3"])
-        assert (out, force) == (tmp_path, True)
+        assert (out, force, loudness.name) == (tmp_path, True, "NORMAL")
         if ending is not None:
             raise ending
 
@@ -191,7 +191,7 @@ def test_endings_have_their_exit_code(monkeypatch, dovetail_path, tmp_path, endi
 def test_verify_reports_by_exit_code(monkeypatch, dovetail_path, tmp_path):
     for passed in (True, False):
 
-        def verify_cases(paths, out, passed=passed):
+        def verify_cases(paths, out, loudness, passed=passed):
             assert (paths, out) == ((dovetail_path,), tmp_path)
             return passed
 

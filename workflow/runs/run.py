@@ -13,13 +13,15 @@ from workflow.case.writing import dump_case
 from workflow.errors import UNWRITTEN, CaseError, NotWritten, UserError
 from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import write_pictures
+from workflow.runs.first_look import first_look
 from workflow.runs.provenance import case_values, provenance_of
 from workflow.shell import checkpoint
 from workflow.shell.analysis import Analysis, Run
 from workflow.shell.checkpoint import Checkpoint
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
 from workflow.shell.lock import locked
-from workflow.shell.reporter import Reporter, telling
+from workflow.shell.reporter import SHORT_RUN, Reporter, telling
+from workflow.shell.screen import Loudness
 from workflow.shell.store import read_bytes
 
 # Seconds in which a process that was cut off, or whoever started it, has come to its end.
@@ -28,16 +30,16 @@ PATIENCE = 60.0
 Kept = Literal["finished", "unfinished", "other", "nothing"]
 
 
-def run_case(case: Case, out: Path, force: bool) -> None:
+def run_case(case: Case, out: Path, force: bool, loudness: Loudness = Loudness.NORMAL) -> None:
     """Run a case from the start into a folder, by the cheapest model if it leaves that open.
 
     Raises FretscaleError; UserError too where another process works in the folder.
     """
     with _working(case, out) as gone:
-        _start(case, out, force, gone)
+        _start(case, out, force, gone, loudness=loudness)
 
 
-def resume_run(out: Path) -> bool:
+def resume_run(out: Path, loudness: Loudness = Loudness.NORMAL) -> bool:
     """Continue the run in a folder from its last whole jump; False if it is finished already.
 
     What a finished one had no time to remove is removed.
@@ -54,7 +56,7 @@ def resume_run(out: Path) -> bool:
                 folder.clear_leftovers()
         return False
     with _working(case, out) as gone:
-        _go_on(case, folder, gone)
+        _go_on(case, folder, gone, loudness)
     return True
 
 
@@ -135,12 +137,19 @@ def _working(
             raise
         again = "the same command"
         if analysis_of(case).resumable and OutputFolder(out).case.exists():
-            again = f"`resume {out}`"
+            again = f"`fretscale resume {out}`"
         where = error.filename or out
         raise NotWritten(f"{where}: {error.strerror}; go on with {again} once it can be") from error
 
 
-def _start(case: Case, out: Path, force: bool, gone: str, damaged: str = "") -> None:
+def _start(
+    case: Case,
+    out: Path,
+    force: bool,
+    gone: str,
+    damaged: str = "",
+    loudness: Loudness = Loudness.NORMAL,
+) -> None:
     """Run a case from the start.
 
     ``gone`` is what to tell of a process that was there before, ``damaged`` why its run is not
@@ -154,10 +163,12 @@ def _start(case: Case, out: Path, force: bool, gone: str, damaged: str = "") -> 
     folder.keep_choice(choice)
     if damaged:
         damaged = f"an earlier run is not taken: {damaged}"
-    _run(analysis, case, folder, (gone, damaged), stays=stays)
+    _run(analysis, case, folder, (gone, damaged), loudness, stays=stays)
 
 
-def _go_on(case: Case, folder: OutputFolder, gone: str) -> None:
+def _go_on(
+    case: Case, folder: OutputFolder, gone: str, loudness: Loudness = Loudness.NORMAL
+) -> None:
     """Continue the run in a folder."""
     analysis, out = analysis_of(case), folder.root
     if not analysis.resumable:
@@ -175,7 +186,7 @@ def _go_on(case: Case, folder: OutputFolder, gone: str) -> None:
     folder.clear_partial()
     folder.reserve_state()
     new = "" if kept else "no state was kept: from the start"
-    _run(analysis, case, folder, (gone, new), resume=True, kept=kept)
+    _run(analysis, case, folder, (gone, new), loudness, resume=True, kept=kept)
 
 
 def _run(
@@ -183,6 +194,7 @@ def _run(
     case: Case,
     folder: OutputFolder,
     told: Sequence[str],
+    loudness: Loudness,
     resume: bool = False,
     kept: Checkpoint | None = None,
     stays: Sequence[str] = (),
@@ -193,11 +205,12 @@ def _run(
     def draw(contents: Any) -> None:
         with reporter.stage("paraview and figures"):
             if analysis.pictures is not None:
+                drawn.extend(analysis.pictures().figures_of(contents))
                 processes = analysis.drawing_processes
                 write_pictures(case.output, folder, analysis.pictures, contents, processes)
 
-    expected = analysis.run_time(case)
-    with closing(Reporter(folder.reserve_log(), resume, expected)) as reporter:
+    expected, drawn = analysis.run_time(case), list[str]()
+    with closing(Reporter(folder.reserve_log(), resume, expected, loudness)) as reporter:
         for line in filter(None, told):
             reporter.say(line)
         if stays:
@@ -217,9 +230,25 @@ def _run(
             compute=compute,
             draw=draw,
         )
-        reporter.say(f"{'resume' if resume else 'run'}: {case.title}")
-        with telling(reporter):
-            analysis.run(run)
+        takes = "" if resume or expected.seconds < SHORT_RUN else f" ({expected.text})"
+        reporter.say(f"{'resume' if resume else 'run'}: {case.title}{takes}")
+        try:
+            with telling(reporter):
+                analysis.run(run)
+        except KeyboardInterrupt as stop:
+            raise KeyboardInterrupt(_stopped(analysis, folder)) from stop
+        for line in first_look(folder.root, drawn):
+            reporter.say(line)
+
+
+def _stopped(analysis: Analysis, folder: OutputFolder) -> str:
+    """What a run that got Ctrl-C has left, and the command that goes on."""
+    out = folder.root
+    if folder.summary.exists():
+        return f"{out} is finished but for what is removed by `fretscale resume {out}`"
+    if not analysis.resumable:
+        return f"{out} is not finished; start again with `fretscale run {folder.case} --out {out}`"
+    return f"{out} keeps what is done; go on with `fretscale resume {out}`"
 
 
 def _is_case(path: Path, case: Case) -> bool:

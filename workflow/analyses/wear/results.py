@@ -14,7 +14,7 @@ from wear.kinetics import LinearRegime
 from workflow.analyses.contact.datasets import LOADS, pressure_field, traction_fields
 from workflow.analyses.wear.body_stress import StressedCycle, with_known_shear
 from workflow.analyses.wear.budget.finding import error_budget
-from workflow.analyses.wear.budget.report import Budget, datasets_of, sentence, summary_of
+from workflow.analyses.wear.budget.report import Budget, datasets_of, sentences, summary_of
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.comparison import comparison_summary, write_comparison
 from workflow.analyses.wear.contact_loops import (
@@ -341,9 +341,10 @@ def _lines(outcome: Outcome, summary: dict[str, Any], budget: Budget) -> Iterato
         name = contact.stage.name
         numbers, peaks = summary[name], summary[name]["peak_pressure"]
         yield (
-            f"  {name}: worn {numbers['depth_1'] * 1e3:.3g} um ({name_1}), "
-            f"{numbers['depth_2'] * 1e3:.3g} um ({name_2}); {numbers['volume_1']:.3g}, "
-            f"{numbers['volume_2']:.3g} {unit}; peak pressure {peaks['unworn']:.0f} -> "
-            f"{peaks['worn']:.0f} MPa; tilt {numbers['tilt']}"
+            f"  {name}: worn {numbers['depth_1'] * 1e3:.3g} um, {numbers['volume_1']:.3g} {unit} "
+            f"({name_1}); {numbers['depth_2'] * 1e3:.3g} um, {numbers['volume_2']:.3g} {unit} "
+            f"({name_2})"
         )
-        yield f"  {name}: estimated errors: {sentence(budget[name])}"
+        pressures = f"{peaks['unworn']:.0f} -> {peaks['worn']:.0f} MPa"
+        yield f"  {name}: peak pressure {pressures}; tilt {numbers['tilt']}"
+        yield from (f"  {name}: {told}" for told in sentences(budget[name]))
