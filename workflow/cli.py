@@ -306,6 +306,7 @@ def check(case: str, overrides: tuple[str, ...]) -> None:
 
     Says what is given in plain units, what looks like a slip, and whether the memory is enough.
     """
+    from workflow.case.doubts import doubts_of
     from workflow.kinds import analysis_of, load_case
 
     loaded = load_case(case, overrides)
@@ -316,6 +317,8 @@ def check(case: str, overrides: tuple[str, ...]) -> None:
     needed = ("memory", f"up to {memory.required / 1e9:.1f} GB"), ("time", run_time.text)
     for name, text in [*loaded.outline(), *needed]:
         click.echo(f"  {name:<10} {text}")
+    for doubt in doubts_of(loaded):
+        click.echo(f"doubt: {doubt}")
 
 
 @cli.command()

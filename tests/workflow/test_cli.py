@@ -73,8 +73,8 @@ def test_check_says_what_would_run(dovetail_path):
     assert first == f"OK {dovetail_path}: Ti-6Al-4V dovetail, one mission per cycle"
     assert "128 x 256 cells" in result.stdout
     assert "22 increments" in result.stdout
-    assert "implicit steps, for an error of 0.01" in result.stdout
-    assert len(rows) < 8
+    assert "implicit steps, for an error of 1 % of the depth" in result.stdout
+    assert len(rows) < 12
 
 
 def test_check_refuses_what_the_memory_cannot_hold_as_run_does(dovetail_path):
@@ -88,15 +88,15 @@ def test_check_refuses_what_the_memory_cannot_hold_as_run_does(dovetail_path):
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
-        ("dovetail", "implicit steps, for an error of 0.01"),
+        ("dovetail", "implicit steps, for an error of 1 % of the depth"),
         ("mesh", "22 increments in 2 legs"),
         ("resultants", "loads in 3-D from loads.csv, without slip"),
         ("specimens", "pad 1 x 1 mm of 121 nodes, flat"),
-        ("bodies_wear", "50 N, stroke 0.05 mm in 8 increments"),
-        ("line_wear", "50 N/mm, stroke 0.05 mm in 8 increments"),
-        ("bodies", "128 x 128 cells of 0.007812 x 0.007812 mm, history auto"),
-        ("line", "512 strips of 0.003906 mm"),
-        ("joint", "bouc_wen under 60 N, evolving with energy, looked at 2 energies"),
+        ("bodies_wear", "50 N, stroke 50 um in 8 increments"),
+        ("line_wear", "50 N/mm, stroke 50 um in 8 increments"),
+        ("bodies", "128 x 128 cells of 7.812 um x 7.812 um, history auto"),
+        ("line", "512 strips of 3.906 um"),
+        ("joint", "bouc_wen, normal load 60 N, friction 0.11, stiffness 27.3 kN/mm"),
         ("rig", "75 N at 100 Hz on mass 1"),
         ("vibration", "10, 40 N on mass 1, 20 to 400 Hz"),
     ],

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from workflow.case.changing import changed
+from workflow.case.doubts import doubts_of
 from workflow.case.sections import Case
 from workflow.case.writing import dump_case
 from workflow.errors import UNWRITTEN, CaseError, NotWritten, UserError
@@ -232,6 +233,8 @@ def _run(
         )
         takes = "" if resume or expected.seconds < SHORT_RUN else f" ({expected.text})"
         reporter.say(f"{'resume' if resume else 'run'}: {case.title}{takes}")
+        for doubt in doubts_of(case):
+            reporter.say(f"doubt: {doubt}", always=True)
         try:
             with telling(reporter):
                 analysis.run(run)

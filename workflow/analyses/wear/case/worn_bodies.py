@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Mapping
 from typing import Annotated, Literal
 
 from pydantic import Field, GetJsonSchemaHandler
@@ -12,6 +13,7 @@ from pydantic_core import CoreSchema
 from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, WearLaw
 from workflow.analyses.wear.case.evolution import Evolution
 from workflow.case.fields import Quantity
+from workflow.case.plain import alike, entries
 from workflow.case.sections import Length, Section, entry
 
 # Metals wear 1e2 to 1e6 um^3 per joule; a forgotten unit gives 1e16.
@@ -25,6 +27,7 @@ LawName = Literal["energy", "energy_amplitude", "archard"]
 class Worn(Section):
     """What the wear of a body may have, whatever its law."""
 
+    law: str  # named first; each law narrows it to its own name
     evolution: Evolution | None = entry(
         "of the coefficient with dissipated energy; without it none", default=None
     )
@@ -90,6 +93,15 @@ class WornByArchard(Worn):
 
     def _base(self) -> WearLaw:
         return ArchardLaw(self.coefficient, self.hardness)
+
+
+def wearing(bodies: Mapping[str, Worn]) -> list[tuple[str, str]]:
+    """Rows of an outline with the law of each body, by name, and its coefficients."""
+    texts = {}
+    for name, body in bodies.items():
+        changes = "" if body.evolution is None else ", changing with dissipated energy"
+        texts[name] = f"{body.law}, {entries(body)}{changes}"
+    return alike("wear law", texts)
 
 
 class _LawMayBeLeftOut:
