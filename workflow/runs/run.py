@@ -22,7 +22,7 @@ from workflow.shell.checkpoint import Checkpoint
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
 from workflow.shell.lock import locked
 from workflow.shell.reporter import SHORT_RUN, Reporter, telling
-from workflow.shell.screen import Loudness
+from workflow.shell.screen import Loudness, Screen
 from workflow.shell.store import read_bytes
 
 # Seconds in which a process that was cut off, or whoever started it, has come to its end.
@@ -157,7 +157,8 @@ def _start(
     believed.
     """
     analysis = analysis_of(case)
-    case, choice = analysis.choose(case)
+    with closing(Screen(loudness > Loudness.QUIET)) as screen, screen.row("choice of settings"):
+        case, choice = analysis.choose(case)
     analysis.memory(case).check()
     folder = OutputFolder(out)
     stays = folder.claim(case, force, analysis.resumable)

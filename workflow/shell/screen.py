@@ -14,8 +14,8 @@ from rich.console import Console, RenderableType
 from rich.progress import BarColumn, Progress, ProgressColumn, TaskID, TextColumn, TimeElapsedColumn
 from rich.table import Column
 
-# Seconds before a row within another is worth being looked at.
-BRIEF = 0.5
+# Seconds before a row is worth being looked at.
+BRIEF = 0.3
 BAR_WIDTH = 20
 
 
@@ -49,11 +49,10 @@ class Row:
 
 
 class _Rows(Progress):
-    """The first one at once, others when they are there for a while."""
+    """Those that are there for a while: what is done at once would only flicker."""
 
     def get_renderables(self) -> Iterable[RenderableType]:
-        shown = [t for n, t in enumerate(self.tasks) if n == 0 or (t.elapsed or 0.0) > BRIEF]
-        yield self.make_tasks_table(shown)
+        yield self.make_tasks_table([t for t in self.tasks if (t.elapsed or 0.0) > BRIEF])
 
 
 class Screen:

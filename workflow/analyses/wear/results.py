@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from sa_solver.normal import NormalContactError
+from sa_solver.types import Progress
 from wear.coupled import KINETICS
 from wear.kinetics import LinearRegime
 from workflow.analyses.contact.datasets import LOADS, pressure_field, traction_fields
@@ -77,8 +78,8 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
     if isinstance(source, StructureStage):
         structure = worn_structure(source, stages, state, case.friction, folder, reporter)
         structure.warn(case.accuracy, reporter)
-    with reporter.stage("stress under the contacts"):
-        stresses = _stresses(outcome, structure, reporter)
+    with reporter.stage("stress under the contacts", "contacts") as told:
+        stresses = _stresses(outcome, structure, reporter, told)
     budget = error_budget(outcome, reporter)
     with reporter.stage("results"):
         recorded, contents = _write_results(outcome, structure, stresses, budget, run)
@@ -104,7 +105,7 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
 
 
 def _stresses(
-    outcome: Outcome, structure: WornStructure | None, reporter: Reporter
+    outcome: Outcome, structure: WornStructure | None, reporter: Reporter, progress: Progress
 ) -> list[InterfaceStress]:
     """Stress under every contact as the case asks for it; empty if it does not."""
     if not outcome.case.stress.wanted:
@@ -124,7 +125,7 @@ def _stresses(
             for moment, tractions, loads in zip(MOMENTS, found, (contact.unworn, worn), strict=True)
         )
         cycles.append((stage, (unworn, after)))
-    return contact_stresses(outcome.case, outcome.source.peak, cycles, reporter)
+    return contact_stresses(outcome.case, outcome.source.peak, cycles, reporter, progress)
 
 
 def _write_results(

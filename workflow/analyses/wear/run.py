@@ -72,9 +72,9 @@ def _compute(run: Run[WearCase]) -> Outcome:
     source = structure_of(case).source(case)
     faces = meshed_faces(case, source, reporter)
     with contact_workers(case, faces if _worn_apart(case, source) else ()) as workers:
-        with reporter.stage("condensation"):
+        with reporter.stage("condensation", "bodies") as told, source.heard(told):
             source.prepare()
-        with reporter.stage("structural friction"):
+        with reporter.stage("structural friction", "increments") as told, source.heard(told):
             unworn = source.unworn()
         if isinstance(source, StructureStage):
             _check_structure(case, source, reporter)
