@@ -161,6 +161,7 @@ LIBRARY_MISSING = "libGLU.so.1: cannot open shared object file: No such file or 
         (errors.OutOfMemory("needs 90 GB, there are 8"), 4, "90 GB"),
         (MemoryError(), 4, "out of memory"),
         (KeyboardInterrupt(), 130, "interrupted"),
+        (KeyboardInterrupt("go on with `it`"), 130, "interrupted: go on with `it`"),
         (PermissionError(13, "Permission denied", "/out"), 2, "/out: Permission denied"),
         (OSError(LIBRARY_MISSING), 3, "libGLU"),
         (ImportError(LIBRARY_MISSING), 3, "libGLU"),

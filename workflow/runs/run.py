@@ -20,6 +20,7 @@ from workflow.shell import checkpoint
 from workflow.shell.analysis import Analysis, Run
 from workflow.shell.checkpoint import Checkpoint
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
+from workflow.shell.forecast import in_words
 from workflow.shell.lock import locked
 from workflow.shell.reporter import SHORT_RUN, Reporter, telling
 from workflow.shell.screen import Loudness, Screen
@@ -232,7 +233,8 @@ def _run(
             compute=compute,
             draw=draw,
         )
-        takes = "" if resume or expected.seconds < SHORT_RUN else f" ({expected.text})"
+        long = not resume and expected.seconds >= SHORT_RUN
+        takes = f" (about {in_words(expected.seconds)})" if long else ""
         reporter.say(f"{'resume' if resume else 'run'}: {case.title}{takes}")
         for doubt in doubts_of(case):
             reporter.say(f"doubt: {doubt}", always=True)

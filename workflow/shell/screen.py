@@ -49,10 +49,14 @@ class Row:
 
 
 class _Rows(Progress):
-    """Those that are there for a while: what is done at once would only flicker."""
+    """The first row where there is no other, and those that are there for a while.
+
+    What is done at once would only flicker.
+    """
 
     def get_renderables(self) -> Iterable[RenderableType]:
-        yield self.make_tasks_table([t for t in self.tasks if (t.elapsed or 0.0) > BRIEF])
+        lasting = [task for task in self.tasks[1:] if (task.elapsed or 0.0) > BRIEF]
+        yield self.make_tasks_table(lasting or self.tasks[:1])
 
 
 class Screen:
@@ -60,7 +64,10 @@ class Screen:
 
     def __init__(self, on: bool) -> None:
         self._rows = _Rows(*_columns(), console=console(), transient=True, expand=True)
+        self._between = self._rows.add_task("working", total=None, at="", left="")
         self._on = on and console().is_terminal
+        if self._on:
+            self._rows.start()
 
     @property
     def on(self) -> bool:
@@ -70,13 +77,12 @@ class Screen:
     @contextmanager
     def row(self, name: str) -> Iterator[Row]:
         """A row as long as something of this ``name`` is being done."""
-        if self._on:
-            self._rows.start()
         task = self._rows.add_task(name, total=None, at="", left="")
         try:
             yield Row(self._rows, task)
         finally:
             self._rows.remove_task(task)
+            self._rows.reset(self._between)
 
     def close(self) -> None:
         """Nothing is left on the terminal."""
