@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Sequence
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field
 from typing import Literal, Protocol
 
 import numpy as np
 
 from fe_models.mesh import Face
-from sa_solver.types import Array, Frame, Grid, Indices, Progress
+from sa_solver.types import Array, Frame, Grid, Indices
 from wear import coupled
 from wear.drive import Drive
 from wear.face_loads import CycleLoads, FaceLoads
@@ -75,10 +74,6 @@ class LoadSource(coupled.LoadSource, Protocol):
         """Whether the contacts are line contacts, all forces per length."""
         ...
 
-    def heard(self, progress: Progress) -> AbstractContextManager[None]:
-        """What is costly of it tells ``progress`` how far it is."""
-        ...
-
     def prepare(self) -> None:
         """Do the costly part now."""
         ...
@@ -96,10 +91,6 @@ class UncoupledSource(ABC):
     """Base of load sources without a structure of ours: nothing to solve, no response to wear."""
 
     peak: int
-
-    def heard(self, progress: Progress) -> AbstractContextManager[None]:
-        """Nothing is."""
-        return nullcontext()
 
     def prepare(self) -> None:  # noqa: B027 - nothing is costly here
         """Nothing."""
