@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,8 +13,10 @@ from fe_models.joint import JointResolvent, JointStiffness, join, join_halves
 from fe_models.mesh import Face, Interface, StructureMesh
 from fe_models.supported_body import SupportedBody
 from sa_solver.increments import dissipated, in_rows, mean_of_ends
-from sa_solver.types import Array, LoadHistory, resultants
+from sa_solver.types import Array, LoadHistory, Progress, resultants, unseen
 
+# Bodies of a joint.
+BODIES = 2
 # A face slides as a whole when nodes that stick carry less than this share of its load.
 STICKING_SHARE = 1e-2
 # Below this share of the cycle's largest P the resultants are the friction solver's remainder.
@@ -94,23 +96,28 @@ class Structure:
         """Body 1 and body 2."""
         return self.body_1, self.body_2
 
-    def condense(self, like: JointResolvent | None = None) -> JointStiffness:
+    def condense(
+        self, like: JointResolvent | None = None, progress: Progress = unseen
+    ) -> JointStiffness:
         """Stiffness and loads of the joint on its interface displacements.
 
-        ``like`` is a joint that differs little from this one and lends it its ρ.
+        ``like`` is a joint that differs little from this one and lends it its ρ. ``progress`` is
+        told the bodies that are condensed.
         """
         held_1, held_2 = self.body_1.held, self.body_2.held
         projection, held = self.projection, held_1.any() or held_2.any()
         if like is None and projection is None and not held:
-            halves = self._condense_halves()
+            halves = self._condense_halves(progress)
             if halves is not None:
                 return halves
         if held:
             every = sp.identity(len(held_2), format="csr") if projection is None else projection
             projection = every[~held_2][:, ~held_1]
-        return join(self.body_1.condense(), self.body_2.condense(), projection, held_2, like)
+        condensed_1 = self.body_1.condense()
+        progress(1, BODIES)
+        return join(condensed_1, self.body_2.condense(), projection, held_2, like)
 
-    def _condense_halves(self) -> JointStiffness | None:
+    def _condense_halves(self, progress: Progress) -> JointStiffness | None:
         """As :meth:`condense`, by a mirror symmetry of both bodies; None if there is none."""
         for axis in self.body_1.elastic.body.axes:
             mirrors = self.body_1.mirror(axis), self.body_2.mirror(axis)
@@ -120,6 +127,7 @@ class Structure:
             if on_1 is None or on_1 != self.body_2.on_interface(mirrors[1]):
                 continue
             halves_1 = self.body_1.condense_halves(mirrors[0], on_1)
+            progress(1, BODIES)
             halves_2 = None if halves_1 is None else self.body_2.condense_halves(mirrors[1], on_1)
             if halves_1 is not None and halves_2 is not None:
                 return join_halves(halves_1, halves_2, on_1)
@@ -160,16 +168,20 @@ class Structure:
         friction: float | Array,
         after: CycleSolution | None = None,
         preload: Array | None = None,
+        progress: Progress = unseen,
     ) -> CycleSolution:
         """Solve one closed cycle of ``amplitudes`` ``(t, cases)``; ``friction`` is the joint's.
 
         From rest and ``preload`` ``(s, cases)``, which is passed once, the first that repeats the
         one before it; or one that follows ``after``, as many cycles on as that one had repeated.
-        Not closed after ``MOST_CYCLES``, it says so by its closure.
+        Not closed after ``MOST_CYCLES``, it says so by its closure. ``progress`` is told the
+        increments that are solved, of those to the second end of the cycle or the next one.
         """
         if after is None:
             once = amplitudes[:0] if preload is None else preload
-            marched = [list(joint.march(np.concatenate([once, amplitudes]), gap))[len(once) :]]
+            path = np.concatenate([once, amplitudes])
+            first = joint.march(path, gap)
+            marched = [_told(first, 0, len(path) + len(amplitudes), progress)[len(once) :]]
             displacement, guess = marched[0][-1].displacement, [s.state for s in marched[0]]
             most = MOST_CYCLES
         else:
@@ -180,7 +192,9 @@ class Structure:
         while len(marched) < most and closure > CLOSED:
             if marched and not all(state.converged for state in marched[-1]):
                 break
-            marched.append(list(joint.march(amplitudes, gap, displacement, guess)))
+            done = len(amplitudes) * len(marched)
+            cycle = joint.march(amplitudes, gap, displacement, guess)
+            marched.append(_told(cycle, done, done + len(amplitudes), progress))
             displacement, guess = marched[-1][-1].displacement, [s.state for s in marched[-1]]
             if len(marched) > 1:
                 closure = _closure(*marched[-2:])
@@ -280,6 +294,17 @@ def mixed(cycles: Sequence[CycleSolution], shares: Sequence[float]) -> CycleSolu
         equilibrium=np.concatenate([cycle.equilibrium for cycle in cycles]),
         cycles=max(cycle.cycles for cycle in cycles),
     )
+
+
+def _told(
+    states: Iterable[FrictionState], before: int, total: int, progress: Progress
+) -> list[FrictionState]:
+    """All states, each of them told: so many of the ``total`` were ``before`` them."""
+    solved = []
+    for number, state in enumerate(states, before + 1):
+        solved.append(state)
+        progress(number, total)
+    return solved
 
 
 def _closure(one: Sequence[FrictionState], two: Sequence[FrictionState]) -> float:

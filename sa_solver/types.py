@@ -23,7 +23,7 @@ increment is ``Ed = Σ µ p |Δs| S >= 0`` with the mean pressure of its ends.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import pairwise
@@ -40,6 +40,14 @@ Mask = NDArray[np.bool_]
 
 ALIKE = 1e-12
 """|β| up to which bodies are alike: what rounding leaves of moduli in different units."""
+
+Progress = Callable[[int, int], None]
+"""Told how many of how many things are done, as often as it may be."""
+
+
+def unseen(done: int, total: int) -> None:
+    """Progress that nobody looks at."""
+
 
 Tilt = Literal["free", "held"]
 """Whether bodies turn about x and y as imposed moments make them, or keep the tilt that they have

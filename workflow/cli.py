@@ -9,10 +9,10 @@ from __future__ import annotations
 import errno
 import os
 import sys
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
@@ -20,8 +20,29 @@ from click.shell_completion import CompletionItem
 from sa_solver.errors import FretscaleError
 from workflow import errors
 
+if TYPE_CHECKING:
+    from workflow.shell.screen import Loudness
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
 # How a command goes on that was stopped.
-ADVICE = "a run continues with `resume DIR`, many with the same command"
+ADVICE = "a run continues with `fretscale resume DIR`, many with the same command"
+TO_TRY = """\
+Three things to try:
+
+  fretscale new bodies ball.yaml           write a case: a ball pressed and sheared on a flat
+  fretscale check ball.yaml                read it: what it would run, and how long
+  fretscale run ball.yaml --out out/ball   run it: ten seconds to the first picture
+
+`fretscale new bodies_wear` writes a ball that wears; all commands: `fretscale --help`.
+"""
+# Commands as the help lists them.
+LISTED = {
+    "A case": ("new", "check", "run", "resume"),
+    "Many runs": ("sweep", "chart", "verify"),
+    "Input and output": ("describe", "resultants", "loops", "schema"),
+}
+OTHERS = "More"
 
 
 class _OneLineGroup(click.Group):
@@ -29,7 +50,7 @@ class _OneLineGroup(click.Group):
 
     def main(self, *args: Any, **settings: Any) -> NoReturn:
         settings["standalone_mode"] = False
-        message, prefix = "", "fretscale: "
+        message = ""
         try:
             code = super().main(*args, **settings)
             if sys.stdout is not None:
@@ -41,14 +62,26 @@ class _OneLineGroup(click.Group):
                 raise
             # What click and rich make of a pipe that was closed.
             message, code = _ending(BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE)))
-        except click.Abort:
-            message, code = f"interrupted; {ADVICE}", errors.INTERRUPTED
-        except click.exceptions.NoArgsIsHelpError as error:
-            message, prefix, code = error.format_message(), "", errors.UserError.exit_code
+        except click.Abort as abort:
+            left = f": {stop}" if (stop := abort.__cause__) and stop.args else ""
+            message, code = f"interrupted{left}", errors.INTERRUPTED
         except click.ClickException as error:
             message, code = _usage(error), errors.UserError.exit_code
-        _say([prefix + line for line in message.splitlines()])
+        _say([f"fretscale: {line}" for line in message.splitlines()])
         sys.exit(code if isinstance(code, int) else errors.DONE)
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        known = [name for names in LISTED.values() for name in names]
+        others = [name for name in self.list_commands(ctx) if name not in known]
+        longest = max(map(len, self.commands))
+        for title, names in {**LISTED, OTHERS: others}.items():
+            rows = [
+                (name.ljust(longest), self.commands[name].get_short_help_str(formatter.width))
+                for name in names
+            ]
+            if rows:
+                with formatter.section(title):
+                    formatter.write_dl(rows)
 
 
 def _say(lines: Sequence[str]) -> None:
@@ -93,14 +126,49 @@ def _usage(error: click.ClickException) -> str:
     return " ".join(error.format_message().split()).rstrip(".") + hint
 
 
-@click.group(cls=_OneLineGroup, context_settings={"help_option_names": ["-h", "--help"]})
+def _loud(command: Command) -> Command:
+    """The switches of all commands that compute."""
+    for switch, level, text in (
+        ("-v/--verbose", "VERBOSE", "Say all that goes to the log, too."),
+        ("-q/--quiet", "QUIET", "Say nothing but errors and warnings."),
+    ):
+        names = switch.split("/")
+        command = click.option(*names, "loudness", flag_value=level, help=text)(command)
+    return command
+
+
+def _loudness(level: str | None) -> Loudness:
+    from workflow.shell.screen import Loudness
+
+    return Loudness[level or "NORMAL"]
+
+
+@contextmanager
+def _repeatable(out: Path) -> Iterator[None]:
+    """What Ctrl-C says of a command that finds what it has done again in a folder."""
+    try:
+        yield
+    except KeyboardInterrupt as stop:
+        raise KeyboardInterrupt(
+            f"{out} keeps the runs that are done; go on with the same command"
+        ) from stop
+
+
+@click.group(
+    cls=_OneLineGroup,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
 @click.version_option(package_name="fretscale")
-def cli() -> None:
+@click.pass_context
+def cli(context: click.Context) -> None:
     """Fretting wear across scales: a structure, its contacts, and how they wear.
 
     Exit codes: 0 done, 1 an expectation missed, 2 bad case or usage, 3 a method failed or the disk
     is full, 4 not enough memory, 130 interrupted.
     """
+    if context.invoked_subcommand is None:
+        click.echo(f"{context.command.get_short_help_str(80)}\n\n{TO_TRY}", nl=False)
 
 
 @cli.command()
@@ -108,23 +176,27 @@ def cli() -> None:
 @click.option("--out", required=True, type=click.Path(path_type=Path), help="Folder to write.")
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
 @click.option("--force", is_flag=True, help="Overwrite a folder that holds another run.")
-def run(case: str, out: Path, overrides: tuple[str, ...], force: bool) -> None:
+@_loud
+def run(
+    case: str, out: Path, overrides: tuple[str, ...], force: bool, loudness: str | None
+) -> None:
     """Run CASE and write its results."""
     from workflow.kinds import load_case
 
     loaded = load_case(case, overrides)
     from workflow.runs.run import run_case
 
-    run_case(loaded, out, force)
+    run_case(loaded, out, force, _loudness(loudness))
 
 
 @cli.command()
 @click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
-def resume(folder: Path) -> None:
-    """Continue an interrupted run from its output FOLDER."""
+@_loud
+def resume(folder: Path, loudness: str | None) -> None:
+    """Go on with an interrupted run in its FOLDER."""
     from workflow.runs.run import resume_run
 
-    if not resume_run(folder):
+    if not resume_run(folder, _loudness(loudness)) and loudness != "QUIET":
         click.echo(f"{folder}: this run is finished; nothing to do")
 
 
@@ -147,11 +219,18 @@ def report(folder: Path, out: Path | None) -> None:
     type=click.Path(path_type=Path),
     help="Folder for the runs, one inside it for each case.",
 )
-def verify(cases: tuple[Path, ...], out: Path) -> int:
+@_loud
+def verify(cases: tuple[Path, ...], out: Path, loudness: str | None) -> int:
     """Run CASES and compare with what they expect."""
     from workflow.runs.verify import verify_cases
 
-    return errors.DONE if verify_cases(cases, out) else errors.ExpectationMissed.exit_code
+    try:
+        met = verify_cases(cases, out, _loudness(loudness))
+    except KeyboardInterrupt as stop:
+        raise KeyboardInterrupt(
+            f"{out} is not complete; start again with the same command"
+        ) from stop
+    return errors.DONE if met else errors.ExpectationMissed.exit_code
 
 
 @cli.command()
@@ -187,6 +266,7 @@ def compare(folders: tuple[Path, ...], out: Path | None, force: bool) -> None:
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
 @click.option("--quantity", "quantities", multiple=True, metavar="PATH", help="In summary.json.")
 @click.option("--accuracy", default="1 %", show_default=True, help="To choose settings for.")
+@_loud
 def chart(
     case: Path,
     out: Path,
@@ -194,8 +274,9 @@ def chart(
     overrides: tuple[str, ...],
     quantities: tuple[str, ...],
     accuracy: str,
+    loudness: str | None,
 ) -> int:
-    """Chart error against cost for each approximation of CASE.
+    """Chart error against cost for what CASE approximates.
 
     Each AXIS has a ladder of runs about the settings of CASE: grid, tolerance, method, stepper,
     dimension, coupling, history, mesh, order, step, harmonics, samples; by default all that apply.
@@ -205,8 +286,8 @@ def chart(
     from workflow.chart.report import show, write_chart
     from workflow.shell.lock import locked
 
-    with locked(out) as gone:
-        if gone:
+    with _repeatable(out), locked(out) as gone:
+        if gone and loudness != "QUIET":
             click.echo(gone, err=True)
         charted = chart_case(
             case,
@@ -215,10 +296,11 @@ def chart(
             overrides=overrides,
             quantities=quantities,
             accuracy=accuracy_of(accuracy),
-            report=lambda line: click.echo(line, err=True),
+            loudness=_loudness(loudness),
         )
         write_chart(charted, out)
-    show(charted)
+    if loudness != "QUIET":
+        show(charted)
     return errors.DONE if charted.complete else errors.MethodFailed.exit_code
 
 
@@ -228,7 +310,15 @@ def chart(
 @click.option("--processes", type=click.IntRange(1), help="Cores to use; all by default.")
 @click.option("--dask", metavar="ADDRESS", help="Of a dask.distributed scheduler, to run there.")
 @click.option("--force", is_flag=True, help="Overwrite runs of another case.")
-def sweep(file: Path, out: Path, processes: int | None, dask: str | None, force: bool) -> int:
+@_loud
+def sweep(
+    file: Path,
+    out: Path,
+    processes: int | None,
+    dask: str | None,
+    force: bool,
+    loudness: str | None,
+) -> int:
     """Run a case many times with other values, as SWEEP says.
 
     SWEEP is a YAML file with the `case`, what to `vary` and the `design`: grid, zip or sample. All
@@ -242,7 +332,9 @@ def sweep(file: Path, out: Path, processes: int | None, dask: str | None, force:
         raise errors.UserError("--processes is for this machine; allowed: it or --dask")
     from workflow.sweep import run_sweep
 
-    done = run_sweep(file, out, processes=processes, dask=dask, force=force)
+    told = _loudness(loudness)
+    with _repeatable(out):
+        done = run_sweep(file, out, processes=processes, dask=dask, force=force, loudness=told)
     return errors.DONE if done else errors.MethodFailed.exit_code
 
 
@@ -250,7 +342,11 @@ def sweep(file: Path, out: Path, processes: int | None, dask: str | None, force:
 @click.argument("case", type=click.Path())
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
 def check(case: str, overrides: tuple[str, ...]) -> None:
-    """Read CASE, say what it would run and about how long, if this machine's memory is enough."""
+    """Read CASE; say what it would run, and how long.
+
+    Says what is given in plain units, what looks like a slip, and whether the memory is enough.
+    """
+    from workflow.case.doubts import doubts_of
     from workflow.kinds import analysis_of, load_case
 
     loaded = load_case(case, overrides)
@@ -261,6 +357,8 @@ def check(case: str, overrides: tuple[str, ...]) -> None:
     needed = ("memory", f"up to {memory.required / 1e9:.1f} GB"), ("time", run_time.text)
     for name, text in [*loaded.outline(), *needed]:
         click.echo(f"  {name:<10} {text}")
+    for doubt in doubts_of(loaded):
+        click.echo(f"doubt: {doubt}")
 
 
 @cli.command()
@@ -269,7 +367,7 @@ def check(case: str, overrides: tuple[str, ...]) -> None:
 @click.option("--set", "overrides", multiple=True, metavar="KEY=VALUE", help="Change an entry.")
 @click.option("--force", is_flag=True, help="Overwrite what is there.")
 def resultants(case: str, out: Path, overrides: tuple[str, ...], force: bool) -> None:
-    """Solve the structure of CASE alone and write the loads of its contacts."""
+    """Write the contact loads of the structure of CASE."""
     from workflow.kinds import analysis_of, load_case
 
     loaded = load_case(case, overrides)
@@ -291,7 +389,9 @@ def resultants(case: str, out: Path, overrides: tuple[str, ...], force: bool) ->
 def loops(
     file: Path, out: Path | None, normal_load: str | None, columns: tuple[str, ...], force: bool
 ) -> None:
-    """Measure friction, stiffness and energy of the hysteresis loops in FILE.
+    """Measure hysteresis loops in FILE.
+
+    Tells friction, stiffness and energy of each of them.
 
     FILE is CSV with headings such as `displacement [um], force [N]`, and `time [s]` where samples
     are not evenly spaced, and `normal_load [N]` where it is known.
@@ -310,7 +410,10 @@ def loops(
 @click.argument("file", type=click.Path(path_type=Path))
 @click.option("--size", metavar="LENGTH", help="Of the elements, for a CAD file, such as '2 mm'.")
 def describe(file: Path, size: str | None) -> None:
-    """List bodies, boundaries and node sets of a mesh or CAD FILE, as a case may name them."""
+    """List what a case may name of a mesh or CAD FILE.
+
+    That is bodies, boundaries and node sets.
+    """
     from workflow.commands.describe import described_file
 
     for line in described_file(file, size):

@@ -61,7 +61,12 @@ def in_process(run: Callable[[Job, Path], None]) -> RunJobs:
     """What runs the jobs of a chart by a function, here and now."""
 
     def run_jobs(
-        jobs: Sequence[Job], out: Path, *, alone: bool, report: Callable[[Finished], None]
+        jobs: Sequence[Job],
+        out: Path,
+        *,
+        alone: bool,
+        report: Callable[[Finished], None],
+        running: Callable[[Sequence[str]], None],
     ) -> list[Finished]:
         assert alone
         ended = []

@@ -72,8 +72,8 @@ def test_check_says_what_would_run(dovetail_path):
     assert first == f"OK {dovetail_path}: Ti-6Al-4V dovetail, one mission per cycle"
     assert "128 x 256 cells" in result.stdout
     assert "22 increments" in result.stdout
-    assert "implicit steps, for an error of 0.01" in result.stdout
-    assert len(rows) < 8
+    assert "implicit steps, for an error of 1 % of the depth" in result.stdout
+    assert len(rows) < 12
 
 
 def test_check_refuses_what_the_memory_cannot_hold_as_run_does(dovetail_path):
@@ -87,15 +87,15 @@ def test_check_refuses_what_the_memory_cannot_hold_as_run_does(dovetail_path):
 @pytest.mark.parametrize(
     ("kind", "words"),
     [
-        ("dovetail", "implicit steps, for an error of 0.01"),
+        ("dovetail", "implicit steps, for an error of 1 % of the depth"),
         ("mesh", "22 increments in 2 legs"),
         ("resultants", "loads in 3-D from loads.csv, without slip"),
         ("specimens", "pad 1 x 1 mm of 121 nodes, flat"),
-        ("bodies_wear", "50 N, stroke 0.05 mm in 8 increments"),
-        ("line_wear", "50 N/mm, stroke 0.05 mm in 8 increments"),
-        ("bodies", "128 x 128 cells of 0.007812 x 0.007812 mm, history auto"),
-        ("line", "512 strips of 0.003906 mm"),
-        ("joint", "bouc_wen under 60 N, evolving with energy, looked at 2 energies"),
+        ("bodies_wear", "50 N, stroke 50 um in 8 increments"),
+        ("line_wear", "50 N/mm, stroke 50 um in 8 increments"),
+        ("bodies", "128 x 128 cells of 7.812 um x 7.812 um, history auto"),
+        ("line", "512 strips of 3.906 um"),
+        ("joint", "bouc_wen, normal load 60 N, friction 0.11, stiffness 27.3 kN/mm"),
         ("rig", "75 N at 100 Hz on mass 1"),
         ("vibration", "10, 40 N on mass 1, 20 to 400 Hz"),
     ],
@@ -156,6 +156,7 @@ LIBRARY_MISSING = "libGLU.so.1: cannot open shared object file: No such file or 
         (errors.OutOfMemory("needs 90 GB, there are 8"), 4, "90 GB"),
         (MemoryError(), 4, "out of memory"),
         (KeyboardInterrupt(), 130, "interrupted"),
+        (KeyboardInterrupt("go on with `it`"), 130, "interrupted: go on with `it`"),
         (PermissionError(13, "Permission denied", "/out"), 2, "/out: Permission denied"),
         (OSError(LIBRARY_MISSING), 3, "libGLU"),
         (ImportError(LIBRARY_MISSING), 3, "libGLU"),
@@ -163,9 +164,9 @@ LIBRARY_MISSING = "libGLU.so.1: cannot open shared object file: No such file or 
     ids=lambda value: type(value).__name__ if isinstance(value, BaseException) else None,
 )
 def test_endings_have_their_exit_code(monkeypatch, dovetail_path, tmp_path, ending, code, words):
-    def run_case(case, out, force):
+    def run_case(case, out, force, loudness):
         assert case == load_case(dovetail_path, ["friction.coefficient=0.3"])
-        assert (out, force) == (tmp_path, True)
+        assert (out, force, loudness.name) == (tmp_path, True, "NORMAL")
         if ending is not None:
             raise ending
 
@@ -186,7 +187,7 @@ def test_endings_have_their_exit_code(monkeypatch, dovetail_path, tmp_path, endi
 def test_verify_reports_by_exit_code(monkeypatch, dovetail_path, tmp_path):
     for passed in (True, False):
 
-        def verify_cases(paths, out, passed=passed):
+        def verify_cases(paths, out, loudness, passed=passed):
             assert (paths, out) == ((dovetail_path,), tmp_path)
             return passed
 

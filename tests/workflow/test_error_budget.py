@@ -17,7 +17,7 @@ from workflow.analyses.wear.budget import finding, lives
 from workflow.analyses.wear.budget.companions import Companions
 from workflow.analyses.wear.budget.lives import STEPS, live
 from workflow.analyses.wear.budget.parts import UNCERTAIN, ResultError, peak_left
-from workflow.analyses.wear.budget.report import datasets_of, sentence, summary_of, warning_of
+from workflow.analyses.wear.budget.report import datasets_of, sentences, summary_of, warning_of
 from workflow.analyses.wear.layout import PARTS
 from workflow.analyses.wear.structure import SETTINGS
 from workflow.analyses.wear.structures import structure_of
@@ -67,8 +67,11 @@ ERROR = ResultError({"link": 0.004, "mesh": 0.03, "increments": None, "steps": 0
 def test_parts_add_up_and_unknown_ones_are_named() -> None:
     assert ERROR.total == pytest.approx(0.046)
     assert summary_of({"depth": ERROR})["depth"] == {**ERROR.parts, "total": ERROR.total}
-    said = sentence({"depth": ERROR})
-    assert said == "depth 4.6% (mesh 3.0%, steps 1.2%, increments unknown)"
+    said = list(sentences({"depth": ERROR}))
+    assert said == [
+        "estimated errors: depth 4.6%",
+        "most of depth: mesh 3.0%, steps 1.2%; unknown: increments",
+    ]
     (written,) = (data.values for data in datasets_of({"depth": ERROR}).values())
     *by_part, total = written
     known = {part: value for part, value in zip(PARTS, by_part, strict=True) if value == value}
@@ -85,7 +88,10 @@ def test_parts_of_opposite_sign_cancel_but_for_what_each_is_uncertain_by() -> No
     off = np.random.default_rng(1).normal(1.0, UNCERTAIN, (2, 100_000))
     drawn = off[0] * parts["mesh"] + off[1] * parts["increments"]
     assert np.sqrt(np.mean(drawn**2)) == pytest.approx(np.hypot(0.01, 0.025), rel=0.02)
-    assert sentence({"volume": error}) == "volume 2.7% (mesh +4.0%, increments -3.0%)"
+    assert list(sentences({"volume": error})) == [
+        "estimated errors: volume 2.7%",
+        "most of volume: mesh +4.0%, increments -3.0%",
+    ]
 
 
 def test_one_sign_is_the_sum_of_sizes() -> None:

@@ -204,7 +204,7 @@ def test_output_that_cannot_be_written_is_one_line(arguments):
 @linux_only
 def test_nothing_is_said_where_nothing_can_be(ball, tmp_path):
     with FULL.open("w") as full:
-        assert command(stderr=full).returncode == 2
+        assert command("no-such-command", stderr=full).returncode == 2
         ending = command("run", ball, "--out", tmp_path / "out", stdout=full, stderr=full)
     assert ending.returncode == 3
     assert "case.yaml" in names(tmp_path / "out")

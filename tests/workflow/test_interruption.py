@@ -30,7 +30,9 @@ def stopped(start, tmp_path_factory):
     with ctrl_c_after_jumps(2):
         run = start(tmp_path_factory.mktemp("stopped") / "out")
     assert run.ending.exit_code == 130
-    assert run.ending.stderr.splitlines()[-1].startswith("fretscale: interrupted")
+    last = run.ending.stderr.splitlines()[-1]
+    assert last.startswith("fretscale: interrupted")
+    assert last.endswith(f"go on with `fretscale resume {run.folder}`")
     return run
 
 

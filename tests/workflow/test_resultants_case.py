@@ -99,7 +99,7 @@ def test_template_is_a_case(written):
     checked = command("check", written)
     assert checked.exit_code == 0
     assert "loads in 3-D from loads.csv, without slip" in checked.stdout
-    assert "early, P up to 50000 N, 11 x 60 mm, rounded" in checked.stdout
+    assert "early, P up to 50 kN, 11 x 60 mm, rounded" in checked.stdout
 
 
 def uncommented(line: str) -> str:

@@ -348,7 +348,7 @@ class TestCase:
         assert isinstance(case, SpecimensCase)
         assert parse_case(dump_case(case), "again.yaml") == case
         assert [name for name, _ in case.outline()] == [
-            *("structure", "load path", "contact", "wear"),
+            *("structure", "load path", "material", "friction", "contact", "wear law", "wear"),
         ]
 
     @pytest.mark.parametrize("name", ["specimens_flat", "specimens_curved"])

@@ -83,7 +83,7 @@ def test_table_has_the_units_of_the_case_and_the_kind_of_each_value(
 ):
     """Of a value 0 the error is in its unit too: 0.4 um, where 0.5 um are allowed."""
 
-    def run_case(case, out, force):
+    def run_case(case, out, force, loudness):
         out.mkdir(parents=True)
         summary = {"length": 0.0121, "share": 0.5, "nothing": 4e-4, "sign": -1.0}
         OutputFolder(out).finish(summary, UNTIED)
@@ -108,7 +108,7 @@ def test_every_case_says_what_it_expects():
 
 
 def test_case_is_named_that_expects_what_is_not_computed(small_path, tmp_path, monkeypatch):
-    def run_case(case, out, force):
+    def run_case(case, out, force, loudness):
         out.mkdir(parents=True)
         OutputFolder(out).finish({}, UNTIED)
 

@@ -254,6 +254,14 @@ class Case(Section, ABC):
     def outline(self) -> list[tuple[str, str]]:
         """What would run, in a few rows of name and text."""
 
+    def doubts(self) -> Iterator[str]:
+        """A line for each thing that entries together can, but are hardly meant to say.
+
+        It begins with one of them. What is unusual of a single one is known elsewhere
+        (:mod:`workflow.case.doubts`).
+        """
+        yield from ()
+
     @property
     def cores(self) -> int:
         """Processes of a run that compute at the same time."""

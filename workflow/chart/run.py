@@ -10,9 +10,10 @@ from __future__ import annotations
 import json
 import re
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
-from itertools import chain, count
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -31,14 +32,15 @@ from workflow.runs.jobs import run_jobs
 from workflow.runs.run import kept_in
 from workflow.shell.cache import kept_files
 from workflow.shell.folder import OutputFolder
-from workflow.shell.forecast import Forecast, in_words
 from workflow.shell.processes import environment
+from workflow.shell.reporter import Reporter
+from workflow.shell.screen import Loudness
 from workflow.shell.summary import number_at
 
 CACHE = "FRETSCALE_CACHE"
 ACCURACY = Quantity("1", above=0.0, at_most=1.0)
 # What the folder of a chart is called, those in it, and the run of the case as it is written.
-KIND = "chart"
+KIND, LOG = "chart", "chart.log"
 RUNS, STRUCTURES, BASELINE = "runs", "structures", "own"
 # Entry of an interface in the summary: the longest stable explicit step of the unworn contact.
 LIMIT = "explicit_limit"
@@ -87,7 +89,7 @@ def chart_case(
     overrides: Sequence[str] = (),
     quantities: Sequence[str] = (),
     accuracy: float = 0.01,
-    report: Callable[[str], None] = lambda line: None,
+    loudness: Loudness = Loudness.NORMAL,
 ) -> Chart:
     """Run the ladders of ``axes``, by default of all that apply, in folders below ``out/runs``.
 
@@ -98,9 +100,15 @@ def chart_case(
     base = (*overrides, *_plain(load_case(case, overrides), quantities))
     settings = axes_of(case, base, axes)
     jobs = _jobs(case, base, settings)
-    _claim(OutputFolder(out, KIND), load_case(case, base))
-    with environment({CACHE: str((out / STRUCTURES).absolute())}):
-        ended, left_out = _run(jobs, settings, out / RUNS, quantities, report)
+    folder = OutputFolder(out, KIND)
+    _claim(folder, load_case(case, base))
+    log = folder.reserve(LOG, "what it said, and when")
+    with (
+        environment({CACHE: str((out / STRUCTURES).absolute())}),
+        closing(Reporter(log, True, loudness=loudness)) as reporter,
+        reporter.course("runs"),
+    ):
+        ended, left_out = _run(jobs, settings, out / RUNS, quantities, reporter)
     runs = _runs(ended)
     if not runs:
         raise MethodFailed(f"{out}: not a single rung ran: {ended[0].job.name}: {ended[0].error}")
@@ -158,15 +166,15 @@ def _run(
     settings: Mapping[Axis, list[Setting]],
     out: Path,
     quantities: Sequence[str],
-    report: Callable[[str], None],
+    reporter: Reporter,
 ) -> tuple[list[Finished], dict[str, str]]:
     """How the jobs ended, and why some were left out, by their name.
 
     The first one shows whether there are such ``quantities``, before all others are run.
     """
-    progress = _Progress(jobs, report)
+    progress = _Progress(jobs, reporter)
     baseline, *others = jobs.values()
-    ended = run_jobs([baseline], out, alone=True, report=progress)
+    ended = run_jobs([baseline], out, alone=True, report=progress, running=progress.running)
     if (summary := ended[0].summary) is not None:
         _check(quantities, _measured(baseline.load(), ended[0].folder, summary))
     left_out = {}
@@ -175,7 +183,8 @@ def _run(
             left_out[jobs[setting.text].name] = why
     progress.leave_out(left_out)
     others = [job for job in others if job.name not in left_out]
-    return ended + run_jobs(others, out, alone=True, report=progress), left_out
+    ended += run_jobs(others, out, alone=True, report=progress, running=progress.running)
+    return ended, left_out
 
 
 def _too_long(setting: Setting, summary: Mapping[str, Any]) -> str:
@@ -195,9 +204,9 @@ class _Progress:
     They are weighed by the time that a check tells of them: from rung to rung that grows.
     """
 
-    def __init__(self, jobs: Mapping[str, Job], report: Callable[[str], None]) -> None:
-        self._report, self._forecast, self._ended = report, Forecast(), 0.0
-        self._numbers, self._total, self._last = count(1), len(jobs), time.perf_counter()
+    def __init__(self, jobs: Mapping[str, Job], reporter: Reporter) -> None:
+        self._reporter, self._spent, self._ended = reporter, 0.0, 0
+        self._total, self._last = len(jobs), time.perf_counter()
         cases = {job.name: job.load() for job in jobs.values()}
         self._times = {n: analysis_of(case).run_time(case).seconds for n, case in cases.items()}
 
@@ -206,20 +215,25 @@ class _Progress:
         for name in names:
             self._times.pop(name, None)
 
+    def running(self, names: Sequence[str]) -> None:
+        """What runs now."""
+        self._reporter.doing(f"{self._ended} of {self._total}, now {', '.join(names)}")
+
     def __call__(self, finished: Finished) -> None:
         ending, own = f"failed: {finished.error}", 0.0
         if finished.summary is not None:
             own = sum(finished.summary.get("seconds", {}).values())
             ending = f"{own:.1f} s"
         name, now = finished.job.name, time.perf_counter()
-        self._ended += self._times[name]
-        self._forecast.reach(self._ended / sum(self._times.values()))
+        self._spent += self._times[name]
+        self._ended += 1
+        told = f"{self._ended}/{self._total} {name}: {ending}"
+        self._reporter.say(told, always=finished.summary is None)
+        at = f"{self._ended} of {self._total}"
+        self._reporter.reached(self._spent / sum(self._times.values()), at)
         if now - self._last < KEPT * own:
-            self._forecast.go_on()
+            self._reporter.goes_on()
         self._last = now
-        left = self._forecast.left
-        to_go = f"; about {in_words(left)} to go" if left else ""
-        self._report(f"{next(self._numbers)}/{self._total} {name}: {ending}{to_go}")
 
 
 def _runs(ended: Sequence[Finished]) -> dict[str, _Run]:

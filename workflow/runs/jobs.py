@@ -27,6 +27,7 @@ def run_jobs(
     alone: bool = False,
     dask: str | None = None,
     report: Callable[[Finished], None] | None = None,
+    running: Callable[[Sequence[str]], None] = lambda names: None,
 ) -> list[Finished]:
     """Run every job in the folder of its name below ``out``; in the order of ``jobs``.
 
@@ -35,7 +36,8 @@ def run_jobs(
     its ``error``. Local runs share ``processes`` cores (default: all there are), of which each
     takes as many as it has contacts; run ``alone``, one after the other, they have all cores and
     threads as by themselves. ``dask`` is the address of a scheduler to send them to instead.
-    ``report`` is called with each job as it ends. Ctrl-C ends all of them; another call goes on.
+    ``report`` is called with each job as it ends, ``running`` with the names of those that run here
+    whenever these change. Ctrl-C ends all of them; another call goes on.
 
     Raises ValueError where two jobs would share a folder.
     """
@@ -64,7 +66,7 @@ def run_jobs(
         run_on_cluster(left, out, dask, end)
     else:
         cores = 1 if alone else processes or os.cpu_count() or 1
-        _run_here(left, out, cores, end, one_thread=not alone)
+        _run_here(left, out, cores, end, running, one_thread=not alone)
     return [ended[job.name] for job in jobs]
 
 
@@ -82,6 +84,7 @@ def _run_here(
     out: Path,
     cores: int,
     end: Callable[[Job, str], None],
+    tell: Callable[[Sequence[str]], None],
     one_thread: bool,
 ) -> None:
     """Run jobs side by side, first come, first served; one that wants more cores runs alone."""
@@ -96,6 +99,7 @@ def _run_here(
                     job, wanted = queue.pop(0)
                     running[pool.submit(run_job, job, out, stop.is_set, one_thread)] = job, wanted
                     free -= wanted
+                tell([job.name for job, _ in running.values()])
                 for future in wait(running, return_when=FIRST_COMPLETED).done:
                     job, _ = running.pop(future)
                     end(job, future.result())

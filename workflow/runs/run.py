@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from workflow.case.changing import changed
+from workflow.case.doubts import doubts_of
 from workflow.case.sections import Case
 from workflow.case.writing import dump_case
 from workflow.errors import UNWRITTEN, CaseError, NotWritten, UserError
@@ -15,13 +16,17 @@ from workflow.kinds import analysis_of, kind_of, load_case
 from workflow.pictures.drawing import write_pictures
 from workflow.report.told import ToldRun
 from workflow.report.writing import write_page
+from workflow.runs.first_look import first_look
 from workflow.runs.provenance import case_values, provenance_of
 from workflow.shell import checkpoint
 from workflow.shell.analysis import Analysis, Run, Summary
 from workflow.shell.checkpoint import Checkpoint
 from workflow.shell.folder import ASIDE, MANIFEST, OutputFolder
+from workflow.shell.forecast import in_words
 from workflow.shell.lock import locked
-from workflow.shell.reporter import Reporter, telling
+from workflow.shell.reporter import SHORT_RUN, Reporter, telling
+from workflow.shell.run_time import RunTime
+from workflow.shell.screen import Loudness, Screen
 from workflow.shell.store import read_bytes
 
 # Seconds in which a process that was cut off, or whoever started it, has come to its end.
@@ -30,16 +35,16 @@ PATIENCE = 60.0
 Kept = Literal["finished", "unfinished", "other", "nothing"]
 
 
-def run_case(case: Case, out: Path, force: bool) -> None:
+def run_case(case: Case, out: Path, force: bool, loudness: Loudness = Loudness.NORMAL) -> None:
     """Run a case from the start into a folder, by the cheapest model if it leaves that open.
 
     Raises FretscaleError; UserError too where another process works in the folder.
     """
     with _working(case, out) as gone:
-        _start(case, out, force, gone)
+        _start(case, out, force, gone, loudness=loudness)
 
 
-def resume_run(out: Path) -> bool:
+def resume_run(out: Path, loudness: Loudness = Loudness.NORMAL) -> bool:
     """Continue the run in a folder from its last whole jump; False if it is finished already.
 
     What a finished one had no time to remove is removed.
@@ -56,7 +61,7 @@ def resume_run(out: Path) -> bool:
                 folder.clear_leftovers()
         return False
     with _working(case, out) as gone:
-        _go_on(case, folder, gone)
+        _go_on(case, folder, gone, loudness)
     return True
 
 
@@ -137,29 +142,39 @@ def _working(
             raise
         again = "the same command"
         if analysis_of(case).resumable and OutputFolder(out).case.exists():
-            again = f"`resume {out}`"
+            again = f"`fretscale resume {out}`"
         where = error.filename or out
         raise NotWritten(f"{where}: {error.strerror}; go on with {again} once it can be") from error
 
 
-def _start(case: Case, out: Path, force: bool, gone: str, damaged: str = "") -> None:
+def _start(
+    case: Case,
+    out: Path,
+    force: bool,
+    gone: str,
+    damaged: str = "",
+    loudness: Loudness = Loudness.NORMAL,
+) -> None:
     """Run a case from the start.
 
     ``gone`` is what to tell of a process that was there before, ``damaged`` why its run is not
     believed.
     """
     analysis = analysis_of(case)
-    case, choice = analysis.choose(case)
+    with closing(Screen(loudness > Loudness.QUIET)) as screen, screen.row("choice of settings"):
+        case, choice = analysis.choose(case)
     analysis.memory(case).check()
     folder = OutputFolder(out)
     stays = folder.claim(case, force, analysis.resumable)
     folder.keep_choice(choice)
     if damaged:
         damaged = f"an earlier run is not taken: {damaged}"
-    _run(analysis, case, folder, (gone, damaged), stays=stays)
+    _run(analysis, case, folder, (gone, damaged), loudness, stays=stays)
 
 
-def _go_on(case: Case, folder: OutputFolder, gone: str) -> None:
+def _go_on(
+    case: Case, folder: OutputFolder, gone: str, loudness: Loudness = Loudness.NORMAL
+) -> None:
     """Continue the run in a folder."""
     analysis, out = analysis_of(case), folder.root
     if not analysis.resumable:
@@ -177,7 +192,7 @@ def _go_on(case: Case, folder: OutputFolder, gone: str) -> None:
     folder.clear_partial()
     folder.reserve_state()
     new = "" if kept else "no state was kept: from the start"
-    _run(analysis, case, folder, (gone, new), resume=True, kept=kept)
+    _run(analysis, case, folder, (gone, new), loudness, resume=True, kept=kept)
 
 
 def _run(
@@ -185,6 +200,7 @@ def _run(
     case: Case,
     folder: OutputFolder,
     told: Sequence[str],
+    loudness: Loudness,
     resume: bool = False,
     kept: Checkpoint | None = None,
     stays: Sequence[str] = (),
@@ -195,6 +211,7 @@ def _run(
     def draw(contents: Any) -> None:
         with reporter.stage("paraview and figures"):
             if analysis.pictures is not None:
+                drawn.extend(analysis.pictures().figures_of(contents))
                 processes = analysis.drawing_processes
                 figures.update(
                     write_pictures(case.output, folder, analysis.pictures, contents, processes)
@@ -205,9 +222,9 @@ def _run(
             _report(run, summary, figures)
 
     figures: dict[str, str] = {}
-
+    drawn: list[str] = []
     expected = analysis.run_time(case)
-    with closing(Reporter(folder.reserve_log(), resume, expected)) as reporter:
+    with closing(Reporter(folder.reserve_log(), resume, expected, loudness)) as reporter:
         for line in filter(None, told):
             reporter.say(line)
         if stays:
@@ -215,6 +232,7 @@ def _run(
                 f"{', '.join(stays)}: in the folder before this run, and not of it; what has a "
                 f"name that the run needs gets {ASIDE} at its end"
             )
+        _announce(case, expected, resume, reporter)
         run = Run(
             kind=kind_of(case),
             case=case,
@@ -228,9 +246,32 @@ def _run(
             draw=draw,
             report=report,
         )
-        reporter.say(f"{'resume' if resume else 'run'}: {case.title}")
-        with telling(reporter):
-            analysis.run(run)
+        try:
+            with telling(reporter):
+                analysis.run(run)
+        except KeyboardInterrupt as stop:
+            raise KeyboardInterrupt(_stopped(analysis, folder)) from stop
+        for line in first_look(folder.root, drawn):
+            reporter.say(line)
+
+
+def _announce(case: Case, expected: RunTime, resume: bool, reporter: Reporter) -> None:
+    """Say what runs, about how long, and what in the case is hardly meant."""
+    long = not resume and expected.seconds >= SHORT_RUN
+    takes = f" (about {in_words(expected.seconds)})" if long else ""
+    reporter.say(f"{'resume' if resume else 'run'}: {case.title}{takes}")
+    for doubt in doubts_of(case):
+        reporter.say(f"doubt: {doubt}", always=True)
+
+
+def _stopped(analysis: Analysis, folder: OutputFolder) -> str:
+    """What a run that got Ctrl-C has left, and the command that goes on."""
+    out = folder.root
+    if folder.summary.exists():
+        return f"{out} is finished but for what is removed by `fretscale resume {out}`"
+    if not analysis.resumable:
+        return f"{out} is not finished; start again with `fretscale run {folder.case} --out {out}`"
+    return f"{out} keeps what is done; go on with `fretscale resume {out}`"
 
 
 def _report(run: Run[Any], summary: Summary, figures: Mapping[str, str]) -> None:

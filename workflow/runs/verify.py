@@ -13,6 +13,8 @@ from workflow.kinds import load_case
 from workflow.runs.run import run_case
 from workflow.shell.expectations import verdicts
 from workflow.shell.folder import OutputFolder
+from workflow.shell.screen import Loudness
+from workflow.shell.screen import console as terminal
 from workflow.shell.summary import QuantityError
 
 COLUMNS = "expected", "computed", "unit", "error", "verdict", "kind", "source"
@@ -20,8 +22,11 @@ COLUMNS = "expected", "computed", "unit", "error", "verdict", "kind", "source"
 FILE_WIDTH = 140
 
 
-def verify_cases(cases: tuple[Path, ...], out: Path) -> bool:
-    """Run each case into its own folder under ``out``; True if every expectation is met."""
+def verify_cases(cases: tuple[Path, ...], out: Path, loudness: Loudness = Loudness.NORMAL) -> bool:
+    """Run each case into its own folder under ``out``; True if every expectation is met.
+
+    Where it is quiet, only what was missed is told, a line for each.
+    """
     loaded = [(path, load_case(path)) for path in cases]
     for path, case in loaded:
         if not case.expect:
@@ -30,9 +35,11 @@ def verify_cases(cases: tuple[Path, ...], out: Path) -> bool:
     if not console.is_terminal:
         console.width = FILE_WIDTH
     met_all = True
-    for path, case in loaded:
+    for number, (path, case) in enumerate(loaded, 1):
         folder = out / path.stem
-        run_case(case, folder, force=True)
+        if len(loaded) > 1 and loudness > Loudness.QUIET:
+            terminal().print(f"case {number} of {len(loaded)}: {path}", markup=False)
+        run_case(case, folder, True, loudness)
         summary = OutputFolder(folder).read_summary()
         table = Table(Column("quantity", no_wrap=True), *COLUMNS, title=str(path), box=SIMPLE)
         try:
@@ -50,5 +57,14 @@ def verify_cases(cases: tuple[Path, ...], out: Path) -> bool:
                 verdict.entry.kind.replace("_", " "),
             )
             table.add_row(verdict.entry.quantity, *row, verdict.entry.source)
-        console.print(table)
+            if not verdict.met and loudness is Loudness.QUIET:
+                told = f"{verdict.computed:.6g} {verdict.unit}".rstrip()
+                terminal().print(
+                    f"warning: {path}: {verdict.entry.quantity}: {told}, expected "
+                    f"{verdict.expected:.6g}",
+                    markup=False,
+                    soft_wrap=True,
+                )
+        if loudness > Loudness.QUIET:
+            console.print(table)
     return met_all

@@ -5,16 +5,15 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeVar
 
-from rich.console import Console
-from rich.progress import BarColumn, Progress, TaskID, TextColumn, TimeElapsedColumn
-
+from sa_solver.types import Progress
 from workflow.shell.forecast import Forecast, in_words
 from workflow.shell.run_time import RunTime
+from workflow.shell.screen import Loudness, Row, Screen, console
 from workflow.shell.store import check_regular
 
 T = TypeVar("T")
@@ -27,6 +26,9 @@ FIRST_WORK, FIRST_STEP, SHORT_RUN = 1.0, 10.0, 10.0
 LITTLE = 0.05
 # A forecast is told again when that of the whole time has changed by this factor.
 CHANGED = 1.5
+# Seconds between two looks of a stage at how far it is, and between two lines about that where
+# there is no screen.
+LOOK, LINE = 0.1, 60.0
 
 
 @dataclass
@@ -34,10 +36,32 @@ class _Course:
     """The long part of a run, on the screen; ``told`` is the last forecast of its whole time."""
 
     name: str
-    bar: Progress
-    task: TaskID
+    row: Row
     forecast: Forecast
     told: float | None = None
+
+
+class _Stage:
+    """Tells how far a stage is: a ``fe_models`` or ``wear`` callback, called as often as it may."""
+
+    def __init__(self, name: str, of: str, row: Row, say: Callable[[str], None] | None) -> None:
+        self._name, self._of, self._row, self._say = name, of, row, say
+        self._forecast, self._looked = Forecast(), time.perf_counter()
+        self._said = self._looked
+
+    def __call__(self, done: int, total: int) -> None:
+        """So many of ``total`` are done."""
+        now = time.perf_counter()
+        if now - self._looked < LOOK:
+            return
+        self._looked = now
+        self._forecast.reach(done / max(total, 1))
+        at, left = f"{done} of {total} {self._of}".rstrip(), self._forecast.left
+        told = "" if left is None else f"about {in_words(left)} more"
+        self._row.show(self._forecast.share, at, told)
+        if self._say and now - self._said > LINE:
+            self._said = now
+            self._say(f"{self._name}: {at}, {told}".rstrip(", "))
 
 
 class Reporter:
@@ -48,11 +72,15 @@ class Reporter:
     """
 
     def __init__(
-        self, log: Path, append: bool = False, expected: RunTime = NOTHING_EXPECTED
+        self,
+        log: Path,
+        append: bool = False,
+        expected: RunTime = NOTHING_EXPECTED,
+        loudness: Loudness = Loudness.NORMAL,
     ) -> None:
         check_regular(log)
         self._log = log.open("a" if append else "w", encoding="utf-8")
-        self._console = Console(stderr=True, highlight=False, force_jupyter=False)
+        self._loudness, self._screen = loudness, Screen(loudness > Loudness.QUIET)
         self._begin, self._expected, self._after = time.perf_counter(), expected, 0.0
         self._course: _Course | None = None
         self._span, self._names = (0.0, 1.0), ""
@@ -60,15 +88,27 @@ class Reporter:
         self.warnings: list[str] = []
 
     def close(self) -> None:
+        self._screen.close()
         self._log.close()
 
-    def say(self, line: str) -> None:
-        """A line on the terminal and in the log."""
-        self._console.print(line, markup=False, soft_wrap=True)
-        self.log(line)
+    @property
+    def spent(self) -> float:
+        """Time since it began [s]."""
+        return time.perf_counter() - self._begin
+
+    def say(self, line: str, always: bool = False) -> None:
+        """A line on the terminal and in the log; ``always`` if it is asked to be quiet too."""
+        self._write(line)
+        if always or self._loudness > Loudness.QUIET:
+            console().print(line, markup=False, soft_wrap=True)
 
     def log(self, line: str) -> None:
-        """A line in the log only."""
+        """A line in the log only, unless it is asked to be verbose."""
+        self._write(line)
+        if self._loudness is Loudness.VERBOSE:
+            console().print(line, markup=False, soft_wrap=True)
+
+    def _write(self, line: str) -> None:
         self._log.write(f"{time.strftime('%H:%M:%S')} {line}\n")
         self._log.flush()
 
@@ -76,17 +116,18 @@ class Reporter:
         """A warning: said once, and kept for the summary."""
         if line not in self.warnings:
             self.warnings.append(line)
-            self.say(f"warning: {line}")
+            self.say(f"warning: {line}", always=True)
 
     @contextmanager
-    def stage(self, name: str) -> Iterator[None]:
-        """Show and time a stage; seconds of the same name add up."""
+    def stage(self, name: str, of: str = "") -> Iterator[Progress]:
+        """Show and time a stage; seconds of the same name add up.
+
+        What it gives may be told how many ``of`` its things are done, and how many there are.
+        """
         begin = time.perf_counter()
-        # One thing at a time can live on the screen.
-        shown = nullcontext() if self._course else self._console.status(name)
         try:
-            with shown:
-                yield
+            with self._screen.row(name) as row:
+                yield _Stage(name, of, row, None if self._screen.on else self.say)
         finally:
             spent = time.perf_counter() - begin
             self.seconds[name] = self.seconds.get(name, 0.0) + spent
@@ -96,17 +137,10 @@ class Reporter:
 
     @contextmanager
     def course(self, name: str) -> Iterator[None]:
-        """The long part of a run: a bar on the screen, where no stage is shown beside it.
-
-        :meth:`part` and :meth:`reached` tell how far it has got.
-        """
-        texts = (TextColumn(f"{{task.fields[{field}]}}", markup=False) for field in ("at", "left"))
-        columns = TextColumn(name), BarColumn(), next(texts), TimeElapsedColumn(), next(texts)
-        with Progress(*columns, console=self._console, transient=True) as bar:
-            task = bar.add_task(name, total=1.0, at="", left="")
-            spent = time.perf_counter() - self._begin
-            self._after = self._expected.after * max(1.0, spent / self._expected.begun)
-            self._course = _Course(name, bar, task, Forecast())
+        """The long part of a run: :meth:`part` and :meth:`reached` tell how far it has got."""
+        with self._screen.row(name) as row:
+            self._after = self._expected.after * max(1.0, self.spent / self._expected.begun)
+            self._course = _Course(name, row, Forecast())
             try:
                 yield
             finally:
@@ -148,19 +182,25 @@ class Reporter:
         if self._course:
             self._course.forecast.go_on()
 
+    def doing(self, text: str) -> None:
+        """What the long part is about just now, to be seen on the screen."""
+        if self._course:
+            self._course.row.doing(text)
+
     def reached(self, share: float, text: str = "") -> None:
         """About so large a ``share`` of the present part is done; ``text`` says how far that is."""
         course, (begin, end) = self._course, self._span
         if course is None:
             return
         course.forecast.reach(begin + (end - begin) * share)
-        course.bar.update(course.task, completed=course.forecast.share)
+        at = f"{self._names}{text}".rstrip(": ")
         if course.forecast.left is None:
+            course.row.show(course.forecast.share, at, "")
             return
         to_go = self._blended(course.forecast.left, course.forecast.share) + self._after
-        at, told = f"{self._names}{text}".rstrip(": "), f"about {in_words(to_go)} to go"
-        course.bar.update(course.task, at=at, left=told)
-        whole, before = time.perf_counter() - self._begin + to_go, course.told
+        told = f"about {in_words(to_go)} to go"
+        course.row.show(course.forecast.share, at, told)
+        whole, before = self.spent + to_go, course.told
         least = FIRST_STEP if course.forecast.steps == 1 else FIRST_WORK
         if course.forecast.measured < least or whole < SHORT_RUN:
             return
@@ -178,7 +218,7 @@ class _Telling(logging.Handler):
         self._reporter = reporter
 
     def emit(self, record: logging.LogRecord) -> None:
-        self._reporter.say(record.getMessage())
+        self._reporter.say(record.getMessage(), always=record.levelno >= logging.WARNING)
 
 
 @contextmanager

@@ -9,6 +9,9 @@ from workflow.shell.analysis import Run
 from workflow.shell.quantities import Quantity
 from workflow.shell.versions import versions
 
+# Stages whose seconds are told at the end; all of them are in the summary.
+MOST_STAGES = 3
+
 
 def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> None:
     """Write the summary of a run, which marks it as finished, and say how it ended.
@@ -33,9 +36,12 @@ def finish(run: Run[Any], numbers: Mapping[str, Any], lines: Iterable[str]) -> N
     run.folder.discard_state()
     for line in lines:
         reporter.say(line)
-    reporter.say(
+    reporter.log(
         f"  seconds: {', '.join(f'{name} {value:.1f}' for name, value in seconds.items())}"
     )
+    longest = sorted(seconds.items(), key=lambda item: -item[1])[:MOST_STAGES]
+    most = ", ".join(f"{name} {value:.1f}" for name, value in longest)
+    reporter.say(f"  took {reporter.spent:.1f} s, most of it: {most}")
 
 
 class QuantityError(ValueError):

@@ -19,6 +19,7 @@ from workflow.runs.run import kept_in
 from workflow.shell.folder import OutputFolder
 from workflow.shell.lock import locked
 from workflow.shell.reporter import Reporter, telling
+from workflow.shell.screen import Loudness
 from workflow.shell.store import write_text
 from workflow.shell.versions import versions
 from workflow.sweep.design import Run, runs_of
@@ -32,7 +33,13 @@ MOST_LINES = 10
 
 
 def run_sweep(
-    path: Path, out: Path, *, processes: int | None, dask: str | None, force: bool
+    path: Path,
+    out: Path,
+    *,
+    processes: int | None,
+    dask: str | None,
+    force: bool,
+    loudness: Loudness = Loudness.NORMAL,
 ) -> bool:
     """Run the sweep in file ``path`` into ``out``; False if any of its runs failed.
 
@@ -47,7 +54,8 @@ def run_sweep(
         finished = _check_runs(sweep, runs, out / RUNS, force)
         write_text(folder.reserve(FILE, "the sweep as run"), text)
         (out / RUNS).mkdir(exist_ok=True)
-        with closing(Reporter(folder.reserve(LOG, "what it said, and when"), True)) as reporter:
+        log = folder.reserve(LOG, "what it said, and when")
+        with closing(Reporter(log, True, loudness=loudness)) as reporter:
             if gone:
                 reporter.say(gone)
             reporter.say(
@@ -59,6 +67,8 @@ def run_sweep(
             _write_summary(sweep, rows, folder)
             failed = sum(not row.done for row in rows)
             reporter.say(f"{len(rows) - failed} runs done, {failed} failed: {out / TABLE}")
+            if figures := sorted((out / FIGURES).iterdir()) if failed < len(rows) else []:
+                reporter.say(f"  figure    {figures[0]}")
     return failed == 0
 
 
@@ -120,15 +130,26 @@ def _run(
         ended[finished.job.name] = finished
         how = f"failed: {finished.error}" if finished.error else "done"
         spent = time.perf_counter() - begin
-        reporter.say(f"  {len(ended)}/{len(jobs)}, {spent:.0f} s: {finished.job.name}: {how}")
+        told = f"  {len(ended)}/{len(jobs)}, {spent:.0f} s: {finished.job.name}: {how}"
+        reporter.say(told, always=bool(finished.error))
         reporter.reached(len(ended) / len(jobs), f"{len(ended)} of {len(jobs)}")
         if len(ended) <= finished_before:
             reporter.goes_on()
 
+    def running(names: Sequence[str]) -> None:
+        reporter.doing(f"{len(ended)} of {len(jobs)}, now {', '.join(names)}")
+
     try:
         out = folder.root / RUNS
         with reporter.course("runs"), telling(reporter):
-            run_jobs(list(jobs.values()), out, processes=processes, dask=dask, report=report)
+            run_jobs(
+                list(jobs.values()),
+                out,
+                processes=processes,
+                dask=dask,
+                report=report,
+                running=running,
+            )
     finally:
         rows = [Row(run, ended[run.name]) for run in runs if run.name in ended]
         if rows:

@@ -7,6 +7,7 @@ kind of case, though both are written ``analysis: contact``.
 from __future__ import annotations
 
 from abc import abstractmethod
+from collections.abc import Iterator, Sequence
 from typing import Annotated, ClassVar, Generic, Literal, Self, TypeVar
 
 import numpy as np
@@ -15,9 +16,11 @@ from pydantic import Discriminator, Field, Tag, model_validator
 from sa_solver.types import Array, Grid
 from sa_solver.types import Material as ElasticMaterial
 from workflow.analyses.contact.load_table import LoadTable, conflict, ramps
+from workflow.case.doubts import heights, hertz, pressed, uneven_cells
 from workflow.case.fields import File, Quantity, Whole
 from workflow.case.input_files import InputFileError, read_heights
 from workflow.case.loading import word_at
+from workflow.case.plain import between, of_bodies, plain
 from workflow.case.sections import (
     Case,
     ElasticBody,
@@ -182,6 +185,22 @@ def elastic(body: Body) -> ElasticMaterial:
     return RIGID if body == "rigid" else body.elastic()
 
 
+def unworn_contact(
+    shape: Section, bodies: Sequence[ElasticBody | str], load: float, line: bool
+) -> tuple[float, float] | None:
+    """Width [mm] and largest pressure [MPa] of a ball or cylinder, None for other shapes."""
+    radius = getattr(shape, "radius", None)
+    compliance = sum(
+        (1.0 - body.elastic().poisson ** 2) / body.elastic().young
+        for body in bodies
+        if isinstance(body, ElasticBody)
+    )
+    if radius is None or compliance == 0.0:
+        return None
+    half_width, pressure = hertz(load, radius, 1.0 / compliance, line)
+    return 2.0 * half_width, pressure
+
+
 # --- loads --------------------------------------------------------------------------------------
 
 
@@ -277,6 +296,15 @@ class LegsOrFile(Section, Generic[LegT]):
             return LoadTable(read_columns(self.file, quantities))
         targets = {key: [getattr(leg, key) for leg in self.legs] for key in quantities}
         return LoadTable(ramps(targets, [leg.increments for leg in self.legs], self.closed))
+
+    def ranges(self) -> Iterator[str]:
+        """Between which values each load goes, from none."""
+        (leg,) = sections_of(type(self).model_fields["legs"].annotation)
+        units = {name: quantity.unit for name, quantity in quantities_of(leg).items()}
+        for name, values in self.table().columns.items():
+            low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
+            upwards = f"up to {plain(high, units[name])}"
+            yield f"{name} {upwards if low == 0.0 else between(low, high, units[name])}"
 
     def place(self, row: int) -> str:
         """The entry that says how long increment ``row`` is."""
@@ -394,14 +422,34 @@ class BodiesCase(Case):
     def outline(self) -> list[tuple[str, str]]:
         table, grid = self.load_path.table(), self.contact.centred()
         (nx, ny), (dx, dy) = grid.shape, grid.pitch
-        kind, cells = "no structure", f"{nx} x {ny} cells of {dx:.4g} x {dy:.4g} mm"
+        kind = "no structure"
+        cells = f"{nx} x {ny} cells of {plain(dx, 'mm', 4)} x {plain(dy, 'mm', 4)}"
         if grid.line:
-            kind, cells = "line contact", f"{nx} strips of {dx:.4g} mm"
+            kind, cells = "line contact", f"{nx} strips of {plain(dx, 'mm', 4)}"
+        count = f"{len(table)} increment{'s' if len(table) > 1 else ''}"
         return [
             ("structure", f"{self.structure.shape}, {kind}"),
-            ("load path", f"{len(table)} increments of {', '.join(table.columns)}"),
+            ("load path", f"{count} of {', '.join(table.columns)}"),
+            ("loads", ", ".join(self.load_path.ranges())),
+            *of_bodies("material", self.materials),
+            ("friction", f"{self.friction.coefficient:g}"),
             ("contact", f"{cells}, history {self.contact.history}"),
         ]
+
+    def doubts(self) -> Iterator[str]:
+        grid, loads = self.contact.centred(), self.load_path.table().columns
+        sides = grid.shape[0] * grid.pitch[0], grid.shape[1] * grid.pitch[1]
+        if grid.line:
+            sides = sides[0], sides[0]
+        else:
+            yield from uneven_cells(sides, grid.shape)
+        if isinstance(self.structure, Heights):
+            yield from heights("structure.file", self.structure.gap_on(grid), sides)
+        elif "P" in loads and (load := float(loads["P"].max())) > 0.0:
+            bodies = self.materials.body_1, self.materials.body_2
+            if found := unworn_contact(self.structure, bodies, load, grid.line):
+                limits = [getattr(body, "yield_stress", None) for body in bodies]
+                yield from pressed("load_path", found[1], limits)
 
 
 class ContactCase(BodiesCase):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
@@ -17,8 +18,10 @@ from workflow.analyses.wear.case.sections import (
     TwoBodies,
     TwoMaterials,
 )
-from workflow.analyses.wear.case.worn_bodies import BodyWear, WornByArchard
+from workflow.analyses.wear.case.worn_bodies import BodyWear, WornByArchard, wearing
+from workflow.case.doubts import pressed
 from workflow.case.fields import Quantity, Whole
+from workflow.case.plain import of_bodies, plain, shares
 from workflow.case.sections import (
     Case,
     Friction,
@@ -222,19 +225,35 @@ class SpecimensCase(Case):
     def outline(self) -> list[tuple[str, str]]:
         form, wear = self.structure.form, self.wear
         pad = self.structure.strip_width
-        shape = "flat" if form is None else f"radii {form.along:g} and {form.across:g} mm"
+        shape = "flat"
+        if form is not None:
+            shape = f"radii {plain(form.along, 'mm')} and {plain(form.across, 'mm')}"
         forces = ", ".join(f"{force:g}" for force in self.load_path.normal_forces)
         nodes = (self.mesh.pad_elements + 1) ** 2
-        end = f"{wear.energy:g} N mm" if wear.cycles is None else f"{wear.cycles:g} cycles"
+        end = f"{wear.cycles:g} cycles" if wear.cycles else f"{1e-3 * (wear.energy or 0.0):g} J"
         fraction, cycles = wear.step.fraction, wear.step.cycles
-        block = f"{fraction:.0%} of their limit" if cycles is None else f"{cycles:g} cycles"
+        block = f"{shares(fraction)} of their limit" if cycles is None else f"{cycles:g} cycles"
         cells = " x ".join(map(str, self.contact.grid))
         return [
             ("structure", f"specimens, pad {pad:g} x {pad:g} mm of {nodes} nodes, {shape}"),
-            ("load path", f"{forces} N, stroke {self.load_path.stroke:g} mm"),
+            ("load path", f"{forces} N, stroke {plain(self.load_path.stroke, 'mm')}"),
+            *of_bodies("material", self.materials),
+            ("friction", f"{self.friction.coefficient:g}"),
             ("contact", f"reduced specimens; beside them {cells} cells on a half-space"),
-            ("wear", f"{wear.law}, {end} each, in cycle blocks of {block}"),
+            *wearing({"body_1": wear.body_1, "body_2": wear.body_2}),
+            ("wear", f"{end} each, in cycle blocks of {block}"),
         ]
+
+    def doubts(self) -> Iterator[str]:
+        side = self.structure.strip_width
+        if self.load_path.stroke > side:
+            yield (
+                f"load_path.stroke: {plain(self.load_path.stroke, 'mm')}, longer than the pad, "
+                f"{plain(side, 'mm')}: is its unit right?"
+            )
+        limits = [body.yield_stress for body in (self.materials.body_1, self.materials.body_2)]
+        for index, force in enumerate(self.load_path.normal_forces):
+            yield from pressed(f"load_path.normal_forces.{index}", force / side**2, limits)
 
     @model_validator(mode="after")
     def _reported_forces_run(self) -> SpecimensCase:

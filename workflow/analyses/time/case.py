@@ -15,6 +15,7 @@ from workflow.analyses.rig.structure import ReducedBody, Rig, driven_place, refu
 from workflow.analyses.wear.case.evolution import PositiveEnergy, TotalEnergy
 from workflow.analyses.wear.case.sections import Cycles
 from workflow.case.fields import Quantity
+from workflow.case.plain import entries, plain, shares
 from workflow.case.sections import (
     Case,
     DottedPath,
@@ -144,8 +145,8 @@ class JointCase(TimeCase):
         drive = self.drive
         return [
             ("structure", "none: the joint alone"),
-            ("joint", joint_outline(self)),
-            ("drive", f"stroke {drive.stroke:g} mm at {drive.frequency:g} Hz"),
+            *joint_outline(self),
+            ("drive", f"stroke {plain(drive.stroke, 'mm')} at {drive.frequency:g} Hz"),
             ("ageing", ageing_outline(self.ageing)),
         ]
 
@@ -217,10 +218,10 @@ class RigCase(TimeCase):
     def outline(self) -> list[tuple[str, str]]:
         structure = self.structure
         rows = [
-            ("structure", f"{structure.text}, damping ratio {structure.damping_ratio:g}"),
-            ("joint", joint_outline(self)),
+            ("structure", f"{structure.text}, damping ratio {shares(structure.damping_ratio)}"),
+            *joint_outline(self),
             ("excitation", excitation_outline(self)),
-            ("steps", f"of {self.integration.step:g} s"),
+            ("steps", f"of {plain(self.integration.step, 's')}"),
         ]
         if self.ageing.wanted:
             rows.append(("ageing", ageing_outline(self.ageing)))
@@ -265,12 +266,15 @@ def check_within(energies: tuple[float, ...], ageing: Ageing) -> None:
         )
 
 
-def joint_outline(case: TimeCase) -> str:
-    """Law and normal load of the joint, and whether it evolves."""
+def joint_outline(case: TimeCase) -> list[tuple[str, str]]:
+    """The joint, whether it evolves, and where it is looked at."""
     evolves = "fixed" if case.evolution.is_empty else "evolving with energy"
     count = len(case.energies)
     looked_at = f"looked at {count} energies" if count > 1 else "looked at one energy"
-    return f"{case.joint.law} under {case.joint.normal_load:g} N, {evolves}, {looked_at}"
+    return [
+        ("joint", f"{case.joint.law}, {entries(case.joint)}"),
+        ("evolution", f"{evolves}, {looked_at}"),
+    ]
 
 
 def excitation_outline(case: RigCase) -> str:
@@ -281,7 +285,7 @@ def excitation_outline(case: RigCase) -> str:
         return f"{excitation.force:g} N at {excitation.frequency:g} Hz on {place}"
     if isinstance(excitation, Hammer):
         return (
-            f"blow of {excitation.force:g} N and {excitation.duration:g} s on {place}, "
+            f"blow of {excitation.force:g} N and {plain(excitation.duration, 's')} on {place}, "
             f"{excitation.record:g} s recorded"
         )
     return f"{excitation.file} on {place}"

@@ -20,6 +20,7 @@ from workflow.analyses.rig.structure import (
     refuse_missing_mass,
 )
 from workflow.case.fields import Entry, Quantity, Whole
+from workflow.case.plain import entries, shares
 from workflow.case.sections import Case, Section, Title, disagreement, entry
 from workflow.case.source import Source
 
@@ -201,7 +202,7 @@ class VibrationCaseBase(Case):
         resolution, harmonics = self.resolution, self.harmonics
         text = f"{len(harmonics)} harmonics to {harmonics[-1]}, {resolution.samples} samples"
         if resolution.tolerance is not None:
-            text += f", growing to a tolerance of {resolution.tolerance:g}"
+            text += f", growing to a tolerance of {shares(resolution.tolerance)}"
         return text
 
     @property
@@ -317,8 +318,8 @@ class VibrationCase(DrivenMass):
     def outline(self) -> list[tuple[str, str]]:
         structure, joint = self.structure, self.joint
         return [
-            ("structure", f"{structure.text}, damping ratio {structure.damping_ratio:g}"),
-            ("joint", f"{joint.law} under {joint.normal_load:g} N"),
+            ("structure", f"{structure.text}, damping ratio {shares(structure.damping_ratio)}"),
+            ("joint", f"{joint.law}, {entries(joint)}"),
             ("forces", self.driving),
             ("resolution", self.resolved),
         ]

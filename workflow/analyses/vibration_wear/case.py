@@ -21,6 +21,7 @@ from workflow.analyses.wear.case.sections import Cycles, PressingForce
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, Reciprocation
 from workflow.case.fields import Quantity
 from workflow.case.loading import YAML, CaseFile
+from workflow.case.plain import entries, shares
 from workflow.case.sections import OutputWithoutFields, Section, Title, disagreement, entry
 from workflow.case.source import Source
 
@@ -117,7 +118,7 @@ class VibrationWearCaseBase(VibrationCaseBase):
     def outline(self) -> list[tuple[str, str]]:
         structure, wear = self.structure, self.wear
         return [
-            ("structure", f"{structure.text}, damping ratio {structure.damping_ratio:g}"),
+            ("structure", f"{structure.text}, damping ratio {shares(structure.damping_ratio)}"),
             ("wear", f"{wear.cycles[-1]:g} cycles of {wear.force:g} N at {wear.frequency:g} Hz"),
             ("forces", self.driving),
             ("resolution", self.resolved),
@@ -169,4 +170,4 @@ class FrictionRigWearCase(VibrationWearCaseBase):
 
     def outline(self) -> list[tuple[str, str]]:
         joint = self.joint
-        return [*super().outline(), ("joint", f"{joint.law} under {joint.normal_load:g} N")]
+        return [*super().outline(), ("joint", f"{joint.law}, {entries(joint)}")]

@@ -17,7 +17,7 @@ import numpy as np
 from fe_models.elasticity import von_mises
 from sa_solver.subsurface import COMPONENTS
 from sa_solver.ties import first_largest
-from sa_solver.types import Array, Material
+from sa_solver.types import Array, Material, Progress
 from wear.bulk_stress import BulkStress
 from wear.life import Ruiz, findley, ruiz, smith_watson_topper
 from wear.tractions import CycleTractions
@@ -171,6 +171,7 @@ def contact_stresses(
     peak: int,
     contacts: Sequence[tuple[ContactStage, tuple[StressedCycle, StressedCycle]]],
     reporter: Reporter,
+    progress: Progress,
 ) -> list[InterfaceStress]:
     """Stress under all ``contacts`` as the case asks for it.
 
@@ -178,7 +179,10 @@ def contact_stresses(
     """
     unknown = [cycle.tractions.unknown for _, cycles in contacts for cycle in cycles]
     _report_stick(np.array(unknown), peak, reporter)
-    stresses = [_interface_stress(case, peak, *contact) for contact in contacts]
+    stresses = []
+    for number, contact in enumerate(contacts, 1):
+        stresses.append(_interface_stress(case, peak, *contact))
+        progress(number, len(contacts))
     for stress, (_, cycles) in zip(stresses, contacts, strict=True):
         if cycles[0].faces is None:
             reporter.log(f"{stress.name}: the stress under it is that of its tractions alone")

@@ -27,7 +27,7 @@ class RunLog(Observer):
     run: Run[WearCase]
     stages: list[ContactStage]
 
-    def stage(self, name: Stage) -> AbstractContextManager[None]:
+    def stage(self, name: Stage) -> AbstractContextManager[object]:
         return self.run.reporter.stage(name)
 
     def jumping(self, state: CoupledState, cycles: float) -> None:

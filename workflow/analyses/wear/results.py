@@ -9,12 +9,13 @@ from typing import Any
 import numpy as np
 
 from sa_solver.normal import NormalContactError
+from sa_solver.types import Progress
 from wear.coupled import KINETICS
 from wear.kinetics import LinearRegime
 from workflow.analyses.contact.datasets import LOADS, pressure_field, traction_fields
 from workflow.analyses.wear.body_stress import StressedCycle, with_known_shear
 from workflow.analyses.wear.budget.finding import error_budget
-from workflow.analyses.wear.budget.report import Budget, datasets_of, sentence, summary_of
+from workflow.analyses.wear.budget.report import Budget, datasets_of, sentences, summary_of
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.comparison import comparison_summary, write_comparison
 from workflow.analyses.wear.contact_loops import (
@@ -77,8 +78,8 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
     if isinstance(source, StructureStage):
         structure = worn_structure(source, stages, state, case.friction, folder, reporter)
         structure.warn(case.accuracy, reporter)
-    with reporter.stage("stress under the contacts"):
-        stresses = _stresses(outcome, structure, reporter)
+    with reporter.stage("stress under the contacts", "contacts") as told:
+        stresses = _stresses(outcome, structure, reporter, told)
     budget = error_budget(outcome, reporter)
     with reporter.stage("results"):
         recorded, contents = _write_results(outcome, structure, stresses, budget, run)
@@ -104,7 +105,7 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
 
 
 def _stresses(
-    outcome: Outcome, structure: WornStructure | None, reporter: Reporter
+    outcome: Outcome, structure: WornStructure | None, reporter: Reporter, progress: Progress
 ) -> list[InterfaceStress]:
     """Stress under every contact as the case asks for it; empty if it does not."""
     if not outcome.case.stress.wanted:
@@ -124,7 +125,7 @@ def _stresses(
             for moment, tractions, loads in zip(MOMENTS, found, (contact.unworn, worn), strict=True)
         )
         cycles.append((stage, (unworn, after)))
-    return contact_stresses(outcome.case, outcome.source.peak, cycles, reporter)
+    return contact_stresses(outcome.case, outcome.source.peak, cycles, reporter, progress)
 
 
 def _write_results(
@@ -344,9 +345,10 @@ def _lines(outcome: Outcome, summary: dict[str, Any], budget: Budget) -> Iterato
         name = contact.stage.name
         numbers, peaks = summary[name], summary[name]["peak_pressure"]
         yield (
-            f"  {name}: worn {numbers['depth_1'] * 1e3:.3g} um ({name_1}), "
-            f"{numbers['depth_2'] * 1e3:.3g} um ({name_2}); {numbers['volume_1']:.3g}, "
-            f"{numbers['volume_2']:.3g} {unit}; peak pressure {peaks['unworn']:.0f} -> "
-            f"{peaks['worn']:.0f} MPa; tilt {numbers['tilt']}"
+            f"  {name}: worn {numbers['depth_1'] * 1e3:.3g} um, {numbers['volume_1']:.3g} {unit} "
+            f"({name_1}); {numbers['depth_2'] * 1e3:.3g} um, {numbers['volume_2']:.3g} {unit} "
+            f"({name_2})"
         )
-        yield f"  {name}: estimated errors: {sentence(budget[name])}"
+        pressures = f"{peaks['unworn']:.0f} -> {peaks['worn']:.0f} MPa"
+        yield f"  {name}: peak pressure {pressures}; tilt {numbers['tilt']}"
+        yield from (f"  {name}: {told}" for told in sentences(budget[name]))

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import AbstractContextManager, nullcontext
 
 from fe_models.mesh import MeshError
 from sa_solver.normal import NormalContactError
+from sa_solver.types import Progress
 from wear.coupled import CoupledSettings, CoupledState, CoupledWear, JumpSize, Stop
 from wear.face_loads import FaceLoads
 from wear.interface import FirstContact, MotionError
@@ -72,9 +74,9 @@ def _compute(run: Run[WearCase]) -> Outcome:
     source = structure_of(case).source(case)
     faces = meshed_faces(case, source, reporter)
     with contact_workers(case, faces if _worn_apart(case, source) else ()) as workers:
-        with reporter.stage("condensation"):
+        with reporter.stage("condensation", "bodies") as told, _heard(source, told):
             source.prepare()
-        with reporter.stage("structural friction"):
+        with reporter.stage("structural friction", "increments") as told, _heard(source, told):
             unworn = source.unworn()
         if isinstance(source, StructureStage):
             _check_structure(case, source, reporter)
@@ -93,6 +95,11 @@ def _compute(run: Run[WearCase]) -> Outcome:
         for number, column in enumerate(zip(*columns, strict=True))
     ]
     return Outcome(case, source, state, interfaces)
+
+
+def _heard(source: LoadSource, progress: Progress) -> AbstractContextManager[None]:
+    """A structure of ours tells how far it is; of other sources nothing takes long."""
+    return source.heard(progress) if isinstance(source, StructureStage) else nullcontext()
 
 
 def _contacts(

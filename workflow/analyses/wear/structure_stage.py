@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Literal, Protocol, TypeVar
@@ -23,7 +24,7 @@ from fe_models.relinearised import (
 )
 from fe_models.stress import CycleStress, cycle_stress, deformation
 from fe_models.structure import CycleSolution, InterfaceHistory, Structure, mixed
-from sa_solver.types import Array, Indices
+from sa_solver.types import Array, Indices, Progress, unseen
 from workflow.analyses.wear.case.sections import Nonlinearity
 from workflow.analyses.wear.load_source import BODIES, ContactFace, UserFace
 from workflow.errors import MethodFailed
@@ -106,6 +107,16 @@ class StructureStage:
         self.peak = model.peak
         self.from_cache = False
         self._worn: tuple[Array, CycleSolution] | None = None
+        self._progress: Progress = unseen
+
+    @contextmanager
+    def heard(self, progress: Progress) -> Iterator[None]:
+        """What is costly of it tells ``progress`` how far it is."""
+        self._progress = progress
+        try:
+            yield
+        finally:
+            self._progress = unseen
 
     @cached_property
     def mesh(self) -> StructureMesh:
@@ -146,7 +157,7 @@ class StructureStage:
         joint = load_joint(key)
         self.from_cache = joint is not None
         if joint is None:
-            joint = self._linear.condense().resolvent()
+            joint = self._linear.condense(progress=self._progress).resolvent()
             save_joint(key, joint)
         return joint
 
@@ -284,7 +295,11 @@ class StructureStage:
         nodal = self._nodal_friction(friction)
         joint, gap = self._joint_of(nodal), self._gap(depths)
         amplitudes, preload = mission.amplitudes, mission.preload
-        return _converged(self.structure.solve_cycle(joint, amplitudes, gap, nodal, after, preload))
+        return _converged(
+            self.structure.solve_cycle(
+                joint, amplitudes, gap, nodal, after, preload, self._progress
+            )
+        )
 
     def stiffest(self, areas: Array) -> float:
         """Most that a change of gap raises pressures by, at nodes of such ``areas`` [MPa/mm]."""

@@ -223,7 +223,7 @@ def worn_structure(
 ) -> WornStructure:
     """Solve the worn structure, put the worn shape into its mesh and write that."""
     pairs = list(zip(contacts, state.interfaces, strict=True))
-    with reporter.stage("structural friction"):
+    with reporter.stage("structural friction", "increments") as told, stage.heard(told):
         cycle = stage.worn_cycle(
             [contact.nodal_depth(interface) for contact, interface in pairs],
             None
@@ -236,11 +236,10 @@ def worn_structure(
         written = _formed({"unworn": stage.mesh, "worn": mesh}, reporter)
         with replacing(folder.reserve("worn.msh", "the mesh with the worn faces")) as partial:
             write_msh(partial, written["worn"])
-    with reporter.stage("stress"):
-        stresses = {
-            "unworn": stage.stress(stage.mesh, stage.unworn_cycle),
-            "worn": stage.stress(mesh, cycle),
-        }
+    with reporter.stage("stress", "states") as told:
+        unworn = stage.stress(stage.mesh, stage.unworn_cycle)
+        told(1, 2)
+        stresses = {"unworn": unworn, "worn": stage.stress(mesh, cycle)}
     return WornStructure(stage, mesh, cycle, stresses, written)
 
 

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Generic, Literal
 
 import numpy as np
 
-from sa_solver.types import Array
+from sa_solver.types import Array, Progress, unseen
 from workflow.analyses.wear.budget.lives import (
     LIFE_FAILURES,
     STEPS,
@@ -86,16 +86,18 @@ class Companions(Generic[AnyWearCase]):
         source_of: Callable[[AnyWearCase], LoadSource],
         followed: Array,
         failed: Callable[[str, Exception], None],
+        progress: Progress = unseen,
     ) -> dict[str, Worn]:
         """Relative errors of what is worn and of pressures: by how much the run tells too much.
 
         What ``mesh``, ``grid`` and ``link`` leave, and under ``coupling`` loads that follow wear
         after such shares of all cycles as ``followed`` has. ``source`` is that of the case itself.
-        Parts of which a life fails are left out and given to ``failed``. Raises
-        :data:`LIFE_FAILURES` where that of ``own`` fails.
+        Parts of which a life fails are left out and given to ``failed``; ``progress`` is told how
+        many have been lived, that of ``own`` first. Raises :data:`LIFE_FAILURES` where that fails.
         """
-        errors = {}
-        for part, told in self._parts(source, source_of, followed).items():
+        errors, parts = {}, self._parts(source, source_of, followed)
+        for lived, (part, told) in enumerate(parts.items(), 1):
+            progress(lived, 1 + len(parts))
             try:
                 errors[part] = told()
             except LIFE_FAILURES as error:

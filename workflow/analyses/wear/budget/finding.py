@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from sa_solver.types import Array
+from sa_solver.types import Array, Progress, unseen
 from workflow.analyses.wear.budget.companions import Companions
 from workflow.analyses.wear.budget.lives import LIFE_FAILURES, Worn
 from workflow.analyses.wear.budget.parts import Errors, errors_of
@@ -19,8 +19,8 @@ Lives = dict[str, Worn]  # by part
 
 def error_budget(outcome: Outcome, reporter: Reporter) -> dict[str, Errors]:
     """Errors of the main results by interface, each by what leaves them."""
-    with reporter.stage("error budget"):
-        lives = lives_of_companions(outcome, reporter)
+    with reporter.stage("error budget", "short lives") as told:
+        lives = lives_of_companions(outcome, reporter, told)
         return {
             contact.stage.name: errors_of(
                 outcome.case,
@@ -32,7 +32,7 @@ def error_budget(outcome: Outcome, reporter: Reporter) -> dict[str, Errors]:
         }
 
 
-def lives_of_companions(outcome: Outcome, reporter: Reporter) -> Lives:
+def lives_of_companions(outcome: Outcome, reporter: Reporter, progress: Progress = unseen) -> Lives:
     """What companions tell; nothing where none are asked for, or of parts that fail."""
     case = outcome.case
     if case.error_budget == "known" or case.contact.method == "nodes":
@@ -44,7 +44,7 @@ def lives_of_companions(outcome: Outcome, reporter: Reporter) -> Lives:
         reporter.log(f"error budget: {part} unknown, a short life failed: {error}")
 
     try:
-        return companions.errors(source, structure.source, followed(outcome), failed)
+        return companions.errors(source, structure.source, followed(outcome), failed, progress)
     except LIFE_FAILURES as error:
         failed("mesh, grid and coupling", error)
         return {}

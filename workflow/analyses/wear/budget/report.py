@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -16,8 +16,8 @@ Budget = Mapping[str, Mapping[str, ResultError]]  # by interface and result
 # Pressure at the edges that wear makes, and stress below them, may be so many times farther off:
 # the finer the cells, the larger they are.
 AT_EDGES, EDGES = 5.0, ("worn_peak_pressure", "life")
-# Parts below this share of the total are not worth a word in a line.
-WORTH_TELLING = 0.1
+# So many parts are told in a line, and none below this share of the total.
+MOST_PARTS, WORTH_TELLING = 2, 0.1
 
 
 def summary_of(errors: Mapping[str, ResultError]) -> dict[str, Any]:
@@ -43,17 +43,27 @@ def _number(part: float | None) -> float:
     return np.nan if part is None else part
 
 
-def sentence(errors: Mapping[str, ResultError]) -> str:
-    """What is left of every result, and by what."""
-    return "; ".join(f"{RESULTS[name]} {_shown(error)}" for name, error in errors.items())
+def sentences(errors: Mapping[str, ResultError]) -> Iterator[str]:
+    """What is left of every result; the largest parts of what is farthest off, and unknown ones.
 
-
-def _shown(error: ResultError) -> str:
-    least = WORTH_TELLING * error.total
-    worth = [(name, part) for name, part in error.largest if part and abs(part) >= least]
-    parts = [f"{name} {part:{'+' if name in error.signed else ''}.1%}" for name, part in worth]
-    parts += [f"{name} unknown" for name in error.unknown]
-    return f"{error.total:.1%}" + (f" ({', '.join(parts)})" if parts else "")
+    All of them are in the summary.
+    """
+    if not errors:
+        return
+    told = ", ".join(f"{RESULTS[name]} {error.total:.1%}" for name, error in errors.items())
+    yield f"estimated errors: {told}"
+    worst = max(errors, key=lambda name: errors[name].total)
+    error = errors[worst]
+    parts = [
+        f"{name} {part:{'+' if name in error.signed else ''}.1%}"
+        for name, part in error.largest[:MOST_PARTS]
+        if part and abs(part) >= WORTH_TELLING * error.total
+    ]
+    unknown = dict.fromkeys(name for error in errors.values() for name in error.unknown)
+    largest = f"most of {RESULTS[worst]}: {', '.join(parts)}" if parts else ""
+    missing = f"unknown: {', '.join(unknown)}" if unknown else ""
+    if largest or missing:
+        yield "; ".join(filter(None, (largest, missing)))
 
 
 def warning_of(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from abc import abstractmethod
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from math import ceil, sqrt
 from typing import Any, ClassVar, Literal
 
@@ -20,8 +20,10 @@ from workflow.analyses.wear.case.sections import (
     Nonlinearity,
     Ratio,
 )
-from workflow.analyses.wear.case.worn_bodies import Worn
+from workflow.analyses.wear.case.worn_bodies import Worn, wearing
+from workflow.case.doubts import idle_steps, uneven_cells
 from workflow.case.fields import shown
+from workflow.case.plain import of_bodies, plain, shares
 from workflow.case.sections import Case, Section, Title, disagreement, entry
 
 # What the summary and the results call their own entries.
@@ -124,11 +126,33 @@ class WearCase(Case):
         plane = getattr(self.structure, "dimension", 3) == 2 or grid[1] == 1
         cells = f"{grid[0]} strips" if plane else f"{grid[0]} x {grid[1]} cells"
         steps = f"{wear.step.kind} steps, {wear.step_size}"
+        changes = "" if self.friction.evolution is None else ", changing with dissipated energy"
+        sides = self.face_sides()
+        pitch = [] if sides is None else [s / n for s, n in zip(sides, grid, strict=True)]
+        of = " x ".join(plain(size, "mm", 4) for size in pitch[: 1 if plane else 2])
         return [
             *self.loads_outline(),
-            ("contact", f"{cells}, {self.contact.method}"),
-            ("wear", f"{wear.law}, {wear.cycles:g} cycles, {steps}"),
+            *of_bodies("material", self.materials),
+            ("friction", f"{self.friction.coefficient:g}{changes}"),
+            ("contact", f"{cells}{f' of {of}' if of else ''}, {self.contact.method}"),
+            *wearing({name: self.wear_of(n) for n, name in enumerate(self.bodies, 1)}),
+            ("wear", f"{wear.cycles:g} cycles, {steps}"),
         ]
+
+    def face_sides(self) -> tuple[float, float] | None:
+        """What the contact grid covers along x and y [mm], where the case itself says it."""
+        return None
+
+    def doubts(self) -> Iterator[str]:
+        yield from idle_steps("wear.step.cycles", self.wear.step.cycles, self.wear.cycles)
+        if (sides := self.face_sides()) is not None:
+            yield from uneven_cells(sides, self.contact.grid)
+
+    @property
+    def yields(self) -> list[float | None]:
+        """Yield stresses of the bodies that have one [MPa]."""
+        bodies = [getattr(self.materials, name) for name in self.bodies]
+        return [getattr(body, "yield_stress", None) for body in bodies]
 
     @property
     def recoupling(self) -> Coupling:
@@ -164,7 +188,7 @@ class FiniteElementCase(WearCase):
         if any(self.legs):
             return f"{count} increments"
         return (
-            f"as many increments as leave {100 * self.wear.tolerance:g} % of depth, about "
+            f"as many increments as leave {shares(self.wear.tolerance)} of depth, about "
             f"{min(count, MOST_INCREMENTS)} and at most {MOST_INCREMENTS}"
         )
 

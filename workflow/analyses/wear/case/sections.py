@@ -16,6 +16,7 @@ from workflow.analyses.wear.case.worn_bodies import (
     with_laws,
 )
 from workflow.case.fields import Quantity, Whole
+from workflow.case.plain import plain, shares
 from workflow.case.sections import (
     ElasticBody,
     FaceCells,
@@ -216,14 +217,14 @@ class Duration(Section):
             jumps = ceil(self.cycles / step.cycles)
             return f"{step.cycles:g} cycles each: {jumps} jumps"
         if step.depth is not None:
-            return f"{step.depth:g} mm deep each"
+            return f"{plain(step.depth, 'mm')} deep each"
         if step.volume is not None:
             return f"{step.volume:g} mm^3 each"
         if step.fraction is not None:
-            return f"{step.fraction:g} of their stability limit each"
+            return f"{shares(step.fraction)} of their stability limit each"
         if self.depth_tolerance is not None:
-            return f"for an error of {self.depth_tolerance:g} mm"
-        return f"for an error of {self.tolerance:.2g} of the depth"
+            return f"for an error of {plain(self.depth_tolerance, 'mm')}"
+        return f"for an error of {shares(self.tolerance)} of the depth"
 
 
 class Laws(Section):

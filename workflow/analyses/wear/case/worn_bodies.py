@@ -15,6 +15,7 @@ from wear.laws import ArchardLaw, EnergyAmplitudeLaw, EnergyLaw, EvolvingLaw, We
 from workflow.analyses.wear.case.evolution import Evolution
 from workflow.case import units
 from workflow.case.fields import Quantity, shown
+from workflow.case.plain import alike, entries
 from workflow.case.sections import Length, Section, disagreement, entry
 
 # Metals wear 1e2 to 1e6 um^3 per joule; a forgotten unit gives 1e16.
@@ -30,6 +31,7 @@ LawName = Literal["energy", "energy_amplitude", "archard"]
 class Worn(Section):
     """What the wear of a body may have, whatever its law."""
 
+    law: str  # named first; each law narrows it to its own name
     evolution: Evolution | None = entry(
         "of the coefficient with dissipated energy; without it none", default=None
     )
@@ -184,6 +186,15 @@ class WornByArchard(Worn):
         assert self.coefficient is not None
         assert self.hardness is not None
         return ArchardLaw(self.coefficient, self.hardness)
+
+
+def wearing(bodies: Mapping[str, Worn]) -> list[tuple[str, str]]:
+    """Rows of an outline with the law of each body, by name, and its coefficients."""
+    texts = {}
+    for name, body in bodies.items():
+        changes = "" if body.evolution is None else ", changing with dissipated energy"
+        texts[name] = f"{body.law}, {entries(body)}{changes}"
+    return alike("wear law", texts)
 
 
 class _LawMayBeLeftOut:

@@ -6,6 +6,7 @@ kind of case, though both are written ``analysis: wear`` and ``kind: bodies``.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from math import inf
 from typing import Annotated, ClassVar, Generic, Literal, Self
 
@@ -31,11 +32,15 @@ from workflow.analyses.contact.case import (
     elastic,
     require_shape,
     touches_along_a_line,
+    unworn_contact,
 )
 from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import Contact, PressingForce, Wear
+from workflow.case.doubts import heights, long_stroke, pressed
 from workflow.case.fields import Quantity, Whole
+from workflow.case.input_files import read_heights
+from workflow.case.plain import plain
 from workflow.case.sections import GridCells, Length, LineCells, Section, Title, disagreement, entry
 from workflow.case.source import Source
 
@@ -265,6 +270,13 @@ class BodiesWearCase(WearCase):
             ("load path", _in_words(self.load_path, "N")),
         ]
 
+    def face_sides(self) -> tuple[float, float]:
+        return self.contact.size
+
+    def doubts(self) -> Iterator[str]:
+        yield from super().doubts()
+        yield from _doubts(self, self.contact.size, line=False)
+
 
 class LineBodiesWearCase(WearCase):
     """Two bodies that wear along a line, in plane strain: everything is per length of it."""
@@ -300,6 +312,13 @@ class LineBodiesWearCase(WearCase):
             ("structure", f"{self.structure.shape}, line contact"),
             ("load path", _in_words(self.load_path, "N/mm")),
         ]
+
+    def face_sides(self) -> tuple[float, float]:
+        return self.contact.size, 1.0
+
+    def doubts(self) -> Iterator[str]:
+        yield from super().doubts()
+        yield from _doubts(self, (self.contact.size, self.contact.size), line=True)
 
 
 def _check(case: BodiesWearCase | LineBodiesWearCase, size: tuple[float, float]) -> None:
@@ -365,5 +384,22 @@ def _in_words(path: LoadPath | LineLoadPath, force: str) -> str:
     table = path.table()
     steps = f"{len(table)} increments, tilt {path.tilt}"
     if isinstance(path, Reciprocation | LineReciprocation):
-        return f"{path.P:g} {force}, stroke {path.stroke:g} mm in {steps}"
-    return f"{', '.join(path.table().columns)} in {steps}"
+        return f"{plain(path.P, force)}, stroke {plain(path.stroke, 'mm')} in {steps}"
+    return f"{', '.join(path.ranges())} in {steps}"
+
+
+def _doubts(
+    case: BodiesWearCase | LineBodiesWearCase, sides: tuple[float, float], line: bool
+) -> Iterator[str]:
+    """About a load and a stroke against the contact that they make, and heights of a file."""
+    bodies = case.materials.body_1, case.materials.body_2
+    table, simple = case.load_path.table(), isinstance(case.load_path, Stroke)
+    load = max(table.columns["P"]) if "P" in table.columns else 0.0
+    found = unworn_contact(case.structure, bodies, load, line) if load > 0.0 else None
+    if found is not None:
+        width, pressure = found
+        stroke = float(np.hypot(*[np.ptp(table[name]) for name in SHIFTS]))
+        yield from pressed(f"load_path{'.P' if simple else ''}", pressure, case.yields)
+        yield from long_stroke(f"load_path{'.stroke' if simple else ''}", stroke, width)
+    if isinstance(case.structure, Heights):
+        yield from heights("structure.file", read_heights(case.structure.file), sides)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from math import cos, pi, radians, sin, tan
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
@@ -19,7 +19,9 @@ from workflow.analyses.wear.case.sections import (
     check_rows,
     check_shares,
 )
+from workflow.case.doubts import pressed
 from workflow.case.fields import AUTO, Auto, OrAuto, Quantity, Whole
+from workflow.case.plain import plain, shares
 from workflow.case.sections import Length, RoundingRadius, Section, disagreement, entry
 
 if TYPE_CHECKING:
@@ -282,11 +284,37 @@ class DovetailCase(FiniteElementCase):
         rows = [
             ("structure", f"dovetail in {self.structure.dimension}-D, {nodes} nodes on a flank"),
             ("load path", f"{self.increments_outline}{peak}{missions}"),
+            ("peak load", ", ".join(self._peak_loads())),
         ]
         if self.fidelity == "auto":
-            by_probes = f"2-D or 3-D and how fine, by probes: {100 * self.accuracy:g} %"
+            by_probes = f"2-D or 3-D and how fine, by probes: {shares(self.accuracy)}"
             rows.append(("fidelity", by_probes))
         return rows
+
+    def _peak_loads(self) -> Iterator[str]:
+        """What loads the blade at the peak of its heaviest mission."""
+        heaviest = self.load_path.missions()[self.load_path.heaviest]
+        yield plain(heaviest["rotation_speed"], "rad/s")
+        mass, radius = self.load_path.airfoil_mass, self.load_path.airfoil_radius
+        yield f"airfoil {plain(mass, 't')} at {plain(radius, 'mm')}: {plain(self._pull, 'N', 4)}"
+        if moment := heaviest["aerodynamic_moment"]:
+            yield f"moment {plain(moment, 'N*mm')}"
+
+    @property
+    def _pull(self) -> float:
+        """Centrifugal force of the airfoil at the peak of the heaviest mission [N]."""
+        path = self.load_path
+        speed = path.missions()[path.heaviest]["rotation_speed"]
+        return float(path.airfoil_mass * path.airfoil_radius * speed**2)
+
+    def face_sides(self) -> tuple[float, float]:
+        return self.structure.face_width, self.structure.slot_length
+
+    def doubts(self) -> Iterator[str]:
+        yield from super().doubts()
+        width, length = self.face_sides()
+        pressure = self._pull / (2.0 * width * length * cos(self.structure.flank_angle))
+        yield from pressed("load_path", pressure, self.yields)
 
     @property
     def cores(self) -> int:

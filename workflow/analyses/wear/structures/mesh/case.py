@@ -34,6 +34,7 @@ from workflow.analyses.wear.structures.mesh.loads import (
 )
 from workflow.case.fields import AUTO, Auto, File, OrAuto, Whole
 from workflow.case.input_files import read_heights
+from workflow.case.plain import entries
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 if TYPE_CHECKING:
@@ -275,6 +276,10 @@ class MeshCase(FiniteElementCase):
             ("structure", f"{Path(structure.file).name}: {' and '.join(bodies)}"),
             *(("face", _outline_of(interface)) for interface in mesh.interfaces),
             ("load path", f"{self.increments_outline} in {len(self.legs)} legs{before}{cycles}"),
+            *(
+                ("load", f"{load.kind}: {entries(load, ('path', 'axis', 'through'))}")
+                for load in structure.loads
+            ),
         ]
 
     @model_validator(mode="after")

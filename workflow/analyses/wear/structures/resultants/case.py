@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, ClassVar, Literal
 
@@ -15,8 +16,10 @@ from workflow.analyses.wear.case.gaps import Gap, GapShape, check_cells, check_g
 from workflow.analyses.wear.case.sections import Contact, TwoBodies, Wear, check_rows
 from workflow.analyses.wear.structures.resultants.faces import FaceError
 from workflow.analyses.wear.structures.resultants.imported import ImportedLoads
+from workflow.case.doubts import pressed, uneven_cells
 from workflow.case.fields import File, OrAlone, Quantity, shown, split_dataset
 from workflow.case.input_files import InputFileError
+from workflow.case.plain import plain
 from workflow.case.sections import Length, Section, Title, disagreement, entry
 
 # How far x and normal may be from perpendicular: six printed digits.
@@ -225,7 +228,8 @@ class ResultantsCase(WearCase):
             *(
                 (
                     "face",
-                    f"{name}, P up to {imported.loads.P.max():g} {unit}, {self._shape(name)}, "
+                    f"{name}, P up to {plain(float(imported.loads.P.max()), unit)}, "
+                    f"{self._shape(name)}, "
                     f"tilt {imported.tilt}",
                 )
                 for name, imported in loads.items()
@@ -236,6 +240,16 @@ class ResultantsCase(WearCase):
         size, gap = self.structure.size_of(name), self.structure.gap_of(name)
         sides = f"{size[0]:g} mm" if self.structure.line else f"{size[0]:g} x {size[1]:g} mm"
         return f"{sides}, {'heights of the file' if gap is None else gap.shape}"
+
+    def doubts(self) -> Iterator[str]:
+        yield from super().doubts()
+        for name, imported in self.loads().items():
+            x, y = sides = self.structure.size_of(name)
+            yield from pressed(
+                "structure.file", float(imported.loads.P.max()) / (x * y), self.yields
+            )
+            if not self.structure.line:
+                yield from uneven_cells(sides, self.cells)
 
     @model_validator(mode="after")
     def _loads_can_be_used(self) -> ResultantsCase:

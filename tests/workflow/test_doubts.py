@@ -1,0 +1,176 @@
+"""Doubts about values that can be but hardly are meant, and the scene as ``check`` tells it."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Iterator
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import get_origin
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from sa_solver.reference.hertz import HertzCylinder, HertzSphere
+from workflow.case.doubts import SQUARE, USUAL, doubts_of, hertz, uneven_cells
+from workflow.case.fields import Quantity
+from workflow.case.plain import between, plain
+from workflow.case.sections import Section, entry_of, sections_of
+from workflow.cli import cli
+from workflow.kinds import kinds, load_case, template
+
+CASES = sorted(Path("cases").glob("*.yaml"))
+
+
+@pytest.mark.parametrize("path", CASES, ids=lambda path: path.stem)
+def test_nothing_is_doubted_of_our_cases(path: Path) -> None:
+    assert list(doubts_of(load_case(path))) == []
+
+
+@pytest.mark.parametrize("kind", kinds())
+def test_nothing_is_doubted_of_templates(kind: str, template_files: Path, tmp_path: Path) -> None:
+    shutil.copytree(template_files, tmp_path, dirs_exist_ok=True)
+    path = tmp_path / "mine.yaml"
+    path.write_text(template(kind), encoding="utf-8")
+    assert list(doubts_of(load_case(path))) == []
+
+
+SLIPS = [
+    # A unit forgotten, or another than was meant.
+    ("dovetail", "materials.blade.young=210 MPa", "210 MPa; usual: 0.3 to 1300 GPa; 210 GPa meant"),
+    ("dovetail", "materials.blade.young=0.115", "115 kPa; usual"),
+    ("dovetail", "materials.blade.poisson=0.03", "0.03; usual: 0.1 to 0.5; 0.3 meant?"),
+    ("dovetail", "materials.disk.density=4.43e-9 kg/m^3", "4.43e-09 t/mm^3 meant?"),
+    ("dovetail", "materials.disk.density=4.43 kg/m^3", "500 to 23000 kg/m^3; 4.43 g/cm^3 meant?"),
+    ("dovetail", "materials.disk.yield_stress=0.9 MPa", "0.9 GPa meant?"),
+    ("dovetail", "friction.coefficient=1.5", "friction.coefficient: 1.5; usual: 0.02 to 1.2"),
+    ("dovetail", "friction.coefficient=0.004", "0.04 meant?"),
+    ("joint", "joint.friction=9", "9 % meant?"),
+    ("dovetail", "load_path.rotation_speed=6000 rad/s", "6000 rpm meant?"),
+    ("dovetail", "load_path.airfoil_mass=0.8 t", "800 kg; usual: 0.005 to 100 kg; 0.8 kg meant?"),
+    ("dovetail", "load_path.airfoil_mass=0.8 g", "0.8 kg meant?"),
+    ("dovetail", "wear.blade.coefficient=0.5 mm^3/J", "5e+08 um^3/J; usual: 1 to 1e+07 um^3/J"),
+    ("dovetail", "wear.blade.coefficient=1e-14", "0.01 um^3/J; usual"),
+    ("dovetail", "stress.life.depth=1.5 mm", "1.5 um meant?"),
+    ("bodies_wear", "load_path.stroke=50", "50 um meant?"),
+    ("bodies_wear", "structure.radius=1 um", "1 mm meant?"),
+    # Loads against what carries them.
+    ("dovetail", "load_path.airfoil_mass=80 kg", "load_path: presses with"),
+    ("bodies", "load_path.legs.0.P=4e7", "75 times the yield stress"),
+    ("bodies_wear", "load_path.P=50 kN", "load_path.P: presses with about 7.25e+03 MPa, 8 times"),
+    ("line", "load_path.legs.0.P=1e7", "times the yield stress"),
+    ("line_wear", "load_path.P=50 kN/mm", "times the yield stress"),
+    ("specimens", "load_path.normal_forces=[17 kN]", "load_path.normal_forces.0: presses with"),
+    # Lengths against each other, and cycles.
+    ("specimens", "load_path.stroke=14 mm", "longer than the pad, 1 mm"),
+    ("line_wear", "load_path.stroke=20 mm", "times the width of the contact"),
+    ("dovetail", "contact.grid=[512, 16]", "175 times longer than wide"),
+    ("bodies", "contact.grid=[512, 16]", "32 times longer than wide"),
+    ("dovetail", "wear.step.cycles=1e6", "1e+06 cycles, of 300000 in all: one jump"),
+]
+
+
+def told_of(kind: str, slip: str, folder: Path) -> list[str]:
+    path = folder / "mine.yaml"
+    path.write_text(template(kind), encoding="utf-8")
+    return list(doubts_of(load_case(path, [slip, *BESIDE.get(slip, ())])))
+
+
+# What else has to be changed for a case to be valid.
+BESIDE = {
+    "load_path.stroke=20 mm": ("contact.size=40 mm",),
+    "load_path.stroke=50": ("wear.motion=neglect",),
+}
+
+
+@pytest.mark.parametrize(("kind", "slip", "words"), SLIPS, ids=[slip for _, slip, _ in SLIPS])
+def test_a_slip_is_doubted(kind: str, slip: str, words: str, tmp_path: Path) -> None:
+    """By the entry that it is in, on one line."""
+    told = [doubt for doubt in told_of(kind, slip, tmp_path) if words in doubt]
+    assert told, told_of(kind, slip, tmp_path)
+    assert slip.split(".")[0] in told[0]
+    assert "\n" not in told[0]
+
+
+@pytest.mark.parametrize(("scale", "words"), [(1e3, "are they in um?"), (1e-3, "are they in m?")])
+def test_heights_in_another_unit_are_doubted(scale: float, words: str, tmp_path: Path) -> None:
+    """A micrometre of roughness, and a paraboloid below it, on a face of a millimetre."""
+    x = np.linspace(-0.5, 0.5, 16)
+    heights = 1e-3 * np.sin(20.0 * x)[:, None] + np.zeros((16, 16))
+    np.save(tmp_path / "gap.npy", heights)
+    heights_case = ["structure={kind: bodies, shape: heights, file: gap.npy}"]
+    slip = "contact={grid: [16, 16], size: [1 mm, 1 mm]}"
+    path = tmp_path / "mine.yaml"
+    path.write_text(template("bodies"), encoding="utf-8")
+    assert list(doubts_of(load_case(path, [*heights_case, slip]))) == []
+    np.save(tmp_path / "gap.npy", scale * heights)
+    (told,) = doubts_of(load_case(path, [*heights_case, slip]))
+    assert words in told
+
+
+def test_all_that_is_usual_is_usual_of_some_entry() -> None:
+    """By its path and its unit: no pattern is misspelt."""
+    leaves = {(path, unit) for kind in kinds().values() for path, unit in quantities_of(kind)}
+    for usual in USUAL:
+        assert any(unit == usual.unit and fnmatchcase(path, usual.path) for path, unit in leaves)
+
+
+def quantities_of(model: type[Section], path: str = "") -> Iterator[tuple[str, str | None]]:
+    """Dotted paths of all quantities that a model may have, and their units."""
+    for name, field in model.model_fields.items():
+        if isinstance(quantity := entry_of(field), Quantity):
+            yield f"{path}{name}", quantity.unit
+        listed = "0." if get_origin(field.annotation) is tuple else ""
+        for section in sections_of(field.annotation):
+            yield from quantities_of(section, f"{path}{name}.{listed}")
+
+
+def test_contacts_are_those_of_hertz() -> None:
+    sphere, cylinder = HertzSphere(50.0, 10.0, 6e4), HertzCylinder(50.0, 10.0, 6e4)
+    ball = sphere.contact_radius, sphere.peak_pressure
+    roller = cylinder.half_width, cylinder.peak_pressure
+    assert hertz(50.0, 10.0, 6e4, line=False) == pytest.approx(ball, rel=1e-12)
+    assert hertz(50.0, 10.0, 6e4, line=True) == pytest.approx(roller, rel=1e-12)
+
+
+def test_cells_are_uneven_beyond_a_limit() -> None:
+    assert list(uneven_cells((1.0, 1.0), (16, int(16 * SQUARE)))) == []
+    assert list(uneven_cells((1.0, 1.0), (16, int(16 * SQUARE) + 1))) != []
+    assert list(uneven_cells((1.0, 1.0), (4096, 1))) == []
+
+
+def test_a_check_tells_the_scene_and_doubts_and_still_is_right() -> None:
+    slip = "materials.blade.young=210 MPa"
+    told = CliRunner().invoke(cli, ["check", "cases/dovetail.yaml", "--set", slip])
+    assert told.exit_code == 0
+    for words in (
+        "6000 rpm, airfoil 0.8 kg at 400 mm: 126.3 kN",
+        "disk: young 115 GPa, poisson 0.29, density 4430 kg/m^3, yield stress 900 MPa",
+        "wear law   disk and blade: energy, coefficient 10000 um^3/J",
+        "cells of 85.94 um x 0.2344 mm",
+        "\ndoubt: materials.blade.young: 210 MPa",
+    ):
+        assert words in told.stdout
+
+
+@pytest.mark.parametrize(
+    ("number", "unit", "said"),
+    [
+        (115e3, "MPa", "115 GPa"),
+        (4.43e-9, "t/mm^3", "4430 kg/m^3"),
+        (0.014, "mm", "14 um"),
+        (0.0, "mm", "0 mm"),
+        (0.0, "t/mm^3", "0 kg/m^3"),
+        (-30e3, "N*mm", "-30 N*m"),
+        (628.318530718, "rad/s", "6000 rpm"),
+        (0.25, "1", "0.25"),
+        (3.0, "mm/s^2", "3 mm/s^2"),
+    ],
+)
+def test_numbers_are_said_in_plain_units(number: float, unit: str, said: str) -> None:
+    assert plain(number, unit) == said
+
+
+def test_a_range_is_said_in_one_unit() -> None:
+    assert between(-120.0, 60.0, "N/mm") == "-120 to 60 N/mm"

@@ -1,0 +1,195 @@
+"""Values that a case may have, but hardly is meant to: most of them a forgotten or mistaken unit.
+
+What is usual is told here, by entry, wider than anything that machines, rigs or laboratories have.
+What two entries say together is the business of each kind of case (``Case.doubts``).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from math import pi, sqrt
+
+import numpy as np
+from pydantic import BaseModel
+
+from sa_solver.types import Array
+from workflow.case.fields import Quantity
+from workflow.case.plain import between, plain, said_in
+from workflow.case.sections import Case, entry_of
+
+# Cells so many times longer than wide waste most of them.
+SQUARE = 5.0
+# Pressures below this [MPa], and beyond so many times the yield stress, are none of a test.
+WEAK, BEYOND = 1e-3, 5.0
+# Strokes over so many widths of the contact are rare even where wear is wanted.
+LONG = 50.0
+# Heights that rise by more than this share of a face are no roughness, nor are those of less [mm].
+STEEP, FINE = 0.3, 1e-5
+
+
+@dataclass(frozen=True)
+class Usual:
+    """What is usual of the entries whose dotted paths match: from ``low`` to ``high``, base unit.
+
+    A value 0 says that there is none of it, and is not doubted.
+    """
+
+    path: str
+    unit: str
+    low: float
+    high: float
+
+
+USUAL = (
+    # From soft polymers to diamond; rubber is not the business of half-spaces.
+    Usual("materials.*.young", "MPa", 300.0, 1.3e6),
+    Usual("materials.*.poisson", "1", 0.1, 0.5),
+    Usual("materials.*.density", "t/mm^3", 5e-10, 2.3e-8),
+    Usual("materials.*.yield_stress", "MPa", 2.0, 2e4),
+    Usual("friction.coefficient", "1", 0.02, 1.2),
+    Usual("joint.friction", "1", 0.02, 1.2),
+    # Metals wear 1e2 to 1e6 um^3 per joule.
+    Usual("wear.*.[ck]*", "1/MPa", 1e-12, 1e-5),
+    Usual("wear.*.coefficient", "1", 1e-9, 3e-2),
+    Usual("wear.*.hardness", "MPa", 100.0, 1e5),
+    Usual("wear.cycles", "1", 1.0, 1e11),
+    # 100 to 25,000 rpm.
+    Usual("*.rotation_speed", "rad/s", 10.0, 2600.0),
+    Usual("structure.loads.*.speed", "rad/s", 10.0, 2600.0),
+    Usual("load_path.airfoil_mass", "t", 5e-6, 0.1),
+    Usual("*.stroke", "mm", 1e-5, 30.0),
+    Usual("*.amplitude", "mm", 1e-6, 10.0),
+    Usual("structure.radius", "mm", 0.01, 1e5),
+    Usual("structure.radius_*", "mm", 0.01, 1e5),
+    Usual("structure.half_width", "mm", 0.005, 100.0),
+    Usual("structure.flank_length", "mm", 0.5, 200.0),
+    Usual("structure.slot_length", "mm", 1.0, 1000.0),
+    Usual("structure.rim_radius", "mm", 20.0, 2000.0),
+    Usual("structure.strip_width", "mm", 0.05, 50.0),
+    Usual("*.frequency", "Hz", 1e-4, 1e5),
+    Usual("stress.life.depth", "mm", 1e-3, 1.0),
+)
+
+# Units that a number may be meant in, the likeliest first, and their sizes in the base unit.
+MEANT: dict[str, tuple[tuple[str, float], ...]] = {
+    "MPa": (("GPa", 1e3), ("Pa", 1e-6), ("kPa", 1e-3)),
+    "t/mm^3": (("kg/m^3", 1e-12), ("g/cm^3", 1e-9), ("t/mm^3", 1.0)),
+    "rad/s": (("rpm", pi / 30.0),),
+    "t": (("kg", 1e-3),),
+    "mm": (("mm", 1.0), ("um", 1e-3), ("m", 1e3), ("nm", 1e-6)),
+    "N": (("N", 1.0), ("kN", 1e3)),
+    "Hz": (("kHz", 1e3), ("Hz", 1.0)),
+    "1": (("%", 0.01),),
+}
+
+
+def doubts_of(case: Case) -> Iterator[str]:
+    """A line for each value that is hardly meant, by itself or beside others."""
+    yield from _unusual(case)
+    yield from case.doubts()
+
+
+def _unusual(case: Case) -> Iterator[str]:
+    """A line for each entry that has an unusual value: what it is, what is usual, what is meant."""
+    for path, number, quantity in _quantities(case):
+        usual = next(
+            (u for u in USUAL if u.unit == quantity.unit and fnmatchcase(path, u.path)), None
+        )
+        if usual is None or number == 0.0 or usual.low <= abs(number) <= usual.high:
+            continue
+        value, range_text = plain(number, usual.unit), between(usual.low, usual.high, usual.unit)
+        yield f"{path}: {value}; usual: {range_text}{_question(abs(number), usual)}"
+
+
+def _quantities(section: BaseModel, path: str = "") -> Iterator[tuple[str, float, Quantity]]:
+    """All numbers that a section gives, with their places."""
+    for name, field in type(section).model_fields.items():
+        value, quantity = getattr(section, name), entry_of(field)
+        items = enumerate(value) if isinstance(value, tuple) else [("", value)]
+        for index, item in items:
+            place = f"{path}{name}" + (f".{index}" if index != "" else "")
+            if isinstance(item, BaseModel):
+                yield from _quantities(item, f"{place}.")
+            elif isinstance(quantity, Quantity) and isinstance(item, float):
+                yield place, float(item), quantity
+
+
+def _question(number: float, usual: Usual) -> str:
+    """What may have been meant, as a question; nothing where no other unit makes it usual."""
+    for written in (number / said_in(number, usual.unit)[0], number):
+        for unit, size in MEANT.get(usual.unit, ()):
+            if usual.low <= written * size <= usual.high and written * size != number:
+                return f"; {written:.6g} {unit} meant?"
+    for factor in (0.1, 10.0) if usual.unit == "1" else ():
+        if usual.low <= factor * number <= usual.high:
+            return f"; {factor * number:.6g} meant?"
+    return ""
+
+
+def uneven_cells(sides: tuple[float, float], cells: tuple[int, int]) -> Iterator[str]:
+    """A doubt about a grid over a face whose cells are far from square, unless it is a line."""
+    if 1 in cells:
+        return
+    dx, dy = (side / count for side, count in zip(sides, cells, strict=True))
+    ratio = max(dx / dy, dy / dx)
+    if ratio > SQUARE:
+        yield (
+            f"contact.grid: cells of {plain(dx, 'mm', 4)} x {plain(dy, 'mm', 4)}, "
+            f"{ratio:.0f} times longer than wide; usual: nearly square"
+        )
+
+
+def pressed(path: str, pressure: float, yields: Iterable[float | None]) -> Iterator[str]:
+    """A doubt about a load that presses with ``pressure`` [MPa] on bodies that yield at these."""
+    if 0.0 < pressure < WEAK:
+        yield f"{path}: presses with about {plain(pressure, 'MPa', 3)} at most: is its unit right?"
+    limits = [limit for limit in yields if limit is not None]
+    if limits and pressure > BEYOND * min(limits):
+        yield (
+            f"{path}: presses with about {plain(pressure, 'MPa', 3)}, "
+            f"{pressure / min(limits):.0f} times the yield stress: is its unit right?"
+        )
+
+
+def hertz(load: float, radius: float, modulus: float, line: bool) -> tuple[float, float]:
+    """Half width of contact [mm] and largest pressure [MPa] of a ball, or a cylinder along a line.
+
+    As :mod:`sa_solver.reference.hertz` has them, which takes too long to load for a check.
+    """
+    if line:
+        half_width = sqrt(4.0 * load * radius / (pi * modulus))
+        return half_width, 2.0 * load / (pi * half_width)
+    half_width = (0.75 * load * radius / modulus) ** (1.0 / 3.0)
+    return half_width, 1.5 * load / (pi * half_width**2)
+
+
+def long_stroke(path: str, stroke: float, width: float) -> Iterator[str]:
+    """A doubt about a stroke over a contact of such a width [mm]."""
+    if stroke > LONG * width:
+        yield (
+            f"{path}: {plain(stroke, 'mm')}, {stroke / width:.0f} times the width of the contact, "
+            f"about {plain(width, 'mm', 3)}: is its unit right?"
+        )
+
+
+def heights(path: str, values: Array, sides: tuple[float, float]) -> Iterator[str]:
+    """A doubt about the heights of a file over a face with such sides [mm]."""
+    reach = float(np.ptp(values))
+    if reach > STEEP * min(sides):
+        other = "um"
+    elif 0.0 < reach < FINE:
+        other = "m"
+    else:
+        return
+    yield (
+        f"{path}: heights over {plain(reach, 'mm', 3)} on {plain(min(sides), 'mm')}; "
+        f"they are read in mm: are they in {other}?"
+    )
+
+
+def idle_steps(path: str, step: float | None, cycles: float) -> Iterator[str]:
+    """A doubt about a wear step of more cycles than all."""
+    if step is not None and step > cycles:
+        yield f"{path}: {step:g} cycles, of {cycles:g} in all: one jump; usual: ten or more"

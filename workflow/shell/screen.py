@@ -1,0 +1,102 @@
+"""What goes on, live at the foot of a terminal: a row for each thing that is being done.
+
+Where stderr is no terminal there is nothing to see of it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from contextlib import contextmanager
+from enum import IntEnum
+from functools import cache
+
+from rich.console import Console, RenderableType
+from rich.progress import BarColumn, Progress, ProgressColumn, TaskID, TextColumn, TimeElapsedColumn
+from rich.table import Column
+
+# Seconds before a row is worth being looked at.
+BRIEF = 0.3
+BAR_WIDTH = 20
+
+
+class Loudness(IntEnum):
+    """What is said on the terminal; the log has everything."""
+
+    QUIET = 0  # errors and warnings
+    NORMAL = 1
+    VERBOSE = 2  # all that goes to the log
+
+
+@cache
+def console() -> Console:
+    """That of stderr: one for all, for a run within a run has its rows below those around it."""
+    return Console(stderr=True, highlight=False, force_jupyter=False)
+
+
+class Row:
+    """One thing that is being done: how far that is, as a bar and in words."""
+
+    def __init__(self, rows: Progress, task: TaskID) -> None:
+        self._rows, self._task = rows, task
+
+    def show(self, share: float, at: str, left: str) -> None:
+        """``share`` of it is done: how far ``at`` that is, and how long what is ``left`` takes."""
+        self._rows.update(self._task, total=1.0, completed=share, at=at, left=left)
+
+    def doing(self, at: str) -> None:
+        """No more of it is done than before."""
+        self._rows.update(self._task, at=at)
+
+
+class _Rows(Progress):
+    """The first row where there is no other, and those that are there for a while.
+
+    What is done at once would only flicker.
+    """
+
+    def get_renderables(self) -> Iterable[RenderableType]:
+        lasting = [task for task in self.tasks[1:] if (task.elapsed or 0.0) > BRIEF]
+        yield self.make_tasks_table(lasting or self.tasks[:1])
+
+
+class Screen:
+    """The rows of a run; nothing is shown if it is not ``on``."""
+
+    def __init__(self, on: bool) -> None:
+        self._rows = _Rows(*_columns(), console=console(), transient=True, expand=True)
+        self._between = self._rows.add_task("working", total=None, at="", left="")
+        self._on = on and console().is_terminal
+        if self._on:
+            self._rows.start()
+
+    @property
+    def on(self) -> bool:
+        """Whether rows can be seen."""
+        return self._on
+
+    @contextmanager
+    def row(self, name: str) -> Iterator[Row]:
+        """A row as long as something of this ``name`` is being done."""
+        task = self._rows.add_task(name, total=None, at="", left="")
+        try:
+            yield Row(self._rows, task)
+        finally:
+            self._rows.remove_task(task)
+            self._rows.reset(self._between)
+
+    def close(self) -> None:
+        """Nothing is left on the terminal."""
+        if self._on:
+            self._rows.stop()
+
+
+def _columns() -> tuple[ProgressColumn, ...]:
+    """Name, bar, seconds, how far, how long; what is too long for the terminal is cut."""
+    cut = Column(ratio=1, no_wrap=True, overflow="ellipsis")
+    return (
+        TextColumn("{task.description}", markup=False),
+        BarColumn(BAR_WIDTH),
+        TimeElapsedColumn(),
+        TextColumn("{task.fields[at]}", markup=False, table_column=cut),
+        TextColumn("{task.fields[left]}", markup=False),
+    )
