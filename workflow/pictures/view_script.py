@@ -21,8 +21,9 @@ SCENE: dict[str, Any] = {}
 SIZE, SHARE = (1800, 1100), 0.1
 # Times that ranges of colours are taken from, at most; lines are so many pixels wide.
 TIMES, LINE = 12, 6
-# Where to cut the window for so many views: each place is cut in two, beside or below each other.
-CUTS = {1: "", 2: "|", 3: "|-", 4: "|--"}
+# How to cut the window for so many views: place by place, beside or below each other. The halves of
+# place n are 2n + 1 and 2n + 2.
+CUTS = {1: (), 2: ("0|",), 3: ("0|", "2-"), 4: ("0|", "1-", "2-")}
 
 
 def folder() -> Path:
@@ -134,22 +135,34 @@ class View:
 COLOURED: dict[str, tuple[float, float]] = {}
 
 
+def cut_window(count: int) -> tuple[Any, list[Any]]:
+    """The window, or a page of it, cut for so many views, and these."""
+    empty = simple.GetActiveView() and not simple.GetSources()
+    window = simple.GetLayout() if empty else simple.CreateLayout()
+    places = {0}
+    for place, how in CUTS[count]:
+        split = window.SplitHorizontal if how == "|" else window.SplitVertical
+        first = split(int(place), 0.5)
+        places = places - {int(place)} | {first, first + 1}
+    views = []
+    for place in sorted(places):
+        view = window.GetView(place)
+        if view is None:
+            view = simple.CreateRenderView()
+            window.AssignView(place, view)
+        views.append(view)
+    return window, views
+
+
 def main() -> None:
     """Build the views, go to the time to begin with, and write the picture that is asked for."""
     simple.LoadPalette("WhiteBackground")
     here = folder()
     opened: dict[str, Series] = {}
-    window = simple.CreateLayout(SCENE["title"])
-    places = [0]
-    for cut in CUTS[len(SCENE["views"])]:
-        place = places.pop(0)
-        split = window.SplitHorizontal if cut == "|" else window.SplitVertical
-        first = split(place, 0.5)
-        places += [first, first + 1]
+    window, places = cut_window(len(SCENE["views"]))
     views = []
-    for place, wanted in zip(sorted(places), SCENE["views"]):  # noqa: B905
-        view = View(simple.CreateView("RenderView"), wanted["title"])
-        simple.AssignViewToLayout(view=view.view, layout=window, hint=place)
+    for place, wanted in zip(places, SCENE["views"]):  # noqa: B905
+        view = View(place, wanted["title"])
         for shown in wanted["shown"]:
             if shown["file"] not in opened:
                 opened[shown["file"]] = Series(here / shown["file"])
