@@ -23,7 +23,12 @@ SIZE, SHARE = (1800, 1100), 0.1
 TIMES, LINE = 12, 6
 # How to cut the window for so many views: place by place, beside or below each other. The halves of
 # place n are 2n + 1 and 2n + 2.
-CUTS = {1: (), 2: ("0|",), 3: ("0|", "2-"), 4: ("0|", "1-", "2-")}
+CUTS: dict[int, list[tuple[int, str]]] = {
+    1: [],
+    2: [(0, "|")],
+    3: [(0, "|"), (2, "-")],
+    4: [(0, "|"), (1, "-"), (2, "-")],
+}
 
 
 def folder() -> Path:
@@ -112,7 +117,7 @@ class View:
         """Title and time."""
         title = simple.Text(registrationName=self._title, Text=self._title)
         label = simple.Show(title, self.view)
-        label.WindowLocation, label.FontSize = "Upper Center", 18
+        label.WindowLocation, label.FontSize = "Upper Center", 16
         if len(series.times) > 1:
             text = f"{time_is.replace(' [1]', '')}: {{time:g}}"
             time = simple.AnnotateTimeFilter(Input=series.reader, Format=text)
@@ -142,14 +147,14 @@ def cut_window(count: int) -> tuple[Any, list[Any]]:
     places = {0}
     for place, how in CUTS[count]:
         split = window.SplitHorizontal if how == "|" else window.SplitVertical
-        first = split(int(place), 0.5)
-        places = places - {int(place)} | {first, first + 1}
+        first = split(place, 0.5)
+        places = places - {place} | {first, first + 1}
     views = []
-    for place in sorted(places):
-        view = window.GetView(place)
+    for number in sorted(places):
+        view = window.GetView(number)
         if view is None:
             view = simple.CreateRenderView()
-            window.AssignView(place, view)
+            window.AssignView(number, view)
         views.append(view)
     return window, views
 

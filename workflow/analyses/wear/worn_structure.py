@@ -229,16 +229,16 @@ def _mission(body: Body, surface: SurfaceHistory, shown: Sequence[int]) -> dict[
     seen = "surface of the body, or of all of it in the plane"
     largest = np.array([maximum_principal(stress) for stress in surface.stress])
     equivalent = von_mises(surface.stress.swapaxes(0, 1))
-    moved, equivalent, largest = (
-        field.astype(np.float32) for field in (surface.displacement, equivalent, largest)
-    )
+    fields = {
+        "displacement": (surface.displacement, "mm", "displacement in each increment"),
+        "von_mises": (equivalent, "MPa", "von Mises stress in each increment"),
+        "maximum_principal": (largest, "MPa", "largest principal stress in each increment"),
+    }
     return {
         "increments": Dataset(np.array(shown) + 1, "1", "increments, counted from 1"),
         "points": Dataset(body.points[surface.vertices], "mm", f"vertices of the {seen}"),
         "triangles": Dataset(surface.triangles, "1", f"triangles of the {seen}"),
-        "displacement": Dataset(moved, "mm", "displacement in each increment"),
-        "von_mises": Dataset(equivalent, "MPa", "von Mises stress in each increment"),
-        "maximum_principal": Dataset(largest, "MPa", "largest principal stress in each increment"),
+        **{name: Dataset(field.astype(np.float32), *of) for name, (field, *of) in fields.items()},
     }
 
 
