@@ -17,8 +17,9 @@ from paraview import simple
 
 SCENE: dict[str, Any] = {}
 
-# Pixels of a picture, and the share of what is shown that an exaggerated motion may take.
-SIZE, SHARE = (1800, 1100), 0.1
+# Pixels of a picture, the share of what is shown that an exaggerated motion may take, and the room
+# that is left for what stands beside it.
+SIZE, SHARE, ROOM = (1800, 1100), 0.1, 1.15
 # Times that ranges of colours are taken from, at most; lines are so many pixels wide.
 TIMES, LINE = 12, 6
 # How to cut the window for so many views: place by place, beside or below each other. The halves of
@@ -85,7 +86,9 @@ class View:
         source = series.reader
         if shown.get("warp"):
             largest = series.span(shown["warp"])[1]
-            factor = shown.get("factor") or self._factor(largest)
+            # Lengths are not made shorter than they are.
+            least = 1.0 if shown["warp"].endswith("[mm]") else 0.0
+            factor = shown.get("factor") or max(self._factor(largest), least)
             vectors = ["POINTS", shown["warp"]]
             source = simple.WarpByVector(Input=source, Vectors=vectors, ScaleFactor=factor)
             motion = shown["warp"].partition(" [")[0]
@@ -97,10 +100,10 @@ class View:
             self._colour(display, series, shown["colour"])
 
     def _factor(self, largest: float) -> float:
-        """1, 2 or 5 times a power of ten, at least 1, by which motion is well seen."""
+        """1, 2 or 5 times a power of ten by which motion is well seen."""
         wanted = SHARE * math.dist(self._extents, (0.0, 0.0, 0.0)) / largest if largest else 1.0
-        power = 10.0 ** math.floor(math.log10(max(wanted, 1.0)))
-        return max(step * power for step in (1, 2, 5) if step * power <= max(wanted, 1.0))
+        power = 10.0 ** math.floor(math.log10(wanted))
+        return max(step * power for step in (1, 2, 5) if step == 1 or step * power <= wanted)
 
     def _colour(self, display: Any, series: Series, name: str) -> None:
         simple.ColorBy(display, ("POINTS", name))
@@ -134,6 +137,9 @@ class View:
         self.view.CameraFocalPoint, self.view.CameraPosition = [0.0, 0.0, 0.0], away
         self.view.CameraViewUp, self.view.CameraParallelProjection = up, 1
         simple.ResetCamera(self.view)
+        # Where the view is narrower than high, ParaView looks at its height alone.
+        width, height = self.view.ViewSize
+        self.view.CameraParallelScale *= ROOM * max(1.0, height / max(width, 1))
 
 
 # Ranges of the colours of each array, which all views share.
@@ -177,11 +183,13 @@ def main() -> None:
     scene = simple.GetAnimationScene()
     scene.UpdateAnimationUsingDataTimeSteps()
     scene.AnimationTime = SCENE["begin"]
+    if len(sys.argv) > 1:
+        window.SetSize(*SIZE)
+    simple.RenderAllViews()
     for view in views:
         view.aim()
     simple.RenderAllViews()
     if len(sys.argv) > 1:
-        window.SetSize(*SIZE)
         simple.SaveScreenshot(sys.argv[1], window, ImageResolution=list(SIZE))
 
 

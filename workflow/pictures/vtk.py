@@ -28,6 +28,8 @@ Step = tuple[float, str, Path, Any]
 COMPONENTS = {3: ("X", "Y", "Z"), 6: ("XX", "YY", "ZZ", "XY", "YZ", "XZ")}
 # What the times of a series may be.
 CYCLES, INCREMENTS, SECONDS = "cycles [1]", "increment [1]", "time [s]"
+# The vectors that make a profile of the pressure on a line.
+PROFILE = "normal_traction [MPa]"
 
 
 @dataclass(frozen=True)
@@ -79,8 +81,14 @@ class FacePoints:
 
 
 def traction_fields(contact: h5py.Group, points: FacePoints) -> Fields:
-    """Pressure, shear and slip on a grid: global vectors, and ``face_`` components in the frame."""
-    fields: Fields = {"pressure": (points.of(contact["pressure"]), "MPa")}
+    """Pressure, shear and slip on a grid: global vectors, and ``face_`` components in the frame.
+
+    Of a line the pressure is a vector too, ``normal_traction``: warped by it, it is a profile.
+    """
+    pressure = points.of(contact["pressure"])
+    fields: Fields = {"pressure": (pressure, "MPa")}
+    if points.grid.line:
+        fields["normal_traction"] = points.normal(pressure), "MPa"
     for name, unit in (("shear", "MPa"), ("slip", "mm")):
         vectors, x, y = points.tangential(contact[name])
         fields[name] = vectors, unit

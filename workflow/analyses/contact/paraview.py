@@ -13,7 +13,14 @@ import h5py
 
 from workflow.analyses.contact.datasets import BODIES, Contents
 from workflow.pictures.view import FIRST, Scene, Shown, View, write_view
-from workflow.pictures.vtk import INCREMENTS, FacePoints, Step, traction_fields, write_series
+from workflow.pictures.vtk import (
+    INCREMENTS,
+    PROFILE,
+    FacePoints,
+    Step,
+    traction_fields,
+    write_series,
+)
 from workflow.shell.results import frame_of, grid_of
 
 VIEWS = {
@@ -23,12 +30,16 @@ VIEWS = {
 }
 
 
-def write_contact(_: Contents, file: h5py.File, folder: Path) -> list[Path]:
+def write_contact(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
     """Write the faces, their series over the increments, and the script; returns their paths."""
     written = write_series(folder / "contact.pvd", INCREMENTS, _faces(file, folder))
     states = file["contact"][BODIES].values()
     last = max(float(state.attrs["increment"]) for state in states)
-    views = [View(title, [Shown("contact.pvd", colour)]) for title, colour in VIEWS.items()]
+    warps = {"pressure [MPa]": PROFILE} if contents.line else {}
+    views = [
+        View(title, [Shown("contact.pvd", colour, warps.get(colour, ""))])
+        for title, colour in VIEWS.items()
+    ]
     scene = Scene(str(file.attrs["title"]), INCREMENTS, last, views)
     return [*written, write_view(scene, folder / FIRST)]
 

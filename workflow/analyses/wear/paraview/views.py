@@ -9,7 +9,7 @@ import h5py
 
 from workflow.analyses.wear.layout import Contents
 from workflow.pictures.view import FIRST, Scene, Shown, View, write_view
-from workflow.pictures.vtk import CYCLES, INCREMENTS
+from workflow.pictures.vtk import CYCLES, INCREMENTS, PROFILE
 
 DISPLACED = "displacement [mm]"
 VON_MISES = "von_mises [MPa]"
@@ -39,7 +39,8 @@ def _views_of_wear(contents: Contents, file: h5py.File) -> Iterator[View]:
         Shown(path, "depth [mm]", f"worn_{_wears_most(file, name)} [mm]") for name, path in series
     ]
     yield View("Worn depth of both bodies", worn)
-    pressure = [Shown(path, "pressure [MPa]") for _, path in series]
+    profile = PROFILE if contents.line else ""
+    pressure = [Shown(path, "pressure [MPa]", profile) for _, path in series]
     yield View("Contact pressure at peak load", pressure)
     if contents.sections:
         sections = [Shown(f"section_{name}.pvd", VON_MISES) for name in contents.names]
