@@ -15,6 +15,7 @@ from tests.workflow.conftest import CONTENTS, PEAK
 from tests.workflow.shown_files import check_arrays, check_scene
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.layout import Contents
+from workflow.analyses.wear.worn_structure import MOST_INCREMENTS, shown_increments
 from workflow.pictures.drawing import write_paraview
 from workflow.pictures.view import first_file
 from workflow.shell.results import frame_of, grid_of
@@ -248,6 +249,21 @@ def test_scripts_show_what_is_there(folder: Path, script: str) -> None:
 def test_first_file_is_the_script(folder: Path, tmp_path: Path) -> None:
     assert first_file(folder.parent) == folder / "view.py"
     assert first_file(tmp_path) is None
+
+
+@pytest.mark.parametrize(("count", "peak"), [(1, 0), (22, 8), (48, 47), (49, 1), (1000, 613)])
+def test_increments_that_are_shown(count: int, peak: int) -> None:
+    """All of them, or as many as are shown at most from first to last; peak load among them."""
+    shown = shown_increments(count, peak)
+    assert len(set(shown)) == len(shown) == min(count, MOST_INCREMENTS)
+    assert peak in shown
+    assert (shown[0], shown[-1]) == (0, count - 1)
+    assert np.diff(shown).max(initial=1) <= 2 * max(1.0, count / MOST_INCREMENTS) + 1
+
+
+def test_same_results_make_the_same_files(results: Path, folder: Path, tmp_path: Path) -> None:
+    for path in write_wear(CONTENTS, results, tmp_path):
+        assert path.read_bytes() == (folder / path.relative_to(tmp_path)).read_bytes(), path
 
 
 def test_run_that_wore_nothing_shows_each_thing_once(results: Path, tmp_path: Path) -> None:

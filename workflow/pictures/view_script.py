@@ -77,7 +77,8 @@ class View:
     """One view of the window: sources, each with its colours and its motion."""
 
     def __init__(self, view: Any, title: str) -> None:
-        self.view, self._title, self._extents = view, title, [0.0, 0.0, 0.0]
+        self.view, self._title = view, title
+        self._extents, self._moved = [0.0, 0.0, 0.0], False
         view.OrientationAxesVisibility = 1
 
     def show(self, series: Series, shown: dict[str, Any]) -> None:
@@ -91,6 +92,7 @@ class View:
             factor = shown.get("factor") or max(self._factor(largest), least)
             vectors = ["POINTS", shown["warp"]]
             source = simple.WarpByVector(Input=source, Vectors=vectors, ScaleFactor=factor)
+            self._moved = True
             motion = shown["warp"].partition(" [")[0]
             if factor != 1.0 and f"{motion} x" not in self._title:
                 self._title += f", {motion} x {factor:g}"
@@ -127,12 +129,12 @@ class View:
             simple.Show(time, self.view).WindowLocation = "Lower Left Corner"
 
     def aim(self) -> None:
-        """Look at what is shown from above and the side, or in its plane from the front."""
+        """Look at what is shown from above and the side, or straight at a plane that stays one."""
         flat = [extent < 1e-6 * max(self._extents) for extent in self._extents]
         away, up = [0.3, -0.7, 1.0], [0.0, 0.0, 1.0]
         if flat[1]:
             away = [0.0, -1.0, 0.0]
-        elif flat[2]:
+        elif flat[2] and not self._moved:
             away, up = [0.0, 0.0, 1.0], [0.0, 1.0, 0.0]
         self.view.CameraFocalPoint, self.view.CameraPosition = [0.0, 0.0, 0.0], away
         self.view.CameraViewUp, self.view.CameraParallelProjection = up, 1
