@@ -350,7 +350,7 @@ class StructureStage:
         return peak
 
     def stress(
-        self, mesh: StructureMesh, solution: CycleSolution, shown: Sequence[int]
+        self, mesh: StructureMesh, solution: CycleSolution, shown: Sequence[int] = ()
     ) -> CycleStress:
         """Stress of both bodies on the unworn or the worn mesh: at peak load, and those ``shown``.
 
