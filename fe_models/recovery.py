@@ -56,6 +56,21 @@ class StressRecovery:
         patches, vertices = self._patches, np.arange(self._elastic.body.mesh.nvertices)
         return self._of(displacement, vertices, patches, self._elastic.order + 1)
 
+    def histories(self, displacements: Array, vertices: Indices) -> Array:
+        """The same of several displacements ``(size, t)`` at some vertices, ``(t, 6, n)`` [MPa].
+
+        The fits are those of the vertices, whatever the displacements: all take them at once.
+        """
+        elastic, axes = self._elastic, list(self._elastic.body.axes)
+        count, d = displacements.shape[1], self._elastic.dimension
+        nodes = self._nodes_near(self._patches[vertices])
+        values = displacements.reshape(-1, d, count).swapaxes(1, 2).reshape(-1, count * d)
+        slopes = _gradients(elastic.nodes[:, axes], values, vertices, nodes, elastic.order + 1)
+        stress = np.empty((count, 6, len(vertices)))
+        for t, slope in enumerate(slopes.reshape(count, d, d, -1)):
+            stress[t] = self._of_slopes(slope, vertices)
+        return stress
+
     def alternatives(self, displacement: Array, vertices: Indices) -> Array:
         """The same at a few ``vertices`` by other fits, ``(k, 6, vertices)``: what is uncertain.
 
@@ -81,15 +96,23 @@ class StressRecovery:
         self, displacement: Array, vertices: Indices, elements: sp.csr_matrix, degree: int
     ) -> Array:
         """By a polynomial of a ``degree`` on so many rows of ``elements`` around ``vertices``."""
-        elastic, axes = self._elastic, list(self._elastic.body.axes)
+        points = self._elastic.nodes[:, list(self._elastic.body.axes)]
+        values = displacement.reshape(-1, self._elastic.dimension)
+        nodes = self._nodes_near(elements)
+        return self._of_slopes(_gradients(points, values, vertices, nodes, degree), vertices)
+
+    def _nodes_near(self, elements: sp.csr_matrix) -> sp.csr_matrix:
+        """Nodes of each row of ``elements``, in their order."""
         nodes = (elements @ self._nodes_of_elements).tocsr()
         nodes.sort_indices()
+        return nodes
+
+    def _of_slopes(self, slopes: Array, vertices: Indices) -> Array:
+        """Stress ``(6, n)`` of derivatives ``(d, d, n)`` of the displacement."""
+        axes = self._elastic.body.axes
         gradient = np.zeros((3, 3, len(vertices)))
-        gradient[np.ix_(axes, axes)] = _gradients(
-            elastic.nodes[:, axes], displacement.reshape(-1, elastic.dimension), vertices, nodes,
-            degree,
-        )  # fmt: skip
-        return self._without_tractions(elastic.cauchy(gradient), vertices)
+        gradient[np.ix_(axes, axes)] = slopes
+        return self._without_tractions(self._elastic.cauchy(gradient), vertices)
 
     @cached_property
     def _elements_of_vertices(self) -> sp.csr_matrix:
@@ -215,17 +238,17 @@ def _exponents(dimension: int, degree: int) -> Indices:
 def _gradients(
     points: Array, values: Array, vertices: Indices, nodes: sp.csr_matrix, degree: int
 ) -> Array:
-    """``(d, d, len(vertices))``: derivatives along axis b, the second, of component a of values.
+    """``(k, d, len(vertices))``: derivatives along axis b, the second, of component a of values.
 
     Fitted to the nodes in each row of ``nodes``, by as high a ``degree`` as they can tell;
-    ``points`` and ``values`` are ``(n, d)``.
+    ``points`` are ``(n, d)`` and ``values`` ``(n, k)``.
     """
-    d, exponents = points.shape[1], _exponents(points.shape[1], degree)
+    k, d, exponents = values.shape[1], points.shape[1], _exponents(points.shape[1], degree)
     regular = REGULAR * np.diag((exponents.sum(axis=1) > 1).astype(float))
     slopes = slice(1, d + 1)
     poor = np.zeros(len(vertices), bool)
     counts = np.diff(nodes.indptr)
-    gradient = np.empty((d, d, len(vertices)))
+    gradient = np.empty((k, d, len(vertices)))
     # Rows of like lengths together, filled up with nodes of no weight.
     order = np.argsort(counts, kind="stable")
     per_chunk = max(AT_ONCE // (len(exponents) * int(counts.max(initial=1))), 1)
@@ -245,9 +268,9 @@ def _gradients(
         right = weighted @ (values[near] - values[own])
         unit = np.broadcast_to(np.eye(len(exponents))[:, slopes], (len(part), len(exponents), d))
         solved = np.linalg.solve(normal, np.concatenate([right, unit], axis=2))[:, slopes]
-        gradient[:, :, part] = (solved[:, :, :d] / size[:, :, None]).transpose(2, 1, 0)
+        gradient[:, :, part] = (solved[:, :, :k] / size[:, :, None]).transpose(2, 1, 0)
         plane = np.linalg.inv(normal[:, : d + 1, : d + 1])[:, slopes, slopes]
-        inflated = np.linalg.solve(plane, solved[:, :, d:])
+        inflated = np.linalg.solve(plane, solved[:, :, k:])
         poor[part] = np.trace(inflated, axis1=1, axis2=2) > d * UNCERTAIN
     if poor.any() and degree > 1:
         gradient[:, :, poor] = _gradients(points, values, vertices[poor], nodes[poor], degree - 1)

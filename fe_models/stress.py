@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -99,28 +100,54 @@ def deformation(
 
 
 @dataclass(frozen=True)
+class SurfaceHistory:
+    """What is seen of a body over some increments: its surface, or all of it in the plane.
+
+    ``vertices`` ``(n,)`` are those of the body's mesh, ``triangles`` ``(m, 3)`` count among them;
+    ``displacement`` ``(t, n, 3)`` [mm], ``stress`` ``(t, 6, n)`` [MPa] as in :class:`StressField`.
+    """
+
+    vertices: Indices
+    triangles: Indices
+    displacement: Array
+    stress: Array
+
+
+@dataclass(frozen=True)
 class CycleStress:
     """Both bodies over a cycle: their ``fields`` at one increment, and how their faces move.
 
     ``faces`` are displacements ``(t, 3, n)`` [mm] of body 1 and body 2, by interface, in the frame
-    and at the nodes of that.
+    and at the nodes of that; ``surfaces`` both bodies in the increments that are shown, if any are.
     """
 
     fields: tuple[StressField, StressField]
     faces: tuple[tuple[Array, Array], ...]
+    surfaces: tuple[SurfaceHistory, ...]
 
 
 def cycle_stress(
-    structure: Structure, force: Array, relative: Array, amplitudes: Array, at: int
+    structure: Structure,
+    force: Array,
+    relative: Array,
+    amplitudes: Array,
+    at: int,
+    shown: Sequence[int] = (),
 ) -> CycleStress:
-    """Stress in increment ``at``, and the motion of the faces in every one.
+    """Stress in increment ``at`` and on the surface in those ``shown``; how the faces move in all.
 
     ``force`` ``(t, 3, n)``, ``relative`` ``(t, 3, n)`` and ``amplitudes`` ``(t, cases)`` as in
     :func:`deformation`.
     """
     every, forces, leads, follows = _motion(structure, force, relative, amplitudes)
-    of_body_2 = structure.body_2.recover(follows[:, at], forces[:, at], amplitudes[at])
-    displacements = every[:, at], of_body_2
+
+    def displacements_in(increments: int | list[int]) -> tuple[Array, Array]:
+        """Of both bodies ``(size, ...)`` in one increment or several."""
+        moved, acting = follows[:, increments], forces[:, increments]
+        of_body_2 = structure.body_2.recover(moved, acting, amplitudes[increments].T)
+        return every[:, increments], of_body_2
+
+    displacements = displacements_in(at)
     dimension = structure.body_1.elastic.dimension
     ends = np.cumsum([len(interface) for interface in structure.mesh.interfaces])[:-1]
     faces_1, faces_2 = (
@@ -131,7 +158,14 @@ def cycle_stress(
         stress_field(body.elastic, displacement, body.free_facets, body.nodes, body.clamped)
         for body, displacement in zip(structure.bodies, displacements, strict=True)
     )
-    return CycleStress((one, two), tuple(zip(faces_1, faces_2, strict=True)))
+    surfaces: tuple[SurfaceHistory, ...] = ()
+    if shown:
+        both = zip(structure.bodies, displacements_in(list(shown)), strict=True)
+        surfaces = tuple(
+            surface_history(body.elastic, displacement, body.free_facets)
+            for body, displacement in both
+        )
+    return CycleStress((one, two), tuple(zip(faces_1, faces_2, strict=True)), surfaces)
 
 
 def _motion(
@@ -190,6 +224,23 @@ def stress_field(
         stress=stress,
         peak=largest(np.arange(count)),
         notch=largest(untouched) if len(untouched) else None,
+    )
+
+
+def surface_history(elastic: ElasticBody, displacements: Array, free: Indices) -> SurfaceHistory:
+    """The surface of a body with displacements ``(size, t)``; nothing acts on the facets ``free``.
+
+    In the plane all of the body is seen.
+    """
+    mesh = elastic.body.mesh
+    cells = mesh.t if elastic.dimension == 2 else mesh.facets[:, mesh.boundary_facets()]
+    vertices, corners = np.unique(cells, return_inverse=True)
+    nodal = displacements.T.reshape(displacements.shape[1], -1, elastic.dimension)
+    return SurfaceHistory(
+        vertices=vertices,
+        triangles=corners.reshape(cells.shape).T,
+        displacement=np.array(in_space(nodal[:, vertices])),
+        stress=StressRecovery(elastic, free).histories(displacements, vertices),
     )
 
 

@@ -146,11 +146,12 @@ class SupportedBody:
     def recover(
         self, interface_displacement: Array, interface_forces: Array, amplitudes: Array
     ) -> Array:
-        """All displacements ``(d all,)`` for given interface displacements ``(d n,)``.
+        """All displacements ``(d all, ...)`` for given interface displacements ``(d n, ...)``.
 
-        Those that are held stay at zero, whatever is given. ``interface_forces`` ``(d n,)`` are the
-        forces on the body there, which must be those of the displacements; where these are of the
-        vertices themselves, nothing depends on them.
+        These, the forces and ``amplitudes`` ``(cases, ...)`` may have columns. Those that are held
+        stay at zero, whatever is given. ``interface_forces`` are the forces on the body there,
+        which must be those of the displacements; where these are of the vertices themselves,
+        nothing depends on them.
         """
         interface_displacement = interface_displacement[self._free]
         if self._springs is not None:
@@ -160,7 +161,7 @@ class SupportedBody:
         inner = np.setdiff1d(np.arange(stiffness.shape[0]), self._interface)
         rhs = loads[inner] @ amplitudes
         rhs -= stiffness[inner][:, self._interface] @ interface_displacement
-        displacement = np.empty(stiffness.shape[0])
+        displacement = np.empty((stiffness.shape[0], *rhs.shape[1:]))
         displacement[self._interface] = interface_displacement
         solve = prepare(stiffness[inner][:, inner].tocsr(), self._soft_motions()[inner])
         displacement[inner] = solve(rhs)

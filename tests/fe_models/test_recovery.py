@@ -65,6 +65,9 @@ def test_a_stress_of_the_elements_order_is_exact(dimension, order):
     few = np.array([0, 7, 17])
     wide = recovery.alternatives(displacement.ravel(), few)[0]
     np.testing.assert_allclose(wide, exact[:, few], atol=1e-7 * scale)
+    together = recovery.histories(np.outer(displacement.ravel(), [1.0, 0.0, -2.0]), few)
+    expected = np.multiply.outer([1.0, 0.0, -2.0], exact[:, few])
+    np.testing.assert_allclose(together, expected, atol=2e-7 * scale)
 
 
 def hole_stress(x, z, uniaxial):

@@ -134,7 +134,7 @@ def test_faces_move_over_a_cycle_as_the_bodies_do(structure, solved, symmetric, 
     """In every increment as far apart as given, and at peak load as all nodes of either body."""
     fields = solved(0.4, symmetric).fields()
     force, relative = fields["force"], fields["displacement"]
-    cycle = cycle_stress(structure, force, relative, symmetric.amplitudes(), PEAK)
+    cycle = cycle_stress(structure, force, relative, symmetric.amplitudes(), PEAK, [0, PEAK])
     start = 0
     for interface, (of_1, of_2) in zip(structure.mesh.interfaces, cycle.faces, strict=True):
         nodes = slice(start, start + len(interface))
@@ -144,8 +144,18 @@ def test_faces_move_over_a_cycle_as_the_bodies_do(structure, solved, symmetric, 
             expected = interface.frame.components(moved).T
             np.testing.assert_allclose(faces[PEAK], expected, atol=1e-9)
         start += len(interface)
-    for field, alone in zip(cycle.fields, peak[3], strict=True):
-        np.testing.assert_allclose(field.stress, alone.stress, atol=1e-6 * alone.von_mises.max())
+    for field, alone, seen in zip(cycle.fields, peak[3], cycle.surfaces, strict=True):
+        scale = alone.von_mises.max()
+        np.testing.assert_allclose(field.stress, alone.stress, atol=1e-6 * scale)
+        # The surface at peak load is that of the field.
+        on_surface = field.stress[:, seen.vertices]
+        np.testing.assert_allclose(seen.stress[1], on_surface, atol=1e-9 * scale)
+        moved = field.displacement[seen.vertices]
+        np.testing.assert_allclose(seen.displacement[1], moved, atol=1e-12)
+        assert np.abs(seen.stress[0]).max() < 0.5 * np.abs(on_surface).max()
+        mesh = field.body.mesh
+        facets = np.sort(seen.vertices[seen.triangles], axis=1).T
+        np.testing.assert_array_equal(facets, mesh.facets[:, mesh.boundary_facets()])
 
 
 @pytest.mark.parametrize("kind", ["MeshTet", "MeshTri"])

@@ -41,6 +41,7 @@ CONTENTS = Contents(
     structure=True,
     coarse=NAMES,
     comparison=True,
+    mission=True,
 )
 
 
@@ -169,7 +170,21 @@ def put_bodies(file: h5py.File) -> None:
             shift = 1e-3 * scale * points * [0.0, 0.0, 1.0]
             group = file.create_group(f"bodies/{body}/{state}")
             put(group, points=points, elements=mesh.cells.reshape(-1, 5)[:, 1:], displacement=shift)
-            put(group, von_mises=stress, maximum_principal=0.8 * stress)
+            tensor = np.multiply.outer(0.1 * np.arange(6.0), stress)
+            put(group, von_mises=stress, maximum_principal=0.8 * stress, stress=tensor)
+            put_mission(group, mesh, shift, stress)
+
+
+def put_mission(body: h5py.Group, mesh: Any, shift: Array, stress: Array) -> None:
+    """Its surface in some increments of a cycle, at the last of which it is unloaded."""
+    surface = mesh.extract_surface(algorithm="dataset_surface")
+    vertices, share = surface["vtkOriginalPointIds"], np.array([0.5, 1.0, 0.0])
+    group = body.create_group("mission")
+    moved, equivalent = (np.multiply.outer(share, field[vertices]) for field in (shift, stress))
+    put(group, increments=np.array([1, PEAK + 1, 22]), triangles=surface.regular_faces)
+    put(group, points=np.array(mesh.points)[vertices], displacement=moved.astype(np.float32))
+    put(group, von_mises=equivalent.astype(np.float32))
+    put(group, maximum_principal=(0.8 * equivalent).astype(np.float32))
 
 
 def fabricate(path: Path, shape: tuple[int, int] = (24, 40)) -> Path:

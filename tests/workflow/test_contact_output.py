@@ -12,6 +12,7 @@ from sa_solver.history import History
 from sa_solver.reference.mindlin import ShearedSphere
 from sa_solver.reference.torsion import TwistedSphere
 from sa_solver.types import Grid, Material
+from tests.workflow.shown_files import check_arrays, check_scene
 from workflow.analyses.contact import ANALYSIS, figures
 from workflow.analyses.contact.datasets import Contents
 from workflow.analyses.contact.load_table import LoadTable
@@ -301,16 +302,19 @@ def test_paraview_steps_through_the_increments(outcome, folder, tmp_path):
     reader = pv.PVDReader(tmp_path / "contact.pvd")
     assert reader.time_values == list(range(1, 2 + 3 * STEPS))
     reader.set_active_time_value(reader.time_values[-1])
-    (image,) = reader.read()
+    (face,) = reader.read()
     last = outcome.history.states[-1]
-    pressure = image.cell_data["pressure"].reshape(GRID.shape, order="F")
+    assert face.dimensions == (*GRID.shape, 1)
+    pressure = face.point_data["pressure [MPa]"].reshape(GRID.shape, order="F")
     np.testing.assert_allclose(pressure, last.traction[2], rtol=2e-7)
     np.testing.assert_allclose(
-        image.cell_data["shear"][:, 0], last.traction[0].ravel(order="F"), rtol=2e-7
+        face.point_data["shear [MPa]"][:, 0], last.traction[0].ravel(order="F"), rtol=2e-7
     )
+    check_arrays(tmp_path)
+    check_scene(tmp_path / "view.py")
 
 
-def test_line_has_no_maps_and_no_images(tmp_path):
+def test_line_has_no_maps_and_is_a_line(tmp_path):
     text = CASE.replace("sphere", "cylinder").replace(" N,", " N/mm,").replace(" N}", " N/mm}")
     case = parse_case(text.replace("[100, 90], size: [1 mm, 0.9 mm]", "64, size: 1 mm"), "c.yaml")
     grid = Grid.strips(1.0, 64)
@@ -323,7 +327,14 @@ def test_line_has_no_maps_and_no_images(tmp_path):
     folder.claim(case, force=False, resumable=False)
     write_contact_results(outcome, SimpleNamespace(kind="line", folder=folder))
     told = ANALYSIS.pictures, Contents(line=True, increments=len(states)), folder.results
-    assert write_paraview(*told, folder.root / "paraview") == []
+    shown = folder.root / "paraview"
+    write_paraview(*told, shown)
+    line = pv.PVDReader(shown / "contact.pvd").read()[0]
+    assert (line.n_lines, line.n_points) == (1, 64)
+    np.testing.assert_allclose(line.points[:, 0], grid.x.ravel())
+    assert line.length == pytest.approx(1.0 - 1.0 / 64)
+    check_arrays(shown)
+    check_scene(shown / "view.py")
     written = write_figures(*told, folder.root / "figures")
     assert {path.stem for path in written} == {"profiles", "forces"}
     with h5py.File(folder.results) as file:

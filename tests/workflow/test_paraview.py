@@ -11,15 +11,20 @@ import pytest
 import pyvista as pv
 
 from sa_solver.types import Array, Frame, Grid
-from tests.workflow.conftest import CONTENTS
+from tests.workflow.conftest import CONTENTS, PEAK
+from tests.workflow.shown_files import check_arrays, check_scene
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.layout import Contents
+from workflow.analyses.wear.worn_structure import MOST_INCREMENTS, shown_increments
 from workflow.pictures.drawing import write_paraview
+from workflow.pictures.view import first_file
 from workflow.shell.results import frame_of, grid_of
 
 SIZE = (10.0, 60.0)  # of the synthetic flanks [mm]
 INTERFACES = ("intrados", "extrados")
 SINGLE = 2e-7  # rounding of single precision
+TANGENTIAL = {"shear": "MPa", "slip": "mm"}
+NODAL = {"displacement": "mm", "von_mises": "MPa", "maximum_principal": "MPa"}
 
 
 @pytest.fixture(scope="module")
@@ -40,14 +45,34 @@ def local_centres(grid: Grid) -> Array:
     return np.stack([x, y, np.zeros(grid.shape)], axis=-1)
 
 
+def on_flank(grid: Grid) -> tuple[Array, Array]:
+    """Which rows and columns of the grid lie on the flank."""
+    on_x, on_y = (
+        np.abs(axis.ravel()) <= size / 2 for axis, size in zip((grid.x, grid.y), SIZE, strict=True)
+    )
+    return on_x, on_y
+
+
+def flank(folder: Path, name: str, jump: str) -> tuple[pv.StructuredGrid, tuple[int, int]]:
+    """A flank, and how many points it has along x and y."""
+    mesh = pv.read(folder / name / f"{jump}.vts")
+    return mesh, mesh.dimensions[:2]
+
+
+def test_arrays_have_units_and_no_nan(folder: Path) -> None:
+    check_arrays(folder)
+
+
 @pytest.mark.parametrize("name", INTERFACES)
 def test_flank_sits_at_its_place(results: Path, folder: Path, name: str) -> None:
-    image = pv.read(folder / name / "00000.vti")
+    mesh, shape = flank(folder, name, "00000")
     with h5py.File(results) as file:
         grid, frame = grid_and_frame(file, name)
-    expected = frame.origin + local_centres(grid) @ frame.axes
-    centres = image.cell_centers().points.reshape(*grid.shape[::-1], 3).swapaxes(0, 1)
-    np.testing.assert_allclose(centres, expected, atol=1e-4)
+    on_x, on_y = on_flank(grid)
+    expected = frame.origin + local_centres(grid)[on_x][:, on_y] @ frame.axes
+    points = mesh.points.reshape(*shape[::-1], 3).swapaxes(0, 1)
+    np.testing.assert_allclose(points, expected, atol=1e-10)
+    assert shape < grid.shape  # what the grid has beyond the flank is none of it
 
 
 @pytest.mark.parametrize("name", INTERFACES)
@@ -55,28 +80,46 @@ def test_flank_sits_at_its_place(results: Path, folder: Path, name: str) -> None
 def test_flank_fields_are_those_of_the_run(
     results: Path, folder: Path, name: str, jump: str
 ) -> None:
-    image = pv.read(folder / name / f"{jump}.vti")
+    mesh, shape = flank(folder, name, jump)
     with h5py.File(results) as file:
         grid, frame = grid_and_frame(file, name)
         contact, surface = file["contact"][name][jump], file["surfaces"][name][jump]
         unworn = file["surfaces"][name]["00000"]
-        scalars = {"pressure": contact["pressure"][()]}
+        scalars, normals = {"pressure [MPa]": contact["pressure"][()]}, {}
         for body in (1, 2):
-            height = scalars[f"height_{body}"] = surface[f"body_{body}"][()]
-            scalars[f"wear_depth_{body}"] = np.abs(height - unworn[f"body_{body}"][()])
-        scalars["wear_depth"] = scalars["wear_depth_1"] + scalars["wear_depth_2"]
-        vectors = {quantity: contact[quantity][()] for quantity in ("shear", "slip")}
+            height = normals[f"surface_{body} [mm]"] = surface[f"body_{body}"][()]
+            worn = normals[f"worn_{body} [mm]"] = height - unworn[f"body_{body}"][()]
+            scalars[f"depth_{body} [mm]"] = np.abs(worn)
+        scalars["depth [mm]"] = scalars["depth_1 [mm]"] + scalars["depth_2 [mm]"]
+        tangential = {f"{key} [{unit}]": contact[key][()] for key, unit in TANGENTIAL.items()}
+    on_x, on_y = on_flank(grid)
     for key, expected in scalars.items():
-        field = image.cell_data[key].reshape(grid.shape, order="F")
-        np.testing.assert_allclose(field, expected, rtol=SINGLE, err_msg=key)
-    for key, (x, y) in vectors.items():
-        components = frame.components(np.array(image.cell_data[key], dtype=float))
-        components = components.reshape(*grid.shape, 3, order="F")
-        scale = np.abs(x).max()
-        np.testing.assert_allclose(components[..., 0], x, atol=SINGLE * scale)
-        np.testing.assert_allclose(components[..., 1], y, atol=SINGLE * scale)
-        np.testing.assert_allclose(components[..., 2], 0.0, atol=SINGLE * scale)
-        np.testing.assert_allclose(image.cell_data[f"{key}_x"], x.ravel(order="F"), rtol=SINGLE)
+        field = mesh.point_data[key].reshape(shape, order="F")
+        np.testing.assert_allclose(field, expected[on_x][:, on_y], rtol=SINGLE, err_msg=key)
+    vectors = {key: (*field, 0.0 * field[0]) for key, field in tangential.items()}
+    vectors |= {key: (0.0 * field, 0.0 * field, field) for key, field in normals.items()}
+    for key, expected in vectors.items():
+        components = frame.components(np.array(mesh.point_data[key], dtype=float))
+        scale = max(np.abs(part).max() for part in expected)
+        for found, part in zip(components.T, expected, strict=True):
+            field = found.reshape(shape, order="F")
+            np.testing.assert_allclose(field, part[on_x][:, on_y], atol=SINGLE * scale)
+    for key, (x, _) in tangential.items():
+        along = mesh.point_data[f"face_{key.replace(' ', '_x ')}"]
+        np.testing.assert_allclose(along, x[on_x][:, on_y].ravel(order="F"), rtol=SINGLE)
+
+
+@pytest.mark.parametrize("name", INTERFACES)
+@pytest.mark.parametrize(("number", "body"), [(1, "disk"), (2, "blade")])
+def test_warped_flank_is_the_worn_surface(folder: Path, name: str, number: int, body: str) -> None:
+    mesh, _ = flank(folder, name, "00006")
+    warped = mesh.warp_by_vector(f"surface_{number} [mm]")
+    surface = pv.read(folder / f"flank_{name}_{body}.stl")
+    there = surface.points[surface.find_closest_point(warped.points[0])]
+    np.testing.assert_allclose(there, warped.points[0], atol=5e-5)
+    for axis in range(3):
+        found, expected = (np.sort(points[:, axis]) for points in (warped.points, surface.points))
+        np.testing.assert_allclose(found, expected, atol=5e-5)
 
 
 @pytest.mark.parametrize("name", INTERFACES)
@@ -86,9 +129,27 @@ def test_series_steps_through_the_cycles(results: Path, folder: Path, name: str)
         assert reader.time_values == list(file["kinetics/cycles"])
     reader.set_active_time_value(reader.time_values[-1])
     last = reader.read()[0]
-    assert last.cell_data["wear_depth"].max() > 0.0
+    assert last.point_data["depth [mm]"].max() > 0.0
+    assert last.field_data["cycles [1]"] == reader.time_values[-1]
     reader.set_active_time_value(0.0)
-    assert reader.read()[0].cell_data["wear_depth"].max() == 0.0
+    assert reader.read()[0].point_data["depth [mm]"].max() == 0.0
+
+
+@pytest.mark.parametrize("state", ["unworn", "worn"])
+def test_structure_moves_over_the_increments(results: Path, folder: Path, state: str) -> None:
+    reader = pv.PVDReader(folder / f"mission_{state}.pvd")
+    assert reader.time_values == [1.0, PEAK + 1.0, 22.0]
+    with h5py.File(results) as file:
+        for number, time in enumerate(reader.time_values):
+            reader.set_active_time_value(time)
+            for part, body in zip(reader.read(), file["bodies"].values(), strict=True):
+                assert part.field_data["increment [1]"] == time
+                stored = body[state]["mission"]
+                np.testing.assert_allclose(part.points, stored["points"], rtol=SINGLE)
+                np.testing.assert_array_equal(part.regular_faces, stored["triangles"])
+                for key, unit in {"displacement": "mm", "von_mises": "MPa"}.items():
+                    shown = part.point_data[f"{key} [{unit}]"]
+                    np.testing.assert_array_equal(shown, stored[key][number])
 
 
 def test_structure_is_unworn_then_worn(results: Path, folder: Path) -> None:
@@ -105,8 +166,11 @@ def test_structure_is_unworn_then_worn(results: Path, folder: Path) -> None:
                 np.testing.assert_array_equal(
                     part.cells_dict[pv.CellType.TETRA], stored["elements"]
                 )
-                for key in ("displacement", "von_mises", "maximum_principal"):
-                    np.testing.assert_allclose(part.point_data[key], stored[key], rtol=SINGLE)
+                for key, unit in NODAL.items():
+                    shown = part.point_data[f"{key} [{unit}]"]
+                    np.testing.assert_allclose(shown, stored[key], rtol=SINGLE)
+                tensor = part.point_data["stress [MPa]"]
+                np.testing.assert_allclose(tensor.T, stored["stress"], rtol=SINGLE)
 
 
 def worn_volume(surface: pv.PolyData, frame: Frame) -> float:
@@ -161,7 +225,7 @@ def header(path: Path) -> ElementTree.Element:
 
 
 def test_files_are_compressed_and_no_newer_than_paraview_can_read(folder: Path) -> None:
-    for path in (folder / "intrados" / "00001.vti", folder / "structure" / "disk_worn.vtu"):
+    for path in (folder / "intrados" / "00001.vts", folder / "structure" / "disk_worn.vtu"):
         root = header(path)
         # Readers since VTK 8 take every version 1 and 2.
         assert re.fullmatch(r"[12]\.\d", root.attrib["version"])
@@ -170,13 +234,42 @@ def test_files_are_compressed_and_no_newer_than_paraview_can_read(folder: Path) 
         assert {array.attrib["format"] for array in root.iter("DataArray")} == {"appended"}
 
 
-def test_arrays_carry_their_units(folder: Path) -> None:
-    arrays = header(folder / "intrados" / "00001.vti").iter("DataArray")
-    units = {
-        a.attrib["Name"]: [key.text.strip() for key in a.iter("InformationKey")] for a in arrays
-    }
-    assert "MPa" in units["pressure"]
-    assert "mm" in units["wear_depth"]
+def test_tensors_say_their_components(folder: Path) -> None:
+    arrays = header(folder / "structure" / "disk_worn.vtu").iter("DataArray")
+    (tensor,) = (a.attrib for a in arrays if a.attrib.get("Name") == "stress [MPa]")
+    names = [tensor[f"ComponentName{number}"] for number in range(6)]
+    assert names == ["XX", "YY", "ZZ", "XY", "YZ", "XZ"]
+
+
+@pytest.mark.parametrize("script", ["view.py", "view_mission.py"])
+def test_scripts_show_what_is_there(folder: Path, script: str) -> None:
+    check_scene(folder / script)
+
+
+def test_first_file_is_the_script(folder: Path, tmp_path: Path) -> None:
+    assert first_file(folder.parent) == folder / "view.py"
+    assert first_file(tmp_path) is None
+
+
+@pytest.mark.parametrize(("count", "peak"), [(1, 0), (22, 8), (48, 47), (49, 1), (1000, 613)])
+def test_increments_that_are_shown(count: int, peak: int) -> None:
+    """All of them, or as many as are shown at most from first to last; peak load among them."""
+    shown = shown_increments(count, peak)
+    assert len(set(shown)) == len(shown) == min(count, MOST_INCREMENTS)
+    assert peak in shown
+    assert (shown[0], shown[-1]) == (0, count - 1)
+    assert np.diff(shown).max(initial=1) <= 2 * max(1.0, count / MOST_INCREMENTS) + 1
+
+
+def test_same_results_make_the_same_files(results: Path, folder: Path, tmp_path: Path) -> None:
+    for path in write_wear(CONTENTS, results, tmp_path):
+        assert path.read_bytes() == (folder / path.relative_to(tmp_path)).read_bytes(), path
+
+
+def test_run_that_wore_nothing_shows_each_thing_once(results: Path, tmp_path: Path) -> None:
+    write_wear(replace(CONTENTS, jumps=0), results, tmp_path)
+    assert pv.PVDReader(tmp_path / "structure.pvd").time_values == [0.0]
+    assert not (tmp_path / "mission_worn.pvd").exists()
 
 
 def write_wear(contents: Contents, results: Path, folder: Path) -> list[Path]:

@@ -13,6 +13,7 @@ from sa_solver.reference.hertz import HertzSphere
 from sa_solver.types import ElasticPair, Frame, Material
 from tests.workflow.commands import invoke
 from tests.workflow.conftest import manifest_has_all
+from tests.workflow.shown_files import check_arrays, check_scene
 from wear.link import LARGEST_RESIDUAL
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.analyses.specimens.half_space import NodeGrid, PadHalfSpace
@@ -281,8 +282,14 @@ class TestResults:
             mesh = reader.read()[0]
             np.testing.assert_allclose(mesh.points[:, :2], pad, atol=1e-6)
             *_, last = load["states"].values()
-            np.testing.assert_allclose(mesh["pressure"], last["pressure"], rtol=1e-6)
+            np.testing.assert_allclose(mesh["pressure [MPa]"], last["pressure"], rtol=1e-6)
             assert mesh.area == pytest.approx(1.0)
+            normal = file["grid/pad"].attrs["axes"][2]
+            for body, into in {1: -1.0, 2: 1.0}.items():
+                worn = mesh[f"worn_{body} [mm]"] @ normal
+                np.testing.assert_allclose(worn, into * last[f"worn_{body}"][()], rtol=1e-6)
+        check_arrays(pictured / "paraview")
+        check_scene(pictured / "paraview" / "view.py")
 
 
 @pytest.fixture(scope="module")

@@ -13,6 +13,7 @@ from sa_solver.subsurface import SubsurfaceStress
 from sa_solver.types import Array, Grid, LoadHistory, Material
 from tests.marks import slow
 from tests.workflow.conftest import contents_of
+from tests.workflow.shown_files import check_arrays, check_scene
 from wear.bulk_stress import BulkStress
 from wear.link import Link
 from wear.tractions import CycleTractions
@@ -376,32 +377,56 @@ def paraview(normal: Any) -> Path:
 def test_maps_are_on_the_flanks(normal: Any, paraview: Path) -> None:
     import pyvista
 
+    check_arrays(paraview)
+    check_scene(paraview / "view.py")
     with h5py.File(normal.folder / "results.h5") as file:
-        last = sorted(file["surfaces/intrados"])[-1]
-        for jump, moment in {"00000": "unworn", last: "worn"}.items():
-            image = pyvista.read(paraview / "intrados" / f"{jump}.vti")
+        reader = pyvista.PVDReader(paraview / "life_intrados.pvd")
+        assert reader.time_values == file["kinetics/cycles"][()][[0, -1]].tolist()
+        for moment in ("unworn", "worn"):
+            mesh = pyvista.read(paraview / "life" / f"intrados_{moment}.vts")
+            x, y, _ = local_points(mesh, file["grid/intrados"]).T
+            grid = grid_of(file["grid/intrados"])
+            rows, columns = (
+                np.searchsorted(axis.ravel() + 1e-4, at) for axis, at in ((grid.x, x), (grid.y, y))
+            )
             for number in BODIES:
                 tension = file[f"stress/life/intrados/{moment}/body_{number}/tension"][()]
-                shown = image.cell_data[f"tension_{number}"].reshape(tension.shape, order="F")
-                np.testing.assert_allclose(shown, tension, rtol=1e-6)
+                shown = mesh.point_data[f"tension_{number} [MPa]"]
+                np.testing.assert_allclose(shown, tension[rows, columns], rtol=1e-6)
+
+
+def local_points(mesh: Any, grid: h5py.Group) -> np.ndarray:
+    """Points of a mesh in the interface frame."""
+    return (mesh.points - grid.attrs["origin"]) @ grid.attrs["axes"].T
 
 
 def test_sections_sit_under_and_above_the_flank(normal: Any, paraview: Path) -> None:
+    """What lies in the body, and nothing else; stress along the face and the global axes."""
     import pyvista
 
     with h5py.File(normal.folder / "results.h5") as file:
-        frame = file["grid/extrados"].attrs
-        group = file["stress/section/extrados"]
+        axes, group = file["grid/extrados"].attrs["axes"], file["stress/section/extrados"]
+        along, depths = np.meshgrid(group["along"], group["depths"], indexing="ij")
         for number, side in {1: -1.0, 2: 1.0}.items():
-            mesh = pyvista.read(paraview / "section" / f"extrados_worn_{number}.vts")
-            x, y, z = ((mesh.points - frame["origin"]) @ frame["axes"].T).T
-            shape = group["along"].size, group["depths"].size
-            along, depths = np.meshgrid(group["along"], group["depths"], indexing="ij")
-            # Points 250 mm from the origin in single precision.
-            np.testing.assert_allclose(x.reshape(shape), along, atol=1e-4)
+            mesh = pyvista.read(paraview / "section" / f"extrados_worn_{number}.vtu")
+            x, y, z = local_points(mesh, file["grid/extrados"]).T
+            stress = group[f"worn/body_{number}/stress"][()]
+            inside = np.isfinite(stress).all(axis=0)
+            assert 0 < mesh.n_points <= np.count_nonzero(inside)
             np.testing.assert_allclose(y, group.attrs["at"], atol=1e-4)
-            np.testing.assert_allclose(z.reshape(shape), side * depths, atol=1e-4)
-            stress = group[f"worn/body_{number}/stress"]
-            np.testing.assert_allclose(
-                mesh.point_data["stress_zx"].reshape(shape), stress[5], rtol=1e-5, atol=1e-4
+            rows, columns = (
+                np.abs(axis[None, :] - at[:, None]).argmin(axis=1)
+                for axis, at in ((group["along"][()], x), (group["depths"][()], side * z))
             )
+            # Points 250 mm from the origin in single precision.
+            np.testing.assert_allclose(x, along[rows, columns], atol=1e-4)
+            np.testing.assert_allclose(side * z, depths[rows, columns], atol=1e-4)
+            expected = stress[:, rows, columns]
+            shown = mesh.point_data["face_stress [MPa]"].T
+            np.testing.assert_allclose(shown, expected, rtol=1e-5, atol=1e-4)
+            # Stress on the planes of the face's normal, found either way.
+            xx, yy, zz, xy, yz, zx = mesh.point_data["stress [MPa]"].T
+            tensor = np.array([[xx, xy, zx], [xy, yy, yz], [zx, yz, zz]])
+            turned = np.einsum("ai,ijn,bj->abn", axes, tensor, axes)
+            np.testing.assert_allclose(turned[2, 2], expected[2], atol=1e-3)
+            np.testing.assert_allclose(turned[2, 0], expected[5], atol=1e-3)

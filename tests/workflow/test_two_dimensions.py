@@ -15,6 +15,7 @@ from fe_models.transfer import FaceTransfer
 from sa_solver.types import Frame, Grid
 from tests.marks import slow
 from tests.workflow.conftest import Run, contents_of, invoke
+from tests.workflow.shown_files import check_arrays, check_scene
 from workflow.analyses.wear import ANALYSIS
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.fidelity import choosing
@@ -127,24 +128,29 @@ def test_figures_speak_of_lengths_and_strips(pictured):
 
 
 @pytest.mark.slow
-def test_paraview_shows_strips_and_plane_bodies(pictured):
+def test_paraview_shows_lines_and_plane_bodies(pictured):
     import pyvista as pv
 
+    check_arrays(pictured.folder / "paraview")
+    for script in ("view.py", "view_mission.py"):
+        check_scene(pictured.folder / "paraview" / script)
     reader = pv.get_reader(pictured.folder / "paraview/intrados.pvd")
     reader.set_active_time_value(reader.time_values[0])
-    strip = reader.read()[0]
-    assert strip.dimensions == (129, 2, 1)
-    assert strip.bounds[2:4] == pytest.approx((-0.5, 0.5))  # 1 mm of the slot: forces are per mm
-    force = strip.cell_data["pressure"].sum() * 11.0 / 128
+    line = reader.read()[0]
+    assert line.n_lines == 1
+    assert np.all(line.points[:, 1] == 0.0)  # in the plane of the bodies
+    force = line["pressure [MPa]"].sum() * 11.0 / 128
     assert force == pytest.approx(
         pictured.summary["intrados"]["peak_load"]["unworn"]["P"], rel=1e-5
     )
+    reader = pv.get_reader(pictured.folder / "paraview/mission_worn.pvd")
+    assert reader.time_values == list(range(1, 23))
     reader = pv.get_reader(pictured.folder / "paraview/structure.pvd")
     assert reader.time_values == [0.0, 3e5]
     for body in reader.read():
         assert set(body.celltypes) == {pv.CellType.TRIANGLE}
         assert np.all(body.points[:, 1] == 0.0)
-        assert not body["displacement"][:, 1].any()
+        assert not body["displacement [mm]"][:, 1].any()
 
 
 # --- Sections of a slot ----------------------------------------------------------------------

@@ -4,10 +4,12 @@ Each is told what the results hold, and reads ``results.h5`` and nothing else: n
 come from the data. A dataset that should be there and is not is an error. Images are 1200 pixels
 wide.
 
-In files for ParaView lengths are in mm, stresses in MPa; each array carries its unit. ``shear`` and
-``slip`` are global vectors, so that glyphs point the right way; those with an axis at the end of
-their names are components in the interface frame. Fields are single precision, which halves the
-files: the doubles are in ``results.h5``.
+In files for ParaView the name of every array ends in its unit, as ``pressure [MPa]``. All lengths
+are in mm, worn depths too, so that Warp By Vector with a factor of 1 is true to scale. Vectors and
+stresses have components along the global axes, so that glyphs point the right way, but for those
+whose names begin with ``face_``: these are along the axes of the contact face. What is not known is
+left out, not drawn as NaN. Fields are single precision, which halves the files: the doubles are in
+``results.h5``.
 """
 
 from __future__ import annotations

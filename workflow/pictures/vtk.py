@@ -1,10 +1,11 @@
-"""Files that ParaView reads, and a contact grid as an image in one of them."""
+"""Files that ParaView reads: arrays with their units, faces as surfaces, series over time."""
 
 from __future__ import annotations
 
 import errno
 import os
 from collections.abc import Iterable
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.sax.saxutils import quoteattr
@@ -19,50 +20,101 @@ if TYPE_CHECKING:
     import pyvista
 
 Fields = dict[str, tuple[Array, str]]
+"""Values ``(n,)``, ``(n, 3)`` or ``(n, 6)`` of points, each with its unit, by their names."""
 Step = tuple[float, str, Path, Any]
 """Time, name, file and data set of a part of a series."""
 
-
-def grid_image(grid: Grid, frame: Frame) -> pyvista.ImageData:
-    """The grid as a sheet of ``nx x ny`` cells at its place in space."""
-    import pyvista
-
-    corner = np.array([-0.5 * grid.size[0], -0.5 * grid.size[1], 0.0])
-    return pyvista.ImageData(
-        dimensions=(grid.shape[0] + 1, grid.shape[1] + 1, 1),
-        spacing=(*grid.pitch, 1.0),
-        origin=frame.origin + frame.to_global(corner),
-        direction_matrix=frame.axes.T,
-    )
+# Names of the components of vectors, and of symmetric tensors in VTK's order.
+COMPONENTS = {3: ("X", "Y", "Z"), 6: ("XX", "YY", "ZZ", "XY", "YZ", "XZ")}
+# What the times of a series may be.
+CYCLES, INCREMENTS, SECONDS = "cycles [1]", "increment [1]", "time [s]"
+# The vectors that make a profile of the pressure on a line.
+PROFILE = "normal_traction [MPa]"
 
 
-def cells(field: h5py.Dataset | Array) -> Array:
-    """A grid field ``(nx, ny)`` as ``(nx ny,)``, x fastest."""
-    return np.ravel(field[()], order="F")
+@dataclass(frozen=True)
+class FacePoints:
+    """Cells of a ``grid`` as points of a surface, of a line in line contacts, at their centres.
+
+    They are those in the ``window`` of rows and columns, all without one, in the nominal plane of
+    the face.
+    """
+
+    grid: Grid
+    frame: Frame
+    window: tuple[slice, slice] = (slice(None), slice(None))
+
+    def of(self, field: h5py.Dataset | Array) -> Array:
+        """A grid field ``(nx, ny)`` at the points ``(n,)``, x fastest."""
+        return np.ravel(field[()][self.window], order="F")
+
+    def normal(self, heights: Array) -> Array:
+        """Global vectors ``(n, 3)`` along the face's normal, so long at the points ``(n,)``."""
+        return np.outer(heights, self.frame.axes[2])
+
+    def tangential(self, field: h5py.Dataset | Array) -> tuple[Array, Array, Array]:
+        """Global vectors ``(n, 3)`` of a grid field ``(2, nx, ny)``, and its x and y ``(n,)``."""
+        x, y = (self.of(component) for component in field[()])
+        return self.frame.to_global(np.stack([x, y, np.zeros_like(x)], axis=1)), x, y
+
+    def mesh(self, fields: Fields) -> pyvista.PolyData | pyvista.StructuredGrid:
+        """The points with their fields, a line or a surface."""
+        import pyvista
+
+        local = np.stack([*map(self.of, self.grid.centres), self.of(np.zeros(self.grid.shape))])
+        points = self.frame.to_global(local.T) + self.frame.origin
+        if self.grid.line:
+            # One line, of so many points.
+            mesh = pyvista.PolyData(points, lines=np.array([len(points), *range(len(points))]))
+        else:
+            mesh = pyvista.StructuredGrid()
+            mesh.points = points
+            nx, ny = np.zeros(self.grid.shape)[self.window].shape
+            mesh.dimensions = (nx, ny, 1)
+        attach(mesh.point_data, fields)
+        return mesh
+
+    @property
+    def suffix(self) -> str:
+        """What the name of its file ends in."""
+        return ".vtp" if self.grid.line else ".vts"
 
 
-def traction_fields(contact: h5py.Group, frame: Frame) -> Fields:
-    """Pressure, shear and slip on a grid: vectors are global, and components in the frame."""
-    fields: Fields = {"pressure": (cells(contact["pressure"]), "MPa")}
+def traction_fields(contact: h5py.Group, points: FacePoints) -> Fields:
+    """Pressure, shear and slip on a grid: global vectors, and ``face_`` components in the frame.
+
+    Of a line the pressure is a vector too, ``normal_traction``: warped by it, it is a profile.
+    """
+    pressure = points.of(contact["pressure"])
+    fields: Fields = {"pressure": (pressure, "MPa")}
+    if points.grid.line:
+        fields["normal_traction"] = points.normal(pressure), "MPa"
     for name, unit in (("shear", "MPa"), ("slip", "mm")):
-        x, y = (cells(component) for component in contact[name][()])
-        fields[name] = frame.to_global(np.stack([x, y, np.zeros_like(x)], axis=1)), unit
-        fields[f"{name}_x"], fields[f"{name}_y"] = (x, unit), (y, unit)
+        vectors, x, y = points.tangential(contact[name])
+        fields[name] = vectors, unit
+        fields[f"face_{name}_x"], fields[f"face_{name}_y"] = (x, unit), (y, unit)
     return fields
 
 
-def attach(data: pyvista.DataSetAttributes, fields: Fields) -> None:
-    """Add ``fields`` to point or cell data, each with its unit and the names of its components."""
-    from vtkmodules.vtkCommonCore import vtkDataArray
+def named(name: str, unit: str) -> str:
+    """The name of an array with its unit, ``1`` where it has none: ParaView shows nothing else."""
+    return f"{name} [{unit}]"
 
+
+def attach(data: pyvista.DataSetAttributes, fields: Fields) -> None:
+    """Add ``fields`` to point data in single precision, their units at the end of their names.
+
+    What has no finite value is left out.
+    """
     for name, (values, unit) in fields.items():
+        if not np.isfinite(values).any():
+            continue
         single: np.ndarray = values.astype(np.float32)
-        data.set_array(single, name)
-        array = data.VTKObject.GetArray(name)
-        array.GetInformation().Set(vtkDataArray.UNITS_LABEL(), unit)
+        data.set_array(single, named(name, unit))
         if values.ndim == 2:
-            for number, axis in enumerate("XYZ"):
-                array.SetComponentName(number, axis)
+            array = data.VTKObject.GetArray(named(name, unit))
+            for number, component in enumerate(COMPONENTS[values.shape[1]]):
+                array.SetComponentName(number, component)
 
 
 def write_stl(surface: pyvista.PolyData, path: Path) -> None:
@@ -75,14 +127,16 @@ def write_stl(surface: pyvista.PolyData, path: Path) -> None:
     _run(writer, path)
 
 
-def write_series(path: Path, steps: Iterable[Step]) -> list[Path]:
+def write_series(path: Path, time_is: str, steps: Iterable[Step]) -> list[Path]:
     """Write the data sets of a series, and a ``.pvd`` over them; returns all files.
 
-    Those of one time are its parts. Times are written with all digits.
+    Those of one time are its parts. Times are written with all digits; ``time_is`` says with its
+    unit what they are, and is a field array of every data set.
     """
     parts: dict[float, int] = {}
     lines, written = [], []
     for time, name, file, data in steps:
+        data.field_data[time_is] = [time]
         _write_xml(data, file)
         written.append(file)
         part = parts[time] = parts.get(time, -1) + 1

@@ -1,4 +1,8 @@
-"""A contact run for ParaView: ``contact.pvd``, an image on the grid at every computed increment."""
+"""A contact run for ParaView: ``contact.pvd``, the face at every computed increment.
+
+Its steps have the cells of the grid as points of a surface (``contact/<increment>.vts``), of a line
+in line contacts (``.vtp``). ``view.py`` shows them.
+"""
 
 from __future__ import annotations
 
@@ -8,22 +12,41 @@ from pathlib import Path
 import h5py
 
 from workflow.analyses.contact.datasets import BODIES, Contents
-from workflow.pictures.vtk import Step, attach, cells, grid_image, traction_fields, write_series
+from workflow.pictures.view import FIRST, Scene, Shown, View, write_view
+from workflow.pictures.vtk import (
+    INCREMENTS,
+    PROFILE,
+    FacePoints,
+    Step,
+    traction_fields,
+    write_series,
+)
 from workflow.shell.results import frame_of, grid_of
+
+VIEWS = {
+    "Contact pressure": "pressure [MPa]",
+    "Shear on body 2": "shear [MPa]",
+    "Slip of body 2 over body 1": "slip [mm]",
+}
 
 
 def write_contact(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
-    """Write images ``contact/<increment>.vti`` and their series; returns their paths.
+    """Write the faces, their series over the increments, and the script; returns their paths."""
+    written = write_series(folder / "contact.pvd", INCREMENTS, _faces(file, folder))
+    states = file["contact"][BODIES].values()
+    last = max(float(state.attrs["increment"]) for state in states)
+    warps = {"pressure [MPa]": PROFILE} if contents.line else {}
+    views = [
+        View(title, [Shown("contact.pvd", colour, warps.get(colour, ""))])
+        for title, colour in VIEWS.items()
+    ]
+    scene = Scene(str(file.attrs["title"]), INCREMENTS, last, views)
+    return [*written, write_view(scene, folder / FIRST)]
 
-    The series' times are the increments. A line contact has profiles, no images: nothing then.
-    """
-    return [] if contents.line else write_series(folder / "contact.pvd", _images(file, folder))
 
-
-def _images(file: h5py.File, folder: Path) -> Iterator[Step]:
-    grid, frame = grid_of(file["grid"][BODIES]), frame_of(file["grid"][BODIES])
+def _faces(file: h5py.File, folder: Path) -> Iterator[Step]:
+    points = FacePoints(grid_of(file["grid"][BODIES]), frame_of(file["grid"][BODIES]))
     for name, state in file["contact"][BODIES].items():
-        image = grid_image(grid, frame)
-        fields = traction_fields(state, frame) | {"gap": (cells(state["gap"]), "mm")}
-        attach(image.cell_data, fields)
-        yield float(state.attrs["increment"]), BODIES, folder / "contact" / f"{name}.vti", image
+        fields = traction_fields(state, points) | {"gap": (points.of(state["gap"]), "mm")}
+        path = folder / "contact" / f"{name}{points.suffix}"
+        yield float(state.attrs["increment"]), BODIES, path, points.mesh(fields)

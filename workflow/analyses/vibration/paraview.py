@@ -3,9 +3,10 @@
 ``cycle_<n>.pvd`` over the time of a cycle [s], every step a mesh of the pad
 (``cycle_<n>/<step>.vtu``) with its fields at the nodes. Vectors are those of the interface frame:
 body 2 relative to body 1, and the force of body 1 on body 2. Warp By Vector on ``vibration``,
-``displacement`` less its mean over the cycle, shows its vibration. ``state`` is 0 where a node
-sticks, 1 where it slips and 2 where it is apart: between the nodes it means nothing, so that it is
-best seen on points or glyphs.
+``displacement`` less its mean over the cycle, shows its vibration. The axes are those of the face,
+and so the global ones of these files. ``view.py`` shows the largest force. ``state`` is 0 where a
+node sticks, 1 where it slips and 2 where it is apart: between the nodes it means nothing, so that
+it is best seen on points or glyphs.
 """
 
 from __future__ import annotations
@@ -20,7 +21,8 @@ import numpy as np
 from sa_solver.types import Array
 from workflow.analyses.vibration.outcome import Contents
 from workflow.analyses.vibration.pad_nodes import rows_and_columns
-from workflow.pictures.vtk import Fields, Step, attach, write_series
+from workflow.pictures.view import FIRST, Scene, Shown, View, write_view
+from workflow.pictures.vtk import SECONDS, Fields, Step, attach, write_series
 
 if TYPE_CHECKING:
     import pyvista
@@ -33,12 +35,29 @@ TO_FRAME = np.array([1.0, 1.0, -1.0])
 
 
 def write_vibration(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
-    """Write the cycle of every force; returns the paths. Nothing where joints have no places."""
+    """Write the cycle of every force and the script; returns the paths.
+
+    Nothing where joints have no places.
+    """
+    if not contents.places:
+        return []
     written: list[Path] = []
-    for number in contents.responses if contents.places else ():
+    for number in contents.responses:
         cycle = _cycle(file["contact"], file["responses"][number], folder / f"cycle_{number}")
-        written += write_series(folder / f"cycle_{number}.pvd", cycle)
-    return written
+        written += write_series(folder / f"cycle_{number}.pvd", SECONDS, cycle)
+    return [*written, _write_view(contents, file, folder)]
+
+
+def _write_view(contents: Contents, file: h5py.File, folder: Path) -> Path:
+    """The script that shows the cycle under the largest force."""
+    largest = max(contents.responses, key=lambda n: float(file["responses"][n].attrs["force"]))
+    series, motion = f"cycle_{largest}.pvd", "vibration [mm]"
+    views = [
+        View("Contact pressure", [Shown(series, "pressure [MPa]", motion)]),
+        View("Vibration", [Shown(series, motion, motion)]),
+    ]
+    scene = Scene(str(file.attrs["title"]), SECONDS, 0.0, views)
+    return write_view(scene, folder / FIRST)
 
 
 def _cycle(contact: h5py.Group, response: h5py.Group, folder: Path) -> Iterator[Step]:

@@ -35,10 +35,10 @@ class Contents:
     ``bodies`` are the names of body 1 and 2, ``jumps`` how many there are beside the unworn state.
     ``line`` contacts have forces and energies per length, a ``mix`` of missions has the share of
     each. A ``structure`` of finite elements gives tractions at its nodes, and both bodies unworn
-    and worn; its ``nodes`` wear, or half-spaces. ``coarse`` are the interfaces with a solution on a
-    coarse grid. The rest is there where a case asks for it: a ``comparison`` of half-space and
-    structure, tangential ``loops``, ``sections`` of the stress under the contacts, and the
-    interfaces with maps of fretting ``life``.
+    and worn, with ``mission`` over the increments too; its ``nodes`` wear, or half-spaces.
+    ``coarse`` are the interfaces with a solution on a coarse grid. The rest is there where a case
+    asks for it: a ``comparison`` of half-space and structure, tangential ``loops``, ``sections`` of
+    the stress under the contacts, and the interfaces with maps of fretting ``life``.
     """
 
     names: tuple[str, ...]
@@ -47,6 +47,7 @@ class Contents:
     line: bool = False
     mix: bool = False
     structure: bool = False
+    mission: bool = False
     nodes: bool = False
     coarse: tuple[str, ...] = ()
     comparison: bool = False
@@ -64,6 +65,11 @@ class Contents:
         """Unworn and worn, each with its jump: both with the only one where nothing wore."""
         names = self.jump_names
         return [("unworn", names[0]), ("worn", names[-1])]
+
+    @property
+    def states(self) -> list[tuple[str, str]]:
+        """The same, but one of each: unworn alone where nothing wore."""
+        return self.ends if self.jumps else self.ends[:1]
 
     @property
     def wears(self) -> str:

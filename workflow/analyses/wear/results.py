@@ -76,7 +76,8 @@ def write_output(outcome: Outcome, run: Run[WearCase]) -> None:
     stages = [contact.stage for contact in outcome.interfaces]
     structure = None
     if isinstance(source, StructureStage):
-        structure = worn_structure(source, stages, state, case.friction, folder, reporter)
+        moves = case.output.paraview
+        structure = worn_structure(source, stages, state, case.friction, moves, folder, reporter)
         structure.warn(case.accuracy, reporter)
     with reporter.stage("stress under the contacts", "contacts") as told:
         stresses = _stresses(outcome, structure, reporter, told)
@@ -174,6 +175,7 @@ def _write_results(
             line=source.line,
             mix=outcome.interfaces[0].unworn.loads.mixed,
             structure=structure is not None,
+            mission=structure is not None and bool(structure.shown),
             nodes=nodes,
             coarse=tuple(coarse),
             comparison=case.contact.method == "full",

@@ -364,13 +364,18 @@ class StructureStage:
         peak: Array = self._amplitudes[self.peak]
         return peak
 
-    def stress(self, mesh: StructureMesh, solution: CycleSolution) -> CycleStress:
-        """Stress of both bodies at peak load, on the unworn or the worn mesh."""
+    def stress(
+        self, mesh: StructureMesh, solution: CycleSolution, shown: Sequence[int] = ()
+    ) -> CycleStress:
+        """Stress of both bodies on the unworn or the worn mesh: at peak load, and those ``shown``.
+
+        Of the increments that are shown it is that of the surface.
+        """
         worn = mesh is not self.mesh
         structure = self._prestressed(self.model.structure(mesh)) if worn else self.structure
         fields = solution.fields()
         force, relative = fields["force"], fields["displacement"]
-        return cycle_stress(structure, force, relative, self._amplitudes, self.peak)
+        return cycle_stress(structure, force, relative, self._amplitudes, self.peak, shown)
 
     def _gap(self, depths: list[Array]) -> Array:
         pairs = zip(self.mesh.interfaces, depths, strict=True)

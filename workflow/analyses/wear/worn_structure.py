@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 
 from fe_models.cut_face import WholeStress, whole_components
+from fe_models.elasticity import maximum_principal, von_mises
 from fe_models.mesh import Body, Interface, MeshError, StructureMesh, write_msh
 from fe_models.nonlinear import NonlinearCheck
 from fe_models.remesh import form_of, formed_mesh, worn_mesh, worn_volume
-from fe_models.stress import CycleStress, PeakStress, StressField
+from fe_models.stress import CycleStress, PeakStress, StressField, SurfaceHistory
 from fe_models.structure import CycleSolution, InterfaceHistory
 from sa_solver.types import Array, LoadHistory
 from wear.coupled import CoupledState
@@ -33,13 +34,18 @@ RESULTANTS = ("P", "Qx", "Qy", "Mx", "My", "Mz")
 # What the summary has of a total Lagrangian check, beside the resultants.
 MEASURES = ("slip_change", "slide", "largest_strain", "largest_rotation", "face_rotation")
 
+GLOBAL_STRESS = "stress xx, yy, zz, xy, yz, zx of the global axes"
+# Increments in which a structure is shown: enough for motion to look smooth, few enough to keep.
+MOST_INCREMENTS = 48
+
 
 @dataclass(frozen=True)
 class WornStructure:
     """The structure before and after: ``cycle`` and ``mesh`` are the worn ones.
 
     ``stresses`` are those of both bodies, unworn and worn; ``written`` the meshes as they are shown
-    then, with body 2 in the form of its faces.
+    then, with body 2 in the form of its faces. ``shown`` are the increments, counted from 0, of
+    which the stresses tell the surfaces.
     """
 
     stage: StructureStage
@@ -47,6 +53,7 @@ class WornStructure:
     cycle: CycleSolution
     stresses: dict[str, CycleStress]
     written: dict[str, StructureMesh]
+    shown: list[int]
 
     def under(
         self, moment: str, number: int
@@ -69,9 +76,12 @@ class WornStructure:
             put_closure(writer, f"structure_worn/{name}", self.cycle)
             put_closure(writer, f"structure/{name}", self.stage.unworn_cycle)
         for moment, mesh in self.written.items():
-            bodies = zip((mesh.body_1, mesh.body_2), self.stresses[moment].fields, strict=True)
-            for body, field in bodies:
+            bodies, stress = (mesh.body_1, mesh.body_2), self.stresses[moment]
+            for body, field in zip(bodies, stress.fields, strict=True):
                 writer.put(f"bodies/{body.name}/{moment}", _body(body, field))
+            for body, surface in zip(bodies, stress.surfaces, strict=bool(self.shown)):
+                mission = _mission(body, surface, self.shown)
+                writer.put(f"bodies/{body.name}/{moment}/mission", mission)
         for name, errors in self._errors().items():
             writer.put(f"bodies/{name}/error", datasets_of(errors), accuracy=accuracy)
 
@@ -208,8 +218,27 @@ def _body(body: Body, field: StressField) -> dict[str, Dataset]:
         "points": Dataset(body.points, "mm", "vertices, the faces of body 2 in their form"),
         "elements": Dataset(body.mesh.t.T, "1", corners),
         "displacement": Dataset(field.displacement, "mm", "displacement at peak load"),
+        "stress": Dataset(field.stress, "MPa", f"{GLOBAL_STRESS} at peak load"),
         "von_mises": Dataset(field.von_mises, "MPa", "von Mises stress at peak load"),
         "maximum_principal": Dataset(field.maximum_principal, "MPa", principal),
+    }
+
+
+def _mission(body: Body, surface: SurfaceHistory, shown: Sequence[int]) -> dict[str, Dataset]:
+    """The surface of a body over the increments, of which there may be many: single precision."""
+    seen = "surface of the body, or of all of it in the plane"
+    largest = np.array([maximum_principal(stress) for stress in surface.stress])
+    equivalent = von_mises(surface.stress.swapaxes(0, 1))
+    fields = {
+        "displacement": (surface.displacement, "mm", "displacement in each increment"),
+        "von_mises": (equivalent, "MPa", "von Mises stress in each increment"),
+        "maximum_principal": (largest, "MPa", "largest principal stress in each increment"),
+    }
+    return {
+        "increments": Dataset(np.array(shown) + 1, "1", "increments, counted from 1"),
+        "points": Dataset(body.points[surface.vertices], "mm", f"vertices of the {seen}"),
+        "triangles": Dataset(surface.triangles, "1", f"triangles of the {seen}"),
+        **{name: Dataset(field.astype(np.float32), *of) for name, (field, *of) in fields.items()},
     }
 
 
@@ -218,10 +247,14 @@ def worn_structure(
     contacts: list[ContactStage],
     state: CoupledState,
     friction: EvolvingFriction,
+    moves: bool,
     folder: OutputFolder,
     reporter: Reporter,
 ) -> WornStructure:
-    """Solve the worn structure, put the worn shape into its mesh and write that."""
+    """Solve the worn structure, put the worn shape into its mesh and write that.
+
+    If it ``moves``, both bodies are told over the increments too.
+    """
     pairs = list(zip(contacts, state.interfaces, strict=True))
     with reporter.stage("structural friction", "increments") as told, stage.heard(told):
         cycle = stage.worn_cycle(
@@ -237,10 +270,18 @@ def worn_structure(
         with replacing(folder.reserve("worn.msh", "the mesh with the worn faces")) as partial:
             write_msh(partial, written["worn"])
     with reporter.stage("stress", "states") as told:
-        unworn = stage.stress(stage.mesh, stage.unworn_cycle)
+        shown = shown_increments(len(cycle.fields()["force"]), stage.peak) if moves else []
+        unworn = stage.stress(stage.mesh, stage.unworn_cycle, shown)
         told(1, 2)
-        stresses = {"unworn": unworn, "worn": stage.stress(mesh, cycle)}
-    return WornStructure(stage, mesh, cycle, stresses, written)
+        stresses = {"unworn": unworn, "worn": stage.stress(mesh, cycle, shown)}
+    return WornStructure(stage, mesh, cycle, stresses, written, shown)
+
+
+def shown_increments(count: int, peak: int) -> list[int]:
+    """The increments, counted from 0, in which the structure is told: evenly, and at peak load."""
+    evenly = np.linspace(0, count - 1, min(count, MOST_INCREMENTS)).round().astype(int)
+    evenly[np.argmin(np.abs(evenly - peak))] = peak
+    return [int(increment) for increment in evenly]
 
 
 def meshed_depths(interface: Interface, depths: tuple[Array, Array]) -> tuple[Array, Array]:

@@ -9,32 +9,38 @@ from typing import TYPE_CHECKING
 import h5py
 import numpy as np
 
+from fe_models.stress import turned
 from sa_solver.types import Array, Frame
 from workflow.analyses.wear.layout import Contents
-from workflow.pictures.vtk import Fields, Step, attach, cells, write_series
+from workflow.pictures.vtk import CYCLES, FacePoints, Fields, Step, attach, write_series
 from workflow.shell.results import frame_of
 
 if TYPE_CHECKING:
     import pyvista
 
 
-def life_fields(contents: Contents, file: h5py.File, interface: str, jump: str) -> Fields:
-    """Maps of the fretting parameter and what it is made of, by name and body; scalars only.
-
-    They are computed before the first and after the last jump: not a number in between.
-    """
+def write_life(
+    contents: Contents, file: h5py.File, interface: str, points: FacePoints, folder: Path
+) -> list[Path]:
+    """Maps of the fretting parameter and what it is made of, unworn and worn, by body."""
     if interface not in contents.life:
-        return {}
-    life = file["stress/life"][interface]
-    moment = {last: moment for moment, last in contents.ends}.get(jump)
-    fields: Fields = {}
-    for body in (1, 2):
-        for key, values in life["unworn"][f"body_{body}"].items():
-            if values.ndim == 2:
-                known = values if moment is None else life[moment][f"body_{body}"][key]
-                field = cells(known) if moment else np.full(values.size, np.nan)
-                fields[f"{key}_{body}"] = field, str(values.attrs["unit"])
-    return fields
+        return []
+    path = folder / f"life_{interface}.pvd"
+    return write_series(path, CYCLES, _maps(contents, file, interface, points, folder / "life"))
+
+
+def _maps(
+    contents: Contents, file: h5py.File, interface: str, points: FacePoints, folder: Path
+) -> Iterator[Step]:
+    contact, life = file["contact"][interface], file["stress/life"][interface]
+    for state, jump in contents.states:
+        fields: Fields = {}
+        for body in (1, 2):
+            for key, values in life[state][f"body_{body}"].items():
+                if values.ndim == 2:
+                    fields[f"{key}_{body}"] = points.of(values), str(values.attrs["unit"])
+        path = folder / f"{interface}_{state}{points.suffix}"
+        yield float(contact[jump].attrs["cycles"]), interface, path, points.mesh(fields)
 
 
 def write_sections(contents: Contents, file: h5py.File, interface: str, folder: Path) -> list[Path]:
@@ -42,30 +48,41 @@ def write_sections(contents: Contents, file: h5py.File, interface: str, folder: 
     if not contents.sections:
         return []
     path = folder / f"section_{interface}.pvd"
-    return write_series(path, _sections(contents, file, interface, folder / "section"))
+    return write_series(path, CYCLES, _sections(contents, file, interface, folder / "section"))
 
 
 def _sections(contents: Contents, file: h5py.File, interface: str, folder: Path) -> Iterator[Step]:
     frame = frame_of(file["grid"][interface])
     contact, section = file["contact"][interface], file["stress/section"][interface]
-    for moment, jump in contents.ends:
+    for state, jump in contents.states:
         for body in (1, 2):
-            mesh = _section(section, f"{moment}/body_{body}", body, frame)
-            path = folder / f"{interface}_{moment}_{body}.vts"
+            mesh = _section(section, f"{state}/body_{body}", body, frame)
+            path = folder / f"{interface}_{state}_{body}.vtu"
             yield float(contact[jump].attrs["cycles"]), f"body_{body}", path, mesh
 
 
-def _section(group: h5py.Group, state: str, body: int, frame: Frame) -> pyvista.StructuredGrid:
-    """One body's section; the components of stress are those of the interface frame."""
+def _section(group: h5py.Group, state: str, body: int, frame: Frame) -> pyvista.UnstructuredGrid:
+    """One body's section, without what lies outside the body."""
     import pyvista
 
-    places = _places(group, body)
-    mesh = pyvista.StructuredGrid()
-    mesh.points = frame.to_global(places.reshape(-1, 3)) + frame.origin
-    mesh.dimensions = (places.shape[1], places.shape[0], 1)
-    fields: Fields = {"von_mises": (np.ravel(group[state]["von_mises"][()]), "MPa")}
-    for component, values in zip(group.attrs["components"], group[state]["stress"], strict=True):
-        fields[f"stress_{component}"] = np.ravel(values), "MPa"
+    places, equivalent = _places(group, body), group[state]["von_mises"][()]
+    number = np.arange(equivalent.size).reshape(equivalent.shape)
+    corners = number[:-1, :-1], number[1:, :-1], number[1:, 1:], number[:-1, 1:]
+    quads = np.stack([corner.ravel() for corner in corners], axis=1)
+    inside = np.isfinite(equivalent.ravel()[quads]).all(axis=1)
+    points, cells = np.unique(quads[inside], return_inverse=True)
+    mesh = pyvista.UnstructuredGrid(
+        {pyvista.CellType.QUAD: cells.reshape(-1, 4)},
+        frame.to_global(places.reshape(-1, 3)[points]) + frame.origin,
+    )
+    along_face = group[state]["stress"][()].reshape(6, -1)[:, points]
+    # The other way round: what the axes of the face are to the global ones.
+    along_global = turned(along_face, Frame(frame.origin, frame.axes.T))
+    fields: Fields = {
+        "von_mises": (equivalent.ravel()[points], "MPa"),
+        "stress": (along_global.T, "MPa"),
+        "face_stress": (along_face.T, "MPa"),
+    }
     attach(mesh.point_data, fields)
     return mesh
 

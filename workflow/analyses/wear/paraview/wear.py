@@ -2,12 +2,17 @@
 
 Written into one folder:
 
-- ``<interface>.pvd``: time series over the cycles; every step is an image on the contact grid
-  (``<interface>/<jump>.vti``), turned and moved to the face's place in the structure;
+- ``view.py``, to be opened first, and ``view_mission.py``: scripts that show what is there;
+- ``<interface>.pvd``: time series over the cycles; every step has the points of the contact grid
+  that lie on the face (``<interface>/<jump>.vts``, a line ``.vtp`` in line contacts), in its
+  nominal plane. Warp By Vector on ``surface_1`` or ``surface_2`` makes them the surface of a body
+  as it is, rounded edges and wear included, on ``worn_1`` or ``worn_2`` its wear alone;
+- ``life_<interface>.pvd``: the fretting parameter on the same points, unworn and worn;
 - ``section_<interface>.pvd``: stress in a plane through both bodies under the contact, unworn and
-  worn (``section/<interface>_<state>_<body>.vts``);
+  worn (``section/<interface>_<state>_<body>.vtu``);
 - ``structure.pvd``: all bodies at peak load, unworn at 0 and worn at the last computed number of
   cycles (``structure/<body>_<state>.vtu``); Warp By Vector on ``displacement`` deforms them;
+- ``mission_unworn.pvd`` and ``mission_worn.pvd``: their surfaces over the increments of the load;
 - ``flank_<interface>_<body>.stl``: the worn surfaces at true scale in global coordinates, but for
   line contacts.
 """
@@ -21,93 +26,102 @@ import h5py
 import numpy as np
 
 from sa_solver.types import Array, Grid
-from workflow.analyses.wear.body_mesh import body_mesh
 from workflow.analyses.wear.layout import Contents, jump_name
-from workflow.analyses.wear.paraview.subsurface import life_fields, write_sections
+from workflow.analyses.wear.paraview.structure import write_structure
+from workflow.analyses.wear.paraview.subsurface import write_life, write_sections
+from workflow.analyses.wear.paraview.views import write_views
 from workflow.pictures.vtk import (
+    CYCLES,
+    FacePoints,
     Fields,
     Step,
-    attach,
-    cells,
-    grid_image,
     traction_fields,
     write_series,
     write_stl,
 )
 from workflow.shell.results import frame_of, grid_of
 
-# Fields at the nodes of a body, with units.
-NODAL = {"displacement": "mm", "von_mises": "MPa", "maximum_principal": "MPa"}
-
 
 def write_wear(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
     """Write the files that show a wear run; returns their paths."""
     written: list[Path] = []
     for name in contents.names:
-        images = _images(contents, file, name, folder / name)
-        written += write_series(folder / f"{name}.pvd", images)
+        points = _face_points(file, name)
+        steps = _faces(contents, file, name, points, folder / name)
+        written += write_series(folder / f"{name}.pvd", CYCLES, steps)
+        written += write_life(contents, file, name, points, folder)
         written += write_sections(contents, file, name, folder)
         if not contents.line:
-            written += _write_worn_surfaces(contents, file, name, folder)
+            written += _write_worn_surfaces(contents, file, name, points, folder)
     if contents.structure:
-        written += write_series(folder / "structure.pvd", _bodies(file, folder / "structure"))
-    return written
+        written += write_structure(contents, file, folder)
+    return [*written, *write_views(contents, file, folder)]
 
 
 # --- faces --------------------------------------------------------------------------------------
 
 
-def _images(contents: Contents, file: h5py.File, interface: str, folder: Path) -> Iterator[Step]:
-    """Images of one face, one per jump."""
+def _face_points(file: h5py.File, interface: str) -> FacePoints:
+    """The cells of an interface's grid that lie on the FE contact face, rounding included.
+
+    What the grid has beyond it is no part of the bodies.
+    """
     grid, frame = grid_of(file["grid"][interface]), frame_of(file["grid"][interface])
-    surfaces = file["surfaces"][interface]
+    window = _face_window(file["structure"][interface]["coordinates"][()], grid)
+    return FacePoints(grid, frame, window)
+
+
+def _faces(
+    contents: Contents, file: h5py.File, interface: str, points: FacePoints, folder: Path
+) -> Iterator[Step]:
+    """One face, after every jump."""
+    contact, surfaces = file["contact"][interface], file["surfaces"][interface]
     for jump in contents.jump_names:
-        contact, image = file["contact"][interface][jump], grid_image(grid, frame)
-        fields = traction_fields(contact, frame) | _surface_fields(surfaces, jump)
-        attach(image.cell_data, fields | life_fields(contents, file, interface, jump))
-        yield float(contact.attrs["cycles"]), interface, folder / f"{jump}.vti", image
+        fields = traction_fields(contact[jump], points) | _surface_fields(surfaces, jump, points)
+        path = folder / f"{jump}{points.suffix}"
+        yield float(contact[jump].attrs["cycles"]), interface, path, points.mesh(fields)
 
 
-def _surface_fields(surfaces: h5py.Group, jump: str) -> Fields:
-    """Heights and wear depths of both bodies, and the depths' sum."""
+def _surface_fields(surfaces: h5py.Group, jump: str, points: FacePoints) -> Fields:
+    """Depths, and the vectors from the nominal plane to the surfaces and what is worn of these."""
     fields: Fields = {}
+    depths = []
     for body in (1, 2):
-        height = cells(surfaces[jump][f"body_{body}"])
-        unworn = cells(surfaces[jump_name(0)][f"body_{body}"])
-        fields[f"height_{body}"] = height, "mm"
-        fields[f"wear_depth_{body}"] = np.abs(height - unworn), "mm"
-    total = sum(fields[f"wear_depth_{body}"][0] for body in (1, 2))
-    return fields | {"wear_depth": (np.asarray(total), "mm")}
+        height = points.of(surfaces[jump][f"body_{body}"])
+        worn = height - points.of(surfaces[jump_name(0)][f"body_{body}"])
+        depths.append(np.abs(worn))
+        fields[f"depth_{body}"] = depths[-1], "mm"
+        fields[f"worn_{body}"] = points.normal(worn), "mm"
+        fields[f"surface_{body}"] = points.normal(height), "mm"
+    return fields | {"depth": (depths[0] + depths[1], "mm")}
 
 
 # --- worn surfaces ------------------------------------------------------------------------------
 
 
 def _write_worn_surfaces(
-    contents: Contents, file: h5py.File, interface: str, folder: Path
+    contents: Contents, file: h5py.File, interface: str, points: FacePoints, folder: Path
 ) -> list[Path]:
     """STL of both worn surfaces of one face, for CAD and meshers.
 
-    Vertices are the centres of the grid cells that lie on the FE contact face, rounding included:
-    what the grid has beyond it is no part of the bodies. Normals point out of the body. An STL
-    file holds single precision: about 1e-5 mm at 250 mm from the origin.
+    Vertices are the points of the face. Normals point out of the body. An STL file holds single
+    precision: about 1e-5 mm at 250 mm from the origin.
     """
     import pyvista
 
-    grid, frame = grid_of(file["grid"][interface]), frame_of(file["grid"][interface])
-    rows, columns = _face_window(file["structure"][interface]["coordinates"][()], grid)
-    last = contents.jump_names[-1]
+    plane, last = points.mesh({}), contents.jump_names[-1]
+    nx, ny, _ = plane.dimensions
     written = []
     for body, name in enumerate(contents.bodies, start=1):
-        height = file["surfaces"][interface][last][f"body_{body}"][()]
-        x, y, z = np.broadcast_arrays(grid.x, grid.y, height)
-        local = np.stack([field[rows, columns] for field in (x, y, z)], axis=-1)
-        triangles = _triangles(local.shape[0], local.shape[1])
+        height = points.of(file["surfaces"][interface][last][f"body_{body}"])
+        triangles = _triangles(nx, ny)
         if body == 2:
             triangles = triangles[:, ::-1]
-        points = frame.to_global(local.reshape(-1, 3)) + frame.origin
+        surface = pyvista.PolyData.from_regular_faces(
+            np.asarray(plane.points) + points.normal(height), triangles
+        )
         path = folder / f"flank_{interface}_{name}.stl"
-        write_stl(pyvista.PolyData.from_regular_faces(points, triangles), path)
+        write_stl(surface, path)
         written.append(path)
     return written
 
@@ -121,22 +135,8 @@ def _face_window(face: Array, grid: Grid) -> tuple[slice, slice]:
 
 
 def _triangles(nx: int, ny: int) -> np.ndarray:
-    """Two triangles per square of an ``(nx, ny)`` array of points, normal along +z, ``(m, 3)``."""
-    index = np.arange(nx * ny).reshape(nx, ny)
+    """Two triangles per square ``(m, 3)`` of ``nx`` by ``ny`` points, x fastest, normal to +z."""
+    index = np.arange(nx * ny).reshape(nx, ny, order="F")
     corners = index[:-1, :-1], index[1:, :-1], index[1:, 1:], index[:-1, 1:]
     a, b, c, d = (corner.ravel() for corner in corners)
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
-
-
-# --- structure ----------------------------------------------------------------------------------
-
-
-def _bodies(file: h5py.File, folder: Path) -> Iterator[Step]:
-    """All bodies at peak load, unworn and worn, with nodal displacement and stresses."""
-    times = {"unworn": 0.0, "worn": float(file["kinetics/cycles"][-1])}
-    for state, time in times.items():
-        for body, states in file["bodies"].items():
-            mesh = body_mesh(states[state])
-            fields = {name: (states[state][name][()], unit) for name, unit in NODAL.items()}
-            attach(mesh.point_data, fields)
-            yield time, body, folder / f"{body}_{state}.vtu", mesh

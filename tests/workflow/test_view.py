@@ -1,0 +1,43 @@
+"""Scripts that show a run, in ParaView itself where it is installed."""
+
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from tests.workflow.conftest import CONTENTS
+from workflow.analyses.wear import ANALYSIS
+from workflow.pictures.drawing import write_paraview
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not (shutil.which("pvbatch") and shutil.which("xvfb-run")),
+        reason="needs ParaView's pvbatch, and xvfb-run to draw without a screen",
+    ),
+]
+
+
+@pytest.mark.parametrize("script", ["view", "view_mission"])
+def test_paraview_draws_every_view(results: Path, tmp_path: Path, script: str) -> None:
+    """From another folder than that of the script, and after the run has been moved."""
+    assert ANALYSIS.pictures is not None
+    write_paraview(ANALYSIS.pictures, CONTENTS, results, tmp_path / "run" / "paraview")
+    (tmp_path / "run").rename(tmp_path / "moved run")
+    picture = tmp_path / f"{script}.png"
+    command = ["xvfb-run", "-a", "pvbatch", f"moved run/paraview/{script}.py", picture.name]
+    done = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert done.returncode == 0, done.stderr[-2000:]
+    assert "ERR" not in done.stderr, done.stderr[-2000:]
+    shown = imread(picture)[:, :, :3]
+    # Something that has colours, and neither white nor the greys of texts, in every view: a large
+    # one on the left and two on the right, or two side by side.
+    colourful = np.ptp(shown, axis=2) > 0.15
+    left, right = np.array_split(colourful, 2, axis=1)
+    views = [left, *np.array_split(right, 2 if script == "view" else 1)]
+    assert [view.mean() > 0.02 for view in views] == [True] * len(views)

@@ -1,0 +1,54 @@
+"""The structure for ParaView: both bodies at peak load, and over the increments of a mission."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from workflow.analyses.wear.body_mesh import body_mesh
+from workflow.analyses.wear.layout import Contents
+from workflow.pictures.vtk import CYCLES, INCREMENTS, Step, attach, write_series
+
+# Fields of a body, with units; those of its surface over the increments have no tensors.
+SURFACE = {"displacement": "mm", "von_mises": "MPa", "maximum_principal": "MPa"}
+NODAL = SURFACE | {"stress": "MPa"}
+
+
+def write_structure(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
+    """The series of both bodies at peak load, and of those over the increments that are there."""
+    bodies = _bodies(contents, file, folder / "structure")
+    written = write_series(folder / "structure.pvd", CYCLES, bodies)
+    for state, _ in contents.states if contents.mission else ():
+        steps = _mission(file, state, folder / "mission")
+        written += write_series(folder / f"mission_{state}.pvd", INCREMENTS, steps)
+    return written
+
+
+def _bodies(contents: Contents, file: h5py.File, folder: Path) -> Iterator[Step]:
+    """All bodies at peak load, unworn and worn, with nodal displacement and stresses."""
+    cycles = file["kinetics/cycles"][()]
+    for (state, _), time in zip(contents.states, cycles[[0, -1]].tolist(), strict=False):
+        for body, states in file["bodies"].items():
+            mesh, group = body_mesh(states[state]), states[state]
+            fields = {name: (np.atleast_1d(group[name][()]), unit) for name, unit in NODAL.items()}
+            tensor, unit = fields["stress"]
+            attach(mesh.point_data, fields | {"stress": (tensor.T, unit)})
+            yield time, body, folder / f"{body}_{state}.vtu", mesh
+
+
+def _mission(file: h5py.File, state: str, folder: Path) -> Iterator[Step]:
+    """What is seen of all bodies, in every increment that is told."""
+    import pyvista
+
+    missions = {body: states[state]["mission"] for body, states in file["bodies"].items()}
+    increments = next(iter(missions.values()))["increments"][()].tolist()
+    for number, increment in enumerate(increments):
+        for body, mission in missions.items():
+            points = mission["points"][()].astype(np.float32)
+            mesh = pyvista.PolyData.from_regular_faces(points, mission["triangles"][()])
+            fields = {name: (mission[name][number], unit) for name, unit in SURFACE.items()}
+            attach(mesh.point_data, fields)
+            yield float(increment), body, folder / f"{body}_{state}_{increment:04d}.vtp", mesh

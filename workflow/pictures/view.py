@@ -1,0 +1,61 @@
+"""Scripts that show a run in ParaView: what they show, and where to find the first of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from importlib import resources
+from pathlib import Path
+from pprint import pformat
+
+from workflow.shell.store import write_text
+
+FIRST = "view.py"
+PLACEHOLDER = "SCENE: dict[str, Any] = {}\n"
+
+
+@dataclass(frozen=True)
+class Shown:
+    """A series in a view: its ``file`` and the arrays, with their units, of colours and motion.
+
+    A ``factor`` of 0 lets the motion be seen well.
+    """
+
+    file: str
+    colour: str = ""
+    warp: str = ""
+    factor: float = 0.0
+
+
+@dataclass(frozen=True)
+class View:
+    """A view of the window; all that is ``shown`` has the times of the first."""
+
+    title: str
+    shown: Sequence[Shown]
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One to four ``views``; ``time`` says what their times are, and ``begin`` the first shown."""
+
+    title: str
+    time: str
+    begin: float
+    views: Sequence[View]
+
+
+def write_view(scene: Scene, path: Path) -> Path:
+    """Write the script that shows a scene; returns its path."""
+    script = resources.files("workflow.pictures").joinpath("view_script.py")
+    text = script.read_text(encoding="utf-8")
+    what = pformat(asdict(scene), width=98, sort_dicts=False)
+    assert PLACEHOLDER in text
+    write_text(path, text.replace(PLACEHOLDER, f"SCENE: dict[str, Any] = {what}\n"))
+    return path
+
+
+def first_file(run: Path) -> Path | None:
+    """The file in the folder of a run that is to be opened first in ParaView, if there is one."""
+    path = run / "paraview" / FIRST
+    return path if path.exists() else None
