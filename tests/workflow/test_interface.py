@@ -101,6 +101,7 @@ def test_a_wrong_override_is_told_as_on_the_command_line(name, value, dovetail_p
         ({}, "the case: analysis: missing; allowed: wear, "),
         (None, "the case: of type NoneType; allowed: the path of a file, a dictionary, a case"),
         ([BALL], "the case: of type list"),
+        (fretscale.load_case(SPHERE).friction, "the case: of type Friction; allowed: the path"),
         (BALL | {"title": object()}, "the case: title: of type object; allowed: number, text"),
         (BALL | {"friction": 0.3}, "the case: friction: 0.3: not a section"),
         (BALL | {"frction": {}}, "the case: frction: unknown key; did you mean 'friction'?"),

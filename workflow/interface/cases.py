@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from workflow import kinds
-from workflow.case.sections import Case, Section
+from workflow.case.sections import Case
 from workflow.case.source import IN_PYTHON, dotted
 from workflow.case.writing import dump_case
 from workflow.errors import CaseError
@@ -48,7 +48,7 @@ def load_case(case: AnyCase, /, **overrides: Any) -> Case:
         return kinds.load_case(os.fspath(case), changes)
     if isinstance(case, Mapping):
         return kinds.parse_case(json.dumps(_plain(case)), IN_PYTHON, changes)
-    if isinstance(case, Section):
+    if type(case) in kinds.kinds().values():
         return kinds.parse_case(dump_case(case), IN_PYTHON, changes) if changes else case
     raise CaseError(
         f"{IN_PYTHON}: of type {type(case).__name__}; allowed: the path of a file, a dictionary, "
