@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import errno
 import os
+import shutil
 import sys
+import textwrap
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -30,11 +32,11 @@ ADVICE = "a run continues with `fretscale resume DIR`, many with the same comman
 TO_TRY = """\
 Three things to try:
 
-  fretscale new bodies ball.yaml           write a case: a ball pressed and sheared on a flat
-  fretscale check ball.yaml                read it: what it would run, and how long
-  fretscale run ball.yaml --out out/ball   run it: ten seconds to the first picture
+  fretscale new bodies ball.yaml           write a case: a ball on a flat
+  fretscale check ball.yaml                what it would run, and how long
+  fretscale run ball.yaml --out out/ball   run it: a picture in ten seconds
 
-`fretscale new bodies_wear` writes a ball that wears; all commands: `fretscale --help`.
+`fretscale new bodies_wear` is of a ball that wears; all commands: `fretscale -h`.
 """
 # Commands as the help lists them.
 LISTED = {
@@ -356,9 +358,17 @@ def check(case: str, overrides: tuple[str, ...]) -> None:
     click.echo(f"OK {case}: {loaded.title}")
     needed = ("memory", f"up to {memory.required / 1e9:.1f} GB"), ("time", run_time.text)
     for name, text in [*loaded.outline(), *needed]:
-        click.echo(f"  {name:<10} {text}")
+        click.echo(_fitted(f"  {name:<10} {text}", indent=13))
     for doubt in doubts_of(loaded):
-        click.echo(f"doubt: {doubt}")
+        click.echo(_fitted(f"doubt: {doubt}", indent=2))
+
+
+def _fitted(line: str, indent: int) -> str:
+    """A line as wide as the terminal, what is more below it; where there is none, as it is."""
+    if not sys.stdout.isatty():
+        return line
+    width = shutil.get_terminal_size().columns
+    return "\n".join(textwrap.wrap(line, width, subsequent_indent=indent * " "))
 
 
 @cli.command()

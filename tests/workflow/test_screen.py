@@ -130,6 +130,7 @@ def test_without_arguments_it_says_what_to_try() -> None:
     told = CliRunner().invoke(cli, [])
     assert (told.exit_code, told.stderr) == (0, "")
     assert TO_TRY in told.stdout
+    assert max(map(len, told.stdout.splitlines())) <= 80
     assert [arguments[0] for arguments in to_try()] == ["new", "check", "run"]
 
 
