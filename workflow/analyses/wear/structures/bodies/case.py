@@ -398,11 +398,7 @@ def _doubts(
     found = unworn_contact(case.structure, bodies, load, line) if load > 0.0 else None
     if found is not None:
         width, pressure = found
-<<<<<<< HEAD
-        stroke = float(np.hypot(np.ptp(table["shift_x"]), np.ptp(table["shift_y"])))
-=======
         stroke = float(np.linalg.norm([np.ptp(table[name]) for name in SHIFTS]))
->>>>>>> CLI
         yield from pressed(f"load_path{'.P' if simple else ''}", pressure, case.yields)
         yield from long_stroke(f"load_path{'.stroke' if simple else ''}", stroke, width)
     if isinstance(case.structure, Heights):
