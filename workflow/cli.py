@@ -36,7 +36,7 @@ Three things to try:
   fretscale check ball.yaml                what it would run, and how long
   fretscale run ball.yaml --out out/ball   run it: a picture in ten seconds
 
-`fretscale new bodies_wear` is of a ball that wears; all commands: `fretscale -h`.
+All commands: `fretscale -h`; a ball that wears: `fretscale new bodies_wear`.
 """
 # Commands as the help lists them.
 LISTED = {

@@ -73,9 +73,9 @@ def export_resultants(case: WearCase, name: str, out: Path, force: bool) -> list
 
 def _write(case: WearCase, source: StructureStage, out: Path, reporter: Reporter) -> None:
     faces = meshed_faces(case, source, reporter)
-    with reporter.stage("condensation"):
+    with reporter.stage("condensation", "bodies") as told, source.heard(told):
         source.prepare()
-    with reporter.stage("structural friction"):
+    with reporter.stage("structural friction", "increments") as told, source.heard(told):
         histories = {
             history.interface.name: _numbered(source, history) for history in source.unworn()
         }
