@@ -105,7 +105,7 @@ def test_where_there_is_no_terminal_a_line_now_and_then(
 
 
 def test_a_run_tells_where_to_look_first(tmp_path: Path) -> None:
-    for name in ("figures/maps.svg", "figures/a.png", "paraview/x.vtu", "paraview/contact.pvd"):
+    for name in ("figures/maps.svg", "figures/a.png", "paraview/view.py"):
         (tmp_path / name).parent.mkdir(exist_ok=True)
         (tmp_path / name).touch()
     (tmp_path / "report.html").touch()
@@ -113,7 +113,7 @@ def test_a_run_tells_where_to_look_first(tmp_path: Path) -> None:
         f"done: {tmp_path}; look first at",
         f"  report    {tmp_path}/report.html",
         f"  figure    {tmp_path}/figures/maps.svg",
-        f"  ParaView  {tmp_path}/paraview/contact.pvd",
+        f"  ParaView  paraview --script={tmp_path}/paraview/view.py",
     ]
 
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-REPORT, FIGURES, PARAVIEW = "report.html", "figures", "paraview"
-# What shows all times of a run comes before what shows one.
-KINDS = ".pvsm", ".pvd", ".vtm", ".vtp", ".vtu"
+from workflow.pictures.view import first_file
+
+REPORT, FIGURES = "report.html", "figures"
 
 
 def first_look(root: Path, drawn: Sequence[str]) -> Iterator[str]:
@@ -20,7 +20,7 @@ def first_look(root: Path, drawn: Sequence[str]) -> Iterator[str]:
         "figure": next(iter(sorted((root / FIGURES).glob(f"{drawn[0]}.*"))), None)
         if drawn
         else None,
-        "ParaView": _in_paraview(root / PARAVIEW),
+        "ParaView": _paraview(root),
     }
     there = {name: path for name, path in found.items() if path is not None}
     yield f"done: {root}" + ("; look first at" if there else "")
@@ -28,7 +28,7 @@ def first_look(root: Path, drawn: Sequence[str]) -> Iterator[str]:
         yield f"  {name:<8}  {path}"
 
 
-def _in_paraview(folder: Path) -> Path | None:
-    """The file to open first: by its kind, then by its name."""
-    paths = [path for kind in KINDS for path in sorted(folder.glob(f"*{kind}"))]
-    return paths[0] if paths else None
+def _paraview(root: Path) -> str | None:
+    """The command that shows a run in ParaView."""
+    script = first_file(root)
+    return None if script is None else f"paraview --script={script}"

@@ -210,9 +210,9 @@ class Leg(Section):
     Forces are those on body 2, motions those of body 1 relative to body 2 far from the contact.
     """
 
-    P: NormalForce | None = entry("normal force [N]", "400 N", default=None)
+    P: NormalForce | None = entry("normal force [N]", "60 N", default=None)
     approach: Travel | None = entry("instead of P [mm]", "13 um", default=None)
-    Qx: Force | None = entry("tangential force along x [N]", "210 N", default=None)
+    Qx: Force | None = entry("tangential force along x [N]", "15 N", default=None)
     shift_x: Travel | None = entry("instead of Qx [mm]", "5 um", default=None)
     Qy: Force | None = entry("tangential force along y [N]", "0 N", default=None)
     shift_y: Travel | None = entry("instead of Qy [mm]", "0 um", default=None)
