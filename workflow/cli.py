@@ -206,7 +206,7 @@ def resume(folder: Path, loudness: str | None) -> None:
 @click.argument("folder", type=click.Path(exists=True, file_okay=False, path_type=Path))
 @click.option("--out", type=click.Path(path_type=Path), help="Another file than its report.html.")
 def report(folder: Path, out: Path | None) -> None:
-    """Write the page that tells all of the finished run in FOLDER, its report.html, anew."""
+    """Write the page of the finished run in FOLDER anew."""
     from workflow.report.writing import write_report
 
     click.echo(write_report(folder, out))
@@ -245,7 +245,7 @@ def verify(cases: tuple[Path, ...], out: Path, loudness: str | None) -> int:
 @click.option("--out", type=click.Path(path_type=Path), help="Folder for table, page and figures.")
 @click.option("--force", is_flag=True, help="Overwrite what is there.")
 def compare(folders: tuple[Path, ...], out: Path | None, force: bool) -> None:
-    """Put the finished runs in FOLDERS side by side: results, cases, and curves.
+    """Put finished runs side by side: results, cases, curves.
 
     The first is what the others are held against. All must be runs of one analysis.
     """
@@ -465,7 +465,7 @@ class _KindsInHelp(click.Command):
 @click.argument("kind", required=False, type=_Kind())
 @click.argument("file", required=False, type=click.Path(path_type=Path))
 def new(kind: str | None, file: Path | None) -> None:
-    """Write a commented case of KIND to FILE, or print it; without KIND list the kinds."""
+    """Write a commented case to FILE; without KIND list the kinds."""
     from workflow.kinds import template
     from workflow.sweep.template import SWEEP, sweep_template
 
@@ -488,7 +488,7 @@ def new(kind: str | None, file: Path | None) -> None:
 
 @cli.command()
 def materials() -> None:
-    """List the materials that a case may name, and where their values are from."""
+    """List the materials that a case may name, with sources."""
     from workflow.commands.materials import known_materials
 
     for line in known_materials():
