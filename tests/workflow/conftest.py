@@ -83,7 +83,10 @@ def put(group: h5py.Group, **values: Any) -> None:
 def put_structure(file: h5py.File, name: str, load: float, cycles: float) -> None:
     """FE face, its fields over the cycle, and the resultants."""
     group = file.create_group(f"{'structure_worn' if cycles else 'structure'}/{name}")
-    nodes = np.meshgrid(np.linspace(-5, 5, 20), np.linspace(-30, 30, 34), indexing="ij")
+    nodes = np.meshgrid(
+        *(0.5 * size * np.linspace(-1, 1, n) for size, n in zip(SIZE, (20, 34), strict=True)),
+        indexing="ij",
+    )
     x, y = (axis.ravel() for axis in nodes)
     index = np.arange(x.size).reshape(20, 34)
     facets = np.stack([index[:-1, :-1], index[1:, :-1], index[1:, 1:]], -1).reshape(-1, 3)
@@ -189,7 +192,7 @@ def put_mission(body: h5py.Group, mesh: Any, shift: Array, stress: Array) -> Non
 
 def fabricate(path: Path, shape: tuple[int, int] = (24, 40)) -> Path:
     """A plausible ``results.h5`` on a grid a little larger than the flank."""
-    grid = Grid.covering((10.8, 63.0), shape)
+    grid = Grid.covering((1.08 * SIZE[0], 1.05 * SIZE[1]), shape)
     with h5py.File(path, "w") as file:
         file.attrs.update(title="Synthetic dovetail", friction=FRICTION, peak_increment=PEAK)
         file.attrs["bodies"] = ["disk", "blade"]

@@ -222,11 +222,11 @@ def test_backbone_and_peaks_against_force(results: h5py.File, summary: dict[str,
 
 def test_loops_and_their_branches(results: h5py.File, summary: dict[str, Any]) -> None:
     figure = vibration_loops.loops(results, CONTENTS)
-    left, right = figure.axes
+    left = figure.axes[0]
     # Of two forces, each in one and in three harmonics.
     assert len(left.lines) == 4
     assert left.get_title() == "100 Hz, 3 harmonics; dashed: the force in 1 alone"
-    names = [text.get_text() for text in right.get_legend().get_texts()]
+    names = [text.get_text() for text in figure.legends[0].get_texts()]
     slopes = [1e-3 * response["loops"][-1]["stiffness"] for response in summary["responses"]]
     assert names == [
         f"{force} N: {slope:.4g} N/µm" for force, slope in zip((2, 25), slopes, strict=True)

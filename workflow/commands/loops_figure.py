@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from sa_solver.types import Array
 from wear.joints.measured_loops import MeasuredLoops
-from workflow.pictures.panels import new_figure
+from workflow.pictures.panels import legend_below, new_figure
 from workflow.pictures.scales import PER_MICRON, TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE, write_figures
 
@@ -29,7 +29,9 @@ def figure(loops: MeasuredLoops, name: str) -> Figure:
     """Loops with the lines that were laid through the middle one; stiffness, friction, energy."""
     drawn = new_figure(_title(loops, name), 7.0)
     left, right = drawn.subfigures(1, 2, squeeze=False, width_ratios=(1.4, 1.0))[0]
-    _draw_loops(left.subplots(), loops)
+    axis = left.subplots()
+    _draw_loops(axis, loops)
+    legend_below(left, [axis])
     panels = right.subplots(3, 1, sharex=True)
     _draw_values(panels[0], PER_MICRON * loops.stick_stiffness, "kt [N/µm]", BLUE)
     _draw_values(panels[1], *_friction(loops), ORANGE)
@@ -59,10 +61,6 @@ def _draw_loops(axis: Axes, loops: MeasuredLoops) -> None:
         _draw_sliding(axis, loops, middle)
     axis.set_xlabel("displacement [µm]")
     axis.set_ylabel("force [N]")
-    # The loop fills its panel: room for the legend above it.
-    low, high = axis.get_ylim()
-    axis.set_ylim(low, high + 0.2 * (high - low))
-    axis.legend(loc="upper left", ncols=3)
 
 
 def _draw_stick(

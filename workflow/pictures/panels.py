@@ -1,32 +1,86 @@
-"""What figures are made with: an empty one, colours in an order, legends, ticks, words."""
+"""What figures are made with: an empty one, panels, colours in an order, legends, ticks, words."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from typing import Any
+from typing import Any, Literal
 
 import h5py
 import numpy as np
 from matplotlib import colormaps
 from matplotlib.axes import Axes
+from matplotlib.axis import Axis
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator
+from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter, NullLocator
 
+from workflow.pictures.fitting import FittedLayout
 from workflow.pictures.style import COLOUR_MAP, LAST_SHADE
 
 Figures = Mapping[str, Callable[[h5py.File], Figure]]
 """What draws each figure of results, by the figure's name."""
 
 WIDTH_INCHES = 12.0
+# At the sides of everything [inches].
+PAD = 0.06
+# Panels beside each other: of more interfaces further ones begin new rows.
+MOST_COLUMNS = 3
 # Of a decade: further numbers would touch each other.
 TICKS = (2.0, 5.0)
+# Ratios of the ends of an axis from which on only decades have numbers, and up to which they are
+# those of a linear one, so many.
+MANY_DECADES, FEW_DECADES, FEW_TICKS = 100.0, 4.0, 5
+# A change is told in percent of what is at least this share of what became of it.
+NEARLY_ZERO = 1e-2
+# Forces are shown in kN from here on [N], volumes in µm³ up to here [mm³].
+LARGE_FORCE, SMALL_VOLUME = 1e3, 1e-3
 
 
-def new_figure(title: str, height: float) -> Figure:
-    """An empty figure with a title, ``height`` in inches."""
-    figure = Figure(figsize=(WIDTH_INCHES, height), layout="constrained")
+def new_figure(title: str, height: float, compress: bool = False) -> Figure:
+    """An empty figure with a title, ``height`` in inches; panels to scale are compressed."""
+    figure = Figure(
+        figsize=(WIDTH_INCHES, height), layout=FittedLayout(w_pad=PAD, compress=compress)
+    )
+    FigureCanvasAgg(figure)  # measures texts at once; others draw the figure for each
     figure.suptitle(title, fontweight="bold")
     return figure
+
+
+def blocks(columns: int) -> int:
+    """How many rows so many columns are broken into."""
+    return -(-columns // MOST_COLUMNS)
+
+
+def panel_rows(
+    figure: Any,
+    rows: int,
+    columns: int,
+    sharex: Literal["all", "row"] = "all",
+) -> Any:
+    """So many ``rows`` of panels for every column; their axes ``(rows, columns)``.
+
+    Of more than ``MOST_COLUMNS`` the others are below, in further :func:`blocks`. All of a row
+    share y, and x with all or with these. The figure, or part of one, is to be high enough.
+    """
+    across = min(columns, MOST_COLUMNS)
+    places = figure.add_gridspec(rows * blocks(columns), across)
+    axes = np.empty((rows, columns), dtype=object)
+    for row, column in np.ndindex(rows, columns):
+        block, place = divmod(column, MOST_COLUMNS)
+        shared = axes[0 if sharex == "all" else row, 0]
+        spot = places[block * rows + row, place]
+        axis = figure.add_subplot(spot, sharex=shared, sharey=axes[row, 0])
+        numbered = sharex == "row" or row == rows - 1
+        axis.tick_params(labelleft=place == 0, labelbottom=numbered)
+        axes[row, column] = axis
+    return axes
+
+
+def label_rows(axes: Any, labels: Iterable[str]) -> None:
+    """What is shown along y, on the panels at the left."""
+    for row, label in zip(axes, labels, strict=True):
+        for axis in row[::MOST_COLUMNS]:
+            axis.set_ylabel(label)
 
 
 def spread(items: Sequence[Any], most: int) -> list[Any]:
@@ -43,9 +97,30 @@ def shaded(items: Sequence[Any], most: int) -> list[tuple[Any, Any]]:
 
 
 def changes(values: Mapping[str, Iterable[float]], digits: str, unit: str = "") -> str:
-    """What became of a value, by name, for a title."""
+    """What became of a value, by name, for a title; of many names where it is largest."""
+    if len(values) > MOST_COLUMNS:
+        values = {name: tuple(series) for name, series in values.items()}
+        name = max(values, key=lambda name: max(values[name]))
+        return f"most on {changes({name: values[name]}, digits, unit)}"
     steps = {name: " → ".join(format(v, digits) for v in series) for name, series in values.items()}
     return ", ".join(f"{name} {text}{unit}" for name, text in steps.items())
+
+
+def change(before: float, after: float, unit: str) -> str:
+    """A relative change for a title; both values where the first is nearly nothing."""
+    if before > NEARLY_ZERO * abs(after):
+        return f"{after / before - 1.0:+.1%}"
+    return f"{before:.3g} → {after:.3g} {unit}"
+
+
+def force_unit(largest: float) -> tuple[float, str]:
+    """Scale and unit in which forces up to so many N are shown."""
+    return (1e-3, "kN") if largest >= LARGE_FORCE else (1.0, "N")
+
+
+def volume_unit(largest: float) -> tuple[float, str]:
+    """Scale and unit in which volumes up to so many mm³ are shown."""
+    return (1.0, "mm³") if largest >= SMALL_VOLUME else (1e9, "µm³")
 
 
 def legend_beside(axis: Axes, title: str | None = None) -> None:
@@ -54,24 +129,56 @@ def legend_beside(axis: Axes, title: str | None = None) -> None:
 
 
 def legend_below(
-    figure: Any, axes: Iterable[Axes], columns: int | None = None, fontsize: float | None = None
+    figure: Any,
+    axes: Iterable[Axes],
+    columns: int | None = None,
+    fontsize: float | None = None,
+    title: str | None = None,
 ) -> None:
     """One legend of several panels, each name once, below all of them; by default in a row."""
     named: dict[str, Any] = {}
     for axis in axes:
         handles, names = axis.get_legend_handles_labels()
         named |= dict(zip(names, handles, strict=True))
-    figure.legend(
-        named.values(),
-        named.keys(),
-        loc="outside lower center",
-        ncols=columns or len(named),
-        fontsize=fontsize,
-    )
+    if named:
+        figure.legend(
+            named.values(),
+            named.keys(),
+            loc="outside lower center",
+            ncols=columns or len(named),
+            fontsize=fontsize,
+            title=title,
+        )
 
 
-def plain_ticks(axis: Axes) -> None:
-    """Plain numbers along a logarithmic x axis, few of them."""
-    axis.xaxis.set_minor_locator(LogLocator(subs=TICKS))
-    axis.xaxis.set_major_formatter("{x:g}")
-    axis.xaxis.set_minor_formatter("{x:g}")
+def plain_ticks(line: Axis) -> None:
+    """A few plain numbers along a logarithmic axis, whatever it spans; limits come first."""
+    low, high = line.get_view_interval()
+    if high > low * MANY_DECADES:
+        line.set_major_locator(LogLocator())
+        line.set_minor_formatter(NullFormatter())
+    elif high > low * FEW_DECADES:
+        line.set_minor_locator(LogLocator(subs=TICKS))
+        line.set_minor_formatter("{x:g}")
+    else:
+        line.set_major_locator(MaxNLocator(FEW_TICKS))
+        line.set_minor_locator(NullLocator())
+    line.set_major_formatter("{x:g}")
+
+
+def whole_ticks(line: Axis) -> None:
+    """Whole numbers along an axis that counts."""
+    line.set_major_locator(MaxNLocator(integer=True))
+
+
+def panel_grid(figure: Any, count: int, columns: int = 2) -> list[Axes]:
+    """So many panels in rows; those of the last one share all of its width."""
+    full, rest = divmod(count, columns)
+    rows = full + bool(rest)
+    places = figure.add_gridspec(rows, columns * max(rest, 1))
+    axes = []
+    for number in range(count):
+        row, place = divmod(number, columns)
+        wide = columns if row == full else max(rest, 1)
+        axes.append(figure.add_subplot(places[row, place * wide : (place + 1) * wide]))
+    return axes

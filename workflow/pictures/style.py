@@ -24,6 +24,9 @@ STYLE: dict[Any, Any] = {
     "axes.titlesize": 13,
     "axes.titlelocation": "left",
     "axes.grid": True,
+    # All of a number is at its tick, but for very small and very large ones.
+    "axes.formatter.useoffset": False,
+    "axes.formatter.limits": (-5, 7),
     "grid.alpha": 0.3,
     "legend.fontsize": 11,
     "legend.framealpha": 0.85,
@@ -98,7 +101,7 @@ def _lay_out(figure: Figure) -> None:
     if engine is not None:
         figure.set_dpi(DOTS_PER_INCH)
         engine.execute(figure)
-        figure.set_layout_engine("none")
+        figure.set_layout_engine(None)
     for artist in figure.findobj(lambda a: isinstance(a, Collection | Line2D)):
         if _vertices(artist) > DENSE:
             artist.set_rasterized(True)

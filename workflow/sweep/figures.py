@@ -14,7 +14,14 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from sa_solver.types import Array
-from workflow.pictures.panels import legend_below, new_figure
+from workflow.pictures.panels import (
+    blocks,
+    label_rows,
+    legend_below,
+    new_figure,
+    panel_rows,
+    plain_ticks,
+)
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, ORANGE, write_figures
 from workflow.sweep.table import Row, Varied, columns_of, interfaces_of, unit_of, varied_in
@@ -66,20 +73,20 @@ def kinetics_bands(title: str, rows: Sequence[Row], names: Sequence[str]) -> Fig
     """Depth and volume of all runs against cycles, by interface."""
     done = [row.finished.summary for row in rows if row.finished.summary]
     statistics = "median (least to largest) at their end"
-    figure = new_figure(f"{title}: {len(done)} runs, {statistics}", 9.0)
-    axes = figure.subplots(2, len(names), sharex=True, sharey="row", squeeze=False)
+    figure = new_figure(f"{title}: {len(done)} runs, {statistics}", 9.0 * blocks(len(names)))
+    axes = panel_rows(figure, 2, len(names))
+    units = [shown or _unit(f"{names[0]}.{quantity}", rows) for quantity, _, _, shown in WEAR]
     for column, name in zip(axes.T, names, strict=True):
         summaries = [summary for summary in done if name in interfaces_of(summary)]
-        for axis, (quantity, words, scale, shown) in zip(column, WEAR, strict=True):
-            unit = shown or _unit(f"{name}.{quantity}", rows)
+        for axis, (quantity, _, scale, _), unit in zip(column, WEAR, units, strict=True):
             last = _draw_bands(axis, summaries, name, quantity, scale)
             low, middle, high = (float(np.quantile(last, q)) for q in (0.0, 0.5, 1.0))
             values = f"{quantity} {middle:.3g} ({low:.3g} to {high:.3g})"
-            axis.set(title=f"{name}: {values} {unit}", ylabel=f"{words} [{unit}]")
-            axis.label_outer()
+            axis.set_title(f"{name}: {values} {unit}")
         column[-1].set_xlabel("cycles")
         column[-1].xaxis.set_major_formatter("{x:,.0f}")
         column[-1].locator_params(axis="x", nbins=5)
+    label_rows(axes, [f"{what[1]} [{unit}]" for what, unit in zip(WEAR, units, strict=True)])
     legend_below(figure, [axes[0, 0]])
     return figure
 
@@ -160,18 +167,22 @@ def _unit(name: str, rows: Sequence[Row]) -> str:
 
 def against(title: str, varied: Varied, panels: list[list[Panel]]) -> Figure:
     """Results of the runs against one entry that varies."""
-    figure = new_figure(f"{title}: against {varied.path}", 4.5 * len(panels))
-    axes = figure.subplots(len(panels), len(panels[0]), sharex=True, sharey="row", squeeze=False)
+    rows, columns = len(panels), len(panels[0])
+    figure = new_figure(f"{title}: against {varied.path}", 4.5 * rows * blocks(columns))
+    axes = panel_rows(figure, rows, columns)
     places, ticks = _places(varied)
     for axis, panel in zip(axes.flat, (panel for row in panels for panel in row), strict=True):
         _draw_against(axis, places, panel)
         correlation = "" if ticks else _correlation(places, panel.values)
-        axis.set(title=f"{panel.title}{correlation}", xlabel=varied.heading, ylabel=panel.label)
-        axis.label_outer()
+        axis.set_title(f"{panel.title}{correlation}")
         if ticks:
             axis.set_xticks(range(len(ticks)), ticks)
         elif places.min() > 0.0 and places.max() > LOGARITHMIC * places.min():
             axis.set_xscale("log")
+            plain_ticks(axis.xaxis)
+    for axis in axes[-1]:
+        axis.set_xlabel(varied.heading)
+    label_rows(axes, [row[0].label for row in panels])
     legend_below(figure, [axes[0, 0]])
     return figure
 

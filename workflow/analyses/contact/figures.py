@@ -14,8 +14,21 @@ from matplotlib.patches import Patch
 from sa_solver.types import Array, Grid
 from workflow.analyses.contact.datasets import BODIES, Contents
 from workflow.analyses.contact.load_table import FORCES, MOTIONS
-from workflow.pictures.fields import MAX_PROFILES, centres, draw_map, middle
-from workflow.pictures.panels import Figures, new_figure, shaded, spread
+from workflow.pictures.fields import (
+    FLAT,
+    MARGIN,
+    MAX_PROFILES,
+    PROFILE_MARGIN,
+    View,
+    centres,
+    draw_map,
+    is_upright,
+    middle,
+    name_sides,
+    scaled_panels,
+    view_of,
+)
+from workflow.pictures.panels import Figures, legend_below, new_figure, shaded, spread
 from workflow.pictures.scales import TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, ORANGE
 from workflow.shell.results import grid_of
@@ -23,9 +36,7 @@ from workflow.shell.results import grid_of
 # One per profile: those of a closed cycle lie on each other.
 DASHES = ("-", "--", "-.", ":", (0, (8, 2)), (0, (1, 3)))
 STICK, SLIP = "#9DC3DE", "#F2B48C"
-# Beyond the contact, how far maps and profiles reach: as a share of the contact's size.
-MARGIN = 0.25
-# Arrows along either side of a map.
+# Arrows along the longer side of a map.
 ARROWS = 17
 # Fewer points make no curve.
 FEWEST_POINTS = 3
@@ -44,31 +55,40 @@ def figures_of(contents: Contents) -> Figures:
 
 
 def profiles(file: h5py.File) -> Figure:
-    """Pressure and shear along x through the centre, at the states where the path turns."""
+    """Pressure and, if any, shear along x through the centre, where the path turns."""
     names = _shown(file)
     along = _main_shear(file, names)
-    figure = new_figure(_profile_title(file, names), 8.5)
-    top, bottom = figure.subplots(2, 1, sharex=True)
+    sheared = any(file["contact"][BODIES][name]["shear"][along].any() for name in names)
+    last = _last_touching(file)
+    figure = new_figure(_profile_title(file, last), 9.5 if sheared else 5.5)
+    axes = figure.subplots(1 + sheared, 1, sharex=True, squeeze=False)[:, 0]
     x = centres(_grid(file), 0)
     for (name, colour), dashes in zip(shaded(names, MAX_PROFILES), DASHES, strict=False):
         state = file["contact"][BODIES][name]
         look = {"color": colour, "linestyle": dashes, "label": _loads(file, name)}
-        top.plot(x, middle(state["pressure"][()], 0), **look)
-        bottom.plot(x, middle(state["shear"][along], 0), **look)
-    limit = float(file.attrs["friction"]) * middle(state["pressure"][()], 0)
-    bottom.fill_between(x, -limit, limit, color="#BBBBBB", alpha=0.4, lw=0, label="±µp, last")
-    component, reach = "xy"[along], _reach(file, names)
-    top.set(ylabel="pressure [MPa]", ylim=(0.0, None), title="pressure at y = 0")
-    bottom.set(xlabel="x [mm]", xlim=(-reach, reach), ylabel=f"shear q{component} [MPa]")
-    bottom.set_title(f"shear along {component} at y = 0")
-    bottom.legend(loc="center left", bbox_to_anchor=(1.0, 1.0))
+        fields = state["pressure"][()], state["shear"][along]
+        for axis, field in zip(axes, fields, strict=False):
+            axis.plot(x, middle(field, 0), **look)
+    place = "" if _grid(file).line else " at y = 0"
+    axes[0].set(ylabel="pressure [MPa]", ylim=(0.0, None), title=f"pressure{place}")
+    if sheared:
+        pressure = middle(file["contact"][BODIES][last]["pressure"][()], 0)
+        limit = float(file.attrs["friction"]) * pressure
+        label = f"±µp, {file['contact'][BODIES][last].attrs['increment']}"
+        axes[1].fill_between(x, -limit, limit, color="#BBBBBB", alpha=0.4, lw=0, label=label)
+        component = "xy"[along]
+        axes[1].set_ylabel(f"shear q{component} [MPa]")
+        axes[1].set_title(f"shear along {component}{place}")
+    axes[-1].set(xlabel="x [mm]", xlim=_view(file, names, PROFILE_MARGIN).x)
+    legend_below(figure, axes, columns=3, title="increment: loads")
     return figure
 
 
-def _profile_title(file: h5py.File, names: list[str]) -> str:
-    state = file["contact"][BODIES][names[-1]]
+def _profile_title(file: h5py.File, name: str) -> str:
+    state = file["contact"][BODIES][name]
     pressure, shear = state["pressure"][()].max(), np.hypot(*state["shear"][()]).max()
-    return f"Last increment: pressure at most {pressure:.4g} MPa, shear {shear:.4g} MPa"
+    text = f"Increment {state.attrs['increment']}: pressure at most {pressure:.4g} MPa"
+    return f"{text}, shear {shear:.4g} MPa" if shear else text
 
 
 def _shown(file: h5py.File) -> list[str]:
@@ -105,65 +125,86 @@ def _loads(file: h5py.File, name: str) -> str:
     return f"{increment}: " + ", ".join(texts)
 
 
-def _reach(file: h5py.File, names: list[str]) -> float:
-    """Half width of the view along x and y [mm]."""
-    grid = _grid(file)
-    pressed = np.any([file["contact"][BODIES][n]["pressure"][()] > 0.0 for n in names], axis=0)
-    x, y = np.broadcast_arrays(grid.x, grid.y)
-    if not pressed.any():
-        return 0.5 * float(max(grid.size[0], grid.size[1] * (not grid.line)))
-    far = np.max(np.abs([x[pressed], y[pressed]])) + grid.pitch[0]
-    return float((1.0 + MARGIN) * far)
+def _view(file: h5py.File, names: list[str], margin: float = MARGIN) -> View:
+    """What is in contact at these states, and a little around it."""
+    fields = [file["contact"][BODIES][name]["pressure"][()] for name in names]
+    return view_of(fields, _grid(file), margin)
 
 
 # --- maps ---------------------------------------------------------------------------------------
 
 
 def maps(file: h5py.File) -> Figure:
-    """Pressure, and where the contact sticks and slips with its shear, at the last state."""
-    name = list(file["contact"][BODIES])[-1]
-    state, grid, reach = file["contact"][BODIES][name], _grid(file), _reach(file, [name])
+    """Pressure, and where the contact sticks and slips with its shear, at the last state in touch.
+
+    Without shear there is nothing to stick.
+    """
+    name = _last_touching(file)
+    state, grid, view = file["contact"][BODIES][name], _grid(file), _view(file, [name])
     pressure, shear = state["pressure"][()], state["shear"][()]
-    # 0 open, 1 stick, 2 slip.
-    regions = np.where(pressure > 0.0, np.where(state["sticking"][()], 1.0, 2.0), 0.0)
-    figure = new_figure(f"Last increment, {_loads(file, name)}", 6.2)
-    left, right = figure.subplots(1, 2, sharex=True, sharey=True)
-    turned = Grid(grid.shape[::-1], grid.pitch[::-1])  # x to the right
-    image = draw_map(left, pressure.T, turned, max(float(pressure.max()), 1e-300))
-    draw_map(right, regions.T, turned, 2.0).set_cmap(ListedColormap(["white", STICK, SLIP]))
-    _draw_arrows(right, shear, grid, reach)
-    figure.colorbar(image, ax=left, label="pressure [MPa]", shrink=0.8)
-    pressed = max(int(np.count_nonzero(regions)), 1)
-    stuck = np.count_nonzero(regions == 1.0) / pressed
-    left.set_title(f"pressure: at most {pressure.max():.4g} MPa")
-    right.set_title(f"shear on body 2: {stuck:.1%} of the contact sticks")
-    right.legend(
-        handles=[Patch(color=STICK, label="stick"), Patch(color=SLIP, label="slip")],
-        loc="upper right",
-    )
-    for axis in (left, right):
-        axis.set(xlabel="x [mm]", xlim=(-reach, reach), ylim=(-reach, reach))
-    left.set_ylabel("y [mm]")
+    turned = is_upright([view])
+    height = view.size[not turned] / view.size[turned]
+    panels = 1 + bool(shear.any())
+    columns = 1 if height <= FLAT else panels
+    title = f"Increment {_loads(file, name)}"
+    figure, axes = scaled_panels(title, [height] * (panels // columns), columns)
+    first = axes.flat[0]
+    image = draw_map(first, pressure, grid, float(pressure.max()) or 1.0, view, turned)
+    first.set_title(f"pressure: at most {pressure.max():.4g} MPa")
+    figure.colorbar(image, ax=first, label="pressure [MPa]", pad=0.01)
+    if panels > 1:
+        _draw_regions(figure, axes.flat[1], state, grid, view, turned)
+    name_sides(axes, turned)
     return figure
 
 
-def _draw_arrows(axis: Axes, shear: Array, grid: Grid, reach: float) -> None:
-    """The shear at about ``ARROWS`` x ``ARROWS`` places in view."""
+def _last_touching(file: h5py.File) -> str:
+    """The last state, or of a path that ends with the bodies apart the last one in contact."""
+    names = list(file["contact"][BODIES])
+    touching = [name for name in names if file["contact"][BODIES][name]["pressure"][()].any()]
+    return (touching or names)[-1]
+
+
+def _draw_regions(
+    figure: Figure, axis: Axes, state: h5py.Group, grid: Grid, view: View, turned: bool
+) -> None:
+    """Where the contact sticks and slips, and its shear."""
+    pressed, sticks = state["pressure"][()] > 0.0, state["sticking"][()].astype(bool)
+    # 0 open, 1 stick, 2 slip.
+    regions = np.where(pressed, np.where(sticks, 1.0, 2.0), 0.0)
+    shown = draw_map(axis, regions, grid, 2.0, view, turned)
+    shown.set_cmap(ListedColormap(["white", STICK, SLIP]))
+    _draw_arrows(axis, state["shear"][()], grid, view, turned)
+    stuck = np.count_nonzero(regions == 1.0) / max(int(np.count_nonzero(pressed)), 1)
+    axis.set_title(f"shear on body 2: {stuck:.1%} of the contact sticks")
+    figure.legend(
+        handles=[Patch(color=STICK, label="stick"), Patch(color=SLIP, label="slip")],
+        loc="outside lower center",
+        ncols=2,
+    )
+
+
+def _draw_arrows(axis: Axes, shear: Array, grid: Grid, view: View, turned: bool) -> None:
+    """The shear at places in view, ``ARROWS`` along its longer side."""
+    apart = max(view.size) / ARROWS
     places = []
-    for centre, pitch in ((grid.x.ravel(), grid.pitch[0]), (grid.y.ravel(), grid.pitch[1])):
-        step = max(1, round(2.0 * reach / (pitch * ARROWS)))
-        places.append(np.flatnonzero(np.abs(centre) <= reach)[::step])
-    qx, qy = (component[np.ix_(*places)].T for component in shear)
-    shown = np.hypot(qx, qy) > 0.0
-    if not shown.any():
+    for direction in (0, 1):
+        centre, (low, high) = centres(grid, direction), view[direction]
+        step = max(1, round(apart / grid.pitch[direction]))
+        places.append(np.flatnonzero((centre >= low) & (centre <= high))[step // 2 :: step])
+    q = np.array([component[np.ix_(*places)] for component in shear])
+    size = np.hypot(*q)
+    if not size.any():
         return
-    x, y = np.meshgrid(grid.x.ravel()[places[0]], grid.y.ravel()[places[1]])
-    longest = float(np.hypot(qx, qy).max()) * ARROWS / (2.0 * reach)  # as long as they are apart
+    at = np.array(np.meshgrid(grid.x.ravel()[places[0]], grid.y.ravel()[places[1]], indexing="ij"))
+    order = slice(None, None, -1 if turned else 1)
+    there = size > 0.0
     axis.quiver(
-        *(x[shown], y[shown], qx[shown], qy[shown]),
+        *at[order, there],
+        *q[order, there],
         angles="xy",
         scale_units="xy",
-        scale=longest,
+        scale=float(size.max()) / apart,  # as long as they are apart
         color=BLACK,
         width=0.004,
         zorder=3,
@@ -190,18 +231,23 @@ def forces(file: h5py.File) -> Figure:
     left.set_xlabel(f"{words} [{'mrad' if history[motion].attrs['unit'] == 'rad' else 'µm'}]")
     left.set_ylabel(f"{force} [{history[force].attrs['unit']}]")
     left.set_title(f"{force} against {words} of body 1")
-    left.legend(loc="best")
+    legend_below(figure, [left])
     right.plot(history["increment"][()], energy, line, color=GREEN, markersize=4)
     right.set(xlabel="increment", title="energy dissipated by slip")
-    right.set_ylabel(f"energy dissipated so far [{history['Edx'].attrs['unit']}]")
+    right.set_ylabel(f"energy dissipated so far [{_in_millijoules(history)}]")
     return figure
 
 
 def _forces_title(history: h5py.Group, energy: float) -> str:
-    text = f"{energy:.4g} {history['Edx'].attrs['unit']} dissipated in all"
+    text = f"{energy:.4g} {_in_millijoules(history)} dissipated in all"
     if history.attrs["method"] != "full":
         text += "; only the turning points are computed"
     return text
+
+
+def _in_millijoules(history: h5py.Group) -> str:
+    """Unit of the energies, N mm, in a word."""
+    return str(history["Edx"].attrs["unit"]).replace("N mm", "mJ")
 
 
 def _driven(history: h5py.Group) -> tuple[str, str]:

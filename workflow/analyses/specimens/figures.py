@@ -12,7 +12,14 @@ from matplotlib.tri import Triangulation
 
 from sa_solver.types import Array
 from workflow.pictures.fields import centres, middle, near_middle
-from workflow.pictures.panels import Figures, legend_below, new_figure, spread
+from workflow.pictures.panels import (
+    Figures,
+    legend_below,
+    new_figure,
+    panel_grid,
+    plain_ticks,
+    spread,
+)
 from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, COLOUR_MAP, GREEN, ORANGE, PURPLE
 from workflow.shell.results import grid_of
@@ -49,12 +56,12 @@ def pad(file: h5py.File) -> Figure:
     """Pressure and path of slip on the pad under the first force: unworn, between, worn."""
     load = _loads(file)[0]
     states = _three(load)
-    figure = new_figure(f"The pad at {_force(load)}: {_pad_title(states)}", 7.2)
+    figure = new_figure(f"The pad at {_force(load)}: {_pad_title(states)}", 7.2, compress=True)
     rows = figure.subplots(2, 3, sharex=True, sharey=True)
     for column, state in enumerate(states):
         top, bottom = rows[:, column]
         pressure, slip = state["pressure"][()], TO_MICRONS * state["cycle_slip"][()]
-        cycles = f"{state.attrs['cycles']:.3g} cycles" if column else "unworn"
+        cycles = f"{state.attrs['cycles']:,.0f} cycles" if column else "unworn"
         _draw_pad(figure, top, file, pressure, "MPa")
         _draw_pad(figure, bottom, file, slip, "µm")
         top.set_title(f"pressure, {cycles}")
@@ -103,9 +110,10 @@ def _draw_pad(figure: Figure, axis: Axes, file: h5py.File, field: Array, unit: s
 def loops(file: h5py.File) -> Figure:
     """Force against motion of the ring, unworn and worn, and the coupled cycle unworn."""
     loads = _loads(file)
-    figure = new_figure(_loops_title(loads), 8.5 if len(loads) > 2 else 5.0)
-    panels = figure.subplots(-(-len(loads) // 2), min(len(loads), 2), squeeze=False).ravel()
-    for axis, load in zip(panels, loads, strict=False):
+    rows = -(-len(loads) // 2)
+    figure = new_figure(_loops_title(loads), 1.0 + 4.0 * rows)
+    panels = panel_grid(figure, len(loads))
+    for axis, load in zip(panels, loads, strict=True):
         states = _states(load)
         ends = zip((states[0], states[-1]), (BLUE, ORANGE), SHAPES, strict=True)
         for state, colour, shape in ends:
@@ -113,8 +121,6 @@ def loops(file: h5py.File) -> Figure:
         look: dict[str, Any] = {"markersize": 4, "label": "unworn, coupled and marched"}
         axis.plot(*_loop(load["coupled_cycle"]), ".", color=BLACK, **look)
         axis.set(title=_force(load), xlabel="motion of the ring [µm]", ylabel="force [N]")
-    for axis in panels[len(loads) :]:
-        axis.set_visible(False)
     legend_below(figure, panels[:1])
     return figure
 
@@ -162,6 +168,7 @@ def kinetics(file: h5py.File) -> Figure:
         areas.plot(cycles, history["area"][1:], label=_force(load), **look)
         pressures.plot(cycles, 100.0 * history["pressure_deviation"][1:], **look)
     _label_kinetics(panels)
+    legend_below(figure, [areas])
     return figure
 
 
@@ -175,6 +182,7 @@ def _label_kinetics(panels: Any) -> None:
     (over_cycles, over_energy), (areas, pressures) = panels
     for axis in panels.ravel():
         axis.set(xscale="log", xlabel="cycles")
+        plain_ticks(axis.xaxis)
     over_energy.set_xlabel("energy dissipated so far [J]")
     over_cycles.set_title("stiffness: all stuck (lines), slope of the loop (dots)")
     over_energy.set_title("the same over the energy")
@@ -183,7 +191,6 @@ def _label_kinetics(panels: Any) -> None:
     areas.set(title="area in contact", ylabel="area [mm²]", ylim=(0.0, None))
     pressures.set(title="unevenness of the pressure", ylim=(0.0, None))
     pressures.set_ylabel("rms of p/mean - 1 [%]")
-    areas.legend(loc="lower right")
 
 
 # --- the half-space -----------------------------------------------------------------------------
@@ -203,7 +210,7 @@ def half_space(file: h5py.File) -> Figure:
         rows[1, column].set(title=f"{shape}: shear along x against the motion", xlabel="x [mm]")
     rows[0, 0].set_ylabel("pressure [MPa]")
     rows[1, 0].set_ylabel("shear [MPa]")
-    rows[0, 0].legend(loc="best")
+    legend_below(figure, [rows[0, 0]])
     return figure
 
 

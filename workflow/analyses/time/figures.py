@@ -12,7 +12,14 @@ from matplotlib.figure import Figure
 
 from sa_solver.types import Array
 from workflow.analyses.time.outcome import LOOP, MOTION, RESPONSE, RING_DOWN, Contents
-from workflow.pictures.panels import Figures, legend_beside, new_figure, shaded
+from workflow.pictures.panels import (
+    Figures,
+    legend_below,
+    new_figure,
+    panel_grid,
+    plain_ticks,
+    shaded,
+)
 from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, HEADROOM, ORANGE, PURPLE
 
@@ -38,6 +45,8 @@ LAW_NAMES = {
 FIRST_MODE = 2.0
 # Motions are shown up to where they have fallen to this share of their largest.
 FADED = 0.02
+# Energies from here on have no decimals [J].
+LARGE_ENERGY = 1e3
 # Points of a time history that a picture can show.
 MOST_POINTS = 20_000
 
@@ -69,7 +78,8 @@ def _states(file: h5py.File, contents: Contents, group: str) -> list[tuple[str, 
 
 def _label(state: h5py.Group, aged: bool) -> str:
     energy = TO_JOULES * float(state.attrs["energy"])
-    text = f"{energy:,.4g} J" if energy else "unworn"
+    words = f"{energy:,.0f}" if energy >= LARGE_ENERGY else f"{energy:.4g}"
+    text = f"{words} J" if energy else "unworn"
     if aged and state.attrs["cycles"]:
         text += f", {state.attrs['cycles']:,.0f} cycles"
     return text
@@ -88,7 +98,7 @@ def loops(file: h5py.File, contents: Contents) -> Figure:
         axis.plot(displacement, force, color=colour, label=label)
     axis.set(xlabel="displacement of the joint [µm]", ylabel="force of the joint [N]")
     axis.set_title(f"{LAW_NAMES[file.attrs['law']]}: settled cycles after so much energy")
-    legend_beside(axis, "dissipated so far")
+    legend_below(figure, [axis], columns=3, title="dissipated so far")
     return figure
 
 
@@ -109,15 +119,15 @@ def evolution(file: h5py.File, contents: Contents) -> Figure:
     present = [name for name in SHOWN if name in contents.evolution]
     panels = [name for name in present if np.ptp(group[name][()]) > 0.0]
     panels = panels or ["friction", "stiffness"]
-    rows = (len(panels) + 2 * contents.aged + 1) // 2
-    figure = new_figure(_evolution_title(group, panels, contents.aged), 1.0 + 3.4 * rows)
-    axes = list(figure.subplots(rows, 2, squeeze=False).ravel())
-    for name in panels:
-        _draw_parameter(axes.pop(0), file, name)
+    count = len(panels) + 2 * contents.aged
+    rows = -(-count // 2)
+    figure = new_figure(_evolution_title(group, panels, contents.aged), 1.3 + 3.4 * rows)
+    axes = panel_grid(figure, count)
+    for name, axis in zip(panels, axes, strict=False):
+        _draw_parameter(axis, file, name)
     if contents.aged:
-        _draw_ageing(axes.pop(0), axes.pop(0), group)
-    for axis in axes:
-        axis.set_axis_off()
+        _draw_ageing(axes[-2], axes[-1], group)
+    legend_below(figure, axes)
     return figure
 
 
@@ -131,14 +141,13 @@ def _draw_parameter(axis: Axes, file: h5py.File, name: str) -> None:
     axis.plot(energies, values, "o", color=BLACK, mfc="none", label="looked at")
     axis.set(xlabel="energy dissipated so far [J]", ylabel=label)
     axis.set_ylim(0.0, HEADROOM * max(axis.dataLim.y1, 1e-300))
-    axis.legend(loc="lower right")
 
 
 def _draw_ageing(left: Axes, right: Axes, group: h5py.Group) -> None:
     """Energy of a cycle, and the cycles it has taken, over the energy."""
     energy = TO_JOULES * group["energy"][()]
     left.plot(energy, group["energy_per_cycle"][()], color=BLUE)
-    left.set(ylabel="energy of a cycle [mJ]", ylim=(0.0, HEADROOM * left.dataLim.y1))
+    left.set(ylabel="energy of a cycle [mJ]", ylim=(0.0, HEADROOM * max(left.dataLim.y1, 1e-300)))
     right.plot(energy, group["cycles"][()], color=ORANGE)
     right.set(ylabel="cycles", ylim=(0.0, None))
     right.yaxis.set_major_formatter("{x:,.0f}")
@@ -181,7 +190,7 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
     bottom.set(title="all that was recorded", xlabel="frequency [Hz]", xlim=(0.0, highest))
     for axis in (top, bottom):
         axis.set_ylabel("acceleration / force [m/s²/N]")
-    top.legend(loc="lower right", title="dissipated so far")
+    legend_below(figure, [top], title="dissipated so far")
     return figure
 
 
@@ -210,10 +219,10 @@ def _response_title(shown: list[tuple[str, Any, h5py.Group]]) -> str:
 def ring_down(file: h5py.File, contents: Contents) -> Figure:
     """Frequency and damping of the first mode against its amplitude, and the motion itself."""
     shown = _states(file, contents, MOTION)
-    figure = new_figure("First mode of the ring-down against its amplitude", 8.5)
-    top, bottom = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.0, 1.3))[:, 0]
-    history = top.subplots()
-    left, right = bottom.subplots(1, 2)
+    figure = new_figure("First mode of the ring-down against its amplitude", 9.0)
+    places = figure.add_gridspec(2, 2, height_ratios=(1.0, 1.3))
+    history = figure.add_subplot(places[0, :])
+    left, right = (figure.add_subplot(places[1, place]) for place in (0, 1))
     for label, colour, moved in shown:
         stuck, envelope = float(moved.parent.attrs["stuck"][0]), moved.parent.get(RING_DOWN)
         missing = "" if envelope else ", no ring-down"
@@ -225,11 +234,13 @@ def ring_down(file: h5py.File, contents: Contents) -> Figure:
         left.semilogx(amplitude, softened, color=colour)
         right.loglog(amplitude, 100.0 * np.abs(envelope["damping_ratio"][()]), color=colour)
     history.set(xlabel="time [s]", ylabel=f"displacement of {_seen(file)} [µm]")
-    history.legend(loc="upper right", title="dissipated so far")
+    legend_below(figure, [history], columns=2, title="dissipated so far")
     left.set_ylabel("frequency over that of the stuck joint [%]")
     right.set_ylabel("damping ratio [%]")
     for axis in (left, right):
         axis.set_xlabel(f"amplitude of {_seen(file)} [µm]")
+        plain_ticks(axis.xaxis)
+    plain_ticks(right.yaxis)
     return figure
 
 
@@ -268,7 +279,7 @@ def motion(file: h5py.File, contents: Contents) -> Figure:
     top.set_ylabel("excitation [N]")
     middle.set_ylabel(f"displacement of {_seen(file)} [µm]")
     bottom.set(xlabel="time [s]", ylabel="dissipated by the joint [mJ]")
-    middle.legend(loc="upper right", title="dissipated before")
+    legend_below(figure, [middle], title="dissipated before")
     return figure
 
 

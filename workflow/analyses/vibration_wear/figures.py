@@ -24,7 +24,15 @@ from workflow.analyses.vibration_wear.outcome import (
     WORN,
     Contents,
 )
-from workflow.pictures.panels import Figures, legend_beside, new_figure, plain_ticks, shaded, spread
+from workflow.pictures.panels import (
+    Figures,
+    legend_below,
+    legend_beside,
+    new_figure,
+    plain_ticks,
+    shaded,
+    spread,
+)
 from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
 from workflow.pictures.style import BLUE, GREEN, ORANGE, PURPLE
 from workflow.shell.results import grid_of
@@ -76,7 +84,8 @@ def frequency_response(file: h5py.File) -> Figure:
         axis.set(title=f"{forces[place]:g} N", ylabel="amplitude / force [µm/N]", yscale="log")
         legend_beside(axis, "resonance")
     panels[-1].set(xlabel="frequency [Hz]", xscale="log")
-    plain_ticks(panels[-1])
+    for side in (panels[-1].xaxis, *(axis.yaxis for axis in panels)):
+        plain_ticks(side)
     return figure
 
 
@@ -95,10 +104,11 @@ def evolution(file: h5py.File, contents: Contents) -> Figure:
         label = f"{forces[column]:g} N"
         frequency.plot(place, history["resonance"][:, column], "o-", color=colour, label=label)
     frequency.set_ylabel("resonance [Hz]")
-    frequency.legend()
+    legend_below(figure, [frequency], title="resonance")
     for axis, curves in ((motion, MOTION), (depth, AT_NODES if contents.at_nodes else ON_GRID)):
         _draw_pair(axis, place, history, curves)
-        axis.set(xlabel=f"cycles (unworn at {place[0]:.3g})", xscale="log")
+        axis.set(xlabel=f"cycles (unworn at {place[0]:g})", xscale="log")
+        plain_ticks(axis.xaxis)
     return figure
 
 
@@ -116,7 +126,7 @@ def scar(file: h5py.File) -> Figure:
         energy.plot(along, contact["energy"][:, middle], color=colour)
     depth.invert_yaxis()
     depth.set_ylabel("worn depth [µm]")
-    legend_beside(depth, "cycles")
+    legend_below(figure, [depth], title="cycles")
     pressure.set_ylabel("pressure [MPa]")
     energy.set(xlabel="x [mm]", ylabel="energy per cycle\nand area [mJ/mm²]")
     return figure
@@ -138,7 +148,7 @@ def profile(file: h5py.File) -> Figure:
         column[-1].set_xlabel(label)
     for axis, label in zip(panels[:, 0], PROFILE.values(), strict=True):
         axis.set_ylabel(label)
-    legend_beside(panels[0, -1], "cycles")
+    legend_below(figure, [panels[0, -1]], title="cycles")
     return figure
 
 
@@ -171,7 +181,7 @@ def loops(file: h5py.File, contents: Contents) -> Figure:
     else:
         label = "force [N]; points: whole tangential problem"
         axis.set(xlabel="displacement of the joint [µm]", ylabel=label)
-    legend_beside(axis, "cycles, energy")
+    legend_below(figure, [axis], columns=3, title="cycles, energy")
     return figure
 
 
@@ -187,6 +197,7 @@ def _draw_pair(axis: Axes, place: Array, history: h5py.Group, curves: Sequence[C
         side.plot(place, scale * history[name][()], "o-", color=colour)
         side.set_ylabel(label, color=colour)
     right.grid(visible=False)
+    right.xaxis.set_visible(False)
 
 
 def _states(file: h5py.File) -> list[tuple[h5py.Group, Any]]:

@@ -93,6 +93,14 @@ class InterfaceStress:
         """Whether there are maps of the fretting parameter."""
         return all(body.maps for moment in self.moments.values() for body in moment.bodies)
 
+    @property
+    def cracking(self) -> bool:
+        """Whether the fretting parameter is above 0 anywhere."""
+        parameter = self.planes.settings.life.parameter
+        name = RUIZ[0] if parameter == "ruiz" else parameter
+        bodies = [body for moment in self.moments.values() for body in moment.bodies]
+        return self.mapped and any(body.maps[name].values.any() for body in bodies)
+
     def write(self, writer: ResultsWriter) -> None:
         """Sections into ``stress/section``, maps into ``stress/life``, by interface."""
         if self.planes.settings.section != "none":

@@ -38,7 +38,8 @@ class Contents:
     and worn, with ``mission`` over the increments too; its ``nodes`` wear, or half-spaces.
     ``coarse`` are the interfaces with a solution on a coarse grid. The rest is there where a case
     asks for it: a ``comparison`` of half-space and structure, tangential ``loops``, ``sections`` of
-    the stress under the contacts, and the interfaces with maps of fretting ``life``.
+    the stress under the contacts, and the interfaces with maps of fretting ``life``, of which only
+    those ``cracking`` are above 0 anywhere. ``worn`` says whether anything has been lost.
     """
 
     names: tuple[str, ...]
@@ -54,6 +55,8 @@ class Contents:
     loops: bool = False
     sections: bool = False
     life: tuple[str, ...] = ()
+    cracking: tuple[str, ...] = ()
+    worn: bool = True
 
     @property
     def jump_names(self) -> list[str]:
@@ -75,6 +78,11 @@ class Contents:
     def wears(self) -> str:
         """What wears, in words."""
         return "nodes" if self.nodes else "half-space"
+
+    @property
+    def loads(self) -> str:
+        """Where the loads are from, in words."""
+        return "finite elements" if self.structure else "imposed loads"
 
     @property
     def per(self) -> str:

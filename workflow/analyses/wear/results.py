@@ -52,6 +52,9 @@ JUMP_FIELDS = {"surfaces": ("body_1", "body_2"), "contact": ("pressure", "shear"
 # What the kinetics have of each linear regime; not numbers where there is none.
 REGIME_ATTRIBUTES = {"linear_from": "start", "rate": "rate", "trend": "trend", "scatter": "scatter"}
 
+# Depths up to here [mm] are rounding of contacts that stick.
+NOTHING = 1e-10
+
 
 @dataclass(frozen=True)
 class PeakHistory:
@@ -182,6 +185,8 @@ def _write_results(
             loops=case.loops.wanted,
             sections=case.stress.section != "none",
             life=tuple(sorted(stress.name for stress in stresses if stress.mapped)),
+            cracking=tuple(sorted(stress.name for stress in stresses if stress.cracking)),
+            worn=any(found.kinetics[-1, :2].max() > NOTHING for found in outcome.interfaces),
         )
         writer.put_contents(contents)
     return recorded, contents

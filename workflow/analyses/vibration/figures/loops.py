@@ -11,7 +11,7 @@ from matplotlib.figure import Figure
 
 from sa_solver.types import Array
 from workflow.analyses.vibration.outcome import Contents
-from workflow.pictures.panels import new_figure, shaded
+from workflow.pictures.panels import legend_below, new_figure, shaded
 from workflow.pictures.scales import PER_MICRON, TO_MICRONS
 
 # More loops than this overlap.
@@ -30,7 +30,7 @@ def loops(file: h5py.File, contents: Contents) -> Figure:
     """
     chosen = shaded(contents.loops, MOST_LOOPS)
     shown = [file["responses"][name] for name, _ in chosen]
-    figure = new_figure(_title(shown), 7.5)
+    figure = new_figure(_title(shown), 8.0)
     left, right = figure.subplots(1, 2, width_ratios=(1.15, 1.0))
     for response, colour in zip(shown, (colour for _, colour in chosen), strict=True):
         for coarse in _resolutions(response)[:-1]:
@@ -39,6 +39,7 @@ def loops(file: h5py.File, contents: Contents) -> Figure:
         _draw_branch(right, _finest(response), colour, f"{response.attrs['force']:g} N")
     _bound(right, [_finest(response) for response in shown])
     _label(left, right, shown[0])
+    legend_below(figure, [right], columns=3, title="excitation: stick slope (dashed)")
     return figure
 
 
@@ -50,7 +51,6 @@ def _label(left: Axes, right: Axes, response: h5py.Group) -> None:
     left.set(title=text, xlabel="displacement [µm]", ylabel="tangential force [N]")
     right.set_title("rising branches from one origin")
     right.set(xlabel="displacement since the reversal [µm]", ylabel="force since the reversal [N]")
-    right.legend(loc="lower right", title="excitation: stick slope (dashed)")
 
 
 def _resolutions(response: h5py.Group) -> list[h5py.Group]:

@@ -16,7 +16,6 @@ from workflow.analyses.vibration.outcome import Contents
 from workflow.pictures.panels import (
     Figures,
     legend_below,
-    legend_beside,
     new_figure,
     plain_ticks,
     shaded,
@@ -80,7 +79,8 @@ def frequency_response(file: h5py.File, contents: Contents) -> Figure:
     _over_frequency(axis, file)
     axis.set_ylabel(f"amplitude of {_seen(file)} / force [µm/N]")
     axis.set_ylim(BELOW * min(lows), ABOVE * max(peaks))
-    legend_beside(axis, "resonance")
+    plain_ticks(axis.yaxis)
+    legend_below(figure, [axis], columns=4, title="resonance")
     return figure
 
 
@@ -90,7 +90,7 @@ def _over_frequency(axis: Axes, file: h5py.File) -> None:
     frequencies = np.concatenate([response["frequency"][()] for response in responses])
     axis.set(xscale="log", yscale="log", xlabel="frequency [Hz]")
     axis.set_xlim(frequencies.min(), frequencies.max())
-    plain_ticks(axis)
+    plain_ticks(axis.xaxis)
 
 
 def _title(file: h5py.File) -> str:
@@ -109,12 +109,12 @@ def _title(file: h5py.File) -> str:
 
 def resonance(file: h5py.File, contents: Contents) -> Figure:
     """Amplitudes with the backbone of phase resonance; frequency and damping against force."""
-    figure = new_figure(_resonance_title(file), 7.5)
-    left, right = figure.subfigures(1, 2, squeeze=False, width_ratios=(1.25, 1.0))[0]
-    axis = left.subplots()
+    figure = new_figure(_resonance_title(file), 8.0)
+    places = figure.add_gridspec(2, 2, width_ratios=(1.25, 1.0))
+    axis = figure.add_subplot(places[:, 0])
     _draw_amplitudes(axis, file, contents)
-    legend_below(left, [axis], columns=4)
-    top, bottom = right.subplots(2, 1, sharex=True)
+    top = figure.add_subplot(places[0, 1])
+    bottom = figure.add_subplot(places[1, 1], sharex=top)
     if contents.backbone:
         for panel, name, factor in ((top, "frequency", 1.0), (bottom, "damping", TO_PERCENT)):
             force, values = file["backbone/force"][()], factor * file["backbone"][name][()]
@@ -123,8 +123,8 @@ def resonance(file: h5py.File, contents: Contents) -> Figure:
     _draw_peaks(bottom, file, "damping", TO_PERCENT, ORANGE)
     top.set_ylabel("resonance frequency [Hz]")
     bottom.set(xlabel="force [N]", ylabel="damping ratio [%]", xscale="log")
-    plain_ticks(bottom)
-    top.legend(loc="best")
+    plain_ticks(bottom.xaxis)
+    legend_below(figure, [axis, top], columns=5)
     return figure
 
 
@@ -140,6 +140,7 @@ def _draw_amplitudes(axis: Axes, file: h5py.File, contents: Contents) -> None:
         axis.plot(backbone["frequency"][()], TO_MICRONS * backbone["amplitude"][()], "--", **look)
     axis.set_ylabel(f"amplitude of {_seen(file)} [µm]")
     axis.set_title("responses and backbone" if contents.backbone else "responses")
+    plain_ticks(axis.yaxis)
 
 
 def _draw_peaks(axis: Axes, file: h5py.File, name: str, factor: float, colour: str) -> None:

@@ -66,7 +66,8 @@ def node_states(file: h5py.File, contents: Contents) -> Figure:
         top.set_title(f"{response.attrs['force']:g} N: {response.attrs['resonance']:.4g} Hz")
         bottom.set_xlabel("frequency [Hz]")
     panels[0, 0].set(xscale="log", yscale="log", ylabel="amplitude / force [µm/N]")
-    plain_ticks(bottom)
+    for side in (bottom.xaxis, panels[0, 0].yaxis):
+        plain_ticks(side)
     panels[1, 0].set_ylabel("nodes by distance from the middle [mm]")
     ticks = np.unique(np.linspace(0, len(order) - 1, MOST_TICKS).round().astype(int))
     panels[1, 0].set_yticks(ticks + 0.5, [f"{distance[order[tick]]:.2g}" for tick in ticks])
@@ -78,7 +79,7 @@ def pad_states(file: h5py.File, contents: Contents) -> Figure:
     """The state of the nodes on the pad: below, at and above the peak of each force."""
     shown = [file["responses"][name] for name in spread(contents.responses, MOST_PADS)]
     height = PAD_ROWS * min(1.0, WIDE / len(shown))
-    figure = new_figure(_title(shown), AROUND_PADS + height)
+    figure = new_figure(_title(shown), AROUND_PADS + height, compress=True)
     panels = figure.subplots(len(OCTAVES), len(shown), sharex=True, sharey=True, squeeze=False)
     for row, (name, factor) in zip(panels, OCTAVES.items(), strict=True):
         for axis, response in zip(row, shown, strict=True):

@@ -7,6 +7,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from sa_solver.types import Array
 from workflow.analyses.wear.layout import PARTS, RESULTS, Contents
 from workflow.pictures.panels import legend_below, new_figure
 from workflow.pictures.style import AMBER, BLACK, BLUE, GREEN, ORANGE, PURPLE, SKY
@@ -54,15 +55,17 @@ def _draw(axis: Axes, group: h5py.Group) -> None:
                 color=COLOURS[part],
                 label=part if sizes is signs[0] else None,
             )
-    reach = np.maximum(totals, signs[0].sum(axis=1))
     axis.scatter(totals, places, color=BLACK, marker="|", s=300, zorder=3, label="all together")
-    for place, (end, total, row) in enumerate(zip(reach, totals, parts, strict=True)):
-        unknown = [part for part, value in zip(PARTS, row, strict=True) if np.isnan(value)]
-        text = f" {total:.1f} %" + (f", {', '.join(unknown)} unknown" if unknown else "")
-        axis.text(end, place, text, va="center", color=BLACK)
     axis.axvline(0.0, color=BLACK, linewidth=1.0)
     axis.axvline(100.0 * group.attrs["accuracy"], color=BLACK, linestyle=":", label="accuracy")
-    axis.set_yticks(places, [RESULTS[result] for result in results])
+    axis.set_yticks(places, list(map(_name, results, totals, parts)))
     axis.invert_yaxis()
     axis.use_sticky_edges = False
-    axis.margins(x=0.3)
+    axis.margins(x=0.05)
+
+
+def _name(result: str, total: float, parts: Array) -> str:
+    """A result with its error, and below what nobody knows of it."""
+    unknown = [part for part, value in zip(PARTS, parts, strict=True) if np.isnan(value)]
+    text = f"{RESULTS[result]}: {total:.1f} %"
+    return f"{text}\n({', '.join(unknown)} unknown)" if unknown else text

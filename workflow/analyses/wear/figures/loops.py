@@ -11,7 +11,15 @@ from matplotlib.figure import Figure
 
 from sa_solver.types import Array
 from workflow.analyses.wear.layout import Contents
-from workflow.pictures.panels import changes, new_figure, shaded
+from workflow.pictures.panels import (
+    blocks,
+    changes,
+    label_rows,
+    legend_below,
+    new_figure,
+    panel_rows,
+    shaded,
+)
 from workflow.pictures.scales import PER_MICRON, TO_JOULES, TO_MICRONS
 from workflow.pictures.style import BLACK, BLUE, GREEN, HEADROOM, ORANGE, PURPLE
 
@@ -24,13 +32,16 @@ def loops(file: h5py.File, contents: Contents) -> Figure:
     """Loops at several numbers of cycles, above stiffness and energy over cumulative energy."""
     groups, per = file["loops"], contents.per
     ends = {name: PER_MICRON * _column(group, "kt")[[0, -1]] for name, group in groups.items()}
-    figure = new_figure(f"Tangential stiffness: {changes(ends, '.4g')} N/µm{per}", 9.0)
-    top, bottom = figure.subfigures(2, 1, squeeze=False, height_ratios=(1.1, 1.0))[:, 0]
-    upper = top.subplots(1, len(groups), sharey=True, squeeze=False)[0]
-    for axis, (name, group) in zip(upper, groups.items(), strict=True):
+    high = 5.0 * blocks(len(groups))
+    figure = new_figure(f"Tangential stiffness: {changes(ends, '.4g')} N/µm{per}", high + 4.5)
+    parts = figure.subfigures(2, 1, squeeze=False, height_ratios=(high, 4.5))
+    top, bottom = parts[:, 0]
+    upper = panel_rows(top, 1, len(groups))
+    for axis, (name, group) in zip(upper[0], groups.items(), strict=True):
         _draw_loops(axis, group)
         axis.set(title=name, xlabel="displacement [µm]")
-    upper[0].set_ylabel(f"force [N{per}]")
+    label_rows(upper, [f"force [N{per}]"])
+    legend_below(top, upper.flat)
     _draw_evolution(bottom, groups, per)
     return figure
 
@@ -43,7 +54,6 @@ def _draw_loops(axis: Axes, group: h5py.Group) -> None:
         label = f"{cycles:,.0f} cycles" if cycles else "unworn"
         displacement, force = TO_MICRONS * loop["displacement"][()], loop["force"][()]
         axis.plot(displacement, force, color=colour, label=label)
-    axis.legend(loc="best")
 
 
 def _draw_evolution(figure: Any, groups: h5py.Group, per: str) -> None:
@@ -59,10 +69,11 @@ def _draw_evolution(figure: Any, groups: h5py.Group, per: str) -> None:
         energy.plot(worn, _column(group, "energy_per_loop"), markersize=size, **look)
     for axis in (stiffness, energy):
         axis.set_xlabel(f"energy dissipated so far [J{per}]")
-        axis.set_ylim(0.0, HEADROOM * axis.dataLim.y1)
+        axis.set_ylim(0.0, HEADROOM * max(axis.dataLim.y1, 1e-300))
     stiffness.set(title="stiffness of the stuck contact", ylabel=f"kt [N/µm{per}]")
     energy.set(title="energy per loop", ylabel=f"energy [mJ{per}]")
-    stiffness.legend(loc="best")
+    if len(groups) > 1:
+        legend_below(figure, [stiffness])
 
 
 def _column(group: h5py.Group, name: str) -> Array:

@@ -14,7 +14,7 @@ from matplotlib.tri import Triangulation
 from sa_solver.types import Array
 from workflow.analyses.wear.body_mesh import body_mesh
 from workflow.analyses.wear.layout import MOMENTS, Contents
-from workflow.pictures.panels import new_figure
+from workflow.pictures.fields import scaled_panels
 from workflow.pictures.style import BLACK
 from workflow.shell.results import grid_of
 
@@ -51,9 +51,9 @@ def structure_stress(file: h5py.File, contents: Contents) -> Figure:
     top = max(ranges[state][1] for state in panels if state != CHANGE)
     texts = (f"{ranges[state][1]:.0f} MPa {state}" for state in panels if state != CHANGE)
     title = f"Von Mises stress {_place(file, contents)} at peak load: at most {', '.join(texts)}"
-    figure = new_figure(title, 1.0 + 4.2 * len(panels))
-    axes = figure.subplots(len(panels), 1, sharex=True, sharey=True, squeeze=False)[:, 0]
-    for axis, (state, sections) in zip(axes, panels.items(), strict=True):
+    height = float(np.divide(*(high - low)[::-1]))
+    figure, axes = scaled_panels(title, [height] * len(panels), 1)
+    for axis, (state, sections) in zip(axes.flat, panels.items(), strict=True):
         least, most = ranges[state]
         signed = state == CHANGE
         colours = _draw_sections(axis, sections, max(-least, most) if signed else top, signed)
@@ -61,7 +61,7 @@ def structure_stress(file: h5py.File, contents: Contents) -> Figure:
         axis.set(xlim=(low[0], high[0]), ylim=(low[1], high[1]), ylabel=f"{'XYZ'[up]} [mm]")
         axis.set_title(f"{state}: {least:+.0f} to {most:+.0f} MPa" if signed else state)
         figure.colorbar(colours, ax=axis, label="[MPa]", pad=0.01)
-    axes[-1].set_xlabel(f"{'XYZ'[right]} [mm]")
+    axes[-1, 0].set_xlabel(f"{'XYZ'[right]} [mm]")
     return figure
 
 

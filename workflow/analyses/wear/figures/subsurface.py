@@ -13,14 +13,32 @@ from matplotlib.ticker import MaxNLocator
 
 from sa_solver.types import Array, Grid
 from workflow.analyses.wear.layout import MOMENTS, Contents
-from workflow.pictures.fields import centres, draw_map, map_top
-from workflow.pictures.panels import changes, new_figure
+from workflow.pictures.fields import (
+    FLAT,
+    PROFILE_MARGIN,
+    Map,
+    centres,
+    colour_bar,
+    draw_maps,
+    scaled_panels,
+    view_of,
+)
+from workflow.pictures.panels import (
+    blocks,
+    changes,
+    label_rows,
+    legend_below,
+    new_figure,
+    panel_rows,
+)
 from workflow.pictures.scales import TO_MICRONS
-from workflow.pictures.style import BLACK, BLUE, FONT_SIZE, ORANGE
+from workflow.pictures.style import BLACK, BLUE, ORANGE
 from workflow.shell.results import grid_of
 
 COLOURS = "magma_r"
 LEVELS = 24
+# Beside the contact, how far sections are shown: as a share of its width.
+BESIDE = 0.5
 # Name of what a map shows, its symbol and unit, by the parameter of the case.
 PARAMETERS = {
     "ruiz": ("cracking_parameter", "Ruiz's F2", "N²/mm³"),
@@ -33,7 +51,7 @@ PARAMETERS = {
 
 
 def subsurface_stress(file: h5py.File, contents: Contents) -> Figure:
-    """Von Mises stress in the section of every contact at peak load, unworn above worn."""
+    """Von Mises stress in the section of every contact at peak load, unworn and worn."""
     sections = file["stress/section"]
     # By moment, both bodies together.
     fields = {name: _values(group, "von_mises").swapaxes(0, 1) for name, group in sections.items()}
@@ -41,23 +59,45 @@ def subsurface_stress(file: h5py.File, contents: Contents) -> Figure:
     largest = {name: np.nanmax(field, axis=(1, 2, 3)) for name, field in fields.items()}
     top = float(max(moments.max() for moments in largest.values()))
     title = f"Von Mises stress under the contact at peak load: {changes(largest, '.0f', ' MPa')}"
-    figure = new_figure(title, 9.0)
-    axes = figure.subplots(2, len(sections), sharex="col", sharey=True, squeeze=False)
-    for column, (name, group) in zip(axes.T, sections.items(), strict=True):
-        for axis, moment, field in zip(column, MOMENTS, fields[name], strict=True):
+    windows = [_window(file, contents, name) for name in sections]
+    heights = [2.0 * depth / (high - low) for (low, high), depth in windows]
+    flat = max(heights) <= FLAT and len(heights) <= 2
+    figure, axes = scaled_panels(title, list(np.repeat(heights, 1 + flat)), 2 - flat)
+    panels = iter(axes.flat)
+    for (name, group), ((low, high), depth) in zip(sections.items(), windows, strict=True):
+        for moment, field in zip(MOMENTS, fields[name], strict=True):
+            axis = next(panels)
             colours = _draw_section(axis, group, field, top)
             _draw_yield(axis, group, field)
             axis.set_title(f"{name}, {moment}: at most {np.nanmax(field):.0f} MPa")
-        along = str(group.attrs["axis"])
-        other = "x" if along == "y" else "y"
-        column[-1].set_xlabel(f"{along} [mm], at {other} = {group.attrs['at']:.3g} mm")
-    lower, upper = contents.bodies
+            axis.set(xlim=(low, high), ylim=(-depth, depth), aspect="equal")
+    along, other = ("y", "x") if group.attrs["axis"] == "y" else ("x", "y")
+    place = "" if contents.line else f", at {other} = {group.attrs['at']:.3g} mm"
+    for axis in axes[-1]:
+        axis.set_xlabel(f"{along} [mm]{place}")
     for axis in axes[:, 0]:
-        axis.set_ylabel(f"z [mm]: {lower} below, {upper} above")
+        axis.set_ylabel("z [mm]")
     whole = all(group.attrs["bulk_stress"] for group in sections.values())
+    lower, upper = contents.bodies
+    begins = TO_MICRONS * float(group["depths"][0])
+    note = f"{upper} above z = 0, {lower} below it, from {begins:.3g} µm below their surfaces on"
+    figure.supxlabel(note, fontsize="small")
     label = f"von Mises stress{'' if whole else ' of the contact alone'} [MPa]"
-    figure.colorbar(colours, ax=axes, label=label, shrink=0.8, pad=0.01)
+    colour_bar(figure, colours, axes, label)
     return figure
+
+
+def _window(
+    file: h5py.File, contents: Contents, interface: str
+) -> tuple[tuple[float, float], float]:
+    """What of a section is shown: the contact and as much beside it along the face, and the depth.
+
+    Stress fades within the width of the contact.
+    """
+    grid, section = grid_of(file["grid"][interface]), file["stress/section"][interface]
+    pressures = [file["contact"][interface][jump]["pressure"][()] for _, jump in contents.ends]
+    view = view_of(pressures, grid, BESIDE)[1 if section.attrs["axis"] == "y" else 0]
+    return view, min(float(section["depths"][-1]), 0.5 * (view[1] - view[0]))
 
 
 def _values(group: h5py.Group, field: str) -> Array:
@@ -80,7 +120,7 @@ def _draw_section(axis: Axes, group: h5py.Group, field: Array, top: float) -> An
             group["along"][()],
             _heights(group, body),
             values.T,
-            levels=MaxNLocator(LEVELS).tick_values(0.0, max(top, 1.0)),
+            levels=MaxNLocator(LEVELS).tick_values(0.0, top or 1.0),
             cmap=COLOURS,
         )
     axis.axhline(0.0, color=BLACK, lw=0.8)
@@ -105,55 +145,56 @@ def _draw_yield(axis: Axes, group: h5py.Group, field: Array) -> None:
 
 def fretting_life(file: h5py.File, contents: Contents) -> Figure:
     """The fretting parameter over every contact, both bodies, unworn beside worn."""
-    groups = {name: file["stress/life"][name] for name in contents.life}
-    grids = [grid_of(file["grid"][name]) for name in groups]
-    life = groups[contents.life[0]].attrs
+    groups = {name: file["stress/life"][name] for name in contents.cracking}
+    life = groups[contents.cracking[0]].attrs
     parameter, symbol, unit = PARAMETERS[life["parameter"]]
     fields = {name: _values(group, parameter) for name, group in groups.items()}
     largest = changes({name: field.max(axis=(0, 2, 3)) for name, field in fields.items()}, ".3g")
     depth = TO_MICRONS * float(life["depth"])
     title = f"{symbol} [{unit}] {depth:.3g} µm below the surface: {largest}"
     label = f"{symbol}{'' if life['bulk_stress'] else ' of the contact alone'} [{unit}]"
+    endangered = np.any([of_bodies.any(axis=(1, 2, 3)) for of_bodies in fields.values()], axis=0)
+    panels = {
+        (name, body): (grid_of(file["grid"][name]), moments)
+        for name, of_bodies in fields.items()
+        for body, moments, shown in zip(contents.bodies, of_bodies, endangered, strict=True)
+        if shown
+    }
     draw = _curves if contents.line else _maps
-    return draw(title, label, fields, grids, contents.bodies)
+    return draw(title, label, panels)
 
 
-def _maps(
-    title: str, label: str, fields: dict[str, Array], grids: list[Grid], bodies: tuple[str, str]
-) -> Figure:
-    top = map_top([field.ravel() for field in fields.values()])
-    figure = new_figure(title, 1.0 + 2.8 * len(fields))
-    axes = figure.subplots(2 * len(fields), 2, sharex=True, sharey=True, squeeze=False)
+Panels = dict[tuple[str, str], tuple[Grid, Array]]
+"""By interface and body the grid, and the parameter ``(2, nx, ny)`` unworn and worn."""
+
+
+def _maps(title: str, label: str, panels: Panels) -> Figure:
     rows = [
-        (name, body, grid, moments)
-        for (name, of_bodies), grid in zip(fields.items(), grids, strict=True)
-        for body, moments in zip(bodies, of_bodies, strict=True)
+        [
+            Map(f"{name}, {body}, {moment}: at most {field.max():.3g}", field, grid)
+            for moment, field in zip(MOMENTS, moments, strict=True)
+        ]
+        for (name, body), (grid, moments) in panels.items()
     ]
-    for line, (name, body, grid, moments) in zip(axes, rows, strict=True):
-        for axis, moment, field in zip(line, MOMENTS, moments, strict=True):
-            image = draw_map(axis, field, grid, top)
-            axis.set_title(f"{name}, {body}, {moment}: at most {field.max():.3g}")
+    return draw_maps(title, rows, label, "white: 0, or outside the contact")
+
+
+def _curves(title: str, label: str, panels: Panels) -> Figure:
+    """Line contacts: the parameter over x, a row for each body."""
+    names, bodies = (list(dict.fromkeys(words)) for words in zip(*panels, strict=True))
+    figure = new_figure(title, (1.0 + 3.8 * len(bodies)) * blocks(len(names)))
+    axes = panel_rows(figure, len(bodies), len(names))
+    spans = []
+    for (name, body), (grid, moments) in panels.items():
+        axis = axes[bodies.index(body), names.index(name)]
+        for moment, field, colour in zip(MOMENTS, moments, (BLUE, ORANGE), strict=True):
+            axis.plot(centres(grid, 0), field[:, 0], color=colour, label=moment)
+        axis.set_title(f"{name}, {body}: at most {' → '.join(f'{m.max():.3g}' for m in moments)}")
+        spans.append(view_of(list(moments), grid, PROFILE_MARGIN).x)
     for axis in axes[-1]:
-        axis.set_xlabel("y [mm]")
-    figure.supylabel("x [mm]", fontsize=FONT_SIZE)
-    figure.colorbar(image, ax=axes, label=f"{label}; white: 0", extend="max", shrink=0.8, pad=0.01)
-    return figure
-
-
-def _curves(
-    title: str, label: str, fields: dict[str, Array], grids: list[Grid], bodies: tuple[str, str]
-) -> Figure:
-    """Line contacts: the parameter over x."""
-    figure = new_figure(title, 9.0)
-    axes = figure.subplots(2, len(grids), sharex=True, sharey=True, squeeze=False)
-    for column, (name, of_bodies), grid in zip(axes.T, fields.items(), grids, strict=True):
-        for axis, body, moments in zip(column, bodies, of_bodies, strict=True):
-            for moment, field, colour in zip(MOMENTS, moments, (BLUE, ORANGE), strict=True):
-                look = {"color": colour, "label": f"{moment}: at most {field.max():.3g}"}
-                axis.plot(centres(grid, 0), field[:, 0], **look)
-            axis.set_title(f"{name}, {body}")
-            axis.legend(loc="upper center")
-        column[-1].set_xlabel("x [mm]")
-    for axis in axes[:, 0]:
-        axis.set_ylabel(label)
+        axis.set_xlabel("x [mm]")
+    axes[0, 0].set_xlim(min(low for low, _ in spans), max(high for _, high in spans))
+    axes[0, 0].set_ylim(bottom=0.0)
+    label_rows(axes, [label] * len(bodies))
+    legend_below(figure, axes.flat)
     return figure

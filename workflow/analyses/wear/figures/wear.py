@@ -1,4 +1,4 @@
-"""Figures of a wear run: resultants, peak pressure, worn profiles, kinetics."""
+"""Figures of a wear run: peak pressure, worn profiles, kinetics; and the list of them all."""
 
 from __future__ import annotations
 
@@ -16,20 +16,34 @@ from wear.kinetics import LinearRegime
 from workflow.analyses.wear.figures.comparison import half_space_and_structure, nodes_on_middle
 from workflow.analyses.wear.figures.error_budget import error_budget
 from workflow.analyses.wear.figures.loops import loops
+from workflow.analyses.wear.figures.resultants import resultants
 from workflow.analyses.wear.figures.structure_stress import structure_stress
 from workflow.analyses.wear.figures.subsurface import fretting_life, subsurface_stress
-from workflow.analyses.wear.layout import EXTRAPOLATION, Contents, energy_name
+from workflow.analyses.wear.layout import EXTRAPOLATION, Contents
 from workflow.pictures.fields import (
     MAP_PERCENTILE,
     MAX_PROFILES,
+    PROFILE_MARGIN,
+    Map,
     centres,
-    draw_map,
-    map_top,
+    draw_maps,
     middle,
+    view_of,
 )
-from workflow.pictures.panels import Figures, changes, legend_below, new_figure, shaded
+from workflow.pictures.panels import (
+    Figures,
+    blocks,
+    change,
+    changes,
+    label_rows,
+    legend_below,
+    new_figure,
+    panel_rows,
+    shaded,
+    volume_unit,
+)
 from workflow.pictures.scales import TO_MICRONS
-from workflow.pictures.style import BLACK, BLUE, FONT_SIZE, GREEN, HEADROOM, ORANGE, PURPLE
+from workflow.pictures.style import BLACK, BLUE, GREEN, HEADROOM, ORANGE, PURPLE
 from workflow.shell.results import grid_of
 
 # Colour, marker, its size and fill: bodies of one material wear alike, and the second must not hide
@@ -46,7 +60,6 @@ BAND_POINTS = 50
 # What a profile along x and one along y show; a line contact has no y.
 ALONG = "along x at y = 0", "along y at x = 0"
 ALONG_LINE = ("along x",)
-NO_SLIDING = "no face slides as a whole"
 
 
 def figures_of(contents: Contents) -> Figures:
@@ -55,152 +68,78 @@ def figures_of(contents: Contents) -> Figures:
         "resultants": (resultants, True),
         "pressure_maps": (pressure_maps, not contents.line),
         "pressure_profiles": (pressure_profiles, True),
-        "worn_profiles": (worn_profiles, True),
-        "kinetics": (kinetics, True),
+        "worn_profiles": (worn_profiles, contents.worn),
+        "kinetics": (kinetics, contents.worn),
         "error_budget": (error_budget, True),
         "structure_stress": (structure_stress, contents.structure),
         "half_space_and_structure": (half_space_and_structure, contents.comparison),
         "loops": (loops, contents.loops),
         "subsurface_stress": (subsurface_stress, contents.sections),
-        "fretting_life": (fretting_life, bool(contents.life)),
+        "fretting_life": (fretting_life, bool(contents.cracking)),
     }
     return {
         name: partial(draw, contents=contents) for name, (draw, there) in drawn.items() if there
     }
 
 
-# --- resultants ---------------------------------------------------------------------------------
-
-
-def resultants(file: h5py.File, contents: Contents) -> Figure:
-    """P, Qx within the Coulomb limits, and energy per increment, one column per interface."""
-    names, per = contents.names, contents.per
-    title = f"Resultants over {_cycles_shown(file, contents)}: {_who_slides(file)}"
-    figure = new_figure(title, 9.0)
-    axes = figure.subplots(3, len(names), sharex=True, sharey="row", squeeze=False)
-    for column, name in zip(axes.T, names, strict=True):
-        history = {k: v[()] for k, v in file["structure"][name]["load_history"].items()}
-        increments = np.arange(1.0, len(history["P"]) + 1.0)
-        _draw_normal_force(column[0], increments, history, name, per)
-        _draw_tangential_force(column[1], increments, history, float(file.attrs["friction"]))
-        # As the half-space's, that of an increment of a mix is per mean cycle.
-        share = history["share"] if contents.mix else 1.0
-        energy = share * (history["Edx"] + history["Edy"])
-        wearing = file["contact"][name][energy_name(contents.nodes)][()]
-        _draw_energy(column[2], increments, energy, wearing, contents)
-        column[2].set_xlabel("increment")
-    labels = f"P [kN{per}]", f"Qx [kN{per}]", f"energy per\nincrement [N mm{per}]"
-    for axis, label in zip(axes[:, 0], labels, strict=True):
-        axis.set_ylabel(label)
-    axes[0, 0].set_ylim(bottom=0.0)
-    return figure
-
-
-def _cycles_shown(file: h5py.File, contents: Contents) -> str:
-    """One cycle, or those of a mix with their shares, by which energies are drawn."""
-    if not contents.mix:
-        return "one cycle"
-    loads = file["structure"][contents.names[0]]["load_history"]
-    _, first = np.unique(loads["block"][()], return_index=True)
-    return f"a mix of {', '.join(f'{share:.0%}' for share in loads['share'][()][first])}"
-
-
-def _who_slides(file: h5py.File) -> str:
-    """What the faces do, for the title."""
-    slides = [group["load_history/sliding"][()] for group in file["structure"].values()]
-    share = np.mean(np.concatenate(slides))
-    return f"faces slide as a whole in {share:.0%} of the increments" if share else NO_SLIDING
-
-
-def _draw_normal_force(
-    axis: Axes, increments: Array, history: dict[str, Array], interface: str, per: str
-) -> None:
-    force = history["P"] / 1e3
-    axis.plot(increments, force, "o-", color=BLUE, markersize=4)
-    peak = int(np.argmax(force))
-    axis.set_title(f"{interface}: P peaks at {force[peak]:.3g} kN{per}, increment {peak + 1}")
-
-
-def _draw_tangential_force(
-    axis: Axes, increments: Array, history: dict[str, Array], friction: float
-) -> None:
-    limit, force = friction * history["P"] / 1e3, history["Qx"] / 1e3
-    label = f"|Qx| < µP, µ = {friction:g}"
-    axis.fill_between(increments, -limit, limit, color="#BBBBBB", alpha=0.5, lw=0, label=label)
-    axis.plot(increments, force, "-", color=GREEN)
-    sliding = history["sliding"].astype(bool)
-    for mask, style, fill, name in (
-        (~sliding, "o", "white", "at least partly stuck"),
-        (sliding, "D", GREEN, "slides as a whole"),
-    ):
-        axis.plot(increments[mask], force[mask], style, color=GREEN, mfc=fill, ms=6, label=name)
-    axis.set_title(f"slides as a whole in increments {_ranges(increments[sliding])}")
-    axis.legend(loc="lower right")
-
-
-def _ranges(numbers: Iterable[Any]) -> str:
-    """``1-3, 7`` of ``1, 2, 3, 7``; ``none`` of nothing."""
-    whole = np.array([*numbers], dtype=int)
-    runs = np.split(whole, np.flatnonzero(np.diff(whole) > 1) + 1) if whole.size else []
-    texts = (f"{run[0]}–{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs)
-    return ", ".join(texts) or "none"
-
-
-def _draw_energy(
-    axis: Axes, increments: Array, structure: Array, wearing: Array, contents: Contents
-) -> None:
-    per, wears = contents.per, contents.wears
-    coarse, fine = (f"{energy.sum():.4g} N mm{per}" for energy in (structure, wearing))
-    axis.bar(increments, structure, width=0.8, color="#9DC3DE", label=f"finite elements: {coarse}")
-    look: dict[str, Any] = {"color": ORANGE, "markersize": 5, "label": f"{wears}: {fine}"}
-    axis.plot(increments, wearing, "D", **look)
-    change = _change(structure.sum(), wearing.sum())
-    axis.set_title(f"energy over the cycle: {wears} {change} against FE")
-    axis.legend(loc="best")
-
-
-def _change(before: float, after: float) -> str:
-    """Relative change, for a title."""
-    return f"{after / before - 1.0:+.1%}" if before else "(no reference)"
-
-
 # --- pressure -----------------------------------------------------------------------------------
 
 
 def pressure_maps(file: h5py.File, contents: Contents) -> Figure:
-    """Peak-load pressure of every face, unworn above worn, on one colour scale."""
-    ends = _ends(contents)
-    states = [(name, jump) for name in contents.names for jump in ends]
-    fields = [file["contact"][name][jump]["pressure"][()] for name, jump in states]
-    top, peaks = map_top(fields), np.reshape([field.max() for field in fields], (-1, len(ends)))
-    largest = changes(dict(zip(contents.names, peaks, strict=True)), ".0f", " MPa")
-    figure = new_figure(f"Largest pressure at peak load: {largest}", 2.0 * len(states) + 1)
-    axes = figure.subplots(len(states), 1, sharex=True, squeeze=False)[:, 0]
-    for axis, (name, jump), field in zip(axes, states, fields, strict=True):
-        image = draw_map(axis, field, grid_of(file["grid"][name]), top)
-        opened = f"{np.mean(field <= 0.0):.0%} of the grid open"
-        axis.set_title(
-            f"{name}, {_cycles(file, name, jump)}: largest {field.max():.0f} MPa, {opened}"
+    """Peak-load pressure of every face, unworn and worn, on one colour scale."""
+    rows, peaks = [], {}
+    for name in contents.names:
+        grid = grid_of(file["grid"][name])
+        fields = _pressures(file, contents, name)
+        peaks[name] = [field.max() for field in fields.values()]
+        rows.append(
+            [
+                Map(_map_title(name, _cycles(file, name, jump), field, grid), field, grid)
+                for jump, field in fields.items()
+            ]
         )
-    axes[-1].set_xlabel("y [mm]")
-    figure.supylabel("x [mm]", fontsize=FONT_SIZE)
-    label = f"pressure [MPa]; white: open; arrow: highest {100 - MAP_PERCENTILE:g}% of the cells"
-    figure.colorbar(image, ax=axes, label=label, extend="max", shrink=0.8, pad=0.01)
-    return figure
+    title = f"Largest pressure at peak load: {changes(peaks, '.0f', ' MPa')}"
+    note = f"white: open; arrow of the scale: the highest {100 - MAP_PERCENTILE:g}% of the cells"
+    return draw_maps(title, rows, "pressure [MPa]", note)
+
+
+def _map_title(interface: str, cycles: str, field: Array, grid: Grid) -> str:
+    closed = grid.cell_area * np.count_nonzero(field > 0.0)
+    return f"{interface}, {cycles}: at most {field.max():.0f} MPa, {closed:.3g} mm² in contact"
+
+
+def _pressures(file: h5py.File, contents: Contents, interface: str) -> dict[str, Array]:
+    """Pressure at peak load, first and last, by jump."""
+    contact = file["contact"][interface]
+    return {jump: contact[jump]["pressure"][()] for jump in _ends(contents)}
+
+
+def _shown_span(file: h5py.File, contents: Contents, direction: int) -> tuple[float, float]:
+    """From where to where all faces are in contact along x (0) or y (1), with a margin [mm]."""
+    views = [
+        view_of(
+            list(_pressures(file, contents, name).values()),
+            grid_of(file["grid"][name]),
+            PROFILE_MARGIN,
+        )
+        for name in contents.names
+    ]
+    return min(view[direction][0] for view in views), max(view[direction][1] for view in views)
 
 
 def pressure_profiles(file: h5py.File, contents: Contents) -> Figure:
     """Peak-load pressure along both middle lines of each face, with the coarse solutions."""
     names, along = contents.names, ALONG_LINE if contents.line else ALONG
-    figure = new_figure(_edge_peak(file, contents), 4.5 * len(along))
-    axes = figure.subplots(len(along), len(names), sharey="row", sharex="row", squeeze=False)
+    figure = new_figure(_edge_peak(file, contents), (1.0 + 4.0 * len(along)) * blocks(len(names)))
+    axes = panel_rows(figure, len(along), len(names), sharex="row")
     for column, name in zip(axes.T, names, strict=True):
         for direction, axis in enumerate(column):
             _draw_profile(axis, file, contents, name, direction)
             axis.set_title(f"{name}, {along[direction]}")
-    axes[0, 0].legend(loc="upper center")
-    for axis in axes[:, 0]:  # rows share it: only once all is drawn
-        axis.set(ylabel="pressure [MPa]", ylim=(0.0, None))
+    label_rows(axes, ["pressure [MPa]"] * len(along))
+    for direction, axis in enumerate(axes[:, 0]):  # rows share it: only once all is drawn
+        axis.set(xlim=_shown_span(file, contents, direction), ylim=(0.0, None))
+    legend_below(figure, axes.flat, columns=2)
     return figure
 
 
@@ -256,22 +195,23 @@ def _edge_peak(file: h5py.File, contents: Contents) -> str:
 def worn_profiles(file: h5py.File, contents: Contents) -> Figure:
     """Both surfaces and the depth worn off, along x in the middle of each face, as cycles go by."""
     names, (lower, upper) = contents.names, contents.bodies
-    figure = new_figure("", 9.0)
-    axes = figure.subplots(2, len(names), sharex=True, sharey="row", squeeze=False)
-    deepest = []
+    figure = new_figure("", 9.5 * blocks(len(names)))
+    axes = panel_rows(figure, 2, len(names))
+    deepest = {}
     for column, name in zip(axes.T, names, strict=True):
-        deepest.append(_draw_wear(column, file, contents, name))
+        deepest[name] = _draw_wear(column, file, contents, name)
         column[0].set_title(f"{name}: {upper} (above) and {lower} (below)")
         column[1].set(title=f"{name}: depth worn off both bodies", xlabel="x [mm]")
-    texts = (f"{name} {depth:.3g} µm" for name, depth in zip(names, deepest, strict=True))
     place = "" if contents.line else " at y = 0"
-    figure.suptitle(f"Depth worn off{place}, at most: {', '.join(texts)}", fontweight="bold")
+    texts = changes({name: [depth] for name, depth in deepest.items()}, ".3g", " µm")
+    figure.suptitle(f"Depth worn off{place}, at most: {texts}", fontweight="bold")
     low, high = axes[0, 0].get_ylim()
-    axes[0, 0].set_ylim(low, min(high, HEIGHT_IN_DEPTHS * max(deepest)) if any(deepest) else high)
+    most = max(deepest.values())
+    axes[0, 0].set_ylim(low, min(high, HEIGHT_IN_DEPTHS * most) if most else high)
+    axes[0, 0].set_xlim(_shown_span(file, contents, 0))
     axes[1, 0].invert_yaxis()
-    axes[0, 0].legend(loc="upper center", ncols=2)
-    axes[0, 0].set_ylabel("height [µm]")
-    axes[1, 0].set_ylabel("wear depth [µm]")
+    label_rows(axes, ("height [µm]", "wear depth [µm]"))
+    legend_below(figure, [axes[0, 0]])
     return figure
 
 
@@ -301,23 +241,25 @@ def kinetics(file: h5py.File, contents: Contents) -> Figure:
     volumes = {
         name: sum(group[f"volume_{body}"][-1] for body in (1, 2)) for name, group in groups.items()
     }
-    totals = (f"{name} {volume:.3g} mm³{per}" for name, volume in volumes.items())
-    figure = new_figure(f"Worn off in {cycles[-1]:,.0f} cycles: {', '.join(totals)}", 13.0)
-    axes = figure.subplots(3, len(groups), sharex=True, sharey="row", squeeze=False)
+    scale, unit = volume_unit(max(volumes.values()))
+    totals = changes({name: [scale * v] for name, v in volumes.items()}, ".3g", f" {unit}{per}")
+    figure = new_figure(
+        f"Worn off in {cycles[-1]:,.0f} cycles: {totals}", 12.0 * blocks(len(groups))
+    )
+    axes = panel_rows(figure, 3, len(groups))
     for column, (name, group) in zip(axes.T, groups.items(), strict=True):
         depth, volume, area = column
-        _draw_area(area, cycles, group, name)
-        axes[2, 0].set_ylim(0.0, max(axes[2, 0].get_ylim()[1], HEADROOM * group["area"][()].max()))
+        _draw_area(area, cycles, group, name, per)
         _draw_kinetics(depth, cycles, group, "depth", contents.bodies, TO_MICRONS)
-        _draw_kinetics(volume, cycles, group, "volume", contents.bodies)
+        _draw_kinetics(volume, cycles, group, "volume", contents.bodies, scale)
         depth.set_title(f"{name}: largest depth, {_regime(group, cycles)}")
         volume.set_title(f"{name}: volume, {_rate(group, per)}")
         area.set_xlabel("cycles")
         area.xaxis.set_major_formatter("{x:,.0f}")
         area.locator_params(axis="x", nbins=5)
-    labels = "largest depth [µm]", f"volume [mm³{per}]", f"area [mm²{per}]"
-    for axis, label in zip(axes[:, 0], labels, strict=True):
-        axis.set_ylabel(label)
+    largest = max(group["area"][()].max() for group in groups.values())
+    axes[2, 0].set_ylim(0.0, HEADROOM * largest)
+    label_rows(axes, ("largest depth [µm]", f"volume [{unit}{per}]", f"area [mm²{per}]"))
     # Not every panel has a linear regime.
     legend_below(figure, axes.flat)
     return figure
@@ -358,18 +300,19 @@ def _draw_extrapolation(axis: Axes, regime: LinearRegime) -> None:
     axis.fill_between(fine, line - reach, line + reach, **look)
 
 
-def _draw_area(axis: Axes, cycles: Array, group: h5py.Group, interface: str) -> None:
+def _draw_area(axis: Axes, cycles: Array, group: h5py.Group, interface: str, per: str) -> None:
     area = group["area"][()]
     axis.plot(cycles, area, "o-", color=PURPLE, markersize=4)
-    axis.set_title(f"{interface}: contact at peak load, {_change(*area[[0, -1]])}")
+    axis.set_title(f"{interface}: contact at peak load, {change(area[0], area[-1], f'mm²{per}')}")
 
 
 def _rate(group: h5py.Group, per: str) -> str:
     """Volume rate of the linear regime, for a title."""
-    rate = float(group.attrs["volume_rate"])
+    rate = 1e6 * float(group.attrs["volume_rate"])
     if not np.isfinite(rate):
         return "no linear regime, no extrapolation"
-    return f"{1e6 * rate:.3g} mm³{per} per 10⁶ cycles at the end"
+    scale, unit = volume_unit(rate)
+    return f"{scale * rate:.3g} {unit}{per} per 10⁶ cycles at the end"
 
 
 def _regime(group: h5py.Group, cycles: Array) -> str:

@@ -1,0 +1,145 @@
+"""Figure of a wear run's loads: resultants of every contact over a cycle, and their energies."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import h5py
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from sa_solver.types import Array, Mask
+from workflow.analyses.wear.layout import Contents, energy_name
+from workflow.pictures.panels import (
+    blocks,
+    change,
+    force_unit,
+    label_rows,
+    legend_below,
+    new_figure,
+    panel_rows,
+    whole_ticks,
+)
+from workflow.pictures.style import BLUE, GREEN, ORANGE
+
+NO_SLIDING = "no face slides as a whole"
+# Of increments that slide as a whole, so many stretches are named in a title.
+MOST_RANGES = 4
+# Energies of less than so much sliding [mm] in a cycle are rounding.
+NOTHING = 1e-9
+
+
+def resultants(file: h5py.File, contents: Contents) -> Figure:
+    """P, Qx within the Coulomb limits, and energy per increment, one column per interface.
+
+    Where no energy is dissipated there is none to show.
+    """
+    names, per = contents.names, contents.per
+    loads = {name: _history(file, name) for name in names}
+    title = f"Resultants over {_cycles_shown(file, contents)}: {_who_slides(loads)}"
+    largest = max(float(history["P"].max()) for history in loads.values())
+    scale, unit = force_unit(largest)
+    friction = float(file.attrs["friction"])
+    energies = {name: _energies(file, contents, name, loads[name]) for name in names}
+    dissipated = max(float(np.sum(pair)) for pair in energies.values())
+    rows = 2 + (dissipated > NOTHING * friction * largest)
+    figure = new_figure(title, 3.2 * rows * blocks(len(names)))
+    axes = panel_rows(figure, rows, len(names))
+    for column, (name, history) in zip(axes.T, loads.items(), strict=True):
+        increments = np.arange(1.0, len(history["P"]) + 1.0)
+        forces = {key: scale * history[key] for key in ("P", "Qx")}
+        _draw_normal_force(column[0], increments, forces["P"], name, f"{unit}{per}")
+        sliding = history["sliding"].astype(bool)
+        _draw_tangential_force(column[1], increments, forces, sliding, friction)
+        for axis in column[2:]:
+            _draw_energy(axis, increments, *energies[name], contents)
+        column[-1].set_xlabel("increment")
+        whole_ticks(column[-1].xaxis)
+    energy_label = f"energy per\nincrement [mJ{per}]"
+    label_rows(axes, (f"P [{unit}{per}]", f"Qx [{unit}{per}]", energy_label)[:rows])
+    axes[0, 0].set_ylim(bottom=0.0)
+    legend_below(figure, axes[1:].flat)
+    return figure
+
+
+def _energies(
+    file: h5py.File, contents: Contents, interface: str, history: dict[str, Array]
+) -> tuple[Array, Array]:
+    """Energy of every increment, of the loads and of what wears; of a mix per mean cycle."""
+    share = history["share"] if contents.mix else 1.0
+    wearing = file["contact"][interface][energy_name(contents.nodes)][()]
+    return share * (history["Edx"] + history["Edy"]), wearing
+
+
+def _history(file: h5py.File, interface: str) -> dict[str, Array]:
+    """Resultants of a contact over the cycle, by their names."""
+    return {k: v[()] for k, v in file["structure"][interface]["load_history"].items()}
+
+
+def _cycles_shown(file: h5py.File, contents: Contents) -> str:
+    """One cycle, or those of a mix with their shares, by which energies are drawn."""
+    if not contents.mix:
+        return "one cycle"
+    loads = file["structure"][contents.names[0]]["load_history"]
+    _, first = np.unique(loads["block"][()], return_index=True)
+    return f"a mix of {', '.join(f'{share:.0%}' for share in loads['share'][()][first])}"
+
+
+def _who_slides(loads: dict[str, dict[str, Array]]) -> str:
+    """What the faces do, for the title."""
+    share = np.mean(np.concatenate([history["sliding"] for history in loads.values()]))
+    return f"faces slide as a whole in {share:.0%} of the increments" if share else NO_SLIDING
+
+
+def _draw_normal_force(
+    axis: Axes, increments: Array, force: Array, interface: str, unit: str
+) -> None:
+    axis.plot(increments, force, "o-", color=BLUE, markersize=4)
+    peak = int(np.argmax(force))
+    axis.set_title(f"{interface}: P peaks at {force[peak]:.3g} {unit}, increment {peak + 1}")
+
+
+def _draw_tangential_force(
+    axis: Axes, increments: Array, forces: dict[str, Array], sliding: Mask, friction: float
+) -> None:
+    limit, force = friction * forces["P"], forces["Qx"]
+    label = f"|Qx| < µP, µ = {friction:g}"
+    axis.fill_between(increments, -limit, limit, color="#BBBBBB", alpha=0.5, lw=0, label=label)
+    axis.plot(increments, force, "-", color=GREEN)
+    for mask, style, fill, name in (
+        (~sliding, "o", "white", "at least partly stuck"),
+        (sliding, "D", GREEN, "slides as a whole"),
+    ):
+        if mask.any():
+            look: dict[str, Any] = {"color": GREEN, "mfc": fill, "ms": 6, "label": name}
+            axis.plot(increments[mask], force[mask], style, **look)
+    axis.set_title(f"slides as a whole in increments {_ranges(increments[sliding])}")
+
+
+def _ranges(numbers: Iterable[Any]) -> str:
+    """``1-3, 7`` of ``1, 2, 3, 7``; ``none`` of nothing; of many stretches the first and last."""
+    whole = np.array([*numbers], dtype=int)
+    runs = np.split(whole, np.flatnonzero(np.diff(whole) > 1) + 1) if whole.size else []
+    texts = [f"{run[0]}–{run[-1]}" if len(run) > 1 else f"{run[0]}" for run in runs]
+    if len(texts) > MOST_RANGES:
+        texts = [*texts[: MOST_RANGES - 1], "...", texts[-1]]
+    return ", ".join(texts) or "none"
+
+
+def _draw_energy(
+    axis: Axes, increments: Array, reference: Array, wearing: Array, contents: Contents
+) -> None:
+    """What is said of the loads in bars, what wears in diamonds."""
+    wears, loads = contents.wears, contents.loads
+    axis.bar(increments, reference, width=0.8, color="#9DC3DE", label=loads)
+    axis.plot(increments, wearing, "D", color=ORANGE, markersize=5, label=wears)
+    before, after = float(reference.sum()), float(wearing.sum())
+    unit = f"mJ{contents.per}"
+    told = change(before, after, unit)
+    if told.endswith("%"):
+        text = f"energy over the cycle: {wears} {after:.4g} {unit}, {told} against {loads}"
+    else:
+        text = f"energy over the cycle: {wears} {after:.3g} {unit}, {loads} {before:.3g}"
+    axis.set_title(text)

@@ -1,0 +1,110 @@
+"""Layout of figures in which no text is cut: long ones are broken into lines, legends into rows."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from typing import Any
+
+from matplotlib.figure import Figure, FigureBase
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.legend import Legend
+from matplotlib.text import Text
+
+# Of the room that there is, what a line may fill: letters are not all of one width.
+FILLED = 0.97
+# Letters that a line has at least, however narrow its panel.
+FEWEST_LETTERS = 8
+# Maps become smaller by what the lines of their titles take, and those narrower with them.
+MOST_LAYOUTS = 4
+
+
+class FittedLayout(ConstrainedLayoutEngine):
+    """Constrained layout that breaks titles and labels longer than their panels into lines.
+
+    How wide panels are is found first, by layouts without and then with broken lines.
+    """
+
+    def __init__(self, **parameters: Any) -> None:
+        super().__init__(**parameters)
+        self._words: dict[Text, str] = {}
+
+    def execute(self, fig: Any) -> None:
+        """Give everything its place; once more where lines had to be broken."""
+        for _ in range(MOST_LAYOUTS):
+            super().execute(fig)
+            if not self._fit(fig):
+                break
+
+    def _fit(self, figure: Figure) -> bool:
+        """Break what is too long for its place; whether there was any."""
+        found = [self._break(text, room) for text, room in _texts(figure)]
+        return any([*found, *(_narrow(legend, room) for legend, room in _legends(figure))])
+
+    def _break(self, text: Text, room: float) -> bool:
+        """Break a text into lines no longer than the ``room`` [pixels]; whether it was."""
+        if not text.get_text() or not text.get_visible():
+            return False
+        box = text.get_window_extent()
+        length = box.height if text.get_rotation() == 90.0 else box.width
+        if length <= room:
+            return False
+        shown, words = text.get_text(), self._words.setdefault(text, text.get_text())
+        longest = max(map(len, shown.split("\n")))
+        lines = broken(words, max(FEWEST_LETTERS, int(FILLED * room / length * longest)))
+        text.set_text(lines)
+        return lines != shown
+
+
+def _texts(figure: Figure) -> Iterator[tuple[Text, float]]:
+    """Titles and labels with the room for their lines [pixels]."""
+    for part in _parts(figure):
+        for text in part.texts:
+            yield text, part.bbox.width  # type: ignore[attr-defined]
+    for axis in figure.axes:
+        yield axis.title, axis.bbox.width
+        yield axis._left_title, axis.bbox.width  # type: ignore[attr-defined]
+        yield axis.xaxis.label, axis.bbox.width
+        yield axis.yaxis.label, axis.bbox.height
+
+
+def _parts(figure: FigureBase) -> Iterator[FigureBase]:
+    """A figure and all that it is divided into."""
+    yield figure
+    for part in figure.subfigs:
+        yield from _parts(part)
+
+
+def _legends(figure: Figure) -> Iterator[tuple[Legend, float]]:
+    """Legends of whole figures, with the room for their rows [pixels]."""
+    for part in _parts(figure):
+        for legend in part.legends:
+            yield legend, part.bbox.width  # type: ignore[attr-defined]
+
+
+def broken(words: str, letters: int) -> str:
+    """A text in lines of so many letters at most, broken after spaces, and names after ``_``.
+
+    What is still too long is broken anywhere.
+    """
+    lines = []
+    for paragraph in words.split("\n"):
+        line = ""
+        for piece in re.split(r"(?<=[\s_/])", paragraph):
+            if line and len(line) + len(piece.rstrip()) > letters:
+                lines.append(line)
+                line = ""
+            while len(piece.rstrip()) > letters:
+                lines.append(piece[:letters])
+                piece = piece[letters:]
+            line += piece
+        lines.append(line)
+    return "\n".join(line.rstrip() for line in lines)
+
+
+def _narrow(legend: Legend, room: float) -> bool:
+    """Give a legend fewer columns until it fits the ``room`` [pixels]; whether it was too wide."""
+    before = legend._ncols  # type: ignore[attr-defined]
+    while legend._ncols > 1 and legend.get_window_extent().width > room:  # type: ignore[attr-defined]
+        legend.set_ncols(legend._ncols - 1)  # type: ignore[attr-defined]
+    return bool(legend._ncols != before)  # type: ignore[attr-defined]
