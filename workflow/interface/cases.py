@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from workflow import kinds
+from workflow.case.doubts import doubts_of
 from workflow.case.sections import Case
 from workflow.case.source import IN_PYTHON, dotted
 from workflow.case.writing import dump_case
@@ -61,18 +62,20 @@ class Check:
     """What a case would run.
 
     ``memory`` is the upper estimate of what it needs [bytes], ``seconds`` the order of magnitude of
-    its time [s], ``outline`` what would run by name.
+    its time [s], ``outline`` what would run by name, ``doubts`` what looks like a slip.
     """
 
     title: str
     outline: dict[str, str]
     memory: float
     seconds: float
+    doubts: tuple[str, ...]
 
     def __str__(self) -> str:
         memory = f"up to {self.memory / 1e9:.1f} GB"
         rows = {**self.outline, "memory": memory, "seconds": f"about {self.seconds:.2g}"}
-        return "\n".join([self.title, *(f"  {name:<10} {text}" for name, text in rows.items())])
+        lines = [f"  {name:<10} {text}" for name, text in rows.items()]
+        return "\n".join([self.title, *lines, *(f"doubt: {doubt}" for doubt in self.doubts)])
 
 
 def check(case: AnyCase, /, **overrides: Any) -> Check:
@@ -90,7 +93,8 @@ def check(case: AnyCase, /, **overrides: Any) -> Check:
     analysis = kinds.analysis_of(loaded)
     memory, time = analysis.memory(loaded), analysis.run_time(loaded)
     memory.check()
-    return Check(loaded.title, dict(loaded.outline()), memory.required, time.seconds)
+    outline, doubts = dict(loaded.outline()), tuple(doubts_of(loaded))
+    return Check(loaded.title, outline, memory.required, time.seconds, doubts)
 
 
 def _text(value: object) -> str:
