@@ -99,7 +99,7 @@ RUN = f"""
 import fretscale
 results = fretscale.run(
     {str(CASES / "dovetail_small.yaml")!r}, "out", quiet=True, error_budget="known",
-    load_path__increments=8, load_path__peak_at=3, output__paraview=False,
+    load_path__increments=[3, 5], output__paraview=False,
     stress__section="none", stress__life__parameter="none",
 )
 """
