@@ -148,7 +148,7 @@ def test_a_check_tells_the_scene_and_doubts_and_still_is_right() -> None:
     assert told.exit_code == 0
     for words in (
         "6000 rpm, airfoil 0.8 kg at 400 mm: 126.3 kN",
-        "disk: young 115 GPa, poisson 0.29, density 4430 kg/m^3, yield stress 900 MPa",
+        "disk: young 115 GPa, poisson 0.29, yield stress 900 MPa, density 4430 kg/m^3",
         "wear law   disk and blade: energy, coefficient 10000 um^3/J",
         "cells of 85.94 um x 0.2344 mm",
         "\ndoubt: materials.blade.young: 210 MPa",
