@@ -33,6 +33,23 @@ def test_grids_of_areas_are_two_numbers(name, grid):
     assert "; allowed: " in line
 
 
+@pytest.mark.parametrize(
+    ("name", "override", "told"),
+    [
+        ("specimens_coarse", "load_path.P=60 N", "allowed: normal_forces, one after the other"),
+        ("dovetail_2d", "load_path.peak_at=8", "the first leg of increments, which are [8, 14]"),
+        ("sphere_wear", "materials.body_1.density=1e-9", "no mass is moved here"),
+        ("sphere_wear", "wear.body_1.specific_wear_rate=1e-9", "coefficient, which is that rate"),
+    ],
+)
+def test_the_key_of_another_case_is_answered_with_ours(name, override, told):
+    with pytest.raises(CaseError) as refused:
+        load_case(CASES / f"{name}.yaml", [override])
+    (line,) = str(refused.value).splitlines()
+    assert line.startswith(f"--set {override}: ")
+    assert told in line
+
+
 def test_cases_of_the_plane_take_one_size(tmp_path):
     (tmp_path / "loads.csv").write_text(ROLLER_LOADS, encoding="utf-8")
     for size in ("1.6 mm", "[1.6 mm, 9 mm]"):

@@ -73,11 +73,17 @@ def of_bodies(title: str, section: Section) -> list[tuple[str, str]]:
     """Rows of a ``title`` with the quantities of every body that a ``section`` has."""
     bodies = {name: getattr(section, name) for name in type(section).model_fields}
     texts = {
-        name: entries(body) if isinstance(body, Section) else body
+        name: _of_body(body) if isinstance(body, Section) else body
         for name, body in bodies.items()
         if isinstance(body, Section | str)
     }
     return alike(title, {name: text for name, text in texts.items() if text})
+
+
+def _of_body(body: Section) -> str:
+    """The quantities of a body, a known material with its name."""
+    name = getattr(body, "material", None)
+    return ", ".join(text for text in (name, entries(body)) if text)
 
 
 def shares(share: float) -> str:

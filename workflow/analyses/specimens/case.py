@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Annotated, ClassVar, Literal
 
 from pydantic import Field, model_validator
@@ -85,6 +85,10 @@ class Specimens(Section):
 
 class FrettingLoads(Section):
     """One normal force after the other, each on unworn specimens."""
+
+    refused: ClassVar[Mapping[str, str]] = {
+        "P": "of other cases; allowed: normal_forces, one after the other, such as [60 N]"
+    }
 
     normal_forces: Annotated[tuple[PressingForce, ...], Field(min_length=1)] = entry(
         "constant while the pair is fretted [N]", ["17 N", "87 N", "150 N", "250 N"]
