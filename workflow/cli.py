@@ -41,8 +41,9 @@ All commands: `fretscale -h`; a ball that wears: `fretscale new bodies_wear`.
 # Commands as the help lists them.
 LISTED = {
     "A case": ("new", "check", "run", "resume"),
+    "What came out": ("report", "compare"),
     "Many runs": ("sweep", "chart", "verify"),
-    "Input and output": ("describe", "resultants", "loops", "schema"),
+    "Input and output": ("materials", "describe", "resultants", "loops", "schema"),
 }
 OTHERS = "More"
 
