@@ -209,6 +209,15 @@ def test_results_say_what_they_are(ball):
         ball["contcat"]
 
 
+def test_main_results_have_units_and_errors(ball, tmp_path):
+    pressure = next(result for result in ball.main if "pressure" in result.name)
+    assert pressure.unit == "MPa"
+    states = ball.summary["states"]
+    assert pressure.value == pytest.approx(states[-1]["peak_pressure"], rel=1e-12)
+    page = ball.report(tmp_path / "for_others.html")
+    assert ball.title in page.read_text(encoding="utf-8")
+
+
 def test_values_are_arrays(ball):
     pressure = ball["contact/bodies/00001/pressure"]
     x, y = pressure.coordinates["x"], pressure.coordinates["y"]

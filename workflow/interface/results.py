@@ -5,14 +5,16 @@ from __future__ import annotations
 import os
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from workflow.case.sections import Case
 from workflow.errors import UserError
 from workflow.interface.datasets import File, Group
-from workflow.kinds import load_case
+from workflow.kinds import analysis_of, load_case
+from workflow.report.writing import write_report
 from workflow.runs.provenance import case_values
 from workflow.shell.folder import DIGESTS, OutputFolder
+from workflow.shell.summary import required_number
 
 
 def open(folder: str | os.PathLike[str]) -> Results:  # noqa: A001 - fretscale.open
@@ -40,10 +42,24 @@ def open(folder: str | os.PathLike[str]) -> Results:  # noqa: A001 - fretscale.o
     return Results(root.absolute(), run.read_summary())
 
 
+class MainResult(NamedTuple):
+    """A main result: of what, its name and value in a base ``unit``, its estimated error.
+
+    ``of`` is empty for the whole run; ``error`` is relative, None where nobody knows.
+    """
+
+    of: str
+    name: str
+    value: float
+    unit: str
+    error: float | None
+
+
 class Results(Group):
     """The results of a run: ``summary`` has the numbers, names lead to all that was computed.
 
-    ``folder`` is where it lies, ``warnings`` what the run has warned of. ``results["contact"]`` is
+    ``folder`` is where it lies, ``warnings`` what the run has warned of, ``main`` its main results
+    with units and estimated errors. ``results["contact"]`` is
     a :class:`Group`, ``results["kinetics/cycles"]`` are :class:`Values`; :meth:`tree` tells what
     there is.
     """
@@ -67,6 +83,19 @@ class Results(Group):
     def case(self) -> Case:
         """The case as run. Raises :class:`CaseError` where a file that it names has gone."""
         return load_case(OutputFolder(self.folder).case)
+
+    @property
+    def main(self) -> list[MainResult]:
+        """The main results, as the report and `fretscale compare` have them."""
+        told = analysis_of(self.case).quantities(self.case, self.summary)
+        return [
+            MainResult(q.group, q.name, required_number(self.summary, q.path), q.unit, q.error)
+            for q in told
+        ]
+
+    def report(self, out: str | os.PathLike[str] | None = None) -> Path:
+        """Write ``report.html`` of the run anew, into its folder or a file ``out``; its path."""
+        return write_report(self.folder, None if out is None else Path(out))
 
     def __repr__(self) -> str:
         warned = f", {len(self.warnings)} warnings" if self.warnings else ""

@@ -9,6 +9,7 @@ What is done with a case
 What comes out
     - ``open``: the results in the folder of a finished run.
     - ``Results``: its summary, warnings and case, and all that it has computed.
+    - ``MainResult``: one of its main results, with unit and estimated error.
     - ``Group``: datasets and groups of ``results.h5`` under one name.
     - ``Values``: a dataset, read when it is needed, with its unit and description.
 
@@ -86,7 +87,7 @@ if TYPE_CHECKING:
     from workflow.errors import CaseError, MethodFailed, NotWritten, OutOfMemory, UserError
     from workflow.interface.cases import Check, check, load_case
     from workflow.interface.datasets import Group, Values
-    from workflow.interface.results import Results, open  # noqa: A004
+    from workflow.interface.results import MainResult, Results, open  # noqa: A004
     from workflow.interface.running import run
 
 __all__ = [
@@ -94,6 +95,7 @@ __all__ = [
     "Check",
     "FretscaleError",
     "Group",
+    "MainResult",
     "MethodFailed",
     "NotWritten",
     "OutOfMemory",
@@ -124,7 +126,7 @@ __getattr__, __dir__ = lazy_names(
         ),
         "interface.cases": ("Check", "check", "load_case"),
         "interface.datasets": ("Group", "Values"),
-        "interface.results": ("Results", "open"),
+        "interface.results": ("MainResult", "Results", "open"),
         "interface.running": ("run",),
     },
     within="workflow",
