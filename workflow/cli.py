@@ -1,34 +1,29 @@
 """The command ``fretscale``.
 
-Everything heavy is imported inside the commands, so that ``--help`` answers at once; whatever ends
-a command early ends it in one line and an exit code (``workflow.errors``).
+Everything heavy is imported inside the commands, so that ``--help`` answers at once.
 """
 
 from __future__ import annotations
 
-import errno
-import os
 import shutil
 import sys
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
 
-from sa_solver.errors import FretscaleError
 from workflow import errors
+from workflow.commands.group import OneLineGroup
 
 if TYPE_CHECKING:
     from workflow.shell.screen import Loudness
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
-# How a command goes on that was stopped.
-ADVICE = "a run continues with `fretscale resume DIR`, many with the same command"
 TO_TRY = """\
 Three things to try:
 
@@ -38,95 +33,6 @@ Three things to try:
 
 All commands: `fretscale -h`; a ball that wears: `fretscale new bodies_wear`.
 """
-# Commands as the help lists them.
-LISTED = {
-    "A case": ("new", "check", "run", "resume"),
-    "What came out": ("report", "compare"),
-    "Many runs": ("sweep", "chart", "verify"),
-    "Input and output": ("materials", "describe", "resultants", "loops", "schema"),
-}
-OTHERS = "More"
-
-
-class _OneLineGroup(click.Group):
-    """A group of commands whose failures are one line on stderr and an exit code."""
-
-    def main(self, *args: Any, **settings: Any) -> NoReturn:
-        settings["standalone_mode"] = False
-        message = ""
-        try:
-            code = super().main(*args, **settings)
-            if sys.stdout is not None:
-                sys.stdout.flush()
-        except (FretscaleError, OSError, ImportError, MemoryError) as error:
-            message, code = _ending(error)
-        except SystemExit as ended:
-            if not ended.code:  # a shell has been told how to complete a command
-                raise
-            # What click and rich make of a pipe that was closed.
-            message, code = _ending(BrokenPipeError(errno.EPIPE, os.strerror(errno.EPIPE)))
-        except click.Abort as abort:
-            left = f": {stop}" if (stop := abort.__cause__) and stop.args else ""
-            message, code = f"interrupted{left}", errors.INTERRUPTED
-        except click.ClickException as error:
-            message, code = _usage(error), errors.UserError.exit_code
-        _say([f"fretscale: {line}" for line in message.splitlines()])
-        sys.exit(code if isinstance(code, int) else errors.DONE)
-
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        known = [name for names in LISTED.values() for name in names]
-        others = [name for name in self.list_commands(ctx) if name not in known]
-        longest = max(map(len, self.commands))
-        for title, names in {**LISTED, OTHERS: others}.items():
-            rows = [
-                (name.ljust(longest), self.commands[name].get_short_help_str(formatter.width))
-                for name in names
-            ]
-            if rows:
-                with formatter.section(title):
-                    formatter.write_dl(rows)
-
-
-def _say(lines: Sequence[str]) -> None:
-    """Say why a command ended, if anybody can read it; then nothing is left to be written."""
-    with suppress(OSError):
-        for line in lines:
-            click.echo(line, err=True)
-    for stream in (sys.stdout, sys.stderr):
-        if stream is None:
-            continue
-        try:
-            stream.flush()
-        except OSError:
-            # Python would try again as it ends, and say that it cannot.
-            os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
-
-
-def _ending(error: Exception) -> tuple[str, int]:
-    """What to say of ``error``, one line for each thing wrong, and the exit code."""
-    if isinstance(error, MemoryError):
-        return f"out of memory: {error}".rstrip(": "), errors.OutOfMemory.exit_code
-    if isinstance(error, FretscaleError):
-        return str(error), errors.exit_code(error)
-    if isinstance(error, OSError) and error.errno in errors.UNWRITTEN:
-        written = f"output: {error.strerror}"
-        if error.filename is not None:
-            written = f"{error.filename}: {error.strerror}; {ADVICE}"
-        return written, errors.NotWritten.exit_code
-    from workflow.shell.system_check import remedy
-
-    if missing := remedy(error):
-        return missing, errors.MethodFailed.exit_code
-    if isinstance(error, OSError) and error.filename is not None:
-        return f"{error.filename}: {error.strerror}", errors.UserError.exit_code
-    raise error
-
-
-def _usage(error: click.ClickException) -> str:
-    """A usage error in one line."""
-    context = getattr(error, "ctx", None)
-    hint = f"; see `{context.command_path} --help`" if context else ""
-    return " ".join(error.format_message().split()).rstrip(".") + hint
 
 
 def _loud(command: Command) -> Command:
@@ -158,7 +64,7 @@ def _repeatable(out: Path) -> Iterator[None]:
 
 
 @click.group(
-    cls=_OneLineGroup,
+    cls=OneLineGroup,
     invoke_without_command=True,
     context_settings={"help_option_names": ["-h", "--help"]},
 )

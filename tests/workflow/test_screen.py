@@ -12,7 +12,8 @@ from click.testing import CliRunner
 from rich.console import Console
 
 from tests.marks import slow
-from workflow.cli import LISTED, TO_TRY, cli
+from workflow.cli import TO_TRY, cli
+from workflow.commands.group import LISTED
 from workflow.runs.first_look import first_look
 from workflow.shell import screen
 from workflow.shell.reporter import LINE, Reporter
@@ -147,6 +148,7 @@ def test_what_it_says_to_try_works_and_leaves_a_picture(
 def test_the_help_lists_every_command_once() -> None:
     told = CliRunner().invoke(cli, ["--help"], terminal_width=80).stdout
     assert all(f"{title}:" in told for title in LISTED)
+    assert {name for names in LISTED.values() for name in names} == set(cli.commands)
     rows = [line.split()[0] for line in told.splitlines() if line.startswith("  ")]
     for name in cli.commands:
         assert rows.count(name) == 1
