@@ -12,7 +12,7 @@ PYHARM := .venv/pyharm/.installed
 # compiled of them is kept for the other process, those that they start, and the next time.
 TESTING := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=
 
-.PHONY: run test test-full bench lint docs docs-gallery install clean
+.PHONY: run test test-full bench lint docs docs-gallery docs-figures install clean
 .DEFAULT_GOAL := run
 
 run: $(INSTALLED)
@@ -44,7 +44,11 @@ docs: $(DOCUMENTABLE)
 # Takes finished runs of out/gallery, and computes what is not there.
 docs-gallery: $(DOCUMENTABLE)
 	@echo 'fretscale: all shipped cases, then their pictures: about 20 minutes of one core.'
-	PATH=$(BIN):$$PATH $(BIN)/python docs/draw_gallery.py out/gallery
+	PATH=$(CURDIR)/$(BIN):$$PATH $(BIN)/python docs/draw_gallery.py out/gallery
+
+docs-figures: $(DOCUMENTABLE)
+	@echo 'fretscale: the runs and charts that theory and README show: about an hour of one core.'
+	PATH=$(CURDIR)/$(BIN):$$PATH $(BIN)/python docs/draw_figures.py out/figures
 
 bench: $(TESTABLE)
 	$(PIP) -e '.[test,bench]'

@@ -43,7 +43,8 @@ INTRODUCTION = """\
 Every case that is shipped, with a figure of its run. `fretscale verify CASE` compares it with what
 it lists under `expect:`, in the units of the list, and shows of what kind every value is: `printed`
 by a publication, in numbers or words (its `source` says where, and what is a mean of what is
-printed), `closed_form` (a formula, a balance or a limit), `independent` (by another method), or `earlier`, a
+printed), `closed_form` (a formula, a balance or a limit), `independent` (by another method), or
+`earlier`, a
 result of ours, which only guards against change: depths and volumes of the default dovetail are of
 that kind, its forces of a closed form.
 
