@@ -62,6 +62,7 @@ nb_execution_in_temp = True
 nb_execution_show_tb = True  # a cell that fails is a warning, hence an error of the build
 nb_execution_timeout = 240
 nb_merge_streams = True
+nb_render_markdown_format = "myst"
 
 autodoc_typehints = "none"
 autodoc_member_order = "bysource"
