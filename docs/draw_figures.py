@@ -22,6 +22,7 @@ FIGURES = {
     "chart_grid": ("chart_grid", "chart cases/sphere_fretting.yaml --axis grid"),
     "chart_stepper": ("chart_stepper", "chart cases/dovetail_2d.yaml --axis stepper"),
     "chart_increments": ("chart_increments", "chart cases/dovetail_2d.yaml --axis increments"),
+    "chart_link": ("chart_link", "chart cases/dovetail_2d.yaml --axis link"),
     "chart_harmonics": (
         "chart_harmonics",
         "chart cases/rig_two_dof.yaml --axis harmonics --set 'forces=[10 N, 50 N]' "
