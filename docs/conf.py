@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import hashlib
+import logging
 import os
 import shutil
 import sys
@@ -10,7 +11,7 @@ from importlib.metadata import version as version_of
 from pathlib import Path
 
 HERE = Path(__file__).parent
-sys.path.insert(0, str(HERE / "_ext"))
+sys.path[:0] = [str(HERE / "_ext"), str(HERE.parent)]
 BUILT = HERE / "_build"
 
 # Tutorials run the command of this environment and checkout, without colours or bars: notebooks ask
@@ -22,6 +23,9 @@ os.environ["IPYTHONDIR"] = str(BUILT / "ipython")
 STARTUP = BUILT / "ipython" / "profile_default" / "startup"
 STARTUP.mkdir(parents=True, exist_ok=True)
 shutil.copy(HERE / "_ext" / "bash_cell.py", STARTUP)
+# Which kernel runs a page, and how it talks to its notebook, is nobody's concern here.
+(STARTUP.parent / "ipython_kernel_config.py").write_text("c.IPKernelApp.log_level = 40\n")
+logging.getLogger("traitlets").setLevel(logging.WARNING)
 
 
 def digest() -> str:
