@@ -79,7 +79,7 @@ def test_joint_law(changed, tmp_path):
     """Its loop loses as much as sliders with its share of spread ones; cases take it."""
     command = changed("joint_law.patch")
     (tmp_path / "case.yaml").write_text(RIG, encoding="utf-8")
-    assert "mixed_iwan under 60 N" in command("check", "case.yaml")
+    assert "mixed_iwan, normal load 60 N" in command("check", "case.yaml")
     law = "MixedIwan(30e3, 0.5, 60.0, share=0.4)"
     code = f"from wear.joints.iwan import MixedIwan; print({law}.loop_energy(7e-3))"
     places = (np.arange(20000) + 0.5) / 20000 * 30.0 / (30e3 * 0.8)  # where spread sliders slip
