@@ -5,13 +5,14 @@ BIN := .venv/bin
 PIP := $(BIN)/python -m pip install -q --disable-pip-version-check -c constraints.txt
 INSTALLED := .venv/.installed
 TESTABLE := .venv/.testable
+DOCUMENTABLE := .venv/.documentable
 SYSTEM_CHECK := workflow/shell/system_check.py
 PYHARM := .venv/pyharm/.installed
 # Tests run side by side in processes; threads inside each would only fight over the cores. What is
 # compiled of them is kept for the other process, those that they start, and the next time.
 TESTING := OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 PYTHONDONTWRITEBYTECODE=
 
-.PHONY: run test test-full bench lint install clean
+.PHONY: run test test-full bench lint docs docs-gallery docs-figures install clean
 .DEFAULT_GOAL := run
 
 run: $(INSTALLED)
@@ -32,6 +33,22 @@ lint: $(TESTABLE)
 	$(BIN)/ruff format --check .
 	$(BIN)/mypy
 	$(BIN)/lint-imports --no-logo
+
+# Tutorials are run, and every warning is an error; what has been run is kept while it is the same.
+docs: $(DOCUMENTABLE)
+	@echo 'fretscale: the pages, with the runs of their tutorials: 2 minutes on two cores.'
+	OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 MKL_NUM_THREADS=1 \
+	    $(BIN)/sphinx-build -q -W --keep-going -n -j 2 -b html docs docs/_build/html
+	@echo 'fretscale: open docs/_build/html/index.html'
+
+# Takes finished runs of out/gallery, and computes what is not there.
+docs-gallery: $(DOCUMENTABLE)
+	@echo 'fretscale: all shipped cases, then their pictures: about 20 minutes of one core.'
+	PATH=$(CURDIR)/$(BIN):$$PATH $(BIN)/python docs/draw_gallery.py out/gallery
+
+docs-figures: $(DOCUMENTABLE)
+	@echo 'fretscale: the runs and charts that theory and README show: about an hour of one core.'
+	PATH=$(CURDIR)/$(BIN):$$PATH $(BIN)/python docs/draw_figures.py out/figures
 
 bench: $(TESTABLE)
 	$(PIP) -e '.[test,bench]'
@@ -58,6 +75,11 @@ $(TESTABLE): $(INSTALLED)
 	$(PIP) -e '.[test]'
 	@touch $@
 
+$(DOCUMENTABLE): $(INSTALLED)
+	@echo 'fretscale: installing what the pages need: 35 MB to download, 150 MB on disk, a minute.'
+	$(PIP) -e '.[docs]'
+	@touch $@
+
 # A peer that is measured beside ours. It brings a hundred packages: an environment of its own.
 $(PYHARM):
 	$(PYTHON) -m venv $(@D)
@@ -67,5 +89,5 @@ $(PYHARM):
 
 clean:
 	rm -rf .venv out build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache \
-	    .hypothesis
+	    .hypothesis docs/_build docs/reference/cases docs/gallery/index.md
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +

@@ -1,0 +1,45 @@
+"""Figures of the theory and of README, from runs: `make docs-figures`, or
+
+    python docs/draw_figures.py RUNS [FIGURE ...]
+
+Each has its command beside it, which takes up to half an hour; runs that are finished below RUNS
+are taken as they are.
+"""
+
+from __future__ import annotations
+
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+from draw_gallery import ROOT, store
+
+# The figure of the run that is taken, and the command.
+FIGURES = {
+    "pressure_profiles": ("pressure_profiles", "run cases/dovetail.yaml"),
+    "rig_response": ("frequency_response", "run cases/rig_harmonic_balance.yaml"),
+    "chart_grid": ("chart_grid", "chart cases/sphere_fretting.yaml --axis grid"),
+    "chart_stepper": ("chart_stepper", "chart cases/dovetail_2d.yaml --axis stepper"),
+    "chart_increments": ("chart_increments", "chart cases/dovetail_2d.yaml --axis increments"),
+    "chart_link": ("chart_link", "chart cases/dovetail_2d.yaml --axis link"),
+    "chart_harmonics": (
+        "chart_harmonics",
+        "chart cases/rig_two_dof.yaml --axis harmonics --set 'forces=[10 N, 50 N]' "
+        "--set 'loops={frequency: 100 Hz}'",
+    ),
+}
+
+
+def main(runs: Path, names: list[str]) -> None:
+    """Store the figures named, of all if none is."""
+    for name in names or FIGURES:
+        figure, command = FIGURES[name]
+        if not (runs / name / "summary.json").exists():
+            arguments = ["fretscale", *shlex.split(command), "--out", str((runs / name).resolve())]
+            subprocess.run(arguments, check=True, cwd=ROOT)
+        store(runs / name / "figures" / f"{figure}.png", ROOT / "docs" / "figures" / f"{name}.png")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]), sys.argv[2:])
