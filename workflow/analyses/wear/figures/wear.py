@@ -63,13 +63,13 @@ ALONG_LINE = ("along x",)
 
 
 def figures_of(contents: Contents) -> Figures:
-    """The figures of a run, by name."""
+    """The figures of a run, by name; the first is what to look at first."""
     drawn = {
-        "resultants": (resultants, True),
-        "pressure_maps": (pressure_maps, not contents.line),
         "pressure_profiles": (pressure_profiles, True),
+        "pressure_maps": (pressure_maps, not contents.line),
         "worn_profiles": (worn_profiles, contents.worn),
         "kinetics": (kinetics, contents.worn),
+        "resultants": (resultants, True),
         "error_budget": (error_budget, True),
         "structure_stress": (structure_stress, contents.structure),
         "half_space_and_structure": (half_space_and_structure, contents.comparison),

@@ -36,7 +36,7 @@ from workflow.analyses.contact.case import (
 )
 from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.wear.case.base import WearCase
-from workflow.analyses.wear.case.sections import Contact, PressingForce, Wear
+from workflow.analyses.wear.case.sections import Contact, Cycles, PressingForce, Wear
 from workflow.case.doubts import heights, long_stroke, pressed
 from workflow.case.fields import Quantity, Whole
 from workflow.case.input_files import read_heights
@@ -121,7 +121,7 @@ class Reciprocation(Stroke):
     """Body 2 moves to and fro at constant speed under a constant normal force."""
 
     P: PressingForce = entry("normal force [N]", "50 N")
-    stroke: Length = entry("of body 2, from end to end, far from the contact [mm]", "50 um")
+    stroke: Length = entry("of body 2, from end to end, far from the contact [mm]", "20 um")
     direction: Direction = entry("of the stroke, from x to y [rad]", "0 deg", default=0.0)
     increments: Increments = entry("equal steps of each way, there and back", 4, default=4)
     tilt: Tilt = entry(TILTS, "held", default="held")
@@ -139,7 +139,7 @@ class LineReciprocation(Stroke):
     """Body 2 moves to and fro along x at constant speed under a constant normal force."""
 
     P: PressingLineForce = entry("normal force [N/mm]", "50 N/mm")
-    stroke: Length = entry("of body 2, from end to end, far from the contact [mm]", "50 um")
+    stroke: Length = entry("of body 2, from end to end, far from the contact [mm]", "20 um")
     increments: Increments = entry("equal steps of each way, there and back", 4, default=4)
     tilt: Tilt = entry(TILTS, "held", default="held")
 
@@ -158,6 +158,9 @@ class Cycle(LegsOrFile[LegT], Generic[LegT]):
     closed: ClassVar[bool] = True
     known_by: ClassVar[frozenset[str]] = frozenset({"legs", "file"})
 
+    legs: tuple[LegT, ...] = entry(
+        "one after the other, over and over: the first from where the last one ends", default=()
+    )
     tilt: Tilt = entry(f"{TILTS}; unless a moment or tilt is named", "held", default="held")
 
     def cycle(self) -> LoadTable:
@@ -208,6 +211,12 @@ METHODS = (
 LINK = "there is no structure to link the contact to: both bodies are half-spaces"
 
 
+class BodiesWear(Wear):
+    """Wear of two bodies, and how far it goes."""
+
+    cycles: Cycles = entry("of the whole run [1]", 1e5)
+
+
 class WearGrid(Contact):
     """Half-space solution on a grid centred on body 2, which moves with it."""
 
@@ -250,7 +259,7 @@ class BodiesWearCase(WearCase):
     materials: BodyMaterials = entry("the two bodies in contact")
     load_path: LoadPath = entry("of body 2 on body 1: a stroke, or legs or a file of a cycle")
     contact: WearGrid = entry("half-space grid")
-    wear: Wear = entry("law, length of the run and step")
+    wear: BodiesWear = entry("law, length of the run and step")
 
     @classmethod
     def suits(cls, source: Source) -> bool:
@@ -293,7 +302,7 @@ class LineBodiesWearCase(WearCase):
         "of body 2 on body 1, forces per length: a stroke, or legs or a file of a cycle"
     )
     contact: LineWearGrid = entry("half-plane grid")
-    wear: Wear = entry("law, length of the run and step")
+    wear: BodiesWear = entry("law, length of the run and step")
 
     @classmethod
     def suits(cls, source: Source) -> bool:
