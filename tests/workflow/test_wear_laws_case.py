@@ -104,7 +104,7 @@ TABLE = "wear.disk.evolution={scope: local, energy: [%s], factor: [%s]}"
         ("wear.disk.law=wishful", "wear.disk.law", "not known; allowed: energy, energy_amplitude, "
          "archard"),
         ("wear.disk.evolutoin=1", "wear.disk.evolutoin", "did you mean 'evolution'?"),
-        ("wear.disk.roughness=1", "wear.disk.roughness", "allowed: coefficient, evolution, law"),
+        ("wear.disk.roughness=1", "wear.disk.roughness", "allowed: coefficient, law, evolution"),
         ("wear.disk={law: archard, coefficient: 1e-4}", "wear.disk.hardness",
          "missing; allowed: H of the worn body, beside coefficient [MPa], such as 3.5 GPa; or "
          "specific_wear_rate, which has both in it"),
