@@ -25,7 +25,7 @@ CASES = Path(__file__).parents[2] / "cases"
 AREA, LINE = template("bodies_wear"), template("line_wear")
 FLAT = "{kind: bodies, shape: flat, half_width: 0.2, half_length: 0.1, step: 5 um}"
 STRIP = "{kind: bodies, shape: flat, half_width: 0.2}"
-SMALL = ["contact.grid=[40, 40]", "load_path.increments=1"]
+SMALL = ["contact.grid=[40, 40]", "load_path={P: 50 N, stroke: 50 um, increments: 1}"]
 
 
 def area(*overrides: str) -> BodiesWearCase:
