@@ -127,7 +127,7 @@ def test_overrides_change_a_loaded_case():
 
 def test_a_check_says_what_the_command_says(monkeypatch):
     checked = fretscale.check(SPHERE, contact__grid=[64, 64])
-    assert "64 x 64 cells" in checked.outline["contact"]
+    assert "64 x 64 cells" in dict(checked.outline)["contact"]
     assert "64 x 64 cells" in str(checked)
     assert checked.memory > 1e9
     doubted = fretscale.check(SPHERE, materials__body_1__young="210 MPa")

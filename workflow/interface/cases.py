@@ -62,19 +62,20 @@ class Check:
     """What a case would run.
 
     ``memory`` is the upper estimate of what it needs [bytes], ``seconds`` the order of magnitude of
-    its time [s], ``outline`` what would run by name, ``doubts`` what looks like a slip.
+    its time [s], ``outline`` what would run in rows of name and text, ``doubts`` what looks like a
+    slip.
     """
 
     title: str
-    outline: dict[str, str]
+    outline: tuple[tuple[str, str], ...]
     memory: float
     seconds: float
     doubts: tuple[str, ...]
 
     def __str__(self) -> str:
         memory = f"up to {self.memory / 1e9:.1f} GB"
-        rows = {**self.outline, "memory": memory, "seconds": f"about {self.seconds:.2g}"}
-        lines = [f"  {name:<10} {text}" for name, text in rows.items()]
+        rows = *self.outline, ("memory", memory), ("seconds", f"about {self.seconds:.2g}")
+        lines = [f"  {name:<10} {text}" for name, text in rows]
         return "\n".join([self.title, *lines, *(f"doubt: {doubt}" for doubt in self.doubts)])
 
 
@@ -93,7 +94,7 @@ def check(case: AnyCase, /, **overrides: Any) -> Check:
     analysis = kinds.analysis_of(loaded)
     memory, time = analysis.memory(loaded), analysis.run_time(loaded)
     memory.check()
-    outline, doubts = dict(loaded.outline()), tuple(doubts_of(loaded))
+    outline, doubts = tuple(loaded.outline()), tuple(doubts_of(loaded))
     return Check(loaded.title, outline, memory.required, time.seconds, doubts)
 
 

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import hashlib
-import io
 import os
 import re
-from contextlib import nullcontext, redirect_stderr
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +15,7 @@ from workflow.interface.results import Results
 from workflow.interface.results import open as open_results
 from workflow.kinds import kind_of
 from workflow.runs.run import bring_to_end, kept_in, run_case
+from workflow.shell.screen import Loudness
 from workflow.shell.streams import hold_standard_streams
 
 # Where runs go that are given no folder.
@@ -41,7 +40,8 @@ def run(
     default one below ``out`` with a name made of the case and its values, the same for the same
     case. A finished run of this case that it holds is not computed again, one that was interrupted
     goes on from there; a run of another case is in the way. With ``force`` all that a run has
-    written there gives way. What a run says goes to stderr, unless ``quiet``, and into its log.
+    written there gives way. What a run says goes to stderr, no more than warnings if ``quiet``, and
+    into its log.
 
     Returns the results, which are read from the folder when they are asked for. Raises
     :class:`FretscaleError`; KeyboardInterrupt leaves a folder to go on from, by the same call or
@@ -64,11 +64,11 @@ def run(
     hold_standard_streams()
     loaded = load_case(case, **overrides)
     folder = OUT / _name(case, loaded) if out is None else Path(out)
-    with redirect_stderr(io.StringIO()) if quiet else nullcontext():
-        if not force and kept_in(folder, loaded) in ("finished", "unfinished"):
-            bring_to_end(loaded, folder)
-        else:
-            run_case(loaded, folder, force)
+    loudness = Loudness.QUIET if quiet else Loudness.NORMAL
+    if not force and kept_in(folder, loaded) in ("finished", "unfinished"):
+        bring_to_end(loaded, folder, loudness=loudness)
+    else:
+        run_case(loaded, folder, force, loudness)
     return open_results(folder)
 
 

@@ -65,7 +65,9 @@ def resume_run(out: Path, loudness: Loudness = Loudness.NORMAL) -> bool:
     return True
 
 
-def bring_to_end(case: Case, root: Path, take_over: bool = False) -> bool:
+def bring_to_end(
+    case: Case, root: Path, take_over: bool = False, loudness: Loudness = Loudness.NORMAL
+) -> bool:
     """Bring a case to its end in a folder, from where that has got to; False if it was there.
 
     A finished run of the same case stays, an unfinished one goes on from its last jump if it can,
@@ -79,9 +81,9 @@ def bring_to_end(case: Case, root: Path, take_over: bool = False) -> bool:
             folder.clear_leftovers()
             return False
         if kept == "unfinished":
-            _go_on(load_case(folder.case), folder, gone)
+            _go_on(load_case(folder.case), folder, gone, loudness)
         else:
-            _start(case, root, True, gone, damaged)
+            _start(case, root, True, gone, damaged, loudness)
         return True
 
 
