@@ -60,7 +60,7 @@ class Results(Group):
 
     ``folder`` is where it lies, ``warnings`` what the run has warned of, ``main`` its main results
     with units and estimated errors. ``results["contact"]`` is
-    a :class:`Group`, ``results["kinetics/cycles"]`` are :class:`Values`; :meth:`tree` tells what
+    a :class:`Group`, ``results["kinetics/cycles"]`` are :class:`Values`; ``tree()`` tells what
     there is.
     """
 
