@@ -47,6 +47,11 @@ class Drive:
         """Free where the bodies turn as imposed moments make them about both axes."""
         return "held" if any(self.motion[k] for k in TILTS) else "free"
 
+    @property
+    def presses(self) -> bool:
+        """Whether a motion across the face is imposed: an approach or a tilt."""
+        return any(self.motion[k] for k in NORMAL)
+
     def values(self, loads: LoadHistory) -> Array:
         """Force or motion imposed at the ends of the increments ``(t, 6)``."""
         motions = np.zeros((len(loads), 6)) if self.motions is None else self.motions

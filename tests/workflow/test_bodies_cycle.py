@@ -128,3 +128,14 @@ def test_a_rigid_punch_held_at_its_approach_wears_itself_free(tmp_path: Path) ->
     hertz = np.sqrt(50.0 * modulus / (np.pi * 10.0))
     assert found["peak_pressure"]["unworn"] == pytest.approx(hertz, rel=5e-3)
     assert found["depth_2"] > 0.0
+
+
+def test_the_force_of_a_held_approach_is_told_worn_too(tmp_path: Path) -> None:
+    """At peak load nothing slides: what presses there is found on the surfaces at the end."""
+    approach = "{legs: [{approach: 1 um, shift_x: 4 um}, {shift_x: 0}, {approach: 1.2 um}]}"
+    settings = ["contact.method=normal", "wear.cycles=2e4", "wear.step.cycles=1e4", *PLAIN]
+    found = run(area(approach, *settings), tmp_path / "out")["interface"]["peak_load"]
+    modulus = 0.5 * 115e3 / (1.0 - 0.29**2)
+    hertz = 4.0 / 3.0 * modulus * np.sqrt(10.0) * 1.2e-3**1.5
+    assert found["unworn"]["P"] == pytest.approx(hertz, rel=0.05)
+    assert 0.0 < found["worn"]["P"] < 0.95 * found["unworn"]["P"]

@@ -46,10 +46,13 @@ class InterfaceOutcome:
 
     @cached_property
     def carried(self) -> dict[str, LoadHistory]:
-        """Loads, unworn and worn, with the moments that hold the tilt where it is held."""
-        worn = np.zeros_like(self.first.pressure)
-        for t, start in self.state.starts.items():
+        """Loads, unworn and worn, with what pressure carries where motions press."""
+        starts, worn = self.state.starts, np.zeros_like(self.first.pressure)
+        for t, start in starts.items():
             worn[t] = start.pressure  # that the last wear step has left
+        still = [t for t in np.flatnonzero(self.state.loads.P > 0.0) if t not in starts]
+        if still and self.stage.settings.drive.presses:
+            worn[still] = self.end.pressure[still]  # nothing has worn there
         return {
             "unworn": self.stage.carried(self.unworn.loads, self.first.pressure),
             "worn": self.stage.carried(self.state.loads, worn),

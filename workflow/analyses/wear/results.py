@@ -300,7 +300,10 @@ def _interface_summary(outcome: Outcome, contact: InterfaceOutcome) -> dict[str,
     wearing = "nodes" if outcome.case.contact.method == "nodes" else "half_space"
     return {
         **dict(zip(KINETICS, contact.kinetics[-1].tolist(), strict=True)),
-        "peak_load": {"unworn": resultants_at(loads, outcome.source.peak)},
+        "peak_load": {
+            when: resultants_at(carried, outcome.source.peak)
+            for when, carried in contact.carried.items()
+        },
         **_tilt_summary(contact),
         "slip_per_cycle": contact.slip_per_cycle,
         "energy_per_cycle": {
