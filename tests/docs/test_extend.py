@@ -70,7 +70,7 @@ def test_wear_law(changed, tmp_path):
     command("new", "line_wear", "case.yaml")
     command("run", "case.yaml", "--out", "out", *settings(WORN))
     worn = json.loads((tmp_path / "out" / "summary.json").read_text("utf-8"))["interface"]
-    slip = 2.0 * 50e-3  # there and back
+    slip = 2.0 * 20e-3  # there and back
     assert worn["volume_1"] / worn["volume_2"] == pytest.approx(slip / 100e-3, rel=1e-6)
 
 

@@ -20,12 +20,12 @@ from tests.workflow.case_leaves import BODY, CELLS
 from tests.workflow.commands import invoke, runs_here
 from workflow.analyses.wear import contact_workers
 from workflow.analyses.wear.budget import finding
-from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.layout import Contents
-from workflow.kinds import kinds, load_case
+from workflow.kinds import kinds
 from workflow.pictures import drawing
 from workflow.shell import processes
 from workflow.shell.folder import OutputFolder
+from workflow.shell.results import read_contents
 
 SIZE, EDGE, END = (10.0, 60.0), 1.0, 3.0
 EDGE_RADIUS, END_RADIUS = 30.0, 150.0
@@ -307,23 +307,8 @@ Runner = Callable[..., Run]
 
 
 def contents_of(folder: Path) -> Contents:
-    """What a finished wear run of one of our structures has written."""
-    summary = json.loads((folder / "summary.json").read_text("utf-8"))
-    case = load_case(folder / "case.yaml")
-    assert isinstance(case, WearCase)
-    names = tuple(sorted(summary["kinetics"].keys() - {"cycles"}))
-    return Contents(
-        names=names,
-        bodies=case.bodies,
-        jumps=summary["jumps"],
-        line=summary["per_length"],
-        structure="structure" in summary,
-        coarse=names,
-        comparison=case.contact.method == "full",
-        loops=case.loops.wanted,
-        sections=case.stress.section != "none",
-        life=() if case.stress.life.parameter == "none" else names,
-    )
+    """What a finished wear run has written, as it says itself."""
+    return read_contents(folder / "results.h5", Contents)
 
 
 def manifest_has_all(folder: Path) -> bool:

@@ -121,7 +121,7 @@ def test_figures_speak_of_lengths_and_strips(pictured):
                 shown += axis.get_legend_handles_labels()[1]
             texts[name] = " | ".join(shown)
     assert "kN/mm" in texts["resultants"]
-    assert "N mm/mm" in texts["resultants"]
+    assert "mJ/mm" in texts["resultants"]
     assert "128 strips" in texts["pressure_profiles"]
     assert "mm³/mm per 10⁶ cycles" in texts["kinetics"]
     assert not any("y = 0" in text or " x 1" in text for text in texts.values())

@@ -1,5 +1,6 @@
 """Scripts that show a run, in ParaView itself where it is installed."""
 
+import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -28,7 +29,9 @@ def test_paraview_draws_every_view(results: Path, tmp_path: Path, script: str) -
     write_paraview(ANALYSIS.pictures, CONTENTS, results, tmp_path / "run" / "paraview")
     (tmp_path / "run").rename(tmp_path / "moved run")
     picture = tmp_path / f"{script}.png"
-    command = ["xvfb-run", "-a", "pvbatch", f"moved run/paraview/{script}.py", picture.name]
+    # A screen of its own: two tests that look for one at the same time may find the same.
+    screen = str(100 + 2 * (os.getpid() % 10_000) + (script == "view"))
+    command = ["xvfb-run", "-n", screen, "pvbatch", f"moved run/paraview/{script}.py", picture.name]
     done = subprocess.run(
         command, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
     )
