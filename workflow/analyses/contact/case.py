@@ -8,19 +8,20 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from typing import Annotated, ClassVar, Generic, Literal, Self, TypeVar
+from typing import Annotated, ClassVar, Literal, Self
 
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from sa_solver.types import Array, Grid
 from sa_solver.types import Material as ElasticMaterial
-from workflow.analyses.contact.load_table import LoadTable, conflict, ramps
+from workflow.analyses.contact.load_path import ContactPath, LegsOrFile, LineContactPath
+from workflow.analyses.contact.load_table import LoadTable
 from workflow.case.doubts import heights, hertz, pressed, uneven_cells
-from workflow.case.fields import File, Quantity, Whole
+from workflow.case.fields import File, Quantity
 from workflow.case.input_files import InputFileError, read_heights
 from workflow.case.loading import word_at
-from workflow.case.plain import between, of_bodies, plain
+from workflow.case.plain import of_bodies, plain
 from workflow.case.sections import (
     Case,
     ElasticBody,
@@ -35,34 +36,11 @@ from workflow.case.sections import (
     Tolerance,
     disagreement,
     entry,
-    quantities_of,
-    sections_of,
 )
 from workflow.case.source import Source
-from workflow.case.table_file import read_columns
 
 # Limits are wide: they catch a forgotten unit or a slipped exponent, not an unusual contact.
 Poisson = Annotated[float, Quantity("1", at_least=0.0, at_most=0.5)]
-NormalForce = Annotated[float, Quantity("N", at_least=0.0, at_most=1e9, range_text="0 to 1e6 kN")]
-Force = Annotated[float, Quantity("N", at_least=-1e9, at_most=1e9, range_text="-1e6 kN to 1e6 kN")]
-Moment = Annotated[
-    float, Quantity("N*mm", at_least=-1e9, at_most=1e9, range_text="-1e6 N*m to 1e6 N*m")
-]
-NormalLineForce = Annotated[
-    float, Quantity("N/mm", at_least=0.0, at_most=1e9, range_text="0 to 1e6 kN/mm")
-]
-LineForce = Annotated[
-    float, Quantity("N/mm", at_least=-1e9, at_most=1e9, range_text="-1e6 kN/mm to 1e6 kN/mm")
-]
-LineMoment = Annotated[
-    float, Quantity("N", at_least=-1e9, at_most=1e9, range_text="-1e6 kN to 1e6 kN")
-]
-Travel = Annotated[float, Quantity("mm", at_least=-1e3, at_most=1e3)]
-Turn = Annotated[float, Quantity("rad", at_least=-1.0, at_most=1.0)]
-BulkStress = Annotated[
-    float, Quantity("MPa", at_least=-1e5, at_most=1e5, range_text="-100 GPa to 100 GPa")
-]
-Increments = Annotated[int, Whole(1, 100_000)]
 
 RIGID = ElasticMaterial(young=np.inf, poisson=0.0)
 AREA_SHAPES = ("sphere", "ellipsoid")
@@ -204,116 +182,6 @@ def unworn_contact(
 # --- loads --------------------------------------------------------------------------------------
 
 
-class Leg(Section):
-    """A part of the path, passed at equal steps; what it does not name keeps its value.
-
-    Forces are those on body 2, motions those of body 1 relative to body 2 far from the contact.
-    """
-
-    P: NormalForce | None = entry("normal force [N]", "60 N", default=None)
-    approach: Travel | None = entry("instead of P [mm]", "13 um", default=None)
-    Qx: Force | None = entry("tangential force along x [N]", "15 N", default=None)
-    shift_x: Travel | None = entry("instead of Qx [mm]", "5 um", default=None)
-    Qy: Force | None = entry("tangential force along y [N]", "0 N", default=None)
-    shift_y: Travel | None = entry("instead of Qy [mm]", "0 um", default=None)
-    Mx: Moment | None = entry("moment of the pressure about x [N*mm]", "0 N*mm", default=None)
-    tilt_x: Turn | None = entry("instead of Mx [rad]", "0 deg", default=None)
-    My: Moment | None = entry("moment of the pressure about y [N*mm]", "0 N*mm", default=None)
-    tilt_y: Turn | None = entry("instead of My [rad]", "0 deg", default=None)
-    Mz: Moment | None = entry("moment of the shear [N*mm]", "10 N*mm", default=None)
-    twist: Turn | None = entry("instead of Mz [rad]", "0.01 deg", default=None)
-    bulk_stress_1: BulkStress | None = entry(
-        "along x in body 1, held from straining along y [MPa]", "100 MPa", default=None
-    )
-    bulk_stress_2: BulkStress | None = entry(
-        "along x in body 2, held from straining along y [MPa]", "0 MPa", default=None
-    )
-    increments: Increments = entry("equal steps to the end of this leg", 1, default=1)
-
-
-class LineLeg(Section):
-    """A part of the path of a line contact; forces and moments are per length."""
-
-    P: NormalLineForce | None = entry("normal force [N/mm]", "400 N/mm", default=None)
-    approach: Travel | None = entry("instead of P, see contact.datum [mm]", "13 um", default=None)
-    Qx: LineForce | None = entry("tangential force along x [N/mm]", "100 N/mm", default=None)
-    shift_x: Travel | None = entry("instead of Qx [mm]", "5 um", default=None)
-    Qy: LineForce | None = entry("tangential force along y [N/mm]", "0 N/mm", default=None)
-    shift_y: Travel | None = entry("instead of Qy [mm]", "0 um", default=None)
-    My: LineMoment | None = entry("moment of the pressure about y [N]", "0 N", default=None)
-    tilt_y: Turn | None = entry("instead of My [rad]", "0 deg", default=None)
-    bulk_stress_1: BulkStress | None = entry(
-        "along x in body 1, in plane strain [MPa]", "100 MPa", default=None
-    )
-    bulk_stress_2: BulkStress | None = entry(
-        "along x in body 2, in plane strain [MPa]", "0 MPa", default=None
-    )
-    increments: Increments = entry("equal steps to the end of this leg", 1, default=1)
-
-
-HistoryFile = Annotated[str, File((".csv",))]
-LegT = TypeVar("LegT", Leg, LineLeg)
-
-
-class LegsOrFile(Section, Generic[LegT]):
-    """Legs one after the other from the unloaded state, or a file."""
-
-    # Whether the path leads back to where it begins, over and over.
-    closed: ClassVar[bool] = False
-
-    legs: tuple[LegT, ...] = entry("one after the other, from no load", default=())
-    file: HistoryFile | None = entry(
-        "instead of legs: columns named like their entries, a row per increment, base units",
-        "history.csv",
-        default=None,
-    )
-
-    @model_validator(mode="after")
-    def _can_be_followed(self) -> Self:
-        """Raise unless the path is given once, presses, and no two entries conflict."""
-        if (self.file is None) == (not self.legs):
-            problem = "both given" if self.legs else "neither given"
-            raise disagreement(
-                f"{problem}; allowed: either legs or file", "file" if self.legs else "legs"
-            )
-        try:
-            places = dict.fromkeys(self.table().columns, "file")
-        except InputFileError as error:
-            raise disagreement(str(error), "file") from error
-        for number, leg in reversed(list(enumerate(self.legs))):
-            given = [key for key in places if getattr(leg, key) is not None]
-            places |= {key: f"legs.{number}.{key}" for key in given}
-        if wrong := conflict(places):
-            key, message = wrong
-            raise disagreement(message, places.get(key, "legs" if self.legs else "file"))
-        return self
-
-    def table(self) -> LoadTable:
-        """Every increment of the path."""
-        (leg_model,) = sections_of(type(self).model_fields["legs"].annotation)
-        quantities = quantities_of(leg_model)
-        if self.file is not None:
-            return LoadTable(read_columns(self.file, quantities))
-        targets = {key: [getattr(leg, key) for leg in self.legs] for key in quantities}
-        return LoadTable(ramps(targets, [leg.increments for leg in self.legs], self.closed))
-
-    def ranges(self) -> Iterator[str]:
-        """Between which values each load goes, from none."""
-        (leg,) = sections_of(type(self).model_fields["legs"].annotation)
-        units = {name: quantity.unit for name, quantity in quantities_of(leg).items()}
-        for name, values in self.table().columns.items():
-            low, high = min(0.0, float(values.min())), max(0.0, float(values.max()))
-            upwards = f"up to {plain(high, units[name])}"
-            yield f"{name} {upwards if low == 0.0 else between(low, high, units[name])}"
-
-    def place(self, row: int) -> str:
-        """The entry that says how long increment ``row`` is."""
-        if self.file is not None:
-            return "load_path.file"
-        ends = np.cumsum([leg.increments for leg in self.legs])
-        return f"load_path.legs.{np.searchsorted(ends, row, side='right')}.increments"
-
-
 def check_bulk_stress(table: LoadTable, materials: BodyMaterials) -> None:
     """Refuse bulk stress in a body that is rigid."""
     for number in (1, 2):
@@ -324,14 +192,6 @@ def check_bulk_stress(table: LoadTable, materials: BodyMaterials) -> None:
                 "allowed: an elastic body",
                 f"materials.{body}",
             )
-
-
-class ContactPath(LegsOrFile[Leg]):
-    """Legs one after the other from the unloaded state, or a file."""
-
-
-class LineContactPath(LegsOrFile[LineLeg]):
-    """Legs one after the other from the unloaded state, or a file; forces are per length."""
 
 
 # --- grids --------------------------------------------------------------------------------------

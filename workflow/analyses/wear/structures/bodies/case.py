@@ -22,10 +22,6 @@ from workflow.analyses.contact.case import (
     Ellipsoid,
     FlatRounded,
     Heights,
-    Leg,
-    LegsOrFile,
-    LegT,
-    LineLeg,
     Shape,
     Sphere,
     check_bulk_stress,
@@ -34,6 +30,7 @@ from workflow.analyses.contact.case import (
     touches_along_a_line,
     unworn_contact,
 )
+from workflow.analyses.contact.load_path import Leg, LegsOrFile, LegT, LineLeg
 from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import Contact, Cycles, PressingForce, Wear
@@ -88,13 +85,14 @@ class FlatStrip(Shape):
 # --- loads --------------------------------------------------------------------------------------
 
 
-def with_held(imposed: LoadTable, tilt: Tilt) -> LoadTable:
-    """A cycle with what is held: motions of 0."""
-    held = ["twist"] if "Mz" not in imposed.columns else []
-    if tilt == "held":
+def with_held(path: LoadPath | LineLoadPath) -> LoadTable:
+    """Every increment of a cycle, with what is held: motions of 0."""
+    given = path.table()
+    held = ["twist"] if "Mz" not in given.columns else []
+    if path.tilt == "held":
         pairs = {"Mx": "tilt_x", "My": "tilt_y"}.items()
-        held += [motion for moment, motion in pairs if moment not in imposed.columns]
-    return LoadTable({name: np.zeros(len(imposed)) for name in held} | imposed.columns)
+        held += [motion for moment, motion in pairs if moment not in given.columns]
+    return LoadTable({name: np.zeros(len(given)) for name in held} | given.columns)
 
 
 def to_and_fro(P: float, stroke: float, increments: int, angle: float = 0.0) -> LoadTable:
@@ -130,10 +128,6 @@ class Reciprocation(Stroke):
         """Every increment of the cycle."""
         return to_and_fro(self.P, self.stroke, self.increments, self.direction)
 
-    def cycle(self) -> LoadTable:
-        """The same with what is held."""
-        return with_held(self.table(), self.tilt)
-
 
 class LineReciprocation(Stroke):
     """Body 2 moves to and fro along x at constant speed under a constant normal force."""
@@ -147,10 +141,6 @@ class LineReciprocation(Stroke):
         """Every increment of the cycle."""
         return to_and_fro(self.P, self.stroke, self.increments)
 
-    def cycle(self) -> LoadTable:
-        """The same with what is held."""
-        return with_held(self.table(), self.tilt)
-
 
 class Cycle(LegsOrFile[LegT], Generic[LegT]):
     """Forces and motions of a closed cycle: the first leg begins where the last one ends."""
@@ -162,10 +152,6 @@ class Cycle(LegsOrFile[LegT], Generic[LegT]):
         "one after the other, over and over: the first from where the last one ends", default=()
     )
     tilt: Tilt = entry(f"{TILTS}; unless a moment or tilt is named", "held", default="held")
-
-    def cycle(self) -> LoadTable:
-        """Every increment of the cycle, with what is held."""
-        return with_held(self.table(), self.tilt)
 
     @model_validator(mode="after")
     def _presses(self) -> Self:
@@ -334,13 +320,13 @@ def _check(case: BodiesWearCase | LineBodiesWearCase, size: tuple[float, float])
     """Refuse what does not fit together: grid, heights, motions, materials and loops."""
     if isinstance(case.structure, Heights):
         require_shape(case.structure.file, case.contact.grid)
-    table, path = case.load_path.cycle(), case.load_path
+    table, path = case.load_path.table(), case.load_path
     check_bulk_stress(table, case.materials)
     _check_room(case, table, size)
     _check_stress(case)
     if isinstance(path, Stroke):
         return
-    given = path.table().columns
+    given = table.columns
     if case.contact.method == "normal":
         forces = sorted(given.keys() & SHEARING)
         if forces or not given.keys() & SHIFTS:

@@ -30,6 +30,7 @@ from workflow.analyses.wear.structures.bodies.case import (
     LineBodiesWearCase,
     LineReciprocation,
     Reciprocation,
+    with_held,
 )
 from workflow.case.input_files import read_heights
 
@@ -46,7 +47,7 @@ class BodiesSource(UncoupledSource):
 
     def __init__(self, case: BodiesWearCase | LineBodiesWearCase) -> None:
         self._case, self.line = case, isinstance(case, LineBodiesWearCase)
-        self._table = case.load_path.cycle()
+        self._table = with_held(case.load_path)
         bodies = case.material(1), case.material(2)
         strain = bulk_strain(self._table, bodies)
         self.drive = Drive(
