@@ -3,6 +3,7 @@
 import os
 import shutil
 import subprocess
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -16,24 +17,45 @@ from workflow.pictures.drawing import write_paraview
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(
-        not (shutil.which("pvbatch") and shutil.which("xvfb-run")),
-        reason="needs ParaView's pvbatch, and xvfb-run to draw without a screen",
+        not (shutil.which("pvbatch") and shutil.which("Xvfb")),
+        reason="needs ParaView's pvbatch, and Xvfb to draw without a screen",
     ),
 ]
 
 
+@pytest.fixture
+def screen() -> Iterator[str]:
+    """A screen in memory: its server takes a free number itself, and says it when it is ready.
+
+    Without `-noreset` the server starts anew when its last window closes, and refuses whom it finds
+    at the door meanwhile: ParaView opens a window to ask what can be drawn before its own.
+    """
+    told, tells = os.pipe()
+    command = ["Xvfb", "-displayfd", str(tells), "-noreset", "-nolisten", "tcp"]
+    with (
+        os.fdopen(told, encoding="ascii") as number,
+        subprocess.Popen(command, pass_fds=[tells], stderr=subprocess.DEVNULL) as server,
+    ):
+        os.close(tells)
+        yield f":{number.readline().strip()}"
+        server.terminate()
+
+
 @pytest.mark.parametrize("script", ["view", "view_mission"])
-def test_paraview_draws_every_view(results: Path, tmp_path: Path, script: str) -> None:
+def test_paraview_draws_every_view(results: Path, tmp_path: Path, screen: str, script: str) -> None:
     """From another folder than that of the script, and after the run has been moved."""
     assert ANALYSIS.pictures is not None
     write_paraview(ANALYSIS.pictures, CONTENTS, results, tmp_path / "run" / "paraview")
     (tmp_path / "run").rename(tmp_path / "moved run")
     picture = tmp_path / f"{script}.png"
-    # A screen of its own: two tests that look for one at the same time may find the same.
-    screen = str(100 + 2 * (os.getpid() % 10_000) + (script == "view"))
-    command = ["xvfb-run", "-n", screen, "pvbatch", f"moved run/paraview/{script}.py", picture.name]
     done = subprocess.run(
-        command, cwd=tmp_path, capture_output=True, text=True, timeout=300, check=False
+        ["pvbatch", f"moved run/paraview/{script}.py", picture.name],
+        cwd=tmp_path,
+        env={**os.environ, "DISPLAY": screen},
+        capture_output=True,
+        text=True,
+        timeout=300,
+        check=False,
     )
     assert done.returncode == 0, done.stderr[-2000:]
     assert "ERR" not in done.stderr, done.stderr[-2000:]
