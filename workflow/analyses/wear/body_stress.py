@@ -83,14 +83,14 @@ def with_known_shear(
 
 
 class StressedBody:
-    """One body under the contact of a ``stage``."""
+    """Body 1 or 2 under the contact of a ``stage``."""
 
-    def __init__(self, stage: ContactStage, material: Material, body: Literal[1, 2]) -> None:
-        self.material = material
-        self._stage, self._body = stage, body
+    def __init__(self, stage: ContactStage, material: Material, number: Literal[1, 2]) -> None:
+        self.material, self.number = material, number
+        self._stage = stage
         # Each keeps the symbols of a depth, or its own: one per body serves both moments.
-        self._solver = SubsurfaceStress(stage.grid, material, body)
-        self._face = BodyFace(stage.grid, stage.transfer, material, body)
+        self._solver = SubsurfaceStress(stage.grid, material, number)
+        self._face = BodyFace(stage.grid, stage.transfer, material, number)
 
     @property
     def convolutions(self) -> int:
@@ -101,7 +101,7 @@ class StressedBody:
         """What a structure carries past the contact; None without one that tells."""
         if cycle.faces is None or cycle.loads.force is None:
             return None
-        moved = cycle.faces[self._body - 1]
+        moved = cycle.faces[self.number - 1]
         return self._face.bulk_stress(cycle.loads.loads, cycle.loads.force, moved)
 
     def history(
@@ -133,10 +133,10 @@ class StressedBody:
         fine = cycle.traction(peak)
         if bulk is None or cycle.fields is None or cycle.loads.force is None:
             return planes.section(self._solver, fine, planes.depths)
-        face, field = self._stage.face, cycle.fields[self._body - 1]
+        face, field = self._stage.face, cycle.fields[self.number - 1]
         whole = field.body.depth(face.name)
         near, below = np.split(planes.depths, [np.searchsorted(planes.depths, whole)])
-        heights = SIDE[self._body] * np.append(whole, below)
+        heights = SIDE[self.number] * np.append(whole, below)
         mesh = field.at(planes.points(heights), face.frame).reshape(6, -1, len(heights))
         nodal = self._stage.transfer.spread(cycle.loads.force[peak])
         row = planes.row(self._stage.transfer.places)

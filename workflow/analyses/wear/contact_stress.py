@@ -8,9 +8,9 @@ at a slipping edge: sections begin, and maps lie, at the case's critical distanc
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -26,7 +26,6 @@ from workflow.analyses.wear.case.base import WearCase
 from workflow.analyses.wear.case.sections import ContactStress, Life
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.layout import MOMENTS
-from workflow.analyses.wear.load_source import BODIES
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 from workflow.shell.results import On, ResultsWriter
@@ -56,20 +55,20 @@ class BodyStress:
 
 @dataclass(frozen=True)
 class ContactMoment:
-    """Both bodies under one contact, unworn or worn.
+    """The bodies under one contact by their numbers, unworn or worn: a rigid one is not there.
 
     ``carried`` is what a structure carries past the contact, where it tells;
     ``left_out`` are the increments, counted from 0, whose shear is not known (see
     :class:`wear.tractions.CycleTractions`) and that the maps do without.
     """
 
-    bodies: tuple[BodyStress, BodyStress]
+    bodies: Mapping[Literal[1, 2], BodyStress]
     carried: tuple[BulkStress, ...]
     left_out: np.ndarray
 
     @property
     def bulk(self) -> bool:
-        """Whether the stress that a structure carries past the contact is in that of both."""
+        """Whether the stress that a structure carries past the contact is in that of all."""
         return len(self.carried) == len(self.bodies)
 
 
@@ -91,15 +90,19 @@ class InterfaceStress:
     @property
     def mapped(self) -> bool:
         """Whether there are maps of the fretting parameter."""
-        return all(body.maps for moment in self.moments.values() for body in moment.bodies)
+        return all(body.maps for body in self._bodies)
 
     @property
     def cracking(self) -> bool:
         """Whether the fretting parameter is above 0 anywhere."""
         parameter = self.planes.settings.life.parameter
         name = RUIZ[0] if parameter == "ruiz" else parameter
-        bodies = [body for moment in self.moments.values() for body in moment.bodies]
-        return self.mapped and any(body.maps[name].values.any() for body in bodies)
+        return self.mapped and any(body.maps[name].values.any() for body in self._bodies)
+
+    @property
+    def _bodies(self) -> list[BodyStress]:
+        """All bodies at all moments."""
+        return [body for moment in self.moments.values() for body in moment.bodies.values()]
 
     def write(self, writer: ResultsWriter) -> None:
         """Sections into ``stress/section``, maps into ``stress/life``, by interface."""
@@ -116,11 +119,11 @@ class InterfaceStress:
         }
         attributes = {"axis": planes.settings.section, "at": planes.at, "components": COMPONENTS}
         attributes["bulk_stress"] = self.bulk
-        limits = {n: self.case.material(n).yield_stress for n in BODIES}
+        limits = {n: self.case.material(n).yield_stress for n in self.case.strained}
         attributes |= {f"yield_stress_{n}": y for n, y in limits.items() if np.isfinite(y)}
         writer.put(group, axes, **attributes)
         for moment, contact in self.moments.items():
-            for number, body in enumerate(contact.bodies, start=1):
+            for number, body in contact.bodies.items():
                 assert body.section is not None
                 section = _section(body.section, contact.bulk)
                 writer.put(f"{group}/{moment}/body_{number}", section)
@@ -128,7 +131,7 @@ class InterfaceStress:
     def _write_life(self, writer: ResultsWriter, group: str) -> None:
         for moment, contact in self.moments.items():
             writer.put(f"{group}/{moment}", {"left_out": Dataset(contact.left_out, "1", LEFT_OUT)})
-            for number, body in enumerate(contact.bodies, start=1):
+            for number, body in contact.bodies.items():
                 on = On(f"grid/{self.name}")
                 writer.put(f"{group}/{moment}/body_{number}", body.maps, on)
         life = self.planes.settings.life
@@ -152,9 +155,10 @@ class InterfaceStress:
 
     def _of_bodies(self, largest: Any) -> dict[str, Any]:
         numbers = {}
-        for number, name in enumerate(self.case.bodies):
+        for number in self.case.strained:
             values = {m: largest(moment.bodies[number]) for m, moment in self.moments.items()}
             before, after = (values[moment]["value"] for moment in MOMENTS)
+            name = self.case.bodies[number - 1]
             numbers[name] = values | {"ratio": after / before if before else None}
         return numbers
 
@@ -206,7 +210,7 @@ def _interface_stress(
     cycles: tuple[StressedCycle, StressedCycle],
 ) -> InterfaceStress:
     planes = Planes(case.stress, stage.grid)
-    bodies = [StressedBody(stage, case.material(n), n) for n in BODIES]
+    bodies = [StressedBody(stage, case.material(n), n) for n in case.strained]
     moments = {
         moment: _moment(case.stress, peak, planes, bodies, cycle)
         for moment, cycle in zip(MOMENTS, cycles, strict=True)
@@ -224,7 +228,7 @@ def _moment(
 ) -> ContactMoment:
     known = cycle.tractions.unknown <= STUCK_SHARE
     bulks = [body.bulk(cycle) for body in bodies]
-    stresses = []
+    stresses: dict[Literal[1, 2], BodyStress] = {}
     for body, bulk in zip(bodies, bulks, strict=True):
         section, maps = None, {}
         if settings.section != "none":
@@ -233,9 +237,9 @@ def _moment(
             history = body.history(cycle, bulk, settings.life.depth, known)
             told = cycle.tractions, known, bulk is not None
             maps = life_maps(settings.life, history, body.material, *told)
-        stresses.append(BodyStress(section, maps))
+        stresses[body.number] = BodyStress(section, maps)
     carried = tuple(filter(None, bulks))
-    return ContactMoment((stresses[0], stresses[1]), carried, np.flatnonzero(~known))
+    return ContactMoment(stresses, carried, np.flatnonzero(~known))
 
 
 def _whose(bulk: bool) -> str:

@@ -39,7 +39,8 @@ class Contents:
     ``coarse`` are the interfaces with a solution on a coarse grid. The rest is there where a case
     asks for it: a ``comparison`` of half-space and structure, tangential ``loops``, ``sections`` of
     the stress under the contacts, and the interfaces with maps of fretting ``life``, of which only
-    those ``cracking`` are above 0 anywhere. ``worn`` says whether anything has been lost.
+    those ``cracking`` are above 0 anywhere; the bodies ``strained`` have such stresses, a rigid one
+    has none. ``worn`` says whether anything has been lost.
     """
 
     names: tuple[str, ...]
@@ -56,6 +57,7 @@ class Contents:
     sections: bool = False
     life: tuple[str, ...] = ()
     cracking: tuple[str, ...] = ()
+    strained: tuple[int, ...] = (1, 2)
     worn: bool = True
 
     @property

@@ -186,6 +186,7 @@ def _write_results(
             sections=case.stress.section != "none",
             life=tuple(sorted(stress.name for stress in stresses if stress.mapped)),
             cracking=tuple(sorted(stress.name for stress in stresses if stress.cracking)),
+            strained=case.strained,
             worn=any(found.kinetics[-1, :2].max() > NOTHING for found in outcome.interfaces),
         )
         writer.put_contents(contents)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import abstractmethod
 from collections.abc import Iterator, Sequence
-from math import ceil, sqrt
+from math import ceil, isfinite, sqrt
 from typing import Any, ClassVar, Literal
 
 from pydantic import model_validator
@@ -85,6 +85,12 @@ class WearCase(Case):
         """Material of body ``number``, 1 or 2."""
         material: ElasticMaterial = getattr(self.materials, self.bodies[number - 1]).elastic()
         return material
+
+    @property
+    def strained(self) -> tuple[Literal[1, 2], ...]:
+        """Numbers of the bodies that have strains and stresses: of all but a rigid one."""
+        bodies: tuple[Literal[1, 2], ...] = (1, 2)
+        return tuple(number for number in bodies if isfinite(self.material(number).young))
 
     def wear_of(self, number: int) -> Worn:
         """Wear law of body ``number``, 1 or 2."""

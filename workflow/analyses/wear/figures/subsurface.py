@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import h5py
@@ -53,24 +54,30 @@ PARAMETERS = {
 def subsurface_stress(file: h5py.File, contents: Contents) -> Figure:
     """Von Mises stress in the section of every contact at peak load, unworn and worn."""
     sections = file["stress/section"]
-    # By moment, both bodies together.
-    fields = {name: _values(group, "von_mises").swapaxes(0, 1) for name, group in sections.items()}
+    strained = contents.strained
+    # By moment, the bodies together.
+    fields = {
+        name: _values(group, "von_mises", strained).swapaxes(0, 1)
+        for name, group in sections.items()
+    }
     # Outside a body stress is not a number.
     largest = {name: np.nanmax(field, axis=(1, 2, 3)) for name, field in fields.items()}
     top = float(max(moments.max() for moments in largest.values()))
     title = f"Von Mises stress under the contact at peak load: {changes(largest, '.0f', ' MPa')}"
     windows = [_window(file, contents, name) for name in sections]
-    heights = [2.0 * depth / (high - low) for (low, high), depth in windows]
+    heights = [len(strained) * depth / (high - low) for (low, high), depth in windows]
     flat = max(heights) <= FLAT and len(heights) <= 2
     figure, axes = scaled_panels(title, list(np.repeat(heights, 1 + flat)), 2 - flat)
     panels = iter(axes.flat)
     for (name, group), ((low, high), depth) in zip(sections.items(), windows, strict=True):
         for moment, field in zip(MOMENTS, fields[name], strict=True):
             axis = next(panels)
-            colours = _draw_section(axis, group, field, top)
-            _draw_yield(axis, group, field)
+            of_bodies = dict(zip(strained, field, strict=True))
+            colours = _draw_section(axis, group, of_bodies, top)
+            _draw_yield(axis, group, of_bodies)
             axis.set_title(f"{name}, {moment}: at most {np.nanmax(field):.0f} MPa")
-            axis.set(xlim=(low, high), ylim=(-depth, depth), aspect="equal")
+            down, up = (depth if body in strained else 0.0 for body in (1, 2))
+            axis.set(xlim=(low, high), ylim=(-down, up), aspect="equal")
     along, other = ("y", "x") if group.attrs["axis"] == "y" else ("x", "y")
     place = "" if contents.line else f", at {other} = {group.attrs['at']:.3g} mm"
     for axis in axes[-1]:
@@ -78,13 +85,22 @@ def subsurface_stress(file: h5py.File, contents: Contents) -> Figure:
     for axis in axes[:, 0]:
         axis.set_ylabel("z [mm]")
     whole = all(group.attrs["bulk_stress"] for group in sections.values())
-    lower, upper = contents.bodies
     begins = TO_MICRONS * float(group["depths"][0])
-    note = f"{upper} above z = 0, {lower} below it, from {begins:.3g} µm below their surfaces on"
-    figure.supxlabel(note, fontsize="small")
+    figure.supxlabel(_whose_sections(contents, begins), fontsize="small")
     label = f"von Mises stress{'' if whole else ' of the contact alone'} [MPa]"
     colour_bar(figure, colours, axes, label)
     return figure
+
+
+def _whose_sections(contents: Contents, begins: float) -> str:
+    """Which body is where in a section that ``begins`` so many µm below the surfaces."""
+    lower, upper = contents.bodies
+    start = f"from {begins:.3g} µm below"
+    if 1 not in contents.strained:
+        return f"{upper} above z = 0, {start} its surface on; {lower} is rigid"
+    if 2 not in contents.strained:
+        return f"{lower} below z = 0, {start} its surface on; {upper} is rigid"
+    return f"{upper} above z = 0, {lower} below it, {start} their surfaces on"
 
 
 def _window(
@@ -100,10 +116,10 @@ def _window(
     return view, min(float(section["depths"][-1]), 0.5 * (view[1] - view[0]))
 
 
-def _values(group: h5py.Group, field: str) -> Array:
-    """A field of both bodies, unworn and worn, ``(2, 2, ...)``."""
+def _values(group: h5py.Group, field: str, bodies: Sequence[int]) -> Array:
+    """A field of such bodies, unworn and worn, ``(bodies, 2, ...)``."""
     return np.array(
-        [[group[f"{moment}/body_{body}/{field}"][()] for moment in MOMENTS] for body in (1, 2)]
+        [[group[f"{moment}/body_{body}/{field}"][()] for moment in MOMENTS] for body in bodies]
     )
 
 
@@ -112,10 +128,10 @@ def _heights(group: h5py.Group, body: int) -> Array:
     return (-1.0 if body == 1 else 1.0) * group["depths"][()]
 
 
-def _draw_section(axis: Axes, group: h5py.Group, field: Array, top: float) -> Any:
+def _draw_section(axis: Axes, group: h5py.Group, field: Mapping[int, Array], top: float) -> Any:
     """Body 1 below and body 2 above the surface, on one colour scale; returns the colours."""
     axis.grid(visible=False)
-    for body, values in zip((1, 2), field, strict=True):
+    for body, values in field.items():
         colours = axis.contourf(
             group["along"][()],
             _heights(group, body),
@@ -127,10 +143,10 @@ def _draw_section(axis: Axes, group: h5py.Group, field: Array, top: float) -> An
     return colours
 
 
-def _draw_yield(axis: Axes, group: h5py.Group, field: Array) -> None:
+def _draw_yield(axis: Axes, group: h5py.Group, field: Mapping[int, Array]) -> None:
     """Where a body with a yield stress would yield."""
     halo: list[AbstractPathEffect] = [withStroke(linewidth=3.0, foreground="white")]
-    for body, values in zip((1, 2), field, strict=True):
+    for body, values in field.items():
         limit = group.attrs.get(f"yield_stress_{body}", np.inf)
         if np.nanmax(values) > limit:
             place = group["along"][()], _heights(group, body)
@@ -148,7 +164,8 @@ def fretting_life(file: h5py.File, contents: Contents) -> Figure:
     groups = {name: file["stress/life"][name] for name in contents.cracking}
     life = groups[contents.cracking[0]].attrs
     parameter, symbol, unit = PARAMETERS[life["parameter"]]
-    fields = {name: _values(group, parameter) for name, group in groups.items()}
+    fields = {name: _values(group, parameter, contents.strained) for name, group in groups.items()}
+    bodies = [contents.bodies[number - 1] for number in contents.strained]
     largest = changes({name: field.max(axis=(0, 2, 3)) for name, field in fields.items()}, ".3g")
     depth = TO_MICRONS * float(life["depth"])
     title = f"{symbol} [{unit}] {depth:.3g} µm below the surface: {largest}"
@@ -157,7 +174,7 @@ def fretting_life(file: h5py.File, contents: Contents) -> Figure:
     panels = {
         (name, body): (grid_of(file["grid"][name]), moments)
         for name, of_bodies in fields.items()
-        for body, moments, shown in zip(contents.bodies, of_bodies, endangered, strict=True)
+        for body, moments, shown in zip(bodies, of_bodies, endangered, strict=True)
         if shown
     }
     draw = _curves if contents.line else _maps

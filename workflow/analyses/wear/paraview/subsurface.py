@@ -35,7 +35,7 @@ def _maps(
     contact, life = file["contact"][interface], file["stress/life"][interface]
     for state, jump in contents.states:
         fields: Fields = {}
-        for body in (1, 2):
+        for body in contents.strained:
             for key, values in life[state][f"body_{body}"].items():
                 if values.ndim == 2:
                     fields[f"{key}_{body}"] = points.of(values), str(values.attrs["unit"])
@@ -44,7 +44,7 @@ def _maps(
 
 
 def write_sections(contents: Contents, file: h5py.File, interface: str, folder: Path) -> list[Path]:
-    """The section through both bodies, unworn and worn, and the series that lists them."""
+    """The section through the bodies, unworn and worn, and the series that lists them."""
     if not contents.sections:
         return []
     path = folder / f"section_{interface}.pvd"
@@ -55,7 +55,7 @@ def _sections(contents: Contents, file: h5py.File, interface: str, folder: Path)
     frame = frame_of(file["grid"][interface])
     contact, section = file["contact"][interface], file["stress/section"][interface]
     for state, jump in contents.states:
-        for body in (1, 2):
+        for body in contents.strained:
             mesh = _section(section, f"{state}/body_{body}", body, frame)
             path = folder / f"{interface}_{state}_{body}.vtu"
             yield float(contact[jump].attrs["cycles"]), f"body_{body}", path, mesh

@@ -323,7 +323,6 @@ def _check(case: BodiesWearCase | LineBodiesWearCase, size: tuple[float, float])
     table, path = case.load_path.table(), case.load_path
     check_bulk_stress(table, case.materials)
     _check_room(case, table, size)
-    _check_stress(case)
     if isinstance(path, Stroke):
         return
     given = table.columns
@@ -342,17 +341,6 @@ def _check(case: BodiesWearCase | LineBodiesWearCase, size: tuple[float, float])
             f"loops run under a normal force, level or free to tilt, but load_path has "
             f"{', '.join(tilted) or 'moments beside a tilt that is held'}; allowed: no loops",
             "loops",
-        )
-
-
-def _check_stress(case: BodiesWearCase | LineBodiesWearCase) -> None:
-    """Refuse to look for stress in a body that is rigid."""
-    wanted = case.stress.section != "none" or case.stress.life.parameter != "none"
-    if wanted and "rigid" in (case.materials.body_1, case.materials.body_2):
-        raise disagreement(
-            "stress under a contact is found in both bodies, and one is rigid; allowed: "
-            "{section: none, life: {parameter: none}}, or two elastic bodies",
-            "stress",
         )
 
 
