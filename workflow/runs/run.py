@@ -211,12 +211,14 @@ def _run(
         return bring_to_end(load_case(file), root)
 
     def draw(contents: Any) -> None:
-        with reporter.stage("paraview and figures"):
+        with reporter.stage("paraview and figures", "pictures") as told:
             if analysis.pictures is not None:
                 drawn.extend(analysis.pictures().figures_of(contents))
                 processes = analysis.drawing_processes
                 figures.update(
-                    write_pictures(case.output, folder, analysis.pictures, contents, processes)
+                    write_pictures(
+                        case.output, folder, analysis.pictures, contents, processes, told
+                    )
                 )
 
     def report(summary: Summary) -> None:
