@@ -104,7 +104,8 @@ def reduce_body(
 
     ``stiffness`` and ``mass`` ``(n, n)`` are symmetric; the mass may be left out where there are no
     modes. ``loads`` ``(n, cases)``. The order of ``kept`` is that of the result. With mass and
-    modes ``done`` is called after each of ``STEPS`` steps. Raises ``ValueError`` if modes are asked for that the body does not have, or without mass, and
+    modes ``done`` is called after each of ``STEPS`` steps. Raises ``ValueError`` if
+    modes are asked for that the body does not have, or without mass, and
     :class:`~fe_models.linear_solver.SolverError` if the body can move while they are held.
     """
     size = stiffness.shape[0]

@@ -50,8 +50,7 @@ def resume_run(out: Path, loudness: Loudness = Loudness.NORMAL) -> bool:
     What a finished one had no time to remove is removed.
     """
     folder = OutputFolder(out)
-    if not folder.case.exists():
-        raise UserError(f"{out}: no run of fretscale here (case.yaml is missing)")
+    folder.check_run()
     case = load_case(folder.case)
     if folder.summary.exists():
         folder.check_finished(case_values(folder))

@@ -203,6 +203,20 @@ class OutputFolder:
             raise UserError(f"{self.summary}: damaged, or of an older version; {self.again}")
         return summary
 
+    def check_run(self) -> None:
+        """Raise UserError where there is no run."""
+        if not self.case.exists():
+            raise UserError(f"{self.root}: no run of fretscale here (case.yaml is missing)")
+
+    def check_ended(self) -> None:
+        """Raise UserError where there is no run, or one that is not finished."""
+        self.check_run()
+        if not self.summary.exists():
+            how = f"start it again with `fretscale run {self.case} --out {self.root}`"
+            if self.lists_state:
+                how = f"go on with `fretscale resume {self.root}`"
+            raise UserError(f"{self.root}: this run is not finished; {how}")
+
     def check_finished(self, case: Mapping[str, Any]) -> None:
         """Raise UserError unless a finished run is as it was left, and of the values of a case."""
         for name, kept in self.read_summary()[DIGESTS].items():
