@@ -143,7 +143,7 @@ def _working(
             raise
         again = "the same command"
         if analysis_of(case).resumable and OutputFolder(out).case.exists():
-            again = f"`fretscale resume {out}`"
+            again = f"`{OutputFolder(out).resume_command}`"
         where = error.filename or out
         raise NotWritten(f"{where}: {error.strerror}; go on with {again} once it can be") from error
 
@@ -181,7 +181,7 @@ def _go_on(
     if not analysis.resumable:
         raise UserError(
             f"{out}: a case of this kind takes up no run half done; start it again with "
-            f"`fretscale run {folder.case} --out {out}`"
+            f"`{folder.run_command}`"
         )
     if not folder.lists_state:
         raise UserError(
@@ -271,10 +271,10 @@ def _stopped(analysis: Analysis, folder: OutputFolder) -> str:
     """What a run that got Ctrl-C has left, and the command that goes on."""
     out = folder.root
     if folder.summary.exists():
-        return f"{out} is finished but for what is removed by `fretscale resume {out}`"
+        return f"{out} is finished but for what is removed by `{folder.resume_command}`"
     if not analysis.resumable:
-        return f"{out} is not finished; start again with `fretscale run {folder.case} --out {out}`"
-    return f"{out} keeps what is done; go on with `fretscale resume {out}`"
+        return f"{out} is not finished; start again with `{folder.run_command}`"
+    return f"{out} keeps what is done; go on with `{folder.resume_command}`"
 
 
 def _report(run: Run[Any], summary: Summary, figures: Mapping[str, str]) -> None:
