@@ -15,7 +15,7 @@ doi:10.2514/3.4741.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from io import RawIOBase
 from pathlib import Path
@@ -33,6 +33,9 @@ from sa_solver.types import Array, Indices
 # The shift of a free body's search over the median of K_jj/M_jj, which no choice of coordinates
 # changes: small enough to separate rigid motions, and large enough that K - σ M is not singular.
 SHIFT_SHARE = 1e-7
+
+# Of a reduction with mass and modes: condensation, factors, modes, mass.
+STEPS = 4
 
 # Unit and description of every dataset of a stored model.
 DATASETS = {
@@ -95,12 +98,14 @@ def reduce_body(
     kept: Indices,
     modes: int = 0,
     loads: Array | None = None,
+    done: Callable[[], None] = lambda: None,
 ) -> ReducedModel:
     """Reduce a body to its ``kept`` displacements and ``modes`` fixed-interface modes.
 
     ``stiffness`` and ``mass`` ``(n, n)`` are symmetric; the mass may be left out where there are no
-    modes. ``loads`` ``(n, cases)``. The order of ``kept`` is that of the result. Raises
-    ``ValueError`` if modes are asked for that the body does not have, or without mass, and
+    modes. ``loads`` ``(n, cases)``. The order of ``kept`` is that of the result. With mass and
+    modes ``done`` is called after each of ``STEPS`` steps. Raises ``ValueError`` if
+    modes are asked for that the body does not have, or without mass, and
     :class:`~fe_models.linear_solver.SolverError` if the body can move while they are held.
     """
     size = stiffness.shape[0]
@@ -111,12 +116,16 @@ def reduce_body(
         raise ValueError(f"{modes} modes of {len(inner)} inner displacements: take 0 to fewer")
     full_loads = np.zeros((size, 0)) if loads is None else loads
     static, static_loads = condense(stiffness, full_loads, kept)
+    done()
     values, shapes, reduced_mass = np.empty(0), np.zeros((size, modes)), None
     if mass is not None:
         solve = factorise(stiffness[inner][:, inner].tocsr())
+        done()
         if modes > 0:
             values, shapes[inner] = _lowest_modes(stiffness, mass, inner, modes, solve)
+            done()
         reduced_mass = _reduced_mass(stiffness, mass, kept, inner, shapes, solve)
+        done()
     return ReducedModel(
         kept=kept,
         stiffness=sl.block_diag(static, np.diag(values)),

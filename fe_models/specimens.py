@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 import scipy.sparse as sp
 from scipy.spatial import cKDTree
 
+from fe_models import reduction
 from fe_models.constraints import Constraints
 from fe_models.elasticity import ElasticBody
 from fe_models.geometry.specimens import CONTACT, Specimen
@@ -19,6 +21,8 @@ from sa_solver.types import Array, Indices, Material
 # Fixed-interface modes of each specimen ("Dynamics simulations of fretting wear for aero-engine
 # applications", thesis, section 4.2).
 MODES = 20
+# Of the reduction of both: the matrices of each, and what is done with them.
+STEPS = 2 * (1 + reduction.STEPS)
 # Kinds of kept points.
 PAD, RING, TARGET = "pad", "ring", "target"
 
@@ -86,13 +90,14 @@ def reduced_specimens(
     order: int = 2,
     modes: int = MODES,
     target_distance: float | None = None,
+    done: Callable[[], None] = lambda: None,
 ) -> tuple[ReducedModel, ReducedModel]:
     """Both specimens on pad and ring, body 1 first.
 
     Their points are ``pad 1``, ``pad 2``, ... in the interface's order, and ``ring 1``, ... by
     angle from the X axis; with a ``target_distance`` [mm] also ``target 1``, the vertex closest to
     the point at X = R on the cylinder's side, so far from the contact plane: where a laser looks
-    along X.
+    along X. ``done`` is called after each of ``STEPS`` steps, if there are modes.
     """
     (face,) = mesh.interfaces
     models = []
@@ -101,8 +106,9 @@ def reduced_specimens(
     ):
         target = NONE if target_distance is None else specimen.target(body, target_distance)
         full = specimen_matrices(specimen, body, pad, material, order, target)
+        done()
         mass = full.mass if modes > 0 else None
-        model = reduce_body(full.stiffness, mass, full.kept, modes)
+        model = reduce_body(full.stiffness, mass, full.kept, modes, done=done)
         ring = specimen.ring(body)
         places = body.mesh.p.T[np.concatenate([pad, ring, target])]
         names = tuple(

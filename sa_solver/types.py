@@ -49,6 +49,19 @@ def unseen(done: int, total: int) -> None:
     """Progress that nobody looks at."""
 
 
+@dataclass
+class Tally:
+    """Tells ``progress`` of each of ``total`` things as it is done; called once for each."""
+
+    progress: Progress
+    total: int
+    done: int = 0
+
+    def __call__(self) -> None:
+        self.done += 1
+        self.progress(self.done, self.total)
+
+
 Tilt = Literal["free", "held"]
 """Whether bodies turn about x and y as imposed moments make them, or keep the tilt that they have
 unloaded and unworn, whatever moments that takes."""

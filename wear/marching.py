@@ -59,14 +59,19 @@ def advance_cycles(
     left: float,
     contact_at: Callable[[State], Contact],
     marched_by: Steps = COMPUTED,
+    reached: Callable[[float], None] = lambda cycles: None,
 ) -> WearStep[State]:
-    """Wear ``cycles`` cycles of the ``left`` ones of the run, in as many steps as it takes."""
+    """Wear ``cycles`` cycles of the ``left`` ones of the run, in as many steps as it takes.
+
+    ``reached`` is told, after each of them, how many cycles are done.
+    """
 
     def further(worn: WearStep[State]) -> WearStep[State] | None:
         most = rest(cycles, worn.cycles)
         if not most > 0.0:
             return None
         step = stepper.step(worn.state, most, left - worn.cycles, contact_at)
+        reached(worn.cycles + step.cycles)
         return WearStep(step.state, worn.cycles + step.cycles, worn.spent + step.spent)
 
     worn = marched_by.march("wear step", WearStep(state, 0.0, Spent()), further)

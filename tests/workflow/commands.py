@@ -17,6 +17,7 @@ from workflow.pictures import drawing
 from workflow.runs import jobs
 from workflow.runs.job import Job
 from workflow.runs.run import bring_to_end
+from workflow.shell import processes
 
 AS_PROCESS = (
     # What is started in the background of a shell is born deaf to Ctrl-C.
@@ -67,8 +68,10 @@ def _workers(
     yield InThisProcess([make(sent(setting)) for setting in settings])
 
 
-def _one_by_one(jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]]) -> list[Any]:
-    return [do(*arguments) for do, arguments in jobs]
+def _one_by_one(
+    jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]], done: Callable[[], None]
+) -> list[Any]:
+    return [processes._last(do(*arguments), done) for do, arguments in jobs]
 
 
 @contextmanager

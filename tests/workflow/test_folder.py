@@ -270,3 +270,8 @@ def test_resume_of_a_finished_run_does_nothing(whole, resume):
     assert run.ending.exit_code == 0
     assert "finished" in run.ending.stdout
     assert {path: path.stat().st_mtime_ns for path in whole.folder.rglob("*")} == before
+
+
+def test_commands_that_are_proposed_can_be_pasted(tmp_path):
+    folder = OutputFolder(tmp_path / "Prüfstand, 2. Lauf")
+    assert folder.resume_command == f"fretscale resume '{folder.root}'"

@@ -169,7 +169,7 @@ def test_an_interrupted_run_goes_on(tmp_path):
     case = fretscale.load_case(CASES / "sphere_wear.yaml", **SMALL, error_budget="known")
     with ctrl_c_after_jumps(1), pytest.raises(KeyboardInterrupt):
         fretscale.run(case, tmp_path / "out", quiet=True)
-    with pytest.raises(fretscale.UserError, match="not finished; continue it with"):
+    with pytest.raises(fretscale.UserError, match="not finished; go on with"):
         fretscale.open(tmp_path / "out")
     results = fretscale.run(case, tmp_path / "out", quiet=True)
     assert "resume" in results.folder.joinpath("run.log").read_text("utf-8")
@@ -302,7 +302,7 @@ def test_folders_without_whole_results_are_refused(ball, tmp_path):
     with pytest.raises(fretscale.UserError, match=r"summary\.json: damaged"):
         fretscale.open(folder)
     Path(folder, "summary.json").unlink()
-    with pytest.raises(fretscale.UserError, match="not finished; continue it with"):
+    with pytest.raises(fretscale.UserError, match="this run is not finished; start it again"):
         fretscale.open(folder)
 
 

@@ -284,6 +284,19 @@ def test_worker_that_dies_is_one_line():
         workers._answers(processes)
 
 
+def counting(to):
+    for _ in range(to):
+        yield
+    return to
+
+
+def test_what_processes_have_done_is_told_as_it_comes():
+    told = []
+    jobs = [(counting, (2,)), (counting, (3,)), (len, ("four",))]
+    assert workers.side_by_side(jobs, lambda: told.append(1)) == [2, 3, 4]
+    assert len(told) == 5
+
+
 @posix_only
 def test_worker_killed_before_its_first_word_is_one_line(monkeypatch):
     """It ends while it is told what to do: a large setting does not go into the pipe at once."""

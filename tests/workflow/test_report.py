@@ -171,7 +171,7 @@ def test_no_page_of_what_is_no_finished_run(drawn, tmp_path):
     with pytest.raises(UserError, match="damaged, or of an older version"):
         write_report(tmp_path)
     (tmp_path / "summary.json").unlink()
-    with pytest.raises(UserError, match="not finished; go on with `fretscale resume"):
+    with pytest.raises(UserError, match="this run is not finished; start it again"):
         write_report(tmp_path)
 
 

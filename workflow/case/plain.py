@@ -30,6 +30,11 @@ def plain(number: float, unit: str | None, digits: int = 6) -> str:
     return f"{number / size:.{digits}g} {name}".rstrip()
 
 
+def counted(number: int, thing: str) -> str:
+    """So many of a thing: 1 run, 3 runs."""
+    return f"{number} {thing}" if number == 1 else f"{number} {thing}s"
+
+
 def between(low: float, high: float, unit: str | None) -> str:
     """Two numbers in the unit of the larger one."""
     size, name = said_in(max(low, high, key=abs), unit)

@@ -7,8 +7,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from workflow.case.plain import counted
 from workflow.case.sections import Case
-from workflow.errors import UserError
 from workflow.interface.datasets import File, Group
 from workflow.kinds import analysis_of, load_case
 from workflow.report.writing import write_report
@@ -32,12 +32,7 @@ def open(folder: str | os.PathLike[str]) -> Results:  # noqa: A001 - fretscale.o
     """
     root = Path(folder)
     run = OutputFolder(root)
-    if not run.case.exists():
-        raise UserError(f"{root}: no run of fretscale here (case.yaml is missing)")
-    if not run.summary.exists():
-        raise UserError(
-            f"{root}: this run is not finished; continue it with `fretscale resume {root}`"
-        )
+    run.check_ended()
     run.check_results(case_values(run))
     return Results(root.absolute(), run.read_summary())
 
@@ -98,5 +93,5 @@ class Results(Group):
         return write_report(self.folder, None if out is None else Path(out))
 
     def __repr__(self) -> str:
-        warned = f", {len(self.warnings)} warnings" if self.warnings else ""
+        warned = f", {counted(len(self.warnings), 'warning')}" if self.warnings else ""
         return f"{self.title}\n  in {self.folder}{warned}\n  {', '.join(self)}; see tree()"

@@ -14,19 +14,23 @@ left out, not drawn as NaN. Fields are single precision, which halves the files:
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import ExitStack
 from functools import partial
 from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import h5py
 
+from sa_solver.types import Progress, Tally, unseen
 from workflow.case.sections import Output
 from workflow.shell.analysis import Pictures
 from workflow.shell.folder import OutputFolder
 from workflow.shell.processes import side_by_side
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
 
 
 def write_pictures(
@@ -35,12 +39,14 @@ def write_pictures(
     pictures: Callable[[], Pictures],
     contents: Any,
     processes: int,
+    progress: Progress = unseen,
 ) -> dict[str, str]:
     """Write the pictures of the results in a folder that a case asks for in its ``output``.
 
     ``contents`` is what the results hold, as ``pictures`` are told it. So many ``processes`` share
-    them, this one among them. Returns the figures as SVG texts by their names, in the order in
-    which they are to be looked at, if they are to go into a report.
+    them, this one among them, and tell ``progress`` what is done. Returns the figures as
+    SVG texts by their names, in the order in which they are to be looked at, if they are to go into
+    a report.
     """
     formats = output.figure_formats
     with ExitStack() as stack:
@@ -53,12 +59,14 @@ def write_pictures(
         parts = processes if formats else 1
         # The last one has files for ParaView to write besides.
         beside = [None] * (parts - 1) + [paraview]
+        order = tuple(pictures().figures_of(contents))
+        wanted = len(order) if formats else 0
         shares = side_by_side(
-            [(_write_share, (*drawn, also, part, parts)) for part, also in enumerate(beside)]
+            [(_write_share, (*drawn, also, part, parts)) for part, also in enumerate(beside)],
+            Tally(progress, wanted + (paraview is not None)),
         )
     vectors = {name: text for share in shares for name, text in share.items()}
-    order = pictures().figures_of(contents) if vectors else ()
-    return {name: vectors[name] for name in order}
+    return {name: vectors[name] for name in order if name in vectors}
 
 
 def _write_share(
@@ -71,14 +79,23 @@ def _write_share(
     paraview: Path | None,
     first: int,
     every: int,
-) -> dict[str, str]:
-    """What one process draws, into the folders that there are; the figures to ``keep``, as SVG."""
+) -> Generator[None, None, dict[str, str]]:
+    """What one process draws, into the folders that there are; the figures to ``keep``, as SVG.
+
+    Yields after each figure, and after the files for ParaView.
+    """
     vectors: dict[str, str] = {}
     if figures is not None:
         kept = vectors if keep else None
-        write_figures(pictures, contents, results, figures, first, every, formats, kept)
+        from workflow.pictures import style
+
+        with h5py.File(results) as file:
+            drawn = _drawn(pictures, contents, file, first, every)
+            for _ in style.each_written(drawn, figures, formats, kept):
+                yield
     if paraview is not None:
         write_paraview(pictures, contents, results, paraview)
+        yield
     return vectors
 
 
@@ -114,10 +131,17 @@ def write_figures(
     # Plots take a second to load: where they are drawn.
     from workflow.pictures import style
 
-    drawn = islice(pictures().figures_of(contents).items(), first, None, every)
     with h5py.File(results) as file:
-        figures = ((name, partial(draw, file)) for name, draw in drawn)
-        return style.write_figures(figures, folder, formats, vectors)
+        drawn = _drawn(pictures, contents, file, first, every)
+        return style.write_figures(drawn, folder, formats, vectors)
+
+
+def _drawn(
+    pictures: Callable[[], Pictures], contents: Any, file: h5py.File, first: int, every: int
+) -> Iterator[tuple[str, Callable[[], Figure]]]:
+    """``every`` so many of the figures from the ``first`` on, to be drawn of an open file."""
+    chosen = islice(pictures().figures_of(contents).items(), first, None, every)
+    return ((name, partial(draw, file)) for name, draw in chosen)
 
 
 def vector_figures(

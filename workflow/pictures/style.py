@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -64,11 +64,21 @@ def write_figures(
     Each appears under its name only when it is complete. ``vectors`` takes each as SVG text, by its
     name, if it is given.
     """
+    return [path for paths in each_written(figures, folder, formats, vectors) for path in paths]
+
+
+def each_written(
+    figures: Iterable[tuple[str, Callable[[], Figure]]],
+    folder: Path,
+    formats: Sequence[str],
+    vectors: dict[str, str] | None,
+) -> Iterator[list[Path]]:
+    """As :func:`write_figures`, which takes all: the paths of each figure once it is written."""
     if formats:
         folder.mkdir(parents=True, exist_ok=True)
-    written = []
-    with rc_context(STYLE):
-        for name, draw in figures:
+    for name, draw in figures:
+        written = []
+        with rc_context(STYLE):
             figure = draw()
             _lay_out(figure)
             for kind in formats:
@@ -78,7 +88,7 @@ def write_figures(
                 written.append(path)
             if vectors is not None:
                 vectors[name] = _as_svg(figure)
-    return written
+        yield written
 
 
 def _save(figure: Figure, target: Any, kind: str) -> None:

@@ -42,12 +42,7 @@ def write_report(root: Path, out: Path | None = None) -> Path:
 def check_finished(root: Path) -> OutputFolder:
     """The folder of a finished run. Raises UserError for anything else."""
     folder = OutputFolder(root)
-    if not folder.case.exists():
-        raise UserError(f"{root}: no run of fretscale here (case.yaml is missing)")
-    if not folder.summary.exists():
-        raise UserError(
-            f"{root}: the run there is not finished; go on with `fretscale resume {root}`"
-        )
+    folder.check_ended()
     return folder
 
 

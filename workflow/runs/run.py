@@ -50,8 +50,7 @@ def resume_run(out: Path, loudness: Loudness = Loudness.NORMAL) -> bool:
     What a finished one had no time to remove is removed.
     """
     folder = OutputFolder(out)
-    if not folder.case.exists():
-        raise UserError(f"{out}: no run of fretscale here (case.yaml is missing)")
+    folder.check_run()
     case = load_case(folder.case)
     if folder.summary.exists():
         folder.check_finished(case_values(folder))
@@ -144,7 +143,7 @@ def _working(
             raise
         again = "the same command"
         if analysis_of(case).resumable and OutputFolder(out).case.exists():
-            again = f"`fretscale resume {out}`"
+            again = f"`{OutputFolder(out).resume_command}`"
         where = error.filename or out
         raise NotWritten(f"{where}: {error.strerror}; go on with {again} once it can be") from error
 
@@ -182,7 +181,7 @@ def _go_on(
     if not analysis.resumable:
         raise UserError(
             f"{out}: a case of this kind takes up no run half done; start it again with "
-            f"`fretscale run {folder.case} --out {out}`"
+            f"`{folder.run_command}`"
         )
     if not folder.lists_state:
         raise UserError(
@@ -211,12 +210,14 @@ def _run(
         return bring_to_end(load_case(file), root)
 
     def draw(contents: Any) -> None:
-        with reporter.stage("paraview and figures"):
+        with reporter.stage("paraview and figures", "pictures") as told:
             if analysis.pictures is not None:
                 drawn.extend(analysis.pictures().figures_of(contents))
                 processes = analysis.drawing_processes
                 figures.update(
-                    write_pictures(case.output, folder, analysis.pictures, contents, processes)
+                    write_pictures(
+                        case.output, folder, analysis.pictures, contents, processes, told
+                    )
                 )
 
     def report(summary: Summary) -> None:
@@ -270,10 +271,10 @@ def _stopped(analysis: Analysis, folder: OutputFolder) -> str:
     """What a run that got Ctrl-C has left, and the command that goes on."""
     out = folder.root
     if folder.summary.exists():
-        return f"{out} is finished but for what is removed by `fretscale resume {out}`"
+        return f"{out} is finished but for what is removed by `{folder.resume_command}`"
     if not analysis.resumable:
-        return f"{out} is not finished; start again with `fretscale run {folder.case} --out {out}`"
-    return f"{out} keeps what is done; go on with `fretscale resume {out}`"
+        return f"{out} is not finished; start again with `{folder.run_command}`"
+    return f"{out} keeps what is done; go on with `{folder.resume_command}`"
 
 
 def _report(run: Run[Any], summary: Summary, figures: Mapping[str, str]) -> None:

@@ -15,6 +15,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager, suppress
 from itertools import chain, count
 from pathlib import Path, PurePath
+from shlex import quote
 from typing import Any
 
 from workflow.case.sections import Case
@@ -203,6 +204,20 @@ class OutputFolder:
             raise UserError(f"{self.summary}: damaged, or of an older version; {self.again}")
         return summary
 
+    def check_run(self) -> None:
+        """Raise UserError where there is no run."""
+        if not self.case.exists():
+            raise UserError(f"{self.root}: no run of fretscale here (case.yaml is missing)")
+
+    def check_ended(self) -> None:
+        """Raise UserError where there is no run, or one that is not finished."""
+        self.check_run()
+        if not self.summary.exists():
+            how = f"start it again with `{self.run_command}`"
+            if self.lists_state:
+                how = f"go on with `{self.resume_command}`"
+            raise UserError(f"{self.root}: this run is not finished; {how}")
+
     def check_finished(self, case: Mapping[str, Any]) -> None:
         """Raise UserError unless a finished run is as it was left, and of the values of a case."""
         for name, kept in self.read_summary()[DIGESTS].items():
@@ -220,9 +235,19 @@ class OutputFolder:
             raise UserError(f"{path}: not as the run in {self.root} had it; {self.again}")
 
     @property
+    def run_command(self) -> str:
+        """What runs its case anew here, for a shell."""
+        return f"fretscale run {quote(str(self.case))} --out {quote(str(self.root))}"
+
+    @property
+    def resume_command(self) -> str:
+        """What goes on with the run here, for a shell."""
+        return f"fretscale resume {quote(str(self.root))}"
+
+    @property
     def again(self) -> str:
         """What to do where a run cannot be believed."""
-        return f"start again with `fretscale run {self.case} --out {self.root} --force`"
+        return f"start again with `{self.run_command} --force`"
 
     def keep_choice(self, record: Mapping[str, Any] | None) -> None:
         """Keep what was chosen for the case with the run until it is finished."""
@@ -323,7 +348,7 @@ class OutputFolder:
         if not self.summary.exists() and self.checkpoint.exists():
             raise UserError(
                 f"{self.root}: holds an unfinished run of this case; continue it with "
-                f"`fretscale resume {self.root}`, or start again with --force"
+                f"`{self.resume_command}`, or start again with --force"
             )
 
     def _entries(self) -> list[str]:

@@ -12,7 +12,7 @@ import pickle
 import signal
 import subprocess
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from contextlib import contextmanager
 from queue import SimpleQueue
 from typing import IO, Any
@@ -96,14 +96,61 @@ def workers(make: Callable[[Any], Answering], settings: Sequence[Any]) -> Iterat
         yield Workers(processes)
 
 
-def side_by_side(jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]]) -> list[Any]:
+def side_by_side(
+    jobs: Sequence[tuple[Callable[..., Any], tuple[Any, ...]]],
+    done: Callable[[], None] = lambda: None,
+) -> list[Any]:
     """Run functions, given with their arguments: the first one here, others in processes.
 
-    Returns what each of them returned. Raises what one of them raised.
+    ``done`` is called whenever one of them yields, of those that are generators. Returns what each
+    of them returned. Raises what one of them raised.
     """
     (here, arguments), *others = jobs
     with _processes(_do, others) as processes:
-        return [here(*arguments), *_answers(processes)]
+        heard = [_Hearing(process, done) for process in processes]
+        answer = _last(here(*arguments), done)
+        answers = [hearing.answer() for hearing in heard]
+    for other in answers:
+        if isinstance(other, Exception):
+            raise other
+    return [answer, *answers]
+
+
+class _Hearing:
+    """Takes what a process says as it comes, also while this one works."""
+
+    def __init__(self, process: Process, done: Callable[[], None]) -> None:
+        self._process, self._done = process, done
+        self._answer: Any = None
+        self._thread = threading.Thread(target=self._listen, daemon=True)
+        self._thread.start()
+
+    def _listen(self) -> None:
+        try:
+            while isinstance(said := self._process.answer(), _Done):
+                self._done()
+            self._answer = said
+        except Exception as error:
+            self._answer = error
+
+    def answer(self) -> Any:
+        self._thread.join()
+        return self._answer
+
+
+class _Done:
+    """What a process says whenever its function yields."""
+
+
+def _last(work: Any, done: Callable[[], None]) -> Any:
+    """What a generator returns, ``done`` called whenever it yields; anything else as it is."""
+    while isinstance(work, Generator):
+        try:
+            next(work)
+        except StopIteration as end:
+            return end.value
+        done()
+    return work
 
 
 @contextmanager
@@ -210,8 +257,12 @@ def _do(
     function: Callable[..., Any],
     arguments: tuple[Any, ...],
 ) -> None:
-    """Run a function and answer once, with what it returned or raised."""
-    _write(answers, _attempt(function, arguments))
+    """Run a function and answer once, with what it returned or raised; tell when it yields."""
+
+    def run() -> Any:
+        return _last(function(*arguments), lambda: _write(answers, _Done()))
+
+    _write(answers, _attempt(run, ()))
 
 
 def _attempt(function: Callable[..., Any], arguments: tuple[Any, ...]) -> Any:

@@ -17,6 +17,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from workflow.case.plain import counted
 from workflow.errors import UserError
 from workflow.shell import checkpoint
 from workflow.shell.analysis import Run
@@ -72,7 +73,7 @@ class RunSteps:
         self._going_on = False
         self._saved, self._cost = time.perf_counter(), FIRST_SAVE
         if run.kept is not None:
-            run.reporter.say(f"  goes on after {self._before} steps")
+            run.reporter.say(f"  goes on after {counted(self._before, 'step')}")
 
     def __call__(self, name: str, step: Callable[[], T]) -> T:
         place = self._next()

@@ -12,6 +12,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing
 from pathlib import Path
 
+from workflow.case.plain import counted
 from workflow.errors import CaseError, UserError
 from workflow.runs.job import Finished, Job
 from workflow.runs.jobs import run_jobs
@@ -59,7 +60,8 @@ def run_sweep(
             if gone:
                 reporter.say(gone)
             reporter.say(
-                f"sweep: {len(runs)} runs of {sweep.file.case}, {finished} finished before"
+                f"sweep: {counted(len(runs), 'run')} of {sweep.file.case}, "
+                f"{finished} finished before"
             )
             rows = _run(sweep, runs, folder, processes, dask, finished, reporter)
             with reporter.stage("figures"):

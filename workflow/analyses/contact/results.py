@@ -21,6 +21,7 @@ from workflow.analyses.contact.datasets import (
 )
 from workflow.analyses.contact.load_table import LoadTable
 from workflow.analyses.contact.summary import loop_summary, slides, state_summaries, stick_zone
+from workflow.case.plain import counted
 from workflow.shell.analysis import Run
 from workflow.shell.dataset import Dataset, described
 from workflow.shell.results import Along, On, run_results
@@ -128,11 +129,13 @@ def _summary(outcome: ContactOutcome) -> dict[str, Any]:
 def _lines(summary: dict[str, Any], grid: Grid) -> Iterator[str]:
     """The end of the run in a few lines."""
     last, history = summary["states"][-1], summary["history"]
+    some = len(summary["states"]) < summary["increments"]
+    computed = f", {len(summary['states'])} of them computed" if some else ""
     split = f" in {history['parts']} parts each" if history["parts"] > 1 else ""
     left = "" if history["error"] is None else f", shear within {history['error']:.1%}"
     yield (
-        f"{summary['increments']} increments, {len(summary['states'])} computed "
-        f"({history['method']}){split}{left}, {summary['convolutions']} convolutions"
+        f"{counted(summary['increments'], 'increment')}{computed} ({history['method']})"
+        f"{split}{left}, {counted(summary['convolutions'], 'convolution')}"
     )
     size = "half_width" if grid.line else "radius"
     yield (

@@ -21,9 +21,9 @@ def friction_rig_model(rig: FrictionRig, reporter: Reporter) -> RigModel:
 
     Raises UserError for a file that is no case of specimens, or one that cannot be meshed.
     """
-    with reporter.stage("reduction"):
+    with reporter.stage("reduction", "steps") as told:
         key, file = "structure.specimens", rig.specimens
-        bodies = reduced_specimens(key, file, reporter, rig.target_distance)
+        bodies = reduced_specimens(key, file, reporter, told, rig.target_distance)
     try:
         model = friction_rig(*bodies.reduction.models, rig.masses, rig.springs, rig.damping_ratio)
     except RigError as error:

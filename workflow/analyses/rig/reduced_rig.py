@@ -10,6 +10,7 @@ import numpy as np
 from fe_models.dynamics.rig import Link, RigError, reduced_rig, unit_force
 from fe_models.mesh import MeshError
 from fe_models.reduction import ReducedModel
+from sa_solver.types import Progress
 from workflow.analyses.rig.rig_model import RigModel
 from workflow.analyses.rig.structure import Against, JointPlaces, Moved, ReducedBody
 from workflow.analyses.specimens.case import SpecimensCase
@@ -27,8 +28,8 @@ def reduced_rig_model(body: ReducedBody, directions: int, reporter: Reporter) ->
 
     Raises UserError for a file without such a body, and for points that it does not have.
     """
-    with reporter.stage("reduction"):
-        reduced = _reduced_body(body, reporter)
+    with reporter.stage("reduction", "steps") as told:
+        reduced = _reduced_body(body, reporter, told)
     points = _Points(reduced)
     joints = [
         joint
@@ -74,16 +75,21 @@ def _across(direction: str) -> list[str]:
 # --- the body -----------------------------------------------------------------------------------
 
 
-def _reduced_body(body: ReducedBody, reporter: Reporter) -> ReducedModel:
+def _reduced_body(body: ReducedBody, reporter: Reporter, progress: Progress) -> ReducedModel:
     if body.body is None:
         return body.stored()
-    return reduced_specimens("structure.file", body.file, reporter).reduction.models[body.body - 1]
+    specimens = reduced_specimens("structure.file", body.file, reporter, progress)
+    return specimens.reduction.models[body.body - 1]
 
 
 def reduced_specimens(
-    key: str, file: str, reporter: Reporter, target_distance: float | None = None
+    key: str,
+    file: str,
+    reporter: Reporter,
+    progress: Progress,
+    target_distance: float | None = None,
 ) -> SpecimensModel:
-    """The specimens of the case in a ``file``, reduced.
+    """The specimens of the case in a ``file``, reduced, of which ``progress`` is told.
 
     Raises UserError for one that is no case of specimens, or that cannot be meshed.
     """
@@ -91,7 +97,7 @@ def reduced_specimens(
     model = SpecimensModel(case, target_distance)
     try:
         memory(case, model.node_count()).check()
-        _ = model.reduction
+        model.prepare(progress)
     except MeshError as error:
         raise UserError(f"{key}: {file}: {error}") from error
     if model.from_cache:

@@ -12,8 +12,8 @@ from fe_models.geometry.specimens import Specimen
 from fe_models.mesh import Interface, StructureMesh
 from fe_models.reduced_contact import ReducedPair
 from fe_models.reduction import ReducedModel, free_frequencies
-from fe_models.specimens import pad_stiffness, reduced_specimens, specimen_matrices
-from sa_solver.types import Array
+from fe_models.specimens import STEPS, pad_stiffness, reduced_specimens, specimen_matrices
+from sa_solver.types import Array, Progress, Tally, unseen
 from workflow.analyses.specimens.case import SpecimensCase
 from workflow.shell.cache import content_key, load_arrays, save_arrays
 
@@ -40,6 +40,7 @@ class SpecimensModel:
 
     def __init__(self, case: SpecimensCase, target_distance: float | None = None) -> None:
         self.case, self._target = case, target_distance
+        self._progress: Progress = unseen
         self.specimen: Specimen = case.geometry()
         self._materials = case.elastic
         self.from_cache = False
@@ -77,6 +78,14 @@ class SpecimensModel:
             tuple((arrays[f"full/{n}"], arrays[f"reduced/{n}"]) for n in (1, 2)),
         )
 
+    def prepare(self, progress: Progress) -> None:
+        """Reduce them now, and tell ``progress`` of the steps of it."""
+        self._progress = progress
+        try:
+            _ = self.reduction
+        finally:
+            self._progress = unseen
+
     def node_count(self) -> int:
         """Nodes of both bodies, midsides included."""
         return self.mesh.node_count(self.case.mesh.order)
@@ -89,7 +98,8 @@ class SpecimensModel:
 
     def _reduce(self, modes: int) -> dict[str, Any]:
         """Everything that is worth keeping, by name."""
-        order = self.case.mesh.order
+        order, bodies = self.case.mesh.order, (1, 2)
+        done = Tally(self._progress, STEPS + len(bodies))
         models = reduced_specimens(
             self.specimen,
             self.mesh,
@@ -97,13 +107,15 @@ class SpecimensModel:
             order,
             modes=modes,
             target_distance=self._target,
+            done=done,
         )
         arrays: dict[str, Any] = {}
-        for number, model in enumerate(models, 1):
+        for number, model in zip(bodies, models, strict=True):
             arrays |= {f"{number}/{name}": values for name, values in vars(model).items()}
             assert model.mass is not None
             arrays[f"reduced/{number}"] = _lowest(model.stiffness, model.mass)
             arrays[f"full/{number}"] = self._full_frequencies(number, arrays)
+            done()
         return arrays
 
     def _full_frequencies(self, number: int, known: dict[str, Any]) -> Array:

@@ -74,7 +74,8 @@ def _compute(case: SpecimensCase, reporter: Reporter, steps: Steps) -> Specimens
     with reporter.stage("mesh"):
         nodes = model.node_count()
     memory(case, nodes).check()
-    with reporter.stage("reduction"):
+    with reporter.stage("reduction", "steps") as told:
+        model.prepare(told)
         pair = model.pair
     if model.from_cache:
         reporter.log("reduction: from the cache")

@@ -125,6 +125,7 @@ def response_under(
     curves = _curves(model, branch)
     if int(np.argmax(curves["amplitude"].values[:, -1])) in (0, len(branch.solutions) - 1):
         reporter.warn(f"{force:g} N: no resonance, the largest motion is at an end of the curve")
+    reporter.doing(f"{force:g} N: resonance")
     peak = steps("resonance", lambda: _resonance(model, branch, curves))
     # The peak may have been found before the resolution grew.
     problem = branch.problem.refined(peak.resolution)
@@ -403,6 +404,7 @@ def _loops(
     start, loops = branch.solutions[nearest], []
     for harmonics in case.loops.harmonics or (start.resolution.harmonics,):
         every = case.with_mean(harmonics)
+        reporter.doing(f"{start.force:g} N: loop at {frequency:g} Hz, {harmonics} harmonics")
         samples = max(case.resolution.samples, SAMPLES_PER_PERIOD * every[-1])
         problem = branch.problem.refined(Resolution(every, samples))
         motion = steps("loop", partial(_known, problem, frequency, start))

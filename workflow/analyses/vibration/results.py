@@ -15,6 +15,7 @@ from workflow.analyses.vibration.outcome import (
     Response,
     VibrationOutcome,
 )
+from workflow.case.plain import counted
 from workflow.shell.analysis import Run
 from workflow.shell.folder import OutputFolder
 from workflow.shell.results import Along, ResultsWriter, run_results
@@ -138,7 +139,9 @@ def _response_line(response: Response, label: str) -> str:
         f"{numbers['points']} points",
         f"error {numbers['error']:.1e}",
     ]
-    return ", ".join(parts) + (f"; {len(numbers['folds'])} folds" if numbers["folds"] else "")
+    return ", ".join(parts) + (
+        f"; {counted(len(numbers['folds']), 'fold')}" if numbers["folds"] else ""
+    )
 
 
 def _loop_line(loop: Curves) -> str:

@@ -28,6 +28,7 @@ from workflow.analyses.vibration_wear.outcome import (
 from workflow.analyses.vibration_wear.pads import PadCycle, WearingPads
 from workflow.analyses.vibration_wear.states import responses_to_all, worn_states
 from workflow.case.loading import load_case
+from workflow.case.plain import counted
 from workflow.shell.dataset import Dataset
 from workflow.shell.reporter import Reporter
 
@@ -95,8 +96,8 @@ def _worn_state(
         **cycle.model.numbers(),
     }
     reporter.log(
-        f"{cycles:g} cycles: {taken} steps, {numbers['touching']} nodes touch, "
-        f"stroke {numbers['stroke']:.4g} mm"
+        f"{cycles:g} cycles: {counted(taken, 'step')}, "
+        f"{counted(numbers['touching'], 'node')} touching, stroke {numbers['stroke']:.4g} mm"
     )
     return WornState(cycles, numbers, _fields(cycle, state, loop), responses)
 

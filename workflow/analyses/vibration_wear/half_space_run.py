@@ -42,6 +42,7 @@ from workflow.analyses.vibration_wear.vibrating_contact import ContactCycle, Vib
 from workflow.analyses.wear.contact_stage import stepper_of
 from workflow.analyses.wear.structures.bodies.case import BodiesWearCase
 from workflow.case.loading import load_case
+from workflow.case.plain import counted
 from workflow.shell.dataset import Dataset
 from workflow.shell.few_cells import check_cells
 from workflow.shell.reporter import Reporter
@@ -96,8 +97,8 @@ class _Description:
         self._warn(cycle, worn=cycles > 0.0)
         numbers["error"], responses, linear = self._responses(cycle)
         self.reporter.log(
-            f"{cycles:g} cycles: {steps} steps, stiffness {numbers['stiffness']:.5g} N/mm, "
-            f"stroke {numbers['stroke']:.4g} mm"
+            f"{cycles:g} cycles: {counted(steps, 'step')}, "
+            f"stiffness {numbers['stiffness']:.5g} N/mm, stroke {numbers['stroke']:.4g} mm"
         )
         return WornState(cycles, numbers | linear, _fields(cycle, loop), responses)
 

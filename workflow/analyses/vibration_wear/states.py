@@ -43,13 +43,26 @@ def worn_states(
             if cycles > 0.0:
                 stretch, left = cycles - done, total - done
                 with reporter.part(0.0, WEAR, "wear"), reporter.stage("wear"):
-                    worn = advance_cycles(stepper, state, stretch, left, contact_at, steps)
+                    worn = advance_cycles(
+                        stepper,
+                        state,
+                        stretch,
+                        left,
+                        contact_at,
+                        steps,
+                        partial(_tell, reporter, stretch),
+                    )
                 state, done = worn.state, cycles
                 count = worn.spent.steps
             name = "worn state" if count else "unworn state"
             with reporter.part(WEAR if count else 0.0, 1.0):
                 states.append(steps(name, partial(describe, state, cycles, count)))
     return tuple(states)
+
+
+def _tell(reporter: Reporter, stretch: float, cycles: float) -> None:
+    """So many ``cycles`` of a ``stretch`` have worn."""
+    reporter.reached(cycles / stretch, f"{cycles:.3g} of {stretch:.3g} cycles")
 
 
 def responses_to_all(

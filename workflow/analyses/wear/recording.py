@@ -16,6 +16,7 @@ from workflow.analyses.wear.contact_loops import kept_loops, loops_due
 from workflow.analyses.wear.contact_stage import ContactStage
 from workflow.analyses.wear.contact_workers import StagedContacts
 from workflow.analyses.wear.warnings import warn_of_growth, warn_of_instability
+from workflow.case.plain import counted
 from workflow.shell.analysis import Run
 from workflow.shell.store import write_arrays
 
@@ -44,7 +45,7 @@ class RunLog(Observer):
         depths = ", ".join(f"{depth * 1e3:.3f}" for depth in after.kinetics[-1, :, :2].ravel())
         self.run.reporter.log(
             f"jump {after.jump}: {after.cycles[-1]:.6g} cycles, depths {depths} um, "
-            f"{spent.steps} steps, {spent.contact_solves} contact problems, "
+            f"{counted(spent.steps, 'step')}, {counted(spent.contact_solves, 'contact problem')}, "
             f"{spent.convolutions} convolutions, drift {drift:.2%}"
         )
 

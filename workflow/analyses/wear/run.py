@@ -54,7 +54,7 @@ def run_wear(run: Run[WearCase]) -> None:
     try:
         write_output(_compute(run), run)
     except (ContactFailure, NormalContactError, MethodFailed) as error:
-        remedy = f"; the state is kept, see `fretscale resume {folder.root}`"
+        remedy = f"; the state is kept, see `{folder.resume_command}`"
         raise MethodFailed(f"{error}{remedy if folder.checkpoint.exists() else ''}") from error
     except MotionError as error:
         raise UserError(

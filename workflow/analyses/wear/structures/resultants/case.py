@@ -92,7 +92,7 @@ class Resultants(Section):
         "3, or 2: line contacts in plane strain, loads per length", 3, default=3
     )
     file: Annotated[str, File((".csv", ".h5", ".hdf5"))] = entry(
-        "loads of one closed cycle (columns: the recipe in the README); .h5 may go on :group",
+        "loads of one closed cycle (columns: docs, loads of another code); .h5 may go on :group",
         "loads.csv",
     )
     size: Sizes = entry(
