@@ -9,8 +9,10 @@ from __future__ import annotations
 
 import ctypes
 import os
+import sys
 import weakref
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,6 +32,8 @@ NESTED_DISSECTION = 2
 # same bits on every processor; what is set by a call would win over it.
 REPRODUCIBLE = 2
 MODE_VARIABLE = "MKL_CBWR"
+# Where pypardiso looks for MKL first; without it, through every folder of the environment.
+PLACE_VARIABLE = "PYPARDISO_MKL_RT"
 # Its number for real symmetric positive definite matrices.
 POSITIVE_DEFINITE = 2
 KILOBYTE = 1024
@@ -42,6 +46,9 @@ class PardisoError(ConvergenceError):
 @cache
 def library() -> Any | None:
     """The loaded MKL, or None where it is not installed."""
+    installed = sorted(map(str, Path(sys.prefix).glob("lib*/libmkl_rt.so*")), key=len)
+    if installed:
+        os.environ.setdefault(PLACE_VARIABLE, installed[0])
     try:
         import pypardiso
     except ImportError:

@@ -141,13 +141,12 @@ def cycle_stress(
     """
     every, forces, leads, follows = _motion(structure, force, relative, amplitudes)
 
-    def displacements_in(increments: int | list[int]) -> tuple[Array, Array]:
-        """Of both bodies ``(size, ...)`` in one increment or several."""
-        moved, acting = follows[:, increments], forces[:, increments]
-        of_body_2 = structure.body_2.recover(moved, acting, amplitudes[increments].T)
-        return every[:, increments], of_body_2
-
-    displacements = displacements_in(at)
+    # The first is that of the fields; all of them by one factorisation.
+    increments = [at, *shown]
+    moved = structure.body_2.recover(
+        follows[:, increments], forces[:, increments], amplitudes[increments].T
+    )
+    displacements = every[:, increments], moved
     dimension = structure.body_1.elastic.dimension
     ends = np.cumsum([len(interface) for interface in structure.mesh.interfaces])[:-1]
     faces_1, faces_2 = (
@@ -155,15 +154,14 @@ def cycle_stress(
         for moved in (leads, follows)
     )
     one, two = (
-        stress_field(body.elastic, displacement, body.free_facets, body.nodes, body.clamped)
+        stress_field(body.elastic, displacement[:, 0], body.free_facets, body.nodes, body.clamped)
         for body, displacement in zip(structure.bodies, displacements, strict=True)
     )
     surfaces: tuple[SurfaceHistory, ...] = ()
     if shown:
-        both = zip(structure.bodies, displacements_in(list(shown)), strict=True)
         surfaces = tuple(
-            surface_history(body.elastic, displacement, body.free_facets)
-            for body, displacement in both
+            surface_history(body.elastic, displacement[:, 1:], body.free_facets)
+            for body, displacement in zip(structure.bodies, displacements, strict=True)
         )
     return CycleStress((one, two), tuple(zip(faces_1, faces_2, strict=True)), surfaces)
 

@@ -42,6 +42,15 @@ def test_flank_nodes_move_into_their_body(coarse_mesh, worn):
             np.testing.assert_allclose(moved[:, :2], 0.0, atol=1e-12)
 
 
+def test_elements_stay_connected_as_they_were(coarse_mesh, worn):
+    _, after = worn
+    for old, new in zip(bodies(coarse_mesh), bodies(after), strict=True):
+        assert new.mesh.facets is old.mesh.facets
+        anew = type(new.mesh)(new.mesh.p, new.mesh.t)
+        for part in ("facets", "t2f", "f2t", "edges", "f2e"):
+            np.testing.assert_array_equal(getattr(new.mesh, part), getattr(anew, part))
+
+
 def test_other_boundaries_stay(coarse_mesh, worn):
     _, after = worn
     for old, new in zip(bodies(coarse_mesh), bodies(after), strict=True):
