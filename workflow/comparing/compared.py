@@ -56,7 +56,7 @@ class Row:
     @property
     def errors(self) -> tuple[float | None, ...]:
         """Estimated errors, relative; None where nobody knows."""
-        return tuple(quantity and quantity.error for quantity in self.quantities)
+        return tuple(q.error if q is not None else None for q in self.quantities)
 
     def difference(self, number: int) -> float | None:
         """Of a run to the first one, relative; None where they cannot be compared."""

@@ -46,7 +46,7 @@ def compare(*runs: AnyRun) -> Comparison:
     ...     balls = fretscale.compare(f"{folder}/light", f"{folder}/heavy")
     >>> balls.entries
     {'load_path.legs.0.P': ('200 N', '400 N')}
-    >>> force = balls["normal force"]
+    >>> force = balls["normal force on body 2, P"]
     >>> force.values, force.unit, force.differences
     ((200.0, 400.0), 'N', (None, 1.0))
     """
