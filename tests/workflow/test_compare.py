@@ -2,6 +2,7 @@
 
 import csv
 
+import fretscale
 import h5py
 import numpy as np
 import pytest
@@ -87,6 +88,48 @@ def test_command_writes_text_table_page_and_curves(runs, tmp_path):
     assert "friction.coefficient" in page.told["What differs in their cases"]
     again = invoke(*command)
     assert (again.exit_code, "exists; give another folder, or --force" in again.stderr) == (2, True)
+
+
+def test_a_program_compares_as_the_command_does(runs, tmp_path):
+    balls = fretscale.compare(runs / "ball", fretscale.open(runs / "rough"), str(runs / "again"))
+    assert balls.names == ("ball", "rough", "again")
+    assert balls.entries == {"friction.coefficient": ("0.7", "0.9", "0.7")}
+    shear = balls["largest shear"]
+    first, other, same = shear.values
+    assert (shear.unit, same) == ("MPa", first)
+    assert shear.differences == (None, pytest.approx(other / first - 1.0), 0.0)
+    assert shear.beyond == (None, True, False)
+    assert shear == balls["after the last increment, largest shear"]
+    with pytest.raises(KeyError, match=r"nothing: not there; allowed: .*largest shear"):
+        balls["nothing"]
+    ended = invoke("compare", runs / "ball", runs / "rough", runs / "again")
+    assert [line.rstrip() for line in ended.stdout.splitlines()] == repr(balls).splitlines()
+    table = balls.pandas()
+    assert table.loc[(shear.of, shear.name), "rough, difference"] == shear.differences[1]
+    page = balls.report(tmp_path / "compared")
+    assert Page(page.read_text("utf-8")).images
+    assert page.with_name("compare.csv").exists()
+    with pytest.raises(fretscale.UserError, match="exists; give another folder"):
+        balls.report(tmp_path / "compared")
+
+
+def test_values_in_different_units_are_not_beside_each_other(runs, tmp_path):
+    """Of a cylinder forces are per length."""
+    line = BALL.replace("sphere, radius: 10 mm", "cylinder, radius: 10 mm")
+    line = line.replace("[16, 16], size: [1 mm, 1 mm]", "64, size: 1 mm")
+    line = line.replace("400 N", "400 N/mm")
+    (tmp_path / "line.yaml").write_text(line.replace("210 N,", "150 N/mm,"), encoding="utf-8")
+    settings = [part for entry in QUIET for part in ("--set", entry)]
+    ended = invoke("run", tmp_path / "line.yaml", "--out", tmp_path / "line", *settings)
+    assert ended.exit_code == 0, ended.stderr
+    found = [
+        r for r in compare([runs / "ball", tmp_path / "line"]).rows if r.first.path[-2:] == ".P"
+    ]
+    assert [row.first.unit for row in found] == ["N", "N/mm"]
+    assert [[value is None for value in row.values] for row in found] == [
+        [False, True],
+        [True, False],
+    ]
 
 
 def test_what_cannot_be_compared_is_refused_in_a_line(runs, tmp_path):

@@ -42,7 +42,9 @@ def ball(tmp_path_factory):
 # --- cases ----------------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("module", ["cases", "datasets", "results", slow("running")])
+@pytest.mark.parametrize(
+    "module", ["cases", "datasets", "results", slow("running"), slow("comparing")]
+)
 def test_the_examples_run(module, monkeypatch):
     monkeypatch.chdir(ROOT)
     failed, _ = doctest.testmod(importlib.import_module(f"workflow.interface.{module}"))

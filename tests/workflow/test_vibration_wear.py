@@ -7,11 +7,13 @@ from dataclasses import replace
 import h5py
 import numpy as np
 import pytest
+import pyvista
 
 from fe_models.dynamics.harmonic_balance import HarmonicBalance, PeriodicLoad
 from fe_models.dynamics.harmonics import Resolution
 from tests.workflow.conftest import invoke
 from tests.workflow.scenes import RIG_OF_THESIS
+from tests.workflow.shown_files import check_arrays, check_scene
 from wear.joints.periodic import PeriodicMarch
 from wear.marching import advance_cycles
 from wear.steppers import ErrorControl, ImplicitStepper, first_cycles
@@ -334,3 +336,21 @@ def test_a_force_without_a_contact_in_reach_of_its_grid_is_warned_of(tmp_path):
     )
     assert result.exit_code == 0, result.output
     assert "reaches the border of its grid" in result.stderr
+
+
+def test_the_worn_contact_is_shown_in_paraview(tmp_path):
+    ended = run(tmp_path, "output.paraview=true", "wear.cycles=[2e4]", "forces=[5 N]")
+    assert ended.exit_code == 0, ended.stderr
+    folder = tmp_path / "out" / "paraview"
+    check_arrays(folder)
+    check_scene(folder / "view.py")
+    series = pyvista.PVDReader(folder / "contact.pvd")
+    assert series.time_values == [0.0, 2e4]
+    face = pyvista.read(folder / "contact" / "00001.vts")
+    with h5py.File(tmp_path / "out" / "results.h5") as file:
+        contact = file["worn/00001/contact"]
+        for name, shown in {"pressure": "pressure [MPa]", "path": "cycle_slip [mm]"}.items():
+            expected = contact[name][()].ravel(order="F")
+            np.testing.assert_allclose(face[shown], expected, rtol=1e-6)
+        worn = face["worn_1 [mm]"][:, 2]
+        np.testing.assert_allclose(worn, -contact["depth_1"][()].ravel(order="F"), rtol=1e-6)

@@ -37,7 +37,7 @@ class ComparedRun:
 class Row:
     """A quantity in every run, None where a run has none: what it is, and its value.
 
-    The first of the runs that has it is what the others are held against.
+    All have one base unit. The first run is what the others are held against.
     """
 
     quantities: tuple[Quantity | None, ...]
@@ -50,15 +50,18 @@ class Row:
     @property
     def everyday(self) -> str:
         """The unit to show it in: that of the largest."""
-        unit = self.first.unit
-        told = zip(self.quantities, self.values, strict=True)
-        sizes = (abs(v) for q, v in told if q is not None and q.unit == unit and v is not None)
-        return self.first.everyday or suited_unit(max(sizes), unit)
+        largest = max(abs(value) for value in self.values if value is not None)
+        return self.first.everyday or suited_unit(largest, self.first.unit)
+
+    @property
+    def errors(self) -> tuple[float | None, ...]:
+        """Estimated errors, relative; None where nobody knows."""
+        return tuple(q.error if q is not None else None for q in self.quantities)
 
     def difference(self, number: int) -> float | None:
         """Of a run to the first one, relative; None where they cannot be compared."""
         first, value = self.values[0], self.values[number]
-        if number == 0 or first is None or value is None or not self._alike(number):
+        if number == 0 or first is None or value is None:
             return None
         if value == first:
             return 0.0
@@ -66,20 +69,11 @@ class Row:
 
     def beyond(self, number: int) -> bool | None:
         """Whether the difference is more than both estimated errors; None where nobody knows."""
-        one, other = self.quantities[0], self.quantities[number]
-        difference = self.difference(number)
-        if difference is None or one is None or other is None:
-            return None
-        if one.error is None or other.error is None:
-            return None
         first, value = self.values[0], self.values[number]
-        assert first is not None
-        assert value is not None
-        return abs(value - first) > one.error * abs(first) + other.error * abs(value)
-
-    def _alike(self, number: int) -> bool:
-        one, other = self.quantities[0], self.quantities[number]
-        return one is not None and other is not None and one.unit == other.unit
+        one, other = self.errors[0], self.errors[number]
+        if number == 0 or first is None or value is None or one is None or other is None:
+            return None
+        return abs(value - first) > one * abs(first) + other * abs(value)
 
 
 @dataclass(frozen=True)
@@ -130,15 +124,20 @@ def _names(paths: Sequence[Path]) -> list[str]:
 
 
 def _rows(analysis: Analysis[Any], runs: Sequence[ToldRun]) -> tuple[Row, ...]:
-    """Quantities of all runs by group and name, in the order of the first run."""
+    """Quantities of all runs by group, name and unit, in the order of the first run.
+
+    Of a line contact and of one over an area the same name may have two units, and so two rows.
+    """
     of_runs = [
-        {(q.group, q.name): q for q in analysis.quantities(run.case, run.summary)} for run in runs
+        {(q.group, q.name, q.unit): q for q in analysis.quantities(run.case, run.summary)}
+        for run in runs
     ]
-    groups = dict.fromkeys(group for of_run in of_runs for group, _ in of_run)
-    names = dict.fromkeys(name for of_run in of_runs for name in of_run)
+    keys = dict.fromkeys(key for of_run in of_runs for key in of_run)
+    groups = list(dict.fromkeys(group for group, _, _ in keys))
+    names = list(dict.fromkeys(key[:2] for key in keys))
     rows = []
-    for name in sorted(names, key=lambda name: list(groups).index(name[0])):
-        quantities = tuple(of_run.get(name) for of_run in of_runs)
+    for key in sorted(keys, key=lambda key: (groups.index(key[0]), names.index(key[:2]))):
+        quantities = tuple(of_run.get(key) for of_run in of_runs)
         values = tuple(
             None if quantity is None else required_number(run.summary, quantity.path)
             for quantity, run in zip(quantities, runs, strict=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from io import StringIO
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -45,6 +46,18 @@ def show(comparison: Comparison) -> None:
     console = Console(highlight=False, markup=False)
     if not console.is_terminal:
         console.width = FILE_WIDTH
+    _print(comparison, console)
+
+
+def text_of(comparison: Comparison) -> str:
+    """The same as a text."""
+    console = Console(file=StringIO(), width=FILE_WIDTH, highlight=False, markup=False)
+    with console.capture() as printed:
+        _print(comparison, console)
+    return "\n".join(line.rstrip() for line in printed.get().splitlines())
+
+
+def _print(comparison: Comparison, console: Console) -> None:
     if comparison.entries:
         entries = Table(Column("case"), *comparison.names, box=SIMPLE)
         for path, texts in comparison.entries.items():
@@ -69,8 +82,7 @@ def _text(row: Row, number: int) -> str:
     quantity, value = row.quantities[number], row.values[number]
     if quantity is None or value is None:
         return NOTHING
-    everyday = row.everyday if quantity.unit == row.first.unit else quantity.everyday
-    shown = str(readable(value, quantity.unit, quantity.error, everyday))
+    shown = str(readable(value, quantity.unit, quantity.error, row.everyday))
     return " ".join([shown, *_apart(row, number)])
 
 
@@ -97,7 +109,12 @@ def _signed(difference: float) -> str:
 
 
 def write_csv(comparison: Comparison, path: Path) -> None:
-    """All quantities in base units: values, estimated errors, and differences, all relative."""
+    """Write the table of all quantities."""
+    write_table(path, columns_of(comparison))
+
+
+def columns_of(comparison: Comparison) -> dict[str, list[Any]]:
+    """All quantities in base units; estimated errors and differences are relative."""
     rows, names = comparison.rows, comparison.names
     columns: dict[str, list[Any]] = {
         "of": [row.first.group for row in rows],
@@ -107,12 +124,11 @@ def write_csv(comparison: Comparison, path: Path) -> None:
     }
     for number, name in enumerate(names):
         columns[name] = [row.values[number] for row in rows]
-        errors = [quantity.error if (quantity := row.quantities[number]) else None for row in rows]
-        columns[f"{name}, estimated error"] = errors
+        columns[f"{name}, estimated error"] = [row.errors[number] for row in rows]
         if number:
             columns[f"{name}, difference"] = [row.difference(number) for row in rows]
             columns[f"{name}, beyond errors"] = [row.beyond(number) for row in rows]
-    write_table(path, columns)
+    return columns
 
 
 # --- page ---------------------------------------------------------------------------------------
@@ -171,8 +187,5 @@ def _cell(row: Row, number: int) -> object:
         return NOTHING
     apart = " ".join(_apart(row, number))
     look = "bad" if row.beyond(number) else "error"
-    shown = (
-        quantity if quantity.unit != row.first.unit else replace(quantity, everyday=row.everyday)
-    )
     told = element("div", element("span", apart, cls=look)) if apart else Html("")
-    return element("div", value_of(shown, value), told)
+    return element("div", value_of(replace(quantity, everyday=row.everyday), value), told)

@@ -219,7 +219,7 @@ def _plain(value: Any) -> Any:
 
 def _data_array(values: Values) -> xr.DataArray:
     """A dataset over its coordinates."""
-    xarray = _library("xarray")
+    xarray = library("xarray")
     dims = _dims(values)
     coordinates = {
         dim: xarray.Variable((dim,), along.values, _attributes(along))
@@ -233,7 +233,7 @@ def _data_array(values: Values) -> xr.DataArray:
 
 def _data_set(group: Group) -> xr.Dataset:
     """The datasets of a group, and those of the numbered groups in it put together."""
-    xarray = _library("xarray")
+    xarray = library("xarray")
     arrays = {name: _data_array(item) for name, item in _datasets(group).items()}
     curves = {name: array for name, array in arrays.items() if name not in array.coords}
     numbered = _numbered(group)
@@ -248,7 +248,7 @@ def _data_set(group: Group) -> xr.Dataset:
 
 def _series(values: Values) -> pd.Series:
     """A curve over what it is along."""
-    pandas = _library("pandas")
+    pandas = library("pandas")
     if values.ndim != 1:
         raise UserError(f"{values.name}: of {values.ndim} axes; allowed: curves, of one")
     return pandas.Series(values.values, _index(values), name=_heading(values))
@@ -256,7 +256,7 @@ def _series(values: Values) -> pd.Series:
 
 def _data_frame(group: Group) -> pd.DataFrame:
     """The curves of a group side by side, or the numbers of the numbered groups in it."""
-    pandas = _library("pandas")
+    pandas = library("pandas")
     datasets = {name: item for name, item in _datasets(group).items() if item.ndim == 1}
     if datasets and len({item.shape for item in datasets.values()}) == 1:
         index = _index(next(iter(datasets.values())))
@@ -279,7 +279,8 @@ def _data_frame(group: Group) -> pd.DataFrame:
     )
 
 
-def _library(name: str) -> Any:
+def library(name: str) -> Any:
+    """A library that not all have. Raises :class:`UserError` where it is not installed."""
     try:
         return import_module(name)
     except ImportError:
@@ -309,7 +310,7 @@ def _index(values: Values) -> Any:
     along = values.coordinates.get(values.dims[0])
     if along is None:
         return None
-    return _library("pandas").Index(along.values, name=_heading(along))
+    return library("pandas").Index(along.values, name=_heading(along))
 
 
 def _datasets(group: Group) -> dict[str, Values]:

@@ -68,7 +68,7 @@ def _cycle(contact: h5py.Group, response: h5py.Group, folder: Path) -> Iterator[
     shown = min(count, MOST_STEPS)
     samples = (np.arange(shown) * count / shown).round().astype(int).tolist()
     for number, step in enumerate(samples):
-        mesh = _pad(contact)
+        mesh = pad_mesh(contact)
         attach(mesh.point_data, _fields(contact, cycle, step, mean))
         yield step / count / frequency, "pad", folder / f"{number:03d}.vtu", mesh
 
@@ -86,11 +86,11 @@ def _fields(contact: h5py.Group, cycle: h5py.Group, step: int, mean: Array) -> F
     }
 
 
-def _pad(contact: h5py.Group) -> pyvista.UnstructuredGrid:
+def pad_mesh(places: h5py.Group) -> pyvista.UnstructuredGrid:
     """Quadrilaterals between the nodes, or the nodes alone if they are not in rows and columns."""
     import pyvista
 
-    x, y = contact["x"][()], contact["y"][()]
+    x, y = places["x"][()], places["y"][()]
     points = np.stack([x, y, np.zeros_like(x)], axis=1)
     numbers = rows_and_columns(x, y)
     if numbers is None:

@@ -20,8 +20,9 @@ def _pictures() -> Pictures:
     # Plots take a second to load: where they are drawn.
     from workflow.analyses.vibration_wear.figures import figures_of
     from workflow.analyses.vibration_wear.outcome import Contents
+    from workflow.analyses.vibration_wear.paraview import write_vibration_wear
 
-    return Pictures(figures_of, contents=Contents)
+    return Pictures(figures_of, write_vibration_wear, contents=Contents)
 
 
 ANALYSIS = Analysis(

@@ -22,7 +22,7 @@ from workflow.analyses.wear.structures.bodies.case import BodiesWearCase, Recipr
 from workflow.case.fields import Quantity
 from workflow.case.loading import YAML, CaseFile
 from workflow.case.plain import entries, shares
-from workflow.case.sections import OutputWithoutFields, Section, Title, disagreement, entry
+from workflow.case.sections import Section, Title, disagreement, entry
 from workflow.case.source import Source
 
 WearingFriction = Annotated[float, Quantity("1", above=0.0, at_most=10.0)]
@@ -107,9 +107,6 @@ class VibrationWearCaseBase(VibrationCaseBase):
     title: Title = entry("one line", "Forced response of a friction rig as it wears")
     structure: Rig | FrictionRig = entry("what holds the contact")
     wear: WearByVibration = entry("how the contact wears")
-    output: OutputWithoutFields = entry(
-        "files beside summary and results", default=OutputWithoutFields()
-    )
 
     @classmethod
     def suits(cls, source: Source) -> bool:

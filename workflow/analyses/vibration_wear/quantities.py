@@ -56,7 +56,8 @@ def main_results(case: VibrationWearCase | FrictionRigWearCase, summary: Summary
 
 def _of_state(number: int, state: Summary, summary: Summary) -> Iterator[Quantity]:
     ends = number == len(summary["states"]) - 1
-    group = "at the end" if ends else f"after {state['cycles']:g} cycles"
+    begun = f"after {state['cycles']:g} cycles" if state["cycles"] else "unworn"
+    group = "at the end" if ends else begun
     place = f"states.{number}"
     of = partial(Quantity, group)
     for name, (unit, text, everyday) in NUMBERS.items():

@@ -13,6 +13,11 @@ What comes out
     - ``Group``: datasets and groups of ``results.h5`` under one name.
     - ``Values``: a dataset, read when it is needed, with its unit and description.
 
+What several runs have in common
+    - ``compare``: put finished runs side by side.
+    - ``Comparison``: what differs in their cases and results, as text, table and page.
+    - ``ComparedResult``: a main result in each of them, and how far they are apart.
+
 What is raised
     - ``FretscaleError``: the base of all; each says in a line what is wrong and what to do.
     - ``CaseError``: a case that cannot be run.
@@ -86,6 +91,7 @@ if TYPE_CHECKING:
     from sa_solver.errors import FretscaleError
     from workflow.errors import CaseError, MethodFailed, NotWritten, OutOfMemory, UserError
     from workflow.interface.cases import Check, check, load_case
+    from workflow.interface.comparing import ComparedResult, Comparison, compare
     from workflow.interface.datasets import Group, Values
     from workflow.interface.results import MainResult, Results, open  # noqa: A004
     from workflow.interface.running import run
@@ -93,6 +99,8 @@ if TYPE_CHECKING:
 __all__ = [
     "CaseError",
     "Check",
+    "ComparedResult",
+    "Comparison",
     "FretscaleError",
     "Group",
     "MainResult",
@@ -103,6 +111,7 @@ __all__ = [
     "UserError",
     "Values",
     "check",
+    "compare",
     "load_case",
     "open",
     "run",
@@ -125,6 +134,7 @@ __getattr__, __dir__ = lazy_names(
             "UserError",
         ),
         "interface.cases": ("Check", "check", "load_case"),
+        "interface.comparing": ("ComparedResult", "Comparison", "compare"),
         "interface.datasets": ("Group", "Values"),
         "interface.results": ("MainResult", "Results", "open"),
         "interface.running": ("run",),

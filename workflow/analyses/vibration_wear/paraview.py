@@ -1,0 +1,88 @@
+"""A contact that a rig wears for ParaView: ``contact.pvd``, its faces over the cycles.
+
+Every step is the contact as it wears (``contact/<state>``): the cells of the grid as points of a
+surface, or the nodes of the pads. Warp By Vector on ``worn_1`` or ``worn_2`` shows a body's worn
+shape; the axes are those of the face. ``view.py`` shows them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+from sa_solver.types import Array, Frame
+from workflow.analyses.vibration.paraview import pad_mesh
+from workflow.analyses.vibration_wear.outcome import CONTACT, NODES, PLACES, WORN, Contents
+from workflow.pictures.view import FIRST, Scene, Shown, View, write_view
+from workflow.pictures.vtk import CYCLES, FacePoints, Fields, Step, attach, write_series
+from workflow.shell.results import grid_of
+
+SERIES = "contact.pvd"
+FACE = Frame(np.zeros(3), np.eye(3))
+# Which way wear moves the surfaces, along the normal.
+INTO_BODY = {1: -1.0, 2: 1.0}
+# Energy per area and cycle, which nodes have as energy alone.
+PER_AREA = "N/mm"
+
+
+def write_vibration_wear(contents: Contents, file: h5py.File, folder: Path) -> list[Path]:
+    """Write the states, their series over the cycles, and the script; returns their paths."""
+    steps = _nodes(file, folder) if contents.at_nodes else _cells(file, folder)
+    written = write_series(folder / SERIES, CYCLES, steps)
+    return [*written, _write_view(file, folder)]
+
+
+def _cells(file: h5py.File, folder: Path) -> Iterator[Step]:
+    points = FacePoints(grid_of(file["grid"]), FACE)
+    for name, state in file[WORN].items():
+        contact = state[CONTACT]
+        shown = {key: points.of(contact[key]) for key in ("pressure", "energy")}
+        path = folder / "contact" / f"{name}{points.suffix}"
+        mesh = points.mesh(_fields(contact, shown, points.of))
+        yield float(state.attrs["cycles"]), CONTACT, path, mesh
+
+
+def _nodes(file: h5py.File, folder: Path) -> Iterator[Step]:
+    places = file[PLACES]
+    area = places["area"][()]
+    for name, state in file[WORN].items():
+        nodes = state[NODES]
+        shown = {"pressure": nodes["normal_force"][()] / area, "energy": nodes["energy"][()] / area}
+        mesh = pad_mesh(places)
+        attach(mesh.point_data, _fields(nodes, shown, lambda dataset: np.asarray(dataset[()])))
+        yield float(state.attrs["cycles"]), CONTACT, folder / "contact" / f"{name}.vtu", mesh
+
+
+def _fields(contact: h5py.Group, shown: dict[str, Array], of: Any) -> Fields:
+    """Of a state: at rest pressure and gap, of a cycle path and energy, and what is worn."""
+    depths = {body: of(contact[f"depth_{body}"]) for body in INTO_BODY}
+    fields: Fields = {
+        "pressure": (shown["pressure"], "MPa"),
+        "gap": (of(contact["gap"]), "mm"),
+        "cycle_slip": (of(contact["path"]), "mm"),
+        "cycle_energy": (shown["energy"], PER_AREA),
+        "depth": (depths[1] + depths[2], "mm"),
+    }
+    for body, depth in depths.items():
+        fields[f"depth_{body}"] = depth, "mm"
+        fields[f"worn_{body}"] = np.outer(INTO_BODY[body] * depth, FACE.axes[2]), "mm"
+    return fields
+
+
+def _write_view(file: h5py.File, folder: Path) -> Path:
+    """The script, which begins at the last state."""
+    states = list(file[WORN].values())
+    last = states[-1][NODES if NODES in states[-1] else CONTACT]
+    most = 1 if np.max(last["depth_1"][()]) >= np.max(last["depth_2"][()]) else 2
+    views = [
+        View("Worn depth of both bodies", [Shown(SERIES, "depth [mm]", f"worn_{most} [mm]")]),
+        View("Contact pressure at rest", [Shown(SERIES, "pressure [MPa]")]),
+        View("Slip in a cycle that wears", [Shown(SERIES, "cycle_slip [mm]")]),
+        View("Energy of such a cycle per area", [Shown(SERIES, f"cycle_energy [{PER_AREA}]")]),
+    ]
+    cycles = float(states[-1].attrs["cycles"])
+    return write_view(Scene(str(file.attrs["title"]), CYCLES, cycles, views), folder / FIRST)

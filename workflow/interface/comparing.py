@@ -1,0 +1,133 @@
+"""Finished runs side by side, from a program."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+from workflow import comparing
+from workflow.comparing.compared import Row
+from workflow.comparing.showing import columns_of, text_of
+from workflow.comparing.writing import write_comparison
+from workflow.interface.datasets import library
+from workflow.interface.results import Results
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+AnyRun = str | os.PathLike[str] | Results
+"""A finished run: its folder, or its results."""
+
+
+def compare(*runs: AnyRun) -> Comparison:
+    """Put two finished runs or more of one analysis side by side; the first is the reference.
+
+    Each is a folder or what :func:`fretscale.run` and :func:`fretscale.open` give. Raises
+    :class:`UserError` for less than two, one twice, a folder without a finished run, and runs of
+    different analyses.
+
+    >>> import fretscale, tempfile
+    >>> coarse = {
+    ...     "contact__grid": [16, 16],
+    ...     "output__paraview": False,
+    ...     "output__figures": False,
+    ... }
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     for name, force in {"light": "200 N", "heavy": "400 N"}.items():
+    ...         _ = fretscale.run(
+    ...             "cases/sphere_normal.yaml",
+    ...             f"{folder}/{name}",
+    ...             quiet=True,
+    ...             **coarse,
+    ...             **{"load_path.legs.0.P": force},
+    ...         )
+    ...     balls = fretscale.compare(f"{folder}/light", f"{folder}/heavy")
+    >>> balls.entries
+    {'load_path.legs.0.P': ('200 N', '400 N')}
+    >>> force = balls["normal force on body 2, P"]
+    >>> force.values, force.unit, force.differences
+    ((200.0, 400.0), 'N', (None, 1.0))
+    """
+    folders = [run.folder if isinstance(run, Results) else Path(run) for run in runs]
+    return Comparison(comparing.compare(folders))
+
+
+class ComparedResult(NamedTuple):
+    """A main result in every run, in the base ``unit`` of the first that has it.
+
+    ``of`` is empty for whole runs. ``values`` are None where a run has none. ``errors`` are
+    estimated ones and ``differences`` those to the first run, both relative and None where there is
+    none; ``beyond`` is whether a difference is more than both estimated errors, None where nobody
+    knows.
+    """
+
+    of: str
+    name: str
+    unit: str
+    values: tuple[float | None, ...]
+    errors: tuple[float | None, ...]
+    differences: tuple[float | None, ...]
+    beyond: tuple[bool | None, ...]
+
+
+class Comparison:
+    """Finished runs side by side, as `fretscale compare` has them; printed, they are its text.
+
+    ``names`` are those of the runs, ``results`` the main results of all,
+    ``comparison["depth"]`` the one of that name, or of ``"flank, depth"``, and ``entries`` in words
+    what differs in the cases, by dotted path.
+    """
+
+    def __init__(self, compared: comparing.Comparison) -> None:
+        self._compared = compared
+        self.names: tuple[str, ...] = tuple(compared.names)
+        self.results: tuple[ComparedResult, ...] = tuple(map(_result, compared.rows))
+        self.entries: dict[str, tuple[str, ...]] = dict(compared.entries)
+
+    def __getitem__(self, name: str) -> ComparedResult:
+        found = [r for r in self.results if name in (r.name, f"{r.of}, {r.name}")]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            raise KeyError(f"{name}: of several; allowed: {_listed(found, whole=True)}")
+        raise KeyError(f"{name}: not there; allowed: {_listed(self.results)}")
+
+    def pandas(self) -> pd.DataFrame:
+        """The table that `compare.csv` has, a row for each result, by what it is of and its name.
+
+        Values are in base units; errors and differences are relative. Raises :class:`UserError`
+        without pandas.
+        """
+        frame = library("pandas").DataFrame(columns_of(self._compared))
+        return frame.set_index(["of", "quantity"])
+
+    def report(self, out: str | os.PathLike[str], force: bool = False) -> Path:
+        """Write ``compare.html``, ``compare.csv`` and curves into a folder ``out``.
+
+        Returns the path of the page. Raises :class:`UserError` for a folder that has them already,
+        unless ``force``, or that is of something else.
+        """
+        _, page = write_comparison(self._compared, Path(out), force)
+        return page
+
+    def __repr__(self) -> str:
+        return text_of(self._compared)
+
+
+def _listed(results: Sequence[ComparedResult], whole: bool = False) -> str:
+    return "; ".join(dict.fromkeys(f"{r.of}, {r.name}" if whole else r.name for r in results))
+
+
+def _result(row: Row) -> ComparedResult:
+    runs = range(len(row.values))
+    return ComparedResult(
+        row.first.group,
+        row.first.name,
+        row.first.unit,
+        row.values,
+        row.errors,
+        tuple(row.difference(run) for run in runs),
+        tuple(row.beyond(run) for run in runs),
+    )
