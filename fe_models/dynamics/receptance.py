@@ -60,7 +60,7 @@ class SteadyMotion:
         """Displacements under forces; held at ω = 0."""
         moving, response = self._moving, np.empty(force.shape, dtype=complex)
         if moving:
-            response[0] = sl.cho_solve(self.structure.static_factors, force[0].real)
+            response[0] = self.structure.respond_at_rest(force[0].real)
         if not self._mixed:
             np.multiply(force[moving:], self._flexibility, out=response[moving:])
         else:
@@ -130,6 +130,13 @@ class Receptance:
     def at(self, angular: Array) -> SteadyMotion:
         """The structure at ``k`` frequencies [rad/s]."""
         return SteadyMotion(self, angular)
+
+    def respond_at_rest(self, force: Array) -> Array:
+        """Displacements ``(n,)`` under constant forces ``(n,)``, held."""
+        if not self.held:
+            return np.asarray(force / self.squares)
+        # Of every product with a Jacobian: numbers that are not finite are found in what it leaves.
+        return np.asarray(sl.cho_solve(self.static_factors, force, check_finite=False))
 
     def _holding_stiffness(self) -> float:
         """κ, a share of what the structure opposes to its joints where it strains."""

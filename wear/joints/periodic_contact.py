@@ -160,6 +160,46 @@ def _round(
 
 
 @compiled(nogil=True, error_model="numpy")
+def _unchanging(joint: Array, memory: ContactMemory, path: Array) -> int:
+    """State in which a contact is all period long, 0 or 2 as :func:`_state_of`; -1 where it slips
+    or changes it.
+
+    Between samples that hold it holds: the force goes straight, within a limit that is linear.
+    """
+    stiffness, normal_stiffness, preload, gap = joint[0], joint[1], joint[3], joint[4]
+    state = 0 if preload + normal_stiffness * (path[0, 2] - gap) > 0.0 else 2
+    for t in range(len(path)):
+        normal = preload + normal_stiffness * (path[t, 2] - gap)
+        if state == 2:
+            if normal > 0.0:
+                return -1
+            continue
+        x = stiffness * (memory.state[0] + (path[t, 0] - path[0, 0]))
+        y = stiffness * (memory.state[1] + (path[t, 1] - path[0, 1]))
+        limit = joint[2] * normal * (1.0 - ON_CIRCLE)
+        if normal <= 0.0 or x * x + y * y >= limit * limit:
+            return -1
+    return state
+
+
+@compiled(nogil=True, error_model="numpy")
+def _write_unchanging(
+    joint: Array, memory: ContactMemory, path: Array, state: int, record: PeriodRecord
+) -> None:
+    """What a contact does that sticks or is apart all period long."""
+    record.states[:] = state
+    if state == 2:
+        record.force[:] = 0.0
+        return
+    record.gradient[0] = memory.derivative
+    for t in range(len(path)):
+        for direction in range(2):
+            moved = path[t, direction] - path[0, direction]
+            record.force[t, direction] = joint[0] * (memory.state[direction] + moved)
+        record.force[t, 2] = joint[3] + joint[1] * (path[t, 2] - joint[4])
+
+
+@compiled(nogil=True, error_model="numpy")
 def _settle_contact(
     joint: Array, memory: ContactMemory, path: Array, period: Period, record: PeriodRecord
 ) -> tuple[float, float, bool]:
@@ -242,10 +282,20 @@ def settle_contacts(period: Period, joints: DrivenJoints) -> None:
         joint, jacobian = joints.parameters[j], joints.jacobian[j]
         record = PeriodRecord(joints.force[j], joints.states[j], gradient)
         _lead_in(joint, memory, joints.before[j], period.lead)
-        joints.dissipated[j], missing, sticks = _settle_contact(
-            joint, memory, joints.path[j], period, record
-        )
+        path = joints.path[j]
+        # Most contacts of a pad: in closed form.
+        state = _unchanging(joint, memory, path)
+        if state >= 0:
+            _write_unchanging(joint, memory, path, state, record)
+            joints.dissipated[j], missing, sticks = 0.0, 0.0, True
+        else:
+            joints.dissipated[j], missing, sticks = _settle_contact(
+                joint, memory, path, period, record
+            )
         joints.change[j] = relative_change(missing, record.force)
+        if state == 2:
+            jacobian[:] = 0.0
+            continue
         if sticks:
             _project_stuck(joint[0], period, shares, record, jacobian)
         else:
