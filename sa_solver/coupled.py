@@ -133,7 +133,26 @@ class CoupledState:
 
 
 class CoupledContact:
-    """Contact of dissimilar bodies with friction on one grid; owns the planned transforms."""
+    """Contact of dissimilar bodies with friction on one grid; owns the planned transforms.
+
+    Examples
+    --------
+    A cylinder pressed on a rigid flat: with friction its surface sticks in the middle, and the
+    pressure is higher than Hertz's.
+
+    >>> from sa_solver import CoupledContact, ElasticPair, Grid, HalfSpace, Material
+    >>> from sa_solver.reference.hertz import HertzCylinder
+    >>> rigid, titanium = Material(float("inf"), 0.3), Material(young=115e3, poisson=0.29)
+    >>> grid = Grid.strips(1.2, 128)
+    >>> half_space = HalfSpace(grid, ElasticPair(rigid, titanium))
+    >>> hertz = HertzCylinder(400.0, 50.0, half_space.pair.contact_modulus)
+    >>> for friction in (0.0, 0.5):
+    ...     contact = CoupledContact(half_space, friction)
+    ...     state = contact.solve(hertz.gap(grid.x), None, [400.0, 0, 0, 0, 0, 0])
+    ...     print(f"µ = {friction}: {state.pressure.max() / hertz.peak_pressure:.3f} of Hertz")
+    µ = 0.0: 1.000 of Hertz
+    µ = 0.5: 1.081 of Hertz
+    """
 
     def __init__(self, half_space: HalfSpace, friction: float) -> None:
         """Plan for ``half_space`` and the coefficient of friction µ.

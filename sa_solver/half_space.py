@@ -42,6 +42,19 @@ class HalfSpace:
 
     ``count`` is the number of zero-padded convolutions done so far, of one component (pressure),
     two (shear) or three.
+
+    Examples
+    --------
+    The centre of a loaded square of side b sinks by Love's 4 ln(1 + √2) p b / π E*:
+
+    >>> import numpy as np
+    >>> from sa_solver import ElasticPair, Grid, HalfSpace, Material
+    >>> steel = Material(young=210e3, poisson=0.3)
+    >>> half_space = HalfSpace(Grid.covering((1.0, 1.0), (25, 25)), ElasticPair(steel, steel))
+    >>> sunk = half_space.normal(np.full((25, 25), 100.0))[12, 12]
+    >>> love = 4.0 * np.log(1.0 + np.sqrt(2.0)) * 100.0 / (np.pi * half_space.pair.contact_modulus)
+    >>> print(f"{1e3 * sunk:.4f} um, Love {1e3 * love:.4f} um")
+    0.9726 um, Love 0.9726 um
     """
 
     def __init__(self, grid: Grid, pair: ElasticPair, datum: float | None = None) -> None:

@@ -62,6 +62,18 @@ class ContactLoadPath:
 
     ``values`` ``(n, 6)``, ``motion`` (6,) and ``strain`` ``(n,)`` as in
     :class:`~sa_solver.contact.ContactLoad`; ``energy`` ``(n, 2)`` or None.
+
+    Examples
+    --------
+    Pressed with 100 N/mm, sheared and sheared back:
+
+    >>> import numpy as np
+    >>> from sa_solver import ContactLoadPath
+    >>> values = np.zeros((3, 6))
+    >>> values[:, 0], values[:, 1] = 100.0, [0.0, 30.0, -30.0]
+    >>> path = ContactLoadPath(values)
+    >>> print(len(path), path.load(2, share=0.5).values[:2])
+    3 [100.   0.]
     """
 
     values: Array
@@ -136,6 +148,30 @@ def march_history(
     what share of the work is done; anew when increments are split.
 
     Raises what :meth:`FrictionalContact.advance` raises.
+
+    Examples
+    --------
+    A cylinder sheared to and fro. Alike bodies remember the turning points only, and only these
+    are solved:
+
+    >>> import numpy as np
+    >>> from sa_solver import ContactLoadPath, ElasticPair, Grid, HalfSpace, Material, march_history
+    >>> from sa_solver.reference.hertz import HertzCylinder
+    >>> from sa_solver.reference.line_partial_slip import ShearedCylinder
+    >>> steel, grid = Material(young=210e3, poisson=0.3), Grid.strips(1.0, 128)
+    >>> half_space = HalfSpace(grid, ElasticPair(steel, steel))
+    >>> hertz = HertzCylinder(200.0, 50.0, half_space.pair.contact_modulus)
+    >>> values = np.zeros((31, 6))
+    >>> values[:, 0] = 200.0
+    >>> values[1:, 1] = np.append(np.linspace(6, 60, 10), np.linspace(54, -60, 20))
+    >>> path = ContactLoadPath(values)
+    >>> history = march_history(half_space, hertz.gap(grid.x), path, friction=0.5)
+    >>> print(history.method, history.indices)
+    reversals [0, 10, 30]
+    >>> exact = ShearedCylinder(hertz, 0.5).shear_after(grid.x, [60.0, -60.0])
+    >>> error = np.abs(history.states[-1].shear[0] - exact).max()
+    >>> print(f"{error:.1f} of {np.abs(exact).max():.1f} MPa")
+    2.8 of 146.2 MPa
     """
     contact = FrictionalContact(half_space, friction, tolerance)
     obstacle = _obstacle_to_legs(half_space, path)

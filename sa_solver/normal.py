@@ -93,7 +93,24 @@ class NormalState:
 
 
 class NormalContact:
-    """Normal contact solver on one grid; owns the planned transforms."""
+    """Normal contact solver on one grid; owns the planned transforms.
+
+    Examples
+    --------
+    A cylinder on a flat, against Hertz:
+
+    >>> from sa_solver import ElasticPair, Grid, HalfSpace, Material, NormalContact
+    >>> from sa_solver.reference.hertz import HertzCylinder
+    >>> steel, grid = Material(young=210e3, poisson=0.3), Grid.strips(1.0, 256)
+    >>> half_space = HalfSpace(grid, ElasticPair(steel, steel))
+    >>> hertz = HertzCylinder(200.0, 50.0, half_space.pair.contact_modulus)
+    >>> state = NormalContact(half_space).solve(hertz.gap(grid.x), P=200.0)
+    >>> print(f"{state.pressure.max():.1f} MPa, Hertz {hertz.peak_pressure:.1f} MPa")
+    383.3 MPa, Hertz 383.3 MPa
+    >>> half_width = 0.5 * (state.pressure > 0.0).sum() * grid.pitch[0]
+    >>> print(f"{half_width:.3f} mm, Hertz {hertz.half_width:.3f} mm")
+    0.332 mm, Hertz 0.332 mm
+    """
 
     def __init__(self, half_space: HalfSpace) -> None:
         """Plan for ``half_space``.

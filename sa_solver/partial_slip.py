@@ -128,6 +128,26 @@ def partial_slip_curve(
     ``height`` ``(nx, ny)`` [mm] is the gap of the unloaded bodies, whose ``tilt`` under P is free
     of moments or held. Raises PartialSlipError for bodies that are not alike or a load that is not
     above 0, LoopFailure where a normal problem does not converge.
+
+    Examples
+    --------
+    A sphere moved along a flat, against Mindlin. Forces and motions are those of a coefficient of
+    friction of 1:
+
+    >>> import numpy as np
+    >>> from sa_solver import ElasticPair, Grid, HalfSpace, Material, NormalContact
+    >>> from sa_solver import partial_slip_curve
+    >>> from sa_solver.reference.mindlin import ShearedSphere
+    >>> steel, grid = Material(young=210e3, poisson=0.3), Grid.covering((0.5, 0.5), (32, 32))
+    >>> sphere = ShearedSphere(load=50.0, radius=10.0, friction=0.5, body_1=steel, body_2=steel)
+    >>> contact = NormalContact(HalfSpace(grid, ElasticPair(steel, steel)))
+    >>> height = sphere.contact.gap(grid.x, grid.y)
+    >>> curve = partial_slip_curve(contact, height, 50.0, tolerance=1e-8)
+    >>> print(f"{curve.stiffness:.0f} N/mm, Mindlin {1.0 / sphere.tangential_compliance:.0f} N/mm")
+    27954 N/mm, Mindlin 28150 N/mm
+    >>> half = np.interp(12.5, 0.5 * curve.force, 0.5 * curve.shift)
+    >>> print(f"{1e3 * half:.3f} um under 12.5 N, Mindlin {1e3 * sphere.displacement(12.5):.3f} um")
+    0.493 um under 12.5 N, Mindlin 0.493 um
     """
     if not contact.half_space.pair.similar:
         raise PartialSlipError("bodies that are not alike: their pressure follows the shear")

@@ -66,6 +66,23 @@ class SubsurfaceStress:
 
     ``count`` is the number of zero-padded convolutions done so far, from three tractions to six
     components of stress inside and three at the surface. The symbols of the latest depth are kept.
+
+    Examples
+    --------
+    The largest shear stress under a cylinder is 0.30 of the peak pressure (1000 MPa), 0.78 half
+    widths (0.5 mm) deep:
+
+    >>> import numpy as np
+    >>> from sa_solver import Grid, Material, SubsurfaceStress
+    >>> grid = Grid.strips(2.0, 200)
+    >>> traction = np.zeros((3, 200, 1))
+    >>> traction[2] = 1000.0 * np.sqrt(np.maximum(0.0, 1.0 - (grid.x / 0.5) ** 2))
+    >>> body = SubsurfaceStress(grid, Material(young=210e3, poisson=0.3), body=1)
+    >>> depths = np.linspace(0.01, 1.0, 100)
+    >>> xx, yy, zz, xy, yz, zx = body.section(traction, "x", 0.0, depths)
+    >>> shear = 0.5 * np.abs(xx - zz)[100]
+    >>> print(f"{shear.max():.0f} MPa at {depths[shear.argmax()]:.2f} mm")
+    300 MPa at 0.39 mm
     """
 
     def __init__(self, grid: Grid, material: Material, body: Literal[1, 2]) -> None:

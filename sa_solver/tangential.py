@@ -118,7 +118,27 @@ class TangentialState:
 
 
 class TangentialContact:
-    """Tangential contact solver on one grid; owns the planned transforms."""
+    """Tangential contact solver on one grid; owns the planned transforms.
+
+    Examples
+    --------
+    A pressed sphere under half of the force that slides it: the stick zone of Cattaneo.
+
+    >>> import numpy as np
+    >>> from sa_solver import ElasticPair, Grid, HalfSpace, Material, TangentialContact
+    >>> from sa_solver.reference.mindlin import ShearedSphere
+    >>> steel, grid = Material(young=210e3, poisson=0.3), Grid.covering((0.5, 0.5), (48, 48))
+    >>> sphere = ShearedSphere(load=50.0, radius=10.0, friction=0.5, body_1=steel, body_2=steel)
+    >>> limit = 0.5 * sphere.contact.pressure(grid.x, grid.y)
+    >>> contact = TangentialContact(HalfSpace(grid, ElasticPair(steel, steel)))
+    >>> state = contact.solve(limit, Qx=12.5)
+    >>> stick = np.sqrt(state.sticking[limit > 0.0].sum() * grid.cell_area / np.pi)
+    >>> print(f"stick radius {stick:.2f} mm, Cattaneo {sphere.stick_radius(12.5):.2f} mm")
+    stick radius 0.12 mm, Cattaneo 0.12 mm
+    >>> mindlin = sphere.displacement(12.5)
+    >>> print(f"moved {1e3 * state.shift_x:.3f} um, Mindlin {1e3 * mindlin:.3f} um")
+    moved 0.493 um, Mindlin 0.493 um
+    """
 
     def __init__(self, half_space: HalfSpace) -> None:
         """Plan for ``half_space``."""

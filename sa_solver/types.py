@@ -72,6 +72,15 @@ class Material:
     """Isotropic linear elastic material.
 
     ``young`` and ``yield_stress`` in MPa, ``density`` in t/mm³.
+
+    Examples
+    --------
+    A steel, in MPa:
+
+    >>> from sa_solver import Material
+    >>> steel = Material(young=210e3, poisson=0.3)
+    >>> print(f"G = {steel.shear_modulus:.0f} MPa, λ = {steel.lame:.0f} MPa")
+    G = 80769 MPa, λ = 121154 MPa
     """
 
     young: float
@@ -97,6 +106,19 @@ class ElasticPair:
     All in 1/MPa: ``normal`` Σ (1-ν)/G, ``shear`` Σ 1/G, ``poisson`` Σ ν/G and ``coupling``
     ½ [(1-2ν2)/G2 - (1-2ν1)/G1], exactly 0 for identical materials. An infinite Young's modulus is
     a rigid body; both rigid are not an elastic pair (InputError).
+
+    Examples
+    --------
+    Two alike bodies have the contact modulus E / 2 (1 - ν²), and no coupling:
+
+    >>> from sa_solver import ElasticPair, Material
+    >>> steel = Material(young=210e3, poisson=0.3)
+    >>> pair = ElasticPair(steel, steel)
+    >>> print(f"{pair.contact_modulus:.0f} MPa of {210e3 / 2 / (1 - 0.3**2):.0f}, {pair.similar}")
+    115385 MPa of 115385, True
+    >>> rubber = Material(young=5.0, poisson=0.5)
+    >>> print(f"β of steel on rubber: {ElasticPair(steel, rubber).dundurs_beta:.1e}")
+    β of steel on rubber: -8.3e-06
     """
 
     body_1: Material
@@ -154,6 +176,17 @@ class Grid:
     ``shape`` is ``(nx, ny)``, ``pitch`` is ``(dx, dy)`` in mm. Fields on it have that shape. A
     ``line`` grid has cells along x only, slices 1 mm long of strips that go on along y for ever
     (plane strain): resultants on it are per mm.
+
+    Examples
+    --------
+    Cell centres are symmetric about the origin of the interface:
+
+    >>> from sa_solver import Grid
+    >>> grid = Grid.covering((1.0, 0.5), (4, 2))
+    >>> print(grid.pitch, grid.cell_area, grid.x.ravel())
+    (0.25, 0.25) 0.0625 [-0.375 -0.125  0.125  0.375]
+    >>> print(Grid.strips(1.0, 4))
+    Grid(shape=(4, 1), pitch=(0.25, 1.0), line=True)
     """
 
     shape: tuple[int, int]
@@ -214,7 +247,22 @@ def _centres(count: int, pitch: float) -> Array:
 
 @dataclass(frozen=True)
 class Frame:
-    """Interface frame: ``origin`` (3,) in mm and ``axes`` (3, 3), whose rows are x, y and z."""
+    """Interface frame: ``origin`` (3,) in mm and ``axes`` (3, 3), whose rows are x, y and z.
+
+    Examples
+    --------
+    A flank at 45°: a force along the global Z has a part along it and one across.
+
+    >>> import numpy as np
+    >>> from sa_solver import Frame
+    >>> half = np.sqrt(0.5)
+    >>> axes = np.array([[half, 0.0, half], [0.0, 1.0, 0.0], [-half, 0.0, half]])
+    >>> flank = Frame(origin=np.array([10.0, 0.0, 5.0]), axes=axes)
+    >>> print(flank.components(np.array([0.0, 0.0, 100.0])).round(2))
+    [70.71  0.   70.71]
+    >>> print(flank.coordinates(np.array([11.0, 0.0, 6.0])).round(4))
+    [1.4142 0.     0.    ]
+    """
 
     origin: Array
     axes: Array
@@ -269,6 +317,21 @@ class LoadHistory:
 
     A mix of missions holds several closed cycles one after the other: ``block`` counts them from 0,
     and ``share`` is how often each increment happens per mean cycle.
+
+    Examples
+    --------
+    A pad under 100 N that slides to and fro by 0.1 mm with µ = 0.5:
+
+    >>> import numpy as np
+    >>> from sa_solver import LoadHistory
+    >>> P, zero = np.array([100.0, 100.0]), np.zeros(2)
+    >>> energy, sliding = 0.5 * P * 0.1, np.array([True, True])
+    >>> cycle = LoadHistory(P, 0.5 * P * [1, -1], zero, zero, zero, zero, energy, zero, sliding)
+    >>> print(f"{cycle.mean_energy:g} N mm a cycle of {len(cycle)} increments")
+    10 N mm a cycle of 2 increments
+    >>> mix = LoadHistory.mix([cycle, cycle], shares=[0.9, 0.1])
+    >>> print(mix.missions)
+    [slice(0, 2, None), slice(2, 4, None)]
     """
 
     P: Array

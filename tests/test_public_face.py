@@ -13,6 +13,10 @@ ROOT = Path(__file__).parent.parent
 FACES = ["sa_solver", "wear", "wear.joints"]
 FACES += ["fe_models", "fe_models.dynamics", "fe_models.geometry", "fretscale"]
 LARGEST = 28
+WITH_EXAMPLES = ["sa_solver", "wear"]
+# Protocols and bases, and what the examples of its neighbours show at work.
+WITHOUT_EXAMPLE = {"Observer", "WearLaw", "Contacts", "CoupledState", "ImplicitStepper"}
+WITHOUT_EXAMPLE |= {"InterfaceSettings", "SecondOrderStepper"}
 INSTALLED = {"numpy", "scipy", "numba", "llvmlite", "pyfftw"}
 
 REFUSING = """
@@ -78,6 +82,28 @@ def test_the_example_of_a_package_runs(name, monkeypatch):
     failed, tried = doctest.testmod(importlib.import_module(name))
     assert tried > 0
     assert failed == 0
+
+
+def _public_objects(name: str) -> dict[str, object]:
+    """Functions and classes of a package, exceptions apart."""
+    package = importlib.import_module(name)
+    objects = {public: getattr(package, public) for public in package.__all__}
+    return {
+        public: value
+        for public, value in objects.items()
+        if not (isinstance(value, type) and issubclass(value, BaseException))
+    }
+
+
+@pytest.mark.parametrize("name", WITH_EXAMPLES)
+def test_examples_of_functions_and_classes_run(name):
+    for public, value in _public_objects(name).items():
+        if public in WITHOUT_EXAMPLE:
+            assert ">>>" not in value.__doc__, f"{public} has an example: take it off the list"
+            continue
+        example = doctest.DocTestParser().get_doctest(value.__doc__, {}, public, None, None)
+        assert example.examples, f"{name}.{public} has no example"
+        assert doctest.DocTestRunner().run(example).failed == 0
 
 
 @pytest.mark.parametrize("package", ["sa_solver", "wear", "fe_models", "workflow"])

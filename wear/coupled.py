@@ -47,6 +47,18 @@ class JumpSize:
     all bodies [mm³] is worn at the present rates.
 
     One of them at most. Without any, as far as the automatic steps of all contacts would go.
+
+    Examples
+    --------
+    Jumps until a micrometre is worn; a jump of two sizes has no meaning:
+
+    >>> from wear import JumpSize
+    >>> print(JumpSize(depth=1e-3))
+    JumpSize(cycles=None, depth=0.001, volume=None)
+    >>> JumpSize(cycles=1000.0, depth=1e-3)
+    Traceback (most recent call last):
+        ...
+    sa_solver.errors.InputError: a jump of more than one size: give cycles, depth or volume
     """
 
     cycles: float | None = None
@@ -63,6 +75,15 @@ class Stop:
     """Where a run ends before its cycles are over: at the first of these that is reached to 0.1 %.
 
     ``depth`` [mm] is the largest of any body, ``volume`` [mm³] that of all bodies together.
+
+    Examples
+    --------
+    A run of 10⁶ cycles that ends earlier where 20 µm are worn:
+
+    >>> from wear import CoupledSettings, Stop
+    >>> settings = CoupledSettings(cycles=1e6, stop=Stop(depth=0.02))
+    >>> print(settings.stop)
+    Stop(depth=0.02, volume=None)
     """
 
     depth: float | None = None
@@ -78,6 +99,15 @@ class CoupledSettings:
     be expected of slips and energies, as wear has moved the load over a face (:data:`RESPONSE`).
     ``friction`` gives the coefficient of a contact after so much dissipated energy [N mm], where
     the source is to know of it; None: it keeps its own.
+
+    Examples
+    --------
+    A run of 10⁵ cycles in jumps of 10⁴, whose loads are solved again after each of them:
+
+    >>> from wear import CoupledSettings, JumpSize
+    >>> settings = CoupledSettings(cycles=1e5, jump=JumpSize(cycles=1e4), resultants="every")
+    >>> print(settings.cycles / settings.jump.cycles, settings.stop)
+    10.0 Stop(depth=None, volume=None)
     """
 
     cycles: float
@@ -120,7 +150,21 @@ class LoadSource(Protocol):
 
 @dataclass(frozen=True)
 class ConstantLoads:
-    """A source of loads that wear does not change: one ``histories`` per contact."""
+    """A source of loads that wear does not change: one ``histories`` per contact.
+
+    Examples
+    --------
+    What a structure would say of a contact, said once:
+
+    >>> import numpy as np
+    >>> from sa_solver import LoadHistory
+    >>> from wear import ConstantLoads, CycleLoads
+    >>> P, zero = np.array([50.0, 100.0]), np.zeros(2)
+    >>> cycle = CycleLoads(LoadHistory(P, *[zero] * 7, sliding=zero == 0.0), np.zeros((2, 2, 1)))
+    >>> source = ConstantLoads([cycle])
+    >>> print(source.worn([np.full(1, 0.01)])[0] is cycle, source.probe([])[0, 0])
+    True 100.0
+    """
 
     histories: Sequence[FaceLoads]
 
@@ -251,7 +295,36 @@ class Observer:
 
 @dataclass(frozen=True)
 class CoupledWear:
-    """A run of the coupled loop. Its methods raise what ``source`` and ``contacts`` raise."""
+    """A run of the coupled loop. Its methods raise what ``source`` and ``contacts`` raise.
+
+    Examples
+    --------
+    The loop stops where a micrometre is worn; an observer tells its jumps:
+
+    >>> import numpy as np
+    >>> from sa_solver import ElasticPair, Grid, LoadHistory, Material
+    >>> from wear import *
+    >>> class Told(Observer):
+    ...     def jumped(self, before, after):
+    ...         print(f"{after.cycles[-1]:.0f} cycles, {1e3 * after.depth:.3f} um")
+    >>> grid, steel, law = Grid.strips(1.4, 70), Material(210e3, 0.3), ArchardLaw(1e-4, 3000.0)
+    >>> contact = InterfaceContact(InterfaceSettings(
+    ...     name="cylinder", grid=grid, gap=grid.x**2 / 20.0, transfer=CellNodes(grid),
+    ...     pair=ElasticPair(steel, steel), laws=(law, law),
+    ...     friction=lambda energy: 0.5, stepper=ImplicitStepper(),
+    ... ))
+    >>> zero, slip = np.zeros(1), np.zeros((1, 2, 70))
+    >>> slip[:, 0] = 0.04
+    >>> loads = [CycleLoads(LoadHistory(zero + 50.0, *[zero] * 7, sliding=zero == 0.0), slip)]
+    >>> settings = CoupledSettings(1e5, jump=JumpSize(cycles=2000.0), stop=Stop(depth=1e-3))
+    >>> loop = CoupledWear(settings, ConstantLoads(loads), Contacts([contact]), [Told()])
+    >>> unworn, first = loop.begin(loads)
+    >>> *_, end = loop.march(unworn)
+    1767 cycles, 0.537 um
+    3584 cycles, 0.894 um
+    4163 cycles, 0.995 um
+    4194 cycles, 1.000 um
+    """
 
     settings: CoupledSettings
     source: LoadSource

@@ -18,6 +18,15 @@ class EnergyTable:
     ``energy`` ascends [N mm, or N/mm where it is per area]. Below ``threshold`` the factor is 0:
     with a constant factor the worn volume is V = α (ΣEd - Ed_th) (Fouvry et al., Wear 255, 2003).
     Raises InputError for a table of no or unequal columns, or that does not ascend.
+
+    Examples
+    --------
+    Nothing wears before a threshold of 50 N mm:
+
+    >>> from wear import EnergyTable
+    >>> table = EnergyTable(energy=(0.0, 100.0), factor=(1.0, 0.5), threshold=50.0)
+    >>> print(table.at(25.0), table.at(75.0), table.mean(0.0, 100.0))
+    0.0 0.625 0.3125
     """
 
     energy: tuple[float, ...] = (0.0,)

@@ -149,6 +149,29 @@ class InterfaceContact:
 
     All of its methods raise :class:`~wear.stepping.ContactFailure` where a contact problem does not
     converge.
+
+    Examples
+    --------
+    How much a sliding cylinder wears in its first cycle, by Archard's K s P / H, and how long steps
+    may be:
+
+    >>> import numpy as np
+    >>> from sa_solver import ElasticPair, Grid, LoadHistory, Material
+    >>> from wear import *
+    >>> grid, steel, law = Grid.strips(1.4, 70), Material(210e3, 0.3), ArchardLaw(1e-4, 3000.0)
+    >>> contact = InterfaceContact(InterfaceSettings(
+    ...     name="cylinder", grid=grid, gap=grid.x**2 / 20.0, transfer=CellNodes(grid),
+    ...     pair=ElasticPair(steel, steel), laws=(law, law),
+    ...     friction=lambda energy: 0.5, stepper=ImplicitStepper(),
+    ... ))
+    >>> zero, slip = np.zeros(1), np.zeros((1, 2, 70))
+    >>> slip[:, 0] = 0.04
+    >>> loads = CycleLoads(LoadHistory(zero + 50.0, *[zero] * 7, sliding=zero == 0.0), slip)
+    >>> state, first = contact.begin(loads, cycles=1e5)
+    >>> print(f"{state.volume_rate:.3e} mm^3/mm of {2 * 1e-4 * 0.04 * 50.0 / 3000.0:.3e}")
+    1.333e-07 mm^3/mm of 1.333e-07
+    >>> print(f"explicit steps of up to {first.stable_cycles:.0f} cycles")
+    explicit steps of up to 96 cycles
     """
 
     def __init__(self, settings: InterfaceSettings) -> None:

@@ -68,6 +68,20 @@ def linear_regime(cycles: Array, values: Array) -> LinearRegime | None:
     """The longest stretch up to the end in which all slopes agree, or None while there is none.
 
     ``cycles`` and ``values`` ``(n,)``, both ascending. Running-in ends where the regime starts.
+
+    Examples
+    --------
+    A volume that grows evenly once the contact has run in:
+
+    >>> import numpy as np
+    >>> from wear import linear_regime
+    >>> cycles = np.linspace(0.0, 1e5, 21)
+    >>> volume = 2e-7 * cycles + 1e-3 * (1.0 - np.exp(-cycles / 5e3))
+    >>> regime = linear_regime(cycles, volume)
+    >>> print(f"from {regime.start:.0f} cycles on {regime.rate:.3e} mm^3 a cycle")
+    from 20000 cycles on 2.002e-07 mm^3 a cycle
+    >>> print(f"{regime.extrapolate(2e5):.4f} +- {regime.uncertainty(2e5):.4f} mm^3 of 0.0410")
+    0.0410 +- 0.0003 mm^3 of 0.0410
     """
     for first in range(len(cycles) - FEWEST_INTERVALS):
         if cycles[first] > LATEST_START * cycles[-1]:

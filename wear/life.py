@@ -80,6 +80,18 @@ def ruiz(stress: Array, work: Array) -> Ruiz:
     ``stress`` ``(t, 6, nx, ny)`` is that of one body at its surface, bulk stress included [MPa];
     ``work`` ``(nx, ny)`` that of friction per area in a mean cycle [N/mm]. The tension is the
     largest principal stress in the plane of the surface.
+
+    Examples
+    --------
+    A place pulled by 200 MPa where friction works 0.4 N/mm a cycle:
+
+    >>> import numpy as np
+    >>> from wear import ruiz
+    >>> stress = np.zeros((2, 6, 1, 1))
+    >>> stress[:, 0, 0, 0] = 200.0, -50.0
+    >>> parameters = ruiz(stress, np.full((1, 1), 0.4))
+    >>> print(parameters.friction_parameter[0, 0], parameters.cracking_parameter[0, 0])
+    0.1 20.0
     """
     _check(stress)
     xx, yy, xy = stress[:, 0], stress[:, 1], stress[:, 3]
@@ -161,6 +173,18 @@ def findley(
     """Findley's parameter of ``stress`` ``(t, 6, ...)`` with ``sensitivity`` k to normal stress.
 
     Raises StressHistoryError for a k below 0 or a history of another shape.
+
+    Examples
+    --------
+    Pulled to and fro with 100 MPa: σ (k + √(1 + k²)) / 2 on the worst plane.
+
+    >>> import numpy as np
+    >>> from wear import findley
+    >>> stress = np.zeros((2, 6, 1))
+    >>> stress[:, 0] = [[100.0], [-100.0]]
+    >>> worst = findley(stress, sensitivity=0.3)
+    >>> print(f"{worst.value[0]:.1f} MPa of {50.0 * (0.3 + np.sqrt(1.0 + 0.3**2)):.1f}")
+    67.2 MPa of 67.2
     """
     if not 0.0 <= sensitivity < np.inf:
         raise StressHistoryError(f"sensitivity k = {sensitivity:g}: must be 0 or more")
@@ -185,6 +209,19 @@ def smith_watson_topper(
     """Smith, Watson and Topper's parameter of ``stress`` ``(t, 6, ...)``, strains being elastic.
 
     0 where no plane is ever pulled. Raises StressHistoryError for a history of another shape.
+
+    Examples
+    --------
+    Pulled to and fro with 100 MPa: σ² / E on the plane across.
+
+    >>> import numpy as np
+    >>> from sa_solver import Material
+    >>> from wear import smith_watson_topper
+    >>> stress = np.zeros((2, 6, 1))
+    >>> stress[:, 0] = [[100.0], [-100.0]]
+    >>> worst = smith_watson_topper(stress, Material(young=115e3, poisson=0.29))
+    >>> print(f"{worst.value[0]:.4f} MPa of {100.0**2 / 115e3:.4f}")
+    0.0870 MPa of 0.0870
     """
 
     def parameter(stress: Array, normal: Array, to_beat: Array) -> Tried:

@@ -110,7 +110,22 @@ class Transfer(Protocol):
 
 @dataclass(frozen=True)
 class CellNodes:
-    """The transfer of a face whose nodes are the cells of its ``grid``, in the order of C."""
+    """The transfer of a face whose nodes are the cells of its ``grid``, in the order of C.
+
+    Examples
+    --------
+    Forces on the cells of a grid are pressures on it:
+
+    >>> import numpy as np
+    >>> from sa_solver import Grid
+    >>> from wear import CellNodes
+    >>> face = CellNodes(Grid.covering((1.0, 1.0), (2, 2)))
+    >>> print(face.spread(np.array([10.0, 20.0, 30.0, 40.0])))
+    [[ 40.  80.]
+     [120. 160.]]
+    >>> print(face.areas)
+    [0.25 0.25 0.25 0.25]
+    """
 
     grid: Grid
 
