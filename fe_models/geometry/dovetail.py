@@ -47,17 +47,16 @@ class Dovetail:
 
     ``flank_angle`` lies between flank and load axis. ``flank_length`` is the flat, ``edge_width``
     the rounded part beyond it at either side (radius ``edge_radius``), ``end_width`` the rounded
-    part at the two slot ends (radius ``end_radius``), inside ``slot_length``. ``rim_radius`` is the
-    radius of the top of the flanks; ``lug_height`` the disk above it, ``disk_height`` below it;
-    ``root_depth`` the blade below the flanks, ``slot_clearance`` the play under the root.
+    part at the two slot ends (radius ``end_radius``), inside ``slot_length``; without them it is
+    straight to the ends. ``rim_radius`` is the radius of the top of the flanks; ``lug_height`` the
+    disk above it, ``disk_height`` below it; ``root_depth`` the blade below the flanks,
+    ``slot_clearance`` the play under the root.
     """
 
     flank_angle: float
     flank_length: float
     edge_radius: float
     edge_width: float
-    end_radius: float
-    end_width: float
     neck_width: float
     neck_fillet: float
     root_depth: float
@@ -70,6 +69,8 @@ class Dovetail:
     rim_radius: float
     blades: int
     skew: float = 0.0
+    end_radius: float | None = None
+    end_width: float | None = None
 
     @property
     def flank_width(self) -> float:
@@ -128,13 +129,16 @@ class Dovetail:
         up = frame.components(self._uphill(side))
         # Oblique coordinates: along the section and along the slot.
         across, along = x / up[0], y - x * up[1] / up[0]
-        return rounded_edge(
-            np.abs(across) * abs(up[0]), 0.5 * self.flank_width * abs(up[0]), self.edge_width,
+        slant = abs(up[0])
+        edges = rounded_edge(
+            np.abs(across) * slant, 0.5 * self.flank_width * slant, self.edge_width,
             self.edge_radius,
-        ) + rounded_edge(
-            np.abs(along) * abs(up[0]), 0.5 * self.slot_length * abs(up[0]), self.end_width,
-            self.end_radius,
         )  # fmt: skip
+        if self.end_width is None or self.end_radius is None:
+            return edges
+        return edges + rounded_edge(
+            np.abs(along) * slant, 0.5 * self.slot_length * slant, self.end_width, self.end_radius
+        )
 
     def check(self) -> None:
         """Raise :class:`MeshError` if the section cannot be drawn."""

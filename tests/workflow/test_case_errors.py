@@ -63,6 +63,8 @@ WRONG = [
      "half the flank_length"),
     ("ends longer than the slot", "end_width: 3 mm", "end_width: 30 mm", "structure.end_width",
      "half the slot_length"),
+    ("half of a rounded end", "end_width: 3 mm", "# ", "structure.end_radius",
+     "end_radius alone; allowed: end_width and end_radius, or neither"),
     ("disk too shallow", "disk_height: 60 mm", "disk_height: 9 mm", "structure.disk_height",
      "10.78 mm"),
     ("disk beyond the axis", "disk_height: 60 mm", "disk_height: 250 mm", "structure.disk_height",

@@ -25,7 +25,7 @@ from workflow.analyses.wear.structure_stage import StructureStage
 from workflow.analyses.wear.structures import structure_of
 from workflow.analyses.wear.uniformity import ALIKE, Uniformity, sections, uniformities
 from workflow.case.writing import dump_case
-from workflow.errors import MethodFailed
+from workflow.errors import CaseError, MethodFailed
 from workflow.kinds import load_case
 from workflow.pictures.style import STYLE
 from workflow.shell.folder import OutputFolder
@@ -60,6 +60,24 @@ def pictured(plane_path: Path, tmp_path_factory: pytest.TempPathFactory) -> Run:
     run = run_case(plane_path, tmp_path_factory.mktemp("pictured") / "out")
     assert run.ending.exit_code == 0, run.ending.stderr
     return run
+
+
+# --- A case in the plane ---------------------------------------------------------------------
+
+
+def test_only_three_dimensions_need_rounded_ends(plane_path, tmp_path):
+    """A section is the same without them; in space, and for probes there, they are asked for."""
+    path = tmp_path / "section.yaml"
+    ends = ("end_width", "end_radius")
+    lines = plane_path.read_text(encoding="utf-8").splitlines()
+    path.write_text("\n".join(line for line in lines if not line.strip().startswith(ends)))
+    straight, rounded = load_case(path), load_case(plane_path)
+    x = np.linspace(-6.0, 6.0, 101)
+    gaps = [case.structure.geometry().flank_gap(x, 0.0 * x, 1) for case in (straight, rounded)]
+    assert np.array_equal(*gaps)
+    for setting in ("structure.dimension=3", "fidelity=auto"):
+        with pytest.raises(CaseError, match="end_width and"):
+            load_case(path, [setting])
 
 
 # --- A run in the plane ----------------------------------------------------------------------

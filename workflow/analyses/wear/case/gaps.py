@@ -29,17 +29,17 @@ class RoundedGap(Section):
 
     @model_validator(mode="after")
     def _arcs_exist(self) -> RoundedGap:
-        if (self.end_width is None) != (self.end_radius is None):
-            given = "end_width" if self.end_radius is None else "end_radius"
-            raise disagreement(
-                f"{given} alone; allowed: end_width and end_radius, or neither", given
-            )
         check_arcs(self)
         return self
 
 
 def check_arcs(face: Section) -> None:
-    """Refuse a rounded edge or end of a face, where it has one, that is wider than its radius."""
+    """Refuse half of a rounded end of a face, and any rounding that is wider than its radius."""
+    given = [key for key in ("end_width", "end_radius") if getattr(face, key) is not None]
+    if len(given) == 1:
+        raise disagreement(
+            f"{given[0]} alone; allowed: end_width and end_radius, or neither", *given
+        )
     for name in ("edge", "end"):
         width, radius = getattr(face, f"{name}_width"), getattr(face, f"{name}_radius")
         if width is not None and width >= radius:

@@ -64,8 +64,14 @@ class Dovetail(Section):
         "rounding of the two flank edges along the slot [mm]", "30 mm"
     )
     edge_width: Length = entry("width of each rounded edge, beyond the flat [mm]", "1.5 mm")
-    end_radius: RoundingRadius = entry("rounding of the flank at the slot ends [mm]", "150 mm")
-    end_width: Length = entry("width of each rounded end, inside the slot length [mm]", "3 mm")
+    end_radius: RoundingRadius | None = entry(
+        "rounding of the flank at the slot ends; counts for nothing in 2 dimensions [mm]",
+        "150 mm",
+        default=None,
+    )
+    end_width: Length | None = entry(
+        "width of each rounded end, inside the slot length [mm]", "3 mm", default=None
+    )
     neck_width: Length = entry("blade, between the tops of the flanks [mm]", "20 mm")
     neck_fillet: Length = entry("blade, radius between neck and flank [mm]", "3 mm")
     slot_length: Length = entry("of the slot, along its direction [mm]", "60 mm")
@@ -107,7 +113,14 @@ class Dovetail(Section):
     def _roundings_fit(self) -> Dovetail:
         check_arcs(self)
         _require_below(self, "edge_width", self.flank_length / 2, "half the flank_length")
-        _require_below(self, "end_width", self.slot_length / 2, "half the slot_length")
+        if self.end_width is not None:
+            _require_below(self, "end_width", self.slot_length / 2, "half the slot_length")
+        elif self.dimension == 3:
+            raise disagreement(
+                "none: without a rounding the pressure has no limit at the slot ends; allowed: "
+                "end_width and end_radius, or dimension 2",
+                *("end_width", "end_radius", "dimension"),
+            )
         return self
 
     @model_validator(mode="after")
@@ -319,6 +332,16 @@ class DovetailCase(FiniteElementCase):
     @property
     def cores(self) -> int:
         return 2
+
+    @model_validator(mode="after")
+    def _ends_are_probed(self) -> DovetailCase:
+        if self.fidelity == "auto" and self.structure.end_width is None:
+            raise disagreement(
+                "auto: looks at three dimensions too, for which structure.end_width and "
+                "structure.end_radius are needed; allowed: these, or fidelity fixed",
+                *("fidelity", "structure.end_width", "structure.end_radius"),
+            )
+        return self
 
     @model_validator(mode="after")
     def _grid_fits(self) -> DovetailCase:

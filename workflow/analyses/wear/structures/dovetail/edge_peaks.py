@@ -32,10 +32,11 @@ def edge_peak_errors(case: DovetailCase, stage: ContactStage, load: float) -> di
         return {}
     dovetail = case.structure
     half_width = 0.5 * dovetail.flank_length
+    width, radius = dovetail.end_width, dovetail.end_radius
     per_length, radii = load, {"edge": dovetail.edge_radius}
-    if not stage.grid.line:
-        per_length = load / (dovetail.slot_length - 2.0 * dovetail.end_width)
-        radii["end"] = dovetail.end_radius
+    if not (stage.grid.line or width is None or radius is None):
+        per_length = load / (dovetail.slot_length - 2.0 * width)
+        radii["end"] = radius
     modulus = stage.pair.contact_modulus
     return {
         edge: FlatRoundedPunch(half_width, radius, per_length, modulus).peak_error(pitch)
