@@ -64,7 +64,7 @@ $(INSTALLED): pyproject.toml constraints.txt
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || \
 	    { echo 'fretscale: needs Python 3.11 or newer; choose one with: make PYTHON=python3.12'; exit 1; }
 	@$(PYTHON) -I $(SYSTEM_CHECK)
-	@echo 'fretscale: installing in .venv: 630 MB to download, 2.3 GB on disk, 2 to 4 minutes.'
+	@echo 'fretscale: installing in .venv: 680 MB to download, 2.3 GB on disk, 2 to 4 minutes.'
 	$(PYTHON) -m venv .venv
 	$(PIP) -e .
 	@$(BIN)/python -I $(SYSTEM_CHECK) --imports

@@ -178,7 +178,8 @@ def _edge_peak(file: h5py.File, contents: Contents) -> str:
         for name in contents.names
     }
     name = max(peaks, key=lambda name: peaks[name])
-    text = f"Edge peak on the {name}: {peaks[name]:.0f} MPa"
+    place = "" if contents.line else " at y = 0"
+    text = f"Edge peak on the {name}{place}: {peaks[name]:.0f} MPa"
     if name in contents.coarse:
         coarse = file["contact"][name]["coarse"]
         peak = middle(coarse["pressure"][()], 0).max()
