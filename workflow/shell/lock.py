@@ -11,6 +11,7 @@ from __future__ import annotations
 import json
 import os
 import socket
+import stat
 import sys
 import time
 from collections.abc import Iterator
@@ -37,9 +38,7 @@ def locked(root: Path, patience: float = 0.0, take_over: bool = False) -> Iterat
     Waits so many seconds for a process that works there. Whoever is to ``take_over`` knows that
     processes of other machines have gone. Raises UserError where the folder stays in use.
     """
-    if root.exists() and not root.is_dir():
-        raise UserError(f"{root}: is a file; give a folder to --out")
-    fresh = not root.exists()
+    fresh = not _is_folder(root)
     path = root / LOCK
     file, alone = _opened(path, patience)
     try:
@@ -62,15 +61,32 @@ def locked(root: Path, patience: float = 0.0, take_over: bool = False) -> Iterat
                 root.rmdir()
 
 
+def _is_folder(root: Path) -> bool:
+    """False where nothing is; raises UserError for what is no folder."""
+    # Looked at once: another process may remove it meanwhile.
+    try:
+        mode = root.stat().st_mode
+    except (FileNotFoundError, NotADirectoryError):
+        return False
+    if not stat.S_ISDIR(mode):
+        raise UserError(f"{root}: is a file; give a folder to --out")
+    return True
+
+
 def _opened(path: Path, patience: float) -> tuple[int, bool]:
     """The lock file, open, and whether the system says that no other process has it."""
     end = time.monotonic() + patience
     while True:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        check_regular(path)
+        # Its last holder may remove the folder, left empty, between any two of these steps.
         try:
+            path.parent.mkdir(parents=True, exist_ok=True)
+            check_regular(path)
             file = os.open(path, FLAGS, 0o666)
-        except FileNotFoundError:  # its last holder has just removed the folder, left empty
+        except FileNotFoundError:
+            continue
+        except FileExistsError:
+            if not _is_folder(path.parent) and path.parent.is_symlink():
+                raise  # to nowhere
             continue
         try:
             if sys.platform != "win32":
