@@ -107,7 +107,7 @@ def test_profiles_show_all_three_methods(results: Path) -> None:
         # Two rows of 20 nodes lie next to y = 0.
         assert len(lines["finite elements, unworn"].get_xdata()) == 40
         peak = file["contact/intrados/00000/pressure"][()][:, 20].max()
-        assert f"intrados: {peak:.0f} MPa" in title(figure)
+        assert f"intrados at y = 0: {peak:.0f} MPa" in title(figure)
 
 
 def test_kinetics_mark_what_is_extrapolated(results: Path) -> None:
