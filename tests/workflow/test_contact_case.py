@@ -77,6 +77,10 @@ WRONG = [
      "shape: heights, file: none.npy", "structure.file", "no such file"),
     ("heights of another kind", BALL, "shape: sphere, radius: 10 mm",
      "shape: heights, file: none.tif", "structure.file", ".npy, .csv, .h5"),
+    ("shear without friction", BALL, "friction: {coefficient: 0.7}\n", "", "friction",
+     "missing, but load_path has Qx"),
+    ("unlike bodies without friction", BALL.replace(*RIGID_2).replace("Qx: 210 N", "Mx: 1 N*mm"),
+     "friction: {coefficient: 0.7}\n", "", "friction", "missing, but unlike bodies rub"),
     ("wear in a contact case", BALL, "contact:", "wear: {law: energy}\ncontact:", "wear",
      "unknown key"),
 ]  # fmt: skip

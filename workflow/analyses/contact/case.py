@@ -13,10 +13,10 @@ from typing import Annotated, ClassVar, Literal, Self
 import numpy as np
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from sa_solver.types import Array, Grid
+from sa_solver.types import Array, ElasticPair, Grid
 from sa_solver.types import Material as ElasticMaterial
 from workflow.analyses.contact.load_path import ContactPath, LegsOrFile, LineContactPath
-from workflow.analyses.contact.load_table import LoadTable
+from workflow.analyses.contact.load_table import PRESSING, LoadTable
 from workflow.case.doubts import heights, hertz, pressed, uneven_cells
 from workflow.case.fields import File, Quantity
 from workflow.case.input_files import InputFileError, read_heights
@@ -268,9 +268,24 @@ class BodiesCase(Case):
     analysis: Literal["contact"] = entry("what is computed", "contact")
     structure: Bodies
     materials: BodyMaterials = entry("the two bodies in contact")
-    friction: Friction = entry("Coulomb's law")
+    friction: Friction = entry(
+        "Coulomb's law; like bodies that are only pressed do without",
+        default=Friction(coefficient=0.0),
+    )
     load_path: LegsOrFile
     contact: HalfSpaceGrid
+
+    @model_validator(mode="after")
+    def _rubs_with_friction(self) -> Self:
+        """Refuse what slides, or would if it could, where nobody has said how."""
+        if "friction" in self.model_fields_set:
+            return self
+        pair = ElasticPair(elastic(self.materials.body_1), elastic(self.materials.body_2))
+        sheared = sorted(set(self.load_path.table().columns) - set(PRESSING))
+        if sheared or not pair.similar:
+            why = f"load_path has {', '.join(sheared)}" if sheared else "unlike bodies rub"
+            raise disagreement(f"missing, but {why}; allowed: a coefficient, or 0", "friction")
+        return self
 
     @model_validator(mode="after")
     def _can_run(self) -> Self:
@@ -292,7 +307,7 @@ class BodiesCase(Case):
             ("load path", f"{count} of {', '.join(table.columns)}"),
             ("loads", ", ".join(self.load_path.ranges())),
             *of_bodies("material", self.materials),
-            ("friction", f"{self.friction.coefficient:g}"),
+            ("friction", f"{self.friction.coefficient:g}" if self.friction.coefficient else "none"),
             ("contact", f"{cells}, history {self.contact.history}"),
         ]
 

@@ -13,6 +13,8 @@ from sa_solver.types import Array
 FORCES = ("P", "Qx", "Qy", "Mx", "My", "Mz")
 # Rigid motions conjugate to them, in the same order.
 MOTIONS = ("approach", "shift_x", "shift_y", "tilt_x", "tilt_y", "twist")
+# Those of them that only press.
+PRESSING = ("P", "Mx", "My", "approach", "tilt_x", "tilt_y")
 
 
 @dataclass(frozen=True)
