@@ -206,6 +206,17 @@ def long_test(
     cycle dissipates nothing the energy stays for good. Raises InputError for cycles, energies or a
     tolerance that make no sense, AgeingError for an energy per cycle that is negative, not finite
     or too rough to be jumped, NeverReachedError for an energy never reached, cycles not limited.
+
+    Examples
+    --------
+    Where a cycle dissipates c (1 + E/E0), the energy comes to E0 ((1 + c/E0)^N - 1) in N cycles:
+
+    >>> from wear.joints import long_test
+    >>> test = long_test(lambda energy: 0.01 * (1.0 + energy / 1e3), cycles=1e5)
+    >>> print(f"{test.final_energy:.2f} N mm of {1e3 * ((1.0 + 1e-5) ** 1e5 - 1.0):.2f}")
+    1718.27 N mm of 1718.27
+    >>> print(f"{test.evaluations} cycles were computed")
+    144 cycles were computed
     """
     if not cycles > 0.0:
         raise InputError(f"{cycles:g} cycles; allowed: more than 0")
@@ -353,7 +364,20 @@ def _through(values: Array, domain: tuple[float, float]) -> Chebyshev:
 
 
 def steady_stroke(law: UniaxialLaw, evolution: JointEvolution, amplitude: float) -> EnergyPerCycle:
-    """Energy per cycle of one joint between ±``amplitude`` [mm], from its law's closed form."""
+    """Energy per cycle of one joint between ±``amplitude`` [mm], from its law's closed form.
+
+    Examples
+    --------
+    A Jenkins element whose friction stays dissipates 4 µN (A - µN/kt) in every cycle:
+
+    >>> from wear.joints import Jenkins, JointEvolution, long_test, steady_stroke
+    >>> law = Jenkins(stiffness=1e4, friction=0.5, normal_load=100.0)
+    >>> steady = steady_stroke(law, JointEvolution(), amplitude=0.01)
+    >>> print(steady(0.0), "N mm of", 4.0 * 50.0 * (0.01 - 50.0 / 1e4))
+    1.0 N mm of 1.0
+    >>> print(f"{long_test(steady, cycles=1e6).final_energy:.0f} N mm")
+    1000000 N mm
+    """
 
     def energy_per_cycle(energy: float) -> float:
         return float(evolution.at(law, energy).loop_energy(amplitude))

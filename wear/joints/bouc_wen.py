@@ -209,6 +209,17 @@ class BoucWen(UniaxialLaw):
     A state's columns are displacement [mm] and ξ; with other parameters the force becomes theirs at
     the same ξ, and what that releases is not counted as dissipated. An increment of nothing gives
     the mean of the tangents forwards and backwards.
+
+    Examples
+    --------
+    With σ = 1/2 and n = 2 it is first loaded as µN tanh(kt x / µN):
+
+    >>> import numpy as np
+    >>> from wear.joints import BoucWen, march_joints
+    >>> law = BoucWen(stiffness=1e4, friction=0.5, normal_load=100.0)
+    >>> history = march_joints(law, law.rest(1), np.zeros((1, 1)), np.full((1, 1, 1), 0.005))
+    >>> print(f"{history.force[0, 0, 0]:.3f} N of {50.0 * np.tanh(1.0):.3f}")
+    38.080 N of 38.080
     """
 
     columns = 2

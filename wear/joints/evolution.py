@@ -48,7 +48,18 @@ class WearFunction(Protocol):
 
 @dataclass(frozen=True)
 class LogarithmicEvolution:
-    """1 + a ln(1 + b E): ``change`` a, ``rate`` b [1/(N mm)], not negative."""
+    """1 + a ln(1 + b E): ``change`` a, ``rate`` b [1/(N mm)], not negative.
+
+    Examples
+    --------
+    Friction that rises by 10 % for each factor e of energy, once beyond 1/b:
+
+    >>> import numpy as np
+    >>> from wear.joints import LogarithmicEvolution
+    >>> friction = LogarithmicEvolution(change=0.1, rate=1.0)
+    >>> print(f"{friction(np.e * 1e4) - friction(1e4):.4f}")
+    0.1000
+    """
 
     change: float
     rate: float
@@ -63,7 +74,18 @@ class LogarithmicEvolution:
 
 @dataclass(frozen=True)
 class ArrheniusEvolution:
-    """1 + a exp(-b / E): ``change`` a, reached late; ``scale`` b [N mm], above 0. 1 for E = 0."""
+    """1 + a exp(-b / E): ``change`` a, reached late; ``scale`` b [N mm], above 0. 1 for E = 0.
+
+    Examples
+    --------
+    A stiffness that falls by 30 % in the end, and by 1/e of that while ``scale`` is dissipated:
+
+    >>> import numpy as np
+    >>> from wear.joints import ArrheniusEvolution
+    >>> stiffness = ArrheniusEvolution(change=-0.3, scale=1.5e5)
+    >>> print(f"{stiffness(1.5e5):.4f} of {1.0 - 0.3 * np.exp(-1.0):.4f}")
+    0.8896 of 0.8896
+    """
 
     change: float
     scale: float
@@ -83,7 +105,16 @@ class ArrheniusEvolution:
 
 @dataclass(frozen=True)
 class LinearEvolution:
-    """1 + a E: ``slope`` a [1/(N mm)]."""
+    """1 + a E: ``slope`` a [1/(N mm)].
+
+    Examples
+    --------
+    Fantetti's macroslip slope after a kilojoule, 1e6 N mm:
+
+    >>> from wear.joints import LinearEvolution
+    >>> print(LinearEvolution(slope=2.4e-7)(1e6))
+    1.24
+    """
 
     slope: float
 
@@ -97,6 +128,16 @@ class ExponentialEvolution:
 
     ``share`` b is that of the ``rate`` c [1/(N mm)], the rest that of ``second_rate`` d; with all
     of it, as by default, it is a single exponential. Rates are not above 0.
+
+    Examples
+    --------
+    A bolt that keeps 40 % of its preload, and of the rest 1/e once a kilojoule is dissipated:
+
+    >>> import numpy as np
+    >>> from wear.joints import ExponentialEvolution
+    >>> preload = ExponentialEvolution(final=0.4, rate=-1e-6)
+    >>> print(f"{preload(1e6):.4f} of {0.4 + 0.6 * np.exp(-1.0):.4f}")
+    0.6207 of 0.6207
     """
 
     final: float
@@ -122,6 +163,15 @@ class TabulatedEvolution:
 
     Linear between them, hence as monotone as they are, and constant beyond both ends. Raises
     InputError for no or unequal columns or energies that do not ascend.
+
+    Examples
+    --------
+    Values measured three times during a test, linear between them:
+
+    >>> from wear.joints import TabulatedEvolution
+    >>> friction = TabulatedEvolution(energies=(0.0, 1e5, 1e6), values=(0.2, 0.6, 0.7))
+    >>> print(friction(5e4), friction(2e6))
+    0.4 0.7
     """
 
     energies: tuple[float, ...]
@@ -140,6 +190,23 @@ class JointEvolution:
 
     A function multiplies the initial value; a table replaces it. Those of None stay. No parameter
     falls below 0: what is worn to nothing stays so.
+
+    Examples
+    --------
+    A joint whose friction rises as ln E, and whose bolt loses preload:
+
+    >>> import numpy as np
+    >>> from wear.joints import ExponentialEvolution, Jenkins, JointEvolution, LogarithmicEvolution
+    >>> new = Jenkins(stiffness=1e4, friction=0.5, normal_load=100.0)
+    >>> evolution = JointEvolution(
+    ...     friction=LogarithmicEvolution(change=0.1, rate=1.0),
+    ...     normal_load=ExponentialEvolution(final=0.4, rate=-1e-6),
+    ... )
+    >>> worn = evolution.at(new, 1e6)
+    >>> print(f"µ = {worn.friction:.4f} of {0.5 * (1.0 + 0.1 * np.log(1e6 + 1.0)):.4f}")
+    µ = 1.1908 of 1.1908
+    >>> print(f"N = {worn.normal_load:.3f} N of {100.0 * (0.4 + 0.6 * np.exp(-1.0)):.3f}")
+    N = 62.073 N of 62.073
     """
 
     stiffness: WearFunction | None = None

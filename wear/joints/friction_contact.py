@@ -413,6 +413,19 @@ class FrictionContact(CompiledLaw):
     position of the slider, and the approach z [mm]. They outlive a change of the parameters: with a
     smaller limit the slider slips at the beginning of the next increment, and the energy that frees
     is dissipated in it. An increment of zero has the tangent of sticking.
+
+    Examples
+    --------
+    A contact that closes by 5 µm and is then pulled aside: it slides along the pull, at µ kn 5 µm.
+
+    >>> import numpy as np
+    >>> from wear.joints import FrictionContact, march_joints
+    >>> law = FrictionContact(stiffness=1e4, normal_stiffness=2e4, friction=0.5, gap=0.001)
+    >>> path = np.array([[[0.0, 0.0, 0.006]], [[0.03, 0.04, 0.006]]])
+    >>> history = march_joints(law, law.rest(1), np.zeros((1, 3)), path)
+    >>> print(history.force[:, 0].round(9))
+    [[  0.   0. 100.]
+     [ 30.  40. 100.]]
     """
 
     directions = columns = 3

@@ -16,6 +16,17 @@ class UniformIwan(MasingLaw):
 
     First loaded, T = (K + kr) d - (K d)² / (4 µN) up to d = 2 µN/K, where the last slider slips,
     and µN + kr d beyond. (Li prints 2 µN/(K + kr), at which the curve would jump.)
+
+    Examples
+    --------
+    It is first loaded as K d - (K d)² / (4 µN):
+
+    >>> import numpy as np
+    >>> from wear.joints import UniformIwan, march_joints
+    >>> law = UniformIwan(stiffness=1e4, friction=0.5, normal_load=100.0)
+    >>> history = march_joints(law, law.rest(1), np.zeros((1, 1)), np.full((1, 1, 1), 0.005))
+    >>> print(f"{history.force[0, 0, 0]:.3f} N of {50.0 - 50.0**2 / 200.0:.3f}")
+    37.500 N of 37.500
     """
 
     @property
@@ -31,6 +42,15 @@ class FourParameterIwan(MasingLaw):
     stiffness of the sliders that slip together, last of all, over that of the others. Segalman's
     F_S is µN and his K_T is ``stiffness``; the last slip at φ = µN (1 + β) / (K (β + (χ+1)/(χ+2))).
     DOI 10.1115/1.1989354.
+
+    Examples
+    --------
+    A small loop loses energy as its amplitude to the power χ + 3:
+
+    >>> from wear.joints import FourParameterIwan
+    >>> law = FourParameterIwan(stiffness=1e4, friction=0.5, normal_load=100.0, chi=-0.5)
+    >>> print(f"{law.loop_energy(2e-3) / law.loop_energy(1e-3):.4f} of {2.0**2.5:.4f}")
+    5.6569 of 5.6569
     """
 
     chi: Parameter = -0.5

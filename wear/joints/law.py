@@ -37,7 +37,29 @@ class JointResponse:
 
 
 class JointLaw(Protocol):
-    """A joint law with its parameters."""
+    """A joint law with its parameters.
+
+    Examples
+    --------
+    Laws that have it are ``Jenkins``, ``BoucWen``, ``UniformIwan``, ``FourParameterIwan`` and
+    ``FrictionContact``. One of one's own, a spring:
+
+    >>> import numpy as np
+    >>> from wear.joints import march_joints
+    >>> from wear.joints.law import JointResponse
+    >>> class Spring:
+    ...     directions = 1
+    ...     def rest(self, joints):
+    ...         return np.zeros((joints, 1))
+    ...     def respond(self, state, increment):
+    ...         stretch = state + increment
+    ...         return JointResponse(
+    ...             1e4 * stretch, np.full((len(state), 1, 1), 1e4), stretch, np.zeros(len(state))
+    ...         )
+    >>> law, path = Spring(), np.array([0.01, -0.01]).reshape(2, 1, 1)
+    >>> print(march_joints(law, law.rest(1), np.zeros((1, 1)), path).force.ravel())
+    [ 100. -100.]
+    """
 
     @property
     def directions(self) -> int:
@@ -69,7 +91,20 @@ class JointHistory:
 def march_joints(
     law: JointLaw, state: JointState, start: Array, displacement: Array
 ) -> JointHistory:
-    """March joints through ``displacement`` ``(t, n, d)`` [mm], from ``start`` ``(n, d)``."""
+    """March joints through ``displacement`` ``(t, n, d)`` [mm], from ``start`` ``(n, d)``.
+
+    Examples
+    --------
+    Two joints to and fro, of which the second only sticks: it dissipates nothing.
+
+    >>> import numpy as np
+    >>> from wear.joints import Jenkins, march_joints
+    >>> law = Jenkins(stiffness=1e4, friction=0.5, normal_load=np.array([100.0, 400.0]))
+    >>> path = np.repeat([[[0.01]], [[-0.01]], [[0.01]]], 2, axis=1)
+    >>> history = march_joints(law, law.rest(2), np.zeros((2, 1)), path)
+    >>> print(history.dissipated[1:].sum(axis=0), "of", law.loop_energy(0.01))
+    [1. 0.] of [1. 0.]
+    """
     forces, dissipated = np.empty(displacement.shape), np.empty(displacement.shape[:2])
     for step, increment in enumerate(np.diff(displacement, axis=0, prepend=start[None])):
         response = law.respond(state, increment)

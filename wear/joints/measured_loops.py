@@ -177,6 +177,21 @@ def measure_loops(
     they slide, and how their stick branches bend, is found for all together. Raises
     MeasuredLoopError for a record without a complete cycle, with too few samples after a reversal,
     or whose loops give energy instead of taking it.
+
+    Examples
+    --------
+    Two cycles of a joint of known friction and stiffness:
+
+    >>> import numpy as np
+    >>> from wear.joints import Jenkins, march_joints, measure_loops
+    >>> law = Jenkins(stiffness=1e4, friction=0.5, normal_load=100.0)
+    >>> motion = 0.03 * np.sin(2.0 * np.pi * np.arange(401) / 160)
+    >>> record = march_joints(law, law.rest(1), np.zeros((1, 1)), motion[:, None, None])
+    >>> loops = measure_loops(motion, record.force.ravel(), normal_load=100.0)
+    >>> print(f"µ = {loops.friction.mean():.4f}, kt = {loops.stick_estimate.value:.0f} N/mm")
+    µ = 0.5000, kt = 10000 N/mm
+    >>> print(f"{loops.energy.mean():.3f} N mm of {law.loop_energy(0.03):.3f}")
+    4.998 N mm of 5.000
     """
     record, branches = complete_branches(loop_record(displacement, force, normal_load, time))
     rises = [WINDOW * record.rise(branch) for branch in branches]
