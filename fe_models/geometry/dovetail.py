@@ -51,6 +51,22 @@ class Dovetail:
     straight to the ends. ``rim_radius`` is the radius of the top of the flanks; ``lug_height`` the
     disk above it, ``disk_height`` below it; ``root_depth`` the blade below the flanks,
     ``slot_clearance`` the play under the root.
+
+    Examples
+    --------
+    Beyond the flat of its flank the gap is that of a circular edge:
+
+    >>> import numpy as np
+    >>> from fe_models.geometry import Dovetail
+    >>> joint = Dovetail(
+    ...     flank_angle=np.radians(45.0), flank_length=3.0, edge_radius=20.0, edge_width=1.0,
+    ...     neck_width=8.0, neck_fillet=2.0, root_depth=5.0, shank_height=10.0, slot_length=20.0,
+    ...     slot_fillet=2.0, slot_clearance=1.0, lug_height=5.0, disk_height=20.0,
+    ...     rim_radius=300.0, blades=60,
+    ... )
+    >>> gap = joint.flank_gap(np.array([0.0, 2.0]), np.zeros(2), side=1)
+    >>> print(gap.round(6), "of", round(20.0 - np.sqrt(20.0**2 - 0.5**2), 6))
+    [0.       0.006251] of 0.006251
     """
 
     flank_angle: float

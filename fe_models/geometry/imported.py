@@ -35,6 +35,28 @@ class ImportedMesh:
 
     ``node_numbers`` ``(n,)`` are the file's own numbers of each body's vertices; ``points`` the
     vertices in each named node set of the file that has any on that body.
+
+    Examples
+    --------
+    A body of one tetrahedron, in Abaqus' format:
+
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from fe_models.geometry import read_bodies
+    >>> text = '''*NODE
+    ... 10, 0, 0, 0
+    ... 20, 6, 0, 0
+    ... 30, 0, 6, 0
+    ... 40, 0, 0, 6
+    ... *ELEMENT, TYPE=C3D4, ELSET=wedge
+    ... 1, 10, 20, 30, 40
+    ... '''
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder, "wedge.inp")
+    ...     _ = file.write_text(text)
+    ...     imported = read_bodies(file)
+    >>> print(imported.node_numbers["wedge"], imported.bodies["wedge"].points[1])
+    [10 20 30 40] [6. 0. 0.]
     """
 
     bodies: dict[str, Body]
@@ -67,6 +89,30 @@ def read_bodies(path: Path, size: float | None = None) -> ImportedMesh:
 
     Raises :class:`MeshError` if the file cannot be read; a body has flat, folded or duplicate
     elements or falls into pieces; bodies share nodes; or a boundary is not on the surface of one.
+
+    Examples
+    --------
+    A plane quadrilateral of 4 mm by 3 mm becomes two triangles; an edge of it is named:
+
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from fe_models.geometry import read_bodies
+    >>> text = '''*NODE
+    ... 1, 0, 0, 0
+    ... 2, 4, 0, 0
+    ... 3, 4, 3, 0
+    ... 4, 0, 3, 0
+    ... *ELEMENT, TYPE=CPE4, ELSET=plate
+    ... 1, 1, 2, 3, 4
+    ... *SURFACE, NAME=side
+    ... plate, S2
+    ... '''
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder, "plate.inp")
+    ...     _ = file.write_text(text)
+    ...     plate = read_bodies(file).bodies["plate"]
+    >>> print(plate.mesh.nelements, "triangles,", plate.outward("side")[:, 0], "mm of side")
+    2 triangles, [3.] mm of side
     """
     path = Path(path)
     grouped = _grouped(path, size)
@@ -97,7 +143,30 @@ def _grouped(path: Path, size: float | None) -> GroupedMesh:
 
 
 def describe_bodies(imported: ImportedMesh) -> list[str]:
-    """Lines that list bodies, boundaries and node sets with their size and place."""
+    """Lines that list bodies, boundaries and node sets with their size and place.
+
+    Examples
+    --------
+    A body of one tetrahedron, in Abaqus' format, whose volume is 6³/6:
+
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from fe_models.geometry import describe_bodies, read_bodies
+    >>> text = '''*NODE
+    ... 10, 0, 0, 0
+    ... 20, 6, 0, 0
+    ... 30, 0, 6, 0
+    ... 40, 0, 0, 6
+    ... *ELEMENT, TYPE=C3D4, ELSET=wedge
+    ... 1, 10, 20, 30, 40
+    ... '''
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     file = Path(folder, "wedge.inp")
+    ...     _ = file.write_text(text)
+    ...     for line in describe_bodies(read_bodies(file)):
+    ...         print(line)
+    body wedge: 4 nodes, 1 tetrahedra, volume 36 mm³
+    """
     lines = []
     for name, body in imported.bodies.items():
         volume = float(np.abs(element_volumes(body.mesh)).sum())

@@ -51,6 +51,16 @@ class Specimen:
     ``ring_nodes`` points are kept on the circumference where the holder ends, ``ring_distance``
     from the contact plane. The pad has ``pad_elements`` squares along each side. ``radii`` are
     those of the strip's form along and across the strip, None if it is flat.
+
+    Examples
+    --------
+    The pad is as wide as the strips, and so are the areas of its nodes together:
+
+    >>> from fe_models.geometry import Specimen
+    >>> mesh = Specimen(strip_width=1.2, pad_elements=2, length=10.0).mesh(size=4.0)
+    >>> (pad,) = mesh.interfaces
+    >>> print(len(pad), f"nodes, {pad.nodal_areas.sum():.4f} mm² of {1.2**2:.4f}")
+    9 nodes, 1.4400 mm² of 1.4400
     """
 
     diameter: float = 8.0
