@@ -18,6 +18,19 @@ class Constraints:
     Where supports meet, each adds what the earlier ones leave free: a node that slides on two
     planes moves along their edge, one that is held stays held. Only displacements that nothing
     constrains yet can be averaged: tie nodes last.
+
+    Examples
+    --------
+    Node 0 is held, node 1 slides on a plane at 45°, and node 2 is the mean of both:
+
+    >>> import numpy as np
+    >>> from fe_models import Constraints
+    >>> constraints = Constraints(3, dimension=2)
+    >>> constraints.hold(np.array([0]))
+    >>> constraints.slide(np.array([1]), np.array([[1.0, 1.0]]))
+    >>> constraints.average(np.array([2]), np.array([[0, 1]]))
+    >>> print(constraints.transformation().toarray().ravel())
+    [ 0.   0.  -1.   1.  -0.5  0.5]
     """
 
     def __init__(self, nodes: int, dimension: int = 3) -> None:

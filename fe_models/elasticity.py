@@ -39,6 +39,24 @@ class ElasticBody:
 
     Triangles are in plane strain; their forces are per length. ``order`` is that of the elements,
     1 or 2. Vertices are the first nodes; with order 2 the midsides follow.
+
+    Examples
+    --------
+    A cube of 1 mm³ that is stretched by ε in one direction only: stress, and force on a face, are
+    (λ + 2 G) ε.
+
+    >>> import numpy as np
+    >>> from skfem import MeshTet
+    >>> from fe_models import Body, ElasticBody
+    >>> from sa_solver import Material
+    >>> steel = Material(young=210e3, poisson=0.3)
+    >>> cube = ElasticBody(Body("cube", MeshTet().refined(1)), steel)
+    >>> stretched = (1e-3 * cube.nodes * [0.0, 0.0, 1.0]).ravel()
+    >>> exact = 1e-3 * (steel.lame + 2.0 * steel.shear_modulus)
+    >>> forces = (cube.stiffness @ stretched).reshape(-1, 3)
+    >>> force = forces[cube.nodes[:, 2] == 1.0, 2].sum()
+    >>> print(f"{cube.stress(stretched)[2].mean():.3f} MPa, {force:.3f} N of {exact:.3f}")
+    282.692 MPa, 282.692 N of 282.692
     """
 
     def __init__(self, body: Body, material: Material, order: int = 1) -> None:

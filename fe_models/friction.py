@@ -52,7 +52,21 @@ class FrictionState:
 
 
 class FrictionalJoint:
-    """A joint with friction coefficient µ, one or by node ``(n,)``, for any gaps and loads."""
+    """A joint with friction coefficient µ, one or by node ``(n,)``, for any gaps and loads.
+
+    Examples
+    --------
+    One node on springs of 100 N/mm is pressed by 10 N, and then pulled off by as much:
+
+    >>> import numpy as np
+    >>> from fe_models import FrictionalJoint, JointStiffness
+    >>> springs = JointStiffness(100.0 * np.eye(3), np.eye(3)[:, 2:], 0, 100.0, 100.0)
+    >>> joint = FrictionalJoint(springs.resolvent(), friction=0.4)
+    >>> for state in joint.march(np.array([[10.0], [-10.0]]), gap=np.zeros(1)):
+    ...     print(f"{state.force[2, 0]:.3f} N, {state.displacement[2, 0]:.3f} mm apart")
+    10.000 N, 0.000 mm apart
+    0.000 N, 0.100 mm apart
+    """
 
     def __init__(self, joint: JointResolvent, friction: float | Array) -> None:
         self._joint, self._friction = joint, friction

@@ -45,6 +45,17 @@ class JointStiffness:
     displacements that ``held`` ``(d n,)`` marks, which stay zero, there are no rows and columns. A
     joint with a mirror symmetry, which holds none, is split into its symmetric and antisymmetric
     parts.
+
+    Examples
+    --------
+    A node on springs of 100 N/mm: with the splitting's ρ, the mean of the extreme eigenvalues, its
+    resolvent is 1 / (100 + 100).
+
+    >>> import numpy as np
+    >>> from fe_models import JointStiffness
+    >>> springs = JointStiffness(100.0 * np.eye(3), np.eye(3)[:, 2:], 0, 100.0, 100.0)
+    >>> print(springs.resolvent().rho, np.diag(springs.resolvent().inverse))
+    100.0 [0.005 0.005 0.005]
     """
 
     stiffness: Array | SplitMatrix

@@ -41,6 +41,19 @@ class Body:
     """One meshed body: tetrahedra, or triangles in the plane (X, Z) for plane strain.
 
     Its named boundaries are those of the mesh.
+
+    Examples
+    --------
+    A cube of 2 mm and its top, whose facets are as large as the face together:
+
+    >>> import numpy as np
+    >>> from skfem import MeshTet
+    >>> from fe_models import Body
+    >>> side = np.linspace(0.0, 2.0, 3)
+    >>> mesh = MeshTet.init_tensor(side, side, side)
+    >>> cube = Body("cube", mesh.with_boundaries({"top": lambda x: x[2] == 2.0}))
+    >>> print(cube.outward("top").sum(axis=0), len(cube.vertices("top")), "vertices")
+    [0. 0. 4.] 9 vertices
     """
 
     name: str
@@ -153,6 +166,22 @@ class Interface(Face):
     ``face_1`` is body 1's own face and ``areas`` ``(n,)`` what it covers of each node's area [mm²].
     Planes of symmetry may cut it: ``planes`` are the axes of the frame that are normal to them, and
     the frame's origin is on them (:mod:`fe_models.cut_face`).
+
+    Examples
+    --------
+    Two cubes that meet node to node over 1 mm²:
+
+    >>> import numpy as np
+    >>> from skfem import MeshTet
+    >>> from fe_models import Body
+    >>> from fe_models.mesh import matched_interface
+    >>> from sa_solver import Frame
+    >>> mesh = MeshTet().refined(1).with_boundaries({"contact": lambda x: x[2] == 0.0})
+    >>> upper, lower = Body("upper", mesh), Body("lower", mesh.mirrored((0.0, 0.0, 1.0)))
+    >>> frame = Frame(np.zeros(3), np.eye(3))
+    >>> face = matched_interface("joint", lower, upper, "contact", frame)
+    >>> print(len(face), f"nodes, {face.nodal_areas.sum():.3f} mm²")
+    9 nodes, 1.000 mm²
     """
 
     nodes_1: Indices
@@ -177,7 +206,25 @@ class Interface(Face):
 
 @dataclass(frozen=True)
 class StructureMesh:
-    """Body 1 and body 2, and the interfaces between them."""
+    """Body 1 and body 2, and the interfaces between them.
+
+    Examples
+    --------
+    Two cubes on each other:
+
+    >>> import numpy as np
+    >>> from skfem import MeshTet
+    >>> from fe_models import Body, StructureMesh
+    >>> from fe_models.mesh import matched_interface
+    >>> from sa_solver import Frame
+    >>> mesh = MeshTet().with_boundaries({"contact": lambda x: x[2] == 0.0})
+    >>> upper, lower = Body("upper", mesh), Body("lower", mesh.mirrored((0.0, 0.0, 1.0)))
+    >>> frame = Frame(np.zeros(3), np.eye(3))
+    >>> face = matched_interface("joint", lower, upper, "contact", frame)
+    >>> cubes = StructureMesh(lower, upper, (face,))
+    >>> print(cubes.node_count(order=1), "nodes,", cubes.node_count(order=2), "with midsides")
+    16 nodes, 52 with midsides
+    """
 
     body_1: Body
     body_2: Body

@@ -115,6 +115,15 @@ class FrettingConditions:
     """What is done to the pair in every cycle.
 
     ``force`` normal [N], ``stroke`` of body 2's ring along x, peak to peak [mm], ``friction`` µ.
+
+    Examples
+    --------
+    17 N, a stroke of 20 µm, µ = 0.8: where nothing gives a cycle dissipates 2 µ F times the stroke.
+
+    >>> from fe_models import FrettingConditions
+    >>> conditions = FrettingConditions(force=17.0, stroke=0.02, friction=0.8)
+    >>> print(f"{2.0 * conditions.friction * conditions.force * conditions.stroke:.3f} N mm")
+    0.544 N mm
     """
 
     force: float
@@ -166,6 +175,22 @@ class ReducedPair:
     """Two specimens on the nodes of their pads.
 
     ``compliance`` ``(n, 3, n, 3)`` [mm/N] is A, in the axes of ``face``.
+
+    Examples
+    --------
+    Three nodes on springs, 500 N/mm each for both bodies together, pressed by 30 N, that fret by
+    ±0.05 mm with µ = 0.5: they dissipate 4 µF (A - µF/k).
+
+    >>> import numpy as np
+    >>> from fe_models import FrettingConditions, ReducedPair
+    >>> from fe_models.mesh import Face
+    >>> from sa_solver import Frame
+    >>> frame, corners = Frame(np.zeros(3), np.eye(3)), np.array([[0, 0], [1.0, 0], [0, 1.0]])
+    >>> face = Face("pad", frame, corners, np.array([[0, 1, 2]]))
+    >>> pair = ReducedPair.from_stiffness(face, 1e3 * np.eye(9), 1e3 * np.eye(9))
+    >>> cycle = pair.fretting_cycle(np.zeros(3), FrettingConditions(30.0, 0.1, 0.5))
+    >>> print(f"{cycle.energy:.3f} N mm of {4.0 * 15.0 * (0.05 - 15.0 / 1500.0):.3f}")
+    2.400 N mm of 2.400
     """
 
     face: Face

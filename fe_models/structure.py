@@ -85,7 +85,40 @@ class CycleSolution:
 
 @dataclass(frozen=True)
 class Structure:
-    """Body 1 is held by its supports, body 2 by contact and what supports it has."""
+    """Body 1 is held by its supports, body 2 by contact and what supports it has.
+
+    Examples
+    --------
+    Two plane blocks on each other, the lower held, the upper pressed by 5 and 10 MPa over
+    1 mm: the contact carries as much.
+
+    >>> import numpy as np
+    >>> from skfem import MeshTri
+    >>> from fe_models import *
+    >>> from fe_models.mesh import matched_interface
+    >>> from fe_models.supported_body import interface_nodes
+    >>> from sa_solver import Frame, Material
+    >>> steel, side = Material(210e3, 0.3), np.linspace(0.0, 1.0, 4)
+    >>> ends = {"contact": lambda x: x[1] == 0.0, "end": lambda x: abs(x[1]) == 1.0}
+    >>> lower, upper = (
+    ...     ElasticBody(Body("block", MeshTri.init_tensor(side, z).with_boundaries(ends)), steel)
+    ...     for z in (side - 1.0, side)
+    ... )
+    >>> frame = Frame(np.array([0.5, 0.0, 0.0]), np.eye(3))
+    >>> face = matched_interface("joint", lower.body, upper.body, "contact", frame)
+    >>> held, free = Constraints(len(lower.nodes), 2), Constraints(len(upper.nodes), 2)
+    >>> held.hold(lower.boundary_nodes("end"))
+    >>> nothing, pressed = np.zeros((lower.size, 1)), upper.pressure_load("end")[:, None]
+    >>> structure = Structure(
+    ...     StructureMesh(lower.body, upper.body, (face,)),
+    ...     SupportedBody(lower, held, *interface_nodes([face], 1, lower.body), nothing),
+    ...     SupportedBody(upper, free, *interface_nodes([face], 2, upper.body), pressed),
+    ... )
+    >>> joint = FrictionalJoint(structure.condense().resolvent(), friction=0.5)
+    >>> cycle = structure.solve_cycle(joint, np.array([[5.0], [10.0]]), structure.gap(), 0.5)
+    >>> print(cycle.histories[0].loads.P.round(4), "N/mm")
+    [ 5. 10.] N/mm
+    """
 
     mesh: StructureMesh
     body_1: SupportedBody
