@@ -13,7 +13,8 @@ ROOT = Path(__file__).parent.parent
 FACES = ["sa_solver", "wear", "wear.joints"]
 FACES += ["fe_models", "fe_models.dynamics", "fe_models.geometry", "fretscale"]
 LARGEST = 28
-WITH_EXAMPLES = ["sa_solver", "wear", "wear.joints", "fe_models", "fe_models.geometry"]
+WITH_EXAMPLES = ["sa_solver", "wear", "wear.joints"]
+WITH_EXAMPLES += ["fe_models", "fe_models.dynamics", "fe_models.geometry"]
 # Protocols and bases, and what the examples of its neighbours show at work.
 WITHOUT_EXAMPLE = {"Observer", "WearLaw", "Contacts", "CoupledState", "ImplicitStepper"}
 WITHOUT_EXAMPLE |= {"InterfaceSettings", "SecondOrderStepper"}

@@ -58,6 +58,22 @@ class ContinuationControl:
     ``first``, ``least`` and ``most`` sizes; ``iterations`` of Newton's method that are wanted, and
     ``max_iterations``, after which a step is halved; ``max_angle`` [degrees] by which the tangent
     may turn in one step; ``max_points`` on one curve. Each new λ is told to ``watch``.
+
+    Examples
+    --------
+    A branch whose points are limited says that it did not get to the end:
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import *
+    >>> from wear.joints import Jenkins, PeriodicMarch
+    >>> rig = lumped_rig({"m": 1e-3}, {Link("m"): 1e3}, [[Link("m")]], damping_ratio=0.02)
+    >>> load = PeriodicLoad({1: -1j * unit_force(rig, "m")})
+    >>> law = Jenkins(stiffness=1e3, friction=0.5, normal_load=10.0)
+    >>> problem = HarmonicBalance(rig, PeriodicMarch(law), load, Resolution((1,), 64))
+    >>> control = ContinuationControl(max_points=3)
+    >>> branch = along_frequency(problem, 1.0, (100.0, 300.0), control=control)
+    >>> print(branch.message.partition(" and ")[0], branch.frequencies.max() < 300.0)
+    the curve has 3 points True
     """
 
     first: float = 0.02

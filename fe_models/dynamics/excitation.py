@@ -34,7 +34,18 @@ class ExcitationForce(ABC):
 
 @dataclass(frozen=True)
 class ConstantForce(ExcitationForce):
-    """A signal that is always 1: ``shape`` is the force [N]."""
+    """A signal that is always 1: ``shape`` is the force [N].
+
+    Examples
+    --------
+    A load of 5 N on the first of two points:
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import ConstantForce
+    >>> print(ConstantForce(np.array([5.0, 0.0]))(np.array([0.0, 1.0])))
+    [[5. 0.]
+     [5. 0.]]
+    """
 
     def value(self, times: Array) -> Array:
         return np.ones_like(times)
@@ -46,6 +57,16 @@ class HarmonicForce(ExcitationForce):
 
     With a ``ramp`` [s] it grows from zero at t = 0 as (1 - cos(π t / ramp)) / 2. Raises
     :class:`ExcitationError` for a frequency that is not above zero or a negative ramp.
+
+    Examples
+    --------
+    A quarter of a period after it has grown in full it is at its amplitude:
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import HarmonicForce
+    >>> force = HarmonicForce(np.ones(1), amplitude=20.0, frequency=50.0, ramp=0.1)
+    >>> print(force(np.array([0.0, 0.105])).ravel())
+    [ 0. 20.]
     """
 
     amplitude: float
@@ -72,6 +93,17 @@ class HammerBlow(ExcitationForce):
     """Half a sine of height ``peak`` [N] from ``start`` on for ``duration`` [s].
 
     Raises :class:`ExcitationError` for a duration that is not above zero.
+
+    Examples
+    --------
+    The impulse of half a sine is 2/π of its peak times its duration:
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import HammerBlow
+    >>> blow = HammerBlow(np.ones(1), peak=100.0, duration=1e-3)
+    >>> times = np.linspace(0.0, 2e-3, 2001)
+    >>> print(f"{np.trapezoid(blow.value(times), times):.6f} N s of {0.2 / np.pi:.6f}")
+    0.063662 N s of 0.063662
     """
 
     peak: float
@@ -94,6 +126,16 @@ class RecordedForce(ExcitationForce):
 
     Raises :class:`ExcitationError` for no or unequal samples, for values that are not finite, or
     for times that do not ascend.
+
+    Examples
+    --------
+    A triangle of three samples:
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import RecordedForce
+    >>> force = RecordedForce(np.ones(1), np.array([0.0, 0.1, 0.2]), np.array([0.0, 10.0, 0.0]))
+    >>> print(force(np.array([0.05, 0.1, 0.3])).ravel())
+    [ 5. 10.  0.]
     """
 
     times: Array
@@ -116,7 +158,20 @@ class RecordedForce(ExcitationForce):
 
 @dataclass(frozen=True)
 class CombinedForces:
-    """The sum of one or more forces."""
+    """The sum of one or more forces.
+
+    Examples
+    --------
+    A load that stays and one that swings:
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import CombinedForces, ConstantForce, HarmonicForce
+    >>> point = np.array([1.0])
+    >>> swing = HarmonicForce(point, amplitude=2.0, frequency=50.0)
+    >>> force = CombinedForces((ConstantForce(5.0 * point), swing))
+    >>> print(force(np.array([0.0, 0.005, 0.015])).ravel())
+    [5. 7. 3.]
+    """
 
     forces: tuple[ExcitationForce, ...]
 

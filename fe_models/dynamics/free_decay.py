@@ -73,6 +73,18 @@ def ring_down(
     every ``step`` [s], without a force. Raises SignalError for a band outside 0 to half the
     sampling rate, too few samples, a decay too fast for the band, and a record that is over before
     the filter has settled.
+
+    Examples
+    --------
+    A mode of 100 Hz whose amplitude decays as exp(-ζ ω t) with ζ = 0.01:
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import ring_down
+    >>> time, omega = np.arange(4000) / 4000.0, 200.0 * np.pi
+    >>> response = np.exp(-0.01 * omega * time) * np.cos(omega * time)
+    >>> decay = ring_down(response, step=1 / 4000, band=(50.0, 150.0))
+    >>> print(f"{decay.frequency.mean():.2f} Hz, {decay.damping_ratio.mean():.4f}")
+    100.00 Hz, 0.0100
     """
     signal = _checked(response, step, band, periods)
     sections = butter(ORDER, band, "bandpass", fs=1.0 / step, output="sos")

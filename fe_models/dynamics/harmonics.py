@@ -38,6 +38,16 @@ class Resolution:
 
     Raises :class:`HarmonicBalanceError` for harmonics out of order, or for fewer samples than show
     the highest of them: two per period of it, and one more.
+
+    Examples
+    --------
+    Three harmonics and the mean are seven functions of time; weights bring samples back to them:
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import Resolution
+    >>> resolution = Resolution(harmonics=(0, 1, 2, 3), samples=64)
+    >>> print(resolution.size, np.allclose(resolution.weights @ resolution.basis, np.eye(7)))
+    7 True
     """
 
     harmonics: tuple[int, ...]

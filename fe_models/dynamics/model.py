@@ -15,6 +15,17 @@ class DynamicModel:
     ``connection`` ``(j d, n)`` is B: it takes displacements of the structure to those of its ``j``
     joints of ``d`` directions, one joint after the other. ``names`` ``(n,)`` are those of the
     degrees of freedom.
+
+    Examples
+    --------
+    A mass of 1 kg on a spring of 1 N/µm, with a joint between it and the ground: ω = √(k/m)
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import DynamicModel, natural_frequencies
+    >>> mass, damping, stiffness = np.array([[1e-3]]), np.zeros((1, 1)), np.array([[1e3]])
+    >>> model = DynamicModel(mass, damping, stiffness, connection=np.eye(1), names=("m",))
+    >>> print((2.0 * np.pi * natural_frequencies(model)).round(6), "rad/s")
+    [1000.] rad/s
     """
 
     mass: Array

@@ -168,6 +168,23 @@ def along_phase_resonance(
     Raises :class:`HarmonicBalanceError` for a load without a first harmonic, an ``output`` that
     is nothing or lags a force of several phases, and forces that are not above zero or do not
     include the start's.
+
+    Examples
+    --------
+    At phase resonance the force does the work of damping and joint, F = c ω X + E / π X:
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import *
+    >>> from wear.joints import Jenkins, PeriodicMarch
+    >>> rig = lumped_rig({"m": 1e-3}, {Link("m"): 1e3}, [[Link("m")]], damping_ratio=0.02)
+    >>> load = PeriodicLoad({1: -1j * unit_force(rig, "m")})
+    >>> law = Jenkins(stiffness=1e3, friction=0.5, normal_load=10.0)
+    >>> problem = HarmonicBalance(rig, PeriodicMarch(law), load, Resolution((1,), 512))
+    >>> backbone = along_phase_resonance(problem, problem.solve(170.0, 10.0), (8.0, 12.0))
+    >>> X = backbone.first_amplitudes(0)
+    >>> taken = 0.04 * 2.0 * np.pi * backbone.frequencies * X + law.loop_energy(X) / (np.pi * X)
+    >>> print(np.abs(taken / backbone.forces - 1.0).max() < 1e-3)
+    True
     """
     weights = _weights(problem, output)
     nearest = nearest_to_phase(start, weights) if isinstance(start, ResponseBranch) else start

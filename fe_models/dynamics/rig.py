@@ -29,7 +29,19 @@ class RigError(InputError):
 
 @dataclass(frozen=True)
 class Link:
-    """What stretches by the displacement of ``second`` relative to ``first``; None is ground."""
+    """What stretches by the displacement of ``second`` relative to ``first``; None is ground.
+
+    Examples
+    --------
+    Two masses of 1 kg that a link of 1 N/µm joins and nothing holds: ω = 0 and √(2 k/m)
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import Link, lumped_rig, natural_frequencies
+    >>> between = Link(second="b", first="a")
+    >>> rig = lumped_rig({"a": 1e-3, "b": 1e-3}, {between: 1e3}, [[between]])
+    >>> print((2.0 * np.pi * natural_frequencies(rig)).round(2), rig.connection)
+    [   0.   1414.21] [[-1.  1.]]
+    """
 
     second: str | None
     first: str | None = None
@@ -45,6 +57,19 @@ def lumped_rig(
 
     Every joint is one link per direction. ``damping_ratio`` is one, or that of each mode ``(n,)``.
     Raises :class:`RigError` for a name that is not a mass, or a mass that is not above zero.
+
+    Examples
+    --------
+    Two masses of 1 kg in a row on springs of 1 N/µm: ω² = (3 ∓ √5)/2 k/m
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import Link, lumped_rig, natural_frequencies
+    >>> springs = {Link("a"): 1e3, Link("b", "a"): 1e3}
+    >>> rig = lumped_rig({"a": 1e-3, "b": 1e-3}, springs, joints=[[Link("b")]])
+    >>> print((2.0 * np.pi * natural_frequencies(rig)).round(2))
+    [ 618.03 1618.03]
+    >>> print((1e3 * np.sqrt(0.5 * (3.0 + np.sqrt(5.0) * np.array([-1.0, 1.0])))).round(2))
+    [ 618.03 1618.03]
     """
     empty = np.zeros((0, 0))
     return connected_rig(empty, empty, (), masses, springs, joints, damping_ratio)
@@ -65,6 +90,24 @@ def reduced_rig(
     displacement the second's minus the first's. ``damping_ratio`` is one, or that of each mode
     ``(n,)`` of the rig. Raises :class:`RigError` for a model without mass, for names that are not
     as many as the kept displacements, and as :func:`lumped_rig`.
+
+    Examples
+    --------
+    Eleven masses and ten springs in a row, reduced to the ends and eight modes: it is free, and
+    vibrates at 2 √(k/m) sin(π/22).
+
+    >>> import numpy as np
+    >>> import scipy.sparse as sp
+    >>> from fe_models import reduce_body
+    >>> from fe_models.dynamics import Link, natural_frequencies, reduced_rig
+    >>> row = sp.diags([-1e3, 2e3, -1e3], [-1, 0, 1], shape=(11, 11), format="lil")
+    >>> row[0, 0] = row[10, 10] = 1e3
+    >>> mass = 1e-3 * sp.identity(11, format="csr")
+    >>> body = reduce_body(row.tocsr(), mass, np.array([0, 10]), modes=8)
+    >>> rig = reduced_rig(body, ("left", "right"), joints=[[Link("right", "left")]])
+    >>> lowest = 2.0 * np.pi * natural_frequencies(rig)[1]
+    >>> print(f"{lowest:.2f} rad/s of {2e3 * np.sin(np.pi / 22.0):.2f}")
+    284.63 rad/s of 284.63
     """
     if reduced.mass is None:
         raise RigError("the reduced model has no mass: reduce the body with its mass matrix")
@@ -134,6 +177,17 @@ def natural_frequencies(model: DynamicModel, joint_stiffness: float | Array = 0.
 
     ``joint_stiffness`` [N/mm] is one for all, one for each row of the connection ``(j d,)``, or
     the joints' tangents ``(j, d, d)``. Zero leaves the joints free. Rigid motions have 0.
+
+    Examples
+    --------
+    A joint that sticks is one more spring, √((k + kt)/m):
+
+    >>> import numpy as np
+    >>> from fe_models.dynamics import Link, lumped_rig, natural_frequencies
+    >>> rig = lumped_rig({"m": 1e-3}, {Link("m"): 1e3}, [[Link("m")]])
+    >>> free, stuck = natural_frequencies(rig)[0], natural_frequencies(rig, joint_stiffness=3e3)[0]
+    >>> print(f"{stuck / free:.6f}")
+    2.000000
     """
     stretch = model.connection
     held = np.asarray(joint_stiffness, dtype=float)
@@ -150,7 +204,17 @@ def natural_frequencies(model: DynamicModel, joint_stiffness: float | Array = 0.
 
 
 def unit_force(model: DynamicModel, name: str) -> Array:
-    """A force of 1 N on the point ``name``, as ``(n,)``. Raises :class:`RigError` if unknown."""
+    """A force of 1 N on the point ``name``, as ``(n,)``. Raises :class:`RigError` if unknown.
+
+    Examples
+    --------
+    1 N on the second of two masses:
+
+    >>> from fe_models.dynamics import Link, lumped_rig, unit_force
+    >>> rig = lumped_rig({"a": 1e-3, "b": 1e-3}, {Link("a"): 1e3, Link("b", "a"): 1e3}, [])
+    >>> print(unit_force(rig, "b"))
+    [0. 1.]
+    """
     force = np.zeros(len(model.names))
     force[_place(model.names, name)] = 1.0
     return force
